@@ -1,0 +1,60 @@
+/// The whole configuration of thermocompd, as loaded and validated from one TOML file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/controllers/controller_config.hpp"
+#include "drivers/sensors/sensor_bus_config.hpp"
+#include "estimator/estimator_config.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+enum class RealTimeRule { require, warn };
+
+struct LoopConfig {
+  double rate_hz{100.0};                      ///< 1..1000
+  int priority{60};                           ///< SCHED_FIFO priority, 1..98
+  int cpu{-1};                                ///< -1: any
+  RealTimeRule real_time{RealTimeRule::warn}; ///< where FIFO or memory locking is not allowed
+};
+
+struct HistoryConfig {
+  bool enabled{true};
+  std::filesystem::path file{"/var/lib/thermocomp/history.db"};
+  double size_MB_max{512.0};
+  double age_days_max{90.0};
+  double commit_s{5.0};          ///< 0.1..10
+  double offsets_period_s{1.0};  ///< offsets are noted this often, for people and for proof
+  double segment_h{6.0};         ///< a state snapshot this often: where a replay can start
+};
+
+struct SocketConfig {
+  std::filesystem::path path{"/run/thermocomp/status.sock"};
+  std::string read_group{"thermocomp"};
+  std::string operator_group{"thermocomp-operator"};
+  std::string bridge_group{"thermocomp-bridge"};
+};
+
+struct DaemonConfig {
+  std::filesystem::path file;                 ///< where it was read from
+  std::filesystem::path model_file;           ///< resolved against the configuration's folder
+  std::filesystem::path state_file{"/var/lib/thermocomp/state.json"};
+  std::string log_level{"info"};
+  LoopConfig loop;
+  EstimatorConfig estimator;
+  std::vector<ModbusBusConfig> modbus_buses;
+  std::vector<CanBusConfig> can_buses;
+  ControllerConfig controller;
+  HistoryConfig history;
+  SocketConfig socket;
+  /// The texts as read, kept with the history so that a replay needs nothing else.
+  std::string text;
+  std::string model_text;
+  std::string model_checksum;                 ///< SHA-256 of the model file, hexadecimal
+  ThermalModel model;
+};
+
+}  // namespace thermocomp

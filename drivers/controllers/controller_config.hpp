@@ -1,0 +1,73 @@
+/// What the controller drivers are built from: plain structures, filled by config/ or by a test.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "drivers/sensors/sensor_bus_config.hpp"
+
+namespace thermocomp {
+
+/// A number in the controller's Modbus registers.
+struct ModbusValue {
+  ModbusTable table{ModbusTable::holding};
+  std::uint16_t address{0};  ///< 0-based, as on the wire
+  Encoding encoding{Encoding::int16};
+  WordOrder word_order{WordOrder::abcd};
+  double scale{1.0};         ///< value = raw * scale (um for offsets)
+};
+
+struct ModbusSignal {
+  std::size_t signal{0};     ///< index of the signal in the configuration
+  ModbusValue value;
+};
+
+/// Per axis: where the offset is written and where the controller shows what it applies.
+struct ModbusAxis {
+  ModbusValue offset;
+  std::optional<ModbusValue> applied;  ///< none: the controller does not read back
+};
+
+struct ModbusControllerConfig {
+  std::string name;
+  ModbusLine line;
+  int unit{1};
+  double period_s{0.1};                        ///< write and read every so often
+  std::vector<ModbusAxis> axes;                ///< order of the configuration's axes
+  std::vector<ModbusSignal> signals;
+  std::optional<ModbusValue> valid_bits;       ///< register: bit i = offset of axis i is valid
+  std::optional<ModbusValue> heartbeat;        ///< register: counts up with every write
+};
+
+struct CanAxis {
+  CanSignal offset;                            ///< in a frame we send
+  std::optional<CanSignal> applied;            ///< in a frame the controller sends
+};
+struct CanControllerSignal {
+  std::size_t signal{0};
+  CanSignal value;
+};
+struct CanControllerConfig {
+  std::string name;
+  std::string interface;
+  double period_s{0.1};
+  double silent_after_s{2.0};                  ///< no frame of the controller for so long: offline
+  double reconnect_s{0.5};
+  std::vector<CanAxis> axes;
+  std::vector<CanControllerSignal> signals;
+  std::optional<CanSignal> valid_bits;
+  std::optional<CanSignal> heartbeat;
+};
+
+/// Sends nothing; applies at once what it is offered and shows it.
+struct DryRunControllerConfig {
+  std::string name;
+  std::size_t axes{0};
+};
+
+using ControllerConfig =
+    std::variant<DryRunControllerConfig, ModbusControllerConfig, CanControllerConfig>;
+
+}  // namespace thermocomp

@@ -1,0 +1,40 @@
+/// A machine controller that takes offsets and tells what it does with them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+struct ControllerHealth {
+  std::string name;
+  std::string kind;             ///< "modbus_tcp", "modbus_rtu", "can", "dry_run"
+  bool connected{false};
+  std::uint64_t connects{0};
+  std::uint64_t writes{0};      ///< offsets sent
+  std::uint64_t write_errors{0};
+  std::uint64_t reads{0};
+  std::uint64_t read_errors{0};
+  std::string last_error;       ///< empty when the last exchange was good
+};
+
+/// Rule of the link: after every (re)connection and after every write that failed the link takes a
+/// new epoch, reads back what the controller applies, publishes both together, and sends no offset
+/// that is not marked with that epoch. So the first offset sent starts from what is applied.
+class ControllerLink {
+ public:
+  ControllerLink() = default;
+  ControllerLink(const ControllerLink&) = delete;
+  ControllerLink& operator=(const ControllerLink&) = delete;
+  virtual ~ControllerLink() = default;
+
+  virtual void start() = 0;                                ///< @throws DriverError
+  virtual void stop() noexcept = 0;                        ///< within a second
+  virtual void newest(ControllerState& state) noexcept = 0;      ///< wait-free; one reader
+  virtual void offer(const OffsetCommand& command) noexcept = 0; ///< wait-free; one writer
+  [[nodiscard]] virtual ControllerHealth health() const = 0;
+};
+
+}  // namespace thermocomp

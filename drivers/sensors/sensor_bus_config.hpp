@@ -1,0 +1,128 @@
+/// What the sensor drivers are built from: plain structures, filled by config/ or by a test.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+enum class Encoding { int16, uint16, int32, uint32, float32, float64 };
+/// Bytes of a value as they come over the wire; the most significant byte is A.
+enum class WordOrder { abcd, dcba, badc, cdab };
+enum class ModbusTable { coil, discrete_input, holding, input };
+
+struct ModbusTcp {
+  std::string host;
+  int port{502};
+};
+struct ModbusRtu {
+  std::string device;         ///< "/dev/ttyUSB0"
+  int baud{9600};
+  char parity{'N'};           ///< 'N', 'E' or 'O'
+  int data_bits{8};
+  int stop_bits{1};
+  bool rs485{false};          ///< let the kernel drive the transceiver's direction (TIOCSRS485)
+};
+
+/// Timing of a Modbus line, shared by sensors and controllers.
+struct ModbusLine {
+  std::variant<ModbusTcp, ModbusRtu> link;
+  double timeout_ms{200.0};           ///< for one answer
+  double inter_frame_delay_ms{-1.0};  ///< silence between frames; negative: 3.5 characters, 1.75 ms above 19200 baud; TCP: 0
+  double reconnect_s{1.0};            ///< pause before a connection is tried again
+  double backoff_s_max{30.0};         ///< longest pause before a dead unit is asked again
+  int retries{1};                     ///< further tries of one request before it has failed
+};
+
+/// A register value that is no temperature but a message of the device.
+struct Sentinel {
+  std::int64_t code{0};  ///< raw value before scale and offset (of the encoding's signedness)
+  Fault fault{Fault::open_circuit};
+};
+
+/// A register or bit beside the value that says whether the value is good.
+struct ModbusStatus {
+  ModbusTable table{ModbusTable::discrete_input};
+  std::uint16_t address{0};   ///< 0-based, as on the wire
+  std::uint16_t mask{0xFFFF}; ///< bits looked at (registers only)
+  /// masked value -> fault; a value not listed and not 0 is device_error
+  std::vector<Sentinel> codes;
+};
+
+struct ModbusChannel {
+  std::size_t sensor{0};       ///< index of the sensor in the configuration
+  ModbusTable table{ModbusTable::input};
+  std::uint16_t address{0};    ///< 0-based, as on the wire
+  Encoding encoding{Encoding::int16};
+  WordOrder word_order{WordOrder::abcd};
+  double scale{1.0};           ///< temp = raw * scale + offset_degC
+  double offset_degC{0.0};
+  std::vector<Sentinel> sentinels;
+  std::optional<ModbusStatus> status;
+};
+
+/// A register that the device changes with each conversion; while it stands still, so do the times
+/// of the device's readings.
+struct ModbusRenewal {
+  ModbusTable table{ModbusTable::input};
+  std::uint16_t address{0};
+};
+
+struct ModbusDeviceConfig {
+  std::string name;
+  int unit{1};                       ///< 0..247 (255 on TCP)
+  double period_s{1.0};              ///< read every so often
+  int registers_per_request_max{125};
+  int gap_registers_max{8};          ///< unused registers read along rather than ask twice
+  bool one_register_a_request{false};
+  std::optional<ModbusRenewal> renewal;
+  std::vector<ModbusChannel> channels;
+};
+
+struct ModbusBusConfig {
+  std::string name;
+  ModbusLine line;
+  std::vector<ModbusDeviceConfig> devices;
+};
+
+enum class ByteOrder { little_endian, big_endian };  ///< Intel, Motorola
+
+/// Where a value stands in a CAN frame. `start_bit` counts as DBC files do: for little_endian the
+/// least significant bit, for big_endian the most significant bit, bit 0 = lowest of byte 0.
+struct CanSignal {
+  std::uint32_t id{0};
+  bool extended_id{false};
+  int start_bit{0};
+  int length_bits{16};              ///< 1..64; a float has 32 or 64
+  ByteOrder byte_order{ByteOrder::little_endian};
+  bool is_signed{true};
+  bool is_float{false};
+  double scale{1.0};                ///< value = raw * scale + offset
+  double offset{0.0};
+  std::vector<Sentinel> sentinels;
+};
+
+struct CanChannel {
+  std::size_t sensor{0};  ///< index of the sensor in the configuration
+  CanSignal signal;
+};
+
+struct CanDeviceConfig {
+  std::string name;
+  std::vector<CanChannel> channels;
+};
+
+struct CanBusConfig {
+  std::string name;
+  std::string interface;        ///< "can0"
+  double reconnect_s{0.5};      ///< pause before the interface is tried again
+  std::vector<CanDeviceConfig> devices;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,55 @@
+/// A bus that brings readings: opened once, read by the cycle without ever waiting.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+/// Counters of one bus unit (Modbus unit, CAN node) for an operator.
+struct UnitHealth {
+  std::string name;              ///< the device's name in the configuration
+  bool answering{false};
+  std::uint64_t requests{0};     ///< Modbus: requests sent. CAN: 0
+  std::uint64_t answers{0};      ///< good answers or frames
+  std::uint64_t timeouts{0};
+  std::uint64_t exceptions{0};   ///< Modbus exception answers
+  std::uint64_t bad_frames{0};   ///< garbled, wrong length, wrong id
+  double round_trip_ms{0.0};     ///< last good answer
+  std::string last_error;        ///< empty when the last exchange was good
+};
+
+struct BusHealth {
+  std::string name;
+  std::string kind;              ///< "modbus_tcp", "modbus_rtu", "can"
+  bool connected{false};
+  std::uint64_t connects{0};     ///< times the bus was opened
+  std::string last_error;
+  std::vector<UnitHealth> units;
+};
+
+class SensorSource {
+ public:
+  SensorSource() = default;
+  SensorSource(const SensorSource&) = delete;
+  SensorSource& operator=(const SensorSource&) = delete;
+  virtual ~SensorSource() = default;
+
+  /// Starts the bus' thread. A bus that is not there yet is no error: it is tried again for ever.
+  /// @throws DriverError when the configuration cannot work on this system at all
+  virtual void start() = 0;
+  /// Ends the thread within a second. The readings stay as they were.
+  virtual void stop() noexcept = 0;
+  /// Copies this bus' newest readings into `all` (one entry a configured sensor, in the order of
+  /// the configuration; entries of other buses are left alone). Wait-free, no allocation; called
+  /// by one thread only.
+  virtual void newest(std::span<Reading> all) noexcept = 0;
+  /// For the operator; any ordinary thread, may lock.
+  [[nodiscard]] virtual BusHealth health() const = 0;
+};
+
+}  // namespace thermocomp

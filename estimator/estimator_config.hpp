@@ -1,0 +1,95 @@
+/// What the estimator is built from: plain structures, filled by config/ or by a test.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+using seconds_d = std::chrono::duration<double>;
+
+/// Which readings are refused before they can do harm.
+struct ScreeningConfig {
+  double temp_degC_min{-30.0};
+  double temp_degC_max{200.0};
+  double stale_after_s{5.0};            ///< age beyond which a reading is stale
+  double rate_K_per_s_max{0.5};         ///< fastest believable slew
+  double rate_allowance_K{1.0};         ///< what noise may add to a step [K]
+  double stuck_after_s{0.0};            ///< the very same value for so long is a fault; 0: never
+  void validate() const;                ///< @throws InvalidValue
+};
+
+enum class SmoothingForm { off, sliding_line, line_of_lines };
+enum class SmoothingHistory { raw, screened };
+
+/// JPH0736976B2: sliding_line is claim 1 (form A), line_of_lines is claim 2 (form B).
+struct SmoothingConfig {
+  SmoothingForm form{SmoothingForm::sliding_line};
+  SmoothingHistory history{SmoothingHistory::screened};
+  double period_s{60.0};         ///< one value of the sensor every so often; 0: every reading
+  std::size_t samples{6};        ///< n, values in a line (3..32)
+  double half_width_K{0.3};      ///< w, half the band
+  double outage_s{300.0};        ///< a gap this long restarts the history
+  void validate() const;         ///< @throws InvalidValue
+};
+
+struct SensorConfig {
+  std::string name;
+  std::optional<std::size_t> reference_sensor;  ///< the value is the difference to this sensor
+  ScreeningConfig screening;
+  SmoothingConfig smoothing;
+};
+
+/// A part of the structure that has one temperature: the mean of its sensors.
+struct BlockConfig {
+  std::string name;
+  std::string input;                 ///< temperature column of the model
+  std::vector<std::size_t> sensors;  ///< indices, at least one
+};
+
+struct LimiterConfig {
+  double offset_um_max{50.0};     ///< bound on |offset| of an axis [um]
+  double rate_um_per_s_max{1.0};  ///< slew bound of an axis [um/s]
+  void validate() const;          ///< @throws InvalidValue
+};
+
+/// An axis (or rotary axis: um reads urad) that takes an offset.
+struct AxisConfig {
+  std::string name;          ///< "z"
+  std::string output;        ///< output of the model whose negative is sent
+  double sign{1.0};          ///< +1, or -1 where the controller counts the offset the other way
+  LimiterConfig limiter;
+};
+
+enum class LossPolicy { hold, ramp_to_zero };
+
+struct CompensationConfig {
+  LossPolicy on_loss{LossPolicy::hold};
+  double hold_s{600.0};                 ///< ramp_to_zero: hold this long first
+  bool enabled_at_first_start{true};
+  bool hold_while_cutting{false};       ///< the offset changes only while cutting_signal is 0
+  std::string cutting_signal;           ///< "cutting_on"; empty: none
+  std::string disable_signal;           ///< "compensation_off_on": 1 disables; empty: none
+  double controller_stale_after_s{2.0};
+  double mismatch_um{2.0};              ///< applied and sent may differ by this much
+  double mismatch_after_s{3.0};         ///< ... or longer by more for this long
+  double prove_um_max{10.0};
+  double prove_hold_s{3.0};
+  void validate() const;                ///< @throws InvalidValue
+};
+
+struct EstimatorConfig {
+  std::vector<SensorConfig> sensors;
+  std::vector<BlockConfig> blocks;
+  std::vector<std::string> signals;     ///< what the controller reports, order of ControllerState
+  std::vector<AxisConfig> axes;
+  bool controller_reads_back{true};     ///< applied_um is reported
+  CompensationConfig compensation;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,59 @@
+#include "estimator/types.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <sstream>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+
+std::string_view to_string(Fault fault) noexcept {
+  switch (fault) {
+    case Fault::none: return "none";
+    case Fault::never_read: return "never_read";
+    case Fault::stale: return "stale";
+    case Fault::open_circuit: return "open_circuit";
+    case Fault::short_circuit: return "short_circuit";
+    case Fault::out_of_range: return "out_of_range";
+    case Fault::too_fast: return "too_fast";
+    case Fault::stuck: return "stuck";
+    case Fault::no_answer: return "no_answer";
+    case Fault::bad_frame: return "bad_frame";
+    case Fault::device_busy: return "device_busy";
+    case Fault::device_error: return "device_error";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(CommandKind kind) noexcept {
+  switch (kind) {
+    case CommandKind::enable: return "enable";
+    case CommandKind::disable: return "disable";
+    case CommandKind::reference: return "reference";
+    case CommandKind::measured: return "measured";
+    case CommandKind::cycle_end: return "cycle_end";
+    case CommandKind::prove: return "prove";
+  }
+  return "unknown";
+}
+
+InvalidValue::InvalidValue(std::string key, std::string value, std::string rule)
+    : std::invalid_argument(key + " = " + value + ": " + rule),
+      key_(std::move(key)),
+      value_(std::move(value)),
+      rule_(std::move(rule)) {}
+
+void require(bool holds, const char* key, double value, const char* rule) {
+  if (holds) return;
+  std::ostringstream text;
+  text << value;
+  throw InvalidValue(key, text.str(), rule);
+}
+
+void abort_with(const char* expression, const char* file, int line) noexcept {
+  std::fprintf(stderr, "thermocomp: broken promise: %s (%s:%d)\n", expression, file, line);
+  std::abort();
+}
+
+}  // namespace thermocomp

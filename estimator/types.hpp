@@ -1,0 +1,83 @@
+/// The types that drivers, estimator and daemon share: what a reading is, what the controller told,
+/// what is sent to it. Everything here is plain data of fixed size, so that it can be copied through
+/// wait-free slots on the real-time thread.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+
+namespace thermocomp {
+
+using std::chrono::nanoseconds;
+
+inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+inline constexpr std::size_t axes_max = 16;     ///< axes of one controller
+inline constexpr std::size_t signals_max = 48;  ///< signals read from one controller
+
+/// Why a reading must not be used; `none` is the only good one.
+enum class Fault : std::uint8_t {
+  none,
+  never_read,     ///< nothing has arrived since the start
+  stale,          ///< not renewed within its time
+  open_circuit,   ///< the device says the thermocouple is broken
+  short_circuit,  ///< the device says the thermocouple is shorted
+  out_of_range,   ///< outside the device's or the configured range, or not a finite number
+  too_fast,       ///< changed faster than the structure can
+  stuck,          ///< the very same value for too long
+  no_answer,      ///< the unit does not answer or the bus is down
+  bad_frame,      ///< the answer was garbled or of the wrong length
+  device_busy,    ///< the device answered "busy"
+  device_error    ///< the device answered with an exception, or its status register says fault
+};
+inline constexpr std::size_t faults_count = 12;
+
+/// The fault's name as it stands in JSON, history and logs.
+[[nodiscard]] std::string_view to_string(Fault fault) noexcept;
+
+/// A value, when it was taken and whether it may be believed. Times are CLOCK_MONOTONIC.
+struct Reading {
+  double temp_degC{not_a_number};
+  nanoseconds taken_at{};
+  Fault fault{Fault::never_read};
+};
+
+/// What the controller last told. Values it does not report are NaN.
+struct ControllerState {
+  nanoseconds taken_at{};
+  /// Changes each time the link is (re)established or a write failed: what was sent before may no
+  /// longer be what is applied. 0: never connected.
+  std::uint32_t link_epoch{0};
+  bool online{false};
+  std::array<double, axes_max> applied_um;    ///< offset in effect, order of the axes [um]
+  std::array<double, signals_max> signals;    ///< order of the configuration, unit of the name
+
+  ControllerState() noexcept {
+    applied_um.fill(not_a_number);
+    signals.fill(not_a_number);
+  }
+};
+
+/// What the cycle wants the controller to apply.
+struct OffsetCommand {
+  std::array<double, axes_max> offset_um{};  ///< absolute, order of the axes [um]
+  std::array<bool, axes_max> valid{};        ///< false: this axis must not be driven
+  /// The link epoch these offsets belong to; a controller link never sends offsets of another one.
+  std::uint32_t link_epoch{0};
+};
+
+/// What an operator (or the CNC program) asks of the estimator.
+enum class CommandKind : std::uint8_t { enable, disable, reference, measured, cycle_end, prove };
+[[nodiscard]] std::string_view to_string(CommandKind kind) noexcept;
+
+struct Command {
+  CommandKind kind{CommandKind::enable};
+  std::uint32_t axis{0};  ///< for `measured` and `prove`: index of the axis
+  double value_um{0.0};   ///< for `measured` and `prove` [um]
+};
+
+}  // namespace thermocomp
