@@ -1,0 +1,12 @@
+#!/bin/bash
+# Every C++ file of the project as clang-format would write it. With --fix: rewrites them.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+
+mapfile -d '' files < <(git ls-files -z -- '*.cpp' '*.hpp')
+if [[ ${1:-} == --fix ]]; then
+  clang-format -i "${files[@]}"
+else
+  clang-format --dry-run --Werror "${files[@]}"
+fi
+echo "${#files[@]} files in form"

@@ -1,0 +1,17 @@
+#!/bin/bash
+# clang-tidy over the translation units of the release build.
+#   scripts/check-tidy.sh [FOLDER...]     default: every folder with code, without the tests
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+source scripts/common.sh
+
+build=build/release
+[[ -f $build/compile_commands.json ]] || cmake --preset release >/dev/null
+
+folders=("$@")
+if ((${#folders[@]} == 0)); then folders=(config drivers estimator daemon simulator cli bench); fi
+pattern="$PWD/($(IFS='|' && echo "${folders[*]}"))/.*\.cpp$"
+
+# -quiet leaves the counts of suppressed warnings; they are no news.
+run-clang-tidy -quiet -p "$build" -j "$(build_jobs)" "$pattern" 2>/dev/null |
+  { grep -v -E '^(clang-tidy|[0-9]+ warnings? (generated|treated))' || true; }

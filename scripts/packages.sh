@@ -1,0 +1,22 @@
+# shellcheck shell=bash disable=SC2034
+# The Debian 12 packages, by what they are for. Sourced by setup.sh; nothing else names a package.
+
+# What the programs are built from and need to run.
+packages_build=(
+  cmake ninja-build g++ pkg-config ccache
+  libeigen3-dev libmodbus-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
+  libsqlite3-dev libsystemd-dev libcli11-dev
+  # Configuring the tree looks for these two, also where only the programs are built.
+  catch2 libbenchmark-dev
+)
+
+# The demo draws a picture of itself.
+packages_demo=("${packages_build[@]}" gnuplot-nox)
+
+# Software that is not ours and that the tests talk to, and the tools of the checks.
+packages_test=(
+  "${packages_demo[@]}"
+  mbpoll can-utils python3-pymodbus python3-can python3-numpy python3-pytest
+  sqlite3 socat rt-tests user-mode-linux valgrind
+  clang-tidy clang-tools clang-format gcovr
+)

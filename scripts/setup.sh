@@ -1,0 +1,77 @@
+#!/bin/bash
+# Installs the Debian packages that are missing, after saying which.
+#   scripts/setup.sh build|demo|test
+# Needs root or sudo only where something is missing. Exit status 0: everything is there.
+set -euo pipefail
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+# shellcheck source=packages.sh
+source "$here/packages.sh"
+
+fail() {
+  echo "setup: $*" >&2
+  exit 1
+}
+
+# One line a package that dpkg does not have installed.
+missing_packages() {
+  local package status
+  for package in "$@"; do
+    status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+    [[ $status == installed ]] || echo "$package"
+  done
+}
+
+# Runs a command as root: directly, or through sudo.
+as_root() {
+  if [[ $(id -u) -eq 0 ]]; then
+    "$@"
+  else
+    sudo "$@"
+  fi
+}
+
+apt_get() {
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=600 \
+    -o Dpkg::Use-Pty=0 "$@"
+}
+
+# The package lists are fetched only when the installation does not work with those at hand: on a
+# fresh system there are none, on an old one they name files that are gone.
+install_packages() {
+  if apt_get install -y --no-install-recommends "$@"; then return 0; fi
+  echo "setup: fetching the package lists (apt-get update)"
+  apt_get update || return 1
+  apt_get install -y --no-install-recommends "$@"
+}
+
+main() {
+  local wanted
+  case ${1:-} in
+    build) wanted=("${packages_build[@]}") ;;
+    demo) wanted=("${packages_demo[@]}") ;;
+    test) wanted=("${packages_test[@]}") ;;
+    *)
+      echo "usage: setup.sh build|demo|test" >&2
+      exit 2
+      ;;
+  esac
+  command -v dpkg-query >/dev/null || fail "this is not a Debian system (no dpkg); the packages are listed in scripts/packages.sh"
+
+  local missing
+  mapfile -t missing < <(missing_packages "${wanted[@]}")
+  if [[ ${#missing[@]} -eq 0 ]]; then
+    echo "setup: all ${#wanted[@]} Debian packages are installed"
+    return 0
+  fi
+  echo "setup: installing ${#missing[@]} Debian packages: ${missing[*]}"
+  if [[ $(id -u) -ne 0 ]] && ! command -v sudo >/dev/null; then
+    fail "not root and no sudo; as root run: apt-get install ${missing[*]}"
+  fi
+  install_packages "${missing[@]}" ||
+    fail "apt-get could not install the packages (see above); by hand: apt-get install ${missing[*]}"
+
+  mapfile -t missing < <(missing_packages "${wanted[@]}")
+  [[ ${#missing[@]} -eq 0 ]] || fail "still missing: ${missing[*]}"
+}
+
+main "$@"

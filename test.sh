@@ -1,0 +1,66 @@
+#!/bin/bash
+# Builds everything and runs every test.
+#   ./test.sh [--preset debug|release|asan-ubsan|tsan|coverage] [-- CTEST_OPTION...]
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
+source scripts/common.sh
+
+usage() {
+  echo "usage: ./test.sh [--preset debug|release|asan-ubsan|tsan|coverage] [-- CTEST_OPTION...]"
+}
+
+preset=release
+ctest_options=()
+while (($#)); do
+  case $1 in
+    --preset)
+      (($# >= 2)) || { usage >&2; exit 2; }
+      preset=$2
+      shift 2
+      ;;
+    --)
+      shift
+      ctest_options=("$@")
+      break
+      ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    *)
+      usage >&2
+      exit 2
+      ;;
+  esac
+done
+case $preset in
+  debug | release | asan-ubsan | tsan | coverage) ;;
+  *)
+    echo "test.sh: no preset called $preset" >&2
+    usage >&2
+    exit 2
+    ;;
+esac
+
+run_tests() {
+  local runner=()
+  if [[ $preset == tsan || $preset == asan-ubsan ]]; then runner=(run_as_sanitizers_need); fi
+  if [[ $preset == coverage ]]; then find "build/$preset" -name '*.gcda' -delete; fi
+  "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$(nproc)" "${ctest_options[@]}"
+}
+
+coverage_report() {
+  gcovr --root . --object-directory "build/$preset" --exclude 'build/' --exclude 'tests/' \
+    --html-details "build/$preset/coverage.html" --txt "build/$preset/coverage.txt" \
+    "build/$preset" &&
+    tail -n 3 "build/$preset/coverage.txt" &&
+    echo "line by line: build/$preset/coverage.html"
+}
+
+stage "packages" scripts/setup.sh test
+stage "configure $preset" cmake --preset "$preset"
+stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)"
+status=0
+stage "tests $preset" run_tests || status=$?
+if [[ $preset == coverage ]]; then stage "coverage" coverage_report; fi
+exit "$status"

@@ -1,0 +1,11 @@
+#!/bin/bash
+# expect_stopped.sh PROGRAM FAULT MESSAGE: passes when PROGRAM FAULT is stopped with MESSAGE.
+set -uo pipefail
+output=$("$1" "$2" 2>&1)
+status=$?
+echo "$output"
+if ((status == 0 || status == 2)); then
+  echo "expected the instrumented build to stop $2; exit status $status" >&2
+  exit 1
+fi
+grep -q "$3" <<<"$output" || { echo "stopped, but not with $3" >&2; exit 1; }
