@@ -15,10 +15,10 @@ namespace thermocomp {
 enum class RealTimeRule { require, warn };
 
 struct LoopConfig {
-  double rate_hz{100.0};                      ///< 1..1000
-  int priority{60};                           ///< SCHED_FIFO priority, 1..98
-  int cpu{-1};                                ///< -1: any
-  RealTimeRule real_time{RealTimeRule::warn}; ///< where FIFO or memory locking is not allowed
+  double rate_hz{100.0};                       ///< 1..1000
+  int priority{60};                            ///< SCHED_FIFO priority, 1..98
+  int cpu{-1};                                 ///< -1: any
+  RealTimeRule real_time{RealTimeRule::warn};  ///< where FIFO or memory locking is not allowed
 };
 
 struct HistoryConfig {
@@ -39,8 +39,8 @@ struct SocketConfig {
 };
 
 struct DaemonConfig {
-  std::filesystem::path file;                 ///< where it was read from
-  std::filesystem::path model_file;           ///< resolved against the configuration's folder
+  std::filesystem::path file;        ///< where it was read from
+  std::filesystem::path model_file;  ///< resolved against the configuration's folder
   std::filesystem::path state_file{"/var/lib/thermocomp/state.json"};
   std::string log_level{"info"};
   LoopConfig loop;
@@ -53,7 +53,7 @@ struct DaemonConfig {
   /// The texts as read, kept with the history so that a replay needs nothing else.
   std::string text;
   std::string model_text;
-  std::string model_checksum;                 ///< SHA-256 of the model file, hexadecimal
+  std::string model_checksum;  ///< SHA-256 of the model file, hexadecimal
   ThermalModel model;
 };
 

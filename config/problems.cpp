@@ -1,0 +1,66 @@
+#include "config/problems.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace thermocomp {
+namespace {
+
+bool same(const Problem& a, const Problem& b) {
+  return a.file == b.file && a.line == b.line && a.key == b.key && a.value == b.value &&
+         a.rule == b.rule;
+}
+
+std::vector<Problem> in_order(std::vector<Problem> problems) {
+  std::vector<std::string> files;
+  for (const Problem& problem : problems) {
+    if (std::find(files.begin(), files.end(), problem.file) == files.end()) {
+      files.push_back(problem.file);
+    }
+  }
+  const auto rank = [&](const Problem& problem) {
+    return std::pair(std::find(files.begin(), files.end(), problem.file), problem.line);
+  };
+  std::stable_sort(problems.begin(), problems.end(),
+                   [&](const Problem& a, const Problem& b) { return rank(a) < rank(b); });
+  std::vector<Problem> once;
+  for (Problem& problem : problems) {
+    const bool seen = std::any_of(once.begin(), once.end(),
+                                  [&](const Problem& other) { return same(problem, other); });
+    if (!seen) once.push_back(std::move(problem));
+  }
+  return once;
+}
+
+std::string lines(const std::vector<Problem>& problems) {
+  std::string text;
+  for (const Problem& problem : problems) {
+    if (!text.empty()) text += '\n';
+    text += to_string(problem);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string to_string(const Problem& problem) {
+  std::string text = problem.file;
+  if (problem.line > 0) text.append(":").append(std::to_string(problem.line));
+  if (!text.empty()) text += ": ";
+  if (!problem.key.empty()) {
+    text += problem.key;
+    if (!problem.value.empty()) text.append(" = ").append(problem.value);
+    text += ": ";
+  } else if (!problem.value.empty()) {
+    text += problem.value + ": ";
+  }
+  return text + problem.rule;
+}
+
+ConfigurationError::ConfigurationError(std::vector<Problem> problems)
+    : ConfigurationError(Sorted{}, in_order(std::move(problems))) {}
+
+ConfigurationError::ConfigurationError(Sorted, std::vector<Problem> problems)
+    : std::runtime_error(lines(problems)), problems_(std::move(problems)) {}
+
+}  // namespace thermocomp

@@ -1,0 +1,35 @@
+/// What is wrong with a file somebody wrote: every problem at once, each with its place and rule.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace thermocomp {
+
+/// One broken rule. Parts that do not apply are empty (line: 0).
+struct Problem {
+  std::string file;   ///< as it was named by whoever asked for it
+  int line{0};        ///< counted from 1; 0: the file as a whole
+  std::string key;    ///< e.g. "sensor[bed_front].address"; in a run file the column
+  std::string value;  ///< as written, shortened; "(missing)" where there is none
+  std::string rule;   ///< what would have been right
+};
+
+/// `file:line: key = value: rule`; what does not apply is left out.
+[[nodiscard]] std::string to_string(const Problem& problem);
+
+/// All problems of one load. what() has one line a problem.
+class ConfigurationError : public std::runtime_error {
+ public:
+  /// Sorts by file (in order of first appearance) and line; drops exact repetitions.
+  explicit ConfigurationError(std::vector<Problem> problems);
+  [[nodiscard]] const std::vector<Problem>& problems() const noexcept { return problems_; }
+
+ private:
+  struct Sorted {};
+  ConfigurationError(Sorted, std::vector<Problem> problems);
+  std::vector<Problem> problems_;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,598 @@
+#include "config/toml_reader.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include <toml++/toml.h>
+
+namespace thermocomp {
+namespace {
+
+constexpr std::size_t shown_value_max = 60;
+constexpr std::uintmax_t file_bytes_max = 64u * 1024u * 1024u;
+
+const toml::table* as_table(const void* node) {
+  return static_cast<const toml::table*>(node);
+}
+const toml::node* as_node(const void* node) {
+  return static_cast<const toml::node*>(node);
+}
+
+int line_of(const toml::source_region& source) {
+  return static_cast<int>(source.begin.line);
+}
+
+std::string shortened(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  if (text.size() <= shown_value_max) return text;
+  std::size_t end = shown_value_max - 4;
+  const auto continues = [&](std::size_t i) {  // inside a UTF-8 sequence
+    return (static_cast<unsigned char>(text[i]) & 0xC0u) == 0x80u;
+  };
+  while (end > 0 && continues(end)) --end;
+  return text.substr(0, end) + " ...";
+}
+
+std::string number_text(double value) {
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+  return {buffer.data(), end};
+}
+
+/// Appends the value as a person would write it on one line, and stops when that is long enough.
+void append_shown(const toml::node& node, std::string& out) {
+  if (out.size() > shown_value_max) return;
+  if (const auto* text = node.as_string()) {
+    out.append("\"").append(text->get()).append("\"");
+  } else if (const auto* number = node.as_floating_point()) {
+    out += number_text(number->get());
+  } else if (const auto* list = node.as_array()) {
+    out += '[';
+    for (const toml::node& element : *list) {
+      if (out.back() != '[') out += ", ";
+      append_shown(element, out);
+    }
+    out += ']';
+  } else if (const auto* table = node.as_table()) {
+    out += '{';
+    for (const auto& [key, value] : *table) {
+      out.append(out.back() == '{' ? " " : ", ").append(key.str()).append(" = ");
+      append_shown(value, out);
+    }
+    out += " }";
+  } else {
+    std::ostringstream other;
+    node.visit([&](const auto& value) { other << value; });
+    out += other.str();
+  }
+}
+
+std::string shown(const toml::node& node) {
+  std::string text;
+  append_shown(node, text);
+  return shortened(text);
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row[b.size()];
+}
+
+const toml::key* find_key(const toml::table& table, std::string_view name) {
+  const auto found = table.find(name);
+  return found == table.cend() ? nullptr : &found->first;
+}
+
+}  // namespace
+
+namespace detail {
+
+struct TomlState {
+  std::string name;
+  std::string text;
+  toml::table root;
+  std::vector<Problem> problems;
+  struct Opened {
+    std::string path;
+    std::set<std::string, std::less<>> asked;
+    bool ignore_rest{false};
+  };
+  std::map<const toml::table*, Opened> opened;
+
+  void add(int line, std::string key, std::string value, std::string_view rule) {
+    problems.push_back({name, line, std::move(key), std::move(value), std::string(rule)});
+  }
+};
+
+}  // namespace detail
+
+bool Range::contains(double value) const {
+  return std::isfinite(value) && (min_excluded ? value > min : value >= min) && value <= max;
+}
+
+std::string Range::rule() const {
+  const bool bounded_below = min > any().min;
+  const bool bounded_above = max < any().max;
+  if (bounded_below && bounded_above) {
+    return std::string("must be in ") + (min_excluded ? "(" : "[") + number_text(min) + ", " +
+           number_text(max) + "]";
+  }
+  if (bounded_below) {
+    return std::string(min_excluded ? "must be above " : "must be at least ") + number_text(min);
+  }
+  if (bounded_above) return "must be at most " + number_text(max);
+  return "must be a finite number";
+}
+
+namespace {
+
+double harmless(const Range& range) {
+  if (range.contains(0.0)) return 0.0;
+  if (!range.min_excluded) return range.min;
+  if (range.contains(range.min + 1.0)) return range.min + 1.0;
+  return range.max;
+}
+
+/// @return the number, or a problem's rule
+std::optional<double> number_in(const toml::node& node, const Range& range, std::string& rule) {
+  if (!node.is_number()) {
+    rule = "must be a number";
+    return std::nullopt;
+  }
+  const double value = node.value<double>().value_or(std::nan(""));
+  if (range.contains(value)) return value;
+  rule = std::isfinite(value) ? range.rule() : "must be a finite number";
+  return std::nullopt;
+}
+
+std::optional<std::int64_t> integer_in(const toml::node& node, std::int64_t low, std::int64_t high,
+                                       std::string& rule) {
+  rule = "must be a whole number in [" + std::to_string(low) + ", " + std::to_string(high) + "]";
+  const auto* integer = node.as_integer();
+  if (integer == nullptr || integer->get() < low || integer->get() > high) return std::nullopt;
+  return integer->get();
+}
+
+}  // namespace
+
+// ---------------------------------------------------------------- TomlTable
+
+TomlTable::TomlTable(std::shared_ptr<detail::TomlState> state, const void* node, std::string path,
+                     int line, bool silent)
+    : state_(std::move(state)), node_(node), path_(std::move(path)), line_(line), silent_(silent) {
+  if (node_ != nullptr) state_->opened[as_table(node_)].path = path_;
+}
+
+const void* TomlTable::find(std::string_view key) const {
+  if (node_ == nullptr) return nullptr;
+  state_->opened[as_table(node_)].asked.emplace(key);
+  return as_table(node_)->get(key);
+}
+
+std::string TomlTable::full(std::string_view key) const {
+  return path_.empty() ? std::string(key) : path_ + "." + std::string(key);
+}
+
+int TomlTable::line(std::string_view key) const {
+  if (node_ == nullptr) return line_;
+  const toml::key* found = find_key(*as_table(node_), key);
+  if (found == nullptr) return line_;
+  const int line = line_of(found->source());
+  return line > 0 ? line : line_;
+}
+
+void TomlTable::problem(std::string_view key, std::string_view rule) const {
+  if (silent_) return;
+  const void* node = find(key);
+  state_->add(line(key), full(key), node == nullptr ? "(missing)" : shown(*as_node(node)), rule);
+}
+
+void TomlTable::problem(std::string_view key, std::string_view value, std::string_view rule) const {
+  if (silent_) return;
+  static_cast<void>(find(key));
+  state_->add(line(key), full(key), shortened(std::string(value)), rule);
+}
+
+void TomlTable::missing(std::string_view key) const {
+  problem(key, "must be given");
+}
+
+void TomlTable::refuse(std::string_view key, std::string_view rule) const {
+  if (has(key)) problem(key, rule);
+}
+
+void TomlTable::ignore_rest() const {
+  if (node_ != nullptr) state_->opened[as_table(node_)].ignore_rest = true;
+}
+
+bool TomlTable::has(std::string_view key) const {
+  return find(key) != nullptr;
+}
+
+bool TomlTable::is_text(std::string_view key) const {
+  const void* node = find(key);
+  return node != nullptr && as_node(node)->is_string();
+}
+
+bool TomlTable::is_table(std::string_view key) const {
+  const void* node = find(key);
+  return node != nullptr && as_node(node)->is_table();
+}
+
+std::vector<std::string> TomlTable::keys() const {
+  std::vector<std::pair<std::pair<std::uint32_t, std::uint32_t>, std::string>> placed;
+  if (node_ != nullptr) {
+    for (const auto& [key, value] : *as_table(node_)) {
+      const auto begin = key.source().begin;
+      placed.push_back({{begin.line, begin.column}, std::string(key.str())});
+    }
+  }
+  std::sort(placed.begin(), placed.end());
+  std::vector<std::string> names;
+  for (auto& entry : placed) names.push_back(std::move(entry.second));
+  return names;
+}
+
+double TomlTable::number(std::string_view key, Range range) const {
+  if (!has(key)) missing(key);
+  return number(key, range, harmless(range));
+}
+
+double TomlTable::number(std::string_view key, Range range, double otherwise) const {
+  const void* node = find(key);
+  if (node == nullptr) return otherwise;
+  std::string rule;
+  const auto value = number_in(*as_node(node), range, rule);
+  if (!value) problem(key, rule);
+  return value.value_or(otherwise);
+}
+
+std::int64_t TomlTable::integer_value(std::string_view key, std::int64_t low, std::int64_t high,
+                                      std::optional<std::int64_t> otherwise) const {
+  const void* node = find(key);
+  if (node == nullptr) {
+    if (!otherwise) missing(key);
+    return otherwise.value_or(low);
+  }
+  std::string rule;
+  const auto value = integer_in(*as_node(node), low, high, rule);
+  if (!value) problem(key, rule);
+  return value.value_or(otherwise.value_or(low));
+}
+
+std::string TomlTable::text(std::string_view key) const {
+  if (!has(key)) missing(key);
+  return text(key, "");
+}
+
+std::string TomlTable::text(std::string_view key, std::string_view otherwise) const {
+  const void* node = find(key);
+  if (node == nullptr) return std::string(otherwise);
+  const auto* value = as_node(node)->as_string();
+  if (value == nullptr || value->get().empty()) {
+    problem(key, "must be a string that is not empty");
+    return std::string(otherwise);
+  }
+  if (value->get().find('\0') != std::string::npos) {
+    problem(key, "must not hold a NUL character");
+    return std::string(otherwise);
+  }
+  return value->get();
+}
+
+bool TomlTable::flag(std::string_view key) const {
+  if (!has(key)) missing(key);
+  return flag(key, false);
+}
+
+bool TomlTable::flag(std::string_view key, bool otherwise) const {
+  const void* node = find(key);
+  if (node == nullptr) return otherwise;
+  const auto* value = as_node(node)->as_boolean();
+  if (value == nullptr) problem(key, "must be true or false");
+  return value == nullptr ? otherwise : value->get();
+}
+
+std::size_t TomlTable::choice_index(std::string_view key,
+                                    const std::vector<std::string_view>& names,
+                                    std::optional<std::size_t> otherwise) const {
+  const void* node = find(key);
+  if (node == nullptr) {
+    if (!otherwise) missing(key);
+    return otherwise.value_or(0);
+  }
+  if (const auto* value = as_node(node)->as_string()) {
+    const auto found = std::find(names.begin(), names.end(), value->get());
+    if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  }
+  std::string rule = "must be one of";
+  for (const std::string_view name : names) rule += " \"" + std::string(name) + '"';
+  problem(key, rule);
+  return otherwise.value_or(0);
+}
+
+// ---------------------------------------------------------------- lists
+
+void TomlTable::for_each_element(std::string_view key, bool required, std::string_view what,
+                                 const std::function<void(const void*, std::size_t)>& each) const {
+  const void* node = find(key);
+  if (node == nullptr) {
+    if (required) missing(key);
+    return;
+  }
+  const toml::array* list = as_node(node)->as_array();
+  if (list == nullptr) {
+    problem(key, "must be a list of " + std::string(what));
+    return;
+  }
+  std::size_t position = 0;
+  for (const toml::node& element : *list) each(&element, ++position);
+}
+
+namespace {
+
+std::string at_position(std::size_t position, std::string_view rule) {
+  return "element " + std::to_string(position) + " " + std::string(rule);
+}
+
+}  // namespace
+
+std::vector<double> TomlTable::numbers(std::string_view key, Range range) const {
+  if (!has(key)) missing(key);
+  return numbers(key, range, {});
+}
+
+std::vector<double> TomlTable::numbers(std::string_view key, Range range,
+                                       std::vector<double> otherwise) const {
+  if (!has(key)) return otherwise;
+  std::vector<double> values;
+  for_each_element(key, false, "numbers", [&](const void* element, std::size_t position) {
+    std::string rule;
+    const auto value = number_in(*as_node(element), range, rule);
+    if (!value) problem(key, shown(*as_node(element)), at_position(position, rule));
+    values.push_back(value.value_or(harmless(range)));
+  });
+  return values;
+}
+
+std::vector<std::int64_t> TomlTable::integers(std::string_view key, std::int64_t low,
+                                              std::int64_t high) const {
+  if (!has(key)) missing(key);
+  return integers(key, low, high, {});
+}
+
+std::vector<std::int64_t> TomlTable::integers(std::string_view key, std::int64_t low,
+                                              std::int64_t high,
+                                              std::vector<std::int64_t> otherwise) const {
+  if (!has(key)) return otherwise;
+  std::vector<std::int64_t> values;
+  for_each_element(key, false, "whole numbers", [&](const void* element, std::size_t position) {
+    std::string rule;
+    const auto value = integer_in(*as_node(element), low, high, rule);
+    if (!value) problem(key, shown(*as_node(element)), at_position(position, rule));
+    values.push_back(value.value_or(low));
+  });
+  return values;
+}
+
+std::vector<std::string> TomlTable::texts(std::string_view key) const {
+  if (!has(key)) missing(key);
+  return texts(key, {});
+}
+
+std::vector<std::string> TomlTable::texts(std::string_view key,
+                                          std::vector<std::string> otherwise) const {
+  if (!has(key)) return otherwise;
+  std::vector<std::string> values;
+  for_each_element(key, false, "strings", [&](const void* element, std::size_t position) {
+    const auto* value = as_node(element)->as_string();
+    if (value == nullptr || value->get().empty()) {
+      problem(key, shown(*as_node(element)),
+              at_position(position, "must be a string that is not empty"));
+    }
+    values.push_back(value == nullptr ? std::string() : value->get());
+  });
+  return values;
+}
+
+std::vector<std::vector<double>> TomlTable::matrix(std::string_view key, std::size_t rows,
+                                                   std::size_t columns) const {
+  std::vector<std::vector<double>> values;
+  bool good = true;
+  const auto bad = [&](std::string_view value, const std::string& rule) {
+    problem(key, value, rule);
+    good = false;
+  };
+  for_each_element(key, true, "rows", [&](const void* element, std::size_t position) {
+    const toml::array* row = as_node(element)->as_array();
+    if (row == nullptr) {
+      bad(shown(*as_node(element)), at_position(position, "must be a row of numbers"));
+      return;
+    }
+    std::vector<double>& numbers = values.emplace_back();
+    for (const toml::node& cell : *row) {
+      std::string rule;
+      const auto number = number_in(cell, Range::any(), rule);
+      const std::size_t column = numbers.size() + 1;
+      if (!number) {
+        bad(shown(cell),
+            "row " + std::to_string(position) + " column " + std::to_string(column) + " " + rule);
+      }
+      numbers.push_back(number.value_or(0.0));
+    }
+    if (numbers.size() != columns) {
+      bad(std::to_string(numbers.size()) + " columns",
+          "row " + std::to_string(position) + " must have " + std::to_string(columns));
+    }
+  });
+  if (good && has(key) && values.size() != rows) {
+    bad(std::to_string(values.size()) + " rows", "must have " + std::to_string(rows));
+  }
+  if (!good) values.clear();
+  return values;
+}
+
+// ---------------------------------------------------------------- nested tables
+
+TomlTable TomlTable::child(std::string_view key, const void* node, std::string path) const {
+  const int own_line = line_of(as_node(node)->source());
+  return {state_, as_node(node)->as_table(), std::move(path), own_line > 0 ? own_line : line(key),
+          silent_};
+}
+
+TomlTable TomlTable::silent_child(std::string_view key) const {
+  return {state_, nullptr, full(key), line(key), true};
+}
+
+TomlTable TomlTable::table(std::string_view key) const {
+  if (!has(key)) {
+    missing(key);
+    return silent_child(key);
+  }
+  return table_or_empty(key);
+}
+
+TomlTable TomlTable::table_or_empty(std::string_view key) const {
+  const void* node = find(key);
+  if (node == nullptr) return {state_, nullptr, full(key), line_, silent_};
+  if (!as_node(node)->is_table()) {
+    problem(key, "must be a table");
+    return silent_child(key);
+  }
+  return child(key, node, full(key));
+}
+
+std::vector<TomlTable> TomlTable::tables(std::string_view key) const {
+  std::vector<TomlTable> result;
+  for_each_element(key, false, "tables", [&](const void* element, std::size_t position) {
+    const toml::table* table = as_node(element)->as_table();
+    if (table == nullptr) {
+      problem(key, shown(*as_node(element)), at_position(position, "must be a table"));
+      return;
+    }
+    std::string label = std::to_string(position);
+    if (const auto name = (*table)["name"].value<std::string>()) label = shortened(*name);
+    result.push_back(child(key, element, full(key) + "[" + label + "]"));
+  });
+  return result;
+}
+
+std::vector<TomlTable> TomlTable::tables_required(std::string_view key) const {
+  std::vector<TomlTable> result = tables(key);
+  if (!has(key)) {
+    missing(key);
+  } else if (result.empty()) {
+    problem(key, "must have at least one entry");
+  }
+  return result;
+}
+
+// ---------------------------------------------------------------- TomlDocument
+
+TomlDocument::TomlDocument(std::shared_ptr<detail::TomlState> state) : state_(std::move(state)) {}
+
+TomlDocument TomlDocument::from_file(const std::filesystem::path& path) {
+  return from_text(read_text_file(path), path.string());
+}
+
+TomlDocument TomlDocument::from_text(std::string text, std::string name) {
+  auto state = std::make_shared<detail::TomlState>();
+  state->name = std::move(name);
+  state->text = std::move(text);
+  try {
+    state->root = toml::parse(std::string_view(state->text));
+  } catch (const toml::parse_error& error) {
+    throw ConfigurationError({{state->name, line_of(error.source()), "", "",
+                               "not TOML: " + std::string(error.description())}});
+  }
+  return TomlDocument(std::move(state));
+}
+
+TomlTable TomlDocument::root() const {
+  return {state_, &state_->root, "", 1, false};
+}
+
+const std::string& TomlDocument::text() const noexcept {
+  return state_->text;
+}
+const std::string& TomlDocument::name() const noexcept {
+  return state_->name;
+}
+
+std::vector<Problem> TomlDocument::all_problems() const {
+  std::vector<Problem> problems = state_->problems;
+  for (const auto& [table, opened] : state_->opened) {
+    if (opened.ignore_rest) continue;
+    const std::vector<std::string> known(opened.asked.begin(), opened.asked.end());
+    for (const auto& [key, value] : *table) {
+      const std::string name(key.str());
+      if (opened.asked.contains(name)) continue;
+      const std::string meant = nearest_name(name, known);
+      const std::string rule =
+          meant.empty() ? "unknown key" : "unknown key; did you mean \"" + meant + "\"?";
+      problems.push_back({state_->name, line_of(key.source()),
+                          opened.path.empty() ? name : opened.path + "." + name, shown(value),
+                          rule});
+    }
+  }
+  return problems;
+}
+
+void TomlDocument::finish() const {
+  std::vector<Problem> problems = all_problems();
+  if (!problems.empty()) throw ConfigurationError(std::move(problems));
+}
+
+// ---------------------------------------------------------------- helpers
+
+std::string read_text_file(const std::filesystem::path& path) {
+  const auto refuse = [&](const std::string& rule) {
+    throw ConfigurationError({{path.string(), 0, "", "", rule}});
+  };
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) refuse("no such file");
+  if (!std::filesystem::is_regular_file(status)) refuse("must be a regular file");
+  const auto size = std::filesystem::file_size(path, error);
+  if (error) refuse("cannot be read: " + error.message());
+  if (size > file_bytes_max) refuse("must have at most 64 MB");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) refuse(std::string("cannot be opened: ") + std::strerror(errno));
+  std::string text(static_cast<std::size_t>(size), '\0');
+  file.read(text.data(), static_cast<std::streamsize>(size));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return text;
+}
+
+std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
+  std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
+  std::string nearest;
+  for (const std::string& candidate : known) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (distance >= best || distance >= name.size()) continue;
+    best = distance;
+    nearest = candidate;
+  }
+  return nearest;
+}
+
+}  // namespace thermocomp

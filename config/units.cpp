@@ -1,0 +1,55 @@
+#include "config/units.hpp"
+
+#include <array>
+
+namespace thermocomp {
+namespace {
+
+constexpr std::array<Unit, 12> registered{{
+    {"_degC", "degC", QuantityKind::temperature},
+    {"_K", "K", QuantityKind::temperature},
+    {"_um", "um", QuantityKind::displacement},
+    {"_urad", "urad", QuantityKind::tilt},
+    {"_mm", "mm", QuantityKind::position},
+    {"_rpm", "rpm", QuantityKind::signal},
+    {"_mm_per_min", "mm/min", QuantityKind::signal},
+    {"_A", "A", QuantityKind::signal},
+    {"_W", "W", QuantityKind::signal},
+    {"_V", "V", QuantityKind::signal},
+    {"_on", "0/1", QuantityKind::signal},
+    {"_percent", "%", QuantityKind::signal},
+}};
+
+}  // namespace
+
+Unit unit_of(std::string_view column) {
+  if (column == "time_s") return {"_s", "s", QuantityKind::time};
+  Unit longest;
+  for (const Unit& unit : registered) {
+    if (column.size() > unit.suffix.size() && column.ends_with(unit.suffix) &&
+        unit.suffix.size() > longest.suffix.size()) {
+      longest = unit;
+    }
+  }
+  return longest;
+}
+
+QuantityKind kind_of(std::string_view column) {
+  return unit_of(column).kind;
+}
+
+bool is_temperature(std::string_view column) {
+  return kind_of(column) == QuantityKind::temperature;
+}
+
+bool is_output(std::string_view column) {
+  const QuantityKind kind = kind_of(column);
+  return kind == QuantityKind::displacement || kind == QuantityKind::tilt;
+}
+
+bool is_operating(std::string_view column) {
+  const QuantityKind kind = kind_of(column);
+  return kind == QuantityKind::position || kind == QuantityKind::signal;
+}
+
+}  // namespace thermocomp

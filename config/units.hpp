@@ -1,0 +1,32 @@
+/// The unit of a column is the longest registered suffix of its name.
+#pragma once
+
+#include <string_view>
+
+namespace thermocomp {
+
+enum class QuantityKind {
+  time,          ///< time_s
+  temperature,   ///< *_degC, *_K
+  displacement,  ///< *_um
+  tilt,          ///< *_urad
+  position,      ///< *_mm
+  signal         ///< *_rpm *_mm_per_min *_A *_W *_V *_on *_percent, and every other name
+};
+
+struct Unit {
+  std::string_view suffix;  ///< "_mm_per_min"; empty: no unit
+  std::string_view symbol;  ///< "mm/min"; empty: no unit
+  QuantityKind kind{QuantityKind::signal};
+};
+
+/// @param column full name of a column. A name that is nothing but the suffix has no unit.
+[[nodiscard]] Unit unit_of(std::string_view column);
+[[nodiscard]] QuantityKind kind_of(std::string_view column);
+[[nodiscard]] bool is_temperature(std::string_view column);
+/// Displacement or tilt: what a model puts out and an axis takes.
+[[nodiscard]] bool is_output(std::string_view column);
+/// Position or operating signal: what a controller reports.
+[[nodiscard]] bool is_operating(std::string_view column);
+
+}  // namespace thermocomp
