@@ -19,25 +19,25 @@
 namespace thermocomp {
 
 enum class Mode : std::uint8_t {
-  starting,         ///< not all inputs have had a value yet; offsets stay where they were
-  disabled,         ///< by an operator or the controller's switch; offsets at or on the way to zero
+  starting,  ///< not all inputs have had a value yet; offsets stay where they were
+  disabled,  ///< by an operator or the controller's switch; offsets at or on the way to zero
   compensating,
-  holding,          ///< data lost: offsets stay
-  ramping_to_zero   ///< data lost for longer than hold_s and the policy says so
+  holding,         ///< data lost: offsets stay
+  ramping_to_zero  ///< data lost for longer than hold_s and the policy says so
 };
 [[nodiscard]] std::string_view to_string(Mode mode) noexcept;
 
 /// Why the estimator does not simply compensate; a set of bits.
 enum class Reason : std::uint32_t {
   operator_disabled = 1u << 0,
-  controller_disabled = 1u << 1,   ///< disable_signal is 1
-  block_lost = 1u << 2,            ///< no good sensor left in a block the model needs
-  signal_lost = 1u << 3,           ///< a position or operating signal the model needs is missing
+  controller_disabled = 1u << 1,  ///< disable_signal is 1
+  block_lost = 1u << 2,           ///< no good sensor left in a block the model needs
+  signal_lost = 1u << 3,          ///< a position or operating signal the model needs is missing
   no_reference = 1u << 4,
   controller_offline = 1u << 5,
-  not_synced = 1u << 6,            ///< what the controller applies is not known yet
-  mismatch = 1u << 7,              ///< applied and sent differ
-  cutting = 1u << 8,               ///< hold_while_cutting holds the offset
+  not_synced = 1u << 6,  ///< what the controller applies is not known yet
+  mismatch = 1u << 7,    ///< applied and sent differ
+  cutting = 1u << 8,     ///< hold_while_cutting holds the offset
   at_bound = 1u << 9,
   applied_out_of_bound = 1u << 10  ///< read-back beyond any bound of ours: axis is not driven
 };
@@ -48,13 +48,13 @@ struct SensorReport {
   double raw_degC{not_a_number};       ///< as the driver gave it
   double smoothed_degC{not_a_number};  ///< what the block gets; a difference where configured
   nanoseconds taken_at{};
-  Fault fault{Fault::never_read};      ///< after screening
-  std::uint32_t clipped_in_a_row{0};   ///< smoothing clipped so many values running
+  Fault fault{Fault::never_read};     ///< after screening
+  std::uint32_t clipped_in_a_row{0};  ///< smoothing clipped so many values running
   std::uint64_t clipped{0};
-  std::uint64_t rejected{0};           ///< readings refused by screening since the start
+  std::uint64_t rejected{0};  ///< readings refused by screening since the start
 };
 
-struct InputReport {                   ///< a temperature column of the model
+struct InputReport {  ///< a temperature column of the model
   double temp_degC{not_a_number};
   double reference_degC{not_a_number};
   bool good{false};
@@ -67,7 +67,7 @@ struct AxisReport {
   double applied_um{not_a_number};       ///< read back
   double measured_um{not_a_number};      ///< last `measured` of the operator
   bool synced{false};
-  bool driven{false};                    ///< offset marked valid
+  bool driven{false};  ///< offset marked valid
   bool mismatch{false};
   bool at_bound{false};
   bool proving{false};
@@ -81,10 +81,10 @@ struct Report {
   Mode mode{Mode::starting};
   nanoseconds mode_since{};
   std::uint32_t reasons{0};
-  bool enabled{true};                    ///< the operator's switch
+  bool enabled{true};  ///< the operator's switch
   std::uint64_t cycle_ends{0};
-  std::vector<SensorReport> sensors;     ///< order of EstimatorConfig::sensors
-  std::vector<InputReport> inputs;       ///< order of ThermalModel::temperature_columns()
+  std::vector<SensorReport> sensors;  ///< order of EstimatorConfig::sensors
+  std::vector<InputReport> inputs;    ///< order of ThermalModel::temperature_columns()
   std::vector<AxisReport> axes;
 };
 
@@ -112,16 +112,18 @@ class Estimator {
   /// An operator's command, taken between two steps. Never throws, never allocates.
   void apply(const Command& command) noexcept;
 
-  [[nodiscard]] Report make_report() const;            ///< allocates; sizes are then fixed
-  void report(Report& out) const noexcept;             ///< no allocation
+  [[nodiscard]] Report make_report() const;  ///< allocates; sizes are then fixed
+  void report(Report& out) const noexcept;   ///< no allocation
 
   /// The exact inner state as bytes, for a replay from here. Only the same configuration and model
   /// (and build of the program) can load it.
   [[nodiscard]] std::size_t state_size_bytes() const noexcept;
-  void save_state(std::span<std::byte> out) const noexcept;  ///< @pre out.size() == state_size_bytes()
-  void load_state(std::span<const std::byte> in);            ///< @throws std::runtime_error on another size or layout
+  void save_state(
+      std::span<std::byte> out) const noexcept;  ///< @pre out.size() == state_size_bytes()
+  void load_state(
+      std::span<const std::byte> in);  ///< @throws std::runtime_error on another size or layout
 
-  void restore(const PersistentState& state);                ///< before the first step; allocates
+  void restore(const PersistentState& state);  ///< before the first step; allocates
   /// Bumpless reload: takes over offsets, switches, references, smoothing and lag states by name.
   /// plan_adoption() allocates and may run on any thread while `previous` is not being replaced;
   /// adopt() neither allocates nor throws.

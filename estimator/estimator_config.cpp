@@ -39,8 +39,7 @@ void CompensationConfig::validate() const {
   require(hold_s >= 0 && hold_s <= 1e6, "hold_s", hold_s, "must be in [0, 1e6]");
   require(controller_stale_after_s > 0 && controller_stale_after_s <= 3600,
           "controller_stale_after_s", controller_stale_after_s, "must be in (0, 3600]");
-  require(mismatch_um > 0 && mismatch_um <= 500, "mismatch_um", mismatch_um,
-          "must be in (0, 500]");
+  require(mismatch_um > 0 && mismatch_um <= 500, "mismatch_um", mismatch_um, "must be in (0, 500]");
   require(mismatch_after_s > 0 && mismatch_after_s <= 3600, "mismatch_after_s", mismatch_after_s,
           "must be in (0, 3600]");
   require(prove_um_max > 0 && prove_um_max <= 50, "prove_um_max", prove_um_max,

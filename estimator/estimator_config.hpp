@@ -17,11 +17,11 @@ using seconds_d = std::chrono::duration<double>;
 struct ScreeningConfig {
   double temp_degC_min{-30.0};
   double temp_degC_max{200.0};
-  double stale_after_s{5.0};            ///< age beyond which a reading is stale
-  double rate_K_per_s_max{0.5};         ///< fastest believable slew
-  double rate_allowance_K{1.0};         ///< what noise may add to a step [K]
-  double stuck_after_s{0.0};            ///< the very same value for so long is a fault; 0: never
-  void validate() const;                ///< @throws InvalidValue
+  double stale_after_s{5.0};     ///< age beyond which a reading is stale
+  double rate_K_per_s_max{0.5};  ///< fastest believable slew
+  double rate_allowance_K{1.0};  ///< what noise may add to a step [K]
+  double stuck_after_s{0.0};     ///< the very same value for so long is a fault; 0: never
+  void validate() const;         ///< @throws InvalidValue
 };
 
 enum class SmoothingForm { off, sliding_line, line_of_lines };
@@ -31,11 +31,11 @@ enum class SmoothingHistory { raw, screened };
 struct SmoothingConfig {
   SmoothingForm form{SmoothingForm::sliding_line};
   SmoothingHistory history{SmoothingHistory::screened};
-  double period_s{60.0};         ///< one value of the sensor every so often; 0: every reading
-  std::size_t samples{6};        ///< n, values in a line (3..32)
-  double half_width_K{0.3};      ///< w, half the band
-  double outage_s{300.0};        ///< a gap this long restarts the history
-  void validate() const;         ///< @throws InvalidValue
+  double period_s{60.0};     ///< one value of the sensor every so often; 0: every reading
+  std::size_t samples{6};    ///< n, values in a line (3..32)
+  double half_width_K{0.3};  ///< w, half the band
+  double outage_s{300.0};    ///< a gap this long restarts the history
+  void validate() const;     ///< @throws InvalidValue
 };
 
 struct SensorConfig {
@@ -60,9 +60,9 @@ struct LimiterConfig {
 
 /// An axis (or rotary axis: um reads urad) that takes an offset.
 struct AxisConfig {
-  std::string name;          ///< "z"
-  std::string output;        ///< output of the model whose negative is sent
-  double sign{1.0};          ///< +1, or -1 where the controller counts the offset the other way
+  std::string name;    ///< "z"
+  std::string output;  ///< output of the model whose negative is sent
+  double sign{1.0};    ///< +1, or -1 where the controller counts the offset the other way
   LimiterConfig limiter;
 };
 
@@ -70,25 +70,25 @@ enum class LossPolicy { hold, ramp_to_zero };
 
 struct CompensationConfig {
   LossPolicy on_loss{LossPolicy::hold};
-  double hold_s{600.0};                 ///< ramp_to_zero: hold this long first
+  double hold_s{600.0};  ///< ramp_to_zero: hold this long first
   bool enabled_at_first_start{true};
-  bool hold_while_cutting{false};       ///< the offset changes only while cutting_signal is 0
-  std::string cutting_signal;           ///< "cutting_on"; empty: none
-  std::string disable_signal;           ///< "compensation_off_on": 1 disables; empty: none
+  bool hold_while_cutting{false};  ///< the offset changes only while cutting_signal is 0
+  std::string cutting_signal;      ///< "cutting_on"; empty: none
+  std::string disable_signal;      ///< "compensation_off_on": 1 disables; empty: none
   double controller_stale_after_s{2.0};
-  double mismatch_um{2.0};              ///< applied and sent may differ by this much
-  double mismatch_after_s{3.0};         ///< ... or longer by more for this long
+  double mismatch_um{2.0};       ///< applied and sent may differ by this much
+  double mismatch_after_s{3.0};  ///< ... or longer by more for this long
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
-  void validate() const;                ///< @throws InvalidValue
+  void validate() const;  ///< @throws InvalidValue
 };
 
 struct EstimatorConfig {
   std::vector<SensorConfig> sensors;
   std::vector<BlockConfig> blocks;
-  std::vector<std::string> signals;     ///< what the controller reports, order of ControllerState
+  std::vector<std::string> signals;  ///< what the controller reports, order of ControllerState
   std::vector<AxisConfig> axes;
-  bool controller_reads_back{true};     ///< applied_um is reported
+  bool controller_reads_back{true};  ///< applied_um is reported
   CompensationConfig compensation;
 };
 

@@ -12,10 +12,11 @@ namespace thermocomp {
 
 /// One `[[term]]` of the model file: an extension of the static matrix by a named cause.
 struct TermSpec {
-  std::string kind;     ///< a registered cause, see term_kinds()
-  std::string subject;  ///< full column name (temperature or operating signal)
-  std::map<std::string, double> shared;                              ///< e.g. tau_s
-  std::map<std::string, std::map<std::string, double>> per_output;   ///< e.g. gain_um_per_K -> output
+  std::string kind;                      ///< a registered cause, see term_kinds()
+  std::string subject;                   ///< full column name (temperature or operating signal)
+  std::map<std::string, double> shared;  ///< e.g. tau_s
+  std::map<std::string, std::map<std::string, double>>
+      per_output;  ///< e.g. gain_um_per_K -> output
 };
 
 /// `[guideway.NAME]`: rows of the matrix at positions along an axis. Between two positions the row

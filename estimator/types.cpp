@@ -10,30 +10,48 @@ namespace thermocomp {
 
 std::string_view to_string(Fault fault) noexcept {
   switch (fault) {
-    case Fault::none: return "none";
-    case Fault::never_read: return "never_read";
-    case Fault::stale: return "stale";
-    case Fault::open_circuit: return "open_circuit";
-    case Fault::short_circuit: return "short_circuit";
-    case Fault::out_of_range: return "out_of_range";
-    case Fault::too_fast: return "too_fast";
-    case Fault::stuck: return "stuck";
-    case Fault::no_answer: return "no_answer";
-    case Fault::bad_frame: return "bad_frame";
-    case Fault::device_busy: return "device_busy";
-    case Fault::device_error: return "device_error";
+    case Fault::none:
+      return "none";
+    case Fault::never_read:
+      return "never_read";
+    case Fault::stale:
+      return "stale";
+    case Fault::open_circuit:
+      return "open_circuit";
+    case Fault::short_circuit:
+      return "short_circuit";
+    case Fault::out_of_range:
+      return "out_of_range";
+    case Fault::too_fast:
+      return "too_fast";
+    case Fault::stuck:
+      return "stuck";
+    case Fault::no_answer:
+      return "no_answer";
+    case Fault::bad_frame:
+      return "bad_frame";
+    case Fault::device_busy:
+      return "device_busy";
+    case Fault::device_error:
+      return "device_error";
   }
   return "unknown";
 }
 
 std::string_view to_string(CommandKind kind) noexcept {
   switch (kind) {
-    case CommandKind::enable: return "enable";
-    case CommandKind::disable: return "disable";
-    case CommandKind::reference: return "reference";
-    case CommandKind::measured: return "measured";
-    case CommandKind::cycle_end: return "cycle_end";
-    case CommandKind::prove: return "prove";
+    case CommandKind::enable:
+      return "enable";
+    case CommandKind::disable:
+      return "disable";
+    case CommandKind::reference:
+      return "reference";
+    case CommandKind::measured:
+      return "measured";
+    case CommandKind::cycle_end:
+      return "cycle_end";
+    case CommandKind::prove:
+      return "prove";
   }
   return "unknown";
 }

@@ -1,0 +1,167 @@
+#include "estimator/displacement_model.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include <Eigen/Core>
+
+#include "estimator/checks.hpp"
+#include "estimator/terms/term.hpp"
+
+namespace thermocomp {
+namespace {
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Vector = Eigen::VectorXd;
+
+std::size_t index_of(const std::vector<std::string>& names, const std::string& name,
+                     const char* key, const char* rule) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) throw InvalidValue(key, name, rule);
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+Matrix matrix_from(const std::vector<std::vector<double>>& rows, std::size_t count,
+                   std::size_t columns, const char* key) {
+  require(rows.size() == count, key, static_cast<double>(rows.size()),
+          "has the wrong number of rows");
+  Matrix matrix(count, columns);
+  for (std::size_t i = 0; i < count; ++i) {
+    require(rows[i].size() == columns, key, static_cast<double>(rows[i].size()),
+            "has a row of the wrong length");
+    for (std::size_t j = 0; j < columns; ++j)
+      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = rows[i][j];
+  }
+  return matrix;
+}
+
+/// Rows of one guideway: at each position one row for each of its outputs.
+struct Guideway {
+  std::size_t signal{0};
+  std::vector<double> positions_mm;
+  std::vector<std::size_t> outputs;
+  std::vector<Matrix> rows_um_per_K;  ///< one an output, shape (positions, inputs)
+
+  /// The two positions around `position_mm` and the share of the second one.
+  [[nodiscard]] std::pair<Eigen::Index, double> place(double position_mm) const noexcept {
+    const auto above = std::upper_bound(positions_mm.begin(), positions_mm.end(), position_mm);
+    if (above == positions_mm.begin()) return {0, 0.0};
+    if (above == positions_mm.end())
+      return {static_cast<Eigen::Index>(positions_mm.size()) - 2, 1.0};
+    const auto lower = above - 1;
+    return {lower - positions_mm.begin(), (position_mm - *lower) / (*above - *lower)};
+  }
+};
+
+Guideway guideway_from(const GuidewaySpec& spec, const ThermalModel& model) {
+  Guideway guideway;
+  guideway.signal = index_of(model.signal_columns(), spec.axis, "guideway.axis", "is not a signal");
+  guideway.positions_mm = spec.positions_mm;
+  require(spec.positions_mm.size() >= 2, "guideway.positions_mm",
+          static_cast<double>(spec.positions_mm.size()), "needs at least two positions");
+  for (std::size_t i = 1; i < spec.positions_mm.size(); ++i)
+    require(spec.positions_mm[i] > spec.positions_mm[i - 1], "guideway.positions_mm",
+            spec.positions_mm[i], "must increase");
+  for (const auto& [output, rows] : spec.rows_um_per_K) {
+    guideway.outputs.push_back(
+        index_of(model.outputs, output, "guideway.rows_um_per_K", "is not an output of the model"));
+    guideway.rows_um_per_K.push_back(
+        matrix_from(rows, spec.positions_mm.size(), model.inputs.size(), "guideway.rows_um_per_K"));
+  }
+  return guideway;
+}
+
+}  // namespace
+
+struct DisplacementModel::Parts {
+  std::size_t columns{0};
+  std::size_t signals{0};
+  std::size_t outputs{0};
+  Eigen::Index inputs{0};
+  Matrix matrix_um_per_K;
+  std::vector<Guideway> guideways;
+  std::vector<TermSpec> term_specs;
+  std::vector<std::unique_ptr<Term>> terms;
+  Vector rise_K;  ///< shape (columns); scratch
+
+  void add_guideways(std::span<const double> signal_values, std::span<double> out) const noexcept {
+    const auto rise = rise_K.head(inputs);
+    for (const Guideway& guideway : guideways) {
+      const auto [lower, share] = guideway.place(signal_values[guideway.signal]);
+      for (std::size_t i = 0; i < guideway.outputs.size(); ++i) {
+        const Matrix& rows = guideway.rows_um_per_K[i];
+        out[guideway.outputs[i]] +=
+            (1.0 - share) * rows.row(lower).dot(rise) + share * rows.row(lower + 1).dot(rise);
+      }
+    }
+  }
+};
+
+DisplacementModel::DisplacementModel(const ThermalModel& model)
+    : parts_(std::make_unique<Parts>()) {
+  parts_->columns = model.temperature_columns().size();
+  parts_->signals = model.signal_columns().size();
+  parts_->outputs = model.outputs.size();
+  parts_->inputs = static_cast<Eigen::Index>(model.inputs.size());
+  parts_->matrix_um_per_K = matrix_from(model.matrix_um_per_K, model.outputs.size(),
+                                        model.inputs.size(), "matrix_um_per_K");
+  for (const GuidewaySpec& spec : model.guideways)
+    parts_->guideways.push_back(guideway_from(spec, model));
+  parts_->term_specs = model.terms;
+  for (const TermSpec& spec : model.terms) parts_->terms.push_back(make_term(spec, model));
+  parts_->rise_K = Vector::Zero(static_cast<Eigen::Index>(parts_->columns));
+}
+
+DisplacementModel::~DisplacementModel() = default;
+DisplacementModel::DisplacementModel(DisplacementModel&&) noexcept = default;
+DisplacementModel& DisplacementModel::operator=(DisplacementModel&&) noexcept = default;
+
+void DisplacementModel::restart() noexcept {
+  for (auto& term : parts_->terms) term->restart();
+}
+
+void DisplacementModel::step(nanoseconds now, std::span<const double> temps_degC,
+                             std::span<const double> reference_degC,
+                             std::span<const double> signals,
+                             std::span<double> displacement_um) noexcept {
+  Parts& parts = *parts_;
+  THERMOCOMP_ENSURE(temps_degC.size() == parts.columns && reference_degC.size() == parts.columns);
+  THERMOCOMP_ENSURE(signals.size() == parts.signals && displacement_um.size() == parts.outputs);
+  for (std::size_t i = 0; i < parts.columns; ++i)
+    parts.rise_K[static_cast<Eigen::Index>(i)] = temps_degC[i] - reference_degC[i];
+  Eigen::Map<Vector> out(displacement_um.data(), static_cast<Eigen::Index>(parts.outputs));
+  out.noalias() = parts.matrix_um_per_K * parts.rise_K.head(parts.inputs);
+  parts.add_guideways(signals, displacement_um);
+  const TermInput input{now, {parts.rise_K.data(), parts.columns}, signals};
+  for (auto& term : parts.terms) term->add(input, displacement_um);
+}
+
+void DisplacementModel::visit_state(StateArchive& archive) {
+  for (auto& term : parts_->terms) term->visit_state(archive);
+}
+
+std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) const {
+  std::vector<int> plan;
+  for (const TermSpec& ours : parts_->term_specs) {
+    const auto& theirs = other.parts_->term_specs;
+    const auto same = std::find_if(theirs.begin(), theirs.end(), [&](const TermSpec& each) {
+      // Gains do not live in the state, so a term with new gains keeps its past.
+      return each.kind == ours.kind && each.subject == ours.subject && each.shared == ours.shared;
+    });
+    plan.push_back(same == theirs.end() ? -1 : static_cast<int>(same - theirs.begin()));
+  }
+  return plan;
+}
+
+void DisplacementModel::adopt_terms(DisplacementModel& other, std::span<const int> plan) noexcept {
+  std::array<std::byte, 256> state;
+  for (std::size_t i = 0; i < plan.size(); ++i) {
+    if (plan[i] < 0) continue;
+    StateArchive save{std::span<std::byte>(state)};
+    other.parts_->terms[static_cast<std::size_t>(plan[i])]->visit_state(save);
+    StateArchive load{std::span<const std::byte>(state.data(), save.position_bytes())};
+    parts_->terms[i]->visit_state(load);
+  }
+}
+
+}  // namespace thermocomp
