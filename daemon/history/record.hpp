@@ -1,0 +1,91 @@
+/// What the cycle tells the history: records of fixed size, through a ring on which neither side
+/// ever waits.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+/// The daemon's time: cycle k is stepped with exactly this time, however late it ran, so a replay
+/// needs no clock readings.
+struct Grid {
+  nanoseconds start{};  ///< CLOCK_MONOTONIC of cycle 0
+  nanoseconds period{std::chrono::milliseconds(10)};
+  [[nodiscard]] nanoseconds time_of(std::uint64_t cycle) const noexcept {
+    return start + period * static_cast<std::int64_t>(cycle);
+  }
+};
+
+enum class RecordKind : std::uint8_t {
+  reading,       ///< index: sensor; value: temp [degC]; time: taken_at; detail: Fault
+  link,          ///< index: link epoch; time: taken_at; detail: online
+  applied,       ///< index: axis; value: applied offset [um]
+  signal,        ///< index: signal; value: in its unit
+  command,       ///< index: axis; value [um]; detail: CommandKind. Applied before that cycle's step
+  skipped,       ///< cycle: first cycle that was not stepped; time_ns: the last such cycle
+  offset,        ///< proof, after the step. index: axis; value [um]; time_ns: epoch; detail: valid
+  cycle_done,    ///< everything up to and with this cycle is in the ring
+  segment_begin  ///< cycle: first cycle to step from the snapshot; time_ns: the last cycle that was
+                 ///< recorded whole before it, or -1; value: unused; index: snapshot;
+                 ///< detail: SegmentReason; session: whose snapshot
+};
+inline constexpr std::size_t record_kinds_count = 9;
+
+/// Why a segment of the history begins.
+enum class SegmentReason : std::uint8_t {
+  start,     ///< the daemon started
+  reload,    ///< another configuration or model
+  periodic,  ///< `segment_h` is over, or the segment has become large
+  gap        ///< something before it was lost
+};
+[[nodiscard]] std::string_view to_string(SegmentReason reason) noexcept;
+
+struct Record {
+  std::uint64_t cycle{0};
+  std::int64_t time_ns{0};
+  double value{0.0};
+  std::uint32_t index{0};
+  RecordKind kind{RecordKind::cycle_done};
+  std::uint8_t detail{0};
+  std::uint16_t session{0};
+};
+static_assert(sizeof(Record) == 32);
+
+/// Equal to the last bit, so that NaN equals itself and -0 differs from 0.
+[[nodiscard]] bool same_bits(double a, double b) noexcept;
+
+/// Single producer (the cycle), single consumer (the writer). Wait-free on both sides, no
+/// allocation after construction.
+class RecordRing {
+ public:
+  /// @param capacity  records; rounded up to a power of two
+  explicit RecordRing(std::size_t capacity = 65536);
+
+  /// Producer. @return false when the ring is full; the record is then not in it
+  [[nodiscard]] bool try_push(const Record& record) noexcept;
+  /// Producer: free places, at least.
+  [[nodiscard]] std::size_t free_places() const noexcept;
+  /// Consumer: moves up to out.size() records into `out`. @return how many
+  std::size_t pop(std::span<Record> out) noexcept;
+
+  /// Producer: what could not be recorded. Any thread may ask how much that is.
+  void count_lost(std::uint64_t records) noexcept;
+  [[nodiscard]] std::uint64_t lost() const noexcept;
+  [[nodiscard]] std::size_t capacity() const noexcept { return mask_ + 1; }
+
+ private:
+  std::size_t mask_;
+  std::unique_ptr<Record[]> records_;
+  alignas(64) std::atomic<std::uint64_t> head_{0};  ///< written by the producer
+  std::uint64_t tail_seen_{0};                      ///< the producer's copy of tail_
+  alignas(64) std::atomic<std::uint64_t> tail_{0};  ///< written by the consumer
+  alignas(64) std::atomic<std::uint64_t> lost_{0};
+};
+
+}  // namespace thermocomp

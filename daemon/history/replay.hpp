@@ -1,0 +1,84 @@
+/// The daemon's own estimator over what was recorded, and what was recorded as a run file.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <iosfwd>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "daemon/history/history_reader.hpp"
+#include "estimator/estimator_config.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// What the estimator of a segment is built from.
+struct ReplaySetup {
+  EstimatorConfig estimator;
+  ThermalModel model;
+};
+/// Texts -> configuration and model. The default parses them as the daemon does.
+using SetupParser = std::function<ReplaySetup(const SegmentSetup&)>;
+[[nodiscard]] ReplaySetup parse_setup(const SegmentSetup& setup);
+
+/// The offsets of one cycle at which the daemon noted its own.
+struct ReplayedOffsets {
+  double time_s{0.0};  ///< since the history's first cycle
+  std::uint64_t cycle{0};
+  const EstimatorConfig* config{nullptr};  ///< names and order of the axes
+  std::span<const double> offset_um;       ///< replayed
+  std::span<const double> recorded_um;     ///< by the daemon
+};
+
+struct ReplaySummary {
+  std::uint64_t segments{0};
+  std::uint64_t gaps{0};       ///< segments before which something was lost
+  std::uint64_t cycles{0};     ///< steps
+  std::uint64_t compared{0};   ///< offsets, one an axis and noted cycle
+  std::uint64_t different{0};  ///< ... that differ in any bit, or in their valid mark or epoch
+  double largest_difference_um{0.0};
+  std::optional<std::uint64_t> first_different_cycle;
+  std::optional<double> first_different_time_s;
+};
+
+using OffsetSink = std::function<void(const ReplayedOffsets&)>;
+/// Called now and then with the fraction done, 0..1.
+using Progress = std::function<void(double)>;
+
+/// Runs every segment from its own start state over every cycle that was stepped.
+/// @throws HistoryError, and what the parser throws
+ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sink,
+                     const Progress& progress = {}, const SetupParser& parser = parse_setup);
+
+/// As a run file: time_s, then `<axis>_offset_um` and `<axis>_recorded_um` of every axis.
+ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& out,
+                            const Progress& progress = {}, const SetupParser& parser = parse_setup);
+
+/// A time in a history: seconds since its first cycle, or wall time (ISO 8601: 2026-03-01T08:30:00,
+/// local unless it ends with Z or +hh:mm; date alone is midnight).
+struct HistoryTime {
+  std::optional<double> seconds;
+  std::optional<std::int64_t> wall_ns;
+};
+/// @throws std::invalid_argument naming the text
+[[nodiscard]] HistoryTime parse_history_time(const std::string& text);
+
+struct ExportSummary {
+  std::uint64_t rows{0};
+  std::vector<std::string> columns;
+};
+/// A run file with a row at every cycle whose offsets were noted and from <= time < to: time_s
+/// (since the first row), `<sensor>_degC` (as the driver gave it; missing where it had a fault),
+/// the model's inputs that no sensor column is called like (mean of the block's good sensors), the
+/// controller's signals, `<axis>_offset_um`, `<axis>_applied_um` and, in the first row after an
+/// operator gave one, `<axis>_measured_um`.
+ExportSummary export_run(const std::filesystem::path& history,
+                         const std::optional<HistoryTime>& from,
+                         const std::optional<HistoryTime>& to, std::ostream& out,
+                         const Progress& progress = {}, const SetupParser& parser = parse_setup);
+
+}  // namespace thermocomp

@@ -1,0 +1,29 @@
+/// What survives a restart, by name: a small JSON file that is either the old or the new one,
+/// whatever happens while it is written.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "estimator/estimator.hpp"
+
+namespace thermocomp {
+
+struct LoadedState {
+  PersistentState state;
+  bool found{false};    ///< a good file was there; otherwise `state` is the caller's fallback
+  std::string warning;  ///< not empty: the file was there and could not be used (for the log)
+};
+
+/// Never throws: a damaged or foreign file is moved aside (`<file>.unusable`) and said in
+/// `warning`.
+/// @param fallback  returned where there is no usable file
+[[nodiscard]] LoadedState load_state_file(const std::filesystem::path& file,
+                                          const PersistentState& fallback) noexcept;
+
+/// Writes beside the file, flushes to the disk, renames over it, flushes the folder.
+/// @return empty, or what went wrong; the old file then still stands
+[[nodiscard]] std::string save_state_file(const std::filesystem::path& file,
+                                          const PersistentState& state) noexcept;
+
+}  // namespace thermocomp
