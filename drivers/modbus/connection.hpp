@@ -1,0 +1,98 @@
+/// A Modbus line that is open or not: one exchange at a time, every wait bounded and interruptible,
+/// every answer checked to be the answer to this very request.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "drivers/sensors/sensor_bus_config.hpp"
+
+namespace thermocomp {
+
+enum class ExchangeOutcome : std::uint8_t {
+  ok,
+  exception,     ///< the unit answered with a Modbus exception
+  timeout,       ///< nothing came in time
+  bad_frame,     ///< something came that is not a valid answer to the request
+  disconnected,  ///< the line is not open, or was lost in this exchange
+  cancelled      ///< cancel() was called
+};
+
+/// How one exchange ended.
+struct Exchange {
+  ExchangeOutcome outcome{ExchangeOutcome::disconnected};
+  int exception_code{0};     ///< 1..255 when outcome is exception
+  nanoseconds sent_at{};     ///< CLOCK_MONOTONIC
+  nanoseconds arrived_at{};  ///< the whole answer was here; 0 without one
+  const char* detail{""};    ///< static text for a person; empty when ok
+
+  [[nodiscard]] bool ok() const noexcept { return outcome == ExchangeOutcome::ok; }
+  /// The fault a reading gets: busy (6) device_busy; a gateway's 10 and 11, a time-out and a lost
+  /// line no_answer; other exceptions device_error; a bad frame bad_frame.
+  [[nodiscard]] Fault fault() const noexcept;
+  /// The unit itself is there: a value or an exception of its own (not a gateway's on its behalf).
+  [[nodiscard]] bool unit_answered() const noexcept;
+};
+
+/// What is checked of a line before anything is opened.
+/// @throws DriverError naming what cannot work (unknown baud rate, parity, port, empty host, ...)
+void check_line(const ModbusLine& line);
+
+/// Silence kept between frames on the line: as configured, else 3.5 characters, 1.75 ms above
+/// 19200 baud; TCP: 0 unless configured.
+[[nodiscard]] nanoseconds inter_frame_delay(const ModbusLine& line) noexcept;
+
+/// The time a frame of so many bytes takes on the line; TCP: 0.
+[[nodiscard]] nanoseconds time_on_line(const ModbusLine& line, std::size_t bytes) noexcept;
+
+/// One thread uses a connection; only cancel() may come from another.
+///
+/// Late answers. TCP: each request has a transaction id of its own; an answer with another one is
+/// thrown away while the wait goes on. RTU has no such id: after a request without answer its unit
+/// is not asked again before ready_at(unit), while the answers of one unit that arrive during an
+/// exchange with another are thrown away. The exchange calls wait for ready_at() by themselves;
+/// whoever has other units to ask looks at it first.
+class ModbusConnection {
+ public:
+  /// @throws DriverError as check_line()
+  explicit ModbusConnection(const ModbusLine& line);
+  ModbusConnection(const ModbusConnection&) = delete;
+  ModbusConnection& operator=(const ModbusConnection&) = delete;
+  ~ModbusConnection();
+
+  /// Opens the line; at once true when open. Bounded by the line's time-out (an answer of the
+  /// name service: 2 s, in which cancel() works too).
+  /// @return whether it is open; if not, last_error() says why
+  bool connect();
+  void disconnect() noexcept;
+  [[nodiscard]] bool connected() const noexcept;
+  [[nodiscard]] const std::string& last_error() const noexcept;
+
+  /// Reads words.size() registers (at most 125), or bits, one a word (at most 2000).
+  /// `words` is written only when the outcome is ok.
+  Exchange read(int unit, ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words);
+  /// Writes holding registers (function 16; at most 123). ok: the unit has confirmed them.
+  Exchange write_registers(int unit, std::uint16_t address, std::span<const std::uint16_t> words);
+  /// Writes one coil (function 5).
+  Exchange write_coil(int unit, std::uint16_t address, bool on);
+
+  /// Before this time the unit is not asked, because an answer to an earlier request may still
+  /// come; 0: at any time.
+  [[nodiscard]] nanoseconds ready_at(int unit) const noexcept;
+
+  /// Waits until `time` (CLOCK_MONOTONIC) without using the processor.
+  /// @return false when cancelled
+  bool pause_until(nanoseconds time) noexcept;
+
+  /// From any thread, for good: every call under way or to come returns soon with `cancelled`.
+  void cancel() noexcept;
+  [[nodiscard]] bool cancelled() const noexcept;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace thermocomp
