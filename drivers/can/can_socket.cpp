@@ -1,0 +1,272 @@
+#include "drivers/can/can_socket.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <poll.h>
+#include <unistd.h>
+
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+namespace {
+
+nanoseconds to_nanoseconds(const timespec& time) noexcept {
+  return std::chrono::seconds{time.tv_sec} + nanoseconds{time.tv_nsec};
+}
+
+nanoseconds clock_now(clockid_t clock) noexcept {
+  timespec time{};
+  clock_gettime(clock, &time);
+  return to_nanoseconds(time);
+}
+
+std::string said(int code) {
+  return std::strerror(code);
+}
+
+can_filter filter_for(const CanId& wanted) noexcept {
+  can_filter filter{};
+  // With CAN_RTR_FLAG in the mask remote requests, which carry no data, stay out too.
+  if (wanted.extended) {
+    filter.can_id = wanted.id | CAN_EFF_FLAG;
+    filter.can_mask = CAN_EFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+  } else {
+    filter.can_id = wanted.id;
+    filter.can_mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+  }
+  return filter;
+}
+
+CanFrame to_frame(const can_frame& raw, nanoseconds received_at) noexcept {
+  CanFrame frame;
+  frame.id.extended = (raw.can_id & CAN_EFF_FLAG) != 0;
+  frame.id.id = raw.can_id & (frame.id.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+  frame.size = std::min<std::size_t>(raw.len, can_bytes_max);
+  std::copy_n(std::begin(raw.data), frame.size, frame.data.begin());
+  frame.received_at = received_at;
+  return frame;
+}
+
+}  // namespace
+
+/// Where recvmmsg leaves a batch.
+struct CanSocket::Buffers {
+  static constexpr std::size_t control_bytes =
+      CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t));
+  struct alignas(cmsghdr) Control {
+    std::array<char, control_bytes> bytes;
+  };
+  std::array<can_frame, batch_max> frames{};
+  std::array<iovec, batch_max> parts{};
+  std::array<Control, batch_max> controls{};
+  std::array<mmsghdr, batch_max> messages{};
+
+  void prepare() noexcept {
+    for (std::size_t i = 0; i < batch_max; ++i) {
+      parts[i] = {&frames[i], sizeof(can_frame)};
+      messages[i] = {};
+      messages[i].msg_hdr.msg_iov = &parts[i];
+      messages[i].msg_hdr.msg_iovlen = 1;
+      messages[i].msg_hdr.msg_control = controls[i].bytes.data();
+      messages[i].msg_hdr.msg_controllen = control_bytes;
+    }
+  }
+};
+
+std::string can_unavailable() {
+  const int probe = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
+  if (probe < 0) return said(errno);
+  ::close(probe);
+  return {};
+}
+
+nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now,
+                            nanoseconds monotonic_now) noexcept {
+  constexpr nanoseconds oldest = std::chrono::seconds{1};
+  return monotonic_now - std::clamp(realtime_now - realtime_stamp, nanoseconds{0}, oldest);
+}
+
+CanSocket::CanSocket(std::string interface, std::vector<CanId> wanted)
+    : interface_(std::move(interface)),
+      wanted_(std::move(wanted)),
+      buffers_(std::make_unique<Buffers>()) {
+  if (interface_.empty() || interface_.size() >= IFNAMSIZ) {
+    throw InvalidValue("interface", interface_, "must be the name of a network interface");
+  }
+  std::sort(wanted_.begin(), wanted_.end());
+  wanted_.erase(std::unique(wanted_.begin(), wanted_.end()), wanted_.end());
+  require(wanted_.size() <= filters_max, "id", static_cast<double>(wanted_.size()),
+          "at most 512 different identifiers can be received on one interface");
+  received_.reserve(batch_max);
+}
+
+CanSocket::~CanSocket() {
+  close();
+}
+
+void CanSocket::fail(const char* what, int code) {
+  error_ = interface_ + ": " + what + ": " + said(code);
+  close();
+}
+
+void CanSocket::close() noexcept {
+  if (socket_ >= 0) ::close(socket_);
+  socket_ = -1;
+}
+
+bool CanSocket::open() {
+  close();
+  bus_off_ = false;
+  dropped_by_socket_ = 0;
+  socket_ = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
+  if (socket_ < 0) {
+    fail("opening a CAN socket", errno);
+    return false;
+  }
+  if (!configure()) return false;
+  error_.clear();
+  return true;
+}
+
+bool CanSocket::configure() {
+  ifreq request{};
+  interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
+  if (::ioctl(socket_, SIOCGIFINDEX, &request) < 0) return fail("no such interface", errno), false;
+  const int index = request.ifr_ifindex;
+  // Binding to an interface that is down would succeed and only fail later.
+  if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return fail("no such interface", errno), false;
+  if ((request.ifr_flags & IFF_UP) == 0) return fail("interface", ENETDOWN), false;
+
+  std::vector<can_filter> filters(wanted_.size());
+  std::transform(wanted_.begin(), wanted_.end(), filters.begin(), filter_for);
+  const auto bytes = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
+  const can_err_mask_t every_error = CAN_ERR_MASK;
+  const int on = 1;
+  const auto set = [this](int level, int option, const void* value, std::size_t size) {
+    return ::setsockopt(socket_, level, option, value, static_cast<socklen_t>(size)) == 0;
+  };
+  // Filters before the bind: no frame of anybody else gets in between. An empty list is legal
+  // and receives nothing.
+  if (!set(SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) ||
+      !set(SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &every_error, sizeof every_error) ||
+      !set(SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on) ||
+      !set(SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on)) {
+    return fail("setting socket options", errno), false;
+  }
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = index;
+  if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) < 0) {
+    return fail("bind", errno), false;
+  }
+  return true;
+}
+
+void CanSocket::wait(int wake_fd, nanoseconds until) noexcept {
+  const nanoseconds left = until - clock_now(CLOCK_MONOTONIC);
+  if (left <= nanoseconds{0}) return;
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
+  const timespec limit{static_cast<time_t>(seconds.count()),
+                       static_cast<long>((left - seconds).count())};
+  // poll skips negative descriptors, so a closed socket just sleeps.
+  std::array<pollfd, 2> watched{pollfd{socket_, POLLIN, 0}, pollfd{wake_fd, POLLIN, 0}};
+  ::ppoll(watched.data(), watched.size(), &limit, nullptr);
+}
+
+std::span<const CanFrame> CanSocket::receive() {
+  received_.clear();
+  if (!is_open()) return {};
+  buffers_->prepare();
+  const int count =
+      ::recvmmsg(socket_, buffers_->messages.data(), batch_max, MSG_DONTWAIT, nullptr);
+  if (count < 0) {
+    if (errno != EAGAIN && errno != EINTR) fail("receiving", errno);
+    return {};
+  }
+  const nanoseconds realtime = clock_now(CLOCK_REALTIME);
+  const nanoseconds monotonic = clock_now(CLOCK_MONOTONIC);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const can_frame& raw = buffers_->frames[i];
+    if (buffers_->messages[i].msg_len != CAN_MTU) continue;
+    const std::optional<nanoseconds> stamp = read_control(buffers_->messages[i].msg_hdr);
+    const CanFrame frame =
+        to_frame(raw, stamp ? monotonic_stamp(*stamp, realtime, monotonic) : monotonic);
+    if ((raw.can_id & CAN_ERR_FLAG) != 0) {
+      note_error_frame(raw.can_id & CAN_ERR_MASK, frame.payload());
+      continue;
+    }
+    if (bus_off_) error_.clear();
+    bus_off_ = false;
+    received_.push_back(frame);
+  }
+  return received_;
+}
+
+std::optional<nanoseconds> CanSocket::read_control(msghdr& header) {
+  std::optional<nanoseconds> stamp;
+  for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
+    if (part->cmsg_level != SOL_SOCKET) continue;
+    if (part->cmsg_type == SCM_TIMESTAMPNS) {
+      timespec time{};
+      std::memcpy(&time, CMSG_DATA(part), sizeof time);
+      stamp = to_nanoseconds(time);
+    } else if (part->cmsg_type == SO_RXQ_OVFL) {
+      std::uint32_t dropped = 0;
+      std::memcpy(&dropped, CMSG_DATA(part), sizeof dropped);
+      errors_.dropped += dropped - dropped_by_socket_;
+      dropped_by_socket_ = dropped;
+    }
+  }
+  return stamp;
+}
+
+void CanSocket::note_error_frame(std::uint32_t error_class, std::span<const std::uint8_t> data) {
+  ++errors_.error_frames;
+  if ((error_class & CAN_ERR_BUSOFF) != 0) {
+    ++errors_.bus_off;
+    bus_off_ = true;
+    error_ = interface_ + ": bus-off";
+  }
+  if ((error_class & CAN_ERR_RESTARTED) != 0) {
+    ++errors_.restarted;
+    bus_off_ = false;
+    error_.clear();
+  }
+  if ((error_class & CAN_ERR_CRTL) == 0 || data.size() < 2) return;
+  if ((data[1] & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
+    ++errors_.error_passive;
+    if (!bus_off_) error_ = interface_ + ": error passive";
+  }
+  if ((data[1] & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
+    ++errors_.error_warning;
+  }
+  if ((data[1] & CAN_ERR_CRTL_ACTIVE) != 0 && !bus_off_) error_.clear();
+}
+
+bool CanSocket::send(const CanFrame& frame) {
+  if (!is_open()) return false;
+  can_frame raw{};
+  raw.can_id = frame.id.id | (frame.id.extended ? CAN_EFF_FLAG : 0u);
+  raw.len = static_cast<std::uint8_t>(frame.size);
+  std::copy_n(frame.data.begin(), frame.size, std::begin(raw.data));
+  const ssize_t sent = ::send(socket_, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent == static_cast<ssize_t>(sizeof raw)) return true;
+  // A full queue (bus-off, nobody acknowledges) is a failed write, not a lost link.
+  if (errno == EAGAIN || errno == ENOBUFS) {
+    error_ = interface_ + ": sending: " + said(errno);
+  } else {
+    fail("sending", errno);
+  }
+  return false;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,110 @@
+/// A SocketCAN raw socket that filters in the kernel, stamps what it receives and can be reopened.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/can/signal_codec.hpp"
+
+struct msghdr;
+
+namespace thermocomp {
+
+using std::chrono::nanoseconds;
+
+struct CanId {
+  std::uint32_t id{0};  ///< 11 or 29 bits
+  bool extended{false};
+  auto operator<=>(const CanId&) const = default;
+};
+
+struct CanFrame {
+  CanId id;
+  std::size_t size{0};  ///< bytes of data, 0..8
+  std::array<std::uint8_t, can_bytes_max> data{};
+  nanoseconds received_at{};  ///< CLOCK_MONOTONIC
+  [[nodiscard]] std::span<const std::uint8_t> payload() const noexcept {
+    return {data.data(), size};
+  }
+};
+
+/// What error frames and the kernel told since the object was made.
+struct CanErrors {
+  std::uint64_t error_frames{0};
+  std::uint64_t bus_off{0};
+  std::uint64_t error_passive{0};
+  std::uint64_t error_warning{0};
+  std::uint64_t restarted{0};
+  std::uint64_t dropped{0};  ///< frames the kernel threw away because the socket's queue was full
+};
+
+/// Whether CAN sockets exist on this system at all. Empty: they do; else what the kernel says.
+[[nodiscard]] std::string can_unavailable();
+
+/// Monotonic time of an event stamped with the wall clock: now less its age, and never in the
+/// future nor more than 1 s ago, so that a step of the wall clock cannot make a reading fresh
+/// for ever or stale at once.
+[[nodiscard]] nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now,
+                                          nanoseconds monotonic_now) noexcept;
+
+/// One bus seen through one socket; used by one thread. Trouble is data: no method throws after
+/// construction (but for memory), a lost link closes the socket and error() says why.
+class CanSocket {
+ public:
+  static constexpr std::size_t filters_max = 512;  ///< the kernel's CAN_RAW_FILTER_MAX
+  static constexpr std::size_t batch_max = 64;     ///< frames of one receive()
+
+  /// @param wanted  identifiers to receive; the kernel drops all others. Duplicates are joined.
+  /// @throws InvalidValue for more than filters_max identifiers or an impossible interface name
+  CanSocket(std::string interface, std::vector<CanId> wanted);
+  CanSocket(const CanSocket&) = delete;
+  CanSocket& operator=(const CanSocket&) = delete;
+  ~CanSocket();
+
+  /// Opens and binds; an interface that is missing or down is refused. @return success
+  bool open();
+  void close() noexcept;
+  [[nodiscard]] bool is_open() const noexcept { return socket_ >= 0; }
+
+  /// Sleeps until something arrived, `wake_fd` became readable (-1: none) or the time has come.
+  void wait(int wake_fd, nanoseconds until) noexcept;
+  /// What has arrived, without waiting, at most batch_max frames; valid until the next call.
+  /// Error frames are counted and not handed out. Closes itself when the link is lost.
+  [[nodiscard]] std::span<const CanFrame> receive();
+  /// @return false when the kernel did not take the frame; the link may be lost then
+  bool send(const CanFrame& frame);
+
+  [[nodiscard]] const CanErrors& errors() const noexcept { return errors_; }
+  /// The controller chip has left the bus and not come back: neither frames nor a restart since.
+  [[nodiscard]] bool bus_off() const noexcept { return bus_off_; }
+  /// Why the last open(), receive() or send() failed, or what the bus suffers from; else empty.
+  [[nodiscard]] const std::string& error() const noexcept { return error_; }
+
+ private:
+  struct Buffers;
+
+  bool configure();
+  void fail(const char* what, int code);
+  /// The kernel's time stamp beside a frame; notes its count of dropped frames too.
+  std::optional<nanoseconds> read_control(msghdr& header);
+  void note_error_frame(std::uint32_t error_class, std::span<const std::uint8_t> data);
+
+  std::string interface_;
+  std::vector<CanId> wanted_;
+  int socket_{-1};
+  bool bus_off_{false};
+  std::string error_;
+  CanErrors errors_;
+  std::uint32_t dropped_by_socket_{0};  ///< the kernel's counter, which starts with the socket
+  std::unique_ptr<Buffers> buffers_;
+  std::vector<CanFrame> received_;
+};
+
+}  // namespace thermocomp
