@@ -1,9 +1,7 @@
 #include "config/toml_reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -12,6 +10,8 @@
 #include <sstream>
 
 #include <toml++/toml.h>
+
+#include "config/number_text.hpp"
 
 namespace thermocomp {
 namespace {
@@ -40,12 +40,6 @@ std::string shortened(std::string text) {
   };
   while (end > 0 && continues(end)) --end;
   return text.substr(0, end) + " ...";
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> buffer{};
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
-  return {buffer.data(), end};
 }
 
 /// Appends the value as a person would write it on one line, and stops when that is long enough.
@@ -158,7 +152,9 @@ std::optional<double> number_in(const toml::node& node, const Range& range, std:
     rule = "must be a number";
     return std::nullopt;
   }
-  const double value = node.value<double>().value_or(std::nan(""));
+  const auto* integer = node.as_integer();
+  const double value =
+      integer != nullptr ? static_cast<double>(integer->get()) : node.as_floating_point()->get();
   if (range.contains(value)) return value;
   rule = std::isfinite(value) ? range.rule() : "must be a finite number";
   return std::nullopt;

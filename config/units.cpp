@@ -1,5 +1,6 @@
 #include "config/units.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace thermocomp {
@@ -50,6 +51,15 @@ bool is_output(std::string_view column) {
 bool is_operating(std::string_view column) {
   const QuantityKind kind = kind_of(column);
   return kind == QuantityKind::position || kind == QuantityKind::signal;
+}
+
+bool is_column_name(std::string_view name) {
+  if (name.empty() || name.front() == ' ' || name.back() == ' ' || name.front() == '#')
+    return false;
+  const auto bad = [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == ',' || c == '"' || c == '|';
+  };
+  return std::none_of(name.begin(), name.end(), bad);
 }
 
 }  // namespace thermocomp

@@ -29,4 +29,10 @@ struct Unit {
 /// Position or operating signal: what a controller reports.
 [[nodiscard]] bool is_operating(std::string_view column);
 
+/// Whether a column can be called so in a run file: printable UTF-8 without blanks at the ends,
+/// without comma, quote, `|` (which joins two subjects) and `#` at the start.
+[[nodiscard]] bool is_column_name(std::string_view name);
+inline constexpr std::string_view column_name_rule =
+    "a column's name must be printable, without comma, quote, |, a blank at an end, # at the start";
+
 }  // namespace thermocomp

@@ -1,0 +1,242 @@
+#include "config/model_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <Eigen/Eigenvalues>
+
+#include "config/toml_reader.hpp"
+#include "config/units.hpp"
+
+namespace thermocomp {
+namespace {
+
+using Rows = std::vector<std::vector<double>>;
+
+constexpr std::size_t inputs_max = 512;
+constexpr std::size_t outputs_max = 64;
+/// What rounding may do to a covariance that was computed and written down.
+constexpr double covariance_tolerance = 1e-9;
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
+  return text;
+}
+
+/// @return whether it is a list of usable names (duplicates are a problem, but names)
+bool read_names(const TomlTable& root, std::string_view key, std::size_t count_max,
+                bool (*right_unit)(std::string_view), std::string_view unit_rule,
+                std::vector<std::string>& names) {
+  names = root.texts(key);
+  if (names.empty()) {
+    if (root.has(key)) root.problem(key, "must name at least one column");
+    return false;
+  }
+  if (names.size() > count_max) {
+    root.problem(key, std::to_string(names.size()) + " names",
+                 "must be at most " + std::to_string(count_max));
+  }
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    if (name.empty()) continue;  // a problem already
+    if (!is_column_name(name)) root.problem(key, name, column_name_rule);
+    if (!right_unit(name)) root.problem(key, name, unit_rule);
+    if (!seen.insert(name).second) root.problem(key, name, "is named twice");
+  }
+  return !contains(names, "");
+}
+
+void read_reference(const TomlTable& root, ThermalModel& model) {
+  if (root.is_text("reference")) {
+    if (root.text("reference") != "first_sample") {
+      root.problem("reference", "must be \"first_sample\" or a list of numbers, one an input");
+    }
+    return;
+  }
+  model.reference_degC = root.numbers("reference");
+  const std::size_t count = model.reference_degC.size();
+  if (root.has("reference") && count != model.inputs.size()) {
+    root.problem("reference", std::to_string(count) + " values",
+                 "must be \"first_sample\" or have one value an input (" +
+                     std::to_string(model.inputs.size()) + ")");
+  }
+}
+
+void read_guideway_rows(const TomlTable& table, const ThermalModel& model, GuidewaySpec& guideway) {
+  const TomlTable rows = table.table("rows_um_per_K");
+  const std::vector<std::string> outputs = rows.keys();
+  if (rows && outputs.empty()) table.problem("rows_um_per_K", "must name at least one output");
+  for (const std::string& output : outputs) {
+    if (!contains(model.outputs, output)) {
+      rows.problem(output, "must be one of the outputs: " + listed(model.outputs));
+      continue;
+    }
+    guideway.rows_um_per_K[output] =
+        rows.matrix(output, guideway.positions_mm.size(), model.inputs.size());
+  }
+}
+
+GuidewaySpec read_guideway(const TomlTable& table, const std::string& name,
+                           const ThermalModel& model) {
+  GuidewaySpec guideway;
+  guideway.name = name;
+  guideway.axis = table.text("axis");
+  if (!guideway.axis.empty() && kind_of(guideway.axis) != QuantityKind::position) {
+    table.problem("axis", "must be a position, a column *_mm");
+  }
+  guideway.positions_mm = table.numbers("positions_mm");
+  const std::vector<double>& at = guideway.positions_mm;
+  if (table.has("positions_mm") && at.size() < 2) {
+    table.problem("positions_mm", "must have at least two positions");
+  }
+  if (std::adjacent_find(at.begin(), at.end(), std::greater_equal<>()) != at.end()) {
+    table.problem("positions_mm", "must be strictly increasing");
+  }
+  read_guideway_rows(table, model, guideway);
+  return guideway;
+}
+
+void check_subject(const TomlTable& table, const TermKind& kind, const std::string& subject,
+                   const ThermalModel& model) {
+  if (subject.empty()) return;  // a problem already
+  const bool is_input = contains(model.inputs, subject);
+  if (kind.subject == TermSubject::model_temperature && !is_input) {
+    table.problem("subject", "must be one of the inputs: " + listed(model.inputs));
+  }
+  if (kind.subject == TermSubject::other_temperature && (is_input || !is_temperature(subject))) {
+    table.problem("subject", "must be a temperature (*_degC, *_K) that is not among the inputs");
+  }
+  if (kind.subject == TermSubject::signal && (is_input || !is_operating(subject))) {
+    table.problem("subject", "must be an operating signal or a position, not a temperature");
+  }
+  if (!is_column_name(subject)) table.problem("subject", column_name_rule);
+}
+
+void read_parameter(const TomlTable& table, const TermParameter& parameter,
+                    const ThermalModel& model, TermSpec& term) {
+  const Range range = Range::between(parameter.min, parameter.max);
+  if (!parameter.per_output) {
+    if (parameter.whole_number) {
+      const auto low = static_cast<std::int64_t>(parameter.min);
+      const auto high = static_cast<std::int64_t>(parameter.max);
+      term.shared[parameter.name] = static_cast<double>(table.integer(parameter.name, low, high));
+    } else {
+      term.shared[parameter.name] = table.number(parameter.name, range);
+    }
+    return;
+  }
+  const TomlTable outputs = table.table(parameter.name);
+  const std::vector<std::string> named = outputs.keys();
+  if (outputs && named.empty()) table.problem(parameter.name, "must name at least one output");
+  for (const std::string& output : named) {
+    if (!contains(model.outputs, output)) {
+      outputs.problem(output, "must be one of the outputs: " + listed(model.outputs));
+      continue;
+    }
+    term.per_output[parameter.name][output] = outputs.number(output, range);
+  }
+}
+
+TermSpec read_term(const TomlTable& table, const ThermalModel& model) {
+  TermSpec term;
+  term.kind = table.text("kind");
+  term.subject = table.text("subject");
+  const TermKind* kind = find_term_kind(term.kind);
+  if (kind == nullptr) {
+    std::vector<std::string> names;
+    for (const TermKind& known : term_kinds()) names.push_back(known.name);
+    if (!term.kind.empty()) table.problem("kind", "must be one of: " + listed(names));
+    table.ignore_rest();
+    return term;
+  }
+  check_subject(table, *kind, term.subject, model);
+  for (const TermParameter& parameter : kind->parameters) {
+    read_parameter(table, parameter, model, term);
+  }
+  return term;
+}
+
+void check_covariance(const TomlTable& table, const Rows& rows) {
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd matrix(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      matrix(i, j) = rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    }
+  }
+  const double largest = matrix.cwiseAbs().maxCoeff();
+  if (!((matrix - matrix.transpose()).cwiseAbs().maxCoeff() <= covariance_tolerance * largest)) {
+    table.problem("matrix_K2", "must be symmetric");
+    return;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix, Eigen::EigenvaluesOnly);
+  const double smallest = solver.eigenvalues().minCoeff();
+  if (!(smallest >= -covariance_tolerance * largest * static_cast<double>(n))) {
+    table.problem("matrix_K2", "must be positive semidefinite");
+  }
+}
+
+void read_covariance(const TomlTable& root, ThermalModel& model) {
+  if (!root.has("covariance")) return;
+  const TomlTable table = root.table("covariance");
+  model.covariance_K2 = table.matrix("matrix_K2", model.inputs.size(), model.inputs.size());
+  if (!model.covariance_K2.empty()) check_covariance(table, model.covariance_K2);
+}
+
+/// @return whether the names could be read
+bool read_model(const TomlDocument& document, ThermalModel& model) {
+  const TomlTable root = document.root();
+  static_cast<void>(root.integer("format", 1, 1));
+  const bool inputs_known = read_names(root, "inputs", inputs_max, is_temperature,
+                                       "must be a temperature (*_degC, *_K)", model.inputs);
+  const bool outputs_known =
+      read_names(root, "outputs", outputs_max, is_output,
+                 "must be a displacement (*_um) or a tilt (*_urad)", model.outputs);
+  if (!inputs_known || !outputs_known) {
+    root.ignore_rest();  // no shape can be judged
+    return false;
+  }
+  read_reference(root, model);
+  model.matrix_um_per_K = root.matrix("matrix_um_per_K", model.outputs.size(), model.inputs.size());
+  const TomlTable guideways = root.table_or_empty("guideway");
+  for (const std::string& name : guideways.keys()) {
+    model.guideways.push_back(read_guideway(guideways.table(name), name, model));
+  }
+  for (const TomlTable& term : root.tables("term")) {
+    model.terms.push_back(read_term(term, model));
+  }
+  read_covariance(root, model);
+  return true;
+}
+
+}  // namespace
+
+ModelReading read_model_text(const std::string& text, const std::string& name) {
+  ModelReading reading;
+  try {
+    const TomlDocument document = TomlDocument::from_text(text, name);
+    reading.names_known = read_model(document, reading.model);
+    reading.problems = document.all_problems();
+  } catch (const ConfigurationError& error) {  // not TOML at all
+    reading.problems = error.problems();
+  }
+  return reading;
+}
+
+ThermalModel parse_model(const std::string& text, const std::string& name) {
+  ModelReading reading = read_model_text(text, name);
+  if (!reading.problems.empty()) throw ConfigurationError(std::move(reading.problems));
+  return std::move(reading.model);
+}
+
+ThermalModel load_model(const std::filesystem::path& path) {
+  return parse_model(read_text_file(path), path.string());
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,263 @@
+#include "config/run_file.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <set>
+
+#include "config/number_text.hpp"
+#include "config/toml_reader.hpp"
+#include "config/units.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr std::size_t problems_max = 100;
+
+std::string_view trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+bool is_missing(std::string_view field) {
+  return field.empty() || field == "nan" || field == "NaN" || field == "NAN";
+}
+
+/// @return nullopt unless all of `field` is one finite decimal number
+std::optional<double> finite_number(std::string_view field) {
+  if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (error != std::errc{} || end != field.data() + field.size()) return std::nullopt;
+  return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+/// Takes the part before the next separator off `rest`; false when nothing is left.
+bool take(std::string_view& rest, char separator, std::string_view& part) {
+  if (rest.data() == nullptr) return false;
+  const auto end = rest.find(separator);
+  part = rest.substr(0, end);
+  rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
+  return true;
+}
+
+class RunParser {
+ public:
+  RunParser(std::string_view text, const std::string& name) : rest_(text) {
+    run_.name = name;
+    constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+    if (rest_.starts_with(byte_order_mark)) rest_.remove_prefix(byte_order_mark.size());
+  }
+
+  RunFile parse() {
+    std::string_view line;
+    while (next_line(line)) {
+      if (run_.columns.empty()) {
+        read_header(line);
+        if (!problems_.empty()) break;  // no row can be judged
+      } else if (!blank_to_the_end(line)) {
+        read_row(line);
+      }
+      if (problems_.size() >= problems_max) break;
+    }
+    if (problems_.empty() && run_.columns.empty()) add(0, "", "", "has no header row");
+    if (problems_.empty() && run_.rows() == 0) add(0, "", "", "has no row of data");
+    if (!problems_.empty()) throw ConfigurationError(std::move(problems_));
+    return std::move(run_);
+  }
+
+ private:
+  void add(int line, std::string key, std::string_view value, std::string rule) {
+    constexpr std::size_t shown_max = 40;
+    std::string shown(value.substr(0, shown_max));
+    if (value.size() > shown_max) shown += " ...";
+    problems_.push_back({run_.name, line, std::move(key), std::move(shown), std::move(rule)});
+  }
+
+  /// The next line that is no comment.
+  bool next_line(std::string_view& line) {
+    while (!rest_.empty()) {
+      ++line_number_;
+      take(rest_, '\n', line);
+      if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+      if (!line.starts_with('#')) return true;
+    }
+    return false;
+  }
+
+  /// Empty lines are allowed where nothing but empty lines follows.
+  [[nodiscard]] bool blank_to_the_end(std::string_view line) const {
+    return trimmed(line).empty() && rest_.find_first_not_of(" \t\r\n") == std::string_view::npos &&
+           run_.columns.size() > 1;
+  }
+
+  void read_header(std::string_view line) {
+    std::set<std::string> seen;
+    std::string_view rest = line;
+    std::string_view field;
+    int position = 0;
+    while (take(rest, ',', field)) {
+      ++position;
+      const std::string name(trimmed(field));
+      const std::string where = "column " + std::to_string(position);
+      if (name.find('"') != std::string::npos) {
+        add(line_number_, where, name, "must not be quoted");
+      } else if (!is_column_name(name)) {
+        add(line_number_, where, name.empty() ? "(empty)" : name, std::string(column_name_rule));
+      } else if (!seen.insert(name).second) {
+        add(line_number_, where, name, "is there twice");
+      }
+      run_.columns.push_back(name);
+    }
+    if (finite_number(run_.columns.front())) {
+      problems_.clear();
+      add(line_number_, "", line, "must be the header row, names of columns");
+      return;
+    }
+    time_ = run_.find("time_s");
+    if (!time_) add(line_number_, "time_s", "(missing)", "must be one of the columns");
+    run_.values.resize(run_.columns.size());
+    const auto rows = static_cast<std::size_t>(std::count(rest_.begin(), rest_.end(), '\n')) + 1;
+    for (auto& column : run_.values) column.reserve(rows);
+  }
+
+  void read_row(std::string_view line) {
+    const auto fields = static_cast<std::size_t>(std::count(line.begin(), line.end(), ',')) + 1;
+    if (fields != run_.columns.size()) {
+      add(line_number_, "", std::to_string(fields) + " fields",
+          "must have " + std::to_string(run_.columns.size()) + ", as the header");
+      return;
+    }
+    std::string_view rest = line;
+    std::string_view field;
+    for (std::size_t i = 0; i < run_.columns.size(); ++i) {
+      take(rest, ',', field);
+      run_.values[i].push_back(value_of(trimmed(field), run_.columns[i]));
+    }
+    check_time();
+  }
+
+  double value_of(std::string_view field, const std::string& column) {
+    if (is_missing(field)) return std::numeric_limits<double>::quiet_NaN();
+    if (const auto number = finite_number(field)) return *number;
+    const bool has_quote = field.find('"') != std::string_view::npos;
+    add(line_number_, column, field,
+        has_quote ? "must not be quoted" : "must be a finite number, empty or nan");
+    bad_time_ = bad_time_ || column == "time_s";
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+
+  void check_time() {
+    const double time_s = run_.values[*time_].back();
+    if (std::isnan(time_s)) {
+      if (!bad_time_) add(line_number_, "time_s", "(missing)", "must not be missing");
+      bad_time_ = false;
+      return;
+    }
+    if (last_time_s_ && !(time_s > *last_time_s_)) {
+      add(line_number_, "time_s", number_text(time_s),
+          "must be greater than in the row before (" + number_text(*last_time_s_) + ")");
+    }
+    last_time_s_ = time_s;
+  }
+
+  std::string_view rest_;
+  int line_number_{0};
+  RunFile run_;
+  std::optional<std::size_t> time_;
+  std::optional<double> last_time_s_;
+  bool bad_time_{false};  ///< the row's time has its problem already
+  std::vector<Problem> problems_;
+};
+
+void select(RunFile& run, const RunSelection& selection) {
+  const std::vector<double>& time_s = run.time_s();
+  const auto row = [&](double time) {
+    return static_cast<std::size_t>(std::lower_bound(time_s.begin(), time_s.end(), time) -
+                                    time_s.begin());
+  };
+  run.selected_begin = row(selection.from_s);
+  run.selected_end = row(selection.to_s);
+  if (run.selected_begin >= run.selected_end) {
+    throw ConfigurationError(
+        {{run.name, 0, "selection",
+          number_text(selection.from_s) + ":" + number_text(selection.to_s),
+          "selects no row; the file has time_s from " + number_text(time_s.front()) + " to " +
+              number_text(time_s.back())}});
+  }
+}
+
+}  // namespace
+
+RunSelection parse_selection(std::string_view argument) {
+  RunSelection selection;
+  const auto at = argument.rfind('@');
+  const auto colon = argument.rfind(':');
+  if (at == std::string_view::npos || colon == std::string_view::npos || colon < at) {
+    selection.file = argument;
+    if (argument.empty()) throw ConfigurationError({{"", 0, "file", "(empty)", "must be named"}});
+    return selection;
+  }
+  selection.file = argument.substr(0, at);
+  const auto refuse = [&](const std::string& rule) {
+    throw ConfigurationError({{"", 0, "selection", std::string(argument), rule}});
+  };
+  if (selection.file.empty()) refuse("must be FILE@T0:T1, and the file is not named");
+  const auto bound = [&](std::string_view text, double& value) {
+    if (text.empty()) return;
+    const auto number = finite_number(text);
+    if (!number) refuse("must be FILE@T0:T1 with T0 and T1 numbers [s] or left out");
+    value = number.value_or(value);
+  };
+  bound(argument.substr(at + 1, colon - at - 1), selection.from_s);
+  bound(argument.substr(colon + 1), selection.to_s);
+  if (!(selection.from_s < selection.to_s)) refuse("T0 must be below T1");
+  return selection;
+}
+
+std::optional<std::size_t> RunFile::find(std::string_view column_name) const {
+  const auto found = std::find(columns.begin(), columns.end(), column_name);
+  if (found == columns.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - columns.begin());
+}
+
+const std::vector<double>& RunFile::column(std::string_view column_name) const {
+  const auto index = find(column_name);
+  if (!index) {
+    throw ConfigurationError(
+        {{this->name, 0, std::string(column_name), "(missing)", "must be one of the columns"}});
+  }
+  return values[*index];
+}
+
+RunFile parse_run(std::string_view text, const std::string& name, const RunSelection& selection) {
+  RunFile run = RunParser(text, name).parse();
+  select(run, selection);
+  return run;
+}
+
+RunFile load_run(const RunSelection& selection) {
+  return parse_run(read_text_file(selection.file), selection.file.string(), selection);
+}
+
+std::string write_run(const RunFile& run) {
+  std::string text;
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    if (i > 0) text += ',';
+    text += run.columns[i];
+  }
+  text += '\n';
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    for (std::size_t i = 0; i < run.columns.size(); ++i) {
+      if (i > 0) text += ',';
+      const double value = run.values[i][row];
+      if (!std::isnan(value)) append_number(text, value);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,54 @@
+/// Run files: measured or simulated data, CSV with one header row; the unit is in the column's name
+/// (config/units.hpp). An empty field or `nan` is a missing value. One file is one run.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/problems.hpp"
+
+namespace thermocomp {
+
+/// `FILE@T0:T1`: the rows with `from_s <= time_s < to_s`.
+struct RunSelection {
+  std::filesystem::path file;
+  double from_s{-std::numeric_limits<double>::infinity()};
+  double to_s{std::numeric_limits<double>::infinity()};
+};
+
+/// `FILE`, `FILE@T0:T1`, `FILE@T0:`, `FILE@:T1`. An `@` that no `:` follows belongs to the name.
+/// @throws ConfigurationError when a bound is no number or T0 < T1 does not hold
+[[nodiscard]] RunSelection parse_selection(std::string_view argument);
+
+/// A whole run, column by column. References and the states of lags start at row 0, whatever is
+/// selected; results are for the rows [selected_begin, selected_end).
+struct RunFile {
+  std::string name;                         ///< the file, for messages
+  std::vector<std::string> columns;         ///< order of the header, time_s among them
+  std::vector<std::vector<double>> values;  ///< shape (columns, rows); NaN: missing
+  std::size_t selected_begin{0};
+  std::size_t selected_end{0};
+
+  [[nodiscard]] std::size_t rows() const noexcept { return values.empty() ? 0 : values[0].size(); }
+  [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
+  /// @throws ConfigurationError naming the file when there is no such column
+  [[nodiscard]] const std::vector<double>& column(std::string_view name) const;
+  [[nodiscard]] const std::vector<double>& time_s() const { return column("time_s"); }
+};
+
+/// At least one row; time_s present and strictly increasing. A selection without rows is refused.
+/// @throws ConfigurationError with every problem (the first 100), each with line, column and rule
+[[nodiscard]] RunFile load_run(const RunSelection& selection);
+/// @param name stands for the file in problems; `selection.file` is not looked at
+[[nodiscard]] RunFile parse_run(std::string_view text, const std::string& name,
+                                const RunSelection& selection = {});
+
+/// All rows as a run file, every number bit for bit; missing values are empty fields.
+[[nodiscard]] std::string write_run(const RunFile& run);
+
+}  // namespace thermocomp
