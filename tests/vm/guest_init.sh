@@ -1,0 +1,32 @@
+#!/bin/sh
+# First process of the guest that run_in_vm.sh boots. The root file system is the host's own
+# (hostfs). VM_RUN, from the kernel's command line, is the folder that holds the file `command`
+# and takes `stdout`, `stderr`, `started` and `status`. Not to be run by hand.
+export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
+mount -t proc proc /proc
+mount -t sysfs sysfs /sys
+mountpoint -q /dev || mount -t devtmpfs dev /dev
+mkdir -p /dev/shm /dev/pts
+mount -t tmpfs tmpfs /dev/shm
+mount -t devpts devpts /dev/pts
+mount -t tmpfs tmpfs /run
+
+modules=/usr/lib/uml/modules/$(uname -r)/kernel
+for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/can-dev \
+              drivers/net/can/vcan; do
+  insmod "$modules/$module.ko" || echo "guest: insmod $module failed"
+done
+ip link set lo up
+for interface in vcan0 vcan1; do
+  ip link add dev "$interface" type vcan && ip link set "$interface" up
+done
+# Real-time threads may use the whole CPU, as on a machine set up for them.
+sysctl -q kernel.sched_rt_runtime_us=-1
+
+: > "$VM_RUN/started"
+bash "$VM_RUN/command" > "$VM_RUN/stdout" 2> "$VM_RUN/stderr"
+echo $? > "$VM_RUN/status.part"
+mv "$VM_RUN/status.part" "$VM_RUN/status"
+sync
+echo o > /proc/sysrq-trigger
+while :; do sleep 1; done
