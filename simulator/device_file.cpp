@@ -1,0 +1,466 @@
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "drivers/can/signal_codec.hpp"
+#include "drivers/modbus/register_codec.hpp"
+#include "estimator/checks.hpp"
+#include "simulator/machine_file_parts.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr double large = 1e9;
+
+const Names<ModbusTable> table_names{{"coil", ModbusTable::coil},
+                                     {"discrete_input", ModbusTable::discrete_input},
+                                     {"holding", ModbusTable::holding},
+                                     {"input", ModbusTable::input}};
+const Names<Encoding> encoding_names{
+    {"int16", Encoding::int16},   {"uint16", Encoding::uint16},   {"int32", Encoding::int32},
+    {"uint32", Encoding::uint32}, {"float32", Encoding::float32}, {"float64", Encoding::float64}};
+const Names<WordOrder> order_names{{"ABCD", WordOrder::abcd},
+                                   {"DCBA", WordOrder::dcba},
+                                   {"BADC", WordOrder::badc},
+                                   {"CDAB", WordOrder::cdab}};
+
+/// Which words of a unit's tables, or bits of a frame, are taken: two values must not share any.
+class Occupied {
+ public:
+  /// @return whether all of them were free; takes them
+  bool take(int unit, ModbusTable table, std::size_t address, std::size_t count) {
+    bool free = true;
+    for (std::size_t i = 0; i < count; ++i) {
+      free = words_.insert({unit, static_cast<int>(table), address + i}).second && free;
+    }
+    return free;
+  }
+  bool take(const CanSignal& signal) {
+    std::uint64_t& bits = frames_[{signal.id, signal.extended_id}];
+    const bool free = (bits & bits_of(signal)) == 0;
+    bits |= bits_of(signal);
+    return free;
+  }
+
+ private:
+  std::set<std::tuple<int, int, std::size_t>> words_;
+  std::map<std::pair<std::uint32_t, bool>, std::uint64_t> frames_;
+};
+
+SimulatedBus read_link(const TomlTable& table, SimulatedBusKind kind) {
+  SimulatedBus bus;
+  bus.kind = kind;
+  switch (kind) {
+    case SimulatedBusKind::modbus_tcp:
+      bus.host = table.text("host", bus.host);
+      bus.port = table.integer("port", 0, 65535, 0);
+      break;
+    case SimulatedBusKind::modbus_rtu:
+      bus.device = table.text("device");
+      bus.baud = table.integer("baud", 300, 4'000'000, bus.baud);
+      bus.line_delay = table.flag("line_delay", false);
+      break;
+    case SimulatedBusKind::can:
+      bus.interface = table.text("interface");
+      return bus;
+  }
+  bus.turnaround_ms = table.number("turnaround_ms", Range::between(0.0, 10000.0), 0.0);
+  return bus;
+}
+
+const Names<SimulatedBusKind> bus_kind_names{{"modbus_tcp", SimulatedBusKind::modbus_tcp},
+                                             {"modbus_rtu", SimulatedBusKind::modbus_rtu},
+                                             {"can", SimulatedBusKind::can}};
+
+/// A value's place in registers; what the table leaves out comes from `defaults`.
+ModbusValue read_place(const TomlTable& table, const ModbusValue& defaults) {
+  ModbusValue value;
+  value.table = table.choice("table", table_names, defaults.table);
+  value.address = table.integer<std::uint16_t>("address", 0, 65535);
+  value.encoding = table.choice("encoding", encoding_names, defaults.encoding);
+  value.word_order = table.choice("word_order", order_names, defaults.word_order);
+  value.scale = table.number("scale", Range::between(-1e6, 1e6), defaults.scale);
+  if (value.scale == 0.0) table.problem("scale", "must not be 0");
+  const std::size_t words = words_of(value.table, value.encoding);
+  if (value.address + words > 65536) table.problem("address", "has its last register beyond 65535");
+  return value;
+}
+
+CanSignal read_can(const TomlTable& table) {
+  CanSignal signal;
+  signal.id = table.integer<std::uint32_t>("id", 0, 0x1FFFFFFF);
+  signal.extended_id = table.flag("extended_id", signal.extended_id);
+  signal.start_bit = table.integer("start_bit", 0, 63);
+  signal.length_bits = table.integer("length_bits", 1, 64, signal.length_bits);
+  signal.byte_order = table.choice<ByteOrder>(
+      "byte_order",
+      {{"little_endian", ByteOrder::little_endian}, {"big_endian", ByteOrder::big_endian}},
+      signal.byte_order);
+  signal.is_signed = table.flag("signed", signal.is_signed);
+  signal.is_float = table.flag("float", signal.is_float);
+  signal.scale = table.number("scale", Range::between(-1e6, 1e6), signal.scale);
+  signal.offset = table.number("offset", Range::between(-1e6, 1e6), signal.offset);
+  try {
+    check(signal);
+  } catch (const InvalidValue& error) {
+    table.problem(error.key(), error.value(), error.rule());
+    return CanSignal{};
+  }
+  return signal;
+}
+
+std::optional<std::int64_t> read_open_circuit_code(const TomlTable& table) {
+  const auto codes = table.integers("open_circuit_codes", -4294967296LL, 4294967295LL,
+                                    std::vector<std::int64_t>{});
+  if (codes.size() > 1) table.problem("open_circuit_codes", "must be the one code that is shown");
+  return codes.empty() ? std::nullopt : std::optional(codes.front());
+}
+
+ModbusStatus read_status(const TomlTable& table, ModbusTable otherwise) {
+  ModbusStatus status;
+  status.table = table.choice("table", table_names, otherwise);
+  status.address = table.integer<std::uint16_t>("address", 0, 65535);
+  const bool bit = is_bit_table(status.table);
+  if (bit) {
+    table.refuse("open_circuit_codes", "must not stand with a bit, which is 1 at a fault");
+  }
+  const auto codes =
+      bit ? std::vector<std::int64_t>{1} : table.integers("open_circuit_codes", 1, 65535, {1});
+  if (codes.size() != 1) table.problem("open_circuit_codes", "must be the one code that is shown");
+  if (!codes.empty()) status.codes.push_back({codes.front(), Fault::open_circuit});
+  return status;
+}
+
+/// What is gathered while the file is read.
+struct Draft {
+  MachineConfig& machine;
+  NameList buses;
+  NameList devices;
+  NameList channels;
+  std::vector<std::pair<std::size_t, std::size_t>> channel_places;  ///< device, channel in it
+  std::vector<std::string> columns;                                 ///< of the plant
+  std::map<std::size_t, Occupied> occupied;                         ///< by bus
+};
+
+/// The register keys that a device gives its channels as defaults.
+struct DeviceDefaults {
+  ModbusValue place;
+  double offset_degC{0.0};
+  std::optional<std::int64_t> code;
+};
+
+void check_column(const Draft& state, const TomlTable& table, std::string_view key,
+                  const std::string& column) {
+  if (!state.machine.plant) return;  // a replayed file has its own columns
+  const auto& columns = state.columns;
+  if (std::find(columns.begin(), columns.end(), column) != columns.end()) return;
+  std::string rule = "must be a column of the plant";
+  const std::string near = nearest_name(column, columns);
+  if (!near.empty()) rule += "; did you mean \"" + near + "\"?";
+  table.problem(key, rule);
+}
+
+void take(Draft& state, std::size_t bus, int unit, const ModbusValue& value,
+          const TomlTable& table) {
+  if (!state.occupied[bus].take(unit, value.table, value.address,
+                                words_of(value.table, value.encoding))) {
+    table.problem("address", "shares a register with another value of this unit");
+  }
+}
+
+void take(Draft& state, std::size_t bus, const CanSignal& signal, const TomlTable& table) {
+  if (!state.occupied[bus].take(signal)) {
+    table.problem("start_bit", "shares a bit with another value of this frame");
+  }
+}
+
+DeviceDefaults read_device(Draft& state, const TomlTable& table) {
+  DeviceDefaults defaults;
+  defaults.place.table = ModbusTable::input;
+  SimulatedDevice device;
+  device.name = state.devices.read(table);
+  device.bus = state.buses.index(table, "bus", "bus");
+  device.period_s = table.number("period_s", Range::between(0.001, 3600.0), device.period_s);
+  const bool can =
+      !state.machine.buses.empty() && state.machine.buses[device.bus].kind == SimulatedBusKind::can;
+  if (!can) {
+    device.unit = table.integer("unit", 0, 255);
+    const bool used = std::any_of(
+        state.machine.devices.begin(), state.machine.devices.end(),
+        [&](const auto& other) { return other.bus == device.bus && other.unit == device.unit; });
+    if (used) table.problem("unit", "is used by another device of this bus");
+    defaults.place.table = table.choice("table", table_names, defaults.place.table);
+    defaults.place.encoding = table.choice("encoding", encoding_names, defaults.place.encoding);
+    defaults.place.word_order = table.choice("word_order", order_names, WordOrder::abcd);
+    defaults.place.scale = table.number("scale", Range::between(-1e6, 1e6), 1.0);
+    if (defaults.place.scale == 0.0) table.problem("scale", "must not be 0");
+    defaults.offset_degC = table.number("offset_degC", Range::between(-1e6, 1e6), 0.0);
+    defaults.code = read_open_circuit_code(table);
+    if (table.has("renewal")) {
+      const TomlTable renewal = table.table("renewal");
+      ModbusValue value;
+      value.table = renewal.choice("table", table_names, ModbusTable::input);
+      value.address = renewal.integer<std::uint16_t>("address", 0, 65535);
+      device.renewal = ModbusRenewal{value.table, value.address};
+      take(state, device.bus, device.unit, value, renewal);
+    }
+  }
+  state.machine.devices.push_back(device);
+  return defaults;
+}
+
+void read_channel(Draft& state, const TomlTable& table,
+                  const std::vector<DeviceDefaults>& defaults) {
+  SimulatedChannel channel;
+  channel.name = state.channels.read(table);
+  const std::size_t index = state.devices.index(table, "device", "device");
+  channel.column = table.text("column", channel.name + "_degC");
+  check_column(state, table, table.has("column") ? "column" : "name", channel.column);
+  if (state.machine.devices.empty()) return table.ignore_rest();
+  SimulatedDevice& device = state.machine.devices[index];
+  state.channel_places.emplace_back(index, device.channels.size());
+  if (state.machine.buses[device.bus].kind == SimulatedBusKind::can) {
+    channel.can = read_can(table);
+    channel.open_circuit_code = read_open_circuit_code(table);
+    take(state, device.bus, channel.can, table);
+  } else {
+    channel.place = read_place(table, defaults[index].place);
+    channel.offset_degC =
+        table.number("offset_degC", Range::between(-1e6, 1e6), defaults[index].offset_degC);
+    channel.open_circuit_code =
+        table.has("open_circuit_codes") ? read_open_circuit_code(table) : defaults[index].code;
+    if (channel.open_circuit_code &&
+        !is_representable(*channel.open_circuit_code, channel.place.encoding)) {
+      table.problem("open_circuit_codes", std::to_string(*channel.open_circuit_code),
+                    "cannot be expressed in the channel's encoding");
+    }
+    take(state, device.bus, device.unit, channel.place, table);
+    if (table.has("status")) {
+      const TomlTable status = table.table("status");
+      channel.status = read_status(status, ModbusTable::discrete_input);
+      ModbusValue word;
+      word.table = channel.status->table;
+      word.address = channel.status->address;
+      take(state, device.bus, device.unit, word, status);
+    }
+  }
+  device.channels.push_back(channel);
+}
+
+/// Controllers: a value's place in registers or in frames.
+template <class Registers, class Frame>
+void read_value(Draft& state, const TomlTable& table, ModbusTable usual, std::size_t bus,
+                Registers& registers, Frame& frame) {
+  if (state.machine.controller->bus.kind == SimulatedBusKind::can) {
+    frame = read_can(table);
+    CanSignal signal = frame.value_or(CanSignal{});
+    take(state, bus, signal, table);
+    return;
+  }
+  ModbusValue defaults;
+  defaults.table = usual;
+  registers = read_place(table, defaults);
+  take(state, bus, state.machine.controller->unit, *registers, table);
+}
+
+void read_axis(Draft& state, const TomlTable& table, NameList& axes, std::size_t bus) {
+  SimulatedAxis axis;
+  axis.name = axes.read(table);
+  axis.output = table.text("output");
+  check_column(state, table, "output", axis.output);
+  const auto& others = state.machine.controller->axes;
+  if (std::any_of(others.begin(), others.end(),
+                  [&](const auto& other) { return other.output == axis.output; })) {
+    table.problem("output", "is used by another axis");
+  }
+  axis.sign = table.number("sign", Range::between(-1.0, 1.0), 1.0);
+  if (axis.sign != 1.0 && axis.sign != -1.0) table.problem("sign", "must be 1 or -1");
+  axis.offset_um_max = table.number("offset_um_max", Range::between(0.0, 1e6), 0.0);
+  axis.rate_um_per_s_max = table.number("rate_um_per_s_max", Range::between(0.0, 1e6), 0.0);
+  std::optional<ModbusValue> registers;
+  std::optional<CanSignal> frame;
+  read_value(state, table.table("offset"), ModbusTable::holding, bus, registers, frame);
+  axis.offset = registers.value_or(ModbusValue{});
+  axis.can_offset = frame.value_or(CanSignal{});
+  if (table.has("applied")) {
+    read_value(state, table.table("applied"), ModbusTable::input, bus, axis.applied,
+               axis.can_applied);
+  }
+  state.machine.controller->axes.push_back(axis);
+}
+
+void read_controller_signal(Draft& state, const TomlTable& table, NameList& names,
+                            std::size_t bus) {
+  SimulatedControllerSignal signal;
+  signal.name = names.read(table);
+  if (table.has("value")) signal.value = table.number("value", Range::between(-large, large));
+  if (!signal.value) check_column(state, table, "name", signal.name);
+  std::optional<ModbusValue> registers;
+  std::optional<CanSignal> frame;
+  read_value(state, table, ModbusTable::input, bus, registers, frame);
+  signal.place = registers.value_or(ModbusValue{});
+  signal.can = frame.value_or(CanSignal{});
+  state.machine.controller->signals.push_back(signal);
+}
+
+void read_controller(Draft& state, const TomlTable& root) {
+  const TomlTable table = root.table("controller");
+  state.machine.controller.emplace();
+  SimulatedController& controller = *state.machine.controller;
+  const auto kind = table.choice("kind", bus_kind_names);
+  controller.bus = read_link(table, kind);
+  controller.bus.name = state.buses.read(table);
+  const std::size_t bus = state.buses.names().size() - 1;
+  if (kind == SimulatedBusKind::can) {
+    controller.period_s =
+        table.number("period_s", Range::between(0.001, 3600.0), controller.period_s);
+  } else {
+    controller.unit = table.integer("unit", 0, 255, 1);
+  }
+  controller.tau_s = table.number("tau_s", Range::between(0.0, 1e6), 0.0);
+  controller.heartbeat_timeout_s =
+      table.number("heartbeat_timeout_s", Range::between(0.0, 1e6), controller.heartbeat_timeout_s);
+  if (table.has("valid_bits")) {
+    read_value(state, table.table("valid_bits"), ModbusTable::holding, bus, controller.valid_bits,
+               controller.can_valid_bits);
+  }
+  if (table.has("heartbeat")) {
+    read_value(state, table.table("heartbeat"), ModbusTable::holding, bus, controller.heartbeat,
+               controller.can_heartbeat);
+  }
+  NameList names;
+  for (const TomlTable& entry : table.tables("signal")) {
+    read_controller_signal(state, entry, names, bus);
+  }
+  NameList axes;
+  for (const TomlTable& entry : root.tables("axis")) read_axis(state, entry, axes, bus);
+  if (controller.axes.size() > axes_max) table.problem("axis", "must be at most 16");
+}
+
+void read_target(const Draft& state, const TomlTable& table, EventConfig& event) {
+  const std::string name = table.text("target");
+  const auto place = [&](const std::vector<std::string>& names) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    return found == names.end() ? std::optional<std::size_t>{}
+                                : std::optional(static_cast<std::size_t>(found - names.begin()));
+  };
+  if (const auto channel = place(state.channels.names())) {
+    event.target = TargetKind::channel;
+    if (*channel < state.channel_places.size()) {
+      std::tie(event.device, event.channel) = state.channel_places[*channel];
+    }
+  } else if (const auto device = place(state.devices.names())) {
+    event.target = TargetKind::device;
+    event.device = *device;
+  } else if (state.machine.controller && name == state.machine.controller->bus.name) {
+    event.target = TargetKind::controller;
+  } else if (const auto bus = place(state.buses.names())) {
+    event.target = TargetKind::bus;
+    event.bus = *bus;
+  } else {
+    table.problem("target", "must name a channel, a device, a bus or the controller");
+  }
+}
+
+/// Which sorts of target an event may have.
+bool fits(EventKind kind, TargetKind target, bool can) {
+  switch (kind) {
+    case EventKind::open_circuit:
+    case EventKind::spike:
+    case EventKind::drift:
+      return target == TargetKind::channel;
+    case EventKind::freeze:
+      return target == TargetKind::channel || target == TargetKind::device;
+    case EventKind::drop:
+    case EventKind::reboot:
+      return target != TargetKind::channel;
+    case EventKind::delay:
+    case EventKind::garbage:
+    case EventKind::exception:
+      return target != TargetKind::channel && !can;
+    case EventKind::reject:
+    case EventKind::misapply:
+    case EventKind::rehome:
+      return target == TargetKind::controller;
+  }
+  return false;
+}
+
+bool on_can(const Draft& state, const EventConfig& event) {
+  const MachineConfig& machine = state.machine;
+  if (event.target == TargetKind::controller) {
+    return machine.controller->bus.kind == SimulatedBusKind::can;
+  }
+  const std::size_t bus = event.target == TargetKind::bus || machine.devices.empty()
+                              ? event.bus
+                              : machine.devices[event.device].bus;
+  return bus < machine.buses.size() && machine.buses[bus].kind == SimulatedBusKind::can;
+}
+
+EventConfig read_event(const Draft& state, const TomlTable& table) {
+  EventConfig event;
+  event.kind = table.choice<EventKind>("kind", {{"open_circuit", EventKind::open_circuit},
+                                                {"freeze", EventKind::freeze},
+                                                {"spike", EventKind::spike},
+                                                {"drift", EventKind::drift},
+                                                {"drop", EventKind::drop},
+                                                {"delay", EventKind::delay},
+                                                {"garbage", EventKind::garbage},
+                                                {"exception", EventKind::exception},
+                                                {"reboot", EventKind::reboot},
+                                                {"reject", EventKind::reject},
+                                                {"misapply", EventKind::misapply},
+                                                {"rehome", EventKind::rehome}});
+  event.at_s = table.number("at_s", Range::between(0.0, large));
+  read_target(state, table, event);
+  if (event.kind != EventKind::rehome) {
+    event.duration_s = table.number("duration_s", Range::above(0.0, large));
+  }
+  if (event.kind == EventKind::spike) {
+    event.change_K = table.number("change_K", Range::between(-1e4, 1e4));
+  }
+  if (event.kind == EventKind::misapply) {
+    event.change_um = table.number("change_um", Range::between(-1e4, 1e4));
+  }
+  if (event.kind == EventKind::drift) {
+    event.rate_K_per_h = table.number("rate_K_per_h", Range::between(-1e6, 1e6));
+  }
+  if (event.kind == EventKind::delay) {
+    event.delay_ms = table.number("delay_ms", Range::above(0.0, 1e6));
+  }
+  if (event.kind == EventKind::exception) event.code = table.integer("code", 1, 255, 6);
+  if (!fits(event.kind, event.target, on_can(state, event))) {
+    table.problem("kind", "cannot happen to such a target");
+  }
+  return event;
+}
+
+}  // namespace
+
+void read_devices(const TomlTable& root, MachineConfig& machine) {
+  Draft state{machine, {}, {}, {}, {}, {}, {}};
+  if (machine.plant) state.columns = plant_columns(*machine.plant);
+  for (const TomlTable& table : root.tables("bus")) {
+    SimulatedBus bus = read_link(table, table.choice("kind", bus_kind_names));
+    bus.name = state.buses.read(table);
+    machine.buses.push_back(bus);
+  }
+  std::vector<DeviceDefaults> defaults;
+  for (const TomlTable& table : root.tables("device")) {
+    defaults.push_back(read_device(state, table));
+  }
+  if (machine.buses.empty()) {
+    machine.devices.clear();  // each was refused already: it names no bus
+  }
+  for (const TomlTable& table : root.tables("channel")) read_channel(state, table, defaults);
+  if (root.has("controller")) {
+    read_controller(state, root);
+  } else if (root.has("axis")) {
+    root.problem("axis", "needs a [controller]");
+  }
+  for (const TomlTable& table : root.tables("event")) {
+    machine.events.push_back(read_event(state, table));
+  }
+}
+
+}  // namespace thermocomp

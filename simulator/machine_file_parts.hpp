@@ -1,0 +1,35 @@
+/// The two halves of the machine file's reader; only machine_file.cpp uses them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/toml_reader.hpp"
+#include "simulator/machine_config.hpp"
+
+namespace thermocomp {
+
+/// Names of one sort, each used once.
+class NameList {
+ public:
+  /// Reads `name`; a problem when it is there already.
+  std::string read(const TomlTable& table);
+  /// Index of the name that `key` of `table` gives; a problem and 0 when there is none such.
+  [[nodiscard]] std::size_t index(const TomlTable& table, std::string_view key,
+                                  std::string_view what) const;
+  [[nodiscard]] std::size_t index_of(const TomlTable& table, std::string_view key,
+                                     const std::string& name, std::string_view what) const;
+  [[nodiscard]] const std::vector<std::string>& names() const noexcept { return names_; }
+
+ private:
+  std::vector<std::string> names_;
+};
+
+/// [plant] and what belongs to it.
+[[nodiscard]] PlantConfig read_plant(const TomlTable& root);
+/// Columns that the plant provides, in its order.
+[[nodiscard]] std::vector<std::string> plant_columns(const PlantConfig& plant);
+/// [[bus]], [[device]], [[channel]], [controller], [[axis]], [[event]].
+void read_devices(const TomlTable& root, MachineConfig& machine);
+
+}  // namespace thermocomp

@@ -1,0 +1,33 @@
+/// Heat flow between lumps, integrated exactly.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace thermocomp {
+
+/// C dT/dt = -K T + q with diagonal C [J/K] and symmetric K [W/K] (n x n).
+/// With q constant over dt the solution is exact in the modes of C^-1/2 K C^-1/2, so no time step
+/// is too long for it and none is needed to be short.
+class ThermalNetwork {
+ public:
+  /// @param conductance_W_per_K  row by row, n x n, symmetric, positive semidefinite (checked:
+  /// size)
+  ThermalNetwork(std::span<const double> capacity_J_per_K,
+                 std::span<const double> conductance_W_per_K);
+  ~ThermalNetwork();
+  ThermalNetwork(ThermalNetwork&&) noexcept;
+  ThermalNetwork& operator=(ThermalNetwork&&) noexcept;
+
+  /// @param temps_degC  n; overwritten by the temperatures dt_s later
+  /// @param heat_W      n; q, constant meanwhile
+  void advance(double dt_s, std::span<const double> heat_W, std::span<double> temps_degC) const;
+
+ private:
+  struct Modes;
+  std::unique_ptr<Modes> modes_;
+};
+
+}  // namespace thermocomp
