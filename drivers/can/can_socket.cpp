@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-#include <poll.h>
 #include <unistd.h>
 
 #include <linux/can.h>
@@ -14,6 +13,7 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
+#include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
@@ -23,9 +23,9 @@ nanoseconds to_nanoseconds(const timespec& time) noexcept {
   return std::chrono::seconds{time.tv_sec} + nanoseconds{time.tv_nsec};
 }
 
-nanoseconds clock_now(clockid_t clock) noexcept {
+nanoseconds wall_clock_now() noexcept {
   timespec time{};
-  clock_gettime(clock, &time);
+  clock_gettime(CLOCK_REALTIME, &time);
   return to_nanoseconds(time);
 }
 
@@ -171,17 +171,6 @@ bool CanSocket::configure() {
   return true;
 }
 
-void CanSocket::wait(int wake_fd, nanoseconds until) noexcept {
-  const nanoseconds left = until - clock_now(CLOCK_MONOTONIC);
-  if (left <= nanoseconds{0}) return;
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
-  const timespec limit{static_cast<time_t>(seconds.count()),
-                       static_cast<long>((left - seconds).count())};
-  // poll skips negative descriptors, so a closed socket just sleeps.
-  std::array<pollfd, 2> watched{pollfd{socket_, POLLIN, 0}, pollfd{wake_fd, POLLIN, 0}};
-  ::ppoll(watched.data(), watched.size(), &limit, nullptr);
-}
-
 std::span<const CanFrame> CanSocket::receive() {
   received_.clear();
   if (!is_open()) return {};
@@ -192,8 +181,8 @@ std::span<const CanFrame> CanSocket::receive() {
     if (errno != EAGAIN && errno != EINTR) fail("receiving", errno);
     return {};
   }
-  const nanoseconds realtime = clock_now(CLOCK_REALTIME);
-  const nanoseconds monotonic = clock_now(CLOCK_MONOTONIC);
+  const nanoseconds realtime = wall_clock_now();
+  const nanoseconds monotonic = monotonic_now();
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const can_frame& raw = buffers_->frames[i];
     if (buffers_->messages[i].msg_len != CAN_MTU) continue;

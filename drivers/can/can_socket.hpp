@@ -72,9 +72,9 @@ class CanSocket {
   bool open();
   void close() noexcept;
   [[nodiscard]] bool is_open() const noexcept { return socket_ >= 0; }
+  /// Readable when receive() has something to say; -1 when closed.
+  [[nodiscard]] int descriptor() const noexcept { return socket_; }
 
-  /// Sleeps until something arrived, `wake_fd` became readable (-1: none) or the time has come.
-  void wait(int wake_fd, nanoseconds until) noexcept;
   /// What has arrived, without waiting, at most batch_max frames; valid until the next call.
   /// Error frames are counted and not handed out. Closes itself when the link is lost.
   [[nodiscard]] std::span<const CanFrame> receive();
