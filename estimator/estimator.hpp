@@ -44,6 +44,11 @@ enum class Reason : std::uint32_t {
 inline constexpr std::size_t reasons_count = 11;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
+/// Of a set of reasons (Report::reasons), whether one is in it.
+[[nodiscard]] constexpr bool has_reason(std::uint32_t reasons, Reason reason) noexcept {
+  return (reasons & static_cast<std::uint32_t>(reason)) != 0;
+}
+
 struct SensorReport {
   double raw_degC{not_a_number};       ///< as the driver gave it
   double smoothed_degC{not_a_number};  ///< what the block gets; a difference where configured
@@ -58,6 +63,11 @@ struct InputReport {  ///< a temperature column of the model
   double temp_degC{not_a_number};
   double reference_degC{not_a_number};
   bool good{false};
+};
+
+struct SignalReport {  ///< an operating signal or position of the model
+  double value{not_a_number};
+  double reference{not_a_number};  ///< when the reference was taken
 };
 
 struct AxisReport {
@@ -83,16 +93,19 @@ struct Report {
   std::uint32_t reasons{0};
   bool enabled{true};  ///< the operator's switch
   std::uint64_t cycle_ends{0};
-  std::vector<SensorReport> sensors;  ///< order of EstimatorConfig::sensors
-  std::vector<InputReport> inputs;    ///< order of ThermalModel::temperature_columns()
+  std::vector<SensorReport> sensors;    ///< order of EstimatorConfig::sensors
+  std::vector<InputReport> inputs;      ///< order of ThermalModel::temperature_columns()
+  std::vector<SignalReport> signals;    ///< order of ThermalModel::signal_columns()
+  std::vector<double> displacement_um;  ///< order of ThermalModel::outputs, since the reference
   std::vector<AxisReport> axes;
 };
 
 /// What survives a restart by name (the state file).
 struct PersistentState {
   bool enabled{true};
-  std::map<std::string, double> reference_degC;  ///< by temperature column
-  std::map<std::string, double> offset_um;       ///< by axis, last sent
+  std::map<std::string, double> reference_degC;     ///< by temperature column
+  std::map<std::string, double> reference_signals;  ///< operating signals then, by column
+  std::map<std::string, double> offset_um;          ///< by axis, last sent
 };
 
 /// Pure: no clock, no I/O, no thread; no allocation after construction except where said.

@@ -29,8 +29,8 @@ void SmoothingConfig::validate() const {
 }
 
 void LimiterConfig::validate() const {
-  require(offset_um_max > 0 && offset_um_max <= 500, "offset_um_max", offset_um_max,
-          "must be in (0, 500]");
+  require(offset_um_max > 0 && offset_um_max <= offset_um_max_of_any_axis, "offset_um_max",
+          offset_um_max, "must be in (0, 500]");
   require(rate_um_per_s_max > 0 && rate_um_per_s_max <= 1000, "rate_um_per_s_max",
           rate_um_per_s_max, "must be in (0, 1000]");
 }

@@ -52,6 +52,9 @@ struct BlockConfig {
   std::vector<std::size_t> sensors;  ///< indices, at least one
 };
 
+/// No axis may be given a larger bound.
+inline constexpr double offset_um_max_of_any_axis = 500.0;
+
 struct LimiterConfig {
   double offset_um_max{50.0};     ///< bound on |offset| of an axis [um]
   double rate_um_per_s_max{1.0};  ///< slew bound of an axis [um/s]

@@ -1,0 +1,37 @@
+/// Whether the controller applies what it was sent, delays of the link allowed for.
+#pragma once
+
+#include <array>
+
+#include "estimator/state_archive.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+/// What is applied now must be something that was sent within the last window: between the smallest
+/// and the largest offset sent in it, a tolerance apart at most.
+class AppliedCheck {
+ public:
+  AppliedCheck(double tolerance_um, nanoseconds window);
+
+  /// Forgets everything; the axis now stands at `offset_um`.
+  void restart(nanoseconds now, double offset_um) noexcept;
+  void sent(nanoseconds now, double offset_um) noexcept;
+  [[nodiscard]] bool agrees(double applied_um) const noexcept;
+  /// After a reload: what the other has sent counts as sent by this one.
+  void adopt(const AppliedCheck& previous) noexcept;
+
+  void visit_state(StateArchive& archive) { archive(min_um_, max_um_, newest_, slot_until_); }
+
+ private:
+  // Old offsets leave in slots of a quarter window: cheap, and the window is kept to 25 %.
+  static constexpr std::size_t slots = 5;
+  double tolerance_um_;
+  nanoseconds slot_length_;
+  std::array<double, slots> min_um_{};
+  std::array<double, slots> max_um_{};
+  std::size_t newest_{0};
+  nanoseconds slot_until_{};
+};
+
+}  // namespace thermocomp

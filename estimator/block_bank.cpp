@@ -1,0 +1,162 @@
+#include "estimator/block_bank.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+namespace {
+
+bool same(const SmoothingConfig& a, const SmoothingConfig& b) {
+  return a.form == b.form && a.history == b.history && a.period_s == b.period_s &&
+         a.samples == b.samples && a.half_width_K == b.half_width_K && a.outage_s == b.outage_s;
+}
+
+}  // namespace
+
+BlockBank::Sensor::Sensor(const SensorConfig& sensor_config)
+    : config(sensor_config),
+      screening(sensor_config.screening),
+      smoother(sensor_config.smoothing) {}
+
+BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns) {
+  for (const SensorConfig& sensor : config.sensors) {
+    if (sensor.reference_sensor && *sensor.reference_sensor >= config.sensors.size())
+      throw InvalidValue("sensor.reference_sensor", sensor.name, "does not exist");
+    sensors_.emplace_back(sensor);
+  }
+  for (const std::string& column : columns) {
+    const auto block = std::find_if(config.blocks.begin(), config.blocks.end(),
+                                    [&](const BlockConfig& each) { return each.input == column; });
+    if (block == config.blocks.end())
+      throw InvalidValue("model.inputs", column, "no [[block]] has this input");
+    if (block->sensors.empty()) throw InvalidValue("block.sensors", block->name, "is empty");
+    for (const std::size_t index : block->sensors)
+      if (index >= sensors_.size())
+        throw InvalidValue("block.sensors", block->name, "does not exist");
+    blocks_.push_back({block->sensors, std::vector<double>(block->sensors.size(), 0.0)});
+  }
+  temps_degC_.assign(columns.size(), not_a_number);
+  good_.assign(columns.size(), 0);
+}
+
+bool BlockBank::step(nanoseconds now, std::span<const Reading> readings) noexcept {
+  THERMOCOMP_ENSURE(readings.size() == sensors_.size());
+  now_ = now;
+  // All are looked at before any is smoothed: a difference needs its reference of this very cycle.
+  for (std::size_t i = 0; i < sensors_.size(); ++i) look_at(sensors_[i], now, readings[i]);
+  for (Sensor& sensor : sensors_) smooth(sensor, now);
+  bool all_good = true;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    good_[i] = update(blocks_[i], temps_degC_[i]) ? 1 : 0;
+    all_good = all_good && good_[i] != 0;
+  }
+  return all_good;
+}
+
+void BlockBank::look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept {
+  sensor.fresh = sensor.screening.look(now, reading);
+  sensor.raw_degC = reading.temp_degC;
+  sensor.fault = sensor.screening.fault(now);
+}
+
+void BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
+  double reference_degC = 0.0;
+  bool usable = sensor.screening.usable(now);
+  if (sensor.config.reference_sensor) {
+    const Screening& reference = sensors_[*sensor.config.reference_sensor].screening;
+    usable = usable && reference.usable(now);
+    reference_degC = reference.good_degC();
+  }
+  if (sensor.fresh && usable)
+    sensor.smoother.add(
+        {sensor.screening.good_at(), sensor.screening.good_degC() - reference_degC});
+  sensor.usable = usable && sensor.smoother.has_value();
+}
+
+bool BlockBank::update(Block& block, double& temp_degC) noexcept {
+  double sum_degC = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < block.sensors.size(); ++i) {
+    const Sensor& sensor = sensors_[block.sensors[i]];
+    if (!sensor.usable) continue;
+    sum_degC += sensor.smoother.value_K() - block.deviation_K[i];
+    ++count;
+  }
+  if (count == 0) return false;
+  if (count == block.sensors.size() && count > 1) {
+    sum_degC = 0.0;
+    for (const std::size_t index : block.sensors) sum_degC += sensors_[index].smoother.value_K();
+  }
+  temp_degC = sum_degC / static_cast<double>(count);
+  if (count == block.sensors.size() && count > 1)
+    for (std::size_t i = 0; i < block.sensors.size(); ++i)
+      block.deviation_K[i] = sensors_[block.sensors[i]].smoother.value_K() - temp_degC;
+  return true;
+}
+
+void BlockBank::report(std::span<SensorReport> sensors) const noexcept {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    const Sensor& sensor = sensors_[i];
+    sensors[i] = {sensor.raw_degC,
+                  sensor.smoother.has_value() ? sensor.smoother.value_K() : not_a_number,
+                  sensor.screening.good_at(),
+                  sensor.fault,
+                  sensor.smoother.clipped_in_a_row(),
+                  sensor.smoother.clipped(),
+                  sensor.screening.rejected()};
+  }
+}
+
+void BlockBank::visit_state(StateArchive& archive) {
+  for (Sensor& sensor : sensors_) archive(sensor);
+  for (Block& block : blocks_) archive(block.deviation_K);
+  archive(temps_degC_, good_, now_);
+}
+
+void BlockBank::plan_adoption(const BlockBank& previous) {
+  sensor_plan_.clear();
+  for (const Sensor& sensor : sensors_) {
+    const auto found =
+        std::find_if(previous.sensors_.begin(), previous.sensors_.end(),
+                     [&](const Sensor& each) { return each.config.name == sensor.config.name; });
+    sensor_plan_.push_back(found == previous.sensors_.end()
+                               ? -1
+                               : static_cast<int>(found - previous.sensors_.begin()));
+  }
+  block_plan_.clear();
+  for (const Block& block : blocks_) {
+    const auto found =
+        std::find_if(previous.blocks_.begin(), previous.blocks_.end(),
+                     [&](const Block& each) { return each.sensors == block.sensors; });
+    block_plan_.push_back(
+        found == previous.blocks_.end() ? -1 : static_cast<int>(found - previous.blocks_.begin()));
+  }
+}
+
+void BlockBank::adopt(const BlockBank& previous) noexcept {
+  now_ = previous.now_;
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    if (sensor_plan_[i] < 0) continue;
+    const Sensor& other = previous.sensors_[static_cast<std::size_t>(sensor_plan_[i])];
+    Sensor& sensor = sensors_[i];
+    sensor.screening.adopt(other.screening);
+    sensor.raw_degC = other.raw_degC;
+    sensor.fault = other.fault;
+    if (!same(sensor.config.smoothing, other.config.smoothing) ||
+        sensor.config.reference_sensor != other.config.reference_sensor)
+      continue;
+    sensor.smoother = other.smoother;  // same sizes: copies into what is there
+    sensor.usable = other.usable;
+  }
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (block_plan_[i] < 0) continue;
+    const auto other = static_cast<std::size_t>(block_plan_[i]);
+    blocks_[i].deviation_K = previous.blocks_[other].deviation_K;
+    temps_degC_[i] = previous.temps_degC_[other];
+    good_[i] = previous.good_[other];
+  }
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,68 @@
+/// Sensors to block temperatures: screening, smoothing, differences, the mean of a block's sensors.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/estimator.hpp"
+#include "estimator/screening.hpp"
+#include "estimator/smoothing.hpp"
+
+namespace thermocomp {
+
+/// All sensors and the blocks they stand for, in the order of the model's temperature columns.
+class BlockBank {
+ public:
+  /// @throws InvalidValue when a column has no block or a block no sensor
+  BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns);
+
+  /// Takes in the newest readings. @return whether every column has a temperature in use
+  bool step(nanoseconds now, std::span<const Reading> readings) noexcept;
+
+  /// Shape (columns): the blocks' temperatures; the last known one where not good, NaN before the
+  /// first.
+  [[nodiscard]] std::span<const double> temps_degC() const noexcept { return temps_degC_; }
+  [[nodiscard]] bool good(std::size_t column) const noexcept { return good_[column] != 0; }
+
+  void report(std::span<SensorReport> sensors) const noexcept;
+  void visit_state(StateArchive& archive);
+
+  void plan_adoption(const BlockBank& previous);
+  void adopt(const BlockBank& previous) noexcept;
+
+ private:
+  struct Sensor {
+    Sensor(const SensorConfig& sensor_config);
+    SensorConfig config;
+    Screening screening;
+    Smoother smoother;
+    double raw_degC{not_a_number};
+    Fault fault{Fault::never_read};
+    bool fresh{false};   ///< the newest reading is a new and good one
+    bool usable{false};  ///< the block may use the smoothed value
+    void visit_state(StateArchive& archive) {
+      archive(screening, smoother, raw_degC, fault, fresh, usable);
+    }
+  };
+  struct Block {
+    std::vector<std::size_t> sensors;
+    /// What each sensor differs from the block's mean, kept from when all were good: a sensor that
+    /// drops out does not shift the mean.
+    std::vector<double> deviation_K;
+  };
+
+  static void look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept;
+  void smooth(Sensor& sensor, nanoseconds now) noexcept;
+  [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
+
+  std::vector<Sensor> sensors_;
+  std::vector<Block> blocks_;  ///< one a column
+  std::vector<double> temps_degC_;
+  std::vector<std::uint8_t> good_;
+  nanoseconds now_{};
+  std::vector<int> sensor_plan_;  ///< index of the previous bank's sensor, -1: none
+  std::vector<int> block_plan_;
+};
+
+}  // namespace thermocomp

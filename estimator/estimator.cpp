@@ -1,0 +1,500 @@
+#include "estimator/estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/axis_channel.hpp"
+#include "estimator/block_bank.hpp"
+#include "estimator/checks.hpp"
+#include "estimator/displacement_model.hpp"
+
+namespace thermocomp {
+namespace {
+
+std::size_t index_of(const std::vector<std::string>& names, const std::string& name,
+                     const char* key, const char* rule) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) throw InvalidValue(key, name, rule);
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+std::vector<int> plan_names(const std::vector<std::string>& ours,
+                            const std::vector<std::string>& theirs) {
+  std::vector<int> plan;
+  for (const std::string& name : ours) {
+    const auto found = std::find(theirs.begin(), theirs.end(), name);
+    plan.push_back(found == theirs.end() ? -1 : static_cast<int>(found - theirs.begin()));
+  }
+  return plan;
+}
+
+void take_by_plan(const std::vector<int>& plan, const std::vector<double>& from,
+                  std::vector<double>& to) noexcept {
+  for (std::size_t i = 0; i < plan.size(); ++i)
+    if (plan[i] >= 0) to[i] = from[static_cast<std::size_t>(plan[i])];
+}
+
+constexpr int no_signal = -1;
+
+}  // namespace
+
+std::string_view to_string(Mode mode) noexcept {
+  switch (mode) {
+    case Mode::starting:
+      return "starting";
+    case Mode::disabled:
+      return "disabled";
+    case Mode::compensating:
+      return "compensating";
+    case Mode::holding:
+      return "holding";
+    case Mode::ramping_to_zero:
+      return "ramping_to_zero";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(Reason reason) noexcept {
+  switch (reason) {
+    case Reason::operator_disabled:
+      return "operator_disabled";
+    case Reason::controller_disabled:
+      return "controller_disabled";
+    case Reason::block_lost:
+      return "block_lost";
+    case Reason::signal_lost:
+      return "signal_lost";
+    case Reason::no_reference:
+      return "no_reference";
+    case Reason::controller_offline:
+      return "controller_offline";
+    case Reason::not_synced:
+      return "not_synced";
+    case Reason::mismatch:
+      return "mismatch";
+    case Reason::cutting:
+      return "cutting";
+    case Reason::at_bound:
+      return "at_bound";
+    case Reason::applied_out_of_bound:
+      return "applied_out_of_bound";
+  }
+  return "unknown";
+}
+
+/// Everything that a step touches; sizes are fixed by the constructor.
+struct Estimator::Parts {
+  Parts(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model);
+
+  void take_signals(nanoseconds now, const ControllerState& controller) noexcept;
+  void take_references() noexcept;
+  void predict(nanoseconds now) noexcept;
+  void decide_mode(nanoseconds now, bool data_good) noexcept;
+  void step_axes(nanoseconds now, const ControllerState& controller) noexcept;
+  [[nodiscard]] double target_um(std::size_t axis) const noexcept;
+  [[nodiscard]] double signal(int index) const noexcept {
+    return index == no_signal ? not_a_number : all_signals[static_cast<std::size_t>(index)];
+  }
+  void add(Reason reason) noexcept { reasons |= static_cast<std::uint32_t>(reason); }
+  void take_new_reference() noexcept;
+  void visit_state(StateArchive& archive);
+
+  EstimatorConfig config;
+  ThermalModel thermal_model;
+  std::vector<std::string> columns;
+  BlockBank blocks;
+  DisplacementModel displacement;
+  DisplacementModel at_reference;  ///< the same model, only ever asked for the zero
+  std::vector<AxisChannel> axes;
+  std::vector<std::size_t> axis_output;    ///< axis -> output
+  std::vector<std::size_t> model_signals;  ///< model's signal -> configured signal
+  int cutting_signal{no_signal};
+  int disable_signal{no_signal};
+  nanoseconds controller_stale_after;
+  nanoseconds hold;
+
+  // state
+  std::uint64_t cycle{0};
+  bool stepped{false};
+  nanoseconds now{};
+  double dt_s{0.0};
+  std::array<double, signals_max> all_signals;
+  bool controller_online{false};
+  std::vector<double> reference_degC;
+  std::vector<double> signal_values;      ///< of the model
+  std::vector<double> model_um;           ///< of the outputs, as the model says
+  std::vector<double> reference_signals;  ///< of the model, when the reference was taken
+  bool zero_known{false};
+  std::vector<double> zero_um;  ///< of the outputs: the model at the reference state
+  std::vector<double> measured_um;
+  bool predicted{false};  ///< model_um is from this step
+  bool ever_good{false};
+  nanoseconds lost_since{};
+  bool enabled;
+  Mode mode{Mode::starting};
+  nanoseconds mode_since{};
+  std::uint32_t reasons{0};
+  std::uint64_t cycle_ends{0};
+
+  // how a reload takes over
+  std::vector<int> column_plan;
+  std::vector<int> signal_plan;
+  std::vector<int> axis_plan;
+  std::vector<int> term_plan;
+  bool keep_reference{false};
+};
+
+Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalModel& model)
+    : config(estimator_config),
+      thermal_model(model),
+      columns(model.temperature_columns()),
+      blocks(config, columns),
+      displacement(model),
+      at_reference(model),
+      controller_stale_after(std::chrono::duration_cast<nanoseconds>(
+          seconds_d(config.compensation.controller_stale_after_s))),
+      hold(std::chrono::duration_cast<nanoseconds>(seconds_d(config.compensation.hold_s))),
+      enabled(config.compensation.enabled_at_first_start) {
+  config.compensation.validate();
+  require(config.axes.size() <= axes_max, "axis", static_cast<double>(config.axes.size()),
+          "are too many axes");
+  require(config.signals.size() <= signals_max, "controller.signal",
+          static_cast<double>(config.signals.size()), "are too many signals");
+  all_signals.fill(not_a_number);
+  for (const AxisConfig& axis : config.axes) {
+    axes.emplace_back(axis, config.compensation, config.controller_reads_back);
+    axis_output.push_back(
+        index_of(model.outputs, axis.output, "axis.output", "is not an output of the model"));
+  }
+  for (const std::string& name : model.signal_columns())
+    model_signals.push_back(
+        index_of(config.signals, name, "controller.signal", "the model needs this signal"));
+  const auto optional_signal = [&](const std::string& name, const char* key) {
+    return name.empty() ? no_signal
+                        : static_cast<int>(index_of(config.signals, name, key,
+                                                    "is not a signal of the controller"));
+  };
+  cutting_signal = optional_signal(config.compensation.cutting_signal, "cutting_signal");
+  disable_signal = optional_signal(config.compensation.disable_signal, "disable_signal");
+  reference_degC.assign(columns.size(), not_a_number);
+  std::copy(model.reference_degC.begin(), model.reference_degC.end(), reference_degC.begin());
+  signal_values.assign(model_signals.size(), not_a_number);
+  model_um.assign(model.outputs.size(), not_a_number);
+  // A reference given as numbers says where zero is; a sampled one says the machine is straight
+  // now.
+  zero_um.assign(model.outputs.size(), model.reference_degC.empty() ? not_a_number : 0.0);
+  measured_um.assign(config.axes.size(), not_a_number);
+}
+
+Estimator::Estimator(const EstimatorConfig& config, const ThermalModel& model)
+    : parts_(std::make_unique<Parts>(config, model)) {}
+Estimator::~Estimator() = default;
+Estimator::Estimator(Estimator&&) noexcept = default;
+Estimator& Estimator::operator=(Estimator&&) noexcept = default;
+
+void Estimator::step(nanoseconds now, std::span<const Reading> readings,
+                     const ControllerState& controller, OffsetCommand& command) noexcept {
+  Parts& parts = *parts_;
+  THERMOCOMP_ENSURE(!parts.stepped || now >= parts.now);
+  parts.dt_s = parts.stepped ? 1e-9 * static_cast<double>((now - parts.now).count()) : 0.0;
+  if (!parts.stepped) parts.lost_since = now;
+  parts.now = now;
+  parts.stepped = true;
+  ++parts.cycle;
+  parts.reasons = 0;
+
+  const bool blocks_good = parts.blocks.step(now, readings);
+  if (!blocks_good) parts.add(Reason::block_lost);
+  parts.take_signals(now, controller);
+  const bool signals_good = !has_reason(parts.reasons, Reason::signal_lost);
+  parts.take_references();
+  const bool referenced = !has_reason(parts.reasons, Reason::no_reference);
+  parts.predicted = blocks_good && signals_good && referenced;
+  if (parts.predicted) parts.predict(now);
+  parts.decide_mode(now, parts.predicted);
+  parts.step_axes(now, controller);
+
+  command.link_epoch = controller.link_epoch;
+  for (std::size_t i = 0; i < parts.axes.size(); ++i) {
+    command.offset_um[i] = parts.axes[i].offset_um();
+    command.valid[i] = parts.axes[i].driven();
+  }
+}
+
+void Estimator::Parts::take_signals(nanoseconds at, const ControllerState& controller) noexcept {
+  controller_online = controller.online && at - controller.taken_at <= controller_stale_after;
+  if (!controller_online) {
+    add(Reason::controller_offline);
+    // Positions and switches of a silent controller are not to be acted on; the lost ones hold.
+    if (!model_signals.empty()) add(Reason::signal_lost);
+    return;
+  }
+  for (std::size_t i = 0; i < config.signals.size(); ++i) all_signals[i] = controller.signals[i];
+  for (std::size_t i = 0; i < model_signals.size(); ++i) {
+    signal_values[i] = all_signals[model_signals[i]];
+    if (!std::isfinite(signal_values[i])) add(Reason::signal_lost);
+  }
+  // A switch whose position is unknown is neither on nor off: hold.
+  if (disable_signal != no_signal && !std::isfinite(signal(disable_signal)))
+    add(Reason::signal_lost);
+}
+
+void Estimator::Parts::take_references() noexcept {
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (!std::isfinite(reference_degC[i]) && blocks.good(i)) {
+      reference_degC[i] = blocks.temps_degC()[i];
+      zero_known = false;
+    }
+    if (!std::isfinite(reference_degC[i])) add(Reason::no_reference);
+  }
+  for (std::size_t i = 0; i < reference_signals.size(); ++i)
+    if (!std::isfinite(reference_signals[i])) {
+      reference_signals[i] = signal_values[i];
+      zero_known = false;
+    }
+}
+
+void Estimator::Parts::predict(nanoseconds at) noexcept {
+  if (!zero_known) {
+    at_reference.restart();
+    at_reference.step(at, reference_degC, reference_degC, reference_signals, zero_um);
+    zero_known = true;
+  }
+  displacement.step(at, blocks.temps_degC(), reference_degC, signal_values, model_um);
+}
+
+void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
+  if (!enabled) add(Reason::operator_disabled);
+  if (signal(disable_signal) >= 0.5) add(Reason::controller_disabled);
+  const bool disabled = has_reason(reasons, Reason::operator_disabled) ||
+                        has_reason(reasons, Reason::controller_disabled);
+  const bool synced =
+      std::all_of(axes.begin(), axes.end(), [](const AxisChannel& axis) { return axis.synced(); });
+  const bool working =
+      data_good && controller_online && synced && !has_reason(reasons, Reason::signal_lost);
+  if (working) {
+    ever_good = true;
+    lost_since = at;
+  }
+  Mode next = Mode::compensating;
+  if (disabled)
+    next = Mode::disabled;
+  else if (!working && config.compensation.on_loss == LossPolicy::ramp_to_zero &&
+           at - lost_since > hold)
+    next = Mode::ramping_to_zero;
+  else if (!working)
+    next = ever_good ? Mode::holding : Mode::starting;
+  if (next != mode) {
+    mode = next;
+    mode_since = at;
+  }
+}
+
+double Estimator::Parts::target_um(std::size_t axis) const noexcept {
+  if (mode == Mode::disabled || mode == Mode::ramping_to_zero) return 0.0;
+  if (mode != Mode::compensating) return not_a_number;
+  const std::size_t output = axis_output[axis];
+  return -config.axes[axis].sign * (model_um[output] - zero_um[output]);
+}
+
+void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controller) noexcept {
+  AxisInput input;
+  input.now = at;
+  input.dt_s = dt_s;
+  input.link_epoch = controller.link_epoch;
+  input.online = controller_online;
+  if (config.compensation.hold_while_cutting) {
+    // Only a clear "not cutting" lets the offset change.
+    input.may_change = controller_online && signal(cutting_signal) < 0.5;
+    if (!input.may_change) add(Reason::cutting);
+  }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    input.applied_um = controller.applied_um[i];
+    input.target_um = target_um(i);
+    axes[i].step(input);
+    if (!axes[i].synced()) add(Reason::not_synced);
+    if (axes[i].mismatch()) add(Reason::mismatch);
+    if (axes[i].at_bound()) add(Reason::at_bound);
+    if (axes[i].out_of_bound()) add(Reason::applied_out_of_bound);
+  }
+}
+
+void Estimator::apply(const Command& command) noexcept {
+  Parts& parts = *parts_;
+  switch (command.kind) {
+    case CommandKind::enable:
+      parts.enabled = true;
+      break;
+    case CommandKind::disable:
+      parts.enabled = false;
+      for (AxisChannel& axis : parts.axes) axis.end_prove();
+      break;
+    case CommandKind::reference:
+      parts.take_new_reference();
+      break;
+    case CommandKind::measured:
+      if (command.axis < parts.axes.size()) parts.measured_um[command.axis] = command.value_um;
+      break;
+    case CommandKind::cycle_end:
+      ++parts.cycle_ends;
+      break;
+    case CommandKind::prove:
+      if (command.axis < parts.axes.size()) parts.axes[command.axis].prove(command.value_um);
+      break;
+  }
+}
+
+void Estimator::Parts::take_new_reference() noexcept {
+  // All or nothing: a reference of two moments would be no state the machine was ever in.
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    if (!blocks.good(i)) return;
+  for (std::size_t i = 0; i < columns.size(); ++i) reference_degC[i] = blocks.temps_degC()[i];
+  std::fill(reference_signals.begin(), reference_signals.end(), not_a_number);
+  displacement.restart();
+}
+
+Report Estimator::make_report() const {
+  Report out;
+  out.sensors.resize(parts_->config.sensors.size());
+  out.inputs.resize(parts_->columns.size());
+  out.signals.resize(parts_->signal_values.size());
+  out.displacement_um.resize(parts_->thermal_model.outputs.size());
+  out.axes.resize(parts_->axes.size());
+  report(out);
+  return out;
+}
+
+void Estimator::report(Report& out) const noexcept {
+  const Parts& parts = *parts_;
+  out.cycle = parts.cycle;
+  out.now = parts.now;
+  out.mode = parts.mode;
+  out.mode_since = parts.mode_since;
+  out.reasons = parts.reasons;
+  out.enabled = parts.enabled;
+  out.cycle_ends = parts.cycle_ends;
+  parts.blocks.report(out.sensors);
+  for (std::size_t i = 0; i < parts.columns.size(); ++i)
+    out.inputs[i] = {parts.blocks.temps_degC()[i], parts.reference_degC[i], parts.blocks.good(i)};
+  for (std::size_t i = 0; i < parts.model_um.size(); ++i)
+    out.displacement_um[i] = parts.model_um[i] - parts.zero_um[i];
+  for (std::size_t i = 0; i < parts.signal_values.size(); ++i)
+    out.signals[i] = {parts.signal_values[i], parts.reference_signals[i]};
+  for (std::size_t i = 0; i < parts.axes.size(); ++i) {
+    const AxisChannel& axis = parts.axes[i];
+    AxisReport& line = out.axes[i];
+    line.displacement_um = out.displacement_um[parts.axis_output[i]];
+    line.target_um = axis.target_um();
+    line.offset_um = axis.offset_um();
+    line.applied_um = axis.applied_um();
+    line.measured_um = parts.measured_um[i];
+    line.synced = axis.synced();
+    line.driven = axis.driven();
+    line.mismatch = axis.mismatch();
+    line.at_bound = axis.at_bound();
+    line.proving = axis.proving();
+  }
+}
+
+void Estimator::Parts::visit_state(StateArchive& archive) {
+  archive(blocks, displacement);
+  for (AxisChannel& axis : axes) archive(axis);
+  archive(cycle, stepped, now, dt_s, all_signals, controller_online, reference_degC, signal_values,
+          reference_signals, zero_known, model_um, zero_um, measured_um, predicted, ever_good,
+          lost_since, enabled, mode, mode_since, reasons, cycle_ends);
+}
+
+std::size_t Estimator::state_size_bytes() const noexcept {
+  StateArchive archive;
+  parts_->visit_state(archive);
+  return archive.position_bytes();
+}
+
+void Estimator::save_state(std::span<std::byte> out) const noexcept {
+  StateArchive archive(out);
+  parts_->visit_state(archive);
+  THERMOCOMP_ENSURE(archive.position_bytes() == out.size());
+}
+
+void Estimator::load_state(std::span<const std::byte> in) {
+  if (in.size() != state_size_bytes())
+    throw std::runtime_error("the estimator's state has another size than this program's");
+  StateArchive archive(in);
+  parts_->visit_state(archive);
+}
+
+void Estimator::restore(const PersistentState& state) {
+  Parts& parts = *parts_;
+  parts.enabled = state.enabled;
+  const auto take = [](const std::map<std::string, double>& from, const std::string& name,
+                       double& to) {
+    const auto found = from.find(name);
+    if (found != from.end() && std::isfinite(found->second)) to = found->second;
+  };
+  for (std::size_t i = 0; i < parts.columns.size(); ++i)
+    take(state.reference_degC, parts.columns[i], parts.reference_degC[i]);
+  const auto signal_columns = parts.thermal_model.signal_columns();
+  for (std::size_t i = 0; i < signal_columns.size(); ++i)
+    take(state.reference_signals, signal_columns[i], parts.reference_signals[i]);
+  for (std::size_t i = 0; i < parts.axes.size(); ++i) {
+    double offset_um = 0.0;
+    take(state.offset_um, parts.config.axes[i].name, offset_um);
+    parts.axes[i].restore(offset_um);
+  }
+}
+
+void Estimator::plan_adoption(const Estimator& previous) {
+  Parts& parts = *parts_;
+  const Parts& other = *previous.parts_;
+  const auto axis_names = [](const EstimatorConfig& config) {
+    std::vector<std::string> names;
+    for (const AxisConfig& axis : config.axes) names.push_back(axis.name);
+    return names;
+  };
+  parts.blocks.plan_adoption(other.blocks);
+  parts.column_plan = plan_names(parts.columns, other.columns);
+  parts.signal_plan =
+      plan_names(parts.thermal_model.signal_columns(), other.thermal_model.signal_columns());
+  parts.axis_plan = plan_names(axis_names(parts.config), axis_names(other.config));
+  parts.term_plan = parts.displacement.plan_terms(other.displacement);
+  // Numbers newly written into the model file are meant; otherwise the machine's state stays.
+  parts.keep_reference = parts.thermal_model.reference_degC == other.thermal_model.reference_degC;
+}
+
+void Estimator::adopt(const Estimator& previous) noexcept {
+  Parts& parts = *parts_;
+  const Parts& other = *previous.parts_;
+  parts.blocks.adopt(other.blocks);
+  parts.displacement.adopt_terms(previous.parts_->displacement, parts.term_plan);
+  if (parts.keep_reference) {
+    take_by_plan(parts.column_plan, other.reference_degC, parts.reference_degC);
+    take_by_plan(parts.signal_plan, other.reference_signals, parts.reference_signals);
+  }
+  take_by_plan(parts.signal_plan, other.signal_values, parts.signal_values);
+  if (parts.config.signals == other.config.signals) parts.all_signals = other.all_signals;
+  for (std::size_t i = 0; i < parts.axes.size(); ++i) {
+    if (parts.axis_plan[i] < 0) continue;
+    const auto from = static_cast<std::size_t>(parts.axis_plan[i]);
+    parts.axes[i].adopt(other.axes[from]);
+    parts.measured_um[i] = other.measured_um[from];
+  }
+  parts.cycle = other.cycle;
+  parts.stepped = other.stepped;
+  parts.now = other.now;
+  parts.dt_s = other.dt_s;
+  parts.ever_good = other.ever_good;
+  parts.lost_since = other.lost_since;
+  parts.enabled = other.enabled;
+  parts.mode = other.mode;
+  parts.mode_since = other.mode_since;
+  parts.cycle_ends = other.cycle_ends;
+}
+
+const EstimatorConfig& Estimator::config() const noexcept {
+  return parts_->config;
+}
+const ThermalModel& Estimator::model() const noexcept {
+  return parts_->thermal_model;
+}
+
+}  // namespace thermocomp

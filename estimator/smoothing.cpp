@@ -1,0 +1,146 @@
+#include "estimator/smoothing.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+
+void SampleHistory::push(const Sample& sample) noexcept {
+  if (full()) {
+    std::copy(samples_.begin() + 1, samples_.end(), samples_.begin());
+    --size_;
+  }
+  samples_[size_] = sample;
+  ++size_;
+}
+
+double SampleHistory::spread_K(const Line& line) const noexcept {
+  std::array<double, smoothing_samples_max> residuals_K{};
+  for (std::size_t i = 0; i < size_; ++i)
+    residuals_K[i] = std::abs(samples_[i].value_K - line.at(samples_[i].at));
+  const auto begin = residuals_K.begin();
+  const auto middle = begin + static_cast<std::ptrdiff_t>(size_ / 2);
+  std::nth_element(begin, middle, begin + static_cast<std::ptrdiff_t>(size_));
+  constexpr double normal_sigma_per_median = 1.4826;
+  return normal_sigma_per_median * *middle;
+}
+
+LineOfLines::LineOfLines(std::size_t samples) : coming_(samples) {}
+
+void LineOfLines::keep(const Sample& sample) noexcept {
+  coming_.push(sample);
+  if (!coming_.full()) return;
+  const Line newest = coming_.line();
+  slopes_K_per_s_ = {slopes_K_per_s_[1], slopes_K_per_s_[2], newest.slope_K_per_s};
+  blocks_ = std::min<std::size_t>(blocks_ + 1, 3);
+  newest_spread_K_ = coming_.spread_K(newest);
+  const nanoseconds last = coming_.newest().at;
+  const auto& [c, b, a] = slopes_K_per_s_;
+  expected_ = {last, 0.0, newest.at(last), 3 * a - 3 * b + c};
+  coming_.clear();
+}
+
+void LineOfLines::restart() noexcept {
+  coming_.clear();
+  blocks_ = 0;
+}
+
+Smoother::Smoother(const SmoothingConfig& config)
+    : form_(config.form),
+      screened_(config.history == SmoothingHistory::screened),
+      period_(std::chrono::duration_cast<nanoseconds>(seconds_d(config.period_s))),
+      outage_(std::chrono::duration_cast<nanoseconds>(seconds_d(config.outage_s))),
+      half_width_K_(config.half_width_K),
+      sliding_line_(config.samples),
+      line_of_lines_(config.samples) {
+  config.validate();
+  THERMOCOMP_ENSURE(config.samples <= smoothing_samples_max);
+}
+
+void Smoother::add(const Sample& sample) noexcept {
+  if (form_ == SmoothingForm::off) {
+    value_K_ = sample.value_K;
+    has_value_ = true;
+    return;
+  }
+  if (has_value_ && sample.at - taken_at_ > std::max(outage_, 2 * period_)) restart();
+  if (!due(sample.at)) return;
+  taken_at_ = sample.at;
+  if (form_ == SmoothingForm::sliding_line)
+    take(sliding_line_, sample);
+  else
+    take(line_of_lines_, sample);
+  has_value_ = true;
+}
+
+bool Smoother::due(nanoseconds at) noexcept {
+  if (!has_value_ || period_ <= nanoseconds{0}) {
+    due_at_ = at + period_;
+    return true;
+  }
+  if (at < due_at_) return false;
+  // Whole periods, so that late samples do not shift the grid.
+  due_at_ += period_ * (1 + (at - due_at_) / period_);
+  return true;
+}
+
+template <class Form>
+void Smoother::take(Form& form, const Sample& sample) noexcept {
+  if (!form.ready()) {
+    value_K_ = sample.value_K;
+    clipped_in_a_row_ = 0;
+    form.keep(sample);
+    return;
+  }
+  const double expected_K = form.expected().at(sample.at);
+  const double distance_K = sample.value_K - expected_K;
+  value_K_ = std::clamp(sample.value_K, expected_K - half_width_K_, expected_K + half_width_K_);
+  if (std::abs(distance_K) <= half_width_K_) {
+    clipped_in_a_row_ = 0;
+  } else {
+    ++clipped_;
+    ++clipped_in_a_row_;
+  }
+  if (screened_)
+    keep_screened(form, sample, distance_K);
+  else
+    form.keep(sample);
+}
+
+template <class Form>
+void Smoother::keep_screened(Form& form, const Sample& sample, double distance_K) noexcept {
+  const auto far_K = [&] { return far_factor * std::max(half_width_K_, form.spread_K()); };
+  if (std::abs(distance_K) <= half_width_K_ || std::abs(distance_K) <= far_K()) {
+    far_count_ = 0;
+    form.keep(sample);
+    return;
+  }
+  // A far value that does not agree with the one before it starts a new run.
+  if (far_count_ > 0 && !(std::abs(sample.value_K - far_[far_count_ - 1].value_K) <= far_K()))
+    far_count_ = 0;
+  far_[far_count_] = sample;
+  ++far_count_;
+  if (far_count_ < agreeing_values) return;
+  // They agree: the temperature is there. The history begins anew with them.
+  form.restart();
+  for (const Sample& far : far_) form.keep(far);
+  far_count_ = 0;
+  value_K_ = sample.value_K;
+}
+
+void Smoother::restart() noexcept {
+  sliding_line_.restart();
+  line_of_lines_.restart();
+  has_value_ = false;
+  clipped_in_a_row_ = 0;
+  far_count_ = 0;
+}
+
+void Smoother::visit_state(StateArchive& archive) {
+  archive(has_value_, value_K_, taken_at_, due_at_, clipped_, clipped_in_a_row_, far_, far_count_,
+          sliding_line_, line_of_lines_);
+}
+
+}  // namespace thermocomp
