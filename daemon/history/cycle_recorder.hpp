@@ -49,7 +49,9 @@ class CycleRecorder {
                 nanoseconds offsets_period, const Estimator& estimator);
 
   /// A segment begins: the estimator stands as it is right before the step of `first_cycle`.
-  void begin(std::uint64_t first_cycle, const Estimator& estimator, SegmentReason reason) noexcept;
+  /// @param previous  the recorder that was in use until now; none at the start of the daemon
+  void begin(std::uint64_t first_cycle, const Estimator& estimator, SegmentReason reason,
+             const CycleRecorder* previous = nullptr) noexcept;
   /// The command was given to Estimator::apply() before the step of `cycle`.
   void command(std::uint64_t cycle, const Command& command) noexcept;
   /// Cycles `from`..`to` (both included) were not stepped.

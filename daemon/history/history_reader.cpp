@@ -1,0 +1,158 @@
+#include "daemon/history/history_reader.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "daemon/history/chunk_codec.hpp"
+#include "daemon/history/database.hpp"
+
+namespace thermocomp {
+namespace {
+
+SegmentReason reason_from(std::int64_t code) {
+  if (code < 0 || code > static_cast<std::int64_t>(SegmentReason::gap)) {
+    throw HistoryError("damaged: unknown reason of a segment");
+  }
+  return static_cast<SegmentReason>(code);
+}
+
+SegmentInfo segment_from(const Statement& row) {
+  SegmentInfo segment;
+  segment.id = row.number(0);
+  segment.run = row.number(1);
+  segment.setup = row.number(2);
+  segment.reason = reason_from(row.number(3));
+  segment.grid.start = nanoseconds(row.number(4));
+  segment.grid.period = nanoseconds(row.number(5));
+  segment.first_cycle = static_cast<std::uint64_t>(row.number(6));
+  segment.last_cycle = row.number(7);
+  segment.wall_ns = row.number(8);
+  segment.records = static_cast<std::uint64_t>(row.number(9));
+  segment.bytes = static_cast<std::uint64_t>(row.number(10));
+  segment.program_version = row.text(11);
+  if (segment.grid.period.count() <= 0) throw HistoryError("damaged: a period is not positive");
+  return segment;
+}
+
+void check_is_history(Database& database) {
+  const std::string name = database.file().string();
+  if (database.number("PRAGMA application_id") != history_application_id) {
+    throw HistoryError(name + ": is not a history of thermocomp");
+  }
+  const std::int64_t version = database.number("PRAGMA user_version");
+  if (version > history_version) {
+    throw HistoryError(name + ": is of version " + std::to_string(version) +
+                       ", this program reads up to version " + std::to_string(history_version));
+  }
+}
+
+}  // namespace
+
+struct HistoryReader::Parts {
+  explicit Parts(const std::filesystem::path& path)
+      : file(path), database(path, DatabaseMode::read_only) {}
+  std::filesystem::path file;
+  mutable Database database;
+  std::vector<SegmentInfo> segments;
+};
+
+HistoryReader::HistoryReader(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) throw HistoryError(file.string() + ": there is no such file");
+  parts_ = std::make_unique<Parts>(file);
+  check_is_history(parts_->database);
+  Statement rows(parts_->database,
+                 "SELECT id, run, setup, reason, grid_start_ns, period_ns, first_cycle, last_cycle,"
+                 " wall_ns, records, bytes, program_version FROM segment ORDER BY id");
+  while (rows.step()) parts_->segments.push_back(segment_from(rows));
+}
+
+HistoryReader::~HistoryReader() = default;
+HistoryReader::HistoryReader(HistoryReader&&) noexcept = default;
+
+const std::filesystem::path& HistoryReader::file() const noexcept {
+  return parts_->file;
+}
+const std::vector<SegmentInfo>& HistoryReader::segments() const noexcept {
+  return parts_->segments;
+}
+
+SegmentSetup HistoryReader::setup(const SegmentInfo& segment) const {
+  Statement row(parts_->database,
+                "SELECT config_text, model_text, model_checksum FROM setup WHERE id = ?");
+  row.bind(segment.setup);
+  if (!row.step()) {
+    throw HistoryError(parts_->file.string() + ": the configuration of segment " +
+                       std::to_string(segment.id) + " is missing");
+  }
+  return {row.text(0), row.text(1), row.text(2)};
+}
+
+SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
+  Statement row(parts_->database, "SELECT estimator_state, inputs FROM segment WHERE id = ?");
+  row.bind(segment.id);
+  if (!row.step()) {
+    throw HistoryError(parts_->file.string() + ": segment " + std::to_string(segment.id) +
+                       " was deleted meanwhile");
+  }
+  SegmentStart start;
+  start.estimator_state = row.blob(0);
+  decode_inputs(row.blob(1), start.readings, start.controller);
+  return start;
+}
+
+RecordCursor HistoryReader::records(const SegmentInfo& segment) const {
+  return RecordCursor(*this, segment);
+}
+
+struct RecordCursor::Parts {
+  Parts(Database& database_in, SegmentInfo segment_in)
+      : database(database_in), segment(std::move(segment_in)) {}
+  Database& database;
+  SegmentInfo segment;
+  std::int64_t next_chunk{0};
+  std::int64_t through{-1};  ///< last cycle that the chunks read so far hold whole
+  std::int64_t wall_minus_grid_ns{0};
+  std::optional<ChunkDecoder> chunk;
+};
+
+RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segment)
+    : parts_(std::make_unique<Parts>(reader.parts_->database, segment)) {
+  parts_->wall_minus_grid_ns = segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
+  parts_->through = static_cast<std::int64_t>(segment.first_cycle) - 1;
+}
+RecordCursor::~RecordCursor() = default;
+RecordCursor::RecordCursor(RecordCursor&&) noexcept = default;
+
+std::int64_t RecordCursor::wall_minus_grid_ns() const noexcept {
+  return parts_->wall_minus_grid_ns;
+}
+
+bool RecordCursor::next(Record& out) {
+  Parts& parts = *parts_;
+  for (;;) {
+    if (parts.chunk && parts.chunk->next(out)) {
+      if (static_cast<std::int64_t>(out.cycle) <= parts.segment.last_cycle) return true;
+      return false;  // what follows was cut off before its cycle was whole
+    }
+    parts.chunk.reset();
+    // A statement of its own for each chunk: a read transaction that stays open would keep the
+    // daemon's write-ahead log from being taken back.
+    Statement row(parts.database,
+                  "SELECT records, count, through_cycle, wall_minus_grid_ns FROM chunk"
+                  " WHERE segment = ? AND number = ?");
+    row.bind(parts.segment.id).bind(parts.next_chunk);
+    if (!row.step()) {
+      if (parts.through >= parts.segment.last_cycle) return false;
+      throw HistoryError(parts.database.file().string() + ": chunk " +
+                         std::to_string(parts.next_chunk) + " of segment " +
+                         std::to_string(parts.segment.id) +
+                         " is missing (damaged, or deleted meanwhile)");
+    }
+    ++parts.next_chunk;
+    parts.through = row.number(2);
+    parts.wall_minus_grid_ns = row.number(3);
+    parts.chunk.emplace(row.blob(0), static_cast<std::uint64_t>(row.number(1)));
+  }
+}
+
+}  // namespace thermocomp

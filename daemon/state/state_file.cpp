@@ -1,0 +1,165 @@
+#include "daemon/state/state_file.hpp"
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fcntl.h>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+namespace thermocomp {
+namespace {
+
+using nlohmann::json;
+
+constexpr int format = 1;
+constexpr std::uintmax_t size_bytes_max = 1u << 20;
+
+json numbers(const std::map<std::string, double>& values) {
+  json object = json::object();
+  for (const auto& [name, value] : values) {
+    // NaN has no place in JSON, and says no more than a name that is missing.
+    if (std::isfinite(value)) object[name] = value;
+  }
+  return object;
+}
+
+std::map<std::string, double> numbers(const json& file, const char* key) {
+  std::map<std::string, double> values;
+  for (const auto& [name, value] : file.at(key).items()) {
+    if (!value.is_number())
+      throw std::runtime_error(std::string(key) + "." + name + " is no number");
+    const auto number = value.get<double>();
+    if (!std::isfinite(number)) {
+      throw std::runtime_error(std::string(key) + "." + name + " is not finite");
+    }
+    values[name] = number;
+  }
+  return values;
+}
+
+std::string to_text(const PersistentState& state) {
+  json file;
+  file["format"] = format;
+  file["program"] = "thermocomp";
+  file["enabled"] = state.enabled;
+  file["reference_degC"] = numbers(state.reference_degC);
+  file["reference_signals"] = numbers(state.reference_signals);
+  file["offset_um"] = numbers(state.offset_um);
+  return file.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+PersistentState from_text(const std::string& text) {
+  const json file = json::parse(text);
+  if (!file.is_object() || file.value("program", "") != "thermocomp") {
+    throw std::runtime_error("is not a state file of thermocomp");
+  }
+  if (file.at("format").get<int>() != format) {
+    throw std::runtime_error("is of format " + file.at("format").dump() + ", not " +
+                             std::to_string(format));
+  }
+  PersistentState state;
+  state.enabled = file.at("enabled").get<bool>();
+  state.reference_degC = numbers(file, "reference_degC");
+  state.reference_signals = numbers(file, "reference_signals");
+  state.offset_um = numbers(file, "offset_um");
+  return state;
+}
+
+std::string read_all(const std::filesystem::path& path) {
+  if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("is no ordinary file");
+  if (std::filesystem::file_size(path) > size_bytes_max) throw std::runtime_error("is too large");
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in) throw std::runtime_error("cannot be read");
+  return text.str();
+}
+
+std::string move_aside(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::string aside = file.string() + ".unusable";
+  std::filesystem::rename(file, aside, error);
+  return error ? "it could not be moved aside (" + error.message() + ")" : "moved to " + aside;
+}
+
+/// Closes itself; -1 is none.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) noexcept : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const noexcept { return fd_; }
+
+ private:
+  int fd_;
+};
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::runtime_error(what + ": " + std::strerror(errno));
+}
+
+void write_flushed(const std::string& path, const std::string& text) {
+  const Descriptor file(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
+  if (file.get() < 0) fail(path);
+  std::size_t done = 0;
+  while (done < text.size()) {
+    const ssize_t count = write(file.get(), text.data() + done, text.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail(path);
+    done += static_cast<std::size_t>(count);
+  }
+  if (fsync(file.get()) != 0) fail(path);
+}
+
+}  // namespace
+
+LoadedState load_state_file(const std::filesystem::path& file,
+                            const PersistentState& fallback) noexcept {
+  LoadedState loaded;
+  try {
+    loaded.state = fallback;
+    std::error_code error;
+    const auto status = std::filesystem::status(file, error);
+    if (status.type() == std::filesystem::file_type::not_found) return loaded;
+    if (error) throw std::runtime_error(error.message());
+    loaded.state = from_text(read_all(file));
+    loaded.found = true;
+  } catch (const std::exception& error) {
+    try {
+      loaded.state = fallback;
+      loaded.warning = "state file " + file.string() + " cannot be used: " + error.what() + "; " +
+                       move_aside(file) + "; references and switches start afresh";
+    } catch (const std::exception&) {
+      loaded.found = false;  // out of memory for a message: starting afresh is still right
+    }
+  }
+  return loaded;
+}
+
+std::string save_state_file(const std::filesystem::path& file,
+                            const PersistentState& state) noexcept {
+  try {
+    const std::string beside = file.string() + ".new";
+    write_flushed(beside, to_text(state));
+    if (rename(beside.c_str(), file.c_str()) != 0) fail(file.string());
+    const std::filesystem::path folder =
+        file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+    const Descriptor directory(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (directory.get() < 0 || fsync(directory.get()) != 0) fail(folder.string());
+    return {};
+  } catch (const std::exception& error) {
+    return std::string("state file: ") + error.what();
+  }
+}
+
+}  // namespace thermocomp
