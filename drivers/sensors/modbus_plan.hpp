@@ -1,0 +1,49 @@
+/// Which requests read all of a Modbus device, and where each value then stands. Pure.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "drivers/sensors/sensor_bus_config.hpp"
+
+namespace thermocomp {
+
+inline constexpr int registers_per_request_limit = 125;  ///< of the protocol
+inline constexpr int bits_per_request_limit = 2000;      ///< of the protocol
+
+/// Reads `count` registers or bits of one table from `address` on.
+struct PlannedRequest {
+  ModbusTable table{ModbusTable::input};
+  std::uint16_t address{0};  ///< 0-based
+  std::uint16_t count{0};
+};
+
+/// Where a value's first register or bit stands in the answers.
+struct WordPlace {
+  std::size_t request{0};  ///< index into ModbusPlan::requests
+  std::size_t offset{0};   ///< words from the answer's first
+};
+
+struct ChannelPlace {
+  WordPlace value;
+  std::optional<WordPlace> status;
+};
+
+struct ModbusPlan {
+  std::vector<PlannedRequest> requests;
+  std::vector<ChannelPlace> channels;  ///< order of the device's channels
+  /// In the first request: a counter read before the values never calls old values new.
+  std::optional<WordPlace> renewal;
+};
+
+/// Neighbouring values share a request while its unused words between two of them are at most
+/// `gap_registers_max` (bits: 16 times that), and its length at most `registers_per_request_max`,
+/// `line_registers_max` and the protocol's limit. A value is never split over two requests.
+/// `one_register_a_request`: every value, status and counter has a request of its own.
+/// @pre the limits are at least as large as the largest value
+[[nodiscard]] ModbusPlan plan_requests(const ModbusDeviceConfig& device,
+                                       int line_registers_max = registers_per_request_limit);
+
+}  // namespace thermocomp

@@ -1,0 +1,55 @@
+/// How often is a unit that does not answer asked again? Pure; the time is passed in.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+
+namespace thermocomp {
+
+/// Pauses double from `pause_first` to `pause_max`; an answer ends them at once. From the third
+/// failure on they are also long enough that all dead units of the line together take no more than
+/// `line_share_max` of its time with their time-outs, as far as `pause_max` allows.
+class UnitBackoff {
+ public:
+  using nanoseconds = std::chrono::nanoseconds;
+  static constexpr double line_share_max = 0.02;
+  static constexpr int failures_before_budget = 2;
+
+  UnitBackoff(nanoseconds pause_first, nanoseconds pause_max) noexcept
+      : pause_first_(std::min(pause_first, pause_max)), pause_max_(pause_max) {}
+
+  void answered() noexcept {
+    failures_ = 0;
+    not_before_ = nanoseconds{0};
+  }
+
+  /// The unit failed (all tries) at `now`.
+  /// @param cost        time of the line that the failed request took
+  /// @param dead_units  units of the line that do not answer, this one among them
+  void failed(nanoseconds now, nanoseconds cost, std::size_t dead_units) noexcept {
+    pause_ = failures_ == 0 ? pause_first_ : std::min(2 * pause_, pause_max_);
+    ++failures_;
+    nanoseconds pause = pause_;
+    if (failures_ > failures_before_budget) {
+      const double budget =
+          static_cast<double>(cost.count()) * static_cast<double>(dead_units) / line_share_max;
+      const auto ceiling = static_cast<double>(pause_max_.count());
+      pause =
+          std::max(pause, nanoseconds{static_cast<nanoseconds::rep>(std::min(budget, ceiling))});
+    }
+    not_before_ = now + pause;
+  }
+
+  [[nodiscard]] bool dead() const noexcept { return failures_ != 0; }
+  [[nodiscard]] nanoseconds not_before() const noexcept { return not_before_; }
+
+ private:
+  nanoseconds pause_first_;
+  nanoseconds pause_max_;
+  nanoseconds pause_{0};
+  nanoseconds not_before_{0};
+  int failures_{0};
+};
+
+}  // namespace thermocomp
