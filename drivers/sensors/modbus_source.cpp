@@ -87,7 +87,11 @@ nanoseconds longest_pause(const ModbusBusConfig& config) {
 }  // namespace
 
 ModbusSource::ModbusSource(const ModbusBusConfig& config)
-    : config_(config), reconnect_(from_seconds(config.line.reconnect_s)), connection_(config.line) {
+    : config_(config),
+      reconnect_(from_seconds(config.line.reconnect_s)),
+      connection_(config.line),
+      readings_(channels_of(config)),
+      slot_(readings_) {
   health_.name = config.name;
   health_.kind = is_serial(config.line) ? "modbus_rtu" : "modbus_tcp";
   for (const ModbusDeviceConfig& device_config : config.devices) {
