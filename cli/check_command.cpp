@@ -1,0 +1,89 @@
+#include "cli/check_command.hpp"
+
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "config/daemon_config.hpp"
+#include "config/problems.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+std::string counted(std::size_t count, const char* what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+std::string line_kind(const ModbusLine& line) {
+  return std::holds_alternative<ModbusRtu>(line.link) ? "modbus_rtu" : "modbus_tcp";
+}
+
+std::string controller_kind(const ControllerConfig& controller) {
+  if (const auto* modbus = std::get_if<ModbusControllerConfig>(&controller)) {
+    return modbus->name + " (" + line_kind(modbus->line) + ")";
+  }
+  if (const auto* can = std::get_if<CanControllerConfig>(&controller)) {
+    return can->name + " (can)";
+  }
+  return std::get<DryRunControllerConfig>(controller).name + " (dry_run: nothing is sent)";
+}
+
+template <class Names>
+std::string list_names(const Names& items) {
+  std::string result;
+  for (const auto& item : items) result += (result.empty() ? "" : ", ") + item.name;
+  return result;
+}
+
+void print_what_was_found(const DaemonConfig& config) {
+  const EstimatorConfig& estimator = config.estimator;
+  for (const ModbusBusConfig& bus : config.modbus_buses) {
+    std::cout << "bus " << bus.name << " (" << line_kind(bus.line)
+              << "): " << counted(bus.devices.size(), "device") << '\n';
+  }
+  for (const CanBusConfig& bus : config.can_buses) {
+    std::cout << "bus " << bus.name << " (can, "
+              << bus.interface << "): " << counted(bus.devices.size(), "device") << '\n';
+  }
+  std::cout << counted(estimator.sensors.size(), "sensor") << ": " << list_names(estimator.sensors)
+            << '\n'
+            << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)
+            << '\n'
+            << "axes: " << list_names(estimator.axes) << '\n'
+            << "controller " << controller_kind(config.controller) << ", "
+            << counted(estimator.signals.size(), "signal") << '\n'
+            << "model " << config.model_file.string() << ": "
+            << counted(config.model.inputs.size(), "input") << ", "
+            << counted(config.model.outputs.size(), "output") << ", "
+            << counted(config.model.terms.size(), "extension term") << ", SHA-256 "
+            << config.model_checksum << '\n'
+            << config.file.string() << ": OK\n";
+}
+
+int run_check(const std::string& file) {
+  try {
+    print_what_was_found(load_daemon_config(file));
+  } catch (const ConfigurationError& error) {
+    const std::size_t count = error.problems().size();
+    std::fprintf(stderr, "%s\n", error.what());
+    std::fprintf(stderr, "%s: %s\n", file.c_str(), counted(count, "problem").c_str());
+    return exit_bad_use;
+  }
+  return exit_success;
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, Action& action) {
+  CLI::App* sub =
+      app.add_subcommand("check", "a daemon's configuration with its model: every problem at once");
+  const auto file = std::make_shared<std::string>();
+  sub->add_option("CONFIG", *file, "configuration of thermocompd")->required();
+  sub->callback([&action, file] { action = [file] { return run_check(*file); }; });
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,126 @@
+#include "cli/observe_commands.hpp"
+
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/daemon_client.hpp"
+#include "cli/status_text.hpp"
+#include "cli/terminal.hpp"
+#include "cli/truth_file.hpp"
+#include "cli/watch_text.hpp"
+#include "daemon/socket/status_client.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+using nlohmann::json;
+using std::chrono::steady_clock;
+
+int run_status(const GlobalOptions& global, bool as_json) {
+  const json status = ask_daemon(global.socket, "status", json::object());
+  if (as_json) {
+    std::cout << status.dump(2) << '\n';
+  } else {
+    std::cout << status_text(status, stdout_is_terminal());
+  }
+  return is_compensating(status) ? exit_success : exit_no;
+}
+
+int run_sensors(const GlobalOptions& global, bool as_json) {
+  const json sensors = ask_daemon(global.socket, "sensors", json::object());
+  if (as_json) {
+    std::cout << sensors.dump(2) << '\n';
+  } else {
+    std::cout << sensors_text(sensors, stdout_is_terminal());
+  }
+  return exit_success;
+}
+
+struct WatchOptions {
+  double period_s{1.0};
+  double for_s{0.0};  ///< 0: until interrupted
+  std::string truth;  ///< file of a simulated machine's true displacement; empty: none
+};
+
+// Ctrl-C is how a watch ends; the table stays on the screen.
+void end_watch(int) {
+  constexpr char newline = '\n';
+  [[maybe_unused]] const auto written = ::write(STDOUT_FILENO, &newline, 1);
+  ::_exit(exit_success);
+}
+
+void show(const json& status, const TruthRow* truth, bool terminal, bool first) {
+  if (terminal) {
+    std::cout << "\033[H\033[J" << watch_screen(status, truth, true);
+  } else {
+    if (first) std::cout << watch_header(status, truth);
+    std::cout << watch_line(status, truth);
+  }
+  std::cout.flush();
+}
+
+void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
+  const bool terminal = stdout_is_terminal();
+  if (terminal) std::signal(SIGINT, end_watch);
+  const auto end = steady_clock::now() + std::chrono::duration<double>(options.for_s);
+  StatusClient client(global.socket);
+  client.call("subscribe", {{"methods", {"status"}}, {"period_s", options.period_s}});
+  std::optional<TruthFile> truth;
+  if (!options.truth.empty()) truth.emplace(options.truth);
+  const auto patience =
+      std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * options.period_s) + 5000);
+  for (bool first = true; options.for_s == 0.0 || steady_clock::now() < end;) {
+    const json notification = client.next(patience);
+    if (notification.value("method", "") != "status") continue;
+    const TruthRow* row = truth ? truth->newest() : nullptr;
+    show(notification.value("params", json::object()), row, terminal, first);
+    first = false;
+  }
+}
+
+int run_watch(const GlobalOptions& global, const WatchOptions& options) {
+  try {
+    watch_until_end(global, options);
+  } catch (const RemoteError& error) {
+    throw Failure(error.what());
+  } catch (const ClientError& error) {
+    throw Failure(error.what());
+  }
+  return exit_success;
+}
+
+}  // namespace
+
+void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
+  const auto as_json = std::make_shared<bool>(false);
+  CLI::App* status = app.add_subcommand(
+      "status", "whether the daemon compensates, by how much, since when, what is wrong");
+  status->add_flag("--json", *as_json, "the daemon's answer as JSON");
+  status->callback(
+      [&, as_json] { action = [&, as_json] { return run_status(global, *as_json); }; });
+
+  CLI::App* sensors = app.add_subcommand("sensors", "every sensor: raw, smoothed, fault");
+  sensors->add_flag("--json", *as_json, "the daemon's answer as JSON");
+  sensors->callback(
+      [&, as_json] { action = [&, as_json] { return run_sensors(global, *as_json); }; });
+
+  const auto options = std::make_shared<WatchOptions>();
+  CLI::App* watch = app.add_subcommand("watch", "a live table of the running daemon");
+  watch->add_option("--period", options->period_s, "seconds between two updates (default 1)")
+      ->check(CLI::Range(0.1, 60.0));
+  watch->add_option("--for", options->for_s, "end after so many seconds")
+      ->check(CLI::PositiveNumber);
+  watch->add_option("--truth", options->truth,
+                    "file that a simulated machine writes its true displacement to");
+  watch->callback([&, options] { action = [&, options] { return run_watch(global, *options); }; });
+}
+
+}  // namespace thermocomp::cli

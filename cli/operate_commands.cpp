@@ -1,0 +1,102 @@
+#include "cli/operate_commands.hpp"
+
+#include <array>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/daemon_client.hpp"
+#include "cli/json_fields.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+using nlohmann::json;
+
+struct PlainCommand {
+  const char* name;
+  const char* method;
+  const char* help;
+  const char* done;
+};
+constexpr std::array<PlainCommand, 5> plain_commands{{
+    {"reference", "reference", "takes the present temperatures as the state without displacement",
+     "reference: the present temperatures"},
+    {"enable", "enable", "switches the compensation on; offsets approach at their slew rate",
+     "compensation switched on"},
+    {"disable", "disable", "switches the compensation off; offsets go to zero at their slew rate",
+     "compensation switched off; offsets go to zero at their slew rate"},
+    {"cycle-end", "cycle_end", "tells that a machining cycle has ended", "end of cycle noted"},
+    {"reload", "reload", "reads configuration and model anew, without a jump of the axes",
+     "configuration and model reloaded"},
+}};
+
+struct AxisValue {
+  std::string axis;
+  double value_um{0.0};
+};
+
+// What the daemon has to say beside "done" (a reload may name the new model, for instance).
+void print_message(const json& answer, const std::string& otherwise) {
+  const std::string message = text_of(answer, "message");
+  std::cout << (message.empty() ? otherwise : message) << '\n';
+}
+
+int run_plain(const GlobalOptions& global, const PlainCommand& command) {
+  print_message(ask_daemon(global.socket, command.method, json::object()), command.done);
+  return exit_success;
+}
+
+int run_measured(const GlobalOptions& global, const AxisValue& given) {
+  const json answer =
+      ask_daemon(global.socket, "measured", {{"axis", given.axis}, {"value_um", given.value_um}});
+  print_message(answer, "measured displacement of " + given.axis +
+                            " noted: " + fixed_signed(given.value_um, 2) + " um");
+  return exit_success;
+}
+
+int run_prove(const GlobalOptions& global, const AxisValue& given) {
+  const json answer =
+      ask_daemon(global.socket, "prove", {{"axis", given.axis}, {"value_um", given.value_um}});
+  print_message(answer, "axis " + given.axis + ": the offset moves by " +
+                            fixed_signed(given.value_um, 2) +
+                            " um, holds, and comes back; an indicator at the tool must move by " +
+                            fixed_signed(given.value_um, 2) + " um in the axis' direction");
+  return exit_success;
+}
+
+using RunAxis = int (*)(const GlobalOptions&, const AxisValue&);
+
+void add_axis_command(CLI::App& app, const GlobalOptions& global, Action& action, const char* name,
+                      const char* help, const char* value_help, RunAxis run) {
+  CLI::App* sub = app.add_subcommand(name, help);
+  const auto given = std::make_shared<AxisValue>();
+  sub->add_option("AXIS", given->axis, "name of the axis in the configuration")->required();
+  sub->add_option("UM", given->value_um, value_help)->required();
+  sub->callback([&global, &action, given, run] {
+    action = [&global, given, run] { return run(global, *given); };
+  });
+}
+
+}  // namespace
+
+void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
+  for (const PlainCommand& command : plain_commands) {
+    CLI::App* sub = app.add_subcommand(command.name, command.help);
+    sub->callback([&global, &action, &command] {
+      action = [&global, &command] { return run_plain(global, command); };
+    });
+  }
+  add_axis_command(app, global, action, "measured",
+                   "gives the daemon a displacement that was measured at the tool",
+                   "measured displacement in um, positive as the axis counts", run_measured);
+  add_axis_command(app, global, action, "prove",
+                   "moves one axis a few um and back, to confirm the sign with an indicator",
+                   "by how much, in um", run_prove);
+}
+
+}  // namespace thermocomp::cli

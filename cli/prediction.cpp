@@ -1,0 +1,185 @@
+#include "cli/prediction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "config/problems.hpp"
+#include "config/units.hpp"
+#include "estimator/displacement_model.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+using Column = std::vector<double>;
+using Columns = std::vector<const Column*>;
+
+Columns columns_of(const RunFile& run, const std::vector<std::string>& names,
+                   std::vector<Problem>& problems) {
+  Columns columns;
+  for (const std::string& name : names) {
+    const auto index = run.find(name);
+    if (index) {
+      columns.push_back(&run.values[*index]);
+    } else {
+      problems.push_back({run.name, 0, name, "(missing)", "the model needs this column"});
+    }
+  }
+  return columns;
+}
+
+// References, order of the model's temperatures: the model's own for its inputs where it has them,
+// else the first value of the column.
+Column references(const ThermalModel& model, const RunFile& run, const Columns& temperatures,
+                  const std::vector<std::string>& names, std::vector<Problem>& problems) {
+  Column result;
+  for (std::size_t i = 0; i < temperatures.size(); ++i) {
+    if (i < model.reference_degC.size()) {
+      result.push_back(model.reference_degC[i]);
+      continue;
+    }
+    const Column& column = *temperatures[i];
+    const auto first = std::find_if(column.begin(), column.end(),
+                                    [](double value) { return std::isfinite(value); });
+    if (first == column.end()) {
+      problems.push_back({run.name, 0, names[i], "(missing)", "has no value to refer to"});
+      continue;
+    }
+    result.push_back(*first);
+  }
+  return result;
+}
+
+// @return false when a value is missing
+bool row_of(const Columns& columns, std::size_t row, Column& out) {
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    out[i] = (*columns[i])[row];
+    if (!std::isfinite(out[i])) return false;
+  }
+  return true;
+}
+
+nanoseconds time_of(double time_s) {
+  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
+}
+
+// The model at every row of the file, NaN where an input is missing; shape (outputs, rows).
+std::vector<Column> model_rows(const ThermalModel& model, const RunFile& run) {
+  std::vector<Problem> problems;
+  const std::vector<std::string> names = model.temperature_columns();
+  const Columns temperatures = columns_of(run, names, problems);
+  const Columns signals = columns_of(run, model.signal_columns(), problems);
+  if (!problems.empty()) throw ConfigurationError(problems);
+  const Column reference_degC = references(model, run, temperatures, names, problems);
+  if (!problems.empty()) throw ConfigurationError(problems);
+
+  DisplacementModel displacement_model(model);
+  displacement_model.restart();
+  Column temps_degC(temperatures.size());
+  Column signal_values(signals.size());
+  Column displacement_um(model.outputs.size());
+  std::vector<Column> rows(model.outputs.size(), Column(run.rows(), not_a_number));
+  const Column& time_s = run.time_s();
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    if (!row_of(temperatures, row, temps_degC) || !row_of(signals, row, signal_values)) continue;
+    displacement_model.step(time_of(time_s[row]), temps_degC, reference_degC, signal_values,
+                            displacement_um);
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i][row] = displacement_um[i];
+  }
+  return rows;
+}
+
+// t0 of an output: the first row with a prediction and, where there is any, a measured value.
+std::size_t first_row(const Column& predicted, const Column* measured) {
+  std::size_t row = 0;
+  while (row < predicted.size() && !(std::isfinite(predicted[row]) &&
+                                     (measured == nullptr || std::isfinite((*measured)[row])))) {
+    ++row;
+  }
+  return row;
+}
+
+bool row_counts(const std::vector<Column>& predicted, const Columns& measured, std::size_t row) {
+  if (!std::isfinite(predicted.front()[row])) return false;
+  const auto has_value = [row](const Column* column) {
+    return column != nullptr && std::isfinite((*column)[row]);
+  };
+  const auto is_there = [](const Column* column) { return column != nullptr; };
+  return std::any_of(measured.begin(), measured.end(), has_value) ||
+         std::none_of(measured.begin(), measured.end(), is_there);
+}
+
+void measure_residual(PredictedOutput& output) {
+  double sum_of_squares = 0.0;
+  double peak_um = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < output.predicted_um.size(); ++i) {
+    const double residual_um = output.measured_um[i] - output.predicted_um[i];
+    if (!std::isfinite(residual_um)) continue;
+    sum_of_squares += residual_um * residual_um;
+    peak_um = std::max(peak_um, std::abs(residual_um));
+    ++count;
+  }
+  output.rms_um = count > 0 ? std::sqrt(sum_of_squares / static_cast<double>(count)) : not_a_number;
+  output.peak_um = count > 0 ? peak_um : not_a_number;
+}
+
+}  // namespace
+
+Prediction predict(const ThermalModel& model, const RunFile& run) {
+  const std::vector<Column> predicted = model_rows(model, run);
+  Columns measured;
+  for (const std::string& output : model.outputs) {
+    const auto index = run.find(output);
+    measured.push_back(index ? &run.values[*index] : nullptr);
+  }
+
+  Prediction result;
+  std::vector<std::size_t> rows;
+  for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
+    if (row_counts(predicted, measured, row)) rows.push_back(row);
+  }
+  for (const std::size_t row : rows) result.time_s.push_back(run.time_s()[row]);
+  for (std::size_t i = 0; i < model.outputs.size(); ++i) {
+    PredictedOutput output;
+    output.name = model.outputs[i];
+    output.measured_there = measured[i] != nullptr;
+    const std::size_t start = first_row(predicted[i], measured[i]);
+    for (const std::size_t row : rows) {
+      const double offset_um = start < run.rows() ? predicted[i][start] : not_a_number;
+      output.predicted_um.push_back(predicted[i][row] - offset_um);
+      output.measured_um.push_back(output.measured_there && start < run.rows()
+                                       ? (*measured[i])[row] - (*measured[i])[start]
+                                       : not_a_number);
+    }
+    measure_residual(output);
+    result.outputs.push_back(std::move(output));
+  }
+  return result;
+}
+
+RunFile as_run_file(const Prediction& prediction) {
+  RunFile file;
+  file.columns.emplace_back("time_s");
+  file.values.push_back(prediction.time_s);
+  for (const PredictedOutput& output : prediction.outputs) {
+    const std::string unit(unit_of(output.name).suffix);
+    const std::string stem = output.name.substr(0, output.name.size() - unit.size());
+    std::vector<double> residual_um;
+    for (std::size_t i = 0; i < output.predicted_um.size(); ++i) {
+      residual_um.push_back(output.measured_um[i] - output.predicted_um[i]);
+    }
+    file.columns.push_back(stem + "_predicted" + unit);
+    file.values.push_back(output.predicted_um);
+    file.columns.push_back(stem + "_measured" + unit);
+    file.values.push_back(output.measured_um);
+    file.columns.push_back(stem + "_residual" + unit);
+    file.values.push_back(std::move(residual_um));
+  }
+  file.selected_end = prediction.time_s.size();
+  return file;
+}
+
+}  // namespace thermocomp::cli

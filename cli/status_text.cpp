@@ -1,0 +1,263 @@
+#include "cli/status_text.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/json_fields.hpp"
+#include "cli/reason_text.hpp"
+#include "cli/terminal.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr int key_width = 15;
+
+std::string line(const std::string& key, const std::string& value) {
+  return padded(key, key_width) + " : " + value + "\n";
+}
+
+std::string with_unit(double value, int digits, const std::string& unit) {
+  return fixed_signed(value, digits, 8) + " " + unit;
+}
+
+bool has_reason(const json& status, const char* name) {
+  const json& reasons = list_of(status, "reasons");
+  return std::find(reasons.begin(), reasons.end(), json(name)) != reasons.end();
+}
+
+std::vector<std::string> axes_not_driven(const json& status) {
+  std::vector<std::string> names;
+  for (const json& axis : list_of(status, "axes")) {
+    if (!flag_of(axis, "driven")) names.push_back(text_of(axis, "name"));
+  }
+  return names;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string result;
+  for (const std::string& word : words) result += (result.empty() ? "" : ", ") + word;
+  return result;
+}
+
+std::string mode_words(const std::string& mode) {
+  if (mode == "starting") return "starting: waiting for the first good values";
+  if (mode == "disabled") return "switched off: offsets at or on the way to zero";
+  if (mode == "holding") return "data lost: holding the last offsets";
+  if (mode == "ramping_to_zero") return "data lost: offsets on the way to zero";
+  return mode;
+}
+
+std::string headline(const json& status, bool colours) {
+  const std::string mode = text_of(status, "mode");
+  const std::string since = ", for " + duration_text(number_of(status, "mode_since_s"));
+  if (is_compensating(status)) {
+    return line("Compensating", coloured("yes", Colour::green, colours) + since);
+  }
+  if (mode == "compensating") {
+    const auto idle = axes_not_driven(status);
+    const std::string what = idle.empty() ? " (the controller takes no offsets)"
+                                          : " (axes not driven: " + joined(idle) + ")";
+    return line("Compensating", coloured("no", Colour::red, colours) + what);
+  }
+  const Colour colour = mode == "disabled" ? Colour::yellow : Colour::red;
+  return line("Compensating",
+              coloured("no", colour, colours) + " (" + mode_words(mode) + since + ")");
+}
+
+std::string axis_marks(const json& axis) {
+  std::vector<std::string> marks;
+  if (!flag_of(axis, "driven")) marks.emplace_back("not driven");
+  if (!flag_of(axis, "synced")) marks.emplace_back("read-back unknown");
+  if (flag_of(axis, "mismatch")) marks.emplace_back("mismatch");
+  if (flag_of(axis, "at_bound")) marks.emplace_back("at its bound");
+  if (flag_of(axis, "proving")) marks.emplace_back("proving its sign");
+  return marks.empty() ? "" : "  [" + joined(marks) + "]";
+}
+
+std::string axes_lines(const json& status) {
+  std::string result;
+  for (const json& axis : list_of(status, "axes")) {
+    const std::string unit = text_of(axis, "unit").empty() ? "um" : text_of(axis, "unit");
+    std::string values = "offset " + with_unit(number_of(axis, "offset"), 2, unit) + ", target " +
+                         with_unit(number_of(axis, "target"), 2, unit) + ", applied " +
+                         with_unit(number_of(axis, "applied"), 2, unit);
+    if (std::isfinite(number_of(axis, "measured"))) {
+      values += ", measured " + with_unit(number_of(axis, "measured"), 2, unit);
+    }
+    result += line("Axis " + text_of(axis, "name"), values + axis_marks(axis));
+  }
+  return result;
+}
+
+std::string inputs_lines(const json& status) {
+  std::string result;
+  for (const json& input : list_of(status, "inputs")) {
+    const double temp_degC = number_of(input, "temp_degC");
+    const double reference_degC = number_of(input, "reference_degC");
+    result += line(text_of(input, "name"), fixed(temp_degC, 2, 8) + " degC, reference " +
+                                               fixed(reference_degC, 2, 8) + " degC, rise " +
+                                               fixed_signed(temp_degC - reference_degC, 2, 7) +
+                                               " K" + (flag_of(input, "good") ? "" : "  [lost]"));
+  }
+  return result;
+}
+
+// Everything that is wrong, worst first: each line says what it is and what to do.
+std::string trouble_lines(const json& status, bool colours) {
+  std::string result;
+  const auto add = [&](const std::string& what, std::string_view remedy) {
+    const std::string key = result.empty() ? "Wrong" : "";
+    result += line(key, coloured(what, Colour::yellow, colours) +
+                            (remedy.empty() ? "" : " -> " + std::string(remedy)));
+  };
+  for (const json& reason : list_of(status, "reasons")) {
+    const std::string name = reason.is_string() ? reason.get<std::string>() : reason.dump();
+    const ReasonText text = reason_text(name);
+    add(std::string(text.meaning), text.remedy);
+  }
+  std::vector<std::string> bad;
+  for (const json& sensor : list_of(status, "sensors_bad")) {
+    if (sensor.is_string()) bad.push_back(sensor.get<std::string>());
+  }
+  if (!bad.empty()) add("bad sensors: " + joined(bad), "thermocomp sensors says why");
+  for (const json& bus : list_of(status, "buses")) {
+    for (const json& unit : list_of(bus, "units")) {
+      if (flag_of(unit, "answering") || !flag_of(bus, "connected")) continue;
+      add("bus " + text_of(bus, "name") + ": " + text_of(unit, "name") + " does not answer (" +
+              text_of(unit, "last_error") + ")",
+          "");
+    }
+    if (!flag_of(bus, "connected")) {
+      add("bus " + text_of(bus, "name") + " is not connected (" + text_of(bus, "last_error") + ")",
+          "");
+    }
+  }
+  for (const json& warning : list_of(status, "warnings")) {
+    if (warning.is_string()) add(warning.get<std::string>(), "");
+  }
+  return result.empty() ? line("Wrong", "nothing") : result;
+}
+
+std::string controller_line(const json& status) {
+  const json& controller = object_of(status, "controller");
+  std::string state = flag_of(controller, "online") ? "online" : "offline";
+  if (!flag_of(controller, "online") && !text_of(controller, "last_error").empty()) {
+    state += " (" + text_of(controller, "last_error") + ")";
+  }
+  return line("Controller",
+              text_of(controller, "name") + " (" + text_of(controller, "kind") + "): " + state);
+}
+
+std::string signals_line(const json& status) {
+  std::string values;
+  for (const auto& [name, value] : object_of(object_of(status, "controller"), "signals").items()) {
+    const double number = value.is_number() ? value.get<double>() : std::nan("");
+    values += (values.empty() ? "" : ", ") + name + " " + fixed(number, 3);
+  }
+  return values.empty() ? "" : line("Signals", values);
+}
+
+std::string buses_line(const json& status) {
+  std::string buses;
+  for (const json& bus : list_of(status, "buses")) {
+    const json& units = list_of(bus, "units");
+    const auto answering = std::count_if(
+        units.begin(), units.end(), [](const json& unit) { return flag_of(unit, "answering"); });
+    buses += (buses.empty() ? "" : ", ") + text_of(bus, "name") + " (" + text_of(bus, "kind") +
+             "): " + std::to_string(answering) + " of " + std::to_string(units.size()) +
+             " units answer";
+  }
+  return buses.empty() ? "" : line("Buses", buses);
+}
+
+std::string model_line(const json& status) {
+  const json& model = object_of(status, "model");
+  return line("Model", text_of(model, "file") + " (SHA-256 " +
+                           text_of(model, "checksum").substr(0, 16) + ")");
+}
+
+std::string cycle_line(const json& status) {
+  const json& cycle = object_of(status, "cycle");
+  return line("Cycle", fixed(number_of(cycle, "rate_hz"), 0) + " Hz, " +
+                           std::to_string(count_of(cycle, "count")) + " cycles, " +
+                           std::to_string(count_of(cycle, "missed")) + " missed, lateness p50 " +
+                           fixed(number_of(cycle, "lateness_us_p50"), 0) + " p99.9 " +
+                           fixed(number_of(cycle, "lateness_us_p999"), 0) + " max " +
+                           fixed(number_of(cycle, "lateness_us_max"), 0) + " us, work p50 " +
+                           fixed(number_of(cycle, "work_us_p50"), 1) + " max " +
+                           fixed(number_of(cycle, "work_us_max"), 1) + " us" +
+                           (flag_of(cycle, "real_time") ? "" : "  [not real-time]"));
+}
+
+std::string history_line(const json& status) {
+  const json& history = object_of(status, "history");
+  if (!flag_of(history, "enabled")) return line("History", "off");
+  std::string text = text_of(history, "file") + ", " + fixed(number_of(history, "size_MB"), 1) +
+                     " MB, last commit " + duration_text(number_of(history, "last_commit_age_s")) +
+                     " ago";
+  const std::uint64_t lost = count_of(history, "lost_records");
+  const std::uint64_t errors = count_of(history, "errors");
+  if (lost > 0) text += ", " + std::to_string(lost) + " records lost";
+  if (errors > 0) text += ", " + std::to_string(errors) + " errors";
+  return line("History", text);
+}
+
+}  // namespace
+
+bool is_compensating(const json& status) {
+  return text_of(status, "mode") == "compensating" && axes_not_driven(status).empty() &&
+         !has_reason(status, "controller_offline");
+}
+
+std::string duration_text(double seconds) {
+  if (!(seconds >= 0.0 && seconds < 1e12)) return "-";
+  const auto total_s = static_cast<std::int64_t>(seconds);
+  const auto parts = [](std::int64_t large, const char* a, std::int64_t small, const char* b) {
+    return std::to_string(large) + a + std::to_string(small) + b;
+  };
+  if (total_s < 60) return std::to_string(total_s) + " s";
+  if (total_s < 3600) return parts(total_s / 60, " min ", total_s % 60, " s");
+  if (total_s < 86400) return parts(total_s / 3600, " h ", total_s % 3600 / 60, " min");
+  return parts(total_s / 86400, " d ", total_s % 86400 / 3600, " h");
+}
+
+std::string status_text(const json& status, bool colours) {
+  return headline(status, colours) + trouble_lines(status, colours) + axes_lines(status) +
+         inputs_lines(status) + controller_line(status) + signals_line(status) +
+         buses_line(status) + model_line(status) + cycle_line(status) + history_line(status) +
+         line("Daemon", "version " + text_of(status, "version") + ", up " +
+                            duration_text(number_of(status, "uptime_s")));
+}
+
+std::string sensors_text(const json& sensors, bool colours) {
+  const json& list = list_of(sensors, "sensors");
+  int width = 6;
+  for (const json& sensor : list) {
+    width = std::max(width, static_cast<int>(text_of(sensor, "name").size()));
+  }
+  std::string result =
+      padded("sensor", width) + "  raw degC  smoothed  age s  clipped  in a row  rejected  state\n";
+  for (const json& sensor : list) {
+    const std::string fault = text_of(sensor, "fault");
+    const ReasonText text = fault_text(fault);
+    const bool good = fault == "none";
+    std::string state = coloured(text.meaning, good ? Colour::green : Colour::red, colours);
+    if (!text.remedy.empty()) state += " -> " + std::string(text.remedy);
+    result +=
+        padded(text_of(sensor, "name"), width) + "  " + fixed(number_of(sensor, "raw_degC"), 2, 8) +
+        "  " + fixed(number_of(sensor, "smoothed_degC"), 2, 8) + "  " +
+        fixed(number_of(sensor, "age_s"), 1, 5) + "  " + fixed(number_of(sensor, "clipped"), 0, 7) +
+        "  " + fixed(number_of(sensor, "clipped_in_a_row"), 0, 8) + "  " +
+        fixed(number_of(sensor, "rejected"), 0, 8) + "  " + state + "\n";
+  }
+  return result;
+}
+
+}  // namespace thermocomp::cli
