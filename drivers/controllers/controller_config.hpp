@@ -17,17 +17,20 @@ struct ModbusValue {
   Encoding encoding{Encoding::int16};
   WordOrder word_order{WordOrder::abcd};
   double scale{1.0};         ///< value = raw * scale (um for offsets)
+  bool operator==(const ModbusValue&) const = default;
 };
 
 struct ModbusSignal {
   std::size_t signal{0};     ///< index of the signal in the configuration
   ModbusValue value;
+  bool operator==(const ModbusSignal&) const = default;
 };
 
 /// Per axis: where the offset is written and where the controller shows what it applies.
 struct ModbusAxis {
   ModbusValue offset;
   std::optional<ModbusValue> applied;  ///< none: the controller does not read back
+  bool operator==(const ModbusAxis&) const = default;
 };
 
 struct ModbusControllerConfig {
@@ -39,15 +42,18 @@ struct ModbusControllerConfig {
   std::vector<ModbusSignal> signals;
   std::optional<ModbusValue> valid_bits;       ///< register: bit i = offset of axis i is valid
   std::optional<ModbusValue> heartbeat;        ///< register: counts up with every write
+  bool operator==(const ModbusControllerConfig&) const = default;
 };
 
 struct CanAxis {
   CanSignal offset;                            ///< in a frame we send
   std::optional<CanSignal> applied;            ///< in a frame the controller sends
+  bool operator==(const CanAxis&) const = default;
 };
 struct CanControllerSignal {
   std::size_t signal{0};
   CanSignal value;
+  bool operator==(const CanControllerSignal&) const = default;
 };
 struct CanControllerConfig {
   std::string name;
@@ -59,12 +65,14 @@ struct CanControllerConfig {
   std::vector<CanControllerSignal> signals;
   std::optional<CanSignal> valid_bits;
   std::optional<CanSignal> heartbeat;
+  bool operator==(const CanControllerConfig&) const = default;
 };
 
 /// Sends nothing; applies at once what it is offered and shows it.
 struct DryRunControllerConfig {
   std::string name;
   std::size_t axes{0};
+  bool operator==(const DryRunControllerConfig&) const = default;
 };
 
 using ControllerConfig =

@@ -1,0 +1,87 @@
+/// Offsets to a controller in CAN frames, and what it applies and measures from its own frames.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <vector>
+
+#include "drivers/bus_thread.hpp"
+#include "drivers/can/can_socket.hpp"
+#include "drivers/controllers/controller_config.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/controllers/write_gate.hpp"
+#include "drivers/wait_free_slot.hpp"
+#include "drivers/wake_event.hpp"
+
+namespace thermocomp {
+
+/// Sends its frames each period while there is a command of this epoch. In sync once every frame it
+/// listens for has come since the link was (re)established; out of sync as soon as one of them has
+/// been missing for silent_after_s, the interface is down or bus-off, or a frame could not be sent.
+/// The published time is that of the oldest of these frames.
+///
+/// An axis whose command is not valid keeps the value sent last (at first: what the controller
+/// applies); its valid bit is 0. A frame with an axis of which neither is known is not sent, unless
+/// the valid bits stand in the same frame. Valid bits and heartbeat are raw numbers: scale and
+/// offset are not used; the heartbeat starts anew when its bits are full.
+class CanController final : public ControllerLink {
+ public:
+  /// @throws InvalidValue for signals that cannot be or overlap
+  explicit CanController(CanControllerConfig config);
+  ~CanController() override;
+
+  /// @throws DriverError when the system has no CAN sockets at all
+  void start() override;
+  void stop() noexcept override;
+  void newest(ControllerState& state) noexcept override;
+  void offer(const OffsetCommand& command) noexcept override;
+  [[nodiscard]] ControllerHealth health() const override;
+
+ private:
+  /// A frame we send.
+  struct Outgoing {
+    CanFrame frame;
+    std::vector<std::size_t> axes;
+    bool has_valid_bits{false};
+    bool has_heartbeat{false};
+  };
+  /// A frame we listen for, with where its values go in state_.
+  struct Incoming {
+    CanId id;
+    std::vector<std::pair<CanSignal, double*>> values;
+    nanoseconds received_at{};
+    bool seen{false};  ///< since the link was (re)established
+  };
+
+  void plan_outgoing();
+  void plan_incoming();
+  Outgoing& outgoing(const CanSignal& signal);
+  void run();
+  void open_or_pause();
+  void receive();
+  void take(const CanFrame& frame);
+  void supervise(nanoseconds now);
+  void synchronise();
+  void send_command(nanoseconds now);
+  bool compose_and_send(Outgoing& outgoing);
+  void publish(bool online, nanoseconds now);
+  void lose();
+
+  const CanControllerConfig config_;
+  std::vector<Outgoing> outgoing_;  ///< offsets first, then valid bits, then heartbeat
+  ControllerState state_;           ///< the thread's own
+  std::vector<Incoming> incoming_;
+  CanSocket socket_;
+  WriteGate gate_;
+  std::uint64_t heartbeat_{0};
+  std::array<double, axes_max> held_um_{};  ///< what an axis that is not valid goes on sending
+  WaitFreeSlot<ControllerState> states_;
+  WaitFreeSlot<OffsetCommand> commands_;
+  WakeEvent wake_;
+  std::atomic<bool> stopping_{false};
+  mutable std::mutex health_mutex_;
+  ControllerHealth health_;
+  BusThread thread_;
+};
+
+}  // namespace thermocomp

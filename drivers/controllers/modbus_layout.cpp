@@ -1,0 +1,64 @@
+#include "drivers/controllers/modbus_layout.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "drivers/modbus/register_codec.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr std::size_t registers_a_read_max = 125;
+constexpr std::size_t bits_a_read_max = 2000;
+constexpr std::size_t registers_a_write_max = 123;
+
+}  // namespace
+
+ReadPlan plan_reads(std::span<const ModbusValue> values, std::size_t gap_max) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    if (values[a].table != values[b].table) return values[a].table < values[b].table;
+    return values[a].address < values[b].address;
+  });
+  ReadPlan plan;
+  plan.places.resize(values.size());
+  for (const std::size_t index : order) {
+    const ModbusValue& value = values[index];
+    const std::size_t begin = value.address;
+    const std::size_t end = begin + words_of(value.table, value.encoding);
+    const std::size_t most = is_bit_table(value.table) ? bits_a_read_max : registers_a_read_max;
+    if (plan.requests.empty() || plan.requests.back().table != value.table ||
+        begin > plan.requests.back().address + plan.requests.back().count + gap_max ||
+        end - plan.requests.back().address > most) {
+      plan.requests.push_back({value.table, value.address, 0});
+    }
+    ReadRequest& request = plan.requests.back();
+    plan.places[index] = {plan.requests.size() - 1, begin - request.address};
+    request.count = std::max(request.count, end - request.address);
+  }
+  return plan;
+}
+
+std::vector<WriteField> join_writes(std::vector<WriteField> fields) {
+  std::sort(fields.begin(), fields.end(),
+            [](const WriteField& a, const WriteField& b) { return a.address < b.address; });
+  std::vector<WriteField> requests;
+  for (WriteField& field : fields) {
+    if (!requests.empty()) {
+      WriteField& last = requests.back();
+      const bool touches = last.address + last.words.size() == field.address;
+      if (touches && last.words.size() + field.words.size() <= registers_a_write_max) {
+        last.words.insert(last.words.end(), field.words.begin(), field.words.end());
+        last.stage = std::max(last.stage, field.stage);
+        continue;
+      }
+    }
+    requests.push_back(std::move(field));
+  }
+  std::stable_sort(requests.begin(), requests.end(),
+                   [](const WriteField& a, const WriteField& b) { return a.stage < b.stage; });
+  return requests;
+}
+
+}  // namespace thermocomp

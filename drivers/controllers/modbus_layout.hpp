@@ -1,0 +1,49 @@
+/// Which requests carry a controller's values: pure planning, no I/O.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "drivers/controllers/controller_config.hpp"
+
+namespace thermocomp {
+
+struct ReadRequest {
+  ModbusTable table{ModbusTable::holding};
+  std::uint16_t address{0};
+  std::size_t count{0};  ///< words (a coil or discrete input is one)
+};
+
+/// Where a value's first word stands in the answers.
+struct WordPlace {
+  std::size_t request{0};
+  std::size_t word{0};
+};
+
+struct ReadPlan {
+  std::vector<ReadRequest> requests;
+  std::vector<WordPlace> places;  ///< one a value, in the order given
+};
+
+/// Few requests that cover all values: neighbours of one table are joined over at most `gap_max`
+/// unused words; a request has at most 125 registers or 2000 bits.
+[[nodiscard]] ReadPlan plan_reads(std::span<const ModbusValue> values, std::size_t gap_max = 8);
+
+/// Values of a higher stage reach the controller after those of a lower one, unless one request
+/// carries both.
+enum class WriteStage { offset, valid_bits, heartbeat };
+
+struct WriteField {
+  std::uint16_t address{0};
+  WriteStage stage{WriteStage::offset};
+  std::vector<std::uint16_t> words;
+};
+
+/// Joins fields whose registers touch into one request each (at most 123 registers), never writing
+/// a register that is in no field. The requests come in the order of their latest stage.
+/// @pre the fields do not overlap
+[[nodiscard]] std::vector<WriteField> join_writes(std::vector<WriteField> fields);
+
+}  // namespace thermocomp
