@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "config/problems.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
 #include "estimator/estimator_config.hpp"
@@ -19,6 +20,7 @@ struct LoopConfig {
   int priority{60};                            ///< SCHED_FIFO priority, 1..98
   int cpu{-1};                                 ///< -1: any
   RealTimeRule real_time{RealTimeRule::warn};  ///< where FIFO or memory locking is not allowed
+  bool operator==(const LoopConfig&) const = default;
 };
 
 struct HistoryConfig {
@@ -29,6 +31,7 @@ struct HistoryConfig {
   double commit_s{5.0};          ///< 0.1..10
   double offsets_period_s{1.0};  ///< offsets are noted this often, for people and for proof
   double segment_h{6.0};         ///< a state snapshot this often: where a replay can start
+  bool operator==(const HistoryConfig&) const = default;
 };
 
 struct SocketConfig {
@@ -36,6 +39,7 @@ struct SocketConfig {
   std::string read_group{"thermocomp"};
   std::string operator_group{"thermocomp-operator"};
   std::string bridge_group{"thermocomp-bridge"};
+  bool operator==(const SocketConfig&) const = default;
 };
 
 struct DaemonConfig {
@@ -56,5 +60,23 @@ struct DaemonConfig {
   std::string model_checksum;  ///< SHA-256 of the model file, hexadecimal
   ThermalModel model;
 };
+
+/// Reads the daemon's file and the model file that it names. Paths in it may be relative to the
+/// folder of the file.
+/// @throws ConfigurationError with every problem of both files
+[[nodiscard]] DaemonConfig load_daemon_config(const std::filesystem::path& path);
+
+/// The same from texts, as the history keeps them. The names stand for the files in problems; no
+/// file is opened.
+/// @throws ConfigurationError
+[[nodiscard]] DaemonConfig parse_daemon_config(const std::string& config_text,
+                                               const std::string& config_name,
+                                               const std::string& model_text,
+                                               const std::string& model_name);
+
+/// What differs between the two that a running daemon cannot take over; empty: a reload will do.
+/// A reload takes over model, blocks, screening, smoothing, limiter, compensation and log_level.
+[[nodiscard]] std::vector<std::string> restart_needed(const DaemonConfig& running,
+                                                      const DaemonConfig& next);
 
 }  // namespace thermocomp

@@ -68,11 +68,14 @@ class TomlTable {
   /// A whole number in [low, high]; `6.0` is not one.
   template <class T = int>
   [[nodiscard]] T integer(std::string_view key, T low, T high) const {
-    return static_cast<T>(integer_value(key, low, high, std::nullopt));
+    return static_cast<T>(integer_value(key, static_cast<std::int64_t>(low),
+                                        static_cast<std::int64_t>(high), std::nullopt));
   }
   template <class T = int>
   [[nodiscard]] T integer(std::string_view key, T low, T high, T otherwise) const {
-    return static_cast<T>(integer_value(key, low, high, otherwise));
+    return static_cast<T>(integer_value(key, static_cast<std::int64_t>(low),
+                                        static_cast<std::int64_t>(high),
+                                        static_cast<std::int64_t>(otherwise)));
   }
   /// A string that is not empty.
   [[nodiscard]] std::string text(std::string_view key) const;

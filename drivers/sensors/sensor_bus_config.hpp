@@ -20,6 +20,7 @@ enum class ModbusTable { coil, discrete_input, holding, input };
 struct ModbusTcp {
   std::string host;
   int port{502};
+  bool operator==(const ModbusTcp&) const = default;
 };
 struct ModbusRtu {
   std::string device;         ///< "/dev/ttyUSB0"
@@ -28,6 +29,7 @@ struct ModbusRtu {
   int data_bits{8};
   int stop_bits{1};
   bool rs485{false};          ///< let the kernel drive the transceiver's direction (TIOCSRS485)
+  bool operator==(const ModbusRtu&) const = default;
 };
 
 /// Timing of a Modbus line, shared by sensors and controllers.
@@ -38,12 +40,14 @@ struct ModbusLine {
   double reconnect_s{1.0};            ///< pause before a connection is tried again
   double backoff_s_max{30.0};         ///< longest pause before a dead unit is asked again
   int retries{1};                     ///< further tries of one request before it has failed
+  bool operator==(const ModbusLine&) const = default;
 };
 
 /// A register value that is no temperature but a message of the device.
 struct Sentinel {
   std::int64_t code{0};  ///< raw value before scale and offset (of the encoding's signedness)
   Fault fault{Fault::open_circuit};
+  bool operator==(const Sentinel&) const = default;
 };
 
 /// A register or bit beside the value that says whether the value is good.
@@ -53,6 +57,7 @@ struct ModbusStatus {
   std::uint16_t mask{0xFFFF}; ///< bits looked at (registers only)
   /// masked value -> fault; a value not listed and not 0 is device_error
   std::vector<Sentinel> codes;
+  bool operator==(const ModbusStatus&) const = default;
 };
 
 struct ModbusChannel {
@@ -65,6 +70,7 @@ struct ModbusChannel {
   double offset_degC{0.0};
   std::vector<Sentinel> sentinels;
   std::optional<ModbusStatus> status;
+  bool operator==(const ModbusChannel&) const = default;
 };
 
 /// A register that the device changes with each conversion; while it stands still, so do the times
@@ -72,6 +78,7 @@ struct ModbusChannel {
 struct ModbusRenewal {
   ModbusTable table{ModbusTable::input};
   std::uint16_t address{0};
+  bool operator==(const ModbusRenewal&) const = default;
 };
 
 struct ModbusDeviceConfig {
@@ -83,12 +90,14 @@ struct ModbusDeviceConfig {
   bool one_register_a_request{false};
   std::optional<ModbusRenewal> renewal;
   std::vector<ModbusChannel> channels;
+  bool operator==(const ModbusDeviceConfig&) const = default;
 };
 
 struct ModbusBusConfig {
   std::string name;
   ModbusLine line;
   std::vector<ModbusDeviceConfig> devices;
+  bool operator==(const ModbusBusConfig&) const = default;
 };
 
 enum class ByteOrder { little_endian, big_endian };  ///< Intel, Motorola
@@ -106,16 +115,19 @@ struct CanSignal {
   double scale{1.0};                ///< value = raw * scale + offset
   double offset{0.0};
   std::vector<Sentinel> sentinels;
+  bool operator==(const CanSignal&) const = default;
 };
 
 struct CanChannel {
   std::size_t sensor{0};  ///< index of the sensor in the configuration
   CanSignal signal;
+  bool operator==(const CanChannel&) const = default;
 };
 
 struct CanDeviceConfig {
   std::string name;
   std::vector<CanChannel> channels;
+  bool operator==(const CanDeviceConfig&) const = default;
 };
 
 struct CanBusConfig {
@@ -123,6 +135,7 @@ struct CanBusConfig {
   std::string interface;        ///< "can0"
   double reconnect_s{0.5};      ///< pause before the interface is tried again
   std::vector<CanDeviceConfig> devices;
+  bool operator==(const CanBusConfig&) const = default;
 };
 
 }  // namespace thermocomp

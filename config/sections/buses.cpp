@@ -1,0 +1,198 @@
+#include "config/sections/buses.hpp"
+
+#include <map>
+#include <optional>
+
+#include "config/sections/can_signals.hpp"
+#include "config/sections/common.hpp"
+#include "config/sections/modbus_values.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+enum class BusKind { modbus_tcp, modbus_rtu, can, unknown };
+
+struct Bus {
+  BusKind kind{BusKind::unknown};
+  std::size_t index{0};  ///< in the list of its kind
+  TomlTable table;
+  bool used{false};
+};
+
+struct Device {
+  BusKind kind{BusKind::unknown};
+  std::size_t bus{0};    ///< in the list of its kind
+  std::size_t index{0};  ///< in its bus
+  TomlTable table;
+  bool used{false};
+};
+
+std::string known(const auto& entries) {
+  std::string text;
+  for (const auto& [name, entry] : entries) text.append(text.empty() ? "" : ", ").append(name);
+  return text.empty() ? "there is none" : text;
+}
+
+class BusReader {
+ public:
+  explicit BusReader(const TomlTable& root) : root_(root) {}
+
+  SensorBuses read(const std::vector<TomlTable>& sensors) {
+    std::set<std::string> bus_names;
+    for (const TomlTable& table : root_.tables_required("bus")) read_bus(table, bus_names);
+    std::set<std::string> device_names;
+    for (const TomlTable& table : root_.tables_required("device")) {
+      read_device(table, device_names);
+    }
+    for (std::size_t i = 0; i < sensors.size(); ++i) read_channel(sensors[i], i);
+    for (const auto& [name, bus] : buses_) {
+      if (!bus.used) bus.table.problem("name", "no device is on this bus");
+    }
+    for (const auto& [name, device] : devices_) {
+      if (device.used) continue;
+      device.table.problem("name", "no sensor is on this device");
+      device.table.ignore_rest();
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void read_bus(const TomlTable& table, std::set<std::string>& names) {
+    const std::string name = unique_name(table, names);
+    const BusKind kind = table.choice<BusKind>("kind",
+                                               {{"modbus_tcp", BusKind::modbus_tcp},
+                                                {"modbus_rtu", BusKind::modbus_rtu},
+                                                {"can", BusKind::can}},
+                                               BusKind::unknown);
+    Bus bus{kind, 0, table, false};
+    if (kind == BusKind::can) {
+      bus.index = result_.can.size();
+      result_.can.push_back(read_can_bus(table, name));
+    } else if (kind == BusKind::unknown) {
+      if (!table.has("kind")) table.problem("kind", "must be given");
+      table.ignore_rest();
+    } else {
+      bus.index = result_.modbus.size();
+      result_.modbus.push_back(read_modbus_bus(table, name, kind));
+    }
+    buses_.try_emplace(name, bus);
+  }
+
+  static CanBusConfig read_can_bus(const TomlTable& table, const std::string& name) {
+    CanBusConfig bus;
+    bus.name = name;
+    bus.interface = read_interface(table);
+    bus.reconnect_s = table.number("reconnect_s", Range::between(0.01, 3600), bus.reconnect_s);
+    refuse_all(table,
+               {"host", "port", "device", "baud", "parity", "data_bits", "stop_bits", "rs485",
+                "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},
+               "makes no sense for kind = \"can\"");
+    return bus;
+  }
+
+  ModbusBusConfig read_modbus_bus(const TomlTable& table, const std::string& name, BusKind kind) {
+    ModbusBusConfig bus;
+    bus.name = name;
+    bus.line = read_modbus_line(table, kind == BusKind::modbus_tcp);
+    table.refuse("interface", "makes no sense on a Modbus bus");
+    if (const auto* rtu = std::get_if<ModbusRtu>(&bus.line.link)) {
+      if (!rtu->device.empty() && !result_.serial_devices.insert(rtu->device).second) {
+        table.problem("device", "is used by two buses");
+      }
+    }
+    return bus;
+  }
+
+  void read_device(const TomlTable& table, std::set<std::string>& names) {
+    const std::string name = unique_name(table, names);
+    const std::string bus_name = table.text("bus");
+    const auto bus = buses_.find(bus_name);
+    Device device{BusKind::unknown, 0, 0, table, false};
+    if (bus == buses_.end()) {
+      if (!bus_name.empty()) table.problem("bus", "must name a bus: " + known(buses_));
+    } else {
+      bus->second.used = true;
+      device.kind = bus->second.kind;
+      device.bus = bus->second.index;
+    }
+    if (device.kind == BusKind::unknown) {
+      table.ignore_rest();
+    } else if (device.kind == BusKind::can) {
+      refuse_all(table,
+                 {"unit", "period_s", "registers_per_request_max", "gap_registers_max",
+                  "one_register_a_request", "renewal", "table", "encoding", "word_order", "status"},
+                 "makes no sense on a CAN bus");
+      device.index = result_.can[device.bus].devices.size();
+      result_.can[device.bus].devices.push_back({name, {}});
+    } else {
+      device.index = result_.modbus[device.bus].devices.size();
+      result_.modbus[device.bus].devices.push_back(read_modbus_device(table, name, device.kind));
+    }
+    devices_.try_emplace(name, device);
+  }
+
+  static ModbusDeviceConfig read_modbus_device(const TomlTable& table, const std::string& name,
+                                               BusKind kind) {
+    ModbusDeviceConfig device;
+    device.name = name;
+    device.unit = read_unit(table, kind == BusKind::modbus_tcp);
+    device.period_s = table.number("period_s", Range::between(0.01, 3600), device.period_s);
+    device.registers_per_request_max =
+        table.integer("registers_per_request_max", 1, 125, device.registers_per_request_max);
+    device.gap_registers_max = table.integer("gap_registers_max", 0, 124, device.gap_registers_max);
+    device.one_register_a_request =
+        table.flag("one_register_a_request", device.one_register_a_request);
+    if (table.has("renewal")) device.renewal = read_modbus_renewal(table.table("renewal"));
+    return device;
+  }
+
+  void read_channel(const TomlTable& sensor, std::size_t index) {
+    const std::string device_name = sensor.text("device");
+    const auto found = devices_.find(device_name);
+    if (found == devices_.end()) {
+      if (!device_name.empty()) sensor.problem("device", "must name a device: " + known(devices_));
+      sensor.ignore_rest();
+      return;
+    }
+    Device& device = found->second;
+    device.used = true;
+    if (device.kind == BusKind::unknown) {
+      sensor.ignore_rest();
+    } else if (device.kind == BusKind::can) {
+      refuse_all(sensor, {"table", "address", "encoding", "word_order", "status"},
+                 "makes no sense on a CAN bus");
+      result_.can[device.bus].devices[device.index].channels.push_back(
+          {index, read_can_signal(sensor, device.table, CanUse::temperature)});
+    } else {
+      ModbusDeviceConfig& modbus = result_.modbus[device.bus].devices[device.index];
+      ModbusChannel channel = read_modbus_channel(sensor, device.table);
+      channel.sensor = index;
+      check_request(sensor, channel, modbus);
+      modbus.channels.push_back(std::move(channel));
+    }
+  }
+
+  /// A value is read in one request, or it could be half old and half new.
+  static void check_request(const TomlTable& sensor, const ModbusChannel& channel,
+                            const ModbusDeviceConfig& device) {
+    const int count = register_count(
+        {channel.table, channel.address, channel.encoding, channel.word_order, channel.scale});
+    if (count > device.registers_per_request_max) {
+      sensor.problem("address", "the value takes " + std::to_string(count) +
+                                    " registers, more than registers_per_request_max");
+    }
+  }
+
+  TomlTable root_;
+  SensorBuses result_;
+  std::map<std::string, Bus> buses_;
+  std::map<std::string, Device> devices_;
+};
+
+}  // namespace
+
+SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors) {
+  return BusReader(root).read(sensors);
+}
+
+}  // namespace thermocomp::sections

@@ -1,0 +1,22 @@
+/// [[bus]], [[device]] and where each [[sensor]] is found on them.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "config/toml_reader.hpp"
+#include "drivers/sensors/sensor_bus_config.hpp"
+
+namespace thermocomp::sections {
+
+struct SensorBuses {
+  std::vector<ModbusBusConfig> modbus;
+  std::vector<CanBusConfig> can;
+  std::set<std::string> serial_devices;  ///< used by a bus; the controller must not use them
+};
+
+/// @param sensors  the [[sensor]] tables in order; their channels get these indices
+[[nodiscard]] SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors);
+
+}  // namespace thermocomp::sections

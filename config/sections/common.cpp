@@ -1,0 +1,34 @@
+#include "config/sections/common.hpp"
+
+#include <map>
+#include <utility>
+
+namespace thermocomp::sections {
+
+std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base, std::int64_t low,
+                                 std::int64_t high) {
+  constexpr std::array<std::pair<std::string_view, Fault>, 4> lists{{
+      {"open_circuit_codes", Fault::open_circuit},
+      {"short_circuit_codes", Fault::short_circuit},
+      {"over_range_codes", Fault::out_of_range},
+      {"error_codes", Fault::device_error},
+  }};
+  std::vector<Sentinel> sentinels;
+  std::map<std::int64_t, std::string_view> listed;
+  for (const auto& [key, fault] : lists) {
+    const bool in_base = base.has(key);
+    const TomlTable& source = !own.has(key) && in_base ? base : own;
+    for (const std::int64_t code : source.integers(key, low, high, {})) {
+      const auto [entry, is_new] = listed.emplace(code, key);
+      if (is_new) {
+        sentinels.push_back({code, fault});
+      } else {
+        source.problem(key, std::to_string(code),
+                       "must not be listed twice (also in " + std::string(entry->second) + ")");
+      }
+    }
+  }
+  return sentinels;
+}
+
+}  // namespace thermocomp::sections

@@ -1,0 +1,81 @@
+/// What the sections of the daemon's file have in common.
+#pragma once
+
+#include <array>
+#include <initializer_list>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/toml_reader.hpp"
+#include "drivers/sensors/sensor_bus_config.hpp"
+#include "estimator/checks.hpp"
+
+namespace thermocomp::sections {
+
+/// Refuses each of `keys` that stands in the table.
+inline void refuse_all(const TomlTable& table, std::initializer_list<std::string_view> keys,
+                       std::string_view rule) {
+  for (const std::string_view key : keys) table.refuse(key, rule);
+}
+
+/// Reads `name`; one used before (in `seen`) is a problem.
+inline std::string unique_name(const TomlTable& table, std::set<std::string>& seen) {
+  std::string name = table.text("name");
+  if (!name.empty() && !seen.insert(name).second) table.problem("name", "is used twice");
+  return name;
+}
+
+/// A scale: any finite number but 0.
+[[nodiscard]] inline double read_scale(const TomlTable& table, double otherwise) {
+  const double scale = table.number("scale", Range::any(), otherwise);
+  if (scale != 0.0) return scale;
+  table.problem("scale", "must not be 0");
+  return 1.0;
+}
+
+/// The codes of `[low, high]` that are messages and no values, by the lists open_circuit_codes,
+/// short_circuit_codes, over_range_codes and error_codes; a list in `own` replaces that of `base`.
+[[nodiscard]] std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base,
+                                               std::int64_t low, std::int64_t high);
+
+template <class Config>
+struct NumberField {
+  std::string_view key;
+  double Config::*member;
+};
+
+/// Reads each field, absent ones as in `fallback`, and then puts Config::validate() to work: every
+/// field it refuses is a problem at its key and goes back to `fallback`, until the rest is valid.
+/// @pre fallback.validate() passes
+template <class Config, std::size_t N>
+void read_fields(const TomlTable& table, const std::array<NumberField<Config>, N>& fields,
+                 const Config& fallback, Config& config) {
+  for (const auto& field : fields) {
+    config.*field.member = table.number(field.key, Range::any(), fallback.*field.member);
+  }
+  for (std::size_t attempt = 0; attempt <= N; ++attempt) {
+    try {
+      config.validate();
+      return;
+    } catch (const InvalidValue& error) {
+      if (table.has(error.key())) {
+        table.problem(error.key(), error.rule());
+      } else {
+        table.problem(error.key(), error.value(), error.rule());
+      }
+      bool reset = false;
+      for (const auto& field : fields) {
+        if (field.key != error.key() || config.*field.member == fallback.*field.member) continue;
+        config.*field.member = fallback.*field.member;
+        reset = true;
+      }
+      if (!reset) break;  // broken beside a fallback: nothing more can be told apart
+    }
+  }
+  for (const auto& field : fields) config.*field.member = fallback.*field.member;
+}
+
+}  // namespace thermocomp::sections

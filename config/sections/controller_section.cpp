@@ -1,0 +1,263 @@
+#include "config/sections/controller_section.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "config/number_text.hpp"
+#include "config/sections/can_signals.hpp"
+#include "config/sections/common.hpp"
+#include "config/sections/modbus_values.hpp"
+#include "config/units.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+enum class Kind { dry_run, modbus_tcp, modbus_rtu, can, unknown };
+
+/// The bound of the axis must be something that the value can carry, or offsets would be cut off.
+void check_reach(const TomlTable& table, std::string_view key, const Range& reach,
+                 const AxisConfig& axis) {
+  const double bound = axis.limiter.offset_um_max;
+  if (reach.contains(bound) && reach.contains(-bound)) return;
+  table.problem(key, "must be able to hold -offset_um_max ... offset_um_max, but reaches from " +
+                         number_text(reach.min) + " to " + number_text(reach.max));
+}
+
+void check_bits(const TomlTable& table, double greatest, std::size_t axes) {
+  if (greatest + 1.0 >= std::exp2(static_cast<double>(axes))) return;
+  table.problem("valid_bits", "must have a bit for each of the " + std::to_string(axes) + " axes");
+}
+
+/// Registers that are written, and by what: no register may be written for two purposes.
+class WrittenRegisters {
+ public:
+  void add(const TomlTable& table, std::string_view key, const ModbusValue& value) {
+    for (int i = 0; i < register_count(value); ++i) {
+      const auto [entry, is_new] = used_.emplace(value.address + i, table.path());
+      if (is_new) continue;
+      table.problem(key, "register " + std::to_string(value.address + i) + " is written by " +
+                             entry->second + " already");
+      return;
+    }
+  }
+
+ private:
+  std::map<int, std::string> used_;
+};
+
+/// The same for the bits of the frames that are sent.
+class SentBits {
+ public:
+  void add(const TomlTable& table, std::string_view key, const CanSignal& signal) {
+    std::uint64_t& used = used_[{signal.id, signal.extended_id}];
+    const std::uint64_t bits = frame_bits(signal);
+    if ((used & bits) != 0) table.problem(key, "shares bits with another value that is sent");
+    used |= bits;
+  }
+  [[nodiscard]] bool sends(const CanSignal& signal) const {
+    return used_.contains({signal.id, signal.extended_id});
+  }
+
+ private:
+  std::map<std::pair<std::uint32_t, bool>, std::uint64_t> used_;
+};
+
+class ControllerReader {
+ public:
+  ControllerReader(const TomlTable& table, const std::vector<TomlTable>& axis_tables,
+                   const std::vector<AxisConfig>& axes)
+      : table_(table), axis_tables_(axis_tables), axes_(axes) {}
+
+  ControllerReading read(const std::set<std::string>& serial_devices) {
+    name_ = table_.text("name");
+    const Kind kind = table_.choice<Kind>("kind",
+                                          {{"dry_run", Kind::dry_run},
+                                           {"modbus_tcp", Kind::modbus_tcp},
+                                           {"modbus_rtu", Kind::modbus_rtu},
+                                           {"can", Kind::can}},
+                                          Kind::unknown);
+    switch (kind) {
+      case Kind::dry_run:
+        read_dry_run();
+        break;
+      case Kind::modbus_tcp:
+      case Kind::modbus_rtu:
+        read_modbus(kind == Kind::modbus_tcp, serial_devices);
+        break;
+      case Kind::can:
+        read_can();
+        break;
+      case Kind::unknown:
+        if (!table_.has("kind")) table_.problem("kind", "must be given");
+        ignore_places();
+        break;
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void ignore_places() {
+    table_.ignore_rest();
+    for (const TomlTable& signal : table_.tables("signal")) {
+      result_.signals.push_back(signal.text("name"));
+      signal.ignore_rest();
+    }
+    for (const TomlTable& axis : axis_tables_) axis.ignore_rest();
+  }
+
+  void read_dry_run() {
+    constexpr std::string_view rule = "makes no sense for a controller of kind = \"dry_run\"";
+    for (const std::string& key : table_.keys()) {
+      if (key != "name" && key != "kind") table_.refuse(key, rule);
+    }
+    for (const TomlTable& axis : axis_tables_) refuse_all(axis, {"offset", "applied"}, rule);
+    result_.config = DryRunControllerConfig{name_, axes_.size()};
+  }
+
+  /// Calls read_value(table, index) for every signal whose name can be used.
+  template <class ReadValue>
+  void read_signals(ReadValue read_value) {
+    std::set<std::string> names;
+    for (const TomlTable& table : table_.tables("signal")) {
+      const std::string name = unique_name(table, names);
+      if (!name.empty() && !is_operating(name)) {
+        table.problem("name", "must be a position or an operating signal by its unit");
+      } else if (!name.empty() && !is_column_name(name)) {
+        table.problem("name", column_name_rule);
+      }
+      if (result_.signals.size() == signals_max) {
+        table.problem("name", "there must be at most " + std::to_string(signals_max) + " signals");
+      }
+      read_value(table, result_.signals.size());
+      result_.signals.push_back(name);
+    }
+  }
+
+  /// Either every axis shows what is applied, or none does.
+  void check_read_back() {
+    const auto shows = [](const TomlTable& axis) { return axis.has("applied"); };
+    const auto count = std::count_if(axis_tables_.begin(), axis_tables_.end(), shows);
+    result_.reads_back = count > 0;
+    if (count == 0) return;
+    for (const TomlTable& axis : axis_tables_) {
+      if (!shows(axis)) axis.problem("applied", "must be given for all axes or for none");
+    }
+  }
+
+  void read_modbus(bool is_tcp, const std::set<std::string>& serial_devices) {
+    ModbusControllerConfig config;
+    config.name = name_;
+    config.line = read_modbus_line(table_, is_tcp);
+    if (const auto* rtu = std::get_if<ModbusRtu>(&config.line.link)) {
+      if (serial_devices.contains(rtu->device)) table_.problem("device", "is used by two buses");
+    }
+    config.unit = read_unit(table_, is_tcp);
+    config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
+    refuse_all(table_, {"interface", "silent_after_s"}, "makes no sense for a Modbus controller");
+    WrittenRegisters written;
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      config.axes.push_back(read_modbus_axis(axis_tables_[i], axes_[i], written));
+    }
+    check_read_back();
+    if (table_.has("valid_bits")) {
+      config.valid_bits = read_modbus_value(table_.table("valid_bits"), RegisterUse::written_bits);
+      written.add(table_, "valid_bits", *config.valid_bits);
+      check_bits(table_, reach(*config.valid_bits).max, axes_.size());
+    }
+    if (table_.has("heartbeat")) {
+      config.heartbeat = read_modbus_value(table_.table("heartbeat"), RegisterUse::written_bits);
+      written.add(table_, "heartbeat", *config.heartbeat);
+    }
+    read_signals([&](const TomlTable& table, std::size_t index) {
+      config.signals.push_back({index, read_modbus_value(table, RegisterUse::signal)});
+    });
+    result_.period_s = config.period_s;
+    result_.config = std::move(config);
+  }
+
+  static ModbusAxis read_modbus_axis(const TomlTable& table, const AxisConfig& axis,
+                                     WrittenRegisters& written) {
+    ModbusAxis place;
+    const TomlTable offset = table.table("offset");
+    place.offset = read_modbus_value(offset, RegisterUse::written);
+    if (offset) {
+      written.add(table, "offset", place.offset);
+      check_reach(table, "offset", reach(place.offset), axis);
+    }
+    if (table.has("applied")) {
+      place.applied = read_modbus_value(table.table("applied"), RegisterUse::number);
+      check_reach(table, "applied", reach(*place.applied), axis);
+    }
+    return place;
+  }
+
+  void read_can() {
+    CanControllerConfig config;
+    config.name = name_;
+    config.interface = read_interface(table_);
+    config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
+    config.silent_after_s =
+        table_.number("silent_after_s", Range::between(0.01, 3600), config.silent_after_s);
+    config.reconnect_s =
+        table_.number("reconnect_s", Range::between(0.01, 3600), config.reconnect_s);
+    refuse_all(table_,
+               {"host", "port", "unit", "device", "baud", "parity", "data_bits", "stop_bits",
+                "rs485", "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},
+               "makes no sense for kind = \"can\"");
+    SentBits sent;
+    for (std::size_t i = 0; i < axes_.size(); ++i) read_can_offset(i, config, sent);
+    for (const auto& [key, place] :
+         {std::pair("valid_bits", &config.valid_bits), std::pair("heartbeat", &config.heartbeat)}) {
+      if (!table_.has(key)) continue;
+      const TomlTable value = table_.table(key);
+      *place = read_can_signal(value, value, CanUse::bits);
+      sent.add(table_, key, **place);
+    }
+    if (config.valid_bits) check_bits(table_, reach(*config.valid_bits).max, axes_.size());
+    const auto received = [&](const TomlTable& table, std::string_view key,
+                              const CanSignal& signal) {
+      if (sent.sends(signal)) table.problem(key, "is in a frame that is sent, not received");
+    };
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      if (!axis_tables_[i].has("applied")) continue;
+      const TomlTable applied = axis_tables_[i].table("applied");
+      config.axes[i].applied = read_can_signal(applied, applied, CanUse::offset);
+      received(axis_tables_[i], "applied", *config.axes[i].applied);
+      check_reach(axis_tables_[i], "applied", reach(*config.axes[i].applied), axes_[i]);
+    }
+    check_read_back();
+    read_signals([&](const TomlTable& table, std::size_t index) {
+      config.signals.push_back({index, read_can_signal(table, table, CanUse::signal)});
+      received(table, "id", config.signals.back().value);
+    });
+    result_.period_s = config.period_s;
+    result_.config = std::move(config);
+  }
+
+  void read_can_offset(std::size_t index, CanControllerConfig& config, SentBits& sent) const {
+    const TomlTable& table = axis_tables_[index];
+    const TomlTable offset = table.table("offset");
+    CanAxis& place = config.axes.emplace_back();
+    place.offset = read_can_signal(offset, offset, CanUse::offset);
+    if (!offset) return;
+    sent.add(table, "offset", place.offset);
+    check_reach(table, "offset", reach(place.offset), axes_[index]);
+  }
+
+  TomlTable table_;
+  const std::vector<TomlTable>& axis_tables_;
+  const std::vector<AxisConfig>& axes_;
+  std::string name_;
+  ControllerReading result_;
+};
+
+}  // namespace
+
+ControllerReading read_controller(const TomlTable& table, const std::vector<TomlTable>& axis_tables,
+                                  const std::vector<AxisConfig>& axes,
+                                  const std::set<std::string>& serial_devices) {
+  return ControllerReader(table, axis_tables, axes).read(serial_devices);
+}
+
+}  // namespace thermocomp::sections

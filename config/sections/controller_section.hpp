@@ -1,0 +1,28 @@
+/// [controller], [[controller.signal]] and where each [[axis]] takes its offset.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "config/toml_reader.hpp"
+#include "drivers/controllers/controller_config.hpp"
+#include "estimator/estimator_config.hpp"
+
+namespace thermocomp::sections {
+
+struct ControllerReading {
+  ControllerConfig config;
+  std::vector<std::string> signals;  ///< names, in order
+  bool reads_back{true};
+  double period_s{0.0};  ///< of the exchange; 0: there is none
+};
+
+/// @param axis_tables  the [[axis]] tables, in the order of `axes`
+/// @param serial_devices  those that a bus uses already
+[[nodiscard]] ControllerReading read_controller(const TomlTable& table,
+                                                const std::vector<TomlTable>& axis_tables,
+                                                const std::vector<AxisConfig>& axes,
+                                                const std::set<std::string>& serial_devices);
+
+}  // namespace thermocomp::sections

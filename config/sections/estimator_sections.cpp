@@ -1,0 +1,203 @@
+#include "config/sections/estimator_sections.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "config/sections/common.hpp"
+#include "config/units.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+ScreeningConfig read_screening(const TomlTable& table, const ScreeningConfig& fallback) {
+  constexpr std::array<NumberField<ScreeningConfig>, 6> fields{{
+      {"temp_degC_min", &ScreeningConfig::temp_degC_min},
+      {"temp_degC_max", &ScreeningConfig::temp_degC_max},
+      {"stale_after_s", &ScreeningConfig::stale_after_s},
+      {"rate_K_per_s_max", &ScreeningConfig::rate_K_per_s_max},
+      {"rate_allowance_K", &ScreeningConfig::rate_allowance_K},
+      {"stuck_after_s", &ScreeningConfig::stuck_after_s},
+  }};
+  ScreeningConfig config = fallback;
+  read_fields(table, fields, fallback, config);
+  return config;
+}
+
+SmoothingConfig read_smoothing(const TomlTable& table, const SmoothingConfig& fallback) {
+  constexpr std::array<NumberField<SmoothingConfig>, 3> fields{{
+      {"period_s", &SmoothingConfig::period_s},
+      {"half_width_K", &SmoothingConfig::half_width_K},
+      {"outage_s", &SmoothingConfig::outage_s},
+  }};
+  SmoothingConfig config = fallback;
+  config.form = table.choice<SmoothingForm>("form",
+                                            {{"off", SmoothingForm::off},
+                                             {"sliding_line", SmoothingForm::sliding_line},
+                                             {"line_of_lines", SmoothingForm::line_of_lines}},
+                                            fallback.form);
+  config.history = table.choice<SmoothingHistory>(
+      "history", {{"raw", SmoothingHistory::raw}, {"screened", SmoothingHistory::screened}},
+      fallback.history);
+  config.samples = table.integer<std::size_t>("samples", 3, 32, fallback.samples);
+  read_fields(table, fields, fallback, config);
+  return config;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
+  return text.empty() ? "there is none" : text;
+}
+
+std::map<std::string, std::size_t> index_of(const std::vector<SensorConfig>& sensors) {
+  std::map<std::string, std::size_t> index;
+  for (std::size_t i = 0; i < sensors.size(); ++i) index.try_emplace(sensors[i].name, i);
+  return index;
+}
+
+void read_references(const std::vector<TomlTable>& tables, std::vector<SensorConfig>& sensors) {
+  const auto index = index_of(sensors);
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    if (!tables[i].has("reference_sensor")) continue;
+    const std::string name = tables[i].text("reference_sensor");
+    const auto found = index.find(name);
+    if (found == index.end()) {
+      if (!name.empty()) tables[i].problem("reference_sensor", "must name a sensor");
+    } else if (found->second == i) {
+      tables[i].problem("reference_sensor", "must be another sensor");
+    } else {
+      sensors[i].reference_sensor = found->second;
+    }
+  }
+}
+
+/// A chain of references that comes back to where it began has no temperature at its end.
+void refuse_cycles(const std::vector<TomlTable>& tables, std::vector<SensorConfig>& sensors) {
+  std::vector<bool> in_cycle(sensors.size(), false);
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    auto next = sensors[i].reference_sensor;
+    for (std::size_t steps = 0; next && *next != i && steps < sensors.size(); ++steps) {
+      next = sensors[*next].reference_sensor;
+    }
+    in_cycle[i] = next == i;
+  }
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    if (!in_cycle[i]) continue;
+    tables[i].problem("reference_sensor", "must not lead back to this sensor");
+    sensors[i].reference_sensor.reset();
+  }
+}
+
+}  // namespace
+
+std::vector<SensorConfig> read_sensors(const TomlTable& root,
+                                       const std::vector<TomlTable>& tables) {
+  const ScreeningConfig screening = read_screening(root.table_or_empty("screening"), {});
+  const SmoothingConfig smoothing = read_smoothing(root.table_or_empty("smoothing"), {});
+  std::set<std::string> names;
+  std::vector<SensorConfig> sensors;
+  for (const TomlTable& table : tables) {
+    SensorConfig& sensor = sensors.emplace_back();
+    sensor.name = unique_name(table, names);
+    sensor.screening = read_screening(table.table_or_empty("screening"), screening);
+    sensor.smoothing = read_smoothing(table.table_or_empty("smoothing"), smoothing);
+  }
+  read_references(tables, sensors);
+  refuse_cycles(tables, sensors);
+  return sensors;
+}
+
+std::vector<BlockConfig> read_blocks(const std::vector<TomlTable>& tables,
+                                     const std::vector<SensorConfig>& sensors) {
+  const auto index = index_of(sensors);
+  std::set<std::string> names;
+  std::vector<BlockConfig> blocks;
+  for (const TomlTable& table : tables) {
+    BlockConfig& block = blocks.emplace_back();
+    block.name = unique_name(table, names);
+    block.input = table.text("input");
+    if (!block.input.empty() && !is_temperature(block.input)) {
+      table.problem("input", "must be a temperature (*_degC, *_K)");
+    }
+    const std::vector<std::string> named = table.texts("sensors");
+    if (table.has("sensors") && named.empty()) {
+      table.problem("sensors", "must name at least one sensor");
+    }
+    for (const std::string& name : named) {
+      const auto found = index.find(name);
+      if (found == index.end()) {
+        if (!name.empty()) table.problem("sensors", name, "must be a sensor's name");
+      } else if (std::find(block.sensors.begin(), block.sensors.end(), found->second) !=
+                 block.sensors.end()) {
+        table.problem("sensors", name, "is named twice");
+      } else {
+        block.sensors.push_back(found->second);
+      }
+    }
+  }
+  return blocks;
+}
+
+std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
+  constexpr std::array<NumberField<LimiterConfig>, 2> fields{{
+      {"offset_um_max", &LimiterConfig::offset_um_max},
+      {"rate_um_per_s_max", &LimiterConfig::rate_um_per_s_max},
+  }};
+  std::set<std::string> names;
+  std::vector<AxisConfig> axes;
+  for (const TomlTable& table : tables) {
+    AxisConfig& axis = axes.emplace_back();
+    axis.name = unique_name(table, names);
+    axis.output = table.text("output");
+    if (!axis.output.empty() && !is_output(axis.output)) {
+      table.problem("output", "must be a displacement (*_um) or a tilt (*_urad)");
+    }
+    const int sign = table.integer("sign", -1, 1, 1);
+    if (sign == 0) table.problem("sign", "must be 1 or -1");
+    axis.sign = sign;
+    for (const auto& field : fields) {  // how far and how fast an axis may move has no default
+      if (!table.has(field.key)) table.problem(field.key, "must be given");
+    }
+    read_fields(table, fields, LimiterConfig{}, axis.limiter);
+  }
+  if (axes.size() > axes_max) {
+    tables[axes_max].problem("name", "there must be at most " + std::to_string(axes_max) + " axes");
+  }
+  return axes;
+}
+
+CompensationConfig read_compensation(const TomlTable& table,
+                                     const std::vector<std::string>& signals) {
+  constexpr std::array<NumberField<CompensationConfig>, 6> fields{{
+      {"hold_s", &CompensationConfig::hold_s},
+      {"controller_stale_after_s", &CompensationConfig::controller_stale_after_s},
+      {"mismatch_um", &CompensationConfig::mismatch_um},
+      {"mismatch_after_s", &CompensationConfig::mismatch_after_s},
+      {"prove_um_max", &CompensationConfig::prove_um_max},
+      {"prove_hold_s", &CompensationConfig::prove_hold_s},
+  }};
+  CompensationConfig config;
+  config.on_loss = table.choice<LossPolicy>(
+      "on_loss", {{"hold", LossPolicy::hold}, {"ramp_to_zero", LossPolicy::ramp_to_zero}},
+      config.on_loss);
+  config.enabled_at_first_start =
+      table.flag("enabled_at_first_start", config.enabled_at_first_start);
+  config.hold_while_cutting = table.flag("hold_while_cutting", config.hold_while_cutting);
+  read_fields(table, fields, CompensationConfig{}, config);
+  const auto read_signal = [&](std::string_view key) {
+    std::string name = table.text(key, "");
+    if (!name.empty() && std::find(signals.begin(), signals.end(), name) == signals.end()) {
+      table.problem(key, "must be a signal of the controller: " + joined(signals));
+    }
+    return name;
+  };
+  config.cutting_signal = read_signal("cutting_signal");
+  config.disable_signal = read_signal("disable_signal");
+  if (config.hold_while_cutting && !table.has("cutting_signal")) {
+    table.problem("hold_while_cutting", "needs a cutting_signal");
+  }
+  return config;
+}
+
+}  // namespace thermocomp::sections

@@ -1,0 +1,26 @@
+/// [screening], [smoothing], [[sensor]], [[block]], [[axis]] and [compensation].
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/toml_reader.hpp"
+#include "estimator/estimator_config.hpp"
+
+namespace thermocomp::sections {
+
+/// Names, reference sensors, screening and smoothing of the [[sensor]] tables, in order.
+[[nodiscard]] std::vector<SensorConfig> read_sensors(const TomlTable& root,
+                                                     const std::vector<TomlTable>& tables);
+
+[[nodiscard]] std::vector<BlockConfig> read_blocks(const std::vector<TomlTable>& tables,
+                                                   const std::vector<SensorConfig>& sensors);
+
+/// Without the keys that say where the offset goes (`offset`, `applied`).
+[[nodiscard]] std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables);
+
+/// @param signals  what the controller reports
+[[nodiscard]] CompensationConfig read_compensation(const TomlTable& table,
+                                                   const std::vector<std::string>& signals);
+
+}  // namespace thermocomp::sections

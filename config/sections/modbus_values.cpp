@@ -1,0 +1,279 @@
+#include "config/sections/modbus_values.hpp"
+
+#include <algorithm>
+#include <arpa/inet.h>
+#include <array>
+
+#include "config/sections/common.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+constexpr int address_max = 65535;
+
+const Names<Encoding>& encodings() {
+  static const Names<Encoding> names{
+      {"int16", Encoding::int16},   {"uint16", Encoding::uint16},   {"int32", Encoding::int32},
+      {"uint32", Encoding::uint32}, {"float32", Encoding::float32}, {"float64", Encoding::float64}};
+  return names;
+}
+
+const Names<WordOrder>& word_orders() {
+  static const Names<WordOrder> names{{"ABCD", WordOrder::abcd},
+                                      {"DCBA", WordOrder::dcba},
+                                      {"BADC", WordOrder::badc},
+                                      {"CDAB", WordOrder::cdab}};
+  return names;
+}
+
+const Names<ModbusTable>& all_tables() {
+  static const Names<ModbusTable> names{{"coil", ModbusTable::coil},
+                                        {"discrete_input", ModbusTable::discrete_input},
+                                        {"holding", ModbusTable::holding},
+                                        {"input", ModbusTable::input}};
+  return names;
+}
+
+const Names<ModbusTable>& register_tables() {
+  static const Names<ModbusTable> names{{"input", ModbusTable::input},
+                                        {"holding", ModbusTable::holding}};
+  return names;
+}
+
+const Names<ModbusTable>& writable_tables() {
+  static const Names<ModbusTable> names{{"holding", ModbusTable::holding}};
+  return names;
+}
+
+bool is_bit(ModbusTable table) {
+  return table == ModbusTable::coil || table == ModbusTable::discrete_input;
+}
+
+int registers(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::int16:
+    case Encoding::uint16:
+      return 1;
+    case Encoding::int32:
+    case Encoding::uint32:
+    case Encoding::float32:
+      return 2;
+    case Encoding::float64:
+      break;
+  }
+  return 4;
+}
+
+struct Codes {
+  std::int64_t low;
+  std::int64_t high;
+};
+
+/// Raw values of an encoding; of a float the whole numbers that it holds exactly.
+Codes codes_of(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::int16:
+      return {-0x8000, 0x7FFF};
+    case Encoding::uint16:
+      return {0, 0xFFFF};
+    case Encoding::int32:
+      return {-0x80000000LL, 0x7FFFFFFFLL};
+    case Encoding::uint32:
+      return {0, 0xFFFFFFFFLL};
+    case Encoding::float32:
+      return {-(1LL << 24), 1LL << 24};
+    case Encoding::float64:
+      break;
+  }
+  return {-(1LL << 53), 1LL << 53};
+}
+
+/// A name, an IPv4 or an IPv6 address that could be one.
+bool is_host(const std::string& host) {
+  constexpr std::size_t name_max = 253;
+  if (host.empty() || host.size() > name_max) return false;
+  std::array<unsigned char, sizeof(in6_addr)> address{};
+  if (host.find(':') != std::string::npos) {
+    return inet_pton(AF_INET6, host.substr(0, host.find('%')).c_str(), address.data()) == 1;
+  }
+  if (host.find_first_not_of("0123456789.") == std::string::npos) {
+    return inet_pton(AF_INET, host.c_str(), address.data()) == 1;
+  }
+  constexpr std::string_view allowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_";
+  return host.find_first_not_of(allowed) == std::string::npos && host.front() != '.' &&
+         host.front() != '-' && host.find("..") == std::string::npos;
+}
+
+ModbusTcp read_tcp(const TomlTable& table) {
+  ModbusTcp tcp;
+  tcp.host = table.text("host");
+  if (!tcp.host.empty() && !is_host(tcp.host)) {
+    table.problem("host", "must be a host's name or an IP address");
+  }
+  tcp.port = table.integer("port", 1, 65535, tcp.port);
+  refuse_all(table, {"device", "baud", "parity", "data_bits", "stop_bits", "rs485"},
+             "makes no sense for kind = \"modbus_tcp\"");
+  return tcp;
+}
+
+ModbusRtu read_rtu(const TomlTable& table) {
+  // The rates that Linux' termios has names for.
+  constexpr std::array bauds{300,    600,    1200,    1800,    2400,    4800,   9600,
+                             19200,  38400,  57600,   115200,  230400,  460800, 500000,
+                             576000, 921600, 1000000, 1152000, 1500000, 2000000};
+  ModbusRtu rtu;
+  rtu.device = table.text("device");
+  if (!rtu.device.empty() && rtu.device.front() != '/') {
+    table.problem("device", "must be an absolute path such as \"/dev/ttyUSB0\"");
+  }
+  rtu.baud = table.integer("baud", bauds.front(), bauds.back());
+  if (std::find(bauds.begin(), bauds.end(), rtu.baud) == bauds.end()) {
+    table.problem("baud", "must be a usual rate: 1200 ... 9600 19200 38400 57600 115200 ...");
+  }
+  rtu.parity = table.choice<char>("parity", {{"none", 'N'}, {"even", 'E'}, {"odd", 'O'}});
+  rtu.data_bits = table.integer("data_bits", 7, 8, rtu.data_bits);
+  rtu.stop_bits = table.integer("stop_bits", 1, 2, rtu.stop_bits);
+  rtu.rs485 = table.flag("rs485", rtu.rs485);
+  refuse_all(table, {"host", "port"}, "makes no sense for kind = \"modbus_rtu\"");
+  return rtu;
+}
+
+/// A value that began below the last register and would pass it.
+void check_address(const TomlTable& table, int address, int count) {
+  if (address + count - 1 <= address_max) return;
+  table.problem("address", "the value takes " + std::to_string(count) +
+                               " registers and would pass register 65535");
+}
+
+std::uint16_t read_address(const TomlTable& table) {
+  return static_cast<std::uint16_t>(table.integer("address", 0, address_max));
+}
+
+ModbusStatus read_status(const TomlTable& table) {
+  ModbusStatus status;
+  status.table = table.choice("table", all_tables());
+  status.address = read_address(table);
+  if (is_bit(status.table)) {
+    table.refuse("mask", "makes no sense for a bit");
+    status.codes = read_codes(table, table, 0, 1);
+    return status;
+  }
+  const int mask = table.integer("mask", 1, 0xFFFF, 0xFFFF);
+  status.mask = static_cast<std::uint16_t>(mask);
+  status.codes = read_codes(table, table, 0, 0xFFFF);
+  for (const Sentinel& code : status.codes) {
+    if ((code.code & ~static_cast<std::int64_t>(mask)) != 0) {
+      table.problem("mask", "hides bits of the code " + std::to_string(code.code));
+    }
+  }
+  return status;
+}
+
+}  // namespace
+
+ModbusLine read_modbus_line(const TomlTable& table, bool is_tcp) {
+  ModbusLine line;
+  if (is_tcp) {
+    line.link = read_tcp(table);
+  } else {
+    line.link = read_rtu(table);
+  }
+  line.timeout_ms = table.number("timeout_ms", Range::between(1, 60000), line.timeout_ms);
+  line.inter_frame_delay_ms =
+      table.number("inter_frame_delay_ms", Range::between(0, 1000), line.inter_frame_delay_ms);
+  line.reconnect_s = table.number("reconnect_s", Range::between(0.01, 3600), line.reconnect_s);
+  line.backoff_s_max =
+      table.number("backoff_s_max", Range::between(0.01, 3600), line.backoff_s_max);
+  line.retries = table.integer("retries", 0, 10, line.retries);
+  return line;
+}
+
+int read_unit(const TomlTable& table, bool is_tcp) {
+  const int unit = table.integer("unit", 0, 255);
+  if (!is_tcp && unit == 0 && table.has("unit")) {
+    table.problem("unit", "0 is the broadcast, which nobody answers; must be in [1, 247]");
+  }
+  if (unit > 247 && !(is_tcp && unit == 255)) {
+    table.problem("unit", is_tcp ? "must be in [0, 247] or 255" : "must be in [1, 247]");
+  }
+  return unit;
+}
+
+ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use) {
+  ModbusValue value;
+  const bool is_written = use == RegisterUse::written || use == RegisterUse::written_bits;
+  const Names<ModbusTable>& tables = is_written                   ? writable_tables()
+                                     : use == RegisterUse::signal ? all_tables()
+                                                                  : register_tables();
+  value.table = table.choice("table", tables);
+  value.address = read_address(table);
+  if (is_bit(value.table)) {
+    refuse_all(table, {"encoding", "word_order", "scale"}, "makes no sense for a bit");
+    value.encoding = Encoding::uint16;
+    return value;
+  }
+  if (use == RegisterUse::written_bits) {
+    value.encoding = table.choice<Encoding>(
+        "encoding", {{"uint16", Encoding::uint16}, {"uint32", Encoding::uint32}});
+    table.refuse("scale", "makes no sense for a count or bits");
+  } else {
+    value.encoding = table.choice("encoding", encodings());
+    value.scale = read_scale(table, value.scale);
+  }
+  value.word_order = table.choice("word_order", word_orders(), value.word_order);
+  check_address(table, value.address, registers(value.encoding));
+  return value;
+}
+
+ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& device) {
+  ModbusChannel channel;
+  // Every key is read in both places, so that a default nobody uses is checked as well.
+  const auto required = [&](std::string_view key) {
+    const bool in_device = device.has(key);
+    if (!sensor.has(key) && !in_device) {
+      sensor.problem(key, "must be given, here or as default in the device");
+    }
+  };
+  required("table");
+  required("encoding");
+  channel.table = sensor.choice("table", register_tables(),
+                                device.choice("table", register_tables(), channel.table));
+  channel.encoding = sensor.choice("encoding", encodings(),
+                                   device.choice("encoding", encodings(), channel.encoding));
+  channel.word_order = sensor.choice("word_order", word_orders(),
+                                     device.choice("word_order", word_orders(), WordOrder::abcd));
+  channel.scale = read_scale(sensor, read_scale(device, channel.scale));
+  channel.offset_degC = sensor.number("offset_degC", Range::between(-1e4, 1e4),
+                                      device.number("offset_degC", Range::between(-1e4, 1e4), 0));
+  channel.address = read_address(sensor);
+  check_address(sensor, channel.address, registers(channel.encoding));
+  const Codes codes = codes_of(channel.encoding);
+  channel.sentinels = read_codes(sensor, device, codes.low, codes.high);
+  if (device.has("status")) channel.status = read_status(device.table("status"));
+  if (sensor.has("status")) channel.status = read_status(sensor.table("status"));
+  refuse_all(sensor, {"id", "start_bit", "length_bits", "byte_order", "extended_id"},
+             "makes no sense on a Modbus bus");
+  return channel;
+}
+
+ModbusRenewal read_modbus_renewal(const TomlTable& table) {
+  ModbusRenewal renewal;
+  renewal.table = table.choice("table", register_tables());
+  renewal.address = read_address(table);
+  return renewal;
+}
+
+int register_count(const ModbusValue& value) {
+  return is_bit(value.table) ? 1 : registers(value.encoding);
+}
+
+Range reach(const ModbusValue& value) {
+  if (value.encoding == Encoding::float32 || value.encoding == Encoding::float64) return {};
+  const Codes codes = codes_of(value.encoding);
+  const double a = static_cast<double>(codes.low) * value.scale;
+  const double b = static_cast<double>(codes.high) * value.scale;
+  return Range::between(std::min(a, b), std::max(a, b));
+}
+
+}  // namespace thermocomp::sections

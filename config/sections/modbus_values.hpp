@@ -1,0 +1,34 @@
+/// The parts of the daemon's file that describe Modbus lines and registers.
+#pragma once
+
+#include "config/toml_reader.hpp"
+#include "drivers/controllers/controller_config.hpp"
+#include "drivers/sensors/sensor_bus_config.hpp"
+
+namespace thermocomp::sections {
+
+/// Keys of a line: host, port or device, baud, ..., and timing. Keys of the other kind are refused.
+[[nodiscard]] ModbusLine read_modbus_line(const TomlTable& table, bool is_tcp);
+/// 1..247; on TCP also 0 and 255. Required.
+[[nodiscard]] int read_unit(const TomlTable& table, bool is_tcp);
+
+enum class RegisterUse {
+  written,       ///< an offset: holding registers
+  written_bits,  ///< heartbeat, valid bits: a holding register without scale
+  number,        ///< applied offset: holding or input registers
+  signal         ///< any table; a bit has no encoding
+};
+[[nodiscard]] ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use);
+
+/// A sensor's channel; what `sensor` leaves out is as in `device`.
+[[nodiscard]] ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& device);
+
+[[nodiscard]] ModbusRenewal read_modbus_renewal(const TomlTable& table);
+
+/// Registers (or bits) that the value takes.
+[[nodiscard]] int register_count(const ModbusValue& value);
+
+/// The numbers that raw * scale can be, least and greatest.
+[[nodiscard]] Range reach(const ModbusValue& value);
+
+}  // namespace thermocomp::sections

@@ -1,0 +1,58 @@
+#include "config/sections/model_binding.hpp"
+
+#include <algorithm>
+
+#include "config/units.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
+  return text;
+}
+
+void check_blocks(const BindingTables& tables, const EstimatorConfig& config,
+                  const std::vector<std::string>& columns) {
+  std::vector<std::string> bound;
+  for (std::size_t i = 0; i < config.blocks.size(); ++i) {
+    const std::string& input = config.blocks[i].input;
+    if (!is_temperature(input)) continue;  // a problem already
+    if (!contains(columns, input)) {
+      tables.blocks[i].problem("input", "must be a temperature of the model: " + joined(columns));
+    } else if (contains(bound, input)) {
+      tables.blocks[i].problem("input", "is bound by another block already");
+    }
+    bound.push_back(input);
+  }
+  for (const std::string& column : columns) {
+    if (!contains(bound, column)) {
+      tables.root.problem("block", column, "the model's temperature needs a block with this input");
+    }
+  }
+}
+
+}  // namespace
+
+void check_binding(const BindingTables& tables, const EstimatorConfig& config,
+                   const ThermalModel& model) {
+  check_blocks(tables, config, model.temperature_columns());
+  for (const std::string& signal : model.signal_columns()) {
+    if (!is_operating(signal)) continue;  // a problem of the model file already
+    if (contains(config.signals, signal)) continue;
+    tables.root.problem("controller.signal", signal,
+                        "the model needs this signal from the controller");
+  }
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    const std::string& output = config.axes[i].output;
+    if (!is_output(output) || contains(model.outputs, output)) continue;
+    tables.axes[i].problem("output", "must be an output of the model: " + joined(model.outputs));
+  }
+}
+
+}  // namespace thermocomp::sections

@@ -1,0 +1,24 @@
+/// Whether the daemon's file and the model fit together.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/toml_reader.hpp"
+#include "estimator/estimator_config.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp::sections {
+
+struct BindingTables {
+  TomlTable root;
+  std::vector<TomlTable> blocks;  ///< order of EstimatorConfig::blocks
+  std::vector<TomlTable> axes;
+};
+
+/// Every temperature column of the model has exactly one block, every signal it names is read from
+/// the controller, every axis' output exists.
+void check_binding(const BindingTables& tables, const EstimatorConfig& config,
+                   const ThermalModel& model);
+
+}  // namespace thermocomp::sections
