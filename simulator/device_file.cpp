@@ -86,7 +86,9 @@ ModbusValue read_place(const TomlTable& table, const ModbusValue& defaults) {
   return value;
 }
 
-CanSignal read_can(const TomlTable& table) {
+enum class CanUse { temperature, signal, bits };  // what its offset is called, and its sign
+
+CanSignal read_can(const TomlTable& table, CanUse use) {
   CanSignal signal;
   signal.id = table.integer<std::uint32_t>("id", 0, 0x1FFFFFFF);
   signal.extended_id = table.flag("extended_id", signal.extended_id);
@@ -96,10 +98,15 @@ CanSignal read_can(const TomlTable& table) {
       "byte_order",
       {{"little_endian", ByteOrder::little_endian}, {"big_endian", ByteOrder::big_endian}},
       signal.byte_order);
-  signal.is_signed = table.flag("signed", signal.is_signed);
-  signal.is_float = table.flag("float", signal.is_float);
-  signal.scale = table.number("scale", Range::between(-1e6, 1e6), signal.scale);
-  signal.offset = table.number("offset", Range::between(-1e6, 1e6), signal.offset);
+  if (use == CanUse::bits) {
+    signal.is_signed = false;
+  } else {
+    signal.is_signed = table.flag("signed", signal.is_signed);
+    signal.is_float = table.flag("float", signal.is_float);
+    signal.scale = table.number("scale", Range::between(-1e6, 1e6), signal.scale);
+    const char* offset = use == CanUse::temperature ? "offset_degC" : "offset";
+    signal.offset = table.number(offset, Range::between(-1e6, 1e6), signal.offset);
+  }
   try {
     check(signal);
   } catch (const InvalidValue& error) {
@@ -220,7 +227,7 @@ void read_channel(Draft& state, const TomlTable& table,
   SimulatedDevice& device = state.machine.devices[index];
   state.channel_places.emplace_back(index, device.channels.size());
   if (state.machine.buses[device.bus].kind == SimulatedBusKind::can) {
-    channel.can = read_can(table);
+    channel.can = read_can(table, CanUse::temperature);
     channel.open_circuit_code = read_open_circuit_code(table);
     take(state, device.bus, channel.can, table);
   } else {
@@ -250,9 +257,9 @@ void read_channel(Draft& state, const TomlTable& table,
 /// Controllers: a value's place in registers or in frames.
 template <class Registers, class Frame>
 void read_value(Draft& state, const TomlTable& table, ModbusTable usual, std::size_t bus,
-                Registers& registers, Frame& frame) {
+                Registers& registers, Frame& frame, CanUse use = CanUse::signal) {
   if (state.machine.controller->bus.kind == SimulatedBusKind::can) {
-    frame = read_can(table);
+    frame = read_can(table, use);
     CanSignal signal = frame.value_or(CanSignal{});
     take(state, bus, signal, table);
     return;
@@ -322,11 +329,11 @@ void read_controller(Draft& state, const TomlTable& root) {
       table.number("heartbeat_timeout_s", Range::between(0.0, 1e6), controller.heartbeat_timeout_s);
   if (table.has("valid_bits")) {
     read_value(state, table.table("valid_bits"), ModbusTable::holding, bus, controller.valid_bits,
-               controller.can_valid_bits);
+               controller.can_valid_bits, CanUse::bits);
   }
   if (table.has("heartbeat")) {
     read_value(state, table.table("heartbeat"), ModbusTable::holding, bus, controller.heartbeat,
-               controller.can_heartbeat);
+               controller.can_heartbeat, CanUse::bits);
   }
   NameList names;
   for (const TomlTable& entry : table.tables("signal")) {

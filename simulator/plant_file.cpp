@@ -43,7 +43,9 @@ SignalConfig read_signal(const TomlTable& table, NameList& signals) {
   SignalConfig signal;
   const NameList earlier = signals;
   signal.name = signals.read(table);
-  if (!is_operating(signal.name)) {
+  if (!is_column_name(signal.name)) {
+    table.problem("name", column_name_rule);
+  } else if (!is_operating(signal.name)) {
     table.problem("name", "must be an operating signal or position, not a temperature or output");
   }
   signal.kind = table.choice<SignalKind>("kind", {{"steps", SignalKind::steps},
@@ -147,6 +149,7 @@ ThermocoupleConfig read_thermocouple(const TomlTable& table, NameList& thermocou
   using Place = ThermocoupleConfig::Place;
   ThermocoupleConfig thermocouple;
   thermocouple.name = thermocouples.read(table);
+  if (!is_column_name(thermocouple.name)) table.problem("name", column_name_rule);
   const std::string node = table.text("node");
   thermocouple.place = node == "room"      ? Place::room
                        : node == "coolant" ? Place::coolant
@@ -180,6 +183,7 @@ PlantConfig read_plant(const TomlTable& root) {
   for (const TomlTable& table : root.tables("output")) {
     OutputConfig output;
     output.name = outputs.read(table);
+    if (!is_column_name(output.name)) table.problem("name", column_name_rule);
     if (!is_output(output.name)) table.problem("name", "must end in _um or _urad");
     output.noise_um = table.number("noise_um", Range::between(0.0, 1e6), 0.0);
     plant.outputs.push_back(output);

@@ -14,18 +14,19 @@ constexpr double rounding = 1e-9;  // of the number of samples, so that 3 x 0.1 
 
 }  // namespace
 
-SimulatedRun simulate(const MachineConfig& machine, double duration_s, std::uint64_t seed) {
+RunFile simulate(const MachineConfig& machine, double duration_s, std::uint64_t seed) {
   THERMOCOMP_ENSURE(machine.plant.has_value() && duration_s >= 0.0 && machine.pitch_s > 0.0);
   Plant plant(*machine.plant, seed);
   const std::vector<OutputConfig>& outputs = machine.plant->outputs;
-  SimulatedRun run;
-  run.names = plant.columns();
-  const std::size_t first_output = run.names.size() - outputs.size();
-  run.names.insert(run.names.begin(), "time_s");
-  run.columns.resize(run.names.size());
+  RunFile run;
+  run.name = "simulation";
+  run.columns = plant.columns();
+  const std::size_t first_output = run.columns.size() - outputs.size();
+  run.columns.insert(run.columns.begin(), "time_s");
+  run.values.resize(run.columns.size());
   const auto samples =
       static_cast<std::uint64_t>(std::floor(duration_s / machine.pitch_s + rounding)) + 1;
-  std::vector<double> row(run.names.size() - 1);
+  std::vector<double> row(run.columns.size() - 1);
   for (std::uint64_t sample = 0; sample < samples; ++sample) {
     const double time_s = static_cast<double>(sample) * machine.pitch_s;
     plant.advance_to(time_s);
@@ -34,9 +35,10 @@ SimulatedRun simulate(const MachineConfig& machine, double duration_s, std::uint
       row[first_output + i] +=
           outputs[i].noise_um * seeded_normal(seed, indicator_stream + i, sample);
     }
-    run.columns[0].push_back(time_s);
-    for (std::size_t i = 0; i < row.size(); ++i) run.columns[i + 1].push_back(row[i]);
+    run.values[0].push_back(time_s);
+    for (std::size_t i = 0; i < row.size(); ++i) run.values[i + 1].push_back(row[i]);
   }
+  run.selected_end = run.rows();
   return run;
 }
 
