@@ -154,7 +154,7 @@ void ModbusSource::run() {
 bool ModbusSource::ensure_connected() {
   if (connection_.connected()) return true;
   if (monotonic_now() < next_connect_at_) {
-    set_lost();
+    if (lost_) set_lost();  // else closed on purpose: the failed exchanges have said what is wrong
     if (!connection_.pause_until(next_connect_at_)) return false;
   }
   next_connect_at_ = monotonic_now() + reconnect_;

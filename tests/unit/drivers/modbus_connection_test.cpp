@@ -1,0 +1,305 @@
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "drivers/driver_error.hpp"
+#include "drivers/modbus/connection.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "modbus_peer.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+ModbusLine tcp_line(int port, double timeout_ms = 300.0) {
+  ModbusLine line;
+  line.link = ModbusTcp{"127.0.0.1", port};
+  line.timeout_ms = timeout_ms;
+  return line;
+}
+ModbusLine rtu_line(const std::string& device, double timeout_ms = 300.0) {
+  ModbusLine line;
+  line.link = ModbusRtu{device, 115200, 'N', 8, 1, false};
+  line.timeout_ms = timeout_ms;
+  return line;
+}
+
+using Words = std::vector<std::uint16_t>;
+
+Exchange read_inputs(ModbusConnection& connection, int unit, int address, Words& words) {
+  return connection.read(unit, ModbusTable::input, static_cast<std::uint16_t>(address), words);
+}
+
+/// Both kinds of line, so that each test runs on both.
+struct Lines {
+  peer::TcpDevice tcp;
+  peer::SerialLine serial;
+  void handle(const peer::Handler& handler) {
+    tcp.handle(handler);
+    serial.handle(handler);
+  }
+  ModbusLine line(bool rtu) const { return rtu ? rtu_line(serial.device()) : tcp_line(tcp.port()); }
+};
+
+}  // namespace
+
+TEST_CASE("registers and bits of every table are read, writes are confirmed", "[connection]") {
+  Lines lines;
+  const bool rtu = GENERATE(false, true);
+  CAPTURE(rtu);
+  ModbusConnection connection(lines.line(rtu));
+  REQUIRE(connection.connect());
+  Words words(3);
+  for (const ModbusTable table : {ModbusTable::holding, ModbusTable::input}) {
+    REQUIRE(connection.read(7, table, 20, words).ok());
+    CHECK(words == Words{7020, 7021, 7022});
+  }
+  Words bits(11);
+  for (const ModbusTable table : {ModbusTable::coil, ModbusTable::discrete_input}) {
+    REQUIRE(connection.read(7, table, 1, bits).ok());
+    CHECK(bits == Words{1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1});
+  }
+  Words many(125);
+  REQUIRE(read_inputs(connection, 1, 0, many).ok());
+  CHECK(many[124] == 1124);
+  CHECK(connection.write_registers(7, 5, words).ok());
+  CHECK(connection.write_coil(7, 5, true).ok());
+}
+
+TEST_CASE("exceptions, silence and wrong answers are told apart", "[connection]") {
+  Lines lines;
+  const bool rtu = GENERATE(false, true);
+  CAPTURE(rtu);
+  ModbusConnection connection(lines.line(rtu));
+  REQUIRE(connection.connect());
+  Words words(2);
+  const auto outcome_of = [&](const peer::Handler& handler) {
+    lines.handle(handler);
+    REQUIRE(connection.connect());
+    return read_inputs(connection, 3, 0, words);
+  };
+
+  const Exchange busy = outcome_of([](const auto& r) { return peer::exception(r, 6); });
+  CHECK(busy.outcome == ExchangeOutcome::exception);
+  CHECK(busy.fault() == Fault::device_busy);
+  CHECK(busy.unit_answered());
+  const Exchange refused = outcome_of([](const auto& r) { return peer::exception(r, 2); });
+  CHECK(refused.fault() == Fault::device_error);
+  const Exchange gateway = outcome_of([](const auto& r) { return peer::exception(r, 11); });
+  CHECK(gateway.fault() == Fault::no_answer);
+  CHECK_FALSE(gateway.unit_answered());
+
+  const Exchange silent = outcome_of([](const auto&) { return peer::Reply{}; });
+  CHECK(silent.outcome == ExchangeOutcome::timeout);
+  CHECK(silent.fault() == Fault::no_answer);
+
+  const Exchange short_answer =
+      outcome_of([](const auto&) { return peer::Reply{peer::registers_pdu(4, {1})}; });
+  CHECK(short_answer.outcome == ExchangeOutcome::bad_frame);
+  CHECK(short_answer.fault() == Fault::bad_frame);
+  const Exchange other_function = outcome_of([](const auto&) {
+    return peer::Reply{peer::registers_pdu(3, {1, 2})};
+  });
+  CHECK(other_function.outcome == ExchangeOutcome::bad_frame);
+  const Exchange other_unit = outcome_of([](const auto&) {
+    peer::Reply reply{peer::registers_pdu(4, {1, 2})};
+    reply.unit = 9;
+    return reply;
+  });
+  CHECK(other_unit.outcome == ExchangeOutcome::bad_frame);
+  const Exchange broken_off = outcome_of([rtu](const auto&) {
+    peer::Reply reply;
+    reply.raw = rtu ? peer::Bytes{3, 4, 4, 0} : peer::Bytes{0, 9, 0, 0, 0, 7, 3, 4, 4};
+    return reply;
+  });
+  CHECK(broken_off.outcome == ExchangeOutcome::bad_frame);
+
+  CHECK(outcome_of(peer::honest).ok());
+  CHECK(words == Words{3000, 3001});
+}
+
+TEST_CASE("a wrong checksum is a bad frame, and the line recovers", "[connection]") {
+  peer::SerialLine serial([](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    reply.spoil_checksum = true;
+    return reply;
+  });
+  ModbusConnection connection(rtu_line(serial.device()));
+  REQUIRE(connection.connect());
+  Words words(2);
+  CHECK(read_inputs(connection, 3, 0, words).outcome == ExchangeOutcome::bad_frame);
+  serial.handle(peer::honest);
+  CHECK(read_inputs(connection, 3, 0, words).ok());
+}
+
+TEST_CASE("TCP: a late answer is not taken for the present one", "[connection][late]") {
+  // The first request is answered late, while the second - of the same shape - is under way.
+  std::atomic<int> count{0};
+  peer::TcpDevice device([&count](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    reply.delay = count++ == 0 ? 250ms : 100ms;
+    return reply;
+  });
+  ModbusConnection connection(tcp_line(device.port(), 200.0));
+  REQUIRE(connection.connect());
+  Words words(2);
+  CHECK(read_inputs(connection, 1, 10, words).outcome == ExchangeOutcome::timeout);
+  REQUIRE(read_inputs(connection, 1, 50, words).ok());
+  CHECK(words == Words{1050, 1051});
+  CHECK(device.connections() == 1);
+}
+
+TEST_CASE("RTU: answers that are always late never land in another request", "[connection][late]") {
+  const auto lateness = GENERATE(120ms, 400ms, 1300ms, 2500ms);
+  CAPTURE(lateness.count());
+  peer::SerialLine serial([lateness](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    if (request.unit == 1) reply.delay = lateness;
+    return reply;
+  });
+  ModbusConnection connection(rtu_line(serial.device(), 100.0));
+  REQUIRE(connection.connect());
+  // As the sensor source does: the same question until it is answered, then the next one.
+  int address = 10;
+  int answers_of_others = 0;
+  const auto end = peer::steady_clock::now() + 7s;
+  while (peer::steady_clock::now() < end) {
+    Words words(2);
+    if (connection.ready_at(1) <= monotonic_now()) {
+      if (read_inputs(connection, 1, address, words).ok()) {
+        CHECK(words[0] == 1000 + address);
+        address += 10;
+      }
+    } else if (read_inputs(connection, 2, 500, words).ok()) {
+      CHECK(words == Words{2500, 2501});
+      ++answers_of_others;
+    }
+  }
+  CHECK(answers_of_others > 50);
+}
+
+TEST_CASE("RTU: rubbish before an answer is not believed and does not last", "[connection]") {
+  std::atomic<bool> rubbish{true};
+  peer::SerialLine serial([&rubbish](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    if (rubbish) reply.raw = {0x55, 0x04, 0xFF, 0x00, 0x13};
+    return reply;
+  });
+  ModbusConnection connection(rtu_line(serial.device()));
+  REQUIRE(connection.connect());
+  Words words(2);
+  CHECK_FALSE(read_inputs(connection, 3, 0, words).ok());
+  rubbish = false;
+  CHECK(peer::eventually([&] { return read_inputs(connection, 3, 0, words).ok(); }));
+  CHECK(words == Words{3000, 3001});
+}
+
+TEST_CASE("a connection closed by the peer is lost, not a time-out", "[connection]") {
+  peer::TcpDevice device([](const peer::Request&) {
+    peer::Reply reply;
+    reply.close = true;
+    return reply;
+  });
+  ModbusConnection connection(tcp_line(device.port()));
+  REQUIRE(connection.connect());
+  Words words(1);
+  CHECK(read_inputs(connection, 1, 0, words).outcome == ExchangeOutcome::disconnected);
+  CHECK_FALSE(connection.connected());
+  CHECK(read_inputs(connection, 1, 0, words).outcome == ExchangeOutcome::disconnected);
+  device.handle(peer::honest);
+  REQUIRE(connection.connect());
+  CHECK(read_inputs(connection, 1, 0, words).ok());
+}
+
+TEST_CASE("TCP: two time-outs in a row end a connection that may be half open", "[connection]") {
+  peer::TcpDevice device([](const peer::Request&) { return peer::Reply{}; });
+  ModbusConnection connection(tcp_line(device.port(), 50.0));
+  REQUIRE(connection.connect());
+  Words words(1);
+  CHECK(read_inputs(connection, 1, 0, words).outcome == ExchangeOutcome::timeout);
+  CHECK(connection.connected());
+  CHECK(read_inputs(connection, 1, 0, words).outcome == ExchangeOutcome::timeout);
+  CHECK_FALSE(connection.connected());
+}
+
+TEST_CASE("cancel ends a wait of any length at once", "[connection]") {
+  Lines lines;
+  lines.handle([](const peer::Request&) { return peer::Reply{}; });
+  const bool rtu = GENERATE(false, true);
+  CAPTURE(rtu);
+  ModbusLine line = lines.line(rtu);
+  line.timeout_ms = 60000.0;
+  ModbusConnection connection(line);
+  REQUIRE(connection.connect());
+  std::thread canceller([&connection] {
+    std::this_thread::sleep_for(50ms);
+    connection.cancel();
+  });
+  Words words(1);
+  CHECK(read_inputs(connection, 1, 0, words).outcome == ExchangeOutcome::cancelled);
+  canceller.join();
+  CHECK_FALSE(connection.pause_until(monotonic_now() + 60s));
+  CHECK_FALSE(connection.connect());
+}
+
+TEST_CASE("a line that cannot be opened says why", "[connection]") {
+  ModbusConnection absent(rtu_line("/nonexistent/port"));
+  CHECK_FALSE(absent.connect());
+  CHECK(absent.last_error().find("/nonexistent/port") != std::string::npos);
+  ModbusLine nobody = tcp_line(1);
+  nobody.link = ModbusTcp{"no-such-host.invalid", 502};
+  ModbusConnection unknown(nobody);
+  CHECK_FALSE(unknown.connect());
+  CHECK(unknown.last_error().find("no-such-host.invalid") != std::string::npos);
+  peer::SerialLine serial;
+  ModbusLine rs485 = rtu_line(serial.device());
+  std::get<ModbusRtu>(rs485.link).rs485 = true;
+  ModbusConnection without_rs485(rs485);
+  CHECK_FALSE(without_rs485.connect());
+  CHECK(without_rs485.last_error().find("RS-485") != std::string::npos);
+}
+
+TEST_CASE("a host name is looked up", "[connection]") {
+  peer::TcpDevice device;
+  ModbusLine line = tcp_line(device.port());
+  line.link = ModbusTcp{"localhost", device.port()};
+  ModbusConnection connection(line);
+  if (!connection.connect()) WARN("localhost: " << connection.last_error());
+  Words words(1);
+  // Where "localhost" is ::1 first, nobody listens there: then the refusal must say so.
+  CHECK((connection.connected() ? read_inputs(connection, 1, 4, words).ok()
+                                : !connection.last_error().empty()));
+}
+
+TEST_CASE("settings that cannot work are refused before anything is opened", "[connection]") {
+  const auto refused = [](const ModbusLine& line) {
+    CHECK_THROWS_AS(ModbusConnection(line), DriverError);
+  };
+  ModbusLine line = rtu_line("/dev/null");
+  std::get<ModbusRtu>(line.link).baud = 12345;  // libmodbus would take 9600 without a word
+  refused(line);
+  line = rtu_line("/dev/null");
+  std::get<ModbusRtu>(line.link).parity = 'X';
+  refused(line);
+  line = rtu_line("/dev/null");
+  std::get<ModbusRtu>(line.link).data_bits = 7;
+  refused(line);
+  refused(rtu_line(""));
+  refused(tcp_line(0));
+  refused(tcp_line(70000));
+  refused(tcp_line(502, 0.0));
+  refused(tcp_line(502, not_a_number));
+}
+
+TEST_CASE("frames keep 3.5 characters apart, 1.75 ms above 19200 baud", "[connection]") {
+  ModbusLine line = rtu_line("/dev/null");
+  CHECK(inter_frame_delay(line) == 1750us);
+  std::get<ModbusRtu>(line.link).baud = 9600;
+  CHECK(inter_frame_delay(line) == std::chrono::nanoseconds(3645833));  // 35 bits
+  std::get<ModbusRtu>(line.link).parity = 'E';
+  CHECK(inter_frame_delay(line) == std::chrono::nanoseconds(4010417));  // 38.5 bits
+  line.inter_frame_delay_ms = 8.0;
+  CHECK(inter_frame_delay(line) == 8ms);
+  CHECK(inter_frame_delay(tcp_line(502)) == 0ns);
+}

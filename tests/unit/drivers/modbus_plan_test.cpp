@@ -1,0 +1,202 @@
+#include "drivers/sensors/modbus_plan.hpp"
+
+#include <map>
+#include <random>
+#include <set>
+#include <tuple>
+
+#include <catch2/catch.hpp>
+
+#include "drivers/modbus/late_answers.hpp"
+#include "drivers/modbus/register_codec.hpp"
+#include "drivers/sensors/unit_backoff.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+ModbusChannel channel_at(int address, Encoding encoding = Encoding::int16,
+                         ModbusTable table = ModbusTable::input) {
+  ModbusChannel channel;
+  channel.table = table;
+  channel.address = static_cast<std::uint16_t>(address);
+  channel.encoding = encoding;
+  return channel;
+}
+
+ModbusDeviceConfig random_device(std::mt19937& random) {
+  const auto pick = [&random](int low, int high) {
+    return std::uniform_int_distribution<int>(low, high)(random);
+  };
+  ModbusDeviceConfig device;
+  device.registers_per_request_max = pick(4, 125);
+  device.gap_registers_max = pick(0, 20);
+  device.one_register_a_request = pick(0, 4) == 0;
+  const int span = pick(10, 3000);
+  const int count = pick(1, 60);
+  for (int i = 0; i < count; ++i) {
+    auto channel = channel_at(pick(0, span), static_cast<Encoding>(pick(0, 5)),
+                              static_cast<ModbusTable>(pick(0, 3)));
+    if (pick(0, 3) == 0) {
+      channel.status.emplace();
+      channel.status->table = static_cast<ModbusTable>(pick(0, 3));
+      channel.status->address = static_cast<std::uint16_t>(pick(0, span));
+    }
+    device.channels.push_back(channel);
+  }
+  if (pick(0, 2) == 0) device.renewal = ModbusRenewal{ModbusTable::input, 5};
+  return device;
+}
+
+/// The words of a table that are wanted at all.
+std::set<std::tuple<ModbusTable, int>> wanted_words(const ModbusDeviceConfig& device) {
+  std::set<std::tuple<ModbusTable, int>> wanted;
+  const auto want = [&wanted](ModbusTable table, int address, std::size_t words) {
+    for (int i = 0; i < static_cast<int>(words); ++i) wanted.emplace(table, address + i);
+  };
+  for (const ModbusChannel& channel : device.channels) {
+    want(channel.table, channel.address, words_of(channel.table, channel.encoding));
+    if (channel.status) want(channel.status->table, channel.status->address, 1);
+  }
+  if (device.renewal) want(device.renewal->table, device.renewal->address, 1);
+  return wanted;
+}
+
+void check_place(const ModbusPlan& plan, const WordPlace& place, ModbusTable table, int address,
+                 std::size_t words) {
+  REQUIRE(place.request < plan.requests.size());
+  const PlannedRequest& request = plan.requests[place.request];
+  CHECK(request.table == table);
+  CHECK(static_cast<std::size_t>(request.address) + place.offset ==
+        static_cast<std::size_t>(address));
+  CHECK(place.offset + words <= request.count);
+}
+
+void check_gaps(const ModbusPlan& plan, const ModbusDeviceConfig& device) {
+  const auto wanted = wanted_words(device);
+  for (const PlannedRequest& request : plan.requests) {
+    const int gap_max = device.one_register_a_request ? 0
+                        : is_bit_table(request.table) ? 16 * device.gap_registers_max
+                                                      : device.gap_registers_max;
+    int gap = 0;
+    for (int i = 0; i < request.count; ++i) {
+      gap = wanted.contains({request.table, request.address + i}) ? 0 : gap + 1;
+      REQUIRE(gap <= gap_max);
+    }
+    CHECK(gap == 0);
+    CHECK(wanted.contains({request.table, int{request.address}}));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("every value is read whole, within the limits and the gaps", "[plan][property]") {
+  const unsigned seed = GENERATE(range(0U, 300U));
+  CAPTURE(seed);
+  std::mt19937 random(seed);
+  const ModbusDeviceConfig device = random_device(random);
+  const ModbusPlan plan = plan_requests(device, 60);
+  REQUIRE(plan.channels.size() == device.channels.size());
+  for (std::size_t i = 0; i < device.channels.size(); ++i) {
+    const ModbusChannel& channel = device.channels[i];
+    check_place(plan, plan.channels[i].value, channel.table, channel.address,
+                words_of(channel.table, channel.encoding));
+    REQUIRE(plan.channels[i].status.has_value() == channel.status.has_value());
+    if (channel.status) {
+      check_place(plan, *plan.channels[i].status, channel.status->table, channel.status->address,
+                  1);
+    }
+  }
+  for (const PlannedRequest& request : plan.requests) {
+    const int limit = is_bit_table(request.table) ? bits_per_request_limit
+                                                  : std::min(device.registers_per_request_max, 60);
+    CHECK(request.count >= 1);
+    CHECK(request.count <= limit);
+    if (device.one_register_a_request) CHECK(request.count <= 4);
+  }
+  check_gaps(plan, device);
+  REQUIRE(plan.renewal.has_value() == device.renewal.has_value());
+  if (plan.renewal) {
+    CHECK(plan.renewal->request == 0);
+    check_place(plan, *plan.renewal, device.renewal->table, device.renewal->address, 1);
+  }
+}
+
+TEST_CASE("neighbours share a request, distant values do not", "[plan]") {
+  ModbusDeviceConfig device;
+  device.gap_registers_max = 3;
+  device.channels = {channel_at(0), channel_at(4), channel_at(9), channel_at(100)};
+  const ModbusPlan plan = plan_requests(device);
+  REQUIRE(plan.requests.size() == 3);  // 0..4 with a gap of 3; 9 is 4 away; 100
+  CHECK(plan.requests[0].count == 5);
+  CHECK(plan.channels[1].value.offset == 4);
+}
+
+TEST_CASE("one register a request gives every value its own request", "[plan]") {
+  ModbusDeviceConfig device;
+  device.one_register_a_request = true;
+  device.channels = {channel_at(0, Encoding::float32), channel_at(2, Encoding::float32),
+                     channel_at(4), channel_at(4)};
+  const ModbusPlan plan = plan_requests(device);
+  REQUIRE(plan.requests.size() == 3);  // the same register is not asked twice
+  CHECK(plan.requests[0].count == 2);
+  CHECK(plan.requests[2].count == 1);
+}
+
+TEST_CASE("back-off doubles up to its end and an answer ends it at once", "[backoff]") {
+  UnitBackoff backoff(1s, 30s);
+  CHECK_FALSE(backoff.dead());
+  std::chrono::nanoseconds now = 100s;
+  std::vector<std::chrono::nanoseconds> pauses;
+  for (int i = 0; i < 8; ++i) {
+    backoff.failed(now, 1ms, 1);
+    pauses.push_back(backoff.not_before() - now);
+    now = backoff.not_before();
+  }
+  CHECK(pauses == std::vector<std::chrono::nanoseconds>{1s, 2s, 4s, 8s, 16s, 30s, 30s, 30s});
+  backoff.answered();
+  CHECK_FALSE(backoff.dead());
+  CHECK(backoff.not_before() == 0s);
+  backoff.failed(now, 1ms, 1);
+  CHECK(backoff.not_before() - now == 1s);
+}
+
+TEST_CASE("dead units keep to their share of the line", "[backoff]") {
+  UnitBackoff backoff(1s, 30s);
+  const auto cost = 200ms;
+  backoff.failed(0s, cost, 1);
+  CHECK(backoff.not_before() == 1s);  // a short outage is found out soon
+  backoff.failed(0s, cost, 1);
+  CHECK(backoff.not_before() == 2s);
+  backoff.failed(0s, cost, 1);
+  CHECK(backoff.not_before() == 10s);  // 200 ms in 10 s are 2 %
+  backoff.failed(0s, cost, 8);
+  CHECK(backoff.not_before() == 30s);  // 80 s would be 2 %, but no unit waits for longer
+}
+
+TEST_CASE("a unit that owes an answer is left alone, longer each time", "[late]") {
+  LateAnswers late;
+  CHECK(late.ready_at() == 0s);
+  late.unanswered(10s, 10200ms);
+  CHECK(late.ready_at() == 11200ms);
+  late.unanswered(11200ms, 11400ms);
+  CHECK(late.ready_at() == 13400ms);
+}
+
+TEST_CASE("an answer while others are owed may be one of theirs: the last is waited for",
+          "[late]") {
+  LateAnswers late;
+  late.unanswered(10s, 10200ms);      // asked at 10.0
+  late.answered(11200ms, 11300ms);    // arrives at 11.3: may be 1.3 s late
+  CHECK(late.ready_at() == 12600ms);  // so that to 11.2 comes by 12.5
+  late.answered(12600ms, 12610ms);
+  CHECK(late.ready_at() == 12600ms);  // nothing is owed any more
+}
+
+TEST_CASE("a unit back after a long time is not punished", "[late]") {
+  LateAnswers late;
+  late.unanswered(10s, 10200ms);
+  late.answered(100s, 100010ms);
+  CHECK(late.ready_at() <= 100s);
+}

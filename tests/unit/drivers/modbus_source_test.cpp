@@ -1,0 +1,368 @@
+#include "drivers/sensors/modbus_source.hpp"
+
+#include <cmath>
+#include <memory>
+#include <set>
+
+#include <catch2/catch.hpp>
+
+#include "drivers/driver_error.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "modbus_peer.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+ModbusDeviceConfig device_of(int unit, std::size_t first_sensor, const std::vector<int>& addresses,
+                             double period_s = 0.02) {
+  ModbusDeviceConfig device;
+  device.name = "unit_" + std::to_string(unit);
+  device.unit = unit;
+  device.period_s = period_s;
+  for (const int address : addresses) {
+    ModbusChannel channel;
+    channel.sensor = first_sensor++;
+    channel.address = static_cast<std::uint16_t>(address);
+    channel.encoding = Encoding::uint16;
+    device.channels.push_back(channel);
+  }
+  return device;
+}
+
+ModbusBusConfig tcp_bus(int port) {
+  ModbusBusConfig bus;
+  bus.name = "test";
+  bus.line.link = ModbusTcp{"127.0.0.1", port};
+  bus.line.reconnect_s = 0.1;
+  return bus;
+}
+
+ModbusBusConfig rtu_bus(const std::string& device) {
+  ModbusBusConfig bus;
+  bus.name = "test";
+  bus.line.link = ModbusRtu{device, 115200, 'N', 8, 1, false};
+  bus.line.timeout_ms = 60.0;
+  bus.line.reconnect_s = 0.1;
+  return bus;
+}
+
+/// A started source and the readings as the cycle sees them.
+struct Running {
+  ModbusSource source;
+  std::vector<Reading> all;
+
+  explicit Running(const ModbusBusConfig& bus, std::size_t sensors = 8)
+      : source(bus), all(sensors) {
+    source.start();
+  }
+  const Reading& reading(std::size_t sensor) {
+    source.newest(all);
+    return all[sensor];
+  }
+  bool becomes(std::size_t sensor, double value) {
+    return peer::eventually(
+        [&] { return reading(sensor).fault == Fault::none && all[sensor].temp_degC == value; });
+  }
+  bool becomes(std::size_t sensor, Fault fault) {
+    return peer::eventually([&] { return reading(sensor).fault == fault; });
+  }
+};
+
+}  // namespace
+
+TEST_CASE("readings arrive with value and time, in the places of their sensors", "[source]") {
+  peer::TcpDevice device;
+  ModbusBusConfig bus = tcp_bus(device.port());
+  bus.devices = {device_of(1, 4, {0, 30}), device_of(2, 1, {7})};
+  bus.devices[1].channels[0].scale = 0.1;
+  const auto began = monotonic_now();
+  Running running(bus);
+  CHECK(running.becomes(4, 1000.0));
+  CHECK(running.becomes(5, 1030.0));
+  CHECK(peer::eventually([&] { return running.reading(1).fault == Fault::none; }));
+  CHECK(running.all[1].temp_degC == Approx(200.7));
+  CHECK(running.all[1].taken_at > began);
+  CHECK(running.all[1].taken_at <= monotonic_now());
+  CHECK(running.all[0].fault == Fault::never_read);  // another bus' sensor is left alone
+  const auto taken_at = running.all[4].taken_at;
+  CHECK(peer::eventually([&] { return running.reading(4).taken_at > taken_at; }));
+  const BusHealth health = running.source.health();
+  CHECK(health.kind == "modbus_tcp");
+  CHECK(health.connected);
+  CHECK(health.units.at(0).answering);
+  CHECK(health.units.at(0).answers > 0);
+}
+
+TEST_CASE("before anything has come a reading says so", "[source]") {
+  peer::SerialLine line([](const peer::Request&) { return peer::Reply{}; });
+  ModbusBusConfig bus = rtu_bus(line.device());
+  bus.line.timeout_ms = 5000.0;
+  bus.devices = {device_of(1, 0, {0})};
+  Running running(bus);
+  CHECK(running.reading(0).fault == Fault::never_read);
+  CHECK(std::isnan(running.all[0].temp_degC));
+}
+
+TEST_CASE("sentinels and status registers are faults of their channel only", "[source]") {
+  peer::TcpDevice device([](const peer::Request& request) {
+    if (request.function == 2) return peer::Reply{{2, 1, 0x02}};  // second channel: broken
+    return peer::Reply{peer::registers_pdu(4, {250, 251, 0xFFFF})};
+  });
+  ModbusBusConfig bus = tcp_bus(device.port());
+  bus.devices = {device_of(1, 0, {0, 1, 2})};
+  for (std::uint16_t i = 0; i < 3; ++i) {
+    ModbusChannel& channel = bus.devices[0].channels[i];
+    channel.sentinels = {{0xFFFF, Fault::out_of_range}};
+    channel.status =
+        ModbusStatus{ModbusTable::discrete_input, i, 0xFFFF, {{1, Fault::open_circuit}}};
+  }
+  Running running(bus);
+  CHECK(running.becomes(0, 250.0));
+  CHECK(running.becomes(1, Fault::open_circuit));
+  CHECK(running.becomes(2, Fault::out_of_range));
+  CHECK(std::isnan(running.all[1].temp_degC));
+}
+
+TEST_CASE("a busy or failing device is a fault, and a value again afterwards", "[source]") {
+  peer::TcpDevice device;
+  ModbusBusConfig bus = tcp_bus(device.port());
+  bus.devices = {device_of(1, 0, {0})};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 1000.0));
+  device.handle([](const auto& r) { return peer::exception(r, 6); });
+  REQUIRE(running.becomes(0, Fault::device_busy));
+  CHECK(std::isnan(running.all[0].temp_degC));
+  const auto last_good = running.all[0].taken_at;
+  CHECK(last_good > 0ns);
+  device.handle([](const auto& r) { return peer::exception(r, 4); });
+  CHECK(running.becomes(0, Fault::device_error));
+  CHECK(running.all[0].taken_at == last_good);  // the time of the last value is kept
+  device.handle(peer::honest);
+  CHECK(running.becomes(0, 1000.0));
+}
+
+TEST_CASE("garbage is a bad frame, and a value again afterwards", "[source]") {
+  peer::TcpDevice tcp;
+  peer::SerialLine serial;
+  const bool rtu = GENERATE(false, true);
+  CAPTURE(rtu);
+  ModbusBusConfig bus = rtu ? rtu_bus(serial.device()) : tcp_bus(tcp.port());
+  bus.devices = {device_of(1, 0, {0})};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 1000.0));
+  const auto garbage = [](const peer::Request&) {
+    peer::Reply reply;
+    reply.raw = {1, 4, 2, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88, 0x99, 0xAA};
+    return reply;
+  };
+  tcp.handle(garbage);
+  serial.handle(garbage);
+  CHECK(running.becomes(0, Fault::bad_frame));
+  tcp.handle(peer::honest);
+  serial.handle(peer::honest);
+  CHECK(running.becomes(0, 1000.0));
+}
+
+TEST_CASE("a dead unit has no answer, the others go on, and it comes back", "[source]") {
+  std::atomic<bool> dead{true};
+  peer::SerialLine line([&dead](const peer::Request& request) {
+    return request.unit == 2 && dead ? peer::Reply{} : peer::honest(request);
+  });
+  ModbusBusConfig bus = rtu_bus(line.device());
+  bus.line.backoff_s_max = 2.0;
+  bus.devices = {device_of(1, 0, {0}), device_of(2, 1, {0}), device_of(3, 2, {0})};
+  Running running(bus);
+  CHECK(running.becomes(1, Fault::no_answer));
+  CHECK(running.becomes(0, 1000.0));
+  CHECK(running.becomes(2, 3000.0));
+  const BusHealth health = running.source.health();
+  CHECK_FALSE(health.units.at(1).answering);
+  CHECK(health.units.at(1).timeouts > 0);
+  CHECK_FALSE(health.units.at(1).last_error.empty());
+  const auto before = running.source.health().units.at(0).answers;
+  CHECK(peer::eventually([&] { return running.source.health().units[0].answers > before + 20; }));
+  dead = false;
+  CHECK(running.becomes(1, 2000.0));
+}
+
+TEST_CASE("late answers never land in another channel", "[source][late]") {
+  // One unit answers everything after its time-out; all of its requests have the same shape.
+  const auto lateness = GENERATE(80ms, 700ms, 1500ms);
+  CAPTURE(lateness.count());
+  peer::SerialLine line([lateness](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    if (request.unit == 1) reply.delay = lateness;
+    return reply;
+  });
+  ModbusBusConfig bus = rtu_bus(line.device());
+  bus.devices = {device_of(1, 0, {0, 100, 200, 300}), device_of(2, 4, {0, 100, 200, 300})};
+  bus.line.backoff_s_max = 0.5;  // as often as possible
+  Running running(bus);
+  const std::array<double, 8> right{1000, 1100, 1200, 1300, 2000, 2100, 2200, 2300};
+  const auto end = peer::steady_clock::now() + 8s;
+  std::uint64_t wrong = 0;
+  while (peer::steady_clock::now() < end) {
+    running.source.newest(running.all);
+    for (std::size_t i = 0; i < right.size(); ++i) {
+      const Reading& reading = running.all[i];
+      if (reading.fault == Fault::none && reading.temp_degC != right[i]) ++wrong;
+    }
+    std::this_thread::sleep_for(1ms);
+  }
+  CHECK(wrong == 0);
+  CHECK(running.becomes(4, 2000.0));
+}
+
+TEST_CASE("a register range that is never answered leaves the rest readable", "[source]") {
+  peer::TcpDevice device([](const peer::Request& request) {
+    return request.address == 100 ? peer::Reply{} : peer::honest(request);
+  });
+  ModbusBusConfig bus = tcp_bus(device.port());
+  bus.line.timeout_ms = 50.0;
+  bus.devices = {device_of(1, 0, {0, 100, 200})};
+  Running running(bus);
+  CHECK(running.becomes(1, Fault::no_answer));
+  CHECK(running.becomes(0, 1000.0));
+  CHECK(running.becomes(2, 1200.0));
+  const auto seen = running.all[2].taken_at;
+  CHECK(peer::eventually([&] { return running.reading(2).taken_at > seen; }));
+}
+
+TEST_CASE("a server that goes away and returns is read again", "[source][reconnect]") {
+  auto device = std::make_unique<peer::TcpDevice>();
+  const int port = device->port();
+  ModbusBusConfig bus = tcp_bus(port);
+  bus.devices = {device_of(1, 0, {0})};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 1000.0));
+  device.reset();
+  REQUIRE(running.becomes(0, Fault::no_answer));
+  CHECK_FALSE(running.source.health().connected);
+  device = std::make_unique<peer::TcpDevice>(peer::honest, port);
+  CHECK(running.becomes(0, 1000.0));
+  CHECK(running.source.health().connects >= 2);
+}
+
+TEST_CASE("a server that closes idle connections costs no reading", "[source][reconnect]") {
+  std::atomic<int> count{0};
+  peer::TcpDevice device([&count](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    reply.close = ++count % 5 == 0;
+    return reply;
+  });
+  ModbusBusConfig bus = tcp_bus(device.port());
+  bus.line.reconnect_s = 0.01;
+  bus.devices = {device_of(1, 0, {0}, 0.05)};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 1000.0));
+  const bool faulty = [&] {
+    for (int i = 0; i < 1500; ++i) {
+      if (running.reading(0).fault != Fault::none) return true;
+      std::this_thread::sleep_for(1ms);
+    }
+    return false;
+  }();
+  CHECK_FALSE(faulty);
+  CHECK(device.connections() > 2);
+}
+
+TEST_CASE("a device that reboots is read again", "[source][reconnect]") {
+  std::atomic<bool> booting{false};
+  const auto handler = [&booting](const peer::Request& request) {
+    return booting ? peer::Reply{} : peer::honest(request);
+  };
+  peer::TcpDevice tcp(handler);
+  peer::SerialLine serial(handler);
+  const bool rtu = GENERATE(false, true);
+  CAPTURE(rtu);
+  ModbusBusConfig bus = rtu ? rtu_bus(serial.device()) : tcp_bus(tcp.port());
+  bus.devices = {device_of(1, 0, {0})};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 1000.0));
+  booting = true;
+  REQUIRE(running.becomes(0, Fault::no_answer));
+  booting = false;
+  CHECK(running.becomes(0, 1000.0));
+}
+
+TEST_CASE("a serial port that vanishes and returns is read again", "[source][reconnect]") {
+  peer::SerialLine line;
+  ModbusBusConfig bus = rtu_bus(line.device());
+  bus.devices = {device_of(1, 0, {0})};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 1000.0));
+  line.unplug();
+  REQUIRE(running.becomes(0, Fault::no_answer));
+  CHECK(peer::eventually([&] { return !running.source.health().connected; }));
+  line.plug_in();
+  CHECK(running.becomes(0, 1000.0));
+}
+
+TEST_CASE("while the renewal counter stands still, so do the times", "[source]") {
+  std::atomic<std::uint16_t> counter{1};
+  peer::TcpDevice device([&counter](const peer::Request& request) {
+    if (request.address == 90) return peer::Reply{peer::registers_pdu(4, {counter})};
+    return peer::honest(request);
+  });
+  ModbusBusConfig bus = tcp_bus(device.port());
+  bus.devices = {device_of(1, 0, {0})};
+  bus.devices[0].renewal = ModbusRenewal{ModbusTable::input, 90};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 1000.0));
+  const auto taken_at = running.all[0].taken_at;
+  const int asked = device.requests();
+  REQUIRE(peer::eventually([&] { return device.requests() > asked + 20; }));
+  CHECK(running.reading(0).taken_at == taken_at);
+  ++counter;
+  CHECK(peer::eventually([&] { return running.reading(0).taken_at > taken_at; }));
+}
+
+TEST_CASE("stop ends every wait within a second", "[source]") {
+  peer::TcpDevice silent([](const peer::Request&) { return peer::Reply{}; });
+  ModbusBusConfig bus = tcp_bus(silent.port());
+  bus.line.timeout_ms = 60000.0;
+  bus.devices = {device_of(1, 0, {0})};
+  const bool nobody = GENERATE(false, true);
+  if (nobody) bus.line.link = ModbusTcp{"no-such-host.invalid", 502};
+  ModbusSource source(bus);
+  source.start();
+  std::this_thread::sleep_for(100ms);
+  const auto began = peer::steady_clock::now();
+  source.stop();
+  CHECK(peer::steady_clock::now() - began < 1s);
+}
+
+TEST_CASE("a configuration that cannot work is refused with the device's name", "[source]") {
+  ModbusBusConfig good = tcp_bus(502);
+  good.devices = {device_of(1, 0, {0})};
+  const auto refused = [&good](const std::function<void(ModbusBusConfig&)>& spoil) {
+    ModbusBusConfig bus = good;
+    spoil(bus);
+    CHECK_THROWS_AS(ModbusSource(bus), DriverError);
+  };
+  CHECK_NOTHROW(ModbusSource(good));
+  refused([](auto& bus) { bus.devices[0].unit = 256; });
+  refused([](auto& bus) { bus.devices[0].unit = -1; });
+  refused([](auto& bus) { bus.devices[0].period_s = 0.0; });
+  refused([](auto& bus) { bus.devices[0].period_s = not_a_number; });
+  refused([](auto& bus) { bus.devices[0].registers_per_request_max = 126; });
+  refused([](auto& bus) { bus.devices[0].registers_per_request_max = 0; });
+  refused([](auto& bus) { bus.devices[0].gap_registers_max = -1; });
+  refused([](auto& bus) { bus.devices[0].channels.clear(); });
+  refused([](auto& bus) { bus.devices.clear(); });
+  refused([](auto& bus) { bus.devices[0].channels[0].scale = 0.0; });
+  refused([](auto& bus) { bus.devices[0].channels[0].offset_degC = not_a_number; });
+  refused([](auto& bus) {
+    bus.devices[0].channels[0].address = 65535;
+    bus.devices[0].channels[0].encoding = Encoding::float32;
+  });
+  refused([](auto& bus) {
+    bus.devices[0].channels[0].sentinels = {{-1, Fault::open_circuit}};  // never in uint16
+  });
+  refused([](auto& bus) {
+    bus.line.link = ModbusRtu{"/dev/null"};
+    bus.devices[0].unit = 0;  // a broadcast has no answer
+  });
+}
