@@ -1,0 +1,81 @@
+#include "daemon/event_log.hpp"
+
+#include <spdlog/spdlog.h>
+
+namespace thermocomp {
+namespace {
+
+/// So many clipped values in a row are news: the temperature really runs away from its past.
+constexpr std::uint32_t clipped_in_a_row_news = 5;
+
+std::string reason_names(std::uint32_t reasons) {
+  std::string names;
+  for (std::size_t i = 0; i < reasons_count; ++i) {
+    const auto reason = static_cast<Reason>(1u << i);
+    if (!has_reason(reasons, reason)) continue;
+    if (!names.empty()) names += ", ";
+    names += to_string(reason);
+  }
+  return names.empty() ? "none" : names;
+}
+
+}  // namespace
+
+void EventLog::note_report(const Report& report, const EstimatorConfig& config) {
+  // "cutting" comes and goes with every part; it is in the status, not in the log.
+  const std::uint32_t reasons = report.reasons & ~static_cast<std::uint32_t>(Reason::cutting);
+  if (first_ || report.mode != mode_ || reasons != reasons_) {
+    const bool good = report.mode == Mode::compensating && reasons == 0;
+    spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}",
+                to_string(report.mode), reason_names(reasons));
+  }
+  first_ = false;
+  mode_ = report.mode;
+  reasons_ = reasons;
+  faults_.resize(report.sensors.size(), Fault::none);
+  clipping_.resize(report.sensors.size(), false);
+  for (std::size_t i = 0; i < report.sensors.size(); ++i) {
+    const SensorReport& sensor = report.sensors[i];
+    if (sensor.fault != faults_[i]) {
+      if (sensor.fault == Fault::none)
+        spdlog::info("sensor {}: good again", config.sensors[i].name);
+      else
+        spdlog::warn("sensor {}: {}", config.sensors[i].name, to_string(sensor.fault));
+      faults_[i] = sensor.fault;
+    }
+    const bool clipping = sensor.clipped_in_a_row >= clipped_in_a_row_news;
+    if (clipping && !clipping_[i])
+      spdlog::warn("sensor {}: {} smoothed values in a row clipped", config.sensors[i].name,
+                   sensor.clipped_in_a_row);
+    clipping_[i] = clipping;
+  }
+}
+
+void EventLog::note_link(const std::string& what, bool connected, const std::string& error) {
+  const auto known = connected_.find(what);
+  if (known != connected_.end() && known->second == connected) return;
+  connected_[what] = connected;
+  if (connected)
+    spdlog::info("{}: connected", what);
+  else
+    spdlog::warn("{}: {}", what, error.empty() ? "not connected" : error);
+}
+
+void EventLog::note_bus(const BusHealth& bus) {
+  note_link("bus " + bus.name, bus.connected, bus.last_error);
+  if (!bus.connected) return;
+  for (const UnitHealth& unit : bus.units)
+    if (unit.answering || !unit.last_error.empty())
+      note_link("device " + unit.name, unit.answering, unit.last_error);
+}
+
+void EventLog::note_controller(const ControllerHealth& controller) {
+  note_link("controller " + controller.name, controller.connected, controller.last_error);
+}
+
+void EventLog::note_missed(std::uint64_t missed) {
+  if (missed > missed_) spdlog::warn("{} cycles missed", missed - missed_);
+  missed_ = missed;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,35 @@
+/// Turns what changes in reports and health into lines of the log, so that no driver and no cycle
+/// has to log.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "estimator/estimator.hpp"
+
+namespace thermocomp {
+
+/// Main's thread only. Each change is one line; a state that stays is not repeated.
+class EventLog {
+ public:
+  void note_report(const Report& report, const EstimatorConfig& config);
+  void note_bus(const BusHealth& bus);
+  void note_controller(const ControllerHealth& controller);
+  void note_missed(std::uint64_t missed);
+
+ private:
+  void note_link(const std::string& what, bool connected, const std::string& error);
+
+  bool first_{true};
+  Mode mode_{Mode::starting};
+  std::uint32_t reasons_{0};
+  std::vector<Fault> faults_;
+  std::vector<bool> clipping_;
+  std::map<std::string, bool> connected_;
+  std::uint64_t missed_{0};
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,121 @@
+#include "daemon/operator_desk.hpp"
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "config/problems.hpp"
+
+namespace thermocomp {
+namespace {
+
+using nlohmann::json;
+
+std::uint32_t axis_index(const StatusView& view, const json& params) {
+  if (!params.contains("axis") || !params["axis"].is_string())
+    throw RpcError(rpc::invalid_params, "params.axis must be the name of an axis");
+  const auto name = params["axis"].get<std::string>();
+  std::string known;
+  for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i) {
+    const std::string& each = view.config.estimator.axes[i].name;
+    if (each == name) return static_cast<std::uint32_t>(i);
+    known += (known.empty() ? "" : ", ") + each;
+  }
+  throw RpcError(rpc::invalid_params, "axis " + name + " does not exist; there is " + known);
+}
+
+double value_um(const json& params) {
+  if (!params.contains("value_um") || !params["value_um"].is_number() ||
+      !std::isfinite(params["value_um"].get<double>()))
+    throw RpcError(rpc::invalid_params, "params.value_um must be a finite number");
+  return params["value_um"].get<double>();
+}
+
+void refuse_unless(bool holds, const std::string& why) {
+  if (!holds) throw RpcError(rpc::refused, why);
+}
+
+void add_reads(StatusServer& server, const DeskActions& actions) {
+  const auto add = [&](const char* name, json (*make)(const StatusView&)) {
+    server.add_method(name, AccessClass::read,
+                      [actions, make](const json&) { return make(actions.view()); });
+  };
+  add("status", status_json);
+  add("sensors", sensors_json);
+  add("offsets", offsets_json);
+  add("timing", timing_json);
+  add("model", model_json);
+}
+
+json take_reference(const DeskActions& actions) {
+  const auto view = actions.view();
+  const auto columns = view.config.model.temperature_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    refuse_unless(view.report.inputs[i].good,
+                  "no reference can be taken: " + columns[i] + " has no good sensor now");
+  actions.command({CommandKind::reference, 0, 0.0});
+  return {{"done", true}};
+}
+
+json note_measured(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
+  const double displacement_um = view.report.axes[command.axis].displacement_um;
+  actions.command(command);
+  // What remains at the tool is what the model did not foresee.
+  return {{"done", true},
+          {"measured_um", command.value_um},
+          {"predicted_um", std::isfinite(displacement_um) ? json(displacement_um) : json(nullptr)}};
+}
+
+json prove(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const Command command{CommandKind::prove, axis_index(view, params), value_um(params)};
+  const double most_um = view.config.estimator.compensation.prove_um_max;
+  refuse_unless(
+      std::abs(command.value_um) <= most_um,
+      "a proving move is at most compensation.prove_um_max = " + std::to_string(most_um) + " um");
+  const AxisReport& axis = view.report.axes[command.axis];
+  refuse_unless(axis.driven, "the axis is not driven: the controller is offline or not in step");
+  refuse_unless(!axis.proving, "the axis is being proved already");
+  refuse_unless(!has_reason(view.report.reasons, Reason::cutting),
+                "not while the controller says it is cutting");
+  actions.command(command);
+  return {{"done", true}};
+}
+
+json reload(const DeskActions& actions) {
+  try {
+    actions.reload();
+  } catch (const ConfigurationError& error) {
+    throw RpcError(rpc::refused, error.what());
+  }
+  return {{"done", true}, {"checksum", actions.view().config.model_checksum}};
+}
+
+}  // namespace
+
+void add_operator_methods(StatusServer& server, const DeskActions& actions) {
+  add_reads(server, actions);
+  const auto add = [&](const char* name, std::function<json(const json&)> handler) {
+    server.add_method(name, AccessClass::operate, std::move(handler));
+  };
+  const auto simple = [&](const char* name, CommandKind kind) {
+    add(name, [actions, kind](const json&) {
+      actions.command({kind, 0, 0.0});
+      return json{{"done", true}};
+    });
+  };
+  simple("enable", CommandKind::enable);
+  simple("disable", CommandKind::disable);
+  simple("cycle_end", CommandKind::cycle_end);
+  add("reference", [actions](const json&) { return take_reference(actions); });
+  add("measured", [actions](const json& params) { return note_measured(actions, params); });
+  add("prove", [actions](const json& params) { return prove(actions, params); });
+  add("reload", [actions](const json&) { return reload(actions); });
+  server.add_method("controller_state", AccessClass::bridge, [](const json&) -> json {
+    throw RpcError(rpc::refused, "this configuration's controller is no bridge");
+  });
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,25 @@
+/// The methods of the status socket: reads, commands and who may use them.
+#pragma once
+
+#include <functional>
+
+#include "config/daemon_config.hpp"
+#include "daemon/socket/status_server.hpp"
+#include "daemon/status_json.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+/// What the desk needs of the daemon behind it.
+struct DeskActions {
+  std::function<StatusView()> view;
+  /// Gives the command to the cycle and waits until it has taken it. @throws RpcError
+  std::function<void(const Command&)> command;
+  /// @throws ConfigurationError or RpcError with what is wrong; the running one then stays
+  std::function<void()> reload;
+};
+
+/// Adds every method of CONTRACTS to `server`. @param actions  copied; must stay callable
+void add_operator_methods(StatusServer& server, const DeskActions& actions);
+
+}  // namespace thermocomp

@@ -1,0 +1,85 @@
+#include "daemon/socket/peer_access.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <grp.h>
+#include <pwd.h>
+
+#include <sys/socket.h>
+
+namespace thermocomp {
+namespace {
+
+/// Looked up for every connection, so that a group made later counts without a restart.
+std::optional<gid_t> group_called(const std::string& name) {
+  group entry{};
+  group* found = nullptr;
+  std::vector<char> text(16 * 1024);
+  while (getgrnam_r(name.c_str(), &entry, text.data(), text.size(), &found) == ERANGE &&
+         text.size() < (4u << 20)) {
+    text.resize(text.size() * 2);
+  }
+  if (found == nullptr) return std::nullopt;
+  return entry.gr_gid;
+}
+
+/// For kernels before 4.13, which do not tell the peer's own list: that of its user.
+std::vector<gid_t> groups_of_user(uid_t user, gid_t group) {
+  const passwd* entry = getpwuid(user);
+  if (entry == nullptr) return {};
+  int count = 64;
+  std::vector<gid_t> groups(static_cast<std::size_t>(count));
+  if (getgrouplist(entry->pw_name, group, groups.data(), &count) < 0 && count > 0) {
+    groups.resize(static_cast<std::size_t>(count));
+    if (getgrouplist(entry->pw_name, group, groups.data(), &count) < 0) return {};
+  }
+  groups.resize(static_cast<std::size_t>(std::max(count, 0)));
+  return groups;
+}
+
+bool is_member(const Peer& peer, gid_t group) {
+  return peer.group == group ||
+         std::find(peer.groups.begin(), peer.groups.end(), group) != peer.groups.end();
+}
+
+}  // namespace
+
+std::optional<Peer> peer_of(int socket_fd) {
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  if (getsockopt(socket_fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) {
+    return std::nullopt;
+  }
+  Peer peer{credentials.uid, credentials.gid, {}};
+  peer.groups.resize(1024);
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    size = static_cast<socklen_t>(peer.groups.size() * sizeof(gid_t));
+    const int code = getsockopt(socket_fd, SOL_SOCKET, SO_PEERGROUPS, peer.groups.data(), &size);
+    const std::size_t count = size / sizeof(gid_t);
+    if (code == 0) {
+      peer.groups.resize(count);
+      return peer;
+    }
+    if (errno != ERANGE) break;
+    peer.groups.resize(count);  // the kernel says how many there are
+  }
+  peer.groups = groups_of_user(peer.user, peer.group);
+  return peer;
+}
+
+PeerAccess access_of(const Peer& peer, uid_t daemon_user, const SocketConfig& config) {
+  if (peer.user == 0) return {true, true, true};
+  const bool is_own_user = peer.user == daemon_user;
+  const auto allowed = [&](const std::string& name) {
+    const std::optional<gid_t> group = group_called(name);
+    // Without the groups this is a development daemon, and its own user stands for all of them.
+    return group ? is_member(peer, *group) : is_own_user;
+  };
+  PeerAccess access;
+  access.operate = allowed(config.operator_group);
+  access.bridge = allowed(config.bridge_group);
+  access.read = is_own_user || access.operate || access.bridge || allowed(config.read_group);
+  return access;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,152 @@
+#include "daemon/socket/status_client.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <poll.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+namespace thermocomp {
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+/// Far more than any answer has; a peer that sends more without a line's end is no daemon of ours.
+constexpr std::size_t line_bytes_max = 64u << 20;
+
+[[noreturn]] void no_daemon(const std::string& path, int error) {
+  std::string why = std::strerror(error);
+  if (error == ENOENT) why = "there is no such socket (is thermocompd running?)";
+  if (error == ECONNREFUSED) why = "nobody listens there (is thermocompd running?)";
+  throw ClientError("no daemon at " + path + ": " + why);
+}
+
+int connect_to(const std::filesystem::path& path) {
+  const std::string text = path.string();
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (text.empty() || text.size() >= sizeof address.sun_path) no_daemon(text, ENAMETOOLONG);
+  std::memcpy(address.sun_path, text.data(), text.size());
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) no_daemon(text, errno);
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    const int error = errno;
+    close(fd);
+    no_daemon(text, error);
+  }
+  return fd;
+}
+
+}  // namespace
+
+struct StatusClient::Parts {
+  explicit Parts(const std::filesystem::path& path_in)
+      : path(path_in.string()), fd(connect_to(path_in)) {}
+  ~Parts() { close(fd); }
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+  std::string path;
+  int fd;
+  std::string input;
+  std::deque<json> notifications;
+  std::int64_t next_id{1};
+
+  void wait_for(short events, Clock::time_point deadline) const;
+  void send_all(const std::string& text, Clock::time_point deadline) const;
+  [[nodiscard]] json receive(Clock::time_point deadline);
+};
+
+void StatusClient::Parts::wait_for(short events, Clock::time_point deadline) const {
+  for (;;) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    if (left <= 0) throw ClientError("no answer in time from the daemon at " + path);
+    pollfd entry{fd, events, 0};
+    const int code = poll(&entry, 1, static_cast<int>(std::min<std::int64_t>(left, 1 << 30)));
+    if (code > 0) return;
+    if (code < 0 && errno != EINTR) throw ClientError(path + ": " + std::strerror(errno));
+  }
+}
+
+void StatusClient::Parts::send_all(const std::string& text, Clock::time_point deadline) const {
+  std::size_t done = 0;
+  while (done < text.size()) {
+    wait_for(POLLOUT, deadline);
+    const ssize_t count =
+        ::send(fd, text.data() + done, text.size() - done, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (count < 0 && (errno == EAGAIN || errno == EINTR)) continue;
+    if (count < 0 && errno == EPIPE) return;  // what the daemon said before may explain why
+    if (count < 0) throw ClientError(path + ": " + std::strerror(errno));
+    done += static_cast<std::size_t>(count);
+  }
+}
+
+json StatusClient::Parts::receive(Clock::time_point deadline) {
+  for (std::size_t searched = 0;;) {
+    const std::size_t end = input.find('\n', searched);
+    if (end != std::string::npos) {
+      const json message = json::parse(input.substr(0, end), nullptr, false);
+      input.erase(0, end + 1);
+      if (!message.is_object()) throw ClientError(path + ": answers something else than JSON-RPC");
+      return message;
+    }
+    searched = input.size();
+    if (searched > line_bytes_max) throw ClientError(path + ": answers without an end");
+    wait_for(POLLIN, deadline);
+    std::array<char, 64 * 1024> bytes;
+    const ssize_t count = recv(fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
+    if (count == 0) throw ClientError("the daemon at " + path + " closed the connection");
+    if (count < 0 && errno != EAGAIN && errno != EINTR) {
+      throw ClientError("the daemon at " + path + ": " + std::strerror(errno));
+    }
+    if (count > 0) input.append(bytes.data(), static_cast<std::size_t>(count));
+  }
+}
+
+StatusClient::StatusClient(const std::filesystem::path& path)
+    : parts_(std::make_unique<Parts>(path)) {}
+StatusClient::~StatusClient() = default;
+StatusClient::StatusClient(StatusClient&&) noexcept = default;
+
+json StatusClient::call(const std::string& method, const json& params,
+                        std::chrono::milliseconds timeout) {
+  const Clock::time_point deadline = Clock::now() + timeout;
+  const std::int64_t id = parts_->next_id++;
+  const json request = {{"jsonrpc", "2.0"},
+                        {"id", id},
+                        {"method", method},
+                        {"params", params.is_null() ? json::object() : params}};
+  parts_->send_all(request.dump(-1, ' ', false, json::error_handler_t::replace) + "\n", deadline);
+  for (;;) {
+    json message = parts_->receive(deadline);
+    if (message.contains("method")) {
+      parts_->notifications.push_back(std::move(message));
+      continue;
+    }
+    const json answered = message.value("id", json());
+    if (!answered.is_null() && answered != id) continue;  // of a call that ran out of time
+    if (const auto error = message.find("error"); error != message.end() && error->is_object()) {
+      throw RemoteError(error->value("code", 0), error->value("message", std::string("error")));
+    }
+    return message.value("result", json());
+  }
+}
+
+json StatusClient::next(std::chrono::milliseconds timeout) {
+  const Clock::time_point deadline = Clock::now() + timeout;
+  while (parts_->notifications.empty()) {
+    json message = parts_->receive(deadline);
+    if (message.contains("method")) parts_->notifications.push_back(std::move(message));
+  }
+  json message = std::move(parts_->notifications.front());
+  parts_->notifications.pop_front();
+  return message;
+}
+
+}  // namespace thermocomp

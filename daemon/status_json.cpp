@@ -1,0 +1,220 @@
+#include "daemon/status_json.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+namespace thermocomp {
+namespace {
+
+using nlohmann::json;
+
+json number(double value) {
+  return std::isfinite(value) ? json(value) : json(nullptr);
+}
+
+double seconds(nanoseconds time) {
+  return 1e-9 * static_cast<double>(time.count());
+}
+double microseconds(nanoseconds time) {
+  return 1e-3 * static_cast<double>(time.count());
+}
+
+std::string unit_of(const std::string& output) {
+  return output.size() > 5 && output.ends_with("_urad") ? "urad" : "um";
+}
+
+json reasons(const Report& report) {
+  json names = json::array();
+  for (std::size_t i = 0; i < reasons_count; ++i) {
+    const auto reason = static_cast<Reason>(1u << i);
+    if (has_reason(report.reasons, reason)) names.push_back(to_string(reason));
+  }
+  return names;
+}
+
+json axes(const StatusView& view) {
+  json list = json::array();
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
+    const AxisReport& axis = view.report.axes[i];
+    const AxisConfig& config = view.config.estimator.axes[i];
+    list.push_back({{"name", config.name},
+                    {"unit", unit_of(config.output)},
+                    {"displacement", number(axis.displacement_um)},
+                    {"target", number(axis.target_um)},
+                    {"offset", number(axis.offset_um)},
+                    {"applied", number(axis.applied_um)},
+                    {"measured", number(axis.measured_um)},
+                    {"synced", axis.synced},
+                    {"driven", axis.driven},
+                    {"mismatch", axis.mismatch},
+                    {"at_bound", axis.at_bound},
+                    {"proving", axis.proving}});
+  }
+  return list;
+}
+
+json inputs(const StatusView& view) {
+  json list = json::array();
+  const auto columns = view.config.model.temperature_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const InputReport& input = view.report.inputs[i];
+    list.push_back({{"name", columns[i]},
+                    {"temp_degC", number(input.temp_degC)},
+                    {"reference_degC", number(input.reference_degC)},
+                    {"good", input.good}});
+  }
+  return list;
+}
+
+json buses(const StatusView& view) {
+  json list = json::array();
+  for (const BusHealth& bus : view.buses) {
+    json units = json::array();
+    for (const UnitHealth& unit : bus.units)
+      units.push_back({{"name", unit.name},
+                       {"answering", unit.answering},
+                       {"requests", unit.requests},
+                       {"answers", unit.answers},
+                       {"timeouts", unit.timeouts},
+                       {"exceptions", unit.exceptions},
+                       {"bad_frames", unit.bad_frames},
+                       {"round_trip_ms", number(unit.round_trip_ms)},
+                       {"last_error", unit.last_error}});
+    list.push_back({{"name", bus.name},
+                    {"kind", bus.kind},
+                    {"connected", bus.connected},
+                    {"connects", bus.connects},
+                    {"last_error", bus.last_error},
+                    {"units", units}});
+  }
+  return list;
+}
+
+json controller(const StatusView& view) {
+  json signals = json::object();
+  for (std::size_t i = 0; i < view.config.estimator.signals.size(); ++i)
+    signals[view.config.estimator.signals[i]] = number(view.controller.signals[i]);
+  const ControllerHealth& health = view.controller_health;
+  return {{"name", health.name},
+          {"kind", health.kind},
+          {"connected", health.connected},
+          {"online", !has_reason(view.report.reasons, Reason::controller_offline)},
+          {"connects", health.connects},
+          {"writes", health.writes},
+          {"write_errors", health.write_errors},
+          {"reads", health.reads},
+          {"read_errors", health.read_errors},
+          {"last_error", health.last_error},
+          {"signals", signals}};
+}
+
+json history(const StatusView& view) {
+  const HistoryStatistics& statistics = view.history;
+  return {{"enabled", view.config.history.enabled},
+          {"file", view.config.history.file.string()},
+          {"working", statistics.working},
+          {"size_MB", static_cast<double>(statistics.bytes) * 1e-6},
+          {"last_commit_age_s", number(statistics.last_commit_age_s)},
+          {"lost_records", statistics.lost},
+          {"errors", statistics.errors},
+          {"last_error", statistics.last_error}};
+}
+
+}  // namespace
+
+json status_json(const StatusView& view) {
+  json bad = json::array();
+  for (std::size_t i = 0; i < view.report.sensors.size(); ++i)
+    if (view.report.sensors[i].fault != Fault::none)
+      bad.push_back(view.config.estimator.sensors[i].name);
+  return {{"mode", to_string(view.report.mode)},
+          {"mode_since_s", number(seconds(view.report.now - view.report.mode_since))},
+          {"enabled", view.report.enabled},
+          {"reasons", reasons(view.report)},
+          {"cycle_ends", view.report.cycle_ends},
+          {"version", THERMOCOMP_VERSION},
+          {"uptime_s", number(view.uptime_s)},
+          {"cycle", timing_json(view)},
+          {"model",
+           {{"file", view.config.model_file.string()},
+            {"checksum", view.config.model_checksum},
+            {"inputs", view.config.model.inputs.size()},
+            {"outputs", view.config.model.outputs.size()}}},
+          {"axes", axes(view)},
+          {"inputs", inputs(view)},
+          {"sensors_bad", bad},
+          {"buses", buses(view)},
+          {"controller", controller(view)},
+          {"history", history(view)},
+          {"warnings", view.warnings}};
+}
+
+json sensors_json(const StatusView& view) {
+  json list = json::array();
+  for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
+    const SensorReport& sensor = view.report.sensors[i];
+    const bool ever = sensor.taken_at != nanoseconds{};
+    list.push_back(
+        {{"name", view.config.estimator.sensors[i].name},
+         {"raw_degC", number(sensor.raw_degC)},
+         {"smoothed_degC", number(sensor.smoothed_degC)},
+         {"fault", to_string(sensor.fault)},
+         {"age_s",
+          ever ? number(std::max(0.0, seconds(view.report.now - sensor.taken_at))) : json(nullptr)},
+         {"clipped_in_a_row", sensor.clipped_in_a_row},
+         {"clipped", sensor.clipped},
+         {"rejected", sensor.rejected}});
+  }
+  return {{"sensors", list}};
+}
+
+json offsets_json(const StatusView& view) {
+  return {{"mode", to_string(view.report.mode)}, {"axes", axes(view)}};
+}
+
+json timing_json(const StatusView& view) {
+  const DurationHistogram& lateness = view.timing.lateness;
+  const DurationHistogram& work = view.timing.work;
+  return {{"count", view.timing.cycles.load()},
+          {"missed", view.timing.missed.load()},
+          {"rate_hz", view.config.loop.rate_hz},
+          {"lateness_us_p50", microseconds(lateness.percentile(0.5))},
+          {"lateness_us_p99", microseconds(lateness.percentile(0.99))},
+          {"lateness_us_p999", microseconds(lateness.percentile(0.999))},
+          {"lateness_us_max", microseconds(lateness.max())},
+          {"work_us_p50", microseconds(work.percentile(0.5))},
+          {"work_us_p999", microseconds(work.percentile(0.999))},
+          {"work_us_max", microseconds(work.max())},
+          {"real_time", view.real_time}};
+}
+
+json model_json(const StatusView& view) {
+  json terms = json::array();
+  for (const TermSpec& term : view.config.model.terms)
+    terms.push_back({{"kind", term.kind},
+                     {"subject", term.subject},
+                     {"shared", term.shared},
+                     {"per_output", term.per_output}});
+  return {{"file", view.config.model_file.string()},
+          {"checksum", view.config.model_checksum},
+          {"inputs", view.config.model.inputs},
+          {"outputs", view.config.model.outputs},
+          {"matrix_um_per_K", view.config.model.matrix_um_per_K},
+          {"terms", terms}};
+}
+
+std::string status_line(const StatusView& view) {
+  std::string line(to_string(view.report.mode));
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
+    char text[64];
+    const AxisConfig& axis = view.config.estimator.axes[i];
+    std::snprintf(text, sizeof text, "%s %s %+.1f %s", i == 0 ? ":" : ",", axis.name.c_str(),
+                  view.report.axes[i].offset_um, unit_of(axis.output).c_str());
+    line += text;
+  }
+  return line;
+}
+
+}  // namespace thermocomp

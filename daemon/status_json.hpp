@@ -1,0 +1,42 @@
+/// The answers of the status socket, made from reports and health.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "config/daemon_config.hpp"
+#include "daemon/cycle/cycle.hpp"
+#include "daemon/history/history_writer.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "estimator/estimator.hpp"
+
+namespace thermocomp {
+
+/// All that a status is made from, at one moment.
+struct StatusView {
+  const DaemonConfig& config;
+  const Report& report;
+  const ControllerState& controller;
+  const CycleTiming& timing;
+  std::vector<BusHealth> buses;
+  ControllerHealth controller_health;
+  HistoryStatistics history;
+  std::vector<std::string> warnings;
+  double uptime_s{0.0};
+  bool real_time{false};
+};
+
+/// NaN becomes null. Units are the ends of the keys; axes and outputs name theirs.
+[[nodiscard]] nlohmann::json status_json(const StatusView& view);
+[[nodiscard]] nlohmann::json sensors_json(const StatusView& view);
+[[nodiscard]] nlohmann::json offsets_json(const StatusView& view);
+[[nodiscard]] nlohmann::json timing_json(const StatusView& view);
+[[nodiscard]] nlohmann::json model_json(const StatusView& view);
+/// One line for systemctl status.
+[[nodiscard]] std::string status_line(const StatusView& view);
+
+}  // namespace thermocomp
