@@ -23,12 +23,21 @@ double number_in(const std::string& field) {
   return result.ec == std::errc() ? value : std::numeric_limits<double>::quiet_NaN();
 }
 
-}  // namespace
-
-double TruthRow::value(const std::string& column) const {
+double value_of(const std::vector<std::string>& columns, const std::vector<double>& values,
+                const std::string& column) {
   const auto found = std::find(columns.begin(), columns.end(), column);
   const auto index = static_cast<std::size_t>(found - columns.begin());
   return index < values.size() ? values[index] : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace
+
+double TruthRow::value(const std::string& column) const {
+  return value_of(columns, values, column);
+}
+
+double TruthRow::change(const std::string& column) const {
+  return value_of(columns, values, column) - value_of(columns, first, column);
 }
 
 TruthFile::TruthFile(std::filesystem::path path) : path_(std::move(path)) {}
@@ -56,6 +65,7 @@ void TruthFile::take_line(const std::string& line) {
   }
   row_.values.clear();
   for (const std::string& field : fields) row_.values.push_back(number_in(field));
+  if (row_.first.empty()) row_.first = row_.values;
 }
 
 }  // namespace thermocomp::cli

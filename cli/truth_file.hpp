@@ -10,9 +10,12 @@ namespace thermocomp::cli {
 
 struct TruthRow {
   std::vector<std::string> columns;
-  std::vector<double> values;  ///< same order; NaN: missing
-  /// @return the value of the column, NaN where there is none
+  std::vector<double> first;   ///< values of the file's first row
+  std::vector<double> values;  ///< of the newest row; NaN: missing
+  /// @return the newest value of the column, NaN where there is none
   [[nodiscard]] double value(const std::string& column) const;
+  /// @return its change since the first row
+  [[nodiscard]] double change(const std::string& column) const;
 };
 
 /// Follows a CSV file that another program appends to.

@@ -49,14 +49,15 @@ std::string first_line(const json& status, bool colours) {
          " missed, lateness p99.9 " + fixed(number_of(cycle, "lateness_us_p999"), 0) + " us\n";
 }
 
-// What the tool does without and with the offsets, as the simulated machine knows it.
+// What the tool does without and with the offsets, as the simulated machine knows it. Its truth
+// file calls the outputs like the axes: x_um, x_error_um.
 struct ToolError {
   double uncompensated_um;
   double compensated_um;
 };
 
 ToolError tool_error(const TruthRow& truth, const std::string& axis) {
-  return {truth.value(axis + "_uncompensated_um"), truth.value(axis + "_error_um")};
+  return {truth.change(axis + "_um"), truth.value(axis + "_error_um")};
 }
 
 std::string axes_table(const json& status, const TruthRow* truth, bool colours) {

@@ -1,0 +1,98 @@
+#include "cli/output_file.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "cli/command.hpp"
+#include "cli/truth_file.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using thermocomp::cli::OutputFile;
+
+struct Folder {
+  Folder() {
+    std::string pattern = (fs::temp_directory_path() / "thermocomp-output.XXXXXX").string();
+    path = ::mkdtemp(pattern.data());
+  }
+  ~Folder() { fs::remove_all(path); }
+  [[nodiscard]] std::ptrdiff_t files() const {
+    return std::distance(fs::directory_iterator(path), fs::directory_iterator());
+  }
+  fs::path path;
+};
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST_CASE("without commit the old file stays and nothing else is left", "[cli][output]") {
+  const Folder folder;
+  const fs::path path = folder.path / "out.csv";
+  std::ofstream(path) << "old";
+  {
+    OutputFile file(path.string());
+    file.stream() << "half of the new";
+  }
+  CHECK(content(path) == "old");
+  CHECK(folder.files() == 1);
+}
+
+TEST_CASE("after commit the new content stands there", "[cli][output]") {
+  const Folder folder;
+  const fs::path path = folder.path / "out.csv";
+  OutputFile file(path.string());
+  file.stream() << "new";
+  file.commit();
+  CHECK(content(path) == "new");
+  CHECK(folder.files() == 1);
+}
+
+TEST_CASE("a symbolic link stays a link", "[cli][output]") {
+  const Folder folder;
+  std::ofstream(folder.path / "real.csv") << "old";
+  fs::create_symlink("real.csv", folder.path / "link.csv");
+  OutputFile file((folder.path / "link.csv").string());
+  file.stream() << "new";
+  file.commit();
+  CHECK(fs::is_symlink(folder.path / "link.csv"));
+  CHECK(content(folder.path / "real.csv") == "new");
+}
+
+TEST_CASE("a device is written, not replaced", "[cli][output]") {
+  OutputFile file("/dev/null");
+  file.stream() << "away";
+  file.commit();
+  CHECK(fs::is_character_file("/dev/null"));
+}
+
+TEST_CASE("a full device and a missing folder are failures that name the file", "[cli][output]") {
+  OutputFile full("/dev/full");
+  full.stream() << "text";
+  CHECK_THROWS_WITH(full.commit(), Catch::Matchers::Contains("/dev/full"));
+  CHECK_THROWS_WITH(OutputFile("/nonexistent/out.csv"),
+                    Catch::Matchers::Contains("/nonexistent/out.csv"));
+}
+
+TEST_CASE("a file that is being written shows its last whole row", "[cli][watch]") {
+  const Folder folder;
+  const fs::path path = folder.path / "truth.csv";
+  thermocomp::cli::TruthFile truth(path);
+  CHECK(truth.newest() == nullptr);
+  std::ofstream writer(path);
+  writer << "# simulated\ntime_s,z_um\n0,1.5\n10,4.0\n20,9" << std::flush;
+  REQUIRE(truth.newest() != nullptr);
+  CHECK(truth.newest()->value("z_um") == 4.0);
+  CHECK(truth.newest()->change("z_um") == 2.5);
+  writer << ".5\n" << std::flush;
+  CHECK(truth.newest()->value("z_um") == 9.5);
+}
+
+}  // namespace

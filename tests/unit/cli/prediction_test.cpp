@@ -1,0 +1,82 @@
+#include "cli/prediction.hpp"
+
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "config/problems.hpp"
+#include "config/run_file.hpp"
+
+namespace {
+
+using Catch::Matchers::Contains;
+using thermocomp::parse_run;
+using thermocomp::parse_selection;
+using thermocomp::RunFile;
+using thermocomp::ThermalModel;
+using thermocomp::cli::as_run_file;
+using thermocomp::cli::predict;
+using thermocomp::cli::Prediction;
+
+ThermalModel two_temperatures() {
+  ThermalModel model;
+  model.inputs = {"t1_degC", "t2_degC"};
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {{2.0, -1.0}};
+  return model;
+}
+
+TEST_CASE("a prediction is the model's change since the first row, beside the measured change",
+          "[cli][predict]") {
+  const RunFile run = parse_run(
+      "time_s,t1_degC,t2_degC,z_um\n0,20,20,100\n10,21,20,103\n20,21,22,100.5\n", "run.csv");
+  const Prediction result = predict(two_temperatures(), run);
+  REQUIRE(result.time_s == std::vector<double>{0, 10, 20});
+  const auto& z = result.outputs.at(0);
+  CHECK(z.predicted_um == std::vector<double>{0, 2, 0});
+  CHECK(z.measured_um == std::vector<double>{0, 3, 0.5});
+  CHECK(z.rms_um == Approx(std::sqrt((0.0 + 1.0 + 0.25) / 3.0)));
+  CHECK(z.peak_um == Approx(1.0));
+}
+
+TEST_CASE("a selection keeps reference and start at the file's first row", "[cli][predict]") {
+  const auto selection = parse_selection("run.csv@10:20");
+  const RunFile run =
+      parse_run("time_s,t1_degC,t2_degC,z_um\n0,20,20,100\n10,21,20,103\n20,21,22,100.5\n",
+                "run.csv", selection);
+  const Prediction result = predict(two_temperatures(), run);
+  REQUIRE(result.time_s == std::vector<double>{10});
+  CHECK(result.outputs[0].predicted_um[0] == Approx(2.0));
+  CHECK(result.outputs[0].measured_um[0] == Approx(3.0));
+}
+
+TEST_CASE("rows with a missing input or without any measured value are skipped", "[cli][predict]") {
+  const RunFile run = parse_run(
+      "time_s,t1_degC,t2_degC,z_um\n0,,20,100\n10,20,20,101\n20,21,nan,5\n30,21,20,\n40,22,20,"
+      "105\n",
+      "run.csv");
+  const Prediction result = predict(two_temperatures(), run);
+  CHECK(result.time_s == std::vector<double>{10, 40});
+  CHECK(result.outputs[0].predicted_um.at(1) == Approx(4.0));
+  CHECK(result.outputs[0].measured_um.at(1) == Approx(4.0));
+}
+
+TEST_CASE("a run without measured displacement is still predicted", "[cli][predict]") {
+  const RunFile run = parse_run("time_s,t1_degC,t2_degC\n0,20,20\n10,21,20\n", "run.csv");
+  const Prediction result = predict(two_temperatures(), run);
+  CHECK(result.outputs[0].predicted_um == std::vector<double>{0, 2});
+  CHECK(std::isnan(result.outputs[0].rms_um));
+}
+
+TEST_CASE("a missing column of the model is named with its file", "[cli][predict]") {
+  const RunFile run = parse_run("time_s,t1_degC,z_um\n0,20,20\n10,21,20\n", "run.csv");
+  CHECK_THROWS_WITH(predict(two_temperatures(), run), Contains("run.csv") && Contains("t2_degC"));
+}
+
+TEST_CASE("the unit stays last in the names of the predicted columns", "[cli][predict]") {
+  const RunFile run = parse_run("time_s,t1_degC,t2_degC,z_um\n0,20,20,1\n", "run.csv");
+  CHECK(as_run_file(predict(two_temperatures(), run)).columns ==
+        std::vector<std::string>{"time_s", "z_predicted_um", "z_measured_um", "z_residual_um"});
+}
+
+}  // namespace

@@ -1,0 +1,122 @@
+#include "cli/status_text.hpp"
+
+#include <string>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/reason_text.hpp"
+#include "cli/watch_text.hpp"
+#include "estimator/estimator.hpp"
+
+namespace {
+
+using Catch::Matchers::Contains;
+using nlohmann::json;
+using thermocomp::cli::duration_text;
+using thermocomp::cli::is_compensating;
+using thermocomp::cli::sensors_text;
+using thermocomp::cli::status_text;
+using thermocomp::cli::watch_header;
+using thermocomp::cli::watch_line;
+using thermocomp::cli::watch_screen;
+
+json good_status() {
+  return json::parse(R"({
+    "mode": "compensating", "mode_since_s": 3725.0, "enabled": true, "reasons": [],
+    "version": "0.1.0", "uptime_s": 4000,
+    "cycle": {"count": 400000, "missed": 3, "rate_hz": 100, "lateness_us_p50": 5.0,
+              "lateness_us_p999": 77.0, "lateness_us_max": 300.0, "work_us_p50": 2.5,
+              "work_us_max": 40.0, "real_time": true},
+    "model": {"file": "m.toml", "checksum": "0123456789abcdef0123", "inputs": 1, "outputs": 1},
+    "axes": [{"name": "z", "unit": "um", "displacement": -3.2, "target": 3.2, "offset": 3.1,
+              "applied": null, "measured": null, "synced": true, "driven": true,
+              "mismatch": false, "at_bound": false, "proving": false}],
+    "inputs": [{"name": "bed_degC", "temp_degC": 22.5, "reference_degC": 21.0, "good": true}],
+    "sensors_bad": [], "buses": [], "warnings": [],
+    "controller": {"name": "cnc", "kind": "modbus_tcp", "connected": true, "online": true,
+                   "last_error": "", "signals": {"spindle_rpm": 6000.0}},
+    "history": {"enabled": true, "file": "h.db", "size_MB": 1.5, "last_commit_age_s": 2.0,
+                "lost_records": 0, "errors": 0}})");
+}
+
+TEST_CASE("the status says at one glance that and how much is compensated", "[cli][status]") {
+  const std::string text = status_text(good_status(), false);
+  CHECK_THAT(text, Contains("Compensating    : yes, for 1 h 2 min"));
+  CHECK_THAT(text, Contains("Axis z          : offset    +3.10 um, target    +3.20 um, applied"));
+  CHECK_THAT(text, Contains("Wrong           : nothing"));
+  CHECK_THAT(text, Contains("SHA-256 0123456789abcdef)"));
+  CHECK_THAT(text, Contains("100 Hz, 400000 cycles, 3 missed"));
+  CHECK_THAT(text, !Contains("\033"));
+}
+
+TEST_CASE("every reason of the estimator is explained with what to do", "[cli][status]") {
+  for (std::size_t bit = 0; bit < thermocomp::reasons_count; ++bit) {
+    const auto name = thermocomp::to_string(static_cast<thermocomp::Reason>(1u << bit));
+    INFO(name);
+    CHECK(thermocomp::cli::reason_text(name).meaning != name);
+    CHECK_FALSE(thermocomp::cli::reason_text(name).remedy.empty());
+  }
+  for (std::size_t fault = 1; fault < thermocomp::faults_count; ++fault) {
+    const auto name = thermocomp::to_string(static_cast<thermocomp::Fault>(fault));
+    INFO(name);
+    CHECK(thermocomp::cli::fault_text(name).meaning != name);
+  }
+}
+
+TEST_CASE("compensating needs the mode, the controller and every axis", "[cli][status]") {
+  CHECK(is_compensating(good_status()));
+  const json bad_parts[] = {{{"mode", "holding"}},
+                            {{"reasons", {"controller_offline"}}},
+                            {{"axes", {{{"name", "z"}, {"driven", false}}}}}};
+  for (const json& part : bad_parts) {
+    json status = good_status();
+    status.update(part);
+    CHECK_FALSE(is_compensating(status));
+    CHECK_THAT(status_text(status, false), Contains("Compensating    : no"));
+  }
+}
+
+TEST_CASE("trouble is named in plain words", "[cli][status]") {
+  json status = good_status();
+  status["mode"] = "holding";
+  status["reasons"] = {"block_lost"};
+  status["sensors_bad"] = {"table"};
+  status["buses"] = json::parse(R"([{"name": "cabinet", "kind": "modbus_tcp", "connected": false,
+    "last_error": "refused", "units": [{"name": "bed_module", "answering": false}]}])");
+  const std::string text = status_text(status, false);
+  CHECK_THAT(text, Contains("no (data lost: holding the last offsets"));
+  CHECK_THAT(text, Contains("no good sensor left -> thermocomp sensors"));
+  CHECK_THAT(text, Contains("bad sensors: table"));
+  CHECK_THAT(text, Contains("bus cabinet is not connected (refused)"));
+}
+
+TEST_CASE("an answer of an unexpected shape is shown, not fatal", "[cli][status]") {
+  for (const char* text : {"{}", "[]", "null", "7", R"({"axes": 5, "cycle": [], "mode": 3})"}) {
+    const json odd = json::parse(text);
+    CHECK_FALSE(is_compensating(odd));
+    CHECK_FALSE(status_text(odd, true).empty());
+    CHECK_FALSE(sensors_text(odd, true).empty());
+    CHECK_FALSE(watch_screen(odd, nullptr, true).empty());
+    CHECK_FALSE(watch_header(odd, nullptr).empty());
+    CHECK_FALSE(watch_line(odd, nullptr).empty());
+  }
+}
+
+TEST_CASE("a watch line shows temperatures, offsets and the simulated truth", "[cli][watch]") {
+  const thermocomp::cli::TruthRow truth{
+      {"time_s", "z_um", "z_offset_um", "z_error_um"}, {0, 1, 0, 0}, {10, -5.5, 6, -0.5}};
+  const std::string line = watch_line(good_status(), &truth);
+  CHECK_THAT(line,
+             Contains("22.50") && Contains("+3.10") && Contains("-6.50") && Contains("-0.50"));
+}
+
+TEST_CASE("durations are for people", "[cli]") {
+  CHECK(duration_text(7.9) == "7 s");
+  CHECK(duration_text(725.0) == "12 min 5 s");
+  CHECK(duration_text(3.0 * 3600 + 1200) == "3 h 20 min");
+  CHECK(duration_text(5.0 * 86400 + 7300) == "5 d 2 h");
+  CHECK(duration_text(thermocomp::not_a_number) == "-");
+}
+
+}  // namespace
