@@ -40,6 +40,13 @@ endif()
 # is not linked does not compile.
 function(thermocomp_rooms target visibility)
   set(root ${CMAKE_BINARY_DIR}/include-roots/${target})
+  # Begun anew in each configuration, before the first link: a link to a folder that an earlier
+  # layout left would lead what is done below it into the sources.
+  get_property(begun GLOBAL PROPERTY thermocomp_root_begun_${target})
+  if(NOT begun)
+    file(REMOVE_RECURSE ${root})  # removes links, never follows them
+    set_property(GLOBAL PROPERTY thermocomp_root_begun_${target} TRUE)
+  endif()
   foreach(path ${ARGN})
     get_filename_component(parent ${root}/${path} DIRECTORY)
     file(MAKE_DIRECTORY ${parent})
