@@ -1,0 +1,356 @@
+// The Modbus link against a libmodbus server.
+#include "drivers/controllers/modbus_controller.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "estimator/checks.hpp"
+#include "modbus_machine.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+using test::Cycle;
+using test::eventually;
+using test::ModbusMachine;
+
+namespace {
+
+constexpr int valid_bits_at = 10;
+constexpr int heartbeat_at = 11;
+
+ModbusValue at(ModbusTable table, std::uint16_t address, Encoding encoding, double scale = 1.0) {
+  ModbusValue value;
+  value.table = table;
+  value.address = address;
+  value.encoding = encoding;
+  value.scale = scale;
+  return value;
+}
+
+/// Three axes as in the example of the documentation: int32 at 0.01 um a count.
+ModbusControllerConfig three_axes(int port) {
+  ModbusControllerConfig config;
+  config.name = "cnc";
+  config.line.link = ModbusTcp{"127.0.0.1", port};
+  config.line.timeout_ms = 300;
+  config.line.reconnect_s = 0.05;
+  config.period_s = 0.02;
+  for (std::uint16_t address : {std::uint16_t{0}, std::uint16_t{2}, std::uint16_t{4}}) {
+    config.axes.push_back({at(ModbusTable::holding, address, Encoding::int32, 0.01),
+                           at(ModbusTable::input, address, Encoding::int32, 0.01)});
+  }
+  config.valid_bits = at(ModbusTable::holding, valid_bits_at, Encoding::uint16);
+  config.heartbeat = at(ModbusTable::holding, heartbeat_at, Encoding::uint16);
+  return config;
+}
+
+std::int32_t int32_of(const ModbusMachine& machine, int address) {
+  const std::uint32_t high = machine.holding(address);
+  return static_cast<std::int32_t>((high << 16) | machine.holding(address + 1));
+}
+
+}  // namespace
+
+TEST_CASE("offsets stand in the controller's registers with sign and scale", "[controllers]") {
+  ModbusMachine machine;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 12.34);
+  cycle.want(1, -7.0);
+  cycle.want(2, -600.005);
+  REQUIRE(eventually([&] { return machine.holding(valid_bits_at) == 0b111; }));
+  CHECK(int32_of(machine, 0) == 1234);
+  CHECK(int32_of(machine, 2) == -700);
+  CHECK(std::abs(int32_of(machine, 4) + 60000.5) <= 0.5);
+}
+
+TEST_CASE("the heartbeat counts up with every write", "[controllers]") {
+  ModbusMachine machine;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 1.0);
+  REQUIRE(eventually([&] { return machine.holding(heartbeat_at) >= 5; }));
+  const std::uint64_t writes = link.health().writes;
+  const std::uint16_t beats = machine.holding(heartbeat_at);
+  CHECK(beats >= writes);
+  CHECK(beats <= link.health().writes + 1);
+}
+
+TEST_CASE("an invalid axis keeps its register and clears its bit", "[controllers]") {
+  ModbusMachine machine;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 1.0);
+  cycle.want(1, 2.0);
+  cycle.want(2, 3.0);
+  REQUIRE(eventually([&] { return machine.holding(valid_bits_at) == 0b111; }));
+  cycle.want(1, 50.0, false);
+  REQUIRE(eventually([&] { return machine.holding(valid_bits_at) == 0b101; }));
+  cycle.want(0, not_a_number);
+  REQUIRE(eventually([&] { return machine.holding(valid_bits_at) == 0b100; }));
+  cycle.want(2, 3.5);
+  REQUIRE(eventually([&] { return int32_of(machine, 4) == 350; }));
+  CHECK(int32_of(machine, 0) == 100);
+  CHECK(int32_of(machine, 2) == 200);
+}
+
+TEST_CASE("what the controller applies and measures is read back", "[controllers]") {
+  ModbusMachine machine;
+  machine.set_input(0, 0xFFFF);  // -500 counts of 0.01 um
+  machine.set_input(1, 0xFE0C);
+  machine.set_input(26, 12000);
+  machine.set_holding(100, 0x41CC);  // 25.5f
+  machine.set_discrete(3, true);
+  machine.set_coil(7, true);
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.signals = {{0, at(ModbusTable::input, 26, Encoding::uint16)},
+                    {1, at(ModbusTable::discrete_input, 3, Encoding::uint16)},
+                    {2, at(ModbusTable::discrete_input, 4, Encoding::uint16)},
+                    {3, at(ModbusTable::coil, 7, Encoding::uint16)},
+                    {5, at(ModbusTable::holding, 100, Encoding::float32, 2.0)}};
+  ModbusController link(config);
+  const nanoseconds before = monotonic_now();
+  link.start();
+  ControllerState state;
+  REQUIRE(eventually([&] {
+    link.newest(state);
+    return state.online;
+  }));
+  CHECK(state.link_epoch != 0);
+  CHECK(state.applied_um[0] == Approx(-5.0));
+  CHECK(state.applied_um[1] == 0.0);
+  CHECK(std::isnan(state.applied_um[3]));
+  CHECK(state.signals[0] == 12000.0);
+  CHECK(state.signals[1] == 1.0);
+  CHECK(state.signals[2] == 0.0);
+  CHECK(state.signals[3] == 1.0);
+  CHECK(std::isnan(state.signals[4]));
+  CHECK(state.signals[5] == 51.0);
+  CHECK(state.taken_at >= before);
+  CHECK(state.taken_at <= monotonic_now());
+  machine.set_input(26, 3000);
+  const nanoseconds first = state.taken_at;
+  REQUIRE(eventually([&] {
+    link.newest(state);
+    return state.signals[0] == 3000.0;
+  }));
+  CHECK(state.taken_at > first);
+  CHECK(link.health().kind == "modbus_tcp");
+}
+
+TEST_CASE("a controller that applies something else is seen", "[controllers]") {
+  ModbusMachine machine;
+  machine.mirrored = 6;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 8.0);
+  REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(8.0); }));
+  machine.mirrored = 0;
+  machine.set_input(1, 300);
+  REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(3.0); }));
+  CHECK(int32_of(machine, 0) == 800);
+}
+
+TEST_CASE("nothing is written without a command of this epoch, not even a heartbeat",
+          "[controllers]") {
+  ModbusMachine machine;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.fixed_epoch = 4711;
+  cycle.want(0, 5.0);
+  const int reads = machine.reads;
+  REQUIRE(eventually([&] { return machine.reads > reads + 20; }));
+  CHECK(machine.writes == 0);
+  CHECK(machine.holding(heartbeat_at) == 0);
+  cycle.fixed_epoch = 0;
+  REQUIRE(eventually([&] { return int32_of(machine, 0) == 500; }));
+}
+
+TEST_CASE("a controller that was switched off and on is read back before it is written",
+          "[controllers]") {
+  auto machine = std::make_unique<ModbusMachine>();
+  machine->mirrored = 6;
+  const int port = machine->port();
+  ModbusController link(three_axes(port));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 9.0);
+  REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(9.0); }));
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.fixed_epoch = epoch;  // a cycle that has not noticed
+  machine.reset();
+  REQUIRE(eventually([&] { return !cycle.state().online; }));
+  CHECK(cycle.state().link_epoch == epoch);
+  CHECK_FALSE(link.health().connected);
+  machine = std::make_unique<ModbusMachine>(port);  // all registers 0
+  machine->mirrored = 6;
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  CHECK(cycle.state().link_epoch > epoch);
+  CHECK(cycle.state().applied_um[0] == 0.0);
+  REQUIRE(eventually([&] { return machine->reads > 20; }));
+  CHECK(machine->writes == 0);
+  cycle.fixed_epoch = 0;
+  REQUIRE(eventually([&] { return int32_of(*machine, 0) == 900; }));
+  CHECK(link.health().connects == 2);
+}
+
+TEST_CASE("a write that fails takes a new epoch and is not repeated with the old one",
+          "[controllers]") {
+  ModbusMachine machine;
+  machine.mirrored = 6;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 2.0);
+  REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(2.0); }));
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.fixed_epoch = epoch;
+  machine.refuse_writes = true;
+  cycle.want(0, 4.0);
+  REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
+  CHECK(link.health().write_errors >= 1);
+  machine.refuse_writes = false;
+  const int writes = machine.writes;
+  const int reads = machine.reads;
+  REQUIRE(eventually([&] { return machine.reads > reads + 20; }));
+  CHECK(machine.writes == writes);
+  CHECK(int32_of(machine, 0) == 200);
+  CHECK(cycle.state().online);
+  cycle.fixed_epoch = 0;
+  REQUIRE(eventually([&] { return int32_of(machine, 0) == 400; }));
+}
+
+TEST_CASE("a controller that cannot be read is offline and is not written", "[controllers]") {
+  ModbusMachine machine;
+  machine.refuse_reads = true;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 2.0);
+  REQUIRE(eventually([&] { return link.health().read_errors >= 3; }));
+  CHECK_FALSE(cycle.state().online);
+  CHECK(cycle.state().link_epoch == 0);
+  CHECK(machine.writes == 0);
+  CHECK(link.health().last_error.find("exception 4") != std::string::npos);
+  machine.refuse_reads = false;
+  REQUIRE(eventually([&] { return int32_of(machine, 0) == 200; }));
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  machine.refuse_reads = true;
+  REQUIRE(eventually([&] { return !cycle.state().online; }));
+  machine.refuse_reads = false;
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  CHECK(cycle.state().link_epoch > epoch);
+}
+
+TEST_CASE("the heartbeat stops when the cycle stands still, and its return is a new epoch",
+          "[controllers]") {
+  ModbusMachine machine;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 6.0);
+  REQUIRE(eventually([&] { return machine.holding(heartbeat_at) > 0; }));
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.hung = true;
+  std::uint16_t last = 0;
+  REQUIRE(eventually([&] {  // no beat between two looks 300 ms (15 periods) apart
+    last = machine.holding(heartbeat_at);
+    std::this_thread::sleep_for(300ms);
+    return machine.holding(heartbeat_at) == last;
+  }));
+  CHECK(cycle.state().online);  // reading goes on
+  std::this_thread::sleep_for(1200ms);
+  CHECK(machine.holding(heartbeat_at) == last);
+  cycle.hung = false;
+  REQUIRE(eventually([&] { return machine.holding(heartbeat_at) != last; }));
+  CHECK(cycle.state().link_epoch > epoch);
+}
+
+TEST_CASE("the link's end writes the newest command once more and nothing else", "[controllers]") {
+  ModbusMachine machine;
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.period_s = 30.0;  // the next write of its own would be far away
+  ModbusController link(config);
+  link.start();
+  ControllerState state;
+  REQUIRE(eventually([&] {
+    link.newest(state);
+    return state.online;
+  }));
+  OffsetCommand command;
+  command.link_epoch = state.link_epoch;
+  command.offset_um[0] = 1.5;
+  command.valid[0] = true;
+  link.offer(command);
+  link.stop();
+  CHECK(machine.writes >= 1);
+  CHECK(int32_of(machine, 0) == 150);
+  CHECK(machine.holding(valid_bits_at) == 1);
+}
+
+TEST_CASE("a controller that never answers neither delays the end nor is written",
+          "[controllers]") {
+  ModbusMachine machine;
+  machine.mute = true;
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.line.timeout_ms = 60'000;
+  ModbusController link(config);
+  link.start();
+  REQUIRE(eventually([&] { return machine.reads > 0; }));
+  const nanoseconds before = monotonic_now();
+  link.stop();
+  CHECK(monotonic_now() - before < 10s);  // the answer's time-out is a minute
+  CHECK(machine.writes == 0);
+}
+
+TEST_CASE("a controller that is not there is tried again for ever", "[controllers]") {
+  int port = 0;
+  {
+    const ModbusMachine machine;
+    port = machine.port();
+  }
+  ModbusController link(three_axes(port));
+  link.start();
+  REQUIRE(eventually([&] { return !link.health().last_error.empty(); }));
+  const ModbusMachine machine(port);
+  REQUIRE(eventually([&] { return link.health().connected; }));
+  CHECK(link.health().last_error.empty());
+}
+
+TEST_CASE("a Modbus controller that cannot be is refused", "[controllers]") {
+  const ModbusControllerConfig good = three_axes(502);
+  CHECK_NOTHROW(ModbusController(good));
+  ModbusControllerConfig bad = good;
+  bad.axes[1].offset.address = 1;  // half of axis 0
+  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  bad = good;
+  bad.axes[0].offset.table = ModbusTable::input;
+  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  bad = good;
+  bad.axes[0].offset.scale = 0.0;
+  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  bad = good;
+  bad.axes[0].offset.address = 65535;  // two registers
+  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  bad = good;
+  bad.period_s = 0.0;
+  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  bad = good;
+  bad.signals = {{signals_max, at(ModbusTable::input, 0, Encoding::int16)}};
+  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  bad = good;
+  bad.axes.resize(17, good.axes[0]);
+  CHECK_THROWS_AS(ModbusController(bad), InvalidValue);
+  bad = good;
+  bad.line.link = ModbusTcp{"", 502};
+  CHECK_THROWS_AS(ModbusController(bad), DriverError);
+}

@@ -1,0 +1,206 @@
+// A CNC's Modbus TCP server in a thread (libmodbus' server side), for the tests of the link.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <poll.h>
+#include <string>
+#include <thread>
+#include <unistd.h>
+#include <vector>
+
+#include <modbus/modbus.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include "drivers/monotonic_clock.hpp"
+#include "drivers/wake_event.hpp"
+
+namespace thermocomp::test {
+
+/// Serves one client at a time on 127.0.0.1. Registers live as long as the object runs; start()
+/// begins with zeros, as a controller that was switched off.
+class ModbusMachine {
+ public:
+  static constexpr int registers = 200;
+
+  /// @param port  0: any free one
+  explicit ModbusMachine(int port = 0) {
+    context_.reset(modbus_new_tcp("127.0.0.1", port));
+    mapping_.reset(modbus_mapping_new(registers, registers, registers, registers));
+    listener_ = modbus_tcp_listen(context_.get(), 4);
+    if (listener_ < 0) throw std::runtime_error(modbus_strerror(errno));
+    sockaddr_in address{};
+    socklen_t length = sizeof address;
+    ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &length);
+    port_ = ntohs(address.sin_port);
+    thread_ = std::thread([this] { serve(); });
+  }
+  ModbusMachine(const ModbusMachine&) = delete;
+  ModbusMachine& operator=(const ModbusMachine&) = delete;
+  ~ModbusMachine() {
+    stopping_ = true;
+    wake_.signal();
+    thread_.join();
+    ::close(listener_);
+  }
+
+  [[nodiscard]] int port() const { return port_; }
+
+  [[nodiscard]] std::uint16_t holding(int address) const {
+    const std::scoped_lock lock(mutex_);
+    return mapping_->tab_registers[address];
+  }
+  void set_holding(int address, std::uint16_t value) {
+    const std::scoped_lock lock(mutex_);
+    mapping_->tab_registers[address] = value;
+  }
+  void set_input(int address, std::uint16_t value) {
+    const std::scoped_lock lock(mutex_);
+    mapping_->tab_input_registers[address] = value;
+  }
+  void set_discrete(int address, bool value) {
+    const std::scoped_lock lock(mutex_);
+    mapping_->tab_input_bits[address] = value ? 1 : 0;
+  }
+  void set_coil(int address, bool value) {
+    const std::scoped_lock lock(mutex_);
+    mapping_->tab_bits[address] = value ? 1 : 0;
+  }
+
+  /// Input registers 0..n show what holding registers 0..n hold, as a controller that applies.
+  std::atomic<int> mirrored{0};
+  /// Writes are refused with "slave device failure".
+  std::atomic<bool> refuse_writes{false};
+  /// Reads are answered with "slave device failure".
+  std::atomic<bool> refuse_reads{false};
+  /// Requests are taken and never answered.
+  std::atomic<bool> mute{false};
+  std::atomic<int> writes{0};
+  std::atomic<int> reads{0};
+
+ private:
+  struct Free {
+    void operator()(modbus_t* context) const {
+      modbus_close(context);
+      modbus_free(context);
+    }
+    void operator()(modbus_mapping_t* mapping) const { modbus_mapping_free(mapping); }
+  };
+
+  void serve() {
+    int client = -1;
+    while (!stopping_) {
+      wake_.wait_until(monotonic_now() + std::chrono::seconds{1}, client < 0 ? listener_ : client);
+      if (stopping_) break;
+      if (client < 0) {
+        pollfd waiting{listener_, POLLIN, 0};
+        if (::poll(&waiting, 1, 0) <= 0) continue;
+        int socket = listener_;
+        client = modbus_tcp_accept(context_.get(), &socket);
+        continue;
+      }
+      pollfd waiting{client, POLLIN, 0};
+      if (::poll(&waiting, 1, 0) > 0 && !answer()) {
+        ::close(client);
+        client = -1;
+      }
+    }
+    if (client >= 0) ::close(client);
+    modbus_set_socket(context_.get(), -1);
+  }
+
+  bool answer() {
+    std::uint8_t query[MODBUS_TCP_MAX_ADU_LENGTH];
+    const int size = modbus_receive(context_.get(), query);
+    if (size < 0) return false;
+    if (size == 0) return true;
+    const int function = query[modbus_get_header_length(context_.get())];
+    const bool is_write = function == MODBUS_FC_WRITE_MULTIPLE_REGISTERS ||
+                          function == MODBUS_FC_WRITE_SINGLE_REGISTER;
+    ++(is_write ? writes : reads);
+    if (mute) return true;
+    if (is_write ? refuse_writes : refuse_reads) {
+      return modbus_reply_exception(context_.get(), query,
+                                    MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE) >= 0;
+    }
+    const std::scoped_lock lock(mutex_);
+    const bool answered = modbus_reply(context_.get(), query, size, mapping_.get()) >= 0;
+    for (int i = 0; i < mirrored; ++i) {
+      mapping_->tab_input_registers[i] = mapping_->tab_registers[i];
+    }
+    return answered;
+  }
+
+  std::unique_ptr<modbus_t, Free> context_;
+  std::unique_ptr<modbus_mapping_t, Free> mapping_;
+  int listener_{-1};
+  int port_{0};
+  mutable std::mutex mutex_;
+  std::atomic<bool> stopping_{false};
+  WakeEvent wake_;
+  std::thread thread_;
+};
+
+/// A cycle at 100 Hz: takes the state, marks the wanted offsets with its epoch, offers them.
+template <class Link>
+class Cycle {
+ public:
+  explicit Cycle(Link& link) : link_(link), thread_([this] { run(); }) {}
+  Cycle(const Cycle&) = delete;
+  Cycle& operator=(const Cycle&) = delete;
+  ~Cycle() {
+    stopping_ = true;
+    thread_.join();
+  }
+
+  void want(std::size_t axis, double offset_um, bool valid = true) {
+    const std::scoped_lock lock(mutex_);
+    wanted_.offset_um[axis] = offset_um;
+    wanted_.valid[axis] = valid;
+  }
+  [[nodiscard]] ControllerState state() const {
+    const std::scoped_lock lock(mutex_);
+    return state_;
+  }
+  /// Stops offering (a hung cycle), while the state is still taken.
+  std::atomic<bool> hung{false};
+  /// Commands keep this epoch instead of the newest; 0: the newest.
+  std::atomic<std::uint32_t> fixed_epoch{0};
+
+ private:
+  void run() {
+    while (!stopping_) {
+      {
+        const std::scoped_lock lock(mutex_);
+        link_.newest(state_);
+        wanted_.link_epoch = fixed_epoch != 0 ? fixed_epoch.load() : state_.link_epoch;
+        if (!hung) link_.offer(wanted_);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds{10});
+    }
+  }
+
+  Link& link_;
+  mutable std::mutex mutex_;
+  OffsetCommand wanted_{};
+  ControllerState state_;
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+/// Waits until `holds` for at most 20 s.
+template <class Condition>
+bool eventually(Condition&& holds) {
+  const auto until = monotonic_now() + std::chrono::seconds{20};
+  while (!holds()) {
+    if (monotonic_now() > until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  }
+  return true;
+}
+
+}  // namespace thermocomp::test

@@ -1,0 +1,256 @@
+// The parts of the controller links that need no bus.
+#include <chrono>
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "drivers/can/can_socket.hpp"
+#include "drivers/controllers/can_controller.hpp"
+#include "drivers/controllers/make_controller.hpp"
+#include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/controllers/write_gate.hpp"
+#include "drivers/driver_error.hpp"
+#include "estimator/checks.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+OffsetCommand of_epoch(std::uint32_t epoch) {
+  OffsetCommand command;
+  command.link_epoch = epoch;
+  return command;
+}
+
+ModbusValue value_at(ModbusTable table, std::uint16_t address,
+                     Encoding encoding = Encoding::int16) {
+  ModbusValue value;
+  value.table = table;
+  value.address = address;
+  value.encoding = encoding;
+  return value;
+}
+
+CanSignal can_signal(std::uint32_t id, int start, int length) {
+  CanSignal signal;
+  signal.id = id;
+  signal.start_bit = start;
+  signal.length_bits = length;
+  return signal;
+}
+
+}  // namespace
+
+TEST_CASE("only commands of the newest epoch may be sent", "[controllers]") {
+  WriteGate gate(100ms);
+  gate.offered(of_epoch(0), 0s);
+  CHECK(gate.verdict(0s) == SendVerdict::nothing_to_send);
+  CHECK(gate.synchronised() == 1);
+  CHECK(gate.verdict(0s) == SendVerdict::nothing_to_send);
+  gate.offered(of_epoch(1), 0s);
+  CHECK(gate.verdict(0s) == SendVerdict::send);
+  gate.lost();
+  CHECK(gate.verdict(0s) == SendVerdict::nothing_to_send);
+  CHECK(gate.synchronised() == 2);
+  CHECK(gate.verdict(0s) == SendVerdict::nothing_to_send);
+  gate.offered(of_epoch(2), 0s);
+  CHECK(gate.verdict(0s) == SendVerdict::send);
+}
+
+TEST_CASE("a command not renewed for more than a second is not sent", "[controllers]") {
+  WriteGate gate(100ms);
+  gate.synchronised();
+  gate.offered(of_epoch(1), 10s);
+  CHECK(gate.verdict(11s) == SendVerdict::send);
+  CHECK(gate.verdict(11s + 1ns) == SendVerdict::nothing_to_send);
+}
+
+TEST_CASE("a long pause between two writes asks for a new epoch", "[controllers]") {
+  const auto verdict_after = [](nanoseconds period, nanoseconds pause) {
+    WriteGate gate(period);
+    gate.synchronised();
+    gate.offered(of_epoch(1), 100s);
+    gate.sent(100s);
+    gate.offered(of_epoch(1), 100s + pause);
+    return gate.verdict(100s + pause);
+  };
+  CHECK(verdict_after(100ms, 1s) == SendVerdict::send);
+  CHECK(verdict_after(100ms, 1s + 1ns) == SendVerdict::resynchronise);
+  CHECK(verdict_after(1s, 5s) == SendVerdict::send);
+  CHECK(verdict_after(1s, 5s + 1ns) == SendVerdict::resynchronise);
+}
+
+TEST_CASE("the wait for the first command of an epoch is no pause", "[controllers]") {
+  WriteGate gate(100ms);
+  gate.synchronised();
+  gate.offered(of_epoch(1), 1000s);
+  CHECK(gate.verdict(1000s) == SendVerdict::send);
+  gate.sent(1000s);
+  gate.lost();
+  gate.synchronised();
+  gate.offered(of_epoch(2), 2000s);
+  CHECK(gate.verdict(2000s) == SendVerdict::send);
+}
+
+TEST_CASE("neighbours are read in one request and far ones are not", "[controllers]") {
+  const std::vector<ModbusValue> values{
+      value_at(ModbusTable::input, 26),
+      value_at(ModbusTable::input, 0, Encoding::int32),
+      value_at(ModbusTable::discrete_input, 5),
+      value_at(ModbusTable::input, 10, Encoding::float32),  // 8 unused registers after the first
+      value_at(ModbusTable::discrete_input, 3),
+      value_at(ModbusTable::input, 21),  // 9 unused registers after 10..11
+  };
+  const ReadPlan plan = plan_reads(values);
+  REQUIRE(plan.requests.size() == 3);
+  CHECK(plan.requests[0].table == ModbusTable::discrete_input);
+  CHECK(plan.requests[0].address == 3);
+  CHECK(plan.requests[0].count == 3);
+  CHECK(plan.requests[1].address == 0);
+  CHECK(plan.requests[1].count == 12);
+  CHECK(plan.requests[2].address == 21);
+  CHECK(plan.requests[2].count == 6);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const ReadRequest& request = plan.requests[plan.places[i].request];
+    CHECK(request.table == values[i].table);
+    CHECK(request.address + plan.places[i].word == values[i].address);
+  }
+}
+
+TEST_CASE("no read request is larger than the protocol allows", "[controllers]") {
+  std::vector<ModbusValue> values;
+  for (std::uint16_t i = 0; i < 200; ++i) {
+    values.push_back(
+        value_at(ModbusTable::holding, static_cast<std::uint16_t>(2 * i), Encoding::int32));
+  }
+  for (const ReadRequest& request : plan_reads(values).requests) CHECK(request.count <= 125);
+  CHECK(plan_reads(values).requests.size() == 4);
+  CHECK(plan_reads({}).requests.empty());
+}
+
+TEST_CASE("touching registers are written together, others are left alone", "[controllers]") {
+  const auto requests = join_writes({{11, WriteStage::heartbeat, {9}},
+                                     {2, WriteStage::offset, {3, 4}},
+                                     {0, WriteStage::offset, {1, 2}},
+                                     {10, WriteStage::valid_bits, {7}},
+                                     {20, WriteStage::offset, {5, 6}}});
+  REQUIRE(requests.size() == 3);
+  CHECK(requests[0].address == 0);
+  CHECK(requests[0].words == std::vector<std::uint16_t>{1, 2, 3, 4});
+  CHECK(requests[1].address == 20);
+  CHECK(requests[2].address == 10);
+  CHECK(requests[2].words == std::vector<std::uint16_t>{7, 9});
+}
+
+TEST_CASE("the heartbeat reaches the controller after the offsets it vouches for",
+          "[controllers]") {
+  const auto requests = join_writes({{0, WriteStage::heartbeat, {1}},
+                                     {2, WriteStage::valid_bits, {1}},
+                                     {4, WriteStage::offset, {1}},
+                                     {6, WriteStage::offset, {1}}});
+  REQUIRE(requests.size() == 4);
+  CHECK(requests[0].address == 4);
+  CHECK(requests[1].address == 6);
+  CHECK(requests[2].address == 2);
+  CHECK(requests[3].address == 0);
+  std::vector<WriteField> many;
+  for (std::uint16_t i = 0; i < 200; ++i) many.push_back({i, WriteStage::offset, {i}});
+  const auto split = join_writes(many);
+  REQUIRE(split.size() == 2);
+  CHECK(split[0].words.size() == 123);
+  CHECK(split[1].address == 123);
+}
+
+TEST_CASE("a dry run applies what it is offered and shows it", "[controllers]") {
+  const auto link = make_controller(DryRunControllerConfig{"bench", 2});
+  ControllerState state;
+  link->newest(state);
+  CHECK_FALSE(state.online);
+  CHECK(state.link_epoch == 0);
+  link->start();
+  link->newest(state);
+  CHECK(state.online);
+  CHECK(state.link_epoch == 1);
+  CHECK(state.applied_um[0] == 0.0);
+  CHECK(state.applied_um[1] == 0.0);
+  CHECK(std::isnan(state.applied_um[2]));
+
+  OffsetCommand command = of_epoch(1);
+  command.offset_um = {3.0, -4.0, 5.0};
+  command.valid = {true, true, true};
+  link->offer(command);
+  command.offset_um = {1.0, 7.0};
+  command.valid = {true, false};
+  link->newest(state);
+  CHECK(state.applied_um[1] == -4.0);
+  CHECK(std::isnan(state.applied_um[2]));
+  link->offer(command);
+  link->newest(state);
+  CHECK(state.applied_um[0] == 1.0);
+  CHECK(state.applied_um[1] == -4.0);
+  command.link_epoch = 2;
+  command.offset_um[0] = 9.0;
+  link->offer(command);
+  link->newest(state);
+  CHECK(state.applied_um[0] == 1.0);
+  CHECK(link->health().writes == 2);
+  link->stop();
+  link->newest(state);
+  CHECK_FALSE(state.online);
+}
+
+TEST_CASE("the resolution of an offset is its scale, none for a float", "[controllers]") {
+  ModbusControllerConfig modbus;
+  modbus.axes.resize(2);
+  modbus.axes[0].offset.scale = -0.01;
+  modbus.axes[1].offset.encoding = Encoding::float32;
+  CHECK(offset_resolution_um(modbus) == std::vector<double>{0.01, 0.0});
+  CanControllerConfig can;
+  can.axes.resize(1);
+  can.axes[0].offset.scale = 0.1;
+  CHECK(offset_resolution_um(can) == std::vector<double>{0.1});
+  CHECK(offset_resolution_um(DryRunControllerConfig{"bench", 2}) == std::vector<double>{0.0, 0.0});
+}
+
+TEST_CASE("a CAN controller that cannot be is refused", "[controllers][can]") {
+  CanControllerConfig good;
+  good.name = "cnc";
+  good.interface = "can0";
+  good.axes = {{can_signal(0x100, 0, 16), can_signal(0x200, 0, 16)},
+               {can_signal(0x100, 16, 16), can_signal(0x200, 16, 16)}};
+  good.valid_bits = can_signal(0x100, 32, 8);
+  good.heartbeat = can_signal(0x100, 40, 8);
+  CHECK_NOTHROW(CanController(good));
+  CanControllerConfig bad = good;
+  bad.axes[1].offset.start_bit = 15;
+  CHECK_THROWS_AS(CanController(bad), InvalidValue);
+  bad = good;
+  bad.axes[1].applied->id = 0x100;
+  CHECK_THROWS_AS(CanController(bad), InvalidValue);
+  bad = good;
+  bad.axes[1].offset.start_bit = 60;
+  CHECK_THROWS_AS(CanController(bad), InvalidValue);
+  bad = good;
+  bad.valid_bits->length_bits = 1;
+  CHECK_THROWS_AS(CanController(bad), InvalidValue);
+  bad = good;
+  bad.interface = "";
+  CHECK_THROWS_AS(CanController(bad), InvalidValue);
+  bad = good;
+  bad.period_s = -1.0;
+  CHECK_THROWS_AS(CanController(bad), InvalidValue);
+}
+
+TEST_CASE("a CAN controller says at its start that the system has no CAN", "[controllers][can]") {
+  if (can_unavailable().empty()) {
+    WARN("this system has CAN: nothing to see here");
+    return;
+  }
+  CanControllerConfig config;
+  config.name = "cnc";
+  config.interface = "can0";
+  CanController link(config);
+  CHECK_THROWS_AS(link.start(), DriverError);
+  link.stop();
+}
