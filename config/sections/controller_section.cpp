@@ -230,6 +230,10 @@ class ControllerReader {
     read_signals([&](const TomlTable& table, std::size_t index) {
       config.signals.push_back({index, read_can_signal(table, table, CanUse::signal)});
       received(table, "id", config.signals.back().value);
+      const bool is_switch = unit_of(table.text("name", "")).suffix == "_on";
+      if (is_switch && !reach(config.signals.back().value).contains(1.0)) {
+        table.problem("signed", "must be false: one bit with a sign is 0 or -1, not 0 or 1");
+      }
     });
     result_.period_s = config.period_s;
     result_.config = std::move(config);
