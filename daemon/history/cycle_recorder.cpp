@@ -92,7 +92,7 @@ void CycleRecorder::record(std::uint64_t cycle, std::span<const Reading> reading
 }
 
 void CycleRecorder::finish(std::uint64_t last_cycle, const OffsetCommand& command) noexcept {
-  push_offsets(last_cycle, command);
+  if (noted_cycle_ != static_cast<std::int64_t>(last_cycle)) push_offsets(last_cycle, command);
   push_done(last_cycle);
 }
 
@@ -153,6 +153,7 @@ void CycleRecorder::push_values(std::uint64_t cycle, RecordKind kind, std::span<
 }
 
 void CycleRecorder::push_offsets(std::uint64_t cycle, const OffsetCommand& command) noexcept {
+  noted_cycle_ = static_cast<std::int64_t>(cycle);
   for (std::uint32_t axis = 0; axis < axes_; ++axis) {
     Record record;
     record.cycle = cycle;

@@ -39,8 +39,8 @@ struct RecordingSession {
 /// system.
 ///
 /// Order of calls: begin() once before the first cycle (or, after a reload, by the cycle itself
-/// between two steps, after Estimator::adopt()); then for each cycle command()*, step, record();
-/// skipped() for cycles that were left out; finish() once after the last cycle.
+/// between two steps, after Estimator::adopt()); then for each cycle: skipped() if cycles before it
+/// were left out, command()*, step, record(); finish() once after the last cycle.
 class CycleRecorder {
  public:
   /// @param grid            the daemon's grid
@@ -83,6 +83,7 @@ class CycleRecorder {
   std::vector<Reading> readings_;  ///< as last recorded
   ControllerState controller_;     ///< as last recorded
   std::uint64_t next_offsets_{0};
+  std::int64_t noted_cycle_{-1};  ///< whose offsets were noted last
   std::uint64_t next_done_{0};
   std::int64_t last_whole_cycle_{-1};
   bool broken_{true};  ///< nothing is recorded until a snapshot is through

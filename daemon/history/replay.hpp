@@ -71,6 +71,9 @@ struct ExportSummary {
   std::uint64_t rows{0};
   std::vector<std::string> columns;
 };
+/// The column of a run file that holds a sensor's readings: `<sensor>_degC`.
+[[nodiscard]] std::string sensor_column(const std::string& sensor);
+
 /// A run file with a row at every cycle whose offsets were noted and from <= time < to: time_s
 /// (since the first row), `<sensor>_degC` (as the driver gave it; missing where it had a fault),
 /// the model's inputs that no sensor column is called like (mean of the block's good sensors), the

@@ -1,0 +1,217 @@
+#include "daemon/history/replay.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ostream>
+
+#include "daemon/history/segment_walk.hpp"
+#include "estimator/estimator.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr std::uint64_t progress_every = 1u << 16;  ///< steps
+
+/// The axes of an offset group as the daemon noted them.
+struct NotedOffsets {
+  std::array<double, axes_max> offset_um{};
+  std::array<bool, axes_max> valid{};
+  std::uint32_t link_epoch{0};
+  std::size_t axes{0};
+};
+
+class SegmentReplay {
+ public:
+  SegmentReplay(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup,
+                const HistoryClock& clock, const OffsetSink& sink, ReplaySummary& summary)
+      : segment_(segment),
+        estimator_(setup.estimator, setup.model),
+        cursor_(reader.records(segment)),
+        clock_(clock),
+        sink_(sink),
+        summary_(summary) {
+    SegmentStart start = reader.start(segment);
+    estimator_.load_state(start.estimator_state);
+    if (start.readings.size() != estimator_.config().sensors.size()) {
+      throw HistoryError("damaged: the inputs at its start do not fit its configuration");
+    }
+    inputs_.readings = std::move(start.readings);
+    inputs_.controller = start.controller;
+    next();
+  }
+
+  /// @param each  called now and then with the cycles done
+  void run(const std::function<void(std::uint64_t)>& each) {
+    const auto end = static_cast<std::uint64_t>(segment_.last_cycle + 1);
+    std::uint64_t cycle = segment_.first_cycle;
+    while (cycle < end) {
+      const std::uint64_t first_stepped = take_inputs(cycle);
+      if (first_stepped != cycle) {
+        cycle = first_stepped;
+        continue;
+      }
+      estimator_.step(segment_.grid.time_of(cycle), inputs_.readings, inputs_.controller, command_);
+      ++summary_.cycles;
+      if (has_record_ && record_.cycle == cycle) take_offsets(cycle);
+      ++cycle;
+      if (cycle % progress_every == 0) each(cycle - segment_.first_cycle);
+    }
+  }
+
+ private:
+  void next() { has_record_ = cursor_.next(record_); }
+
+  /// Everything that reached the estimator before the step of `cycle`.
+  /// @return `cycle`, or the first cycle after those that were skipped
+  std::uint64_t take_inputs(std::uint64_t cycle) {
+    while (has_record_ && record_.cycle <= cycle && record_.kind != RecordKind::offset) {
+      if (record_.cycle < cycle) throw HistoryError("damaged: records are out of order");
+      if (record_.kind == RecordKind::skipped) {
+        if (record_.time_ns < static_cast<std::int64_t>(cycle)) {
+          throw HistoryError("damaged: skipped cycles end before they begin");
+        }
+        const auto after = static_cast<std::uint64_t>(record_.time_ns) + 1;
+        next();
+        return after;
+      }
+      if (record_.kind == RecordKind::command) {
+        if (record_.detail > static_cast<std::uint8_t>(CommandKind::prove)) {
+          throw HistoryError("damaged: unknown command");
+        }
+        estimator_.apply({static_cast<CommandKind>(record_.detail), record_.index, record_.value});
+      } else {
+        inputs_.apply(record_);
+      }
+      next();
+    }
+    return cycle;
+  }
+
+  void take_offsets(std::uint64_t cycle) {
+    NotedOffsets noted;
+    const std::size_t axes = estimator_.config().axes.size();
+    while (has_record_ && record_.cycle == cycle && record_.kind == RecordKind::offset) {
+      if (record_.index >= axes) throw HistoryError("damaged: an offset of no axis");
+      noted.offset_um[record_.index] = record_.value;
+      noted.valid[record_.index] = record_.detail != 0;
+      noted.link_epoch = static_cast<std::uint32_t>(record_.time_ns);
+      noted.axes = record_.index + std::size_t{1};
+      next();
+    }
+    compare(cycle, noted);
+    if (!sink_) return;
+    sink_({clock_.seconds_at(segment_, cycle), cycle, &estimator_.config(),
+           std::span<const double>(command_.offset_um).first(noted.axes),
+           std::span<const double>(noted.offset_um).first(noted.axes)});
+  }
+
+  void compare(std::uint64_t cycle, const NotedOffsets& noted) {
+    for (std::size_t axis = 0; axis < noted.axes; ++axis) {
+      ++summary_.compared;
+      if (same_bits(command_.offset_um[axis], noted.offset_um[axis]) &&
+          command_.valid[axis] == noted.valid[axis] && command_.link_epoch == noted.link_epoch) {
+        continue;
+      }
+      ++summary_.different;
+      const double difference_um = std::abs(command_.offset_um[axis] - noted.offset_um[axis]);
+      if (!(difference_um <= summary_.largest_difference_um)) {
+        summary_.largest_difference_um = difference_um;
+      }
+      if (!summary_.first_different_cycle) {
+        summary_.first_different_cycle = cycle;
+        summary_.first_different_time_s = clock_.seconds_at(segment_, cycle);
+      }
+    }
+  }
+
+  const SegmentInfo& segment_;
+  Estimator estimator_;
+  RecordCursor cursor_;
+  const HistoryClock& clock_;
+  const OffsetSink& sink_;
+  ReplaySummary& summary_;
+  InputsInForce inputs_;
+  OffsetCommand command_;
+  Record record_;
+  bool has_record_{false};
+};
+
+std::uint64_t cycles_of(const SegmentInfo& segment) {
+  return static_cast<std::uint64_t>(segment.last_cycle + 1) - segment.first_cycle;
+}
+
+ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups,
+                         const OffsetSink& sink, const Progress& progress) {
+  ReplaySummary summary;
+  const HistoryClock clock(reader.segments());
+  std::uint64_t total = 0;
+  for (const SegmentInfo& segment : reader.segments()) total += cycles_of(segment);
+  std::uint64_t done = 0;
+  for (const SegmentInfo& segment : reader.segments()) {
+    if (segment.reason == SegmentReason::gap) ++summary.gaps;
+    try {
+      SegmentReplay replayed(reader, segment, setups.of(segment), clock, sink, summary);
+      replayed.run([&](std::uint64_t cycles) {
+        if (progress) progress(static_cast<double>(done + cycles) / static_cast<double>(total));
+      });
+    } catch (const std::exception& error) {
+      throw HistoryError(reader.file().string() + ": segment " + std::to_string(segment.id) +
+                         " (written by version " + segment.program_version +
+                         ") cannot be replayed: " + error.what());
+    }
+    ++summary.segments;
+    done += cycles_of(segment);
+  }
+  if (progress) progress(1.0);
+  return summary;
+}
+
+}  // namespace
+
+std::string sensor_column(const std::string& sensor) {
+  constexpr std::string_view unit = "_degC";
+  const bool has_unit = sensor.size() > unit.size() && sensor.ends_with(unit);
+  return has_unit ? sensor : sensor + std::string(unit);
+}
+
+ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sink,
+                     const Progress& progress, const SetupParser& parser) {
+  const HistoryReader reader(history);
+  const ParsedSetups setups(reader, parser);
+  return replay_all(reader, setups, sink, progress);
+}
+
+ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& out,
+                            const Progress& progress, const SetupParser& parser) {
+  const HistoryReader reader(history);
+  const ParsedSetups setups(reader, parser);
+  RunColumns columns;
+  columns.column("time_s");
+  for (const auto& [id, setup] : setups.all()) {
+    for (const AxisConfig& axis : setup.estimator.axes) {
+      columns.column(axis.name + "_offset_um");
+      columns.column(axis.name + "_recorded_um");
+    }
+  }
+  std::string text;
+  append_header(text, columns.names());
+  std::vector<double> row(columns.names().size());
+  const OffsetSink sink = [&](const ReplayedOffsets& offsets) {
+    std::fill(row.begin(), row.end(), not_a_number);
+    row[0] = offsets.time_s;
+    for (std::size_t axis = 0; axis < offsets.offset_um.size(); ++axis) {
+      const std::string& name = offsets.config->axes[axis].name;
+      row[columns.column(name + "_offset_um")] = offsets.offset_um[axis];
+      row[columns.column(name + "_recorded_um")] = offsets.recorded_um[axis];
+    }
+    append_row(text, row);
+    out << text;
+    text.clear();
+  };
+  const ReplaySummary summary = replay_all(reader, setups, sink, progress);
+  out << text;
+  return summary;
+}
+
+}  // namespace thermocomp

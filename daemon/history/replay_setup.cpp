@@ -1,0 +1,14 @@
+#include <utility>
+
+#include "config/daemon_config.hpp"
+#include "daemon/history/replay.hpp"
+
+namespace thermocomp {
+
+ReplaySetup parse_setup(const SegmentSetup& setup) {
+  DaemonConfig config = parse_daemon_config(setup.config_text, "configuration of the segment",
+                                            setup.model_text, "model of the segment");
+  return {std::move(config.estimator), std::move(config.model)};
+}
+
+}  // namespace thermocomp
