@@ -40,32 +40,31 @@ struct AxisValue {
   double value_um{0.0};
 };
 
-// What the daemon has to say beside "done" (a reload may name the new model, for instance).
-void print_message(const json& answer, const std::string& otherwise) {
-  const std::string message = text_of(answer, "message");
-  std::cout << (message.empty() ? otherwise : message) << '\n';
-}
-
 int run_plain(const GlobalOptions& global, const PlainCommand& command) {
-  print_message(ask_daemon(global.socket, command.method, json::object()), command.done);
+  const json answer = ask_daemon(global.socket, command.method, json::object());
+  const std::string checksum = text_of(answer, "checksum");
+  std::cout << command.done;
+  if (!checksum.empty()) std::cout << ", model SHA-256 " << checksum.substr(0, 16);
+  std::cout << '\n';
   return exit_success;
 }
 
 int run_measured(const GlobalOptions& global, const AxisValue& given) {
   const json answer =
       ask_daemon(global.socket, "measured", {{"axis", given.axis}, {"value_um", given.value_um}});
-  print_message(answer, "measured displacement of " + given.axis +
-                            " noted: " + fixed_signed(given.value_um, 2) + " um");
+  std::cout << "axis " << given.axis << ": measured " << fixed_signed(given.value_um, 2)
+            << " um, the model says " << fixed_signed(number_of(answer, "predicted_um"), 2)
+            << " um\n";
   return exit_success;
 }
 
 int run_prove(const GlobalOptions& global, const AxisValue& given) {
-  const json answer =
-      ask_daemon(global.socket, "prove", {{"axis", given.axis}, {"value_um", given.value_um}});
-  print_message(answer, "axis " + given.axis + ": the offset moves by " +
-                            fixed_signed(given.value_um, 2) +
-                            " um, holds, and comes back; an indicator at the tool must move by " +
-                            fixed_signed(given.value_um, 2) + " um in the axis' direction");
+  ask_daemon(global.socket, "prove", {{"axis", given.axis}, {"value_um", given.value_um}});
+  const std::string amount = fixed_signed(given.value_um, 2);
+  std::cout << "axis " << given.axis << ": moves by " << amount
+            << " um, stands for a few seconds and comes back;\nan indicator at the tool must show "
+            << amount
+            << " um in the axis' positive direction, else change the sign in its [[axis]] table\n";
   return exit_success;
 }
 
