@@ -130,6 +130,10 @@ struct Plant::Parts {
   /// From the grid point `dt_s` on, into `nodes` and `lagged`.
   void look_ahead(double dt_s, std::vector<double>& nodes, std::vector<double>& lagged) const {
     nodes = grid_degC;
+    if (dt_s == 0.0) {
+      lagged = grid_lagged_degC;
+      return;
+    }
     (coolant_flows ? flooded : dry).advance(dt_s, inflow_W, nodes);
     for (std::size_t i = 0; i < lagged.size(); ++i) {
       const double lag_s = config.thermocouples[i].lag_s;

@@ -1,0 +1,210 @@
+// The machine file is read strictly, and the files that ship are right.
+#include "simulator/machine_file.hpp"
+
+#include <cmath>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "config/model_file.hpp"
+#include "simulator/plant.hpp"
+#include "simulator/simulate.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+const std::string folder = THERMOCOMP_CONFIG_FOLDER;
+
+const std::string small = R"(format = 1
+[plant]
+[[signal]]
+name = "spindle_rpm"
+kind = "steps"
+times_s = [0]
+values = [1000]
+[[output]]
+name = "z_um"
+[[node]]
+name = "spindle"
+capacity_J_per_K = 1000
+displacement_um_per_K = { z_um = 2.0 }
+[[thermocouple]]
+name = "spindle"
+node = "spindle"
+[[bus]]
+name = "cabinet"
+kind = "modbus_tcp"
+[[device]]
+name = "module"
+bus = "cabinet"
+unit = 1
+[[channel]]
+name = "spindle"
+device = "module"
+address = 0
+[controller]
+name = "cnc"
+kind = "modbus_tcp"
+[[axis]]
+name = "z"
+output = "z_um"
+offset = { address = 0, encoding = "int32", scale = 0.01 }
+[[event]]
+kind = "drop"
+target = "module"
+at_s = 1
+duration_s = 1
+)";
+
+std::string replaced(const std::string& from, const std::string& to) {
+  std::string text = small;
+  const auto at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+struct Broken {
+  std::string from, to, key, rule;
+};
+
+}  // namespace
+
+TEST_CASE("the small machine is read as it stands") {
+  const MachineConfig machine = parse_machine(small, "small");
+  CHECK(machine.plant->nodes[0].displacement_um_per_K.at("z_um") == 2.0);
+  CHECK(machine.devices[0].channels[0].column == "spindle_degC");
+  CHECK(machine.controller->axes[0].offset.scale == 0.01);
+  CHECK(machine.events[0].target == TargetKind::device);
+}
+
+TEST_CASE("a broken machine file is refused with line, key and rule") {
+  const auto broken = GENERATE(values<Broken>({
+      {"format = 1", "format = 2", "format", ""},
+      {"[plant]", "[plant]\nstep_min = 1", "step_min", ""},
+      {"values = [1000]", "values = [1000, 2]", "values", "as many numbers"},
+      {"times_s = [0]", "times_s = [1]", "times_s", "begin with 0"},
+      {"name = \"z_um\"", "name = \"z\"", "name", "_um"},
+      {"capacity_J_per_K = 1000", "capacity_J_per_K = 0", "capacity_J_per_K", "must be"},
+      {"capacity_J_per_K = 1000", "capacity_J_per_K = \"big\"", "capacity_J_per_K", ""},
+      {"{ z_um = 2.0 }", "{ y_um = 2.0 }", "y_um", "output"},
+      {"node = \"spindle\"", "node = \"spindel\"", "node", "did you mean \"spindle\""},
+      {"unit = 1", "unit = 256", "unit", ""},
+      {"unit = 1\n", "", "unit", ""},
+      {"bus = \"cabinet\"", "bus = \"cupboard\"", "bus", "must name a bus"},
+      {"device = \"module\"", "device = \"modul\"", "device", "did you mean"},
+      {"address = 0\n", "address = 65536\n", "address", ""},
+      {"name = \"spindle\"\ndevice", "name = \"column\"\ndevice", "name", "column of the plant"},
+      {"output = \"z_um\"", "output = \"y_um\"", "output", "column of the plant"},
+      {"scale = 0.01", "scale = 0", "scale", "must not be 0"},
+      {"kind = \"drop\"", "kind = \"spike\"\nchange_K = 1", "kind", "cannot happen"},
+      {"kind = \"drop\"", "kind = \"explode\"", "kind", ""},
+      {"target = \"module\"", "target = \"nobody\"", "target", "must name"},
+      {"duration_s = 1\n", "", "duration_s", ""},
+      {"[controller]\nname = \"cnc\"", "[controller]\nname = \"cabinet\"", "name", "twice"},
+      {"[[event]]",
+       "[[channel]]\nname = \"b\"\ncolumn = \"spindle_degC\"\ndevice = \"module\"\n"
+       "address = 0\n[[event]]",
+       "address", "shares a register"},
+  }));
+  const std::string text = replaced(broken.from, broken.to);
+  INFO(broken.from << " -> " << broken.to);
+  try {
+    (void)parse_machine(text, "small");
+    FAIL("was accepted");
+  } catch (const ConfigurationError& error) {
+    bool found = false;
+    for (const Problem& problem : error.problems()) {
+      INFO(to_string(problem));
+      CHECK(problem.line > 0);
+      found = found || (problem.key.ends_with(broken.key) &&
+                        problem.rule.find(broken.rule) != std::string::npos);
+    }
+    INFO(error.what());
+    CHECK(found);
+  }
+}
+
+TEST_CASE("a machine without a plant may show columns that only a run file has") {
+  const MachineConfig machine = parse_machine(R"(format = 1
+[[bus]]
+name = "cabinet"
+kind = "modbus_tcp"
+[[device]]
+name = "module"
+bus = "cabinet"
+unit = 1
+[[channel]]
+name = "t1"
+device = "module"
+address = 0
+)",
+                                              "replay only");
+  CHECK_FALSE(machine.plant);
+  CHECK(machine.devices[0].channels[0].column == "t1_degC");
+}
+
+TEST_CASE("the commented example is right and every event kind is in it") {
+  const MachineConfig machine = load_machine(folder + "/examples/machine.toml");
+  for (int kind = 0; kind <= static_cast<int>(EventKind::rehome); ++kind) {
+    bool there = false;
+    for (const EventConfig& event : machine.events) {
+      there = there || event.kind == static_cast<EventKind>(kind);
+    }
+    CHECK(there);
+  }
+}
+
+TEST_CASE("the demonstration's model is the block matrix of its machine") {
+  const MachineConfig machine = load_machine(folder + "/demo/machine.toml");
+  const ThermalModel model = load_model(folder + "/demo/model.toml");
+  std::vector<std::string> blocks;
+  for (const std::string& input : model.inputs) {
+    blocks.push_back(input.substr(0, input.size() - std::string("_degC").size()));
+  }
+  const auto matrix = block_matrix(*machine.plant, blocks);
+  REQUIRE(matrix.size() == model.matrix_um_per_K.size());
+  for (std::size_t row = 0; row < matrix.size(); ++row) {
+    CHECK(machine.plant->outputs[row].name == model.outputs[row]);
+    for (std::size_t block = 0; block < blocks.size(); ++block) {
+      CHECK(matrix[row][block] == Approx(model.matrix_um_per_K[row][block]).margin(1e-9));
+    }
+  }
+}
+
+TEST_CASE("block temperatures of the demonstration explain all but 12 % of its displacement") {
+  const MachineConfig machine = load_machine(folder + "/demo/machine.toml");
+  const ThermalModel model = load_model(folder + "/demo/model.toml");
+  const auto seed = GENERATE(20u, 1u, 2u);
+  const RunFile run = simulate(machine, machine.duration_s, seed);
+  const std::vector<std::vector<std::string>> sensors{{"bed_front_degC", "bed_rear_degC"},
+                                                      {"table_degC"},
+                                                      {"room_degC"},
+                                                      {"column_left_degC"},
+                                                      {"column_right_degC"},
+                                                      {"spindle_front_degC", "spindle_rear_degC"}};
+  const auto block_degC = [&](std::size_t block, std::size_t row) {
+    double sum = 0.0;
+    for (const std::string& column : sensors[block]) sum += run.column(column)[row];
+    return sum / static_cast<double>(sensors[block].size());
+  };
+  double before = 0.0;
+  double after = 0.0;
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    for (std::size_t output = 0; output < model.outputs.size(); ++output) {
+      const auto& measured = run.column(model.outputs[output]);
+      const double displacement = measured[row] - measured[0];
+      double predicted = 0.0;
+      for (std::size_t block = 0; block < sensors.size(); ++block) {
+        predicted +=
+            model.matrix_um_per_K[output][block] * (block_degC(block, row) - block_degC(block, 0));
+      }
+      before += displacement * displacement;
+      after += (displacement - predicted) * (displacement - predicted);
+    }
+  }
+  const auto rows = static_cast<double>(run.rows());
+  CHECK(std::sqrt(before / rows) > 20.0);
+  CHECK(std::sqrt(before / rows) < 60.0);
+  CHECK(std::sqrt(after / before) < 0.12);
+}

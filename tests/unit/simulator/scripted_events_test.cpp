@@ -1,0 +1,152 @@
+// The script of what goes wrong, and what the simulated controller does with offsets.
+#include "simulator/scripted_events.hpp"
+
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "simulator/simulated_cnc.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+MachineConfig one_device() {
+  MachineConfig machine;
+  machine.buses.resize(1);
+  machine.devices.resize(1);
+  machine.devices[0].channels.resize(2);
+  machine.controller.emplace();
+  return machine;
+}
+
+EventConfig event(EventKind kind, TargetKind target, double at_s, double duration_s) {
+  EventConfig made;
+  made.kind = kind;
+  made.target = target;
+  made.at_s = at_s;
+  made.duration_s = duration_s;
+  made.channel = target == TargetKind::channel ? 1 : 0;
+  return made;
+}
+
+SimulatedController two_axes() {
+  SimulatedController controller;
+  controller.axes.resize(2);
+  controller.axes[1].offset_um_max = 10.0;
+  controller.heartbeat = ModbusValue{};
+  controller.heartbeat_timeout_s = 1.0;
+  return controller;
+}
+
+}  // namespace
+
+TEST_CASE("an event is in force from its time until its duration is over, and only on its target") {
+  MachineConfig machine = one_device();
+  machine.events = {event(EventKind::open_circuit, TargetKind::channel, 100.0, 50.0)};
+  CHECK_FALSE(effects_at(machine, 99.9).channels[0][1].open_circuit);
+  CHECK(effects_at(machine, 100.0).channels[0][1].open_circuit);
+  CHECK_FALSE(effects_at(machine, 100.0).channels[0][0].open_circuit);
+  CHECK(effects_at(machine, 149.9).channels[0][1].open_circuit);
+  CHECK_FALSE(effects_at(machine, 150.0).channels[0][1].open_circuit);
+}
+
+TEST_CASE("each kind of event does what its name says") {
+  MachineConfig machine = one_device();
+  EventConfig made = event(GENERATE(EventKind::freeze, EventKind::drop, EventKind::delay,
+                                    EventKind::garbage, EventKind::exception, EventKind::reboot),
+                           TargetKind::device, 10.0, 10.0);
+  made.delay_ms = 300.0;
+  made.code = 6;
+  machine.events = {made};
+  const UnitEffect effect = effects_at(machine, 15.0).devices[0];
+  CHECK(effect.frozen == (made.kind == EventKind::freeze));
+  CHECK(effect.silent == (made.kind == EventKind::drop));
+  CHECK(effect.garbage == (made.kind == EventKind::garbage));
+  CHECK(effect.down == (made.kind == EventKind::reboot));
+  CHECK(effect.delay_ms == (made.kind == EventKind::delay ? 300.0 : 0.0));
+  CHECK(effect.exception.has_value() == (made.kind == EventKind::exception));
+}
+
+TEST_CASE("spikes and drifts add up and end") {
+  MachineConfig machine = one_device();
+  EventConfig spike = event(EventKind::spike, TargetKind::channel, 1000.0, 10.0);
+  spike.change_K = 8.0;
+  EventConfig drift = event(EventKind::drift, TargetKind::channel, 0.0, 3600.0);
+  drift.rate_K_per_h = 3.6;
+  machine.events = {spike, drift};
+  CHECK(effects_at(machine, 500.0).channels[0][1].added_K == Approx(0.5));
+  CHECK(effects_at(machine, 1005.0).channels[0][1].added_K == Approx(8.0 + 1.005));
+  CHECK(effects_at(machine, 3600.0).channels[0][1].added_K == 0.0);
+}
+
+TEST_CASE("a controller applies offsets only once and while the heartbeat beats") {
+  SimulatedCnc cnc(two_axes());
+  cnc.take(0.0, {{5.0, 5.0}, 3, 1.0});
+  cnc.step(0.1, {});
+  CHECK(cnc.applied_um(0) == 0.0);  // one value of the heartbeat is no beat
+  cnc.take(0.2, {{5.0, 5.0}, 3, 2.0});
+  cnc.step(0.3, {});
+  CHECK(cnc.applied_um(0) == 5.0);
+  cnc.take(1.5, {{7.0, 7.0}, 3, 2.0});  // it stands still
+  cnc.step(1.6, {});
+  CHECK(cnc.applied_um(0) == 5.0);
+  CHECK_FALSE(cnc.alive());
+  cnc.take(1.7, {{7.0, 7.0}, 3, 3.0});
+  cnc.step(1.8, {});
+  CHECK(cnc.applied_um(0) == 7.0);
+}
+
+TEST_CASE("a controller leaves axes alone that are not valid, out of bound or not a number") {
+  SimulatedController config = two_axes();
+  config.heartbeat.reset();
+  SimulatedCnc cnc(config);
+  cnc.take(0.0, {{5.0, 5.0}, 3, 0.0});
+  cnc.step(0.1, {});
+  cnc.take(0.2, {{6.0, 6.0}, 2, 0.0});
+  cnc.step(0.3, {});
+  CHECK(cnc.applied_um(0) == 5.0);
+  CHECK(cnc.applied_um(1) == 6.0);
+  cnc.take(0.4, {{NAN, 10.5}, 3, 0.0});
+  cnc.step(0.5, {});
+  CHECK(cnc.applied_um(0) == 5.0);
+  CHECK(cnc.applied_um(1) == 6.0);
+}
+
+TEST_CASE("a controller approaches the offset with its time constant and rate") {
+  SimulatedController config = two_axes();
+  config.heartbeat.reset();
+  config.tau_s = 1.0;
+  SimulatedCnc slow(config);
+  slow.step(0.0, {});
+  slow.take(0.0, {{10.0, 0.0}, 3, 0.0});
+  for (int i = 1; i <= 100; ++i) slow.step(0.01 * i, {});
+  CHECK(slow.applied_um(0) == Approx(10.0 * (1.0 - std::exp(-1.0))));
+  config.tau_s = 0.0;
+  config.axes[0].rate_um_per_s_max = 2.0;
+  SimulatedCnc limited(config);
+  limited.step(0.0, {});
+  limited.take(0.0, {{10.0, 0.0}, 3, 0.0});
+  limited.step(1.0, {});
+  CHECK(limited.applied_um(0) == Approx(2.0));
+}
+
+TEST_CASE("a controller rejects, misapplies and forgets as the script says") {
+  SimulatedController config = two_axes();
+  config.heartbeat.reset();
+  SimulatedCnc cnc(config);
+  cnc.take(0.0, {{5.0, 5.0}, 3, 0.0});
+  cnc.step(0.1, {});
+  cnc.step(0.2, {true, 0.0, 0});
+  cnc.take(0.3, {{6.0, 6.0}, 3, 0.0});
+  cnc.step(0.4, {true, 0.0, 0});
+  CHECK(cnc.applied_um(0) == 5.0);
+  CHECK_FALSE(cnc.step(0.5, {false, 3.0, 0}));
+  CHECK(cnc.applied_um(0) == 8.0);
+  CHECK(cnc.step(0.6, {false, 0.0, 1}));  // homed
+  CHECK(cnc.applied_um(0) == 0.0);
+  CHECK_FALSE(cnc.step(0.7, {false, 0.0, 1}));
+  cnc.take(0.8, {{6.0, 6.0}, 3, 0.0});
+  cnc.step(0.9, {false, 0.0, 1});
+  CHECK(cnc.applied_um(0) == 6.0);
+}
