@@ -1,0 +1,158 @@
+#include "daemon/cycle/cycle.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <time.h>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+namespace {
+
+nanoseconds now_on_clock() noexcept {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return std::chrono::seconds(time.tv_sec) + nanoseconds(time.tv_nsec);
+}
+
+void sleep_until(nanoseconds wake) noexcept {
+  timespec time{};
+  time.tv_sec = std::chrono::duration_cast<std::chrono::seconds>(wake).count();
+  time.tv_nsec = (wake % std::chrono::seconds(1)).count();
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
+  }
+}
+
+}  // namespace
+
+bool CommandQueue::try_push(const Command& command) noexcept {
+  const std::uint64_t head = head_.load(std::memory_order_relaxed);
+  if (head - tail_.load(std::memory_order_acquire) == capacity) return false;
+  commands_[head % capacity] = command;
+  head_.store(head + 1, std::memory_order_release);
+  return true;
+}
+
+bool CommandQueue::try_pop(Command& command) noexcept {
+  const std::uint64_t tail = tail_.load(std::memory_order_relaxed);
+  if (tail == head_.load(std::memory_order_acquire)) return false;
+  command = commands_[tail % capacity];
+  tail_.store(tail + 1, std::memory_order_release);
+  return true;
+}
+
+Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
+             std::size_t sensors, std::unique_ptr<CycleBrain> brain)
+    : grid_(grid),
+      sources_(std::move(sources)),
+      link_(link),
+      brain_(std::move(brain)),
+      observed_(brain_.get()),
+      readings_(sensors) {
+  constexpr nanoseconds report_period = std::chrono::milliseconds(100);
+  report_every_ =
+      static_cast<std::uint64_t>(std::max<std::int64_t>(1, report_period / grid.period));
+}
+
+void Cycle::run() noexcept {
+  std::uint64_t cycle = newest_due(now_on_clock());
+  if (brain_->recorder) brain_->recorder->begin(cycle, brain_->estimator, SegmentReason::start);
+  while (!stop_.load(std::memory_order_relaxed)) {
+    const nanoseconds wake = grid_.time_of(cycle);
+    sleep_until(wake);
+    const nanoseconds start = now_on_clock();
+    step(cycle);
+    const nanoseconds end = now_on_clock();
+    timing_.lateness.record(start - wake);
+    timing_.work.record(end - start);
+    timing_.cycles.store(timing_.cycles.load(std::memory_order_relaxed) + 1,
+                         std::memory_order_release);
+    cycle = next_after(cycle, end);
+  }
+}
+
+void Cycle::step(std::uint64_t cycle) noexcept {
+  cycle_ = cycle;
+  take_over(cycle);
+  CycleBrain& brain = *brain_;
+  bool commanded = false;
+  for (Command command; commands_.try_pop(command); commanded = true) {
+    brain.estimator.apply(command);
+    if (brain.recorder) brain.recorder->command(cycle, command);
+  }
+  for (SensorSource* source : sources_) source->newest(readings_);
+  link_.newest(controller_);
+  // The grid's time, not the clock's: the same steps can be taken again from the history.
+  brain.estimator.step(grid_.time_of(cycle), readings_, controller_, offsets_);
+  link_.offer(offsets_);
+  if (brain.recorder)
+    brain.recorder->record(cycle, readings_, controller_, offsets_, brain.estimator);
+  publish(commanded);
+  // Given back only now, when the new one has something to report.
+  if (retiring_ != nullptr)
+    retired_.store(std::exchange(retiring_, nullptr), std::memory_order_release);
+}
+
+std::uint64_t Cycle::newest_due(nanoseconds now) const noexcept {
+  return now < grid_.start ? 0 : static_cast<std::uint64_t>((now - grid_.start) / grid_.period);
+}
+
+std::uint64_t Cycle::next_after(std::uint64_t cycle, nanoseconds now) noexcept {
+  // A cycle that is late by less than a period still runs, whole periods are left out and counted,
+  // and the phase stays.
+  const std::uint64_t due = newest_due(now);
+  if (due <= cycle + 1) return cycle + 1;
+  timing_.missed.store(timing_.missed.load(std::memory_order_relaxed) + due - cycle - 1,
+                       std::memory_order_relaxed);
+  if (brain_->recorder) brain_->recorder->skipped(cycle + 1, due - 1);
+  return due;
+}
+
+void Cycle::take_over(std::uint64_t cycle) noexcept {
+  CycleBrain* next = incoming_.exchange(nullptr, std::memory_order_acquire);
+  if (next == nullptr) return;
+  retiring_ = brain_.release();
+  next->estimator.adopt(retiring_->estimator);
+  if (next->recorder)
+    next->recorder->begin(cycle, next->estimator, SegmentReason::reload, retiring_->recorder.get());
+  brain_.reset(next);
+  next_report_ = cycle;
+}
+
+void Cycle::publish(bool at_once) noexcept {
+  if (!at_once && cycle_ < next_report_) return;
+  next_report_ = cycle_ + report_every_;
+  brain_->estimator.report(brain_->reports.back());
+  brain_->reports.publish();
+  controller_slot_.back() = controller_;
+  controller_slot_.publish();
+}
+
+void Cycle::hand_over(std::unique_ptr<CycleBrain> next) noexcept {
+  THERMOCOMP_ENSURE(incoming_.load() == nullptr && retired_.load() == nullptr);
+  handed_over_ = next.release();
+  incoming_.store(handed_over_, std::memory_order_release);
+}
+
+std::unique_ptr<CycleBrain> Cycle::take_retired() noexcept {
+  std::unique_ptr<CycleBrain> retired(retired_.exchange(nullptr, std::memory_order_acquire));
+  if (retired) observed_ = handed_over_;
+  return retired;
+}
+
+const Report& Cycle::report() noexcept {
+  observed_->reports.fresh();
+  return observed_->reports.front();
+}
+
+const ControllerState& Cycle::controller() noexcept {
+  controller_slot_.fresh();
+  return controller_slot_.front();
+}
+
+void Cycle::clear_timing() noexcept {
+  timing_.lateness.clear();
+  timing_.work.clear();
+}
+
+}  // namespace thermocomp

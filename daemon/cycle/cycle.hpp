@@ -1,0 +1,113 @@
+/// The fixed-rate cycle: newest readings -> estimator -> offsets, on an absolute grid of time.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "daemon/cycle/duration_histogram.hpp"
+#include "daemon/history/cycle_recorder.hpp"
+#include "daemon/history/record.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "drivers/wait_free_slot.hpp"
+#include "estimator/estimator.hpp"
+
+namespace thermocomp {
+
+/// What a configuration gives the cycle and a reload replaces as a whole.
+struct CycleBrain {
+  explicit CycleBrain(Estimator made)
+      : estimator(std::move(made)), reports(estimator.make_report()) {}
+  Estimator estimator;
+  std::unique_ptr<CycleRecorder> recorder;  ///< none: no history
+  WaitFreeSlot<Report> reports;             ///< cycle -> main
+};
+
+/// Commands of the operator on their way to the cycle. One producer, one consumer, wait-free.
+class CommandQueue {
+ public:
+  [[nodiscard]] bool try_push(const Command& command) noexcept;
+  [[nodiscard]] bool try_pop(Command& command) noexcept;
+
+ private:
+  static constexpr std::size_t capacity = 64;
+  std::array<Command, capacity> commands_{};
+  std::atomic<std::uint64_t> head_{0};
+  std::atomic<std::uint64_t> tail_{0};
+};
+
+/// Counters of the cycle; written by it, read by anyone.
+struct CycleTiming {
+  DurationHistogram lateness;  ///< woken up after the grid's time
+  DurationHistogram work;      ///< from waking up to being done
+  std::atomic<std::uint64_t> cycles{0};
+  std::atomic<std::uint64_t> missed{0};
+};
+
+/// On the thread that calls run(): no allocation, no lock, no log call, no exception and no system
+/// call but the sleep and the clock.
+class Cycle {
+ public:
+  /// @param sources, link  outlive the cycle
+  /// @param sensors        number of configured sensors
+  Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
+        std::size_t sensors, std::unique_ptr<CycleBrain> brain);
+
+  /// Until stop(); the first cycle is the grid's newest.
+  void run() noexcept;
+  void stop() noexcept { stop_.store(true, std::memory_order_relaxed); }
+
+  /// Main's side. @return false when 64 commands wait already
+  [[nodiscard]] bool send(const Command& command) noexcept { return commands_.try_push(command); }
+  /// Main's side: the cycle goes over to `next` at its next step. The brain it had until then can
+  /// be had by take_retired(). @pre the last one handed over has been taken back
+  void hand_over(std::unique_ptr<CycleBrain> next) noexcept;
+  [[nodiscard]] std::unique_ptr<CycleBrain> take_retired() noexcept;
+  /// Main's side: the newest report of the brain in use, as of take_retired().
+  [[nodiscard]] const Report& report() noexcept;
+  /// Main's side: newest controller state seen by the cycle.
+  [[nodiscard]] const ControllerState& controller() noexcept;
+
+  [[nodiscard]] const CycleTiming& timing() const noexcept { return timing_; }
+  /// Lateness and work so far are forgotten: starting up is not running.
+  void clear_timing() noexcept;
+  /// After run() has returned: the last offsets and the cycle they are from.
+  [[nodiscard]] const OffsetCommand& last_offsets() const noexcept { return offsets_; }
+  [[nodiscard]] std::uint64_t last_cycle() const noexcept { return cycle_; }
+  /// Main's side: the brain in use, as of take_retired().
+  [[nodiscard]] CycleBrain& brain() noexcept { return *observed_; }
+
+ private:
+  void step(std::uint64_t cycle) noexcept;
+  void take_over(std::uint64_t cycle) noexcept;
+  void publish(bool at_once) noexcept;
+  [[nodiscard]] std::uint64_t newest_due(nanoseconds now) const noexcept;
+  [[nodiscard]] std::uint64_t next_after(std::uint64_t cycle, nanoseconds now) noexcept;
+
+  Grid grid_;
+  std::vector<SensorSource*> sources_;
+  ControllerLink& link_;
+  std::unique_ptr<CycleBrain> brain_;  ///< the cycle's
+  CycleBrain* retiring_{nullptr};      ///< the cycle's: to be given back after this step
+  CycleBrain* observed_;               ///< main's: whose reports it reads
+  CycleBrain* handed_over_{nullptr};   ///< main's: whose they will be
+  CommandQueue commands_;
+  std::atomic<CycleBrain*> incoming_{nullptr};
+  std::atomic<CycleBrain*> retired_{nullptr};
+  std::atomic<bool> stop_{false};
+  CycleTiming timing_;
+  WaitFreeSlot<ControllerState> controller_slot_;
+
+  std::vector<Reading> readings_;
+  ControllerState controller_;
+  OffsetCommand offsets_;
+  std::uint64_t cycle_{0};
+  std::uint64_t report_every_;
+  std::uint64_t next_report_{0};
+};
+
+}  // namespace thermocomp
