@@ -1,0 +1,228 @@
+// Two comparisons, each within one run.
+//
+// rate_over_libmodbus: readings a second of ModbusSource polling as fast as it can (32 float32
+//   channels, 64 registers of one unit, one request) over those of a bare loop
+//   `modbus_read_input_registers(64)` of libmodbus, decoding the floats, from the same server
+//   process over TCP on this machine. Alternating rounds, median of the rounds' ratios. A reading
+//   of ours counts when a good answer has been decoded and published.
+//
+// living_rate_half_dead: 8 units on one serial line (a pseudo terminal; the server takes the
+//   frames' time at 19200 baud plus 3 ms before each answer), of which 4 never answer: readings
+//   a second of the 4 living, polled as fast as the line allows, over the rate of the same
+//   4 units alone on that line. Time-out 200 ms and back-off up to 30 s, the defaults. Measured
+//   over 60 s from 40 s after the start (two full back-off cycles); what the first 10 s cost is
+//   printed beside it.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <numeric>
+#include <signal.h>
+#include <string>
+#include <thread>
+#include <unistd.h>
+#include <vector>
+
+#include <modbus/modbus.h>
+#include <sys/wait.h>
+
+#include "drivers/monotonic_clock.hpp"
+#include "drivers/sensors/modbus_source.hpp"
+#include "modbus_bench_server.hpp"
+
+namespace {
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+constexpr int channels = 32;
+constexpr int registers = 2 * channels;
+
+/// A server in a process of its own, ended with this object.
+class ServerProcess {
+ public:
+  template <class Body>
+  explicit ServerProcess(Body body) : process_(::fork()) {
+    if (process_ == 0) {
+      body();
+      ::_exit(0);
+    }
+  }
+  ServerProcess(const ServerProcess&) = delete;
+  ServerProcess& operator=(const ServerProcess&) = delete;
+  ~ServerProcess() {
+    ::kill(process_, SIGKILL);
+    ::waitpid(process_, nullptr, 0);
+  }
+
+ private:
+  pid_t process_;
+};
+
+double seconds_of(nanoseconds time) {
+  return static_cast<double>(time.count()) * 1e-9;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+/// High word first. (libmodbus 3.1's own float functions mean another byte order on this machine.)
+float float_at(const std::vector<std::uint16_t>& words, std::size_t at) {
+  const std::uint32_t bits = (std::uint32_t{words[at]} << 16) | words[at + 1];
+  float value = 0.0F;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+/// Readings a second of the bare loop.
+double bare_rate(int port, nanoseconds duration) {
+  modbus_t* context = modbus_new_tcp("127.0.0.1", port);
+  modbus_set_slave(context, 1);
+  if (context == nullptr || modbus_connect(context) != 0) {
+    std::fprintf(stderr, "libmodbus: %s\n", modbus_strerror(errno));
+    std::exit(1);
+  }
+  std::vector<std::uint16_t> words(registers);
+  std::vector<float> temps(channels);
+  std::uint64_t readings = 0;
+  const nanoseconds began = monotonic_now();
+  while (monotonic_now() - began < duration) {
+    if (modbus_read_input_registers(context, 0, registers, words.data()) != registers) {
+      std::fprintf(stderr, "libmodbus: %s\n", modbus_strerror(errno));
+      std::exit(1);
+    }
+    for (std::size_t i = 0; i < temps.size(); ++i) temps[i] = float_at(words, 2 * i);
+    readings += channels;
+  }
+  const double rate = static_cast<double>(readings) / seconds_of(monotonic_now() - began);
+  if (!(temps[0] == 20.0F)) std::fprintf(stderr, "libmodbus: unexpected value\n");
+  modbus_close(context);
+  modbus_free(context);
+  return rate;
+}
+
+ModbusDeviceConfig unit_with(int unit, int count, std::size_t first_sensor) {
+  ModbusDeviceConfig device;
+  device.name = "unit_" + std::to_string(unit);
+  device.unit = unit;
+  device.period_s = 1e-6;  // as fast as it can
+  for (int i = 0; i < count; ++i) {
+    ModbusChannel channel;
+    channel.sensor = first_sensor + static_cast<std::size_t>(i);
+    channel.address = static_cast<std::uint16_t>(2 * i);
+    channel.encoding = Encoding::float32;
+    device.channels.push_back(channel);
+  }
+  return device;
+}
+
+/// Good answers of the units up to `living`.
+std::uint64_t answers_of(const ModbusSource& source, std::size_t living) {
+  const BusHealth health = source.health();
+  return std::accumulate(
+      health.units.begin(), health.units.begin() + static_cast<long>(living), std::uint64_t{0},
+      [](std::uint64_t sum, const UnitHealth& unit) { return sum + unit.answers; });
+}
+
+/// Answers a second over `duration`.
+double answer_rate(const ModbusSource& source, std::size_t living, nanoseconds duration) {
+  const std::uint64_t before = answers_of(source, living);
+  const nanoseconds began = monotonic_now();
+  std::this_thread::sleep_for(duration);
+  const auto answers = static_cast<double>(answers_of(source, living) - before);
+  return answers / seconds_of(monotonic_now() - began);
+}
+
+double our_rate(int port, nanoseconds duration) {
+  ModbusBusConfig bus;
+  bus.name = "bench";
+  bus.line.link = ModbusTcp{"127.0.0.1", port};
+  bus.devices = {unit_with(1, channels, 0)};
+  ModbusSource source(bus);
+  source.start();
+  while (answers_of(source, 1) == 0) std::this_thread::sleep_for(1ms);
+  const double rate = channels * answer_rate(source, 1, duration);
+  std::vector<Reading> all(channels);
+  source.newest(all);
+  const bool good = std::all_of(all.begin(), all.end(), [](const Reading& reading) {
+    return reading.fault == Fault::none && reading.temp_degC == 20.0;
+  });
+  source.stop();
+  if (!good) {
+    std::fprintf(stderr, "modbus_poll: a reading was not good\n");
+    std::exit(1);
+  }
+  return rate;
+}
+
+double rate_over_libmodbus() {
+  const bench::TcpListener listener;
+  const ServerProcess server([&listener] { bench::serve_tcp(listener); });
+  constexpr int rounds = 31;
+  std::vector<double> ratios;
+  std::vector<double> bare_rates;
+  bare_rate(listener.port(), 500ms);  // warm
+  for (int round = 0; round < rounds; ++round) {
+    double ours = 0.0;
+    double bare = 0.0;
+    if (round % 2 == 0) bare = bare_rate(listener.port(), 500ms);
+    ours = our_rate(listener.port(), 500ms);
+    if (round % 2 != 0) bare = bare_rate(listener.port(), 500ms);
+    ratios.push_back(ours / bare);
+    bare_rates.push_back(bare);
+    std::fprintf(stderr, "round %d: ours %.0f, libmodbus %.0f readings/s, ratio %.3f\n", round + 1,
+                 ours, bare, ours / bare);
+  }
+  std::fprintf(stderr, "ratio from %.3f to %.3f; libmodbus median %.0f readings/s\n",
+               *std::min_element(ratios.begin(), ratios.end()),
+               *std::max_element(ratios.begin(), ratios.end()), median(bare_rates));
+  return median(ratios);
+}
+
+ModbusBusConfig serial_bus(const std::string& device, int units) {
+  ModbusBusConfig bus;
+  bus.name = "bench";
+  bus.line.link = ModbusRtu{device, 19200, 'N', 8, 1, false};
+  for (int unit = 1; unit <= units; ++unit) {
+    bus.devices.push_back(unit_with(unit, 4, 4 * static_cast<std::size_t>(unit - 1)));
+  }
+  return bus;
+}
+
+double living_rate_half_dead() {
+  constexpr std::size_t living = 4;
+  const bench::PseudoTerminal line;
+  const ServerProcess server([&line] { bench::serve_rtu(line, living); });
+  double alone = 0.0;
+  {
+    ModbusSource source(serial_bus(line.device(), 4));
+    source.start();
+    std::this_thread::sleep_for(1s);
+    alone = answer_rate(source, living, 20s);
+    source.stop();
+  }
+  std::fprintf(stderr, "4 living units alone: %.2f answers/s\n", alone);
+  ModbusSource source(serial_bus(line.device(), 8));
+  source.start();
+  const double first = answer_rate(source, living, 10s);
+  std::fprintf(stderr, "with 4 dead, first 10 s: %.2f answers/s, ratio %.3f\n", first,
+               first / alone);
+  std::this_thread::sleep_for(30s);
+  const double steady = answer_rate(source, living, 60s);
+  source.stop();
+  std::fprintf(stderr, "with 4 dead, steady: %.2f answers/s\n", steady);
+  return steady / alone;
+}
+
+}  // namespace
+
+int main() {
+  const double over_libmodbus = rate_over_libmodbus();
+  const double half_dead = living_rate_half_dead();
+  std::printf("rate_over_libmodbus %.3f ratio\n", over_libmodbus);
+  std::printf("living_rate_half_dead %.3f ratio\n", half_dead);
+  return 0;
+}

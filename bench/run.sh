@@ -1,0 +1,34 @@
+#!/bin/sh
+# The benchmarks. Without an argument: their names, one a line. With one: runs it; the last lines
+# of its output are "NAME VALUE UNIT". Exit status 0 when it could measure, 2 for an unknown name.
+# Everything else (building, progress, what is compared with what) goes to stderr.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+source_dir=$(dirname "$here")
+
+list() {
+  for script in "$here"/*.sh; do
+    name=$(basename "$script" .sh)
+    [ "$name" = run ] || echo "$name"
+  done
+}
+
+if [ $# -eq 0 ]; then
+  list
+  exit 0
+fi
+if [ $# -ne 1 ] || ! list | grep -qxF -- "$1"; then
+  echo "bench/run.sh: no benchmark of that name; there are:" $(list) >&2
+  exit 2
+fi
+
+# A benchmark finds the programs here; THERMOCOMP_BENCH_BUILD names another, already built folder.
+if [ -z "${THERMOCOMP_BENCH_BUILD:-}" ]; then
+  THERMOCOMP_BENCH_BUILD=$source_dir/build/release
+  if [ ! -f "$THERMOCOMP_BENCH_BUILD/build.ninja" ]; then
+    (cd "$source_dir" && cmake --preset release) >&2
+  fi
+  (cd "$source_dir" && cmake --build --preset release) >&2
+fi
+export THERMOCOMP_BENCH_BUILD
+exec "$here/$1.sh"
