@@ -43,9 +43,22 @@ struct Arguments {
   SessionOptions session;
 };
 
+/// CLI::Range lets "nan" pass.
+CLI::Validator number_between(double low, double high) {
+  return CLI::Validator(
+      [low, high](std::string& text) {
+        double value = 0.0;
+        const bool number = CLI::detail::lexical_cast(text, value);
+        if (number && value >= low && value <= high) return std::string();
+        return text + " must be a number from " + CLI::detail::to_string(low) + " to " +
+               CLI::detail::to_string(high);
+      },
+      "NUMBER");
+}
+
 void declare(CLI::App& app, Arguments& arguments) {
-  const auto positive = CLI::Range(1e-9, 1e9);
-  const auto not_negative = CLI::Range(0.0, 1e9);
+  const auto positive = number_between(1e-9, 1e9);
+  const auto not_negative = number_between(0.0, 1e9);
   SessionOptions& session = arguments.session;
   app.add_option("machine", arguments.machine, "Machine file (TOML)")->required();
   app.add_option("--seed", arguments.seed, "Seed instead of the file's");
@@ -73,12 +86,14 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->check(positive);
   app.add_option("--ports-file", session.ports_file, "The ready line goes there too");
   app.add_option("--port", arguments.ports, "NAME=PORT of a bus or the controller")
-      ->type_name("NAME=PORT");
+      ->type_name("NAME=PORT")
+      ->allow_extra_args(false);
   app.add_option("--path", arguments.paths, "NAME=PATH of a serial line's link")
-      ->type_name("NAME=PATH");
+      ->type_name("NAME=PATH")
+      ->allow_extra_args(false);
   app.add_option("--tick-ms", arguments.tick_ms,
                  "Registers are brought up to date so often, real time")
-      ->check(CLI::Range(0.1, 10000.0));
+      ->check(number_between(0.1, 10000.0));
   app.footer(footer);
 }
 
