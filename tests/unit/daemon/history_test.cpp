@@ -1,0 +1,297 @@
+#include <fstream>
+#include <signal.h>
+#include <sstream>
+#include <thread>
+
+#include <catch2/catch.hpp>
+#include <sqlite3.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+#include "config/run_file.hpp"
+#include "daemon/history/history_reader.hpp"
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+
+namespace {
+
+template <class Condition>
+bool eventually(Condition condition) {
+  for (int i = 0; i < 400; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return false;
+}
+
+ReplaySummary replay_quietly(const std::filesystem::path& file) {
+  return replay(file, {}, {}, parse_test_setup);
+}
+
+void run_sql(const std::filesystem::path& file, const char* sql) {
+  sqlite3* handle = nullptr;
+  REQUIRE(sqlite3_open(file.c_str(), &handle) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(handle, sql, nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(handle);
+}
+
+bool has_moved_aside(const std::filesystem::path& folder) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().string().find(".damaged-") != std::string::npos) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("replay gives the daemon's offsets bit for bit", "[history][replay]") {
+  const unsigned seed = GENERATE(range(0u, 30u));
+  const TempFolder folder;
+  HistoryConfig config = history_config(folder / "h.db");
+  config.segment_h = seed % 2 == 0 ? 10.0 / 3600.0 : 6.0;
+  RecordedMachine machine(config, seed);
+  machine.start();
+  machine.run(1500);
+  std::this_thread::sleep_for(std::chrono::milliseconds(seed % 5 == 0 ? 200 : 1));
+  machine.run(1500);
+  machine.reload(2.0 + seed);
+  machine.run(2000);
+  machine.stop();
+  const ReplaySummary summary = replay_quietly(config.file);
+  CHECK(summary.compared > 900);
+  CHECK(summary.different == 0);
+  CHECK(summary.largest_difference_um == 0.0);
+  CHECK(summary.gaps == 0);
+  CHECK(summary.segments >= 2);
+}
+
+TEST_CASE("replay notices a history that was changed", "[history][replay]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 3);
+  machine.start();
+  machine.run(3000);
+  machine.stop();
+  run_sql(config.file, "UPDATE setup SET config_text = '2.000001'");
+  const ReplaySummary summary = replay_quietly(config.file);
+  CHECK(summary.different > 0);
+  CHECK(summary.largest_difference_um > 0.0);
+  CHECK(summary.first_different_cycle.has_value());
+}
+
+TEST_CASE("a ring that overflows leaves a gap and a replay that still agrees", "[history]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 4, 256);
+  machine.start();
+  for (int i = 0; i < 4; ++i) {
+    machine.run(5000);  // far faster than the writer drains
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  }
+  machine.run(10);
+  machine.stop();
+  CHECK(machine.writer().statistics().lost > 0);
+  const ReplaySummary summary = replay_quietly(config.file);
+  CHECK(summary.gaps > 0);
+  CHECK(summary.compared > 0);
+  CHECK(summary.different == 0);
+}
+
+TEST_CASE("what was committed before kill -9 is read and replayed whole", "[history][crash]") {
+  const unsigned seed = GENERATE(range(0u, 8u));
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    RecordedMachine machine(config, seed);
+    machine.start();
+    for (;;) {
+      machine.run(100);
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(400 + 37 * seed));
+  const bool was_started = eventually([&] { return std::filesystem::exists(config.file); });
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  REQUIRE(was_started);
+  const ReplaySummary before = replay_quietly(config.file);
+  CHECK(before.different == 0);
+
+  RecordedMachine machine(config, seed + 100);
+  machine.start();
+  machine.run(500);
+  machine.stop();
+  const ReplaySummary after = replay_quietly(config.file);
+  CHECK(after.segments == before.segments + 1);
+  CHECK(after.compared > before.compared);
+  CHECK(after.different == 0);
+}
+
+TEST_CASE("the file keeps to its size by losing the oldest segments", "[history]") {
+  const TempFolder folder;
+  HistoryConfig config = history_config(folder / "h.db");
+  config.size_MB_max = 0.5;
+  RecordedMachine machine(config, 5);
+  machine.start();
+  std::uint64_t largest = 0;
+  for (int i = 0; i < 30; ++i) {
+    machine.run(10000);
+    const std::uint64_t commits = machine.writer().statistics().commits;
+    REQUIRE(eventually([&] { return machine.writer().statistics().commits > commits; }));
+    largest = std::max(largest, machine.writer().statistics().bytes);
+  }
+  machine.stop();
+  CHECK(largest > 200000);
+  CHECK(largest <= 600000);  // the bound and one commit of this fast machine
+  CHECK(std::filesystem::file_size(config.file) <= 600000);
+  const HistoryReader reader(config.file);
+  CHECK(reader.segments().front().id > 1);
+  CHECK(replay_quietly(config.file).different == 0);
+}
+
+TEST_CASE("a file that is no database is moved aside and a new one begun", "[history]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  std::ofstream(config.file) << std::string(20000, 'x');
+  RecordedMachine machine(config, 6);
+  machine.start();
+  machine.run(300);
+  machine.stop();
+  CHECK(has_moved_aside(folder.path()));
+  CHECK(replay_quietly(config.file).different == 0);
+}
+
+TEST_CASE("a file that is damaged while running is moved aside", "[history]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  {
+    RecordedMachine machine(config, 7);
+    machine.start();
+    machine.run(20000);
+    machine.stop();
+  }
+  std::fstream file(config.file, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(4096);
+  file << std::string(40000, '\xA5');
+  file.close();
+  RecordedMachine machine(config, 8);
+  machine.start();
+  machine.run(300);
+  REQUIRE(eventually([&] { return machine.writer().statistics().working; }));
+  machine.run(300);
+  REQUIRE(eventually([&] {
+    machine.run(20);
+    return machine.writer().statistics().records > 0;
+  }));
+  machine.stop();
+  CHECK(has_moved_aside(folder.path()));
+  CHECK(replay_quietly(config.file).different == 0);
+}
+
+TEST_CASE("a newer version and another program's database are refused", "[history]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  SECTION("newer") {
+    {
+      RecordedMachine machine(config, 9);
+      machine.start();
+      machine.stop();
+    }
+    run_sql(config.file, "PRAGMA user_version = 99");
+    CHECK_THROWS_WITH(HistoryReader(config.file), Catch::Contains("version 99"));
+    CHECK_THROWS_WITH(HistoryWriter(config, Grid{}, "test").start(), Catch::Contains("version 99"));
+  }
+  SECTION("foreign") {
+    run_sql(config.file, "CREATE TABLE mine (x)");
+    CHECK_THROWS_WITH(HistoryWriter(config, Grid{}, "test").start(),
+                      Catch::Contains("another program"));
+    CHECK_THROWS_AS(HistoryReader(config.file), HistoryError);
+  }
+  SECTION("missing") {
+    CHECK_THROWS_WITH(HistoryReader(config.file), Catch::Contains("no such file"));
+  }
+}
+
+TEST_CASE("a full disk is counted, and after it the history goes on", "[history]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 10);
+  machine.start();
+  machine.run(1000);
+  REQUIRE(eventually([&] { return machine.writer().statistics().records > 0; }));
+  // Writes beyond the limit fail with EFBIG, which SQLite reports as it does a full disk.
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  signal(SIGXFSZ, SIG_IGN);
+  rlimit tight = before;
+  tight.rlim_cur = 4096;
+  REQUIRE(setrlimit(RLIMIT_FSIZE, &tight) == 0);
+  machine.run(2000);
+  const bool has_failed = eventually([&] { return machine.writer().statistics().errors > 0; });
+  setrlimit(RLIMIT_FSIZE, &before);
+  REQUIRE(has_failed);
+  CHECK_FALSE(machine.writer().statistics().last_error.empty());
+  CHECK(eventually([&] { return machine.writer().statistics().working; }));
+  machine.run(500);
+  machine.stop();
+  const ReplaySummary summary = replay_quietly(config.file);
+  CHECK(summary.different == 0);
+  CHECK(summary.cycles > 3000);
+}
+
+TEST_CASE("a history is read while it is written", "[history]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 11);
+  machine.start();
+  machine.run(2000);
+  REQUIRE(eventually([&] { return machine.writer().statistics().records > 0; }));
+  CHECK(replay_quietly(config.file).different == 0);
+  CHECK(replay_quietly(config.file).compared > 0);
+  machine.stop();
+}
+
+TEST_CASE("an export is a run file with what the estimator was given", "[history][export]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 12);
+  machine.start();
+  machine.run(3000);
+  machine.reload(5.0);
+  machine.run(1000);
+  machine.stop();
+  std::ostringstream out;
+  const ExportSummary summary = export_run(config.file, HistoryTime{5.0, {}}, HistoryTime{20.0, {}},
+                                           out, {}, parse_test_setup);
+  const RunFile run = parse_run(out.str(), "export");
+  CHECK(run.rows() == summary.rows);
+  CHECK(run.time_s().front() == 0.0);
+  CHECK(run.time_s().back() < 15.0);
+  CHECK(run.time_s().back() > 14.0);
+  for (const char* name :
+       {"bed_degC", "bed_in_degC", "spindle_rpm", "y_offset_um", "z_applied_um", "z_measured_um"}) {
+    CHECK(run.find(name).has_value());
+  }
+  const double temp_degC = run.column("bed_degC").back();
+  CHECK((std::isnan(temp_degC) || (temp_degC > 19.0 && temp_degC < 25.0)));
+
+  std::ostringstream replayed;
+  replay_to_csv(config.file, replayed, {}, parse_test_setup);
+  const RunFile offsets = parse_run(replayed.str(), "replay");
+  CHECK(offsets.column("z_offset_um") == offsets.column("z_recorded_um"));
+}
+
+TEST_CASE("times are seconds or wall times, and anything else is refused", "[history][export]") {
+  CHECK(*parse_history_time("12.5").seconds == 12.5);
+  CHECK(*parse_history_time("1970-01-02T00:00:00Z").wall_ns == 86'400'000'000'000);
+  CHECK(*parse_history_time("1970-01-02T01:00+01:00").wall_ns == 86'400'000'000'000);
+  CHECK(parse_history_time("2026-03-01").wall_ns.has_value());
+  for (const char* text : {"", "yesterday", "nan", "2026-13-01", "2026-02-31", "2026-03-01T25:00",
+                           "2026-03-01T08:30:00+1", "12 s"}) {
+    CHECK_THROWS_AS(parse_history_time(text), std::invalid_argument);
+  }
+}
