@@ -8,6 +8,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "cycle_stub.hpp"
 #include "estimator/checks.hpp"
 #include "modbus_machine.hpp"
 

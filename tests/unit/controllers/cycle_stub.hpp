@@ -1,0 +1,73 @@
+// What stands for the daemon's cycle in the tests of the links.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <thread>
+
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/monotonic_clock.hpp"
+
+namespace thermocomp::test {
+
+/// A cycle at 100 Hz: takes the state, marks the wanted offsets with its epoch, offers them.
+template <class Link>
+class Cycle {
+ public:
+  explicit Cycle(Link& link) : link_(link), thread_([this] { run(); }) {}
+  Cycle(const Cycle&) = delete;
+  Cycle& operator=(const Cycle&) = delete;
+  ~Cycle() {
+    stopping_ = true;
+    thread_.join();
+  }
+
+  void want(std::size_t axis, double offset_um, bool valid = true) {
+    const std::scoped_lock lock(mutex_);
+    wanted_.offset_um[axis] = offset_um;
+    wanted_.valid[axis] = valid;
+  }
+  [[nodiscard]] ControllerState state() const {
+    const std::scoped_lock lock(mutex_);
+    return state_;
+  }
+  /// Stops offering (a hung cycle), while the state is still taken.
+  std::atomic<bool> hung{false};
+  /// Commands keep this epoch instead of the newest; 0: the newest.
+  std::atomic<std::uint32_t> fixed_epoch{0};
+
+ private:
+  void run() {
+    while (!stopping_) {
+      {
+        const std::scoped_lock lock(mutex_);
+        link_.newest(state_);
+        wanted_.link_epoch = fixed_epoch != 0 ? fixed_epoch.load() : state_.link_epoch;
+        if (!hung) link_.offer(wanted_);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds{10});
+    }
+  }
+
+  Link& link_;
+  mutable std::mutex mutex_;
+  OffsetCommand wanted_{};
+  ControllerState state_;
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+/// Waits until `holds` for at most 20 s.
+template <class Condition>
+bool eventually(Condition&& holds) {
+  const auto until = monotonic_now() + std::chrono::seconds{20};
+  while (!holds()) {
+    if (monotonic_now() > until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  }
+  return true;
+}
+
+}  // namespace thermocomp::test

@@ -1,0 +1,258 @@
+// Thermocouples read from real CAN interfaces.
+#include "drivers/sensors/can_source.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "../unit/controllers/cycle_stub.hpp"
+#include "can_bus.hpp"
+#include "drivers/can/can_socket.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+using test::eventually;
+using test::RawSender;
+using test::shell;
+
+namespace {
+
+CanSignal temperature(std::uint32_t id, int start, ByteOrder order = ByteOrder::little_endian) {
+  CanSignal signal;
+  signal.id = id;
+  signal.start_bit = start;
+  signal.length_bits = 16;
+  signal.byte_order = order;
+  signal.scale = 0.1;
+  signal.sentinels = {{32767, Fault::open_circuit}};
+  return signal;
+}
+
+/// Node A: sensors 0 and 1 in 0x181 (Intel); node B: sensor 3 in 0x18FF1234 (29 bits, Motorola).
+CanBusConfig two_nodes(const std::string& interface) {
+  CanBusConfig bus;
+  bus.name = "spindle_bus";
+  bus.interface = interface;
+  bus.reconnect_s = 0.05;
+  bus.devices.resize(2);
+  bus.devices[0].name = "a";
+  bus.devices[0].channels = {{0, temperature(0x181, 0)}, {1, temperature(0x181, 16)}};
+  bus.devices[1].name = "b";
+  bus.devices[1].channels = {{3, temperature(0x18FF1234, 7, ByteOrder::big_endian)}};
+  bus.devices[1].channels[0].signal.extended_id = true;
+  return bus;
+}
+
+struct Running {
+  explicit Running(const CanBusConfig& config) : source(config), readings(4) {
+    source.start();
+    if (!eventually([&] { return source.health().connected; })) throw std::runtime_error("down");
+  }
+  const Reading& newest(std::size_t sensor) {
+    source.newest(readings);
+    return readings[sensor];
+  }
+  bool becomes(std::size_t sensor, double temp_degC) {
+    return eventually([&] { return newest(sensor).temp_degC == Approx(temp_degC); });
+  }
+  CanSource source;
+  std::vector<Reading> readings;
+};
+
+}  // namespace
+
+TEST_CASE("thermocouples are read from frames of cansend and of a raw socket", "[vm][source]") {
+  Running bus(two_nodes("vcan0"));
+  CHECK(bus.newest(0).fault == Fault::never_read);
+  REQUIRE(shell("cansend vcan0 181#E100C9FF"));  // 22.5 and -5.5 degC
+  REQUIRE(bus.becomes(0, 22.5));
+  CHECK(bus.newest(1).temp_degC == Approx(-5.5));
+  CHECK(bus.newest(0).fault == Fault::none);
+  CHECK(bus.newest(3).fault == Fault::never_read);
+  RawSender sender("vcan0");
+  REQUIRE(sender.send(0x18FF1234 | CAN_EFF_FLAG, {0x01, 0x2C}));
+  REQUIRE(bus.becomes(3, 30.0));
+  REQUIRE(sender.send(0x181, {0xFF, 0x7F, 0xE2, 0x00}));
+  REQUIRE(bus.becomes(1, 22.6));
+  CHECK(bus.newest(0).fault == Fault::open_circuit);
+  CHECK(std::isnan(bus.newest(0).temp_degC));
+  CHECK(bus.newest(2).fault == Fault::never_read);  // another bus' sensor is left alone
+  const BusHealth health = bus.source.health();
+  CHECK(health.kind == "can");
+  CHECK(health.units[0].answering);
+  CHECK(health.units[0].answers == 2);
+  CHECK(health.units[1].answers == 1);
+}
+
+TEST_CASE("thermocouples are read from frames of python-can", "[vm][source]") {
+  Running bus(two_nodes("vcan0"));
+  REQUIRE(
+      shell("/usr/bin/python3 -c \"\n"
+            "import can\n"
+            "bus = can.Bus('vcan0', bustype='socketcan')\n"
+            "bus.send(can.Message(arbitration_id=0x18FF1234, is_extended_id=True,\n"
+            "                     data=[0x01, 0x90]))\n"
+            "bus.shutdown()\n\""));
+  CHECK(bus.becomes(3, 40.0));
+}
+
+TEST_CASE("a reading carries the time of its frame and keeps it until the next", "[vm][source]") {
+  Running bus(two_nodes("vcan0"));
+  RawSender sender("vcan0");
+  const nanoseconds before = monotonic_now();
+  REQUIRE(sender.send(0x181, {10, 0, 20, 0}));
+  const nanoseconds after = monotonic_now();
+  REQUIRE(bus.becomes(0, 1.0));
+  const nanoseconds taken_at = bus.newest(0).taken_at;
+  // The stamp is made while send() runs; the two clocks are read one after the other.
+  CHECK(taken_at >= before - 500ms);
+  CHECK(taken_at <= after + 500ms);
+  REQUIRE(sender.send(0x18FF1234 | CAN_EFF_FLAG, {0, 50}));
+  REQUIRE(bus.becomes(3, 5.0));
+  CHECK(bus.newest(0).taken_at == taken_at);
+  CHECK(bus.newest(3).taken_at > taken_at);
+}
+
+TEST_CASE("frames that waited in the queue carry the time of their arrival", "[vm][source]") {
+  CanSocket socket("vcan0", {{0x300, false}});
+  REQUIRE(socket.open());
+  RawSender sender("vcan0");
+  REQUIRE(sender.send(0x300, {1}));
+  const nanoseconds sent_at = monotonic_now();
+  std::this_thread::sleep_for(900ms);
+  const auto frames = socket.receive();
+  REQUIRE(frames.size() == 1);
+  CHECK(frames[0].received_at <= sent_at + 500ms);
+}
+
+TEST_CASE("the kernel drops frames nobody asked for", "[vm][source]") {
+  CanSocket socket("vcan0", {{0x123, false}, {0x1ABCDEF, true}});
+  REQUIRE(socket.open());
+  RawSender sender("vcan0");
+  for (int i = 0; i < 100; ++i) REQUIRE(sender.send(0x124, {i}));
+  REQUIRE(sender.send(0x123 | CAN_EFF_FLAG, {1}));  // the same number, 29 bits
+  REQUIRE(sender.send(0x123 | CAN_RTR_FLAG, {}));   // a request, no data
+  REQUIRE(sender.send(0x1ABCDEF | CAN_EFF_FLAG, {2}));
+  REQUIRE(sender.send(0x123, {3}));
+  const auto frames = socket.receive();  // the socket itself does not look at identifiers
+  REQUIRE(frames.size() == 2);
+  CHECK(frames[0].id == CanId{0x1ABCDEF, true});
+  CHECK(frames[1].id == CanId{0x123, false});
+}
+
+TEST_CASE("a burst is received in batches without loss", "[vm][source]") {
+  CanSocket socket("vcan0", {{0x300, false}});
+  REQUIRE(socket.open());
+  RawSender sender("vcan0");
+  for (int i = 0; i < 150; ++i) REQUIRE(sender.send(0x300, {i}));
+  int next = 0;
+  for (auto frames = socket.receive(); !frames.empty(); frames = socket.receive()) {
+    CHECK(frames.size() <= CanSocket::batch_max);
+    for (const CanFrame& frame : frames) CHECK(frame.data[0] == next++);
+  }
+  CHECK(next == 150);
+  CHECK(socket.errors().dropped == 0);
+}
+
+TEST_CASE("frames lost because nobody read them are counted", "[vm][source]") {
+  CanSocket socket("vcan0", {{0x300, false}});
+  REQUIRE(socket.open());
+  RawSender sender("vcan0");
+  for (int i = 0; i < 2000; ++i) REQUIRE(sender.send(0x300, {i % 256}));
+  std::uint64_t received = 0;
+  for (auto frames = socket.receive(); !frames.empty(); frames = socket.receive()) {
+    received += frames.size();
+  }
+  REQUIRE(received < 2000);
+  REQUIRE(sender.send(0x300, {1}));  // the kernel tells with the next frame
+  CHECK(socket.receive().size() == 1);
+  CHECK(received + socket.errors().dropped == 2000);
+}
+
+TEST_CASE("a bus-off is counted, told and over with the next frame", "[vm][source]") {
+  Running bus(two_nodes("vcan0"));
+  REQUIRE(shell("cansend vcan0 181#0A001400"));
+  REQUIRE(bus.becomes(0, 1.0));
+  REQUIRE(shell("cansend vcan0 20000040#0000000000000000"));
+  REQUIRE(eventually([&] { return bus.source.health().bus_offs == 1; }));
+  CHECK(bus.source.health().error_frames == 1);
+  CHECK_FALSE(bus.source.health().connected);
+  CHECK(bus.source.health().last_error == "vcan0: bus-off");
+  CHECK(eventually([&] { return bus.newest(0).fault == Fault::no_answer; }));
+  REQUIRE(shell("cansend vcan0 181#0B001400"));
+  REQUIRE(bus.becomes(0, 1.1));
+  CHECK(eventually([&] { return bus.source.health().connected; }));
+  CHECK(bus.source.health().last_error.empty());
+}
+
+TEST_CASE("error passive and a restart are told", "[vm][source]") {
+  CanSocket socket("vcan0", {});
+  REQUIRE(socket.open());
+  REQUIRE(shell("cansend vcan0 20000004#0020000000000000"));  // TX_PASSIVE
+  REQUIRE(eventually([&] {
+    CHECK(socket.receive().empty());
+    return socket.errors().error_passive == 1;
+  }));
+  CHECK(socket.error() == "vcan0: error passive");
+  REQUIRE(shell("cansend vcan0 20000040#0000000000000000"));
+  REQUIRE(eventually([&] {
+    CHECK(socket.receive().empty());
+    return socket.bus_off();
+  }));
+  REQUIRE(shell("cansend vcan0 20000100#0000000000000000"));  // restarted
+  REQUIRE(eventually([&] {
+    CHECK(socket.receive().empty());
+    return socket.errors().restarted == 1;
+  }));
+  CHECK_FALSE(socket.bus_off());
+  CHECK(socket.error().empty());
+}
+
+TEST_CASE("a short frame is a fault of its readings", "[vm][source]") {
+  Running bus(two_nodes("vcan0"));
+  REQUIRE(shell("cansend vcan0 181#0A0014"));  // three bytes: sensor 0 is whole, sensor 1 is not
+  REQUIRE(bus.becomes(0, 1.0));
+  CHECK(bus.newest(1).fault == Fault::bad_frame);
+}
+
+TEST_CASE("an interface that goes down and up again is read again", "[vm][source]") {
+  REQUIRE(shell("ip link add dev vcan7 type vcan && ip link set vcan7 up"));
+  {
+    Running bus(two_nodes("vcan7"));
+    REQUIRE(shell("cansend vcan7 181#0A001400"));
+    REQUIRE(bus.becomes(0, 1.0));
+    REQUIRE(shell("ip link set vcan7 down"));
+    REQUIRE(eventually([&] { return bus.newest(0).fault == Fault::no_answer; }));
+    CHECK(eventually([&] { return !bus.source.health().connected; }));
+    CHECK(bus.source.health().last_error.find("vcan7") == 0);
+    REQUIRE(shell("ip link set vcan7 up"));
+    REQUIRE(eventually([&] { return bus.source.health().connected; }));
+    CHECK(bus.newest(0).fault == Fault::no_answer);
+    REQUIRE(shell("cansend vcan7 181#0B001400"));
+    REQUIRE(bus.becomes(0, 1.1));
+    CHECK(bus.source.health().connects == 2);
+  }
+  REQUIRE(shell("ip link del vcan7"));
+}
+
+TEST_CASE("an interface that is pulled out and put back is read again", "[vm][source]") {
+  CanSource source(two_nodes("vcan8"));
+  std::vector<Reading> readings(4);
+  source.start();  // before the interface exists
+  REQUIRE(eventually([&] { return !source.health().last_error.empty(); }));
+  for (int round = 1; round <= 2; ++round) {
+    REQUIRE(shell("ip link add dev vcan8 type vcan && ip link set vcan8 up"));
+    REQUIRE(eventually([&] { return source.health().connected; }));
+    REQUIRE(shell("cansend vcan8 181#0A00" + std::to_string(round) + "000"));
+    REQUIRE(eventually([&] {
+      source.newest(readings);
+      return readings[1].temp_degC == Approx(1.6 * round);
+    }));
+    REQUIRE(shell("ip link del vcan8"));
+    REQUIRE(eventually([&] { return !source.health().connected; }));
+  }
+}
