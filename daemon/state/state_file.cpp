@@ -32,7 +32,9 @@ json numbers(const std::map<std::string, double>& values) {
 
 std::map<std::string, double> numbers(const json& file, const char* key) {
   std::map<std::string, double> values;
-  for (const auto& [name, value] : file.at(key).items()) {
+  const json& object = file.at(key);
+  if (!object.is_object()) throw std::runtime_error(std::string(key) + " is no table");
+  for (const auto& [name, value] : object.items()) {
     if (!value.is_number())
       throw std::runtime_error(std::string(key) + "." + name + " is no number");
     const auto number = value.get<double>();

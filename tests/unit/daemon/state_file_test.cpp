@@ -1,0 +1,77 @@
+#include "daemon/state/state_file.hpp"
+
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+
+namespace {
+
+PersistentState sample_state() {
+  PersistentState state;
+  state.enabled = false;
+  state.reference_degC = {{"bed_degC", 20.1}, {"spindle_degC", 0.1 + 0.2}};
+  state.reference_signals = {{"spindle_rpm", 1.0 / 3.0}};
+  state.offset_um = {{"z", -12.345678901234567}};
+  return state;
+}
+
+}  // namespace
+
+TEST_CASE("a state comes back bit for bit", "[state]") {
+  const TempFolder folder;
+  const PersistentState state = sample_state();
+  REQUIRE(save_state_file(folder / "state.json", state).empty());
+  const LoadedState loaded = load_state_file(folder / "state.json", {});
+  CHECK(loaded.found);
+  CHECK(loaded.warning.empty());
+  CHECK(loaded.state.enabled == state.enabled);
+  CHECK(loaded.state.reference_degC == state.reference_degC);
+  CHECK(loaded.state.reference_signals == state.reference_signals);
+  CHECK(loaded.state.offset_um == state.offset_um);
+}
+
+TEST_CASE("no state file is the first start and no warning", "[state]") {
+  const TempFolder folder;
+  const LoadedState loaded = load_state_file(folder / "state.json", sample_state());
+  CHECK_FALSE(loaded.found);
+  CHECK(loaded.warning.empty());
+  CHECK_FALSE(loaded.state.enabled);
+}
+
+TEST_CASE("an unusable state file is moved aside and said", "[state]") {
+  const std::string text = GENERATE(as<std::string>{}, "", "{", "[]", "null", "{\"enabled\": true}",
+                                    R"({"program":"other","format":1})",
+                                    R"({"program":"thermocomp","format":2,"enabled":true,
+                                        "reference_degC":{},"reference_signals":{},"offset_um":{}})",
+                                    R"({"program":"thermocomp","format":1,"enabled":1,
+                                        "reference_degC":{},"reference_signals":{},"offset_um":{}})",
+                                    R"({"program":"thermocomp","format":1,"enabled":true,
+                                        "reference_degC":{"a":"hot"},"reference_signals":{},
+                                        "offset_um":{}})",
+                                    R"({"program":"thermocomp","format":1,"enabled":true,
+                                        "reference_degC":3,"reference_signals":{},"offset_um":{}})");
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "state.json";
+  std::ofstream(file) << text;
+  const LoadedState loaded = load_state_file(file, sample_state());
+  CHECK_FALSE(loaded.found);
+  CHECK(loaded.warning.find("state.json cannot be used") != std::string::npos);
+  CHECK(loaded.state.offset_um == sample_state().offset_um);
+  CHECK_FALSE(std::filesystem::exists(file));
+  CHECK(std::filesystem::exists(file.string() + ".unusable"));
+}
+
+TEST_CASE("a state that cannot be written is an error and leaves the old file", "[state]") {
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "state.json";
+  REQUIRE(save_state_file(file, sample_state()).empty());
+  std::filesystem::create_directory(file.string() + ".new");  // where the new one would be made
+  CHECK_FALSE(save_state_file(file, PersistentState{}).empty());
+  CHECK(load_state_file(file, {}).state.offset_um == sample_state().offset_um);
+  CHECK_FALSE(save_state_file(folder / "missing/state.json", sample_state()).empty());
+}

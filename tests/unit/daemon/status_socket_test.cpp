@@ -1,0 +1,350 @@
+#include <atomic>
+#include <cstring>
+#include <fstream>
+#include <grp.h>
+#include <poll.h>
+#include <random>
+#include <thread>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+
+#include "daemon/socket/peer_access.hpp"
+#include "daemon/socket/status_client.hpp"
+#include "daemon/socket/status_server.hpp"
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+using nlohmann::json;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+namespace {
+
+/// A server with a method of each class, on a thread of its own.
+class RunningServer {
+ public:
+  explicit RunningServer(const std::filesystem::path& path) : config_{path, "", "", ""} {
+    config_.read_group = "thermocomp-no-such-group";
+    config_.operator_group = "thermocomp-no-such-group";
+    config_.bridge_group = "thermocomp-no-such-group";
+    server_ = std::make_unique<StatusServer>(config_);
+    server_->add_method("status", AccessClass::read, [](const json&) {
+      return json{{"mode", "compensating"}, {"value_um", not_a_number}};
+    });
+    server_->add_method("big", AccessClass::read,
+                        [](const json&) { return json(std::string(300000, 'x')); });
+    server_->add_method("enable", AccessClass::operate, [](const json&) { return json(true); });
+    server_->add_method("controller_state", AccessClass::bridge,
+                        [](const json&) { return json(true); });
+    server_->add_method("measured", AccessClass::operate, [](const json& params) {
+      return json(params.at("value_um").get<double>());
+    });
+    server_->add_method("fails", AccessClass::read,
+                        [](const json&) -> json { throw RpcError(rpc::refused, "not now"); });
+    thread_ = std::thread([this] {
+      while (!stopping_) server_->handle(milliseconds(20));
+    });
+  }
+  ~RunningServer() {
+    stopping_ = true;
+    thread_.join();
+  }
+  RunningServer(const RunningServer&) = delete;
+  RunningServer& operator=(const RunningServer&) = delete;
+
+ private:
+  SocketConfig config_;
+  std::unique_ptr<StatusServer> server_;
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+class RawClient {
+ public:
+  explicit RawClient(const std::filesystem::path& path)
+      : fd_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    is_connected_ = connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  }
+  ~RawClient() { close(fd_); }
+  RawClient(const RawClient&) = delete;
+  RawClient& operator=(const RawClient&) = delete;
+
+  [[nodiscard]] bool is_connected() const { return is_connected_; }
+  void send(const std::string& text) const {
+    std::size_t done = 0;
+    while (done < text.size()) {
+      const ssize_t count = ::send(fd_, text.data() + done, text.size() - done, MSG_NOSIGNAL);
+      if (count <= 0) return;
+      done += static_cast<std::size_t>(count);
+    }
+  }
+  void end_sending() const { shutdown(fd_, SHUT_WR); }
+  /// The next line, or "" when the connection ended or nothing came in 10 s.
+  std::string line() {
+    for (;;) {
+      const std::size_t end = input_.find('\n');
+      if (end != std::string::npos) {
+        std::string text = input_.substr(0, end);
+        input_.erase(0, end + 1);
+        return text;
+      }
+      pollfd entry{fd_, POLLIN, 0};
+      if (poll(&entry, 1, 10000) <= 0) return {};
+      char bytes[4096];
+      const ssize_t count = recv(fd_, bytes, sizeof bytes, 0);
+      if (count <= 0) return {};
+      input_.append(bytes, static_cast<std::size_t>(count));
+    }
+  }
+  int error_code() {
+    const json answer = json::parse(line(), nullptr, false);
+    return answer.is_object() && answer.contains("error") ? answer["error"]["code"].get<int>() : 0;
+  }
+
+ private:
+  int fd_;
+  bool is_connected_{false};
+  std::string input_;
+};
+
+constexpr const char* status_request = "{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"status\"}\n";
+
+}  // namespace
+
+TEST_CASE("a call is answered, and NaN is null", "[socket]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  StatusClient client(folder / "s");
+  const json status = client.call("status", json::object());
+  CHECK(status["mode"] == "compensating");
+  CHECK(status["value_um"].is_null());
+  CHECK(client.call("measured", {{"value_um", 2.5}}) == 2.5);
+  CHECK(client.call("big", {}).get<std::string>().size() == 300000);
+  try {
+    client.call("fails", {});
+    FAIL("no error");
+  } catch (const RemoteError& error) {
+    CHECK(error.code() == rpc::refused);
+    CHECK(std::string(error.what()) == "not now");
+  }
+}
+
+TEST_CASE("each kind of bad request has its error, and the next request works", "[socket]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  RawClient client(folder / "s");
+  const std::vector<std::pair<std::string, int>> requests = {
+      {"nonsense", rpc::parse_error},
+      {"\xff\xfe", rpc::parse_error},
+      {std::string(60000, '['), rpc::parse_error},
+      {"[]", rpc::invalid_request},
+      {R"([{"jsonrpc":"2.0","id":1,"method":"status"}])", rpc::invalid_request},
+      {"3", rpc::invalid_request},
+      {R"({"id":1,"method":"status"})", rpc::invalid_request},
+      {R"({"jsonrpc":"2.0","id":1})", rpc::invalid_request},
+      {R"({"jsonrpc":"2.0","id":{},"method":"status"})", rpc::invalid_request},
+      {R"({"jsonrpc":"2.0","id":1,"method":7})", rpc::invalid_request},
+      {R"({"jsonrpc":"2.0","id":1,"method":"nothing"})", rpc::method_not_found},
+      {R"({"jsonrpc":"2.0","id":1,"method":"status","params":[1]})", rpc::invalid_params},
+      {R"({"jsonrpc":"2.0","id":1,"method":"measured"})", rpc::invalid_params},
+      {R"({"jsonrpc":"2.0","id":1,"method":"measured","params":{"value_um":"a"}})",
+       rpc::invalid_params},
+      {R"({"jsonrpc":"2.0","id":1,"method":"subscribe","params":{"period_s":0.01}})",
+       rpc::invalid_params},
+      {R"({"jsonrpc":"2.0","id":1,"method":"subscribe","params":{"methods":["enable"]}})",
+       rpc::invalid_params},
+      {R"({"jsonrpc":"2.0","id":1,"method":"subscribe","params":{"speed":1}})",
+       rpc::invalid_params}};
+  for (const auto& [text, code] : requests) {
+    INFO(text.substr(0, 80));
+    client.send(text + "\n");
+    CHECK(client.error_code() == code);
+  }
+  client.send(status_request);
+  CHECK(client.line().find("compensating") != std::string::npos);
+}
+
+TEST_CASE("a line that is too long ends the connection with an error", "[socket]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  RawClient client(folder / "s");
+  client.send(std::string(70000, 'a'));
+  CHECK(client.error_code() == rpc::invalid_request);
+  CHECK(client.line().empty());
+  StatusClient other(folder / "s");
+  CHECK_NOTHROW(other.call("status", {}));
+}
+
+TEST_CASE("a request in pieces and one without an open input are answered", "[socket]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  RawClient client(folder / "s");
+  for (const char c : std::string(status_request)) client.send(std::string(1, c));
+  CHECK(client.line().find("compensating") != std::string::npos);
+  client.send(status_request);
+  client.end_sending();
+  CHECK(client.line().find("compensating") != std::string::npos);
+  CHECK(client.line().empty());
+}
+
+TEST_CASE("random bytes never stop the server", "[socket][fuzz]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    std::mt19937 random(seed);
+    const RawClient client(folder / "s");
+    std::string text;
+    const std::string pieces = "{}[]\",:0129eE.-\\u\n nulltruefalsejsonrpc2.0methodidparams";
+    for (std::size_t i = 0, count = random() % 5000; i < count; ++i) {
+      text += random() % 3 == 0 ? static_cast<char>(random()) : pieces[random() % pieces.size()];
+      if (random() % 200 == 0) text += status_request;
+    }
+    client.send(text);
+  }
+  StatusClient client(folder / "s");
+  CHECK(client.call("status", {})["mode"] == "compensating");
+}
+
+TEST_CASE("more clients than allowed are told so, and places are given back", "[socket]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  int served = 0;
+  int refused = 0;
+  {
+    std::vector<std::unique_ptr<RawClient>> clients;
+    for (int i = 0; i < 200; ++i) {
+      clients.push_back(std::make_unique<RawClient>(folder / "s"));
+      clients.back()->send(status_request);
+      const std::string line = clients.back()->line();
+      served += line.find("compensating") != std::string::npos ? 1 : 0;
+      refused += line.find("clients already") != std::string::npos ? 1 : 0;
+    }
+  }
+  CHECK(served == static_cast<int>(StatusServer::clients_max));
+  CHECK(refused + served >= 198);  // a refused peer may lose the line when it was still sending
+  bool is_served = false;
+  for (int i = 0; i < 100 && !is_served; ++i) {
+    RawClient client(folder / "s");
+    client.send(status_request);
+    is_served = client.line().find("compensating") != std::string::npos;
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  CHECK(is_served);
+}
+
+TEST_CASE("a client that never reads is cut off and the others are served", "[socket]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  const RawClient slow(folder / "s");
+  std::string flood;
+  for (int i = 0; i < 100; ++i) flood += "{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"big\"}\n";
+  slow.send(flood);
+  StatusClient client(folder / "s");
+  CHECK(client.call("status", {})["mode"] == "compensating");
+}
+
+TEST_CASE("a subscription sends what was asked for until the client leaves", "[socket]") {
+  const TempFolder folder;
+  const RunningServer server(folder / "s");
+  StatusClient client(folder / "s");
+  client.call("subscribe", {{"methods", {"status"}}, {"period_s", 0.1}});
+  for (int i = 0; i < 3; ++i) {
+    const json message = client.next(seconds(10));
+    CHECK(message["method"] == "status");
+    CHECK(message["params"]["mode"] == "compensating");
+  }
+  CHECK(client.call("status", {})["mode"] == "compensating");
+}
+
+TEST_CASE("another user without the groups may do nothing", "[socket][permission]") {
+  if (geteuid() != 0) {
+    WARN("skipped: only root can take another user");
+    return;
+  }
+  const TempFolder folder;
+  std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
+  const RunningServer server(folder / "s");
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    if (setgroups(0, nullptr) != 0 || setgid(65534) != 0 || setuid(65534) != 0) _exit(10);
+    RawClient client(folder / "s");
+    int failures = client.is_connected() ? 0 : 1;
+    for (const char* method : {"status", "enable", "controller_state", "subscribe"}) {
+      client.send(std::string("{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"") + method + "\"}\n");
+      if (client.error_code() != rpc::not_permitted) ++failures;
+    }
+    _exit(failures);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  CHECK(WEXITSTATUS(status) == 0);
+}
+
+TEST_CASE("each group may do what is its own", "[socket][permission]") {
+  // Groups of every Debian system stand for those of the package.
+  const SocketConfig config{"/s", "users", "disk", "dialout"};
+  const auto gid = [](const char* name) { return getgrnam(name)->gr_gid; };
+  const auto access = [&](uid_t user, std::vector<gid_t> groups) {
+    return access_of({user, 65534, std::move(groups)}, 990, config);
+  };
+  const PeerAccess reader = access(1000, {gid("users")});
+  CHECK((reader.read && !reader.operate && !reader.bridge));
+  const PeerAccess op = access(1000, {gid("disk")});
+  CHECK((op.read && op.operate && !op.bridge));
+  const PeerAccess bridge = access(1000, {gid("dialout")});
+  CHECK((bridge.read && !bridge.operate && bridge.bridge));
+  const PeerAccess nobody = access(1000, {});
+  CHECK((!nobody.read && !nobody.operate && !nobody.bridge));
+  const PeerAccess own = access(990, {});
+  CHECK((own.read && !own.operate && !own.bridge));
+  const PeerAccess root = access(0, {});
+  CHECK((root.read && root.operate && root.bridge));
+  const PeerAccess developer =
+      access_of({1000, 1000, {}}, 1000, {"/s", "no-such-1", "no-such-2", "no-such-3"});
+  CHECK((developer.read && developer.operate && developer.bridge));
+}
+
+TEST_CASE("a socket path is taken over only from the dead", "[socket]") {
+  const TempFolder folder;
+  const std::filesystem::path path = folder / "s";
+  SECTION("a second daemon is refused") {
+    const RunningServer server(path);
+    CHECK_THROWS_WITH(StatusServer(SocketConfig{path, "a", "b", "c"}),
+                      Catch::Contains("another daemon"));
+    StatusClient client(path);
+    CHECK_NOTHROW(client.call("status", {}));
+  }
+  SECTION("a file left by a dead daemon is replaced") {
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    REQUIRE(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+    close(fd);
+    const RunningServer server(path);
+    StatusClient client(path);
+    CHECK_NOTHROW(client.call("status", {}));
+  }
+  SECTION("another file is left alone") {
+    std::ofstream(path) << "text";
+    CHECK_THROWS_WITH(StatusServer(SocketConfig{path, "a", "b", "c"}),
+                      Catch::Contains("no socket"));
+    CHECK(std::filesystem::file_size(path) == 4);
+  }
+  SECTION("the file goes when the daemon ends") {
+    { const RunningServer server(path); }
+    CHECK_FALSE(std::filesystem::exists(path));
+    CHECK_THROWS_WITH(StatusClient(path), Catch::Contains("no daemon at"));
+  }
+}
