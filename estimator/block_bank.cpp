@@ -8,6 +8,9 @@
 namespace thermocomp {
 namespace {
 
+constexpr int no_sensor = -1;
+constexpr int unknown_sensor = -2;  ///< one that the previous bank did not have
+
 bool same(const SmoothingConfig& a, const SmoothingConfig& b) {
   return a.form == b.form && a.history == b.history && a.period_s == b.period_s &&
          a.samples == b.samples && a.half_width_K == b.half_width_K && a.outage_s == b.outage_s;
@@ -128,11 +131,28 @@ void BlockBank::plan_adoption(const BlockBank& previous) {
   block_plan_.clear();
   for (const Block& block : blocks_) {
     const auto found =
-        std::find_if(previous.blocks_.begin(), previous.blocks_.end(),
-                     [&](const Block& each) { return each.sensors == block.sensors; });
+        std::find_if(previous.blocks_.begin(), previous.blocks_.end(), [&](const Block& each) {
+          // The same sensors by name: a new file may number them anew.
+          return std::equal(block.sensors.begin(), block.sensors.end(), each.sensors.begin(),
+                            each.sensors.end(), [&](std::size_t ours, std::size_t theirs) {
+                              return sensor_plan_[ours] == static_cast<int>(theirs);
+                            });
+        });
     block_plan_.push_back(
         found == previous.blocks_.end() ? -1 : static_cast<int>(found - previous.blocks_.begin()));
   }
+}
+
+int BlockBank::reference_of(const Sensor& sensor) noexcept {
+  const auto& reference = sensor.config.reference_sensor;
+  return reference ? static_cast<int>(*reference) : no_sensor;
+}
+
+int BlockBank::previous_reference(const Sensor& sensor) const noexcept {
+  const int reference = reference_of(sensor);
+  if (reference == no_sensor) return no_sensor;
+  const int previous = sensor_plan_[static_cast<std::size_t>(reference)];
+  return previous < 0 ? unknown_sensor : previous;
 }
 
 void BlockBank::adopt(const BlockBank& previous) noexcept {
@@ -145,7 +165,7 @@ void BlockBank::adopt(const BlockBank& previous) noexcept {
     sensor.raw_degC = other.raw_degC;
     sensor.fault = other.fault;
     if (!same(sensor.config.smoothing, other.config.smoothing) ||
-        sensor.config.reference_sensor != other.config.reference_sensor)
+        previous_reference(sensor) != reference_of(other))
       continue;
     sensor.smoother = other.smoother;  // same sizes: copies into what is there
     sensor.usable = other.usable;

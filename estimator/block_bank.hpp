@@ -54,6 +54,10 @@ class BlockBank {
 
   static void look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept;
   void smooth(Sensor& sensor, nanoseconds now) noexcept;
+  /// Index of a sensor's reference sensor, or no_sensor.
+  [[nodiscard]] static int reference_of(const Sensor& sensor) noexcept;
+  /// The same, counted in the previous bank.
+  [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
 
   std::vector<Sensor> sensors_;

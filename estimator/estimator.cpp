@@ -36,6 +36,10 @@ void take_by_plan(const std::vector<int>& plan, const std::vector<double>& from,
 
 constexpr int no_signal = -1;
 
+/// No operating signal is larger; a value beyond is a garbled register, and its square would stay
+/// in the lags for ever.
+constexpr double signal_magnitude_max = 1e9;
+
 }  // namespace
 
 std::string_view to_string(Mode mode) noexcept {
@@ -180,9 +184,10 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
   std::copy(model.reference_degC.begin(), model.reference_degC.end(), reference_degC.begin());
   signal_values.assign(model_signals.size(), not_a_number);
   model_um.assign(model.outputs.size(), not_a_number);
-  // A reference given as numbers says where zero is; a sampled one says the machine is straight
-  // now.
-  zero_um.assign(model.outputs.size(), model.reference_degC.empty() ? not_a_number : 0.0);
+  // A reference given as numbers means a machine at rest; a sampled one says that the machine is
+  // straight now, whatever it is doing.
+  reference_signals.assign(model_signals.size(), model.reference_degC.empty() ? not_a_number : 0.0);
+  zero_um.assign(model.outputs.size(), not_a_number);
   measured_um.assign(config.axes.size(), not_a_number);
 }
 
@@ -229,7 +234,9 @@ void Estimator::Parts::take_signals(nanoseconds at, const ControllerState& contr
     if (!model_signals.empty()) add(Reason::signal_lost);
     return;
   }
-  for (std::size_t i = 0; i < config.signals.size(); ++i) all_signals[i] = controller.signals[i];
+  for (std::size_t i = 0; i < config.signals.size(); ++i)
+    all_signals[i] = std::abs(controller.signals[i]) <= signal_magnitude_max ? controller.signals[i]
+                                                                             : not_a_number;
   for (std::size_t i = 0; i < model_signals.size(); ++i) {
     signal_values[i] = all_signals[model_signals[i]];
     if (!std::isfinite(signal_values[i])) add(Reason::signal_lost);
@@ -247,7 +254,8 @@ void Estimator::Parts::take_references() noexcept {
     }
     if (!std::isfinite(reference_degC[i])) add(Reason::no_reference);
   }
-  for (std::size_t i = 0; i < reference_signals.size(); ++i)
+  // Of a silent controller only the last signals are known; they are not those of this moment.
+  for (std::size_t i = 0; controller_online && i < reference_signals.size(); ++i)
     if (!std::isfinite(reference_signals[i])) {
       reference_signals[i] = signal_values[i];
       zero_known = false;

@@ -34,7 +34,9 @@ Fault Screening::judge(nanoseconds now, const Reading& reading) noexcept {
   // Written so that NaN fails.
   if (!(reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_))
     return Fault::out_of_range;
-  if (now - reading.taken_at > stale_after_) return Fault::stale;
+  // A time far ahead is as useless as an old one: it would make every later reading look old.
+  if (!(reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_))
+    return Fault::stale;
   if (!has_good_) {
     same_since_ = reading.taken_at;
     return Fault::none;

@@ -109,6 +109,18 @@ void Smoother::take(Form& form, const Sample& sample) noexcept {
     form.keep(sample);
 }
 
+bool Smoother::agree(const std::array<Sample, agreeing_values>& far, double within_K) noexcept {
+  const auto& [first, second, third] = far;
+  const double step_K = second.value_K - first.value_K;
+  if (std::abs(step_K) <= within_K && std::abs(third.value_K - second.value_K) <= within_K)
+    return true;
+  // A steep course is on a line though its values are far from each other.
+  const auto way = static_cast<double>((third.at - second.at).count());
+  const auto first_way = static_cast<double>((second.at - first.at).count());
+  return first_way > 0 &&
+         std::abs(second.value_K + step_K * way / first_way - third.value_K) <= within_K;
+}
+
 template <class Form>
 void Smoother::keep_screened(Form& form, const Sample& sample, double distance_K) noexcept {
   const auto far_K = [&] { return far_factor * std::max(half_width_K_, form.spread_K()); };
@@ -117,12 +129,15 @@ void Smoother::keep_screened(Form& form, const Sample& sample, double distance_K
     form.keep(sample);
     return;
   }
-  // A far value that does not agree with the one before it starts a new run.
-  if (far_count_ > 0 && !(std::abs(sample.value_K - far_[far_count_ - 1].value_K) <= far_K()))
-    far_count_ = 0;
   far_[far_count_] = sample;
   ++far_count_;
   if (far_count_ < agreeing_values) return;
+  if (!agree(far_, far_K())) {
+    // The newest ones may be the beginning of a run that does.
+    std::copy(far_.begin() + 1, far_.end(), far_.begin());
+    --far_count_;
+    return;
+  }
   // They agree: the temperature is there. The history begins anew with them.
   form.restart();
   for (const Sample& far : far_) form.keep(far);

@@ -87,7 +87,8 @@ class Smoother {
   [[nodiscard]] std::uint32_t clipped_in_a_row() const noexcept { return clipped_in_a_row_; }
   void visit_state(StateArchive& archive);
 
-  /// How many values in a row must be far outside and agree before they become the new history.
+  /// How many values in a row must be far outside and agree - beside each other, or on one line -
+  /// before they become the new history.
   static constexpr std::size_t agreeing_values = 3;
   /// Far outside: this many times the half-width or the robust spread, whichever is larger.
   static constexpr double far_factor = 3.0;
@@ -96,6 +97,8 @@ class Smoother {
   [[nodiscard]] bool due(nanoseconds at) noexcept;
   template <class Form>
   void take(Form& form, const Sample& sample) noexcept;
+  [[nodiscard]] static bool agree(const std::array<Sample, agreeing_values>& far,
+                                  double within_K) noexcept;
   template <class Form>
   void keep_screened(Form& form, const Sample& sample, double distance_K) noexcept;
   void restart() noexcept;
