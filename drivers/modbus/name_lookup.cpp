@@ -10,6 +10,7 @@
 #include <sys/eventfd.h>
 
 #include "drivers/bus_thread.hpp"
+#include "estimator/checks.hpp"
 
 namespace thermocomp {
 
@@ -106,6 +107,7 @@ bool NameLookup::done() const noexcept {
 }
 
 std::optional<SocketAddress> NameLookup::result(std::string& error) const {
+  THERMOCOMP_ENSURE(done());  // also what makes the other thread's result visible here
   if (state_->error == 0) return state_->address;
   error = state_->host + ": " + ::gai_strerror(state_->error);
   return std::nullopt;

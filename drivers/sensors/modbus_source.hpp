@@ -19,7 +19,8 @@ namespace thermocomp {
 ///
 /// A request that fails is tried again as the line's `retries` say (of a unit that answered until
 /// then); a unit without answer is asked again with growing pauses (UnitBackoff), alone on its
-/// line at least every `reconnect_s`. A lost line is opened again every `reconnect_s`.
+/// line at least every `reconnect_s` (serial: every 3 s, for the sake of late answers). A lost line
+/// is opened again every `reconnect_s`.
 class ModbusSource final : public SensorSource {
  public:
   /// @throws DriverError naming the device and what cannot work

@@ -45,7 +45,7 @@ struct Reply {
   int unit{-1};  ///< -1: the one that was asked
   bool spoil_checksum{false};
   bool close{false};  ///< TCP: close the connection instead
-  Bytes raw{};          ///< sent as it is instead of a frame
+  Bytes raw{};        ///< sent as it is instead of a frame
 };
 
 using Handler = std::function<Reply(const Request&)>;
