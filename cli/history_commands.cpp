@@ -7,11 +7,11 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
-#include "cli/run_replay.hpp"
 #include "cli/terminal.hpp"
 #include "config/daemon_config.hpp"
 #include "config/run_file.hpp"
 #include "daemon/history/replay.hpp"
+#include "daemon/history/run_replay.hpp"
 
 namespace thermocomp::cli {
 
@@ -79,16 +79,13 @@ int run_history_replay(const ReplayOptions& options) {
 int run_file_replay(const ReplayOptions& options) {
   const DaemonConfig config = load_daemon_config(options.config);
   const RunFile run = load_run(parse_selection(options.input));
-  for (const std::string& doubt : doubts_about(config, run)) {
-    std::fprintf(stderr, "warning: %s\n", doubt.c_str());
-  }
   OutputFile file(options.output);
-  {
-    Progress progress("replay");
-    file.stream() << write_run(
-        replay_run(config, run, [&progress](double fraction) { progress.update(fraction); }));
-  }
+  const RunReplaySummary summary = replay_run_file(config, run, file.stream());
   file.commit();
+  for (const std::string& note : summary.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  std::fprintf(stderr, "%llu rows, %llu steps of %g s\n",
+               static_cast<unsigned long long>(summary.rows),
+               static_cast<unsigned long long>(summary.steps), summary.step_period_s);
   return exit_success;
 }
 

@@ -1,0 +1,66 @@
+# What really happened at the tool of the demonstration's machine.
+#   gnuplot -e "truth='...'; events='...'; picture='...'; format='png'" demo.gnuplot
+set datafile separator ","
+set datafile columnheaders
+if (format eq "png") {
+  set terminal pngcairo size 1100,1150 font "DejaVu Sans,11" background rgb "white"
+} else {
+  set terminal svg size 1100,1150 font "DejaVu Sans,14" background rgb "white"
+}
+set output picture
+
+hours = 8
+set xrange [0:hours]
+set xtics 1
+set grid back lc rgb "#dddddd"
+set lmargin 9
+set rmargin 22
+set key outside right top Left reverse samplen 2
+
+# Events: a grey stripe each, its name above the first panel.
+set datafile separator whitespace
+set datafile nocolumnheaders
+stats events using 1 nooutput
+count = STATS_records
+array begin[count + 1]
+array end[count + 1]
+array name[count + 1]
+stats events using (begin[int(column(0)) + 1] = column(1)) nooutput
+stats events using (end[int(column(0)) + 1] = column(2)) nooutput
+stats events using (name[int(column(0)) + 1] = strcol(3), 1) nooutput
+do for [i = 1:count] {
+  last = end[i] - begin[i] > 0.04 ? end[i] : begin[i] + 0.04
+  set object i rectangle from begin[i], graph 0 to last, graph 1 \
+    fillcolor rgb "#c8c8c8" fillstyle solid 0.6 noborder behind
+  set label i name[i] at begin[i], graph 1.03 left font ",9" textcolor rgb "#505050"
+}
+set datafile separator ","
+set datafile columnheaders
+
+x_colour = "#1f6fb4"
+y_colour = "#d95f02"
+z_colour = "#1b9e77"
+
+set multiplot layout 3,1
+set ylabel "displacement, um"
+set title "Tool against work since the start of the shift, without compensation" offset 0,1
+plot truth using (column("time_s")/3600):(column("x_error_um")-column("x_offset_um")) \
+       with lines lw 2 lc rgb x_colour title "x", \
+     truth using (column("time_s")/3600):(column("y_error_um")-column("y_offset_um")) \
+       with lines lw 2 lc rgb y_colour title "y", \
+     truth using (column("time_s")/3600):(column("z_error_um")-column("z_offset_um")) \
+       with lines lw 2 lc rgb z_colour title "z"
+
+do for [i = 1:count] { unset label i }
+set title "The same with the offsets that the controller applied" offset 0,0
+plot truth using (column("time_s")/3600):"x_error_um" with lines lw 1.5 lc rgb x_colour title "x", \
+     truth using (column("time_s")/3600):"y_error_um" with lines lw 1.5 lc rgb y_colour title "y", \
+     truth using (column("time_s")/3600):"z_error_um" with lines lw 1.5 lc rgb z_colour title "z"
+
+set title "Temperatures"
+set ylabel "degC"
+set xlabel "hours of the shift"
+plot for [place in "bed_front bed_rear table room column_left column_right spindle_front spindle_rear"] \
+  truth using (column("time_s")/3600):place."_degC" with lines lw 1.5 \
+  title system("echo ".place." | tr _ ' '")
+unset multiplot
