@@ -44,17 +44,15 @@ TEST_CASE("no state file is the first start and no warning", "[state]") {
 }
 
 TEST_CASE("an unusable state file is moved aside and said", "[state]") {
-  const std::string text = GENERATE(as<std::string>{}, "", "{", "[]", "null", "{\"enabled\": true}",
-                                    R"({"program":"other","format":1})",
-                                    R"({"program":"thermocomp","format":2,"enabled":true,
-                                        "reference_degC":{},"reference_signals":{},"offset_um":{}})",
-                                    R"({"program":"thermocomp","format":1,"enabled":1,
-                                        "reference_degC":{},"reference_signals":{},"offset_um":{}})",
-                                    R"({"program":"thermocomp","format":1,"enabled":true,
-                                        "reference_degC":{"a":"hot"},"reference_signals":{},
-                                        "offset_um":{}})",
-                                    R"({"program":"thermocomp","format":1,"enabled":true,
-                                        "reference_degC":3,"reference_signals":{},"offset_um":{}})");
+  const std::string head = R"({"program":"thermocomp",)";
+  const std::string rest = R"(,"reference_signals":{},"offset_um":{}})";
+  const std::string good = R"("reference_degC":{})" + rest;
+  const std::string text = GENERATE_COPY(
+      std::string(), std::string("{"), std::string("[]"), std::string("null"),
+      std::string(R"({"enabled": true})"), std::string(R"({"program":"other","format":1})"),
+      head + R"("format":2,"enabled":true,)" + good, head + R"("format":1,"enabled":1,)" + good,
+      head + R"("format":1,"enabled":true,"reference_degC":{"a":"hot"})" + rest,
+      head + R"("format":1,"enabled":true,"reference_degC":3)" + rest);
   const TempFolder folder;
   const std::filesystem::path file = folder / "state.json";
   std::ofstream(file) << text;
