@@ -62,38 +62,41 @@ void declare(CLI::App& app, Arguments& arguments) {
   SessionOptions& session = arguments.session;
   app.add_option("machine", arguments.machine, "Machine file (TOML)")->required();
   app.add_option("--seed", arguments.seed, "Seed instead of the file's");
-  app.add_option("--time-factor", session.time_factor,
-                 "Plant time goes so much faster than real time")
-      ->check(positive);
-  app.add_option("--duration", arguments.duration_h,
-                 "Plant hours instead of the file's; 0: until stopped")
-      ->check(not_negative);
+  auto* factor = app.add_option("--time-factor", session.time_factor,
+                                "Plant time goes so much faster than real time");
+  auto* duration = app.add_option("--duration", arguments.duration_h,
+                                  "Plant hours instead of the file's; 0: until stopped");
   app.add_flag("--start-on-heartbeat", session.start_on_heartbeat,
-               "Plant time stands at 0 until the controller's heartbeat beats");
-  app.add_option("--replay", session.replay, "Run file whose rows take the place of the plant");
-  app.add_option("--row-period-ms", arguments.row_period_ms,
-                 "Replay: one row each so often, real time")
-      ->check(positive);
-  app.add_option("--rows", arguments.rows, "Replay: rows A:B, from A and before B");
-  app.add_option("--row-log", session.row_log,
-                 "Replay: CSV of each row and the CLOCK_MONOTONIC ns at which it could be read");
-  app.add_option("--settle-s", session.settle_s, "Replay: the last row stands for so long")
-      ->check(not_negative);
+               "Time stands at the beginning until the controller's heartbeat beats");
   app.add_flag("--stay", session.stay, "Go on after the end until stopped");
   app.add_option("--truth", session.truth, "Run file of what really happened at the tool");
-  app.add_option("--truth-period-s", arguments.truth_period_s,
-                 "Plant time between its rows, instead of the file's pitch_s")
-      ->check(positive);
+  auto* truth_period = app.add_option("--truth-period-s", arguments.truth_period_s,
+                                      "Plant time between its rows, instead of the file's pitch_s");
+  auto* replay =
+      app.add_option("--replay", session.replay, "Run file whose rows take the place of the plant");
+  auto* row_period = app.add_option("--row-period-ms", arguments.row_period_ms,
+                                    "Replay: one row each so often, real time; else by time_s");
+  auto* rows = app.add_option("--rows", arguments.rows, "Replay: rows A:B, from A and before B");
+  auto* row_log = app.add_option(
+      "--row-log", session.row_log,
+      "Replay: CSV of each row and the CLOCK_MONOTONIC ns at which it could be read");
+  auto* settle = app.add_option("--settle-s", session.settle_s,
+                                "Replay: the last row stands for so long (default 1)");
   app.add_option("--ports-file", session.ports_file, "The ready line goes there too");
-  app.add_option("--port", arguments.ports, "NAME=PORT of a bus or the controller")
+  app.add_option("--port", arguments.ports, "NAME=PORT of a bus or the controller; several times")
       ->type_name("NAME=PORT")
       ->allow_extra_args(false);
-  app.add_option("--path", arguments.paths, "NAME=PATH of a serial line's link")
+  app.add_option("--path", arguments.paths, "NAME=PATH of a serial line's link; several times")
       ->type_name("NAME=PATH")
       ->allow_extra_args(false);
   app.add_option("--tick-ms", arguments.tick_ms,
-                 "Registers are brought up to date so often, real time")
+                 "Registers are brought up to date so often, real time (default 10)")
       ->check(number_between(0.1, 10000.0));
+  for (auto* option : {factor, truth_period, row_period}) option->check(positive);
+  for (auto* option : {duration, settle}) option->check(not_negative);
+  for (auto* option : {row_period, rows, row_log, settle}) option->needs(replay);
+  for (auto* option : {duration, truth_period}) option->excludes(replay);
+  row_period->excludes(factor);
   app.footer(footer);
 }
 

@@ -250,13 +250,20 @@ class ReplaySession : public Session {
   }
 
   void first_row() override { take_row(options_.row_begin); }
-  void start() override { show(options_.row_begin); }
+  void start() override {
+    waiting_ = options_.start_on_heartbeat;
+    show(options_.row_begin);
+  }
 
   void show(std::size_t row) {
     if (row != options_.row_begin) record(plant_s(shown_));
     take_row(row);
     devices_.update(EventLoop::now(), plant_s(row), row_, true);
     if (log_.is_open()) log_ << row << ',' << EventLoop::now().count() << '\n';
+    if (!waiting_) schedule_after(row);
+  }
+
+  void schedule_after(std::size_t row) {
     if (row + 1 < end_) {
       loop_.at(due(row + 1), [this, row] { show(row + 1); });
     } else {
@@ -265,6 +272,11 @@ class ReplaySession : public Session {
   }
 
   void on_tick(nanoseconds now) override {
+    if (waiting_ && devices_.heartbeat_seen()) {
+      waiting_ = false;
+      started_ = now;
+      schedule_after(shown_);
+    }
     devices_.update(now, plant_s(shown_), row_, false);
     status_.show(now, plant_s(shown_), truth_);
   }
@@ -279,6 +291,7 @@ class ReplaySession : public Session {
   RunFile run_;
   std::size_t end_{0};
   std::size_t shown_{0};
+  bool waiting_{false};
   std::ofstream log_;
 };
 

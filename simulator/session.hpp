@@ -15,7 +15,7 @@ struct SessionOptions {
   double time_factor{1.0};         ///< plant time goes so much faster than real time
   double duration_s{0.0};          ///< plant time; 0: until stopped
   double tick_s{0.01};             ///< registers are brought up to date so often, real time
-  bool start_on_heartbeat{false};  ///< plant time stands at 0 until the heartbeat beats
+  bool start_on_heartbeat{false};  ///< time stands at the beginning until the heartbeat beats
   std::filesystem::path replay;    ///< run file instead of the plant; empty: the plant
   double row_period_s{0.0};        ///< replay: real time a row; 0: by time_s and time_factor
   std::size_t row_begin{0};        ///< replay: first row

@@ -118,6 +118,23 @@ def test_time_stands_still_until_the_heartbeat(simulate):
     eventually(lambda: position() == 2000, "time began")
 
 
+def test_a_replay_waits_at_its_first_row_for_the_heartbeat(simulate, tmp_path):
+    path = run_file(tmp_path, 4)
+    machine = MACHINE[MACHINE.index("[[bus]]"):].replace("room_degC", "t1_degC")
+    for signal in ("x_mm", "spindle_rpm"):
+        machine = machine.replace(f'name = "{signal}"', f'name = "{signal}"\nvalue = 0')
+    simulator = simulate("format = 1\n" + machine, "--replay", path, "--row-period-ms", 50,
+                         "--start-on-heartbeat", "--stay")
+    link = simulator.connect("cabinet")
+    shown = lambda: struct.unpack(">h", ask(link, 3, read_request(4, 0, 1))[2:])[0]
+    time.sleep(0.4)
+    assert shown() == 50
+    cnc = simulator.connect("cnc")
+    for beat in (1, 2):
+        ask(cnc, 1, struct.pack(">BHH", 6, 11, beat))
+    eventually(lambda: shown() == 350, "the last row")
+
+
 def test_ports_and_paths_can_be_given_on_the_command_line(simulate, tmp_path):
     simulator = simulate(MACHINE, "--port", "cabinet=0", "--port", "cnc=0",
                          "--path", "line=elsewhere/line")
@@ -166,7 +183,9 @@ def test_the_same_seed_gives_the_same_truth(simulate, tmp_path):
     (["--replay", "run.csv", "--truth", "no/such/folder/truth"], "cannot be written"),
     (["--replay", "run.csv", "--port", "nobody=1"], "nobody"),
     (["--replay", "run.csv", "--port", "cabinet=99999"], "99999"),
-    (["--rows", "1:2"], "need --replay"),
+    (["--rows", "1:2"], "--replay"),
+    (["--replay", "run.csv", "--duration", "1"], "--duration"),
+    (["--replay", "run.csv", "--row-period-ms", "1", "--time-factor", "2"], "--time-factor"),
     (["--time-factor", "0"], "--time-factor"),
     (["--time-factor", "nan"], "--time-factor"),
     (["--row-period-ms", "-1"], "--row-period-ms"),
