@@ -46,11 +46,11 @@ class BusReader {
     }
     for (std::size_t i = 0; i < sensors.size(); ++i) read_channel(sensors[i], i);
     for (const auto& [name, bus] : buses_) {
-      if (!bus.used) bus.table.problem("name", "no device is on this bus");
+      if (!bus.used && !misnamed_bus_) bus.table.problem("name", "no device is on this bus");
     }
     for (const auto& [name, device] : devices_) {
       if (device.used) continue;
-      device.table.problem("name", "no sensor is on this device");
+      if (!misnamed_device_) device.table.problem("name", "no sensor is on this device");
       device.table.ignore_rest();
     }
     return std::move(result_);
@@ -109,6 +109,7 @@ class BusReader {
     const auto bus = buses_.find(bus_name);
     Device device{BusKind::unknown, 0, 0, table, false};
     if (bus == buses_.end()) {
+      misnamed_bus_ = true;
       if (!bus_name.empty()) table.problem("bus", "must name a bus: " + known(buses_));
     } else {
       bus->second.used = true;
@@ -150,6 +151,7 @@ class BusReader {
     const std::string device_name = sensor.text("device");
     const auto found = devices_.find(device_name);
     if (found == devices_.end()) {
+      misnamed_device_ = true;
       if (!device_name.empty()) sensor.problem("device", "must name a device: " + known(devices_));
       sensor.ignore_rest();
       return;
@@ -187,6 +189,9 @@ class BusReader {
   SensorBuses result_;
   std::map<std::string, Bus> buses_;
   std::map<std::string, Device> devices_;
+  /// A reference to a name that does not exist: whom nobody names may be the one that was meant.
+  bool misnamed_bus_{false};
+  bool misnamed_device_{false};
 };
 
 }  // namespace

@@ -32,10 +32,10 @@ std::pair<std::int64_t, std::int64_t> codes_of(const CanSignal& signal) {
 
 /// A whole number that may stand in `own` or in `base`. Both are checked.
 int required_integer(const TomlTable& own, const TomlTable& base, std::string_view key, int low,
-                     int high) {
+                     int high, int otherwise) {
   const bool in_base = base.has(key);
   if (!own.has(key) && !in_base) own.problem(key, "must be given");
-  return own.integer(key, low, high, base.integer(key, low, high, low));
+  return own.integer(key, low, high, base.integer(key, low, high, otherwise));
 }
 
 void read_place(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
@@ -45,8 +45,10 @@ void read_place(const TomlTable& own, const TomlTable& base, CanSignal& signal) 
   const TomlTable& source = !own.has("id") && in_base ? base : own;
   const std::int64_t id_max = signal.extended_id ? extended_id_max : standard_id_max;
   signal.id = static_cast<std::uint32_t>(source.integer<std::int64_t>("id", 0, id_max, 0));
-  signal.start_bit = required_integer(own, base, "start_bit", 0, frame_bits_max - 1);
-  signal.length_bits = required_integer(own, base, "length_bits", 1, frame_bits_max);
+  signal.start_bit =
+      required_integer(own, base, "start_bit", 0, frame_bits_max - 1, signal.start_bit);
+  signal.length_bits =
+      required_integer(own, base, "length_bits", 1, frame_bits_max, signal.length_bits);
   signal.byte_order = own.choice("byte_order", byte_orders(),
                                  base.choice("byte_order", byte_orders(), signal.byte_order));
   if (frame_bits(signal) == 0) {

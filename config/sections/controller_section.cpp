@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "config/number_text.hpp"
 #include "config/sections/can_signals.hpp"
@@ -160,20 +161,23 @@ class ControllerReader {
       config.axes.push_back(read_modbus_axis(axis_tables_[i], axes_[i], written));
     }
     check_read_back();
-    if (table_.has("valid_bits")) {
-      config.valid_bits = read_modbus_value(table_.table("valid_bits"), RegisterUse::written_bits);
-      written.add(table_, "valid_bits", *config.valid_bits);
-      check_bits(table_, reach(*config.valid_bits).max, axes_.size());
-    }
-    if (table_.has("heartbeat")) {
-      config.heartbeat = read_modbus_value(table_.table("heartbeat"), RegisterUse::written_bits);
-      written.add(table_, "heartbeat", *config.heartbeat);
-    }
+    config.valid_bits = read_written_bits("valid_bits", written);
+    if (config.valid_bits) check_bits(table_, reach(*config.valid_bits).max, axes_.size());
+    config.heartbeat = read_written_bits("heartbeat", written);
     read_signals([&](const TomlTable& table, std::size_t index) {
       config.signals.push_back({index, read_modbus_value(table, RegisterUse::signal)});
     });
     result_.period_s = config.period_s;
     result_.config = std::move(config);
+  }
+
+  [[nodiscard]] std::optional<ModbusValue> read_written_bits(std::string_view key,
+                                                             WrittenRegisters& written) const {
+    const TomlTable place = table_.table_or_empty(key);
+    if (!place) return std::nullopt;
+    const ModbusValue value = read_modbus_value(place, RegisterUse::written_bits);
+    written.add(table_, key, value);
+    return value;
   }
 
   static ModbusAxis read_modbus_axis(const TomlTable& table, const AxisConfig& axis,
@@ -209,8 +213,8 @@ class ControllerReader {
     for (std::size_t i = 0; i < axes_.size(); ++i) read_can_offset(i, config, sent);
     for (const auto& [key, place] :
          {std::pair("valid_bits", &config.valid_bits), std::pair("heartbeat", &config.heartbeat)}) {
-      if (!table_.has(key)) continue;
-      const TomlTable value = table_.table(key);
+      const TomlTable value = table_.table_or_empty(key);
+      if (!value) continue;
       *place = read_can_signal(value, value, CanUse::bits);
       sent.add(table_, key, **place);
     }
@@ -220,8 +224,8 @@ class ControllerReader {
       if (sent.sends(signal)) table.problem(key, "is in a frame that is sent, not received");
     };
     for (std::size_t i = 0; i < axes_.size(); ++i) {
-      if (!axis_tables_[i].has("applied")) continue;
-      const TomlTable applied = axis_tables_[i].table("applied");
+      const TomlTable applied = axis_tables_[i].table_or_empty("applied");
+      if (!applied) continue;
       config.axes[i].applied = read_can_signal(applied, applied, CanUse::offset);
       received(axis_tables_[i], "applied", *config.axes[i].applied);
       check_reach(axis_tables_[i], "applied", reach(*config.axes[i].applied), axes_[i]);

@@ -1,0 +1,229 @@
+#include "config/daemon_config.hpp"
+
+#include <functional>
+
+#include "config/model_file.hpp"
+#include "files.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::test;
+
+namespace {
+
+DaemonConfig parse(const std::string& text, const std::string& model = "small_machine_model.toml") {
+  return parse_daemon_config(text, "machine.toml", example(model), "model.toml");
+}
+
+DaemonConfig edited_machine(const std::string& from, const std::string& to) {
+  return parse(edited(example("small_machine.toml"), from, to));
+}
+
+}  // namespace
+
+TEST_CASE("every example loads", "[config]") {
+  std::size_t loaded = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(examples)) {
+    const std::string text = text_of(entry.path());
+    if (text.find("\n[[bus]]\n") == std::string::npos ||
+        text.find("\n[model]\n") == std::string::npos) {
+      continue;  // a model, or another program's file
+    }
+    INFO(entry.path());
+    CHECK_NOTHROW(load_daemon_config(entry.path()));
+    ++loaded;
+  }
+  CHECK(loaded >= 4);
+}
+
+TEST_CASE("the small machine is what its file says", "[config]") {
+  const DaemonConfig config = load_daemon_config(examples / "small_machine.toml");
+  CHECK(config.loop.rate_hz == 100);
+  CHECK(config.model_file == examples / "small_machine_model.toml");
+  CHECK(config.text == example("small_machine.toml"));
+  CHECK(config.model_text == example("small_machine_model.toml"));
+  CHECK(config.model_checksum == sha256_hex(config.model_text));
+  REQUIRE(config.modbus_buses.size() == 2);
+  const ModbusDeviceConfig& bed = config.modbus_buses[0].devices.at(0);
+  REQUIRE(bed.channels.size() == 4);
+  CHECK(bed.channels[1].sensor == 1);
+  CHECK(bed.channels[1].scale == 0.1);
+  REQUIRE(bed.channels[1].sentinels.size() == 1);
+  CHECK(bed.channels[1].sentinels[0].code == 32767);
+  CHECK(bed.channels[1].sentinels[0].fault == Fault::open_circuit);
+  const ModbusDeviceConfig& column = config.modbus_buses[1].devices.at(0);
+  REQUIRE(column.channels.size() == 4);
+  CHECK(column.channels[3].sensor == 7);
+  CHECK(column.channels[3].address == 6);
+  CHECK(column.channels[3].encoding == Encoding::float32);
+  CHECK(column.channels[3].word_order == WordOrder::cdab);
+  const auto& line = config.modbus_buses[1].line;
+  CHECK(std::get<ModbusRtu>(line.link).parity == 'E');
+  CHECK(line.inter_frame_delay_ms == 2.0);
+  CHECK(config.modbus_buses[0].line.inter_frame_delay_ms < 0);
+}
+
+TEST_CASE("a sensor's own keys stand above those for every sensor", "[config]") {
+  const DaemonConfig config = load_daemon_config(examples / "small_machine.toml");
+  const auto& sensors = config.estimator.sensors;
+  REQUIRE(sensors.size() == 8);
+  CHECK(sensors[3].smoothing.half_width_K == 1.0);
+  CHECK(sensors[3].smoothing.samples == 6);
+  CHECK(sensors[2].smoothing.half_width_K == 0.3);
+  CHECK(sensors[6].screening.rate_K_per_s_max == 1.0);
+  CHECK(sensors[7].screening.rate_K_per_s_max == 0.5);
+}
+
+TEST_CASE("axes, blocks and signals keep their order and places", "[config]") {
+  const DaemonConfig config = load_daemon_config(examples / "small_machine.toml");
+  REQUIRE(config.estimator.blocks.size() == 6);
+  CHECK(config.estimator.blocks[5].sensors == std::vector<std::size_t>{6, 7});
+  CHECK(config.estimator.signals ==
+        std::vector<std::string>{"x_mm", "spindle_rpm", "cutting_on", "compensation_off_on"});
+  CHECK(config.estimator.controller_reads_back);
+  const auto& controller = std::get<ModbusControllerConfig>(config.controller);
+  REQUIRE(controller.axes.size() == 3);
+  CHECK(controller.axes[2].offset.address == 4);
+  CHECK(controller.axes[2].applied.has_value());
+  CHECK(controller.signals.at(2).value.table == ModbusTable::discrete_input);
+  CHECK(controller.heartbeat->address == 11);
+}
+
+TEST_CASE("the CAN example is what its file says", "[config][can]") {
+  const DaemonConfig config = load_daemon_config(examples / "can.toml");
+  REQUIRE(config.can_buses.size() == 1);
+  const auto& channels = config.can_buses[0].devices.at(0).channels;
+  REQUIRE(channels.size() == 2);
+  CHECK(channels[1].signal.id == 0x181);
+  CHECK(channels[1].signal.start_bit == 16);
+  CHECK(channels[1].signal.length_bits == 16);
+  CHECK(channels[1].signal.sentinels.at(0).code == 0x7FFF);
+  const auto& controller = std::get<CanControllerConfig>(config.controller);
+  CHECK(controller.axes.at(0).applied->byte_order == ByteOrder::big_endian);
+  CHECK_FALSE(controller.valid_bits->is_signed);
+  CHECK(config.estimator.compensation.hold_while_cutting);
+}
+
+TEST_CASE("a dry run reads back what it is offered", "[config]") {
+  const DaemonConfig config = load_daemon_config(examples / "modbus_rtu.toml");
+  CHECK(std::get<DryRunControllerConfig>(config.controller).axes == 1);
+  CHECK(config.estimator.controller_reads_back);
+}
+
+TEST_CASE("without any applied offset the controller does not read back", "[config]") {
+  const std::string text = edited(
+      example("modbus_tcp.toml"),
+      "applied = { table = \"input\", address = 0, encoding = \"int16\", scale = 0.01 }\n", "");
+  CHECK_FALSE(parse(text, "column_model.toml").estimator.controller_reads_back);
+}
+
+TEST_CASE("values at their bounds are accepted", "[config]") {
+  const std::vector<std::pair<std::string, std::string>> edits = {
+      {"rate_hz = 100", "rate_hz = 1"},
+      {"rate_hz = 100", "rate_hz = 1000.0"},
+      {"priority = 60", "priority = 98"},
+      {"commit_s = 5.0", "commit_s = 10"},
+      {"commit_s = 5.0", "commit_s = 0.1"},
+      {"unit = 7", "unit = 247"},
+      {"unit = 1\nperiod_s", "unit = 255\nperiod_s"},
+      {"unit = 1\nperiod_s", "unit = 0\nperiod_s"},
+      {"address = 6\n", "address = 65534\n"},
+      {"address = 1\n", "address = 0\n"},  // two sensors on the same register
+      {"port = 502 ", "port = 65535 "},
+      {"host = \"192.168.10.20\"", "host = \"cabinet-1.local\""},
+      {"host = \"192.168.10.20\"", "host = \"::1\""},
+      {"offset_um_max = 60.0", "offset_um_max = 500.0"},
+      {"offset_um_max = 60.0", "offset_um_max = 60"},
+      {"sign = 1 ", "sign = -1 "},
+      {"samples = 6", "samples = 32"},
+      {"samples = 6", "samples = 3"},
+      {"stale_after_s = 5.0", "stale_after_s = 3600"},
+      {"stuck_after_s = 0.0", "stuck_after_s = 1e6"},
+      {"temp_degC_min = -30.0", "temp_degC_min = -273.15"},
+      {"open_circuit_codes = [32767]", "open_circuit_codes = [32767, -32768, 0]"},
+      {"form = \"sliding_line\"", "form = \"off\""},
+  };
+  for (const auto& [from, to] : edits) {
+    INFO(to);
+    CHECK_NOTHROW(edited_machine(from, to));
+  }
+}
+
+TEST_CASE("everything behind \"default\" may be left out and is then the same", "[config]") {
+  const std::string full = example("small_machine.toml");
+  std::string text;
+  std::size_t dropped = 0;
+  std::size_t begin = 0;
+  while (begin < full.size()) {
+    const std::size_t end = full.find('\n', begin) + 1;
+    const std::string line = full.substr(begin, end - begin);
+    begin = end;
+    const bool has_default = line.find("# default") != std::string::npos && line.front() != '#';
+    dropped += has_default ? 1 : 0;
+    if (!has_default) text += line;
+  }
+  CHECK(dropped > 40);
+  const DaemonConfig a = parse(full);
+  const DaemonConfig b = parse(text);
+  CHECK(a.loop == b.loop);
+  CHECK(a.modbus_buses == b.modbus_buses);
+  CHECK(a.controller == b.controller);
+  CHECK(a.socket == b.socket);
+  CHECK(a.history == b.history);
+  CHECK(a.estimator.compensation.hold_s == b.estimator.compensation.hold_s);
+  CHECK(a.estimator.sensors[0].screening.stale_after_s ==
+        b.estimator.sensors[0].screening.stale_after_s);
+}
+
+TEST_CASE("the texts of a history give the same configuration as the files", "[config]") {
+  const DaemonConfig loaded = load_daemon_config(examples / "small_machine.toml");
+  const DaemonConfig parsed = parse_daemon_config(loaded.text, loaded.file.string(),
+                                                  loaded.model_text, loaded.model_file.string());
+  CHECK(restart_needed(loaded, parsed).empty());
+  CHECK(parsed.model_checksum == loaded.model_checksum);
+  CHECK(write_model(parsed.model) == write_model(loaded.model));
+}
+
+TEST_CASE("a reload takes over model, blocks, screening, smoothing, limits and policy",
+          "[config]") {
+  const DaemonConfig running = parse(example("small_machine.toml"));
+  const std::vector<std::pair<std::string, std::string>> edits = {
+      {"log_level = \"info\"", "log_level = \"debug\""},
+      {"sensors = [\"bed_front\", \"bed_rear\"]", "sensors = [\"bed_front\"]"},
+      {"rate_K_per_s_max = 0.5 ", "rate_K_per_s_max = 0.7 "},
+      {"form = \"sliding_line\"", "form = \"off\""},
+      {"offset_um_max = 60.0", "offset_um_max = 30.0"},
+      {"on_loss = \"hold\"", "on_loss = \"ramp_to_zero\""},
+  };
+  for (const auto& [from, to] : edits) {
+    INFO(to);
+    CHECK(restart_needed(running, edited_machine(from, to)).empty());
+  }
+}
+
+TEST_CASE("what a reload cannot take over is named", "[config]") {
+  const DaemonConfig running = parse(example("small_machine.toml"));
+  const std::vector<std::vector<std::string>> edits = {
+      {"rate_hz = 100", "rate_hz = 200", "loop"},
+      {"timeout_ms = 200", "timeout_ms = 300", "bus cabinet"},
+      {"address = 6\n", "address = 8\n", "bus column_line"},
+      {"period_s = 0.1 ", "period_s = 0.2 ", "controller, or registers of the axes"},
+      {"offset = { table = \"holding\", address = 4", "offset = { table = \"holding\", address = 6",
+       "controller, or registers of the axes"},
+      {"name = \"z\"", "name = \"w\"", "names, count or order of the axes"},
+      {"sign = 1 ", "sign = -1 ", "sign of an axis"},
+      {"path = \"/run/thermocomp/status.sock\"", "path = \"/run/other.sock\"", "socket"},
+      {"commit_s = 5.0", "commit_s = 6.0", "history"},
+      {"state_file = \"/var/lib/thermocomp/state.json\"", "state_file = \"/var/lib/x.json\"",
+       "state_file"},
+  };
+  for (const auto& edit : edits) {
+    INFO(edit[1]);
+    CHECK(restart_needed(running, edited_machine(edit[0], edit[1])) ==
+          std::vector<std::string>{edit[2]});
+  }
+  std::string text = example("small_machine.toml");
+  text = edited(text, "name = \"spindle_rear\"", "name = \"spindle_back\"");
+  text = edited(text, "\"spindle_rear\"]", "\"spindle_back\"]");
+  CHECK(restart_needed(running, parse(text)) ==
+        std::vector<std::string>{"names or order of the sensors"});
+}

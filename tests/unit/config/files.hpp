@@ -1,0 +1,86 @@
+/// The examples as texts, and how tests break them.
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "config/problems.hpp"
+
+namespace thermocomp::test {
+
+inline const std::filesystem::path examples{THERMOCOMP_EXAMPLES};
+
+inline std::string text_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  REQUIRE(file.good());
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+inline std::string example(const std::string& name) {
+  return text_of(examples / name);
+}
+
+/// `text` with the first `from` replaced by `to`; `from` has to be there.
+inline std::string edited(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  INFO("looking for: " << from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+/// Line, counted from 1, of the first `snippet`.
+inline int line_of(const std::string& text, const std::string& snippet) {
+  const auto at = text.find(snippet);
+  INFO("looking for: " << snippet);
+  REQUIRE(at != std::string::npos);
+  return 1 + static_cast<int>(
+                 std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+}
+
+/// What `load` throws; none when it does not throw.
+template <class Load>
+std::vector<Problem> problems_of(Load load) {
+  try {
+    static_cast<void>(load());
+  } catch (const ConfigurationError& error) {
+    return error.problems();
+  }
+  return {};
+}
+
+/// One way of breaking a good text and what has to be said about it.
+struct Broken {
+  std::string what;
+  std::string from;
+  std::string to;
+  std::string at;    ///< a snippet of the line that is blamed; empty: `to` begins there
+  std::string key;   ///< of the problem, in full
+  std::string rule;  ///< a part of it
+};
+
+/// The edit's only problem is the expected one, with file, line, key, value and rule.
+template <class Parse>
+void check_refused(const Broken& broken, const std::string& good, const std::string& file,
+                   Parse parse) {
+  const std::string text = edited(good, broken.from, broken.to);
+  const auto problems = problems_of([&] { return parse(text); });
+  std::string told;
+  for (const Problem& problem : problems) told += to_string(problem) + "\n";
+  INFO(broken.what << "\n" << told);
+  CHECK(problems.size() == 1);
+  if (problems.empty()) return;
+  const Problem& problem = problems.front();
+  CHECK(problem.file == file);
+  CHECK(problem.line == line_of(text, broken.at.empty() ? broken.to : broken.at));
+  CHECK(problem.key == broken.key);
+  CHECK(!problem.value.empty());
+  CHECK_THAT(problem.rule, Catch::Contains(broken.rule));
+}
+
+}  // namespace thermocomp::test

@@ -1,0 +1,203 @@
+#include "config/model_file.hpp"
+
+#include <cmath>
+#include <iostream>
+#include <limits>
+
+#include "config/run_file.hpp"
+#include "files.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::test;
+
+namespace {
+
+const std::string good = R"(format = 1
+inputs = ["a_degC", "b_degC"]
+outputs = ["z_um", "c_urad"]
+reference = [20.0, 21.0]
+matrix_um_per_K = [[1.0, 2.0], [3.0, 4.0]]
+[guideway.slide]
+axis = "x_mm"
+positions_mm = [0.0, 100.0]
+rows_um_per_K.z_um = [[0.5, 0.0], [0.0, 0.5]]
+[[term]]
+kind = "thermal_lag"
+subject = "a_degC"
+tau_s = 900.0
+gain_um_per_K = { z_um = 1.2 }
+[[term]]
+kind = "missing_heat_source"
+subject = "spindle_rpm"
+tau_s = 1800.0
+power = 2
+gain_um_per_unit = { z_um = 1e-7 }
+[[term]]
+kind = "missing_temperature"
+subject = "oil_degC"
+tau_s = 0.0
+gain_um_per_K = { z_um = 0.1, c_urad = 0.2 }
+[covariance]
+matrix_K2 = [[4.0, 1.0], [1.0, 9.0]]
+)";
+
+const std::vector<Broken>& broken_models() {
+  static const std::vector<Broken> table = {
+      {"unknown key", "reference =", "refrence = 1\nreference =", "", "refrence",
+       "did you mean \"reference\"?"},
+      {"format missing", "format = 1\n", "", "inputs", "format", "must be given"},
+      {"format of the future", "format = 1\n", "format = 2\n", "", "format", "[1, 1]"},
+      {"format a string", "format = 1\n", "format = \"1\"\n", "", "format", "whole number"},
+      {"inputs missing", "inputs = [\"a_degC\", \"b_degC\"]\n", "", "format", "inputs",
+       "must be given"},
+      {"no input", "inputs = [\"a_degC\", \"b_degC\"]", "inputs = []", "", "inputs",
+       "at least one"},
+      {"input twice", "\"b_degC\"]", "\"a_degC\"]", "", "inputs", "named twice"},
+      {"input no temperature", "inputs = [\"a_degC\", \"b_degC\"]",
+       "inputs = [\"a_degC\", \"b_rpm\"]", "", "inputs", "must be a temperature"},
+      {"input no string", "\"b_degC\"]", "5]", "", "inputs", "must be a string"},
+      {"input with a comma", "\"b_degC\"]", "\"b,_degC\"]", "", "inputs", "comma"},
+      {"reference too short", "reference = [20.0, 21.0]", "reference = [20.0]", "", "reference",
+       "one value an input (2)"},
+      {"reference not a number", "reference = [20.0, 21.0]", "reference = [20.0, nan]", "",
+       "reference", "finite"},
+      {"reference unknown word", "reference = [20.0, 21.0]", "reference = \"last_sample\"", "",
+       "reference", "first_sample"},
+      {"reference missing", "reference = [20.0, 21.0]\n", "", "format", "reference",
+       "must be given"},
+      {"matrix missing", "matrix_um_per_K = [[1.0, 2.0], [3.0, 4.0]]\n", "", "format",
+       "matrix_um_per_K", "must be given"},
+      {"matrix with a short row", "[[1.0, 2.0], [3.0, 4.0]]", "[[1.0], [3.0, 4.0]]", "",
+       "matrix_um_per_K", "row 1 must have 2"},
+      {"matrix with too many rows", "[[1.0, 2.0], [3.0, 4.0]]", "[[1, 2], [3, 4], [5, 6]]", "",
+       "matrix_um_per_K", "must have 2"},
+      {"matrix with NaN", "[[1.0, 2.0], [3.0, 4.0]]", "[[1.0, nan], [3.0, 4.0]]", "",
+       "matrix_um_per_K", "row 1 column 2 must be a finite number"},
+      {"matrix with infinity", "[[1.0, 2.0], [3.0, 4.0]]", "[[1.0, 2.0], [inf, 4.0]]", "",
+       "matrix_um_per_K", "row 2 column 1"},
+      {"matrix with text", "[[1.0, 2.0], [3.0, 4.0]]", "[[1.0, \"2\"], [3.0, 4.0]]", "",
+       "matrix_um_per_K", "must be a number"},
+      {"guideway axis no position", "axis = \"x_mm\"", "axis = \"x_um\"", "", "guideway.slide.axis",
+       "*_mm"},
+      {"guideway positions fall", "positions_mm = [0.0, 100.0]", "positions_mm = [100.0, 0.0]", "",
+       "guideway.slide.positions_mm", "strictly increasing"},
+      {"guideway positions equal", "positions_mm = [0.0, 100.0]", "positions_mm = [5.0, 5.0]", "",
+       "guideway.slide.positions_mm", "strictly increasing"},
+      {"guideway rows too few", "[[0.5, 0.0], [0.0, 0.5]]", "[[0.5, 0.0]]", "",
+       "guideway.slide.rows_um_per_K.z_um", "must have 2"},
+      {"guideway of an unknown output", "rows_um_per_K.z_um", "rows_um_per_K.w_um",
+       "rows_um_per_K.w_um", "guideway.slide.rows_um_per_K.w_um", "one of the outputs"},
+      {"guideway with an unknown key", "axis = \"x_mm\"", "axis = \"x_mm\"\nspeed = 3", "speed = 3",
+       "guideway.slide.speed", "unknown key"},
+      {"term of an unknown kind", "kind = \"thermal_lag\"", "kind = \"thermal_leg\"", "",
+       "term[1].kind", "must be one of: thermal_lag"},
+      {"lag of what is no input", "subject = \"a_degC\"", "subject = \"x_degC\"", "",
+       "term[1].subject", "one of the inputs: a_degC, b_degC"},
+      {"heat source from a temperature", "subject = \"spindle_rpm\"", "subject = \"x_degC\"", "",
+       "term[2].subject", "not a temperature"},
+      {"other temperature that is an input", "subject = \"oil_degC\"", "subject = \"b_degC\"", "",
+       "term[3].subject", "not among the inputs"},
+      {"other temperature that is a signal", "subject = \"oil_degC\"", "subject = \"oil_rpm\"", "",
+       "term[3].subject", "must be a temperature"},
+      {"parameter missing", "tau_s = 900.0\n", "", "[[term]]", "term[1].tau_s", "must be given"},
+      {"parameter out of range", "tau_s = 900.0", "tau_s = 0.0", "", "term[1].tau_s", "[0.001"},
+      {"parameter unknown", "tau_s = 900.0", "tau_s = 900.0\nphase = 3", "phase = 3",
+       "term[1].phase", "unknown key"},
+      {"parameter not whole", "power = 2", "power = 1.5", "", "term[2].power", "whole number"},
+      {"parameter beyond", "power = 2", "power = 3", "", "term[2].power", "[1, 2]"},
+      {"gain of an unknown output", "{ z_um = 1.2 }", "{ w_um = 1.2 }", "",
+       "term[1].gain_um_per_K.w_um", "one of the outputs"},
+      {"gain without a table", "{ z_um = 1.2 }", "1.2", "gain_um_per_K = 1.2",
+       "term[1].gain_um_per_K", "must be a table"},
+      {"gain of no output", "{ z_um = 1.2 }", "{ }", "", "term[1].gain_um_per_K", "at least one"},
+      {"gain not a number", "{ z_um = 1.2 }", "{ z_um = nan }", "", "term[1].gain_um_per_K.z_um",
+       "finite"},
+      {"covariance not symmetric", "[[4.0, 1.0], [1.0, 9.0]]", "[[4.0, 1.0], [2.0, 9.0]]", "",
+       "covariance.matrix_K2", "symmetric"},
+      {"covariance not positive", "[[4.0, 1.0], [1.0, 9.0]]", "[[4.0, 7.0], [7.0, 9.0]]", "",
+       "covariance.matrix_K2", "positive semidefinite"},
+      {"covariance with an unknown key", "[covariance]", "[covariance]\nunit = \"K2\"",
+       "unit = \"K2\"", "covariance.unit", "unknown key"},
+  };
+  return table;
+}
+
+std::filesystem::path spindle_data() {
+  const char* given = std::getenv("THERMOCOMP_DATA");
+  const std::filesystem::path data =
+      given != nullptr ? std::filesystem::path(given)
+                       : std::filesystem::path(THERMOCOMP_SOURCE).parent_path() / "shared" / "data";
+  return data / "spindle_46h";
+}
+
+}  // namespace
+
+TEST_CASE("each broken model is refused with file, line, key, value and rule", "[config][model]") {
+  CHECK(broken_models().size() >= 30);
+  for (const Broken& broken : broken_models()) {
+    check_refused(broken, good, "model.toml",
+                  [](const std::string& text) { return parse_model(text, "model.toml"); });
+  }
+}
+
+TEST_CASE("all problems of a model are told at once", "[config][model]") {
+  std::string text = edited(good, "[[1.0, 2.0], [3.0, 4.0]]", "[[nan, 2.0], [3.0, \"x\"]]");
+  text = edited(text, "power = 2", "power = 7");
+  text = edited(text, "axis = \"x_mm\"", "axis = \"x\"");
+  text = edited(text, "reference = [20.0, 21.0]", "reference = []");
+  CHECK(problems_of([&] { return parse_model(text, "m"); }).size() == 5);
+}
+
+TEST_CASE("a model is what its file says", "[config][model]") {
+  const ThermalModel model = parse_model(good, "model.toml");
+  CHECK(model.inputs == std::vector<std::string>{"a_degC", "b_degC"});
+  CHECK(model.reference_degC == std::vector<double>{20, 21});
+  CHECK(model.matrix_um_per_K[1][0] == 3.0);
+  REQUIRE(model.guideways.size() == 1);
+  CHECK(model.guideways[0].rows_um_per_K.at("z_um")[1][1] == 0.5);
+  REQUIRE(model.terms.size() == 3);
+  CHECK(model.terms[1].shared.at("power") == 2.0);
+  CHECK(model.terms[2].per_output.at("gain_um_per_K").at("c_urad") == 0.2);
+  CHECK(model.covariance_K2[0][1] == 1.0);
+  CHECK(parse_model(edited(good, "[20.0, 21.0]", "\"first_sample\""), "m").reference_degC.empty());
+}
+
+TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
+  ThermalModel model = parse_model(good, "model.toml");
+  model.matrix_um_per_K = {{1.0 / 3.0, -0.0}, {5e-324, 1.7976931348623157e308}};
+  model.reference_degC = {20.000000000000004, 1e-5};
+  model.guideways[0].name = "slide \"one\"";
+  const ThermalModel back = parse_model(write_model(model), "written");
+  CHECK(back.matrix_um_per_K == model.matrix_um_per_K);
+  CHECK(std::signbit(back.matrix_um_per_K[0][1]));
+  CHECK(back.reference_degC == model.reference_degC);
+  CHECK(back.guideways[0].name == model.guideways[0].name);
+  CHECK(back.terms[1].shared == model.terms[1].shared);
+  CHECK(back.terms[2].per_output == model.terms[2].per_output);
+  CHECK(back.covariance_K2 == model.covariance_K2);
+  CHECK(write_model(back) == write_model(model));
+}
+
+TEST_CASE("a covariance that is only just semidefinite is accepted", "[config][model]") {
+  CHECK_NOTHROW(parse_model(edited(good, "[[4.0, 1.0], [1.0, 9.0]]", "[[4, 6], [6, 9]]"), "m"));
+  CHECK_NOTHROW(parse_model(edited(good, "[[4.0, 1.0], [1.0, 9.0]]", "[[0, 0], [0, 0]]"), "m"));
+}
+
+TEST_CASE("the checksum is SHA-256 (FIPS 180-4, examples)", "[config][model]") {
+  CHECK(sha256_hex("") == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  CHECK(sha256_hex("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+TEST_CASE("the spindle model and its run load", "[config][model][data]") {
+  const auto folder = spindle_data();
+  if (!std::filesystem::exists(folder / "static_model.toml")) {
+    std::cout << "skipped: no data in " << folder << '\n';
+    return;
+  }
+  const ThermalModel model = load_model(folder / "static_model.toml");
+  CHECK(model.inputs.size() == 16);
+  CHECK(model.outputs.size() == 5);
+  const RunFile run = load_run(parse_selection((folder / "hours_00_32.csv").string()));
+  CHECK(run.rows() == 7705);
+  for (const std::string& input : model.inputs) CHECK(run.find(input).has_value());
+}

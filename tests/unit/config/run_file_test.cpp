@@ -1,0 +1,155 @@
+#include "config/run_file.hpp"
+
+#include <cmath>
+
+#include "files.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::test;
+
+namespace {
+
+const std::string good =
+    "# measured on a Monday\n"
+    "time_s,t1_degC,z_um,coolant_on\n"
+    "0,20.5,0,0\n"
+    "# a comment between rows\n"
+    "15,,1.25,1\n"
+    "31.5,nan,-2e-3,1\n";
+
+RunFile parse(const std::string& text) {
+  return parse_run(text, "run.csv");
+}
+
+struct BadRun {
+  std::string what;
+  std::string text;
+  int line;
+  std::string key;
+  std::string rule;
+};
+
+}  // namespace
+
+TEST_CASE("a run file is read column by column", "[config][run]") {
+  const RunFile run = parse(good);
+  CHECK(run.columns == std::vector<std::string>{"time_s", "t1_degC", "z_um", "coolant_on"});
+  CHECK(run.rows() == 3);
+  CHECK(run.time_s() == std::vector<double>{0, 15, 31.5});
+  CHECK(run.column("z_um") == std::vector<double>{0, 1.25, -2e-3});
+  CHECK(run.column("t1_degC")[0] == 20.5);
+  CHECK(std::isnan(run.column("t1_degC")[1]));
+  CHECK(std::isnan(run.column("t1_degC")[2]));
+  CHECK(run.find("t2_degC") == std::nullopt);
+  CHECK(run.selected_begin == 0);
+  CHECK(run.selected_end == 3);
+}
+
+TEST_CASE("line ends, byte order mark, blanks and empty last lines do not matter",
+          "[config][run]") {
+  const RunFile run = parse("\xEF\xBB\xBFtime_s, z_um\r\n0, +1\r\n 1 ,NaN\r\n\r\n\n");
+  CHECK(run.columns[1] == "z_um");
+  CHECK(run.rows() == 2);
+  CHECK(run.column("z_um")[0] == 1.0);
+  CHECK(parse("time_s\n0\n1").rows() == 2);
+}
+
+TEST_CASE("each bad run file is refused with file, line, column and rule", "[config][run]") {
+  const std::vector<BadRun> table = {
+      {"nothing", "", 0, "", "no header"},
+      {"comments only", "# a\n# b\n", 0, "", "no header"},
+      {"header only", "time_s,a\n", 0, "", "no row"},
+      {"no time", "t1_degC\n1\n", 1, "time_s", "must be one of the columns"},
+      {"no header", "0,1\n1,2\n", 1, "", "header row"},
+      {"column twice", "time_s,a,a\n0,1,2\n", 1, "column 3", "twice"},
+      {"column without a name", "time_s,,a\n0,1,2\n", 1, "column 2", "name"},
+      {"quoted header", "time_s,\"a\"\n0,1\n", 1, "column 2", "quoted"},
+      {"bar in a name", "time_s,a|b\n0,1\n", 1, "column 2", "name"},
+      {"too few fields", "time_s,a\n0\n", 2, "", "must have 2"},
+      {"too many fields", "time_s,a\n0,1,2\n", 2, "", "must have 2"},
+      {"empty line between rows", "time_s,a\n0,1\n\n1,2\n", 3, "", "must have 2"},
+      {"a word", "time_s,a\n0,hot\n", 2, "a", "finite number"},
+      {"two numbers", "time_s,a\n0,1 2\n", 2, "a", "finite number"},
+      {"decimal comma's remains", "time_s,a\n0,1;5\n", 2, "a", "finite number"},
+      {"quoted number", "time_s,a\n0,\"1\"\n", 2, "a", "quoted"},
+      {"infinite", "time_s,a\n0,inf\n", 2, "a", "finite number"},
+      {"too large for a double", "time_s,a\n0,1e999\n", 2, "a", "finite number"},
+      {"hexadecimal", "time_s,a\n0,0x10\n", 2, "a", "finite number"},
+      {"sign twice", "time_s,a\n0,+-1\n", 2, "a", "finite number"},
+      {"time missing", "time_s,a\n0,1\n,2\n", 3, "time_s", "must not be missing"},
+      {"time not a number", "time_s,a\n0,1\nsoon,2\n", 3, "time_s", "finite number"},
+      {"time stands still", "time_s,a\n0,1\n0,2\n", 3, "time_s", "greater than"},
+      {"time runs backwards", "time_s,a\n5,1\n4,2\n", 3, "time_s", "before (5)"},
+      {"backwards past a comment", "time_s,a\n5,1\n#\n4,2\n", 4, "time_s", "greater than"},
+  };
+  for (const BadRun& bad : table) {
+    const auto problems = problems_of([&] { return parse(bad.text); });
+    INFO(bad.what);
+    REQUIRE(problems.size() == 1);
+    INFO(to_string(problems.front()));
+    CHECK(problems.front().file == "run.csv");
+    CHECK(problems.front().line == bad.line);
+    CHECK(problems.front().key == bad.key);
+    CHECK_THAT(problems.front().rule, Catch::Contains(bad.rule));
+  }
+}
+
+TEST_CASE("several problems of a run file are told at once, but not without end", "[config][run]") {
+  CHECK(problems_of([] { return parse("time_s,a,b\n0,x,y\n0,1\n-1,2,3\n"); }).size() == 4);
+  std::string text = "time_s,a\n";
+  for (int i = 0; i < 1000; ++i) text += std::to_string(i) + ",x\n";
+  CHECK(problems_of([&] { return parse(text); }).size() == 100);
+}
+
+TEST_CASE("writing then reading a run changes no bit", "[config][run]") {
+  RunFile run;
+  run.columns = {"time_s", "a"};
+  run.values = {{0.1, 1.0 / 3.0, 1e9}, {-0.0, std::nan(""), 5e-324}};
+  const RunFile back = parse(write_run(run));
+  CHECK(back.columns == run.columns);
+  CHECK(back.values[0] == run.values[0]);
+  CHECK(std::signbit(back.values[1][0]));
+  CHECK(std::isnan(back.values[1][1]));
+  CHECK(back.values[1][2] == 5e-324);
+  CHECK(write_run(back) == write_run(run));
+}
+
+TEST_CASE("a selection is a half-open interval of time, and the run stays whole", "[config][run]") {
+  const auto selected = [](const std::string& argument) {
+    const RunFile run = parse_run(good, "run.csv", parse_selection(argument));
+    CHECK(run.rows() == 3);
+    return std::pair(run.selected_begin, run.selected_end);
+  };
+  CHECK(selected("run.csv") == std::pair<std::size_t, std::size_t>(0, 3));
+  CHECK(selected("run.csv@:") == std::pair<std::size_t, std::size_t>(0, 3));
+  CHECK(selected("run.csv@15:31.5") == std::pair<std::size_t, std::size_t>(1, 2));
+  CHECK(selected("run.csv@15.1:") == std::pair<std::size_t, std::size_t>(2, 3));
+  CHECK(selected("run.csv@:15") == std::pair<std::size_t, std::size_t>(0, 1));
+  CHECK(selected("run.csv@-5:1e9") == std::pair<std::size_t, std::size_t>(0, 3));
+}
+
+TEST_CASE("the file's name may hold an @", "[config][run]") {
+  CHECK(parse_selection("a@b.csv").file == "a@b.csv");
+  CHECK(parse_selection("a@b.csv@1:2").file == "a@b.csv");
+  CHECK(parse_selection("c:/runs/a@b.csv").file == "c:/runs/a@b.csv");
+}
+
+TEST_CASE("selections that mean nothing are refused", "[config][run]") {
+  for (const char* argument : {"", "run.csv@x:", "run.csv@1:y", "run.csv@5:5", "run.csv@6:5",
+                               "run.csv@nan:5", "run.csv@0:inf", "@1:2"}) {
+    INFO(argument);
+    CHECK(problems_of([&] { return parse_selection(argument); }).size() == 1);
+  }
+  const auto problems =
+      problems_of([] { return parse_run(good, "run.csv", parse_selection("run.csv@100:200")); });
+  REQUIRE(problems.size() == 1);
+  CHECK_THAT(problems.front().rule, Catch::Contains("selects no row"));
+}
+
+TEST_CASE("a column that is asked for and missing is named with its file", "[config][run]") {
+  const RunFile run = parse(good);
+  const auto problems = problems_of([&] { return run.column("t9_degC"); });
+  REQUIRE(problems.size() == 1);
+  CHECK(problems.front().file == "run.csv");
+  CHECK(problems.front().key == "t9_degC");
+}
