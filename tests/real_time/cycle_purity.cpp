@@ -1,0 +1,202 @@
+// 10,000 cycles of the real cycle, with a real Modbus source, history and a reload under way: on
+// its thread nothing is allocated, locked or paged in and nothing but the sleep is asked of the
+// kernel. With --plant it does one such thing on purpose, and must then say so (exit status 1).
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <unistd.h>
+
+#include <sys/mman.h>
+
+#include "daemon/cycle/cycle.hpp"
+#include "daemon/cycle/real_time_thread.hpp"
+#include "daemon/history/history_writer.hpp"
+#include "drivers/controllers/dry_run_controller.hpp"
+#include "drivers/sensors/modbus_source.hpp"
+#include "tests/real_time/thread_watch.hpp"
+
+namespace {
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+constexpr std::uint64_t cycles_before = 300;
+constexpr std::uint64_t cycles_watched = 10'000;
+constexpr std::size_t sensors = 16;
+
+enum class Plant { nothing, allocation, lock, fault, system_call };
+
+/// Called by the cycle like any other source: begins and ends the watch, gives readings that
+/// change, and does what is planted.
+class ProbeSource final : public SensorSource {
+ public:
+  explicit ProbeSource(Plant plant) : plant_(plant) {}
+  void start() override {}
+  void stop() noexcept override {}
+  [[nodiscard]] BusHealth health() const override { return {}; }
+
+  void newest(std::span<Reading> all) noexcept override {
+    ++cycle_;
+    if (cycle_ == cycles_before) test::begin_watch();
+    if (cycle_ == cycles_before + cycles_watched) {
+      counts = test::end_watch();
+      done.store(true);
+    }
+    if (cycle_ == cycles_before + cycles_watched / 2) commit_the_plant();
+    for (std::size_t i = 0; i + 1 < all.size(); ++i)
+      all[i] = {20.0 + 1e-3 * static_cast<double>((cycle_ + i) % 100), nanoseconds(now()),
+                Fault::none};
+  }
+
+  std::atomic<bool> done{false};
+  test::ThreadCounts counts;
+
+ private:
+  static nanoseconds now() noexcept { return std::chrono::steady_clock::now().time_since_epoch(); }
+  void commit_the_plant() noexcept {
+    if (plant_ == Plant::allocation) std::free(std::malloc(64));
+    if (plant_ == Plant::lock) std::lock_guard guard(mutex_);
+    if (plant_ == Plant::system_call) static_cast<void>(::getppid());
+    if (plant_ == Plant::fault) *fresh_page_ = 1;
+  }
+
+  Plant plant_;
+  std::uint64_t cycle_{0};
+  std::mutex mutex_;
+  // Mapped before memory is locked, and nobody has touched it yet.
+  volatile char* fresh_page_{static_cast<volatile char*>(
+      mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0))};
+};
+
+std::string numbered(const char* name, std::size_t index) {
+  std::string text(name);
+  text += std::to_string(index);
+  return text;
+}
+
+std::string input_name(std::size_t block) {
+  std::string text = numbered("b", block);
+  text += "_degC";
+  return text;
+}
+
+EstimatorConfig make_config() {
+  EstimatorConfig config;
+  for (std::size_t i = 0; i < sensors; ++i) {
+    SensorConfig sensor;
+    sensor.name = numbered("s", i);
+    sensor.smoothing.period_s = 0.01;
+    sensor.smoothing.form = i % 2 == 0 ? SmoothingForm::sliding_line : SmoothingForm::line_of_lines;
+    config.sensors.push_back(sensor);
+    // The last sensor is on the Modbus line, where nobody answers; it shares a block.
+    if (i % 2 == 1) config.blocks.push_back({numbered("b", i / 2), input_name(i / 2), {i - 1, i}});
+  }
+  config.axes.push_back({"x", "x_um", 1.0, {}});
+  config.axes.push_back({"y", "y_um", 1.0, {}});
+  config.axes.push_back({"z", "z_um", 1.0, {}});
+  return config;
+}
+
+ThermalModel make_model(double gain_um_per_K) {
+  ThermalModel model;
+  for (std::size_t i = 0; i < sensors / 2; ++i) model.inputs.push_back(input_name(i));
+  model.outputs = {"x_um", "y_um", "z_um"};
+  model.matrix_um_per_K.assign(3, std::vector<double>(sensors / 2, gain_um_per_K));
+  model.terms.push_back(
+      {"thermal_lag", "b0_degC", {{"tau_s", 5.0}}, {{"gain_um_per_K", {{"x_um", 1.0}}}}});
+  return model;
+}
+
+ModbusBusConfig silent_line() {
+  ModbusBusConfig bus;
+  bus.name = "line";
+  bus.line.link = ModbusTcp{"127.0.0.1", 9};
+  ModbusDeviceConfig device;
+  device.name = "module";
+  ModbusChannel channel;
+  channel.sensor = sensors - 1;
+  device.channels.push_back(channel);
+  bus.devices.push_back(device);
+  return bus;
+}
+
+Plant plant_from(int argc, char** argv) {
+  const std::string name = argc > 2 ? argv[2] : "";
+  if (argc == 1) return Plant::nothing;
+  if (name == "allocation") return Plant::allocation;
+  if (name == "lock") return Plant::lock;
+  if (name == "fault") return Plant::fault;
+  if (name == "system_call") return Plant::system_call;
+  std::fprintf(stderr, "usage: cycle_purity [--plant allocation|lock|fault|system_call]\n");
+  std::exit(2);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ProbeSource probe(plant_from(argc, argv));
+  ModbusSource line(silent_line());
+  DryRunController controller({"none", 3});
+  const Grid grid{std::chrono::steady_clock::now().time_since_epoch(), 1ms};
+  char folder[] = "/tmp/cycle_purity_XXXXXX";
+  if (mkdtemp(folder) == nullptr) return 2;
+  HistoryConfig history_config;
+  history_config.file = std::filesystem::path(folder) / "history.db";
+  history_config.commit_s = 0.5;
+  HistoryWriter history(history_config, grid, "test");
+  const auto make_brain = [&](double gain_um_per_K) {
+    auto brain = std::make_unique<CycleBrain>(Estimator(make_config(), make_model(gain_um_per_K)));
+    brain->recorder = history.make_recorder({"", "", ""}, brain->estimator);
+    return brain;
+  };
+  Cycle cycle(grid, {&probe, &line}, controller, sensors, make_brain(2.0));
+  history.start();
+  line.start();
+  controller.start();
+  for (const std::string& warning : {lock_memory()})
+    if (!warning.empty()) std::printf("note: %s\n", warning.c_str());
+  RealTimeThread thread;
+  const std::string no_fifo = thread.start({60, -1}, [&] { cycle.run(); });
+  if (!no_fifo.empty()) std::printf("note: %s\n", no_fifo.c_str());
+
+  // Main does its part meanwhile: commands, a reload, reading reports.
+  std::this_thread::sleep_for(2s);
+  bool sent = cycle.send({CommandKind::disable, 0, 0.0});
+  auto next = make_brain(3.0);
+  next->estimator.plan_adoption(cycle.brain().estimator);
+  cycle.hand_over(std::move(next));
+  std::this_thread::sleep_for(1s);
+  const bool reloaded = cycle.take_retired() != nullptr;
+  sent = cycle.send({CommandKind::enable, 0, 0.0}) && sent;
+  sent = cycle.send({CommandKind::prove, 0, 5.0}) && sent;
+  while (!probe.done.load()) {
+    static_cast<void>(cycle.report());
+    std::this_thread::sleep_for(50ms);
+  }
+  cycle.stop();
+  thread.join();
+  line.stop();
+  history.stop();
+  std::filesystem::remove_all(folder);
+
+  const test::ThreadCounts& counts = probe.counts;
+  std::printf("%llu cycles: %llu allocations, %llu locks, %llu system calls, %lld page faults\n",
+              static_cast<unsigned long long>(cycles_watched),
+              static_cast<unsigned long long>(counts.allocations),
+              static_cast<unsigned long long>(counts.locks),
+              static_cast<unsigned long long>(counts.system_calls),
+              static_cast<long long>(counts.page_faults));
+  if (!sent || !reloaded) {
+    std::printf("the reload or a command was not taken\n");
+    return 3;
+  }
+  return counts.allocations + counts.locks + counts.system_calls == 0 && counts.page_faults == 0
+             ? 0
+             : 1;
+}
