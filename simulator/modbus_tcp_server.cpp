@@ -15,7 +15,7 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t unsent_bytes_max = 256 * 1024;
+constexpr std::size_t unsent_bytes_max = 262144;
 
 nanoseconds from_ms(double ms) {
   return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double, std::milli>(ms));

@@ -1,4 +1,4 @@
-"""Sensors and controller read by mbpoll and by raw bytes, and everything the script can do to them."""
+"""Sensors and controller read by mbpoll and by raw bytes, and all that the script does to them."""
 
 import random
 import socket

@@ -87,7 +87,8 @@ def test_a_missing_value_of_a_replayed_row_is_an_open_circuit(simulate, tmp_path
 
 def test_plant_time_goes_by_the_factor_and_ends_by_itself(simulate, tmp_path):
     truth = tmp_path / "truth.csv"
-    machine = MACHINE.replace("capacity_J_per_K = 1000", "capacity_J_per_K = 1000\nroom_W_per_K = 1")
+    machine = MACHINE.replace("capacity_J_per_K = 1000",
+                              "capacity_J_per_K = 1000\nroom_W_per_K = 1")
     machine += '[[source]]\nnode = "spindle"\nsignal = "spindle_rpm"\nheat_W = 3\nat = 6000\n'
     simulator = simulate(machine, "--time-factor", 3600, "--duration", 1.0, "--truth", truth,
                          "--ports-file", tmp_path / "ports.json")
