@@ -80,7 +80,8 @@ start_daemon() {
   [[ -n $sensors_port && -n $controller_port ]] || fail "no ports in $out/ports.json"
   cp config/demo/model.toml "$out/model.toml"
   sed -e "s/^port = 15020\$/port = $sensors_port/" -e "s/^port = 15030\$/port = $controller_port/" \
-    -e "s#\"demo_output/\(status.sock\|column_line\)\"#\"$run/\1\"#" -e "s#\"demo_output/#\"#" \
+    -e "s#^device = \"/.*\"#device = \"$run/column_line\"#" \
+    -e "s#\"demo_output/status.sock\"#\"$run/status.sock\"#" -e "s#\"demo_output/#\"#" \
     config/demo/thermocompd.toml >"$out/thermocompd.toml"
   "$bin/thermocompd" "$out/thermocompd.toml" >"$out/thermocompd.log" 2>&1 &
   daemon_pid=$!
