@@ -188,8 +188,9 @@ void Daemon::Parts::supervise() {
   bool stopping = false;
   while (!stopping) {
     pollfd files[] = {{signals, POLLIN, 0}, {server->fd(), POLLIN, 0}};
+    // Rounded up: a rest of a millisecond must be slept, not spun through.
     const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(next_tick - Clock::now()).count();
+        std::chrono::ceil<std::chrono::milliseconds>(next_tick - Clock::now()).count();
     const int ready = poll(files, 2, static_cast<int>(std::clamp<std::int64_t>(left, 0, 100)));
     if (ready < 0 && errno != EINTR)
       throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
