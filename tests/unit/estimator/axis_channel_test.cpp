@@ -1,0 +1,293 @@
+#include "estimator/axis_channel.hpp"
+
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+AxisConfig axis_of(double offset_um_max = 50, double rate_um_per_s_max = 2) {
+  return {"z", "z_um", 1.0, {offset_um_max, rate_um_per_s_max}};
+}
+
+/// An axis and the controller it talks to, stepped every 0.1 s.
+struct Bench {
+  explicit Bench(bool reads_back = true, const AxisConfig& axis = axis_of(),
+                 const CompensationConfig& compensation = {})
+      : channel(axis, compensation, reads_back) {
+    input.dt_s = 0.1;
+    input.link_epoch = 1;
+    input.online = true;
+    input.applied_um = 0.0;
+  }
+  /// The controller applies what it was sent in the step before.
+  void step(double target_um) {
+    if (obeys && channel.driven()) input.applied_um = channel.offset_um();
+    input.now += 100ms;
+    input.target_um = target_um;
+    channel.step(input);
+  }
+  void steps(int count, double target_um) {
+    for (int i = 0; i < count; ++i) step(target_um);
+  }
+  AxisInput input;
+  AxisChannel channel;
+  bool obeys{true};
+};
+
+}  // namespace
+
+TEST_CASE("an axis is not driven before the controller has told what it applies", "[axis]") {
+  Bench bench;
+  bench.obeys = false;
+  bench.input.online = false;
+  bench.steps(5, 30.0);
+  CHECK_FALSE(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 0.0);
+  bench.input.online = true;
+  bench.input.applied_um = not_a_number;
+  bench.steps(5, 30.0);
+  CHECK_FALSE(bench.channel.synced());
+  bench.input.applied_um = 12.0;
+  bench.step(30.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == Approx(12.2));  // from what is applied, at the rate
+}
+
+TEST_CASE("an axis of a link that was never connected is not driven", "[axis]") {
+  for (const bool reads_back : {true, false}) {
+    Bench bench(reads_back);
+    bench.input.link_epoch = 0;
+    bench.steps(5, 30.0);
+    CHECK_FALSE(bench.channel.driven());
+    CHECK(bench.channel.offset_um() == 0.0);
+  }
+}
+
+TEST_CASE("a controller that does not read back is driven from what was sent last", "[axis]") {
+  Bench bench(false);
+  bench.channel.restore(8.0);
+  bench.input.applied_um = not_a_number;
+  bench.step(8.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 8.0);
+  CHECK(std::isnan(bench.channel.applied_um()));
+  bench.input.link_epoch = 2;
+  bench.steps(3, 8.0);
+  CHECK(bench.channel.offset_um() == 8.0);
+}
+
+TEST_CASE("a new epoch starts from the read-back, not from what was sent", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  REQUIRE(bench.channel.offset_um() == 10.0);
+  bench.input.online = false;
+  bench.input.link_epoch = 2;
+  bench.step(10.0);
+  CHECK_FALSE(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 10.0);
+  bench.obeys = false;
+  bench.input.online = true;
+  bench.input.applied_um = 3.0;
+  bench.step(10.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == Approx(3.2));
+  CHECK_FALSE(bench.channel.mismatch());
+}
+
+TEST_CASE("a restored offset that is out of date gives way to the read-back", "[axis]") {
+  Bench bench;
+  bench.channel.restore(40.0);
+  bench.input.applied_um = -5.0;
+  bench.obeys = false;
+  bench.step(40.0);
+  CHECK(bench.channel.offset_um() == Approx(-4.8));
+}
+
+TEST_CASE("a restored offset that no configuration allows is not taken", "[axis]") {
+  for (const double offset_um : {501.0, -1e9, not_a_number}) {
+    Bench bench(false);
+    bench.channel.restore(offset_um);
+    CHECK(bench.channel.offset_um() == 0.0);
+  }
+}
+
+TEST_CASE("a re-homed controller is followed at once, and the mismatch is told", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  CHECK_FALSE(bench.channel.mismatch());
+  bench.obeys = false;
+  bench.input.applied_um = 0.0;
+  bench.step(10.0);
+  CHECK(bench.channel.mismatch());
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == Approx(0.2));
+  bench.obeys = true;
+  bench.steps(29, 10.0);
+  CHECK(bench.channel.mismatch());  // told for mismatch_after_s
+  bench.steps(40, 10.0);
+  CHECK_FALSE(bench.channel.mismatch());
+  CHECK(bench.channel.offset_um() == 10.0);
+}
+
+TEST_CASE("a read-back that is late, but of what was sent, is no mismatch", "[axis]") {
+  Bench bench;
+  bench.steps(50, 5.0);
+  bench.obeys = false;  // the read-back stands still while the offset goes on
+  const double before_um = bench.channel.offset_um();
+  for (int i = 0; i < 20; ++i) bench.step(20.0);
+  CHECK_FALSE(bench.channel.mismatch());
+  CHECK(bench.channel.offset_um() > before_um + 3.9);
+}
+
+TEST_CASE("a controller that ignores what it is sent becomes a mismatch", "[axis]") {
+  Bench bench;
+  bench.steps(10, 0.0);
+  bench.obeys = false;
+  bench.steps(60, 50.0);
+  CHECK(bench.channel.mismatch());
+  CHECK(bench.channel.offset_um() < 50.0);
+}
+
+TEST_CASE("a read-back beyond the bound is not driven until it is back", "[axis]") {
+  Bench bench;
+  bench.steps(10, 1.0);
+  bench.obeys = false;
+  for (const double applied_um : {50.2, -400.0, 1e30}) {
+    bench.input.applied_um = applied_um;
+    bench.step(1.0);
+    CHECK(bench.channel.out_of_bound());
+    CHECK_FALSE(bench.channel.driven());
+    CHECK(std::abs(bench.channel.offset_um()) <= 50.0);
+  }
+  bench.input.applied_um = 49.0;
+  bench.step(49.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 49.0);
+}
+
+TEST_CASE("a read-back rounded just beyond the bound is the bound", "[axis]") {
+  Bench bench;
+  bench.obeys = false;
+  bench.input.applied_um = 50.05;
+  bench.step(50.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 50.0);
+}
+
+TEST_CASE("a read-back that is no number changes nothing once in agreement", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  bench.input.applied_um = not_a_number;
+  bench.steps(50, 12.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 12.0);
+}
+
+TEST_CASE("while the controller is silent the offset goes on without comparison", "[axis]") {
+  Bench bench;
+  bench.steps(10, 0.0);
+  bench.obeys = false;
+  bench.input.online = false;
+  bench.input.applied_um = 33.0;
+  bench.steps(10, 1.0);
+  CHECK(bench.channel.driven());
+  CHECK_FALSE(bench.channel.mismatch());
+  CHECK(bench.channel.offset_um() == 1.0);
+}
+
+TEST_CASE("the surface-aware hold keeps the offset while cutting", "[axis]") {
+  Bench bench;
+  bench.steps(10, 1.0);
+  bench.input.may_change = false;
+  bench.steps(50, 9.0);
+  CHECK(bench.channel.offset_um() == 1.0);
+  CHECK(bench.channel.target_um() == 9.0);
+  bench.input.may_change = true;
+  bench.step(9.0);
+  CHECK(bench.channel.offset_um() == Approx(1.2));
+}
+
+TEST_CASE("a proving move goes out and back and ends where it began", "[axis]") {
+  Bench bench;
+  bench.steps(50, 4.0);
+  bench.channel.prove(6.0);
+  CHECK(bench.channel.proving());
+  double largest_um = 0.0;
+  int steps = 0;
+  double before_um = bench.channel.offset_um();
+  while (bench.channel.proving() && steps < 1000) {
+    bench.step(-30.0);  // the compensation waits
+    if (bench.channel.proving()) CHECK(bench.channel.offset_um() >= 4.0);
+    CHECK(std::abs(bench.channel.offset_um() - before_um) <= 0.2 + 1e-12);
+    before_um = bench.channel.offset_um();
+    largest_um = std::max(largest_um, before_um);
+    ++steps;
+  }
+  CHECK(largest_um == 10.0);
+  CHECK(bench.channel.offset_um() == 4.0);
+  CHECK(steps >= 30 + 30 + 30);  // 3 s out, 3 s there, 3 s back
+  bench.step(-30.0);
+  CHECK(bench.channel.offset_um() == Approx(3.8));
+}
+
+TEST_CASE("a proving move stays within the bound", "[axis]") {
+  Bench bench(true, axis_of(5, 10));
+  bench.steps(20, 4.0);
+  bench.channel.prove(9.0);
+  double largest_um = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    bench.step(not_a_number);
+    largest_um = std::max(largest_um, bench.channel.offset_um());
+  }
+  CHECK(largest_um == 5.0);
+  CHECK(bench.channel.offset_um() == 4.0);
+  CHECK_FALSE(bench.channel.proving());
+}
+
+TEST_CASE("a proving move that is too long, no number or of an axis not driven is ignored",
+          "[axis]") {
+  Bench bench;
+  bench.channel.prove(5.0);
+  CHECK_FALSE(bench.channel.proving());
+  bench.step(0.0);
+  for (const double move_um : {10.1, -10.1, not_a_number}) {
+    bench.channel.prove(move_um);
+    CHECK_FALSE(bench.channel.proving());
+  }
+  bench.channel.prove(-10.0);
+  CHECK(bench.channel.proving());
+}
+
+TEST_CASE("losing the link ends a proving move", "[axis]") {
+  Bench bench;
+  bench.steps(5, 0.0);
+  bench.channel.prove(5.0);
+  bench.steps(5, 0.0);
+  bench.input.link_epoch = 2;
+  bench.input.online = false;
+  bench.step(0.0);
+  CHECK_FALSE(bench.channel.proving());
+}
+
+TEST_CASE("after a reload the axis goes on from where it is", "[axis]") {
+  Bench before;
+  before.steps(300, 40.0);
+  Bench after(true, axis_of(10, 2));
+  after.channel.adopt(before.channel);
+  after.input = before.input;
+  CHECK(after.channel.driven());
+  double last_um = 40.0;
+  for (int i = 0; i < 150; ++i) {
+    after.step(40.0);
+    CHECK(after.channel.offset_um() == Approx(std::max(10.0, last_um - 0.2)));
+    last_um = after.channel.offset_um();
+  }
+  CHECK(last_um == 10.0);
+  CHECK(after.channel.driven());
+  CHECK_FALSE(after.channel.mismatch());
+}

@@ -1,0 +1,221 @@
+#include "estimator/displacement_model.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "estimator/checks.hpp"
+#include "estimator/estimator_config.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+using Vector = std::vector<double>;
+
+ThermalModel two_by_two() {
+  ThermalModel model;
+  model.inputs = {"t1_degC", "t2_degC"};
+  model.outputs = {"x_um", "z_um"};
+  model.matrix_um_per_K = {{5.0, 0.5}, {-2.0, 3.0}};
+  return model;
+}
+
+ThermalModel without_matrix(const std::vector<std::string>& outputs = {"z_um"}) {
+  ThermalModel model;
+  model.inputs = {"t1_degC"};
+  model.outputs = outputs;
+  model.matrix_um_per_K.assign(outputs.size(), {0.0});
+  return model;
+}
+
+Vector displacement(DisplacementModel& model, nanoseconds now, const Vector& temps_degC,
+                    const Vector& reference_degC, const Vector& signals, std::size_t outputs) {
+  Vector out(outputs, 99.0);
+  model.step(now, temps_degC, reference_degC, signals, out);
+  return out;
+}
+
+/// One output, reference 0: what it is at `now`.
+double single(DisplacementModel& model, nanoseconds now, const Vector& temps_degC,
+              const Vector& signals = {}) {
+  return displacement(model, now, temps_degC, Vector(temps_degC.size(), 0.0), signals, 1)[0];
+}
+
+}  // namespace
+
+TEST_CASE("the displacement is the matrix times the rise over the reference", "[displacement]") {
+  DisplacementModel model(two_by_two());
+  CHECK(displacement(model, 1s, {22.0, 24.0}, {20.0, 20.0}, {}, 2) == Vector{12.0, 8.0});
+  CHECK(displacement(model, 2s, {20.0, 20.0}, {20.0, 20.0}, {}, 2) == Vector{0.0, 0.0});
+  CHECK(displacement(model, 3s, {19.0, 20.0}, {20.0, 20.0}, {}, 2) == Vector{-5.0, 2.0});
+}
+
+TEST_CASE("a guideway's row is that of the position: at nodes, between, and beyond the ends",
+          "[displacement]") {
+  ThermalModel spec = two_by_two();
+  spec.guideways = {
+      {"column", "y_mm", {0.0, 100.0, 400.0}, {{"z_um", {{1.0, 0.0}, {3.0, 10.0}, {-3.0, 40.0}}}}}};
+  DisplacementModel model(spec);
+  const auto z_um = [&](double y_mm) {
+    return displacement(model, 1s, {1.0, 2.0}, {0.0, 0.0}, {y_mm}, 2);
+  };
+  // The matrix alone gives x = 6, z = 4; the rows give 1, 23, 77.
+  CHECK(z_um(0.0) == Vector{6.0, 5.0});
+  CHECK(z_um(100.0) == Vector{6.0, 27.0});
+  CHECK(z_um(400.0) == Vector{6.0, 81.0});
+  CHECK(z_um(50.0)[1] == Approx(4.0 + 12.0));
+  CHECK(z_um(200.0)[1] == Approx(4.0 + 23.0 + (77.0 - 23.0) / 3));
+  CHECK(z_um(-1000.0)[1] == Approx(5.0));
+  CHECK(z_um(1e6)[1] == Approx(81.0));
+}
+
+TEST_CASE("a lag follows a step exactly, whatever the steps of time", "[displacement]") {
+  // d = g (LP(T) - T): after a step of 10 K it is -g 10 exp(-t / tau).
+  ThermalModel spec = without_matrix();
+  spec.terms = {
+      {"thermal_lag", "t1_degC", {{"tau_s", 900.0}}, {{"gain_um_per_K", {{"z_um", 1.2}}}}}};
+  for (const int step_s : {1, 7, 60, 899, 5000}) {
+    DisplacementModel model(spec);
+    CHECK(single(model, 0s, {0.0}) == 0.0);
+    // The input of a step is taken as constant over it.
+    int time_s = 0;
+    for (int i = 0; i < 20; ++i) {
+      time_s += step_s;
+      CHECK(single(model, std::chrono::seconds(time_s), {10.0}) ==
+            Approx(-12.0 * std::exp(-time_s / 900.0)).margin(1e-12));
+    }
+  }
+}
+
+TEST_CASE("a lag at irregular steps is the analytic one too", "[displacement]") {
+  ThermalModel spec = without_matrix();
+  spec.terms = {
+      {"thermal_lag", "t1_degC", {{"tau_s", 100.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}}};
+  DisplacementModel model(spec);
+  single(model, 0s, {0.0});
+  double time_s = 0.0;
+  for (const int step_ms : {1, 40, 40, 12000, 5, 333333, 10}) {
+    time_s += 1e-3 * step_ms;
+    const auto now = std::chrono::duration_cast<nanoseconds>(seconds_d(time_s));
+    CHECK(single(model, now, {1.0}) == Approx(-std::exp(-time_s / 100.0)).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("a missing heat source warms with the signal, linear or squared", "[displacement]") {
+  for (const double power : {1.0, 2.0}) {
+    ThermalModel spec = without_matrix();
+    spec.terms = {{"missing_heat_source",
+                   "spindle_rpm",
+                   {{"tau_s", 1800.0}, {"power", power}},
+                   {{"gain_um_per_unit", {{"z_um", 0.004}}}}}};
+    DisplacementModel model(spec);
+    CHECK(single(model, 0s, {20.0}, {0.0}) == 0.0);
+    const double heat = std::pow(3000.0, power);
+    for (int i = 1; i <= 50; ++i)
+      CHECK(single(model, i * 120s, {20.0}, {3000.0}) ==
+            Approx(0.004 * heat * -std::expm1(-120.0 * i / 1800.0)));
+  }
+}
+
+TEST_CASE("a missing temperature acts at once without tau_s and late with it", "[displacement]") {
+  for (const double tau_s : {0.0, 600.0}) {
+    ThermalModel spec = without_matrix();
+    spec.terms = {{"missing_temperature",
+                   "room_degC",
+                   {{"tau_s", tau_s}},
+                   {{"gain_um_per_K", {{"z_um", -3.0}}}}}};
+    REQUIRE(spec.temperature_columns() == std::vector<std::string>{"t1_degC", "room_degC"});
+    DisplacementModel model(spec);
+    CHECK(single(model, 0s, {5.0, 0.0}) == 0.0);
+    for (int i = 1; i <= 20; ++i) {
+      const double share = tau_s > 0 ? -std::expm1(-30.0 * i / tau_s) : 1.0;
+      CHECK(single(model, i * 30s, {5.0, 2.0}) == Approx(-6.0 * share));
+    }
+  }
+}
+
+TEST_CASE("speed growth follows the squared speed at once", "[displacement]") {
+  ThermalModel spec = without_matrix();
+  spec.terms = {{"speed_growth", "spindle_rpm", {}, {{"gain_um_per_unit2", {{"z_um", 1e-7}}}}}};
+  DisplacementModel model(spec);
+  CHECK(single(model, 0s, {0.0}, {10000.0}) == Approx(10.0));
+  CHECK(single(model, 1s, {0.0}, {-2000.0}) == Approx(0.4));
+  CHECK(single(model, 2s, {0.0}, {0.0}) == 0.0);
+}
+
+TEST_CASE("a term acts on the outputs it names, in their order", "[displacement]") {
+  ThermalModel spec = without_matrix({"x_um", "y_um", "z_um"});
+  spec.terms = {{"speed_growth",
+                 "spindle_rpm",
+                 {},
+                 {{"gain_um_per_unit2", {{"z_um", 3.0}, {"x_um", -1.0}}}}}};
+  DisplacementModel model(spec);
+  CHECK(displacement(model, 0s, {0.0}, {0.0}, {2.0}, 3) == Vector{-4.0, 0.0, 12.0});
+}
+
+TEST_CASE("a restart starts the lags at their input's value", "[displacement]") {
+  ThermalModel spec = without_matrix();
+  spec.terms = {
+      {"thermal_lag", "t1_degC", {{"tau_s", 900.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}}};
+  DisplacementModel model(spec);
+  single(model, 0s, {0.0});
+  CHECK(single(model, 1s, {10.0}) < -9.0);
+  model.restart();
+  CHECK(single(model, 2s, {10.0}) == 0.0);
+}
+
+TEST_CASE("a reloaded model keeps the past of the terms that are the same", "[displacement]") {
+  ThermalModel spec = without_matrix();
+  const TermSpec slow{
+      "thermal_lag", "t1_degC", {{"tau_s", 900.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}};
+  const TermSpec fast{
+      "thermal_lag", "t1_degC", {{"tau_s", 10.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}};
+  spec.terms = {fast, slow};
+  DisplacementModel before(spec);
+  single(before, 0s, {0.0});
+  single(before, 100s, {10.0});
+
+  SECTION("with a new gain, at another place in the file") {
+    TermSpec stronger = slow;
+    stronger.per_output["gain_um_per_K"]["z_um"] = 2.0;
+    spec.terms = {stronger};
+    DisplacementModel after(spec);
+    const auto plan = after.plan_terms(before);
+    CHECK(plan == std::vector<int>{1});
+    after.adopt_terms(before, plan);
+    CHECK(single(after, 200s, {10.0}) == Approx(-20.0 * std::exp(-200.0 / 900.0)));
+  }
+  SECTION("a term with another time constant starts anew") {
+    TermSpec other = slow;
+    other.shared["tau_s"] = 901.0;
+    spec.terms = {other};
+    DisplacementModel after(spec);
+    CHECK(after.plan_terms(before) == std::vector<int>{-1});
+    after.adopt_terms(before, after.plan_terms(before));
+    CHECK(single(after, 200s, {10.0}) == 0.0);
+  }
+}
+
+TEST_CASE("a model whose shapes or names do not fit is refused", "[displacement]") {
+  const auto refused = [](auto change) {
+    ThermalModel model = two_by_two();
+    model.guideways = {{"g", "y_mm", {0.0, 1.0}, {{"z_um", {{0, 0}, {0, 0}}}}}};
+    change(model);
+    CHECK_THROWS_AS(DisplacementModel(model), InvalidValue);
+  };
+  refused([](ThermalModel& model) { model.matrix_um_per_K.pop_back(); });
+  refused([](ThermalModel& model) { model.matrix_um_per_K[1].push_back(1.0); });
+  refused([](ThermalModel& model) { model.guideways[0].positions_mm = {0.0}; });
+  refused([](ThermalModel& model) { model.guideways[0].positions_mm = {1.0, 1.0}; });
+  refused([](ThermalModel& model) { model.guideways[0].rows_um_per_K["z_um"].pop_back(); });
+  refused([](ThermalModel& model) { model.guideways[0].rows_um_per_K["q_um"] = {{0, 0}, {0, 0}}; });
+  refused([](ThermalModel& model) { model.terms = {{"magic", "t1_degC", {}, {}}}; });
+  refused([](ThermalModel& model) { model.terms = {{"thermal_lag", "t1_degC", {}, {}}}; });
+  refused([](ThermalModel& model) {
+    model.terms = {
+        {"thermal_lag", "t9_degC", {{"tau_s", 1.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}}};
+  });
+}

@@ -1,0 +1,460 @@
+#include "estimator/estimator.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "estimator/checks.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+/// Two blocks, one axis z, spindle speed with growth; smoothing off so that figures are plain.
+EstimatorConfig small_config() {
+  EstimatorConfig config;
+  for (const char* name : {"s1", "s2"}) {
+    SensorConfig sensor;
+    sensor.name = name;
+    sensor.smoothing.form = SmoothingForm::off;
+    config.sensors.push_back(sensor);
+  }
+  config.blocks = {{"head", "t1_degC", {0}}, {"column", "t2_degC", {1}}};
+  config.signals = {"spindle_rpm", "cutting_on", "compensation_off_on"};
+  config.axes = {{"z", "z_um", 1.0, {50.0, 10.0}}};
+  config.compensation.disable_signal = "compensation_off_on";
+  return config;
+}
+
+ThermalModel small_model() {
+  ThermalModel model;
+  model.inputs = {"t1_degC", "t2_degC"};
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {{5.0, 1.0}};
+  return model;
+}
+
+ThermalModel model_with_growth() {
+  ThermalModel model = small_model();
+  model.terms = {{"speed_growth", "spindle_rpm", {}, {{"gain_um_per_unit2", {{"z_um", 1e-7}}}}}};
+  return model;
+}
+
+/// An estimator with a controller that applies at once; one step is 1 s.
+struct Machine {
+  explicit Machine(const EstimatorConfig& config = small_config(),
+                   const ThermalModel& model = small_model())
+      : estimator(config, model), readings(config.sensors.size()) {
+    controller.link_epoch = 1;
+    controller.online = true;
+    controller.applied_um[0] = 0.0;
+    controller.signals[0] = 0.0;
+    controller.signals[1] = 0.0;
+    controller.signals[2] = 0.0;
+  }
+  void step(const std::vector<double>& temps_degC) {
+    now += 1s;
+    for (std::size_t i = 0; i < temps_degC.size(); ++i)
+      readings[i] = {temps_degC[i], now,
+                     std::isnan(temps_degC[i]) ? Fault::open_circuit : Fault::none};
+    controller.taken_at = now;
+    estimator.step(now, readings, controller, command);
+    if (controller.online && command.valid[0]) controller.applied_um[0] = command.offset_um[0];
+  }
+  void steps(int count, const std::vector<double>& temps_degC) {
+    for (int i = 0; i < count; ++i) step(temps_degC);
+  }
+  [[nodiscard]] Report report() const { return estimator.make_report(); }
+  [[nodiscard]] bool says(Reason reason) const { return has_reason(report().reasons, reason); }
+  [[nodiscard]] double offset_um() const { return command.offset_um[0]; }
+
+  Estimator estimator;
+  std::vector<Reading> readings;
+  ControllerState controller;
+  OffsetCommand command;
+  nanoseconds now{};
+};
+
+void reload(Machine& machine, const EstimatorConfig& config, const ThermalModel& model) {
+  Estimator next(config, model);
+  next.plan_adoption(machine.estimator);
+  next.adopt(machine.estimator);
+  machine.estimator = std::move(next);
+}
+
+constexpr double lost = not_a_number;
+
+}  // namespace
+
+TEST_CASE("the reference is the first valid sample and stays", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, lost});
+  CHECK(machine.report().mode == Mode::starting);
+  CHECK(machine.says(Reason::no_reference));
+  CHECK(machine.says(Reason::block_lost));
+  CHECK(machine.offset_um() == 0.0);
+  machine.step({20.5, 30.0});
+  CHECK(machine.report().inputs[0].reference_degC == 20.0);
+  CHECK(machine.report().inputs[1].reference_degC == 30.0);
+  machine.steps(10, {21.0, 31.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.report().reasons == 0);
+  CHECK(machine.report().inputs[0].reference_degC == 20.0);
+  // 5 x 1 K + 1 x 1 K: the offset is its negative.
+  CHECK(machine.offset_um() == -6.0);
+  CHECK(machine.report().axes[0].displacement_um == 6.0);
+}
+
+TEST_CASE("an axis that the controller counts the other way gets the other sign", "[estimator]") {
+  auto config = small_config();
+  config.axes[0].sign = -1.0;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 31.0});
+  CHECK(machine.offset_um() == 6.0);
+}
+
+TEST_CASE("a reference in the model file is used as it stands", "[estimator]") {
+  auto model = small_model();
+  model.reference_degC = {20.0, 20.0};
+  Machine machine(small_config(), model);
+  machine.steps(10, {21.0, 22.0});
+  CHECK(machine.offset_um() == -7.0);
+}
+
+TEST_CASE("a commanded reference makes the present state the straight one", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 31.0});
+  machine.estimator.apply({CommandKind::reference, 0, 0.0});
+  machine.steps(10, {21.0, 31.0});
+  CHECK(machine.offset_um() == 0.0);
+  CHECK(machine.report().inputs[0].reference_degC == 21.0);
+}
+
+TEST_CASE("a reference is not taken while a block is lost", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, lost});
+  machine.estimator.apply({CommandKind::reference, 0, 0.0});
+  machine.step({21.0, lost});
+  CHECK(machine.report().inputs[0].reference_degC == 20.0);
+}
+
+TEST_CASE("a sampled reference takes the running spindle as part of the straight state",
+          "[estimator]") {
+  Machine machine(small_config(), model_with_growth());
+  machine.controller.signals[0] = 10000.0;
+  machine.steps(10, {20.0, 30.0});
+  CHECK(machine.offset_um() == 0.0);
+  CHECK(machine.report().signals[0].reference == 10000.0);
+  machine.controller.signals[0] = 0.0;
+  machine.steps(10, {20.0, 30.0});
+  CHECK(machine.offset_um() == Approx(10.0));
+}
+
+TEST_CASE("a reference in the model file means a machine at rest", "[estimator]") {
+  auto model = model_with_growth();
+  model.reference_degC = {20.0, 30.0};
+  Machine machine(small_config(), model);
+  machine.controller.signals[0] = 10000.0;
+  machine.steps(10, {20.0, 30.0});
+  CHECK(machine.offset_um() == Approx(-10.0));
+}
+
+TEST_CASE("a reference commanded while the controller is silent waits for its signals",
+          "[estimator]") {
+  Machine machine(small_config(), model_with_growth());
+  machine.controller.signals[0] = 10000.0;
+  machine.steps(10, {20.0, 30.0});
+  machine.controller.online = false;
+  machine.step({20.0, 30.0});
+  machine.estimator.apply({CommandKind::reference, 0, 0.0});
+  machine.steps(3, {20.0, 30.0});
+  machine.controller.online = true;
+  machine.controller.signals[0] = 0.0;
+  machine.steps(3, {20.0, 30.0});
+  CHECK(machine.report().signals[0].reference == 0.0);
+  CHECK(machine.offset_um() == 0.0);
+}
+
+TEST_CASE("a signal that is missing or garbled holds the offset and leaves nothing behind",
+          "[estimator]") {
+  auto model = small_model();
+  model.terms = {{"missing_heat_source",
+                  "spindle_rpm",
+                  {{"tau_s", 60.0}, {"power", 2.0}},
+                  {{"gain_um_per_unit", {{"z_um", 1e-7}}}}}};
+  Machine machine(small_config(), model);
+  machine.step({20.0, 30.0});
+  machine.steps(5, {21.0, 30.0});
+  for (const double garbage : {not_a_number, 3e38, -1e200, 1e300}) {
+    machine.controller.signals[0] = garbage;
+    machine.steps(3, {22.0, 30.0});
+    CHECK(machine.says(Reason::signal_lost));
+    CHECK(machine.report().mode == Mode::holding);
+    CHECK(machine.offset_um() == -5.0);
+  }
+  machine.controller.signals[0] = 0.0;
+  machine.steps(3, {21.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == -5.0);
+}
+
+TEST_CASE("lost data hold the offset; it goes on from there when they return", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 30.0});
+  machine.steps(5, {21.0, lost});
+  CHECK(machine.report().mode == Mode::compensating);  // the last good reading still serves
+  machine.steps(1000, {lost, lost});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::block_lost));
+  CHECK(machine.offset_um() == -5.0);
+  machine.step({22.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == -10.0);
+}
+
+TEST_CASE("the ramp policy holds for hold_s, then goes to zero at the slew rate", "[estimator]") {
+  auto config = small_config();
+  config.compensation.on_loss = LossPolicy::ramp_to_zero;
+  config.compensation.hold_s = 30;
+  config.axes[0].limiter.rate_um_per_s_max = 1.0;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, 30.0});
+  REQUIRE(machine.offset_um() == -5.0);
+  int held = 0;
+  while (machine.report().mode != Mode::ramping_to_zero && held < 100) {
+    machine.step({lost, 30.0});
+    if (machine.report().mode == Mode::holding) CHECK(machine.offset_um() == -5.0);
+    ++held;
+  }
+  CHECK(held == 5 + 31);  // five seconds until stale, more than thirty held
+  CHECK(machine.offset_um() == -4.0);
+  machine.steps(4, {lost, 30.0});
+  CHECK(machine.offset_um() == 0.0);
+  machine.step({21.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == -1.0);
+}
+
+TEST_CASE("disable and enable move at the slew rate", "[estimator]") {
+  auto config = small_config();
+  config.axes[0].limiter.rate_um_per_s_max = 1.0;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, 30.0});
+  machine.estimator.apply({CommandKind::disable, 0, 0.0});
+  for (int i = 1; i <= 7; ++i) {
+    machine.step({21.0, 30.0});
+    CHECK(machine.offset_um() == std::min(-5.0 + i, 0.0));
+  }
+  CHECK(machine.report().mode == Mode::disabled);
+  CHECK_FALSE(machine.report().enabled);
+  CHECK(machine.says(Reason::operator_disabled));
+  machine.estimator.apply({CommandKind::enable, 0, 0.0});
+  for (int i = 1; i <= 7; ++i) {
+    machine.step({21.0, 30.0});
+    CHECK(machine.offset_um() == std::max(-1.0 * i, -5.0));
+  }
+}
+
+TEST_CASE("the controller's switch disables; unknown, it holds", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 30.0});
+  machine.controller.signals[2] = not_a_number;
+  machine.steps(5, {22.0, 30.0});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.offset_um() == -5.0);
+  machine.controller.signals[2] = 1.0;
+  machine.steps(5, {22.0, 30.0});
+  CHECK(machine.report().mode == Mode::disabled);
+  CHECK(machine.says(Reason::controller_disabled));
+  CHECK(machine.report().enabled);
+  CHECK(machine.offset_um() == 0.0);
+  machine.controller.signals[2] = 0.0;
+  machine.steps(5, {22.0, 30.0});
+  CHECK(machine.offset_um() == -10.0);
+}
+
+TEST_CASE("a controller gone silent holds the offset", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 30.0});
+  machine.controller.online = false;
+  machine.steps(10, {25.0, 30.0});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::controller_offline));
+  CHECK(machine.offset_um() == -5.0);
+}
+
+TEST_CASE("the offset holds while cutting where so configured", "[estimator]") {
+  auto config = small_config();
+  config.compensation.hold_while_cutting = true;
+  config.compensation.cutting_signal = "cutting_on";
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 30.0});
+  for (const double cutting : {1.0, not_a_number}) {
+    machine.controller.signals[1] = cutting;
+    machine.steps(5, {22.0, 30.0});
+    CHECK(machine.says(Reason::cutting));
+    CHECK(machine.offset_um() == -5.0);
+  }
+  machine.controller.signals[1] = 0.0;
+  machine.steps(2, {22.0, 30.0});
+  CHECK(machine.offset_um() == -10.0);
+  CHECK_FALSE(machine.says(Reason::cutting));
+}
+
+TEST_CASE("measured and cycle end are remembered for the report and move nothing", "[estimator]") {
+  Machine machine;
+  machine.steps(3, {20.0, 30.0});
+  machine.estimator.apply({CommandKind::measured, 0, 3.5});
+  machine.estimator.apply({CommandKind::measured, 77, 1.0});
+  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
+  machine.step({20.0, 30.0});
+  CHECK(machine.report().axes[0].measured_um == 3.5);
+  CHECK(machine.report().cycle_ends == 1);
+  CHECK(machine.offset_um() == 0.0);
+}
+
+TEST_CASE("a restart goes on with switch, reference and offset", "[estimator]") {
+  Machine machine;
+  PersistentState state;
+  state.enabled = true;
+  state.reference_degC = {{"t1_degC", 20.0}, {"t2_degC", 30.0}, {"gone_degC", 1.0}};
+  state.offset_um = {{"z", -8.0}};
+  machine.estimator.restore(state);
+  machine.controller.applied_um[0] = -8.0;
+  machine.steps(3, {22.0, 30.0});
+  CHECK(machine.report().inputs[0].reference_degC == 20.0);
+  CHECK(machine.offset_um() == -10.0);
+
+  Machine disabled;
+  state.enabled = false;
+  disabled.estimator.restore(state);
+  disabled.controller.applied_um[0] = -8.0;
+  disabled.steps(3, {22.0, 30.0});
+  CHECK(disabled.report().mode == Mode::disabled);
+  CHECK(disabled.offset_um() == 0.0);
+}
+
+TEST_CASE("a reload does not move the axis by itself", "[estimator]") {
+  Machine machine(small_config(), model_with_growth());
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 30.0});
+  REQUIRE(machine.offset_um() == -5.0);
+  reload(machine, small_config(), model_with_growth());
+  machine.step({21.0, 30.0});
+  CHECK(machine.offset_um() == -5.0);
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.command.valid[0]);
+  CHECK(machine.report().cycle == 12);
+}
+
+TEST_CASE("after a reload a smaller bound is approached at the slew rate", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(30, {26.0, 30.0});
+  REQUIRE(machine.offset_um() == -30.0);
+  auto config = small_config();
+  config.axes[0].limiter = {12.0, 2.0};
+  reload(machine, config, small_model());
+  for (int i = 1; i <= 12; ++i) {
+    machine.step({26.0, 30.0});
+    CHECK(machine.offset_um() == std::min(-30.0 + 2.0 * i, -12.0));
+  }
+  CHECK(machine.says(Reason::at_bound));
+}
+
+TEST_CASE("a reload with another matrix approaches the new offset at the slew rate",
+          "[estimator]") {
+  auto config = small_config();
+  config.axes[0].limiter.rate_um_per_s_max = 1.0;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, 30.0});
+  auto model = small_model();
+  model.matrix_um_per_K = {{-5.0, 1.0}};
+  reload(machine, config, model);
+  for (int i = 1; i <= 12; ++i) {
+    machine.step({21.0, 30.0});
+    CHECK(machine.offset_um() == std::min(-5.0 + i, 5.0));
+  }
+}
+
+TEST_CASE("a reload takes numbers newly written as the reference, and keeps an old one",
+          "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(5, {21.0, 30.0});
+  auto model = small_model();
+  model.reference_degC = {21.0, 30.0};
+  reload(machine, small_config(), model);
+  machine.steps(5, {21.0, 30.0});
+  CHECK(machine.offset_um() == 0.0);
+  machine.estimator.apply({CommandKind::reference, 0, 0.0});
+  machine.steps(5, {21.5, 30.0});
+  reload(machine, small_config(), model);
+  machine.steps(5, {21.5, 30.0});
+  CHECK(machine.report().inputs[0].reference_degC == 21.0);
+}
+
+TEST_CASE("an estimator that loads a state goes on bit for bit", "[estimator]") {
+  auto config = small_config();
+  for (SensorConfig& sensor : config.sensors) {
+    sensor.smoothing.form = SmoothingForm::sliding_line;
+    sensor.smoothing.period_s = 0;
+  }
+  Machine machine(config, model_with_growth());
+  const auto temps = [](int i) {
+    return std::vector<double>{20.0 + 0.3 * std::sin(0.1 * i), 30.0 + 0.01 * i};
+  };
+  for (int i = 0; i < 40; ++i) machine.step(temps(i));
+  machine.estimator.apply({CommandKind::prove, 0, 2.0});
+  machine.steps(2, temps(40));
+  std::vector<std::byte> state(machine.estimator.state_size_bytes());
+  machine.estimator.save_state(state);
+  Machine twin(config, model_with_growth());
+  twin.estimator.load_state(state);
+  twin.now = machine.now;
+  twin.controller = machine.controller;
+  for (int i = 42; i < 100; ++i) {
+    machine.step(temps(i));
+    twin.step(temps(i));
+    REQUIRE(machine.offset_um() == twin.offset_um());
+  }
+  std::vector<std::byte> twin_state(state.size());
+  machine.estimator.save_state(state);
+  twin.estimator.save_state(twin_state);
+  CHECK(state == twin_state);
+}
+
+TEST_CASE("a state of another size is refused", "[estimator]") {
+  Machine machine;
+  std::vector<std::byte> state(machine.estimator.state_size_bytes());
+  machine.estimator.save_state(state);
+  state.pop_back();
+  CHECK_THROWS_AS(machine.estimator.load_state(state), std::runtime_error);
+}
+
+TEST_CASE("configuration and model that do not fit are refused", "[estimator]") {
+  const auto refused = [](auto change) {
+    auto config = small_config();
+    auto model = model_with_growth();
+    change(config, model);
+    CHECK_THROWS_AS(Estimator(config, model), InvalidValue);
+  };
+  refused([](auto& config, auto&) { config.axes[0].output = "y_um"; });
+  refused([](auto& config, auto&) { config.signals = {"cutting_on", "compensation_off_on"}; });
+  refused([](auto& config, auto&) { config.compensation.disable_signal = "no_on"; });
+  refused([](auto& config, auto&) { config.blocks.pop_back(); });
+  refused([](auto& config, auto&) { config.compensation.mismatch_um = not_a_number; });
+  refused([](auto&, auto& model) { model.matrix_um_per_K[0].pop_back(); });
+}

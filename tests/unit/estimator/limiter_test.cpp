@@ -1,0 +1,84 @@
+#include "estimator/limiter.hpp"
+
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+using namespace thermocomp;
+
+namespace {
+LimiterConfig bounds(double offset_um_max, double rate_um_per_s_max) {
+  return {offset_um_max, rate_um_per_s_max};
+}
+}  // namespace
+
+TEST_CASE("the offset goes to its target at the slew rate and lands on it exactly", "[limiter]") {
+  Limiter limiter(bounds(50, 2));
+  limiter.step(3.3, 0.5);
+  CHECK(limiter.offset_um() == 1.0);
+  limiter.step(3.3, 0.5);
+  CHECK(limiter.offset_um() == 2.0);
+  limiter.step(3.3, 1.0);
+  CHECK(limiter.offset_um() == 3.3);
+  limiter.step(-10.0, 0.25);
+  CHECK(limiter.offset_um() == Approx(2.8));
+}
+
+TEST_CASE("the offset stops at its bound and says so", "[limiter]") {
+  Limiter limiter(bounds(5, 100));
+  limiter.step(5.0, 1);
+  CHECK_FALSE(limiter.at_bound());
+  limiter.step(80.0, 1);
+  CHECK(limiter.offset_um() == 5.0);
+  CHECK(limiter.at_bound());
+  limiter.step(-80.0, 1);
+  CHECK(limiter.offset_um() == -5.0);
+  CHECK(limiter.at_bound());
+  limiter.step(0.0, 1);
+  CHECK_FALSE(limiter.at_bound());
+}
+
+TEST_CASE("a long pause makes no leap: at most one second counts", "[limiter]") {
+  Limiter limiter(bounds(50, 2));
+  limiter.step(40.0, 3600.0);
+  CHECK(limiter.offset_um() == 2.0);
+}
+
+TEST_CASE("no time, backward time or a time that is no number moves nothing", "[limiter]") {
+  Limiter limiter(bounds(50, 2));
+  for (const double dt_s : {0.0, -1.0, not_a_number}) {
+    limiter.step(40.0, dt_s);
+    CHECK(limiter.offset_um() == 0.0);
+  }
+}
+
+TEST_CASE("a target that is no number moves nothing", "[limiter]") {
+  Limiter limiter(bounds(50, 2));
+  limiter.start_from(7.0);
+  for (const double target_um : {not_a_number, std::numeric_limits<double>::infinity(),
+                                 -std::numeric_limits<double>::infinity()}) {
+    limiter.step(target_um, 1.0);
+    CHECK(limiter.offset_um() == 7.0);
+  }
+}
+
+TEST_CASE("an offset outside the bound comes in at the slew rate, target or not", "[limiter]") {
+  Limiter limiter(bounds(10, 2));
+  limiter.start_from(15.0);
+  limiter.step(40.0, 1.0);
+  CHECK(limiter.offset_um() == 13.0);
+  limiter.step(not_a_number, 1.0);
+  CHECK(limiter.offset_um() == 11.0);
+  limiter.step(0.0, 0.25);
+  CHECK(limiter.offset_um() == 10.5);
+  limiter.step(40.0, 1.0);
+  CHECK(limiter.offset_um() == 10.0);
+}
+
+TEST_CASE("bounds that have no meaning are refused", "[limiter]") {
+  CHECK_THROWS(Limiter(bounds(0, 1)));
+  CHECK_THROWS(Limiter(bounds(501, 1)));
+  CHECK_THROWS(Limiter(bounds(not_a_number, 1)));
+  CHECK_THROWS(Limiter(bounds(50, 0)));
+  CHECK_THROWS(Limiter(bounds(50, not_a_number)));
+}
