@@ -1,5 +1,7 @@
 #include "cli/observe_commands.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <iostream>
@@ -71,14 +73,25 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
   const bool terminal = stdout_is_terminal();
   if (terminal) std::signal(SIGINT, end_watch);
   const auto end = steady_clock::now() + std::chrono::duration<double>(options.for_s);
+  const auto remaining = [end] {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - steady_clock::now());
+    return std::max(left, std::chrono::milliseconds(0));
+  };
+  const auto over = [&] { return options.for_s > 0.0 && steady_clock::now() >= end; };
   StatusClient client(global.socket);
   client.call("subscribe", {{"methods", {"status"}}, {"period_s", options.period_s}});
   std::optional<TruthFile> truth;
   if (!options.truth.empty()) truth.emplace(options.truth);
   const auto patience =
       std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * options.period_s) + 5000);
-  for (bool first = true; options.for_s == 0.0 || steady_clock::now() < end;) {
-    const json notification = client.next(patience);
+  for (bool first = true; !over();) {
+    json notification;
+    try {
+      notification = client.next(options.for_s > 0.0 ? std::min(patience, remaining()) : patience);
+    } catch (const ClientError&) {
+      if (over()) return;
+      throw;
+    }
     if (notification.value("method", "") != "status") continue;
     const TruthRow* row = truth ? truth->newest() : nullptr;
     show(notification.value("params", json::object()), row, terminal, first);

@@ -141,9 +141,9 @@ std::string watch_header(const json& status, const TruthRow* truth) {
   const json& axes = list_of(status, "axes");
   const int inputs_width = column_width * static_cast<int>(inputs.size());
   const int axes_width = column_width * static_cast<int>(axes.size());
-  std::string groups = padded("", 16) + padded("  temperatures degC", inputs_width) + " |" +
+  std::string groups = padded("", 21) + padded("  temperatures degC", inputs_width) + " |" +
                        padded("  offsets um", axes_width);
-  std::string names = padded("up s  mode", 16);
+  std::string names = padded("up s  mode", 21);
   for (const json& input : inputs) names += right(short_name(input), column_width);
   names += " |";
   for (const json& axis : axes) names += right(text_of(axis, "name"), column_width);
@@ -160,7 +160,7 @@ std::string watch_header(const json& status, const TruthRow* truth) {
 std::string watch_line(const json& status, const TruthRow* truth) {
   const json& axes = list_of(status, "axes");
   std::string result = fixed(number_of(status, "uptime_s"), 0, 4) + "  " +
-                       padded(text_of(status, "mode").substr(0, 10), 10);
+                       padded(text_of(status, "mode").substr(0, 15), 15);
   for (const json& input : list_of(status, "inputs")) {
     result += flag_of(input, "good") ? fixed(number_of(input, "temp_degC"), 2, column_width)
                                      : right("lost", column_width);

@@ -1,0 +1,155 @@
+"""Exit statuses and output of the commands that need no daemon."""
+import csv
+import os
+import pathlib
+import stat
+
+import pytest
+from conftest import SOURCE, run
+
+DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
+EXAMPLES = SOURCE / "config" / "examples"
+MODEL = """format = 1
+inputs = ["t1_degC"]
+outputs = ["z_um"]
+reference = "first_sample"
+matrix_um_per_K = [[2.0]]
+"""
+RUN = "time_s,t1_degC,z_um\n0,20,5\n10,21,8\n20,,9\n30,22,9\n"
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "run.csv").write_text(RUN)
+    return tmp_path
+
+
+def predict(files, run_argument="run.csv", output="out.csv"):
+    return run("predict", "--model", "model.toml", run_argument, "-o", output, cwd=files)
+
+
+def test_help_succeeds_and_bad_use_is_status_2():
+    assert run("--help").returncode == 0
+    assert run("predict", "--help").returncode == 0
+    for arguments in ([], ["nosuch"], ["predict"], ["measured", "z"], ["measured", "z", "much"],
+                      ["check", "a", "b"], ["watch", "--for", "-1"]):
+        answer = run(*arguments)
+        assert answer.returncode == 2, arguments
+        assert answer.stderr, arguments
+
+
+@pytest.mark.parametrize("name", ["small_machine", "modbus_tcp", "modbus_rtu", "can"])
+def test_every_example_checks(name):
+    answer = run("check", EXAMPLES / f"{name}.toml")
+    assert answer.returncode == 0, answer.stderr
+    assert "OK" in answer.stdout and "SHA-256" in answer.stdout
+
+
+def test_check_names_every_problem_with_file_line_key_value_and_rule(tmp_path):
+    text = (EXAMPLES / "small_machine.toml").read_text()
+    text = text.replace("rate_hz = 100 ", "rate_hz = 99999 ").replace("data_bits", "data_bitz")
+    (tmp_path / "broken.toml").write_text(text)
+    (tmp_path / "small_machine_model.toml").write_text(
+        (EXAMPLES / "small_machine_model.toml").read_text())
+    answer = run("check", "broken.toml", cwd=tmp_path)
+    assert answer.returncode == 2
+    lines = answer.stderr.splitlines()
+    assert any(line.startswith("broken.toml:") and "rate_hz" in line and "99999" in line
+               for line in lines)
+    assert any("data_bitz" in line for line in lines)
+    assert lines[-1].endswith("problems")
+
+
+def test_predict_writes_predicted_measured_and_residual(files):
+    answer = predict(files)
+    assert answer.returncode == 0, answer.stderr
+    rows = list(csv.DictReader((files / "out.csv").open()))
+    assert list(rows[0]) == ["time_s", "z_predicted_um", "z_measured_um", "z_residual_um"]
+    assert [float(row["time_s"]) for row in rows] == [0, 10, 30]
+    assert [float(row["z_residual_um"]) for row in rows] == [0, 1, 0]
+    assert answer.stderr.split() == ["z_um", "0.577", "1.000"]
+
+
+def test_predict_of_a_selection_refers_to_the_first_row_of_the_file(files):
+    answer = predict(files, "run.csv@30:", "-")
+    assert answer.returncode == 0
+    assert answer.stdout.splitlines()[1].split(",") == ["30", "4", "4", "0"]
+
+
+@pytest.mark.parametrize("name, text", [
+    ("model.toml", "format = 2\n"), ("model.toml", MODEL + "surprise = 1\n"),
+    ("model.toml", MODEL.replace("2.0", "nan")), ("model.toml", "not toml"),
+    ("run.csv", ""), ("run.csv", "time_s,other_degC,z_um\n0,1,2\n"),
+    ("run.csv", "time_s,t1_degC,z_um\n0,20,5\n0,21,6\n"),
+    ("run.csv", "time_s,t1_degC,z_um\n0,warm,5\n"), ("run.csv", "time_s,t1_degC,z_um\n0,,5\n")])
+def test_bad_input_is_refused_by_name_and_leaves_no_output(files, name, text):
+    (files / name).write_text(text)
+    answer = predict(files)
+    assert answer.returncode == 2
+    assert name in answer.stderr
+    assert sorted(path.name for path in files.iterdir()) == ["model.toml", "run.csv"]
+
+
+def test_output_that_cannot_be_written_is_status_2(files):
+    assert predict(files, output="nosuch/out.csv").returncode == 2
+    assert predict(files, output="/dev/full").returncode == 2
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no measured data at {DATA} (THERMOCOMP_DATA)")
+def test_the_static_model_of_the_spindle_gives_its_known_errors(tmp_path):
+    spindle = DATA / "spindle_46h"
+    answer = run("predict", "--model", spindle / "static_model.toml",
+                 spindle / "hours_00_32.csv", "-o", tmp_path / "out.csv")
+    assert answer.returncode == 0, answer.stderr
+    rms_um = [float(line.split()[1]) for line in answer.stderr.splitlines()]
+    assert rms_um == pytest.approx([2.974, 2.685, 4.680, 4.594, 3.098], abs=0.002)
+
+
+def test_simulate_is_repeated_by_its_seed(tmp_path):
+    machine = EXAMPLES / "machine.toml"
+    outputs = {}
+    for name, seed in (("a", 5), ("b", 5), ("c", 6)):
+        answer = run("simulate", machine, "-o", tmp_path / name, "--seed", seed)
+        if "duration" in answer.stderr:
+            pytest.skip("the example runs until it is stopped")
+        assert answer.returncode == 0, answer.stderr
+        outputs[name] = (tmp_path / name).read_text()
+    assert outputs["a"] == outputs["b"] != outputs["c"]
+    assert outputs["a"].startswith("time_s,")
+
+
+def test_a_run_file_is_replayed_through_a_configuration(tmp_path):
+    demo = SOURCE / "config" / "demo"
+    assert run("simulate", demo / "machine.toml", "-o", tmp_path / "run.csv").returncode == 0
+    answer = run("replay", "--config", demo / "thermocompd.toml",
+                 f"{tmp_path / 'run.csv'}@:1200", "-o", tmp_path / "out.csv")
+    assert answer.returncode == 0, answer.stderr
+    header = (tmp_path / "out.csv").read_text().splitlines()[0]
+    assert header.startswith("time_s,") and "z_offset_um" in header
+
+
+@pytest.mark.parametrize("command", ["export", "replay"])
+def test_what_is_no_history_is_refused(tmp_path, command):
+    (tmp_path / "h.db").write_text("no database")
+    for name in ("h.db", "nosuch.db"):
+        answer = run(command, name, "-o", "out.csv", cwd=tmp_path)
+        assert answer.returncode == 2
+        assert name in answer.stderr
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_modelling_commands_say_which_package_is_missing(tmp_path):
+    answer = run("fit", "run.csv", "--outputs", "z_um", env={"PATH": str(tmp_path)})
+    assert answer.returncode == 2
+    assert answer.stderr.count("\n") == 1 and "thermocomp-modelling" in answer.stderr
+
+
+def test_modelling_commands_hand_everything_to_the_other_program(tmp_path):
+    other = tmp_path / "thermocomp-modelling"
+    other.write_text('#!/bin/sh\necho "$@"\nexit 1\n')
+    other.chmod(other.stat().st_mode | stat.S_IXUSR)
+    answer = run("diagnose", "--model", "m.toml", "--help", "-o", "x",
+                 env={"PATH": f"{tmp_path}:/bin"})
+    assert answer.stdout.strip() == "diagnose --model m.toml --help -o x"
+    assert answer.returncode == 1

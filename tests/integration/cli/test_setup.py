@@ -1,0 +1,69 @@
+"""scripts/setup.sh against package tools that only pretend."""
+import os
+import subprocess
+
+import pytest
+from conftest import SOURCE
+
+DPKG_QUERY = """#!/bin/sh
+for last; do :; done
+grep -qx "$last" "$FAKE/installed" && printf installed
+"""
+APT_GET = """#!/bin/sh
+echo "$@" >> "$FAKE/calls"
+case "$*" in
+  *update*) [ -e "$FAKE/offline" ] && exit 100; touch "$FAKE/lists"; exit 0 ;;
+esac
+[ -e "$FAKE/lists" ] || exit 100
+for word; do echo "$word" >> "$FAKE/installed"; done
+"""
+
+
+@pytest.fixture
+def system(tmp_path):
+    for name, text in (("dpkg-query", DPKG_QUERY), ("apt-get", APT_GET),
+                       ("id", "#!/bin/sh\necho 0\n")):
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+    (tmp_path / "installed").write_text("cmake\n")
+    (tmp_path / "calls").write_text("")
+    return tmp_path
+
+
+def set_up(system, what="demo"):
+    return subprocess.run(
+        [SOURCE / "scripts" / "setup.sh", what], capture_output=True, text=True, timeout=60,
+        env={**os.environ, "FAKE": str(system), "PATH": f"{system}:/usr/bin:/bin"})
+
+
+def test_a_fresh_system_gets_its_lists_and_then_the_packages(system):
+    answer = set_up(system)
+    assert answer.returncode == 0, answer.stderr
+    assert "installing" in answer.stdout and "libmodbus-dev" in answer.stdout
+    assert " cmake" not in answer.stdout
+    assert "update" in (system / "calls").read_text()
+
+
+def test_lists_at_hand_are_not_fetched_again(system):
+    (system / "lists").touch()
+    assert set_up(system).returncode == 0
+    assert "update" not in (system / "calls").read_text()
+
+
+def test_with_everything_installed_nothing_is_called(system):
+    (system / "lists").touch()
+    assert set_up(system, "test").returncode == 0
+    (system / "calls").write_text("")
+    assert set_up(system, "test").returncode == 0
+    assert (system / "calls").read_text() == ""
+
+
+def test_without_a_network_one_line_says_what_to_do(system):
+    (system / "offline").touch()
+    answer = set_up(system)
+    assert answer.returncode == 1
+    assert answer.stderr.splitlines()[-1].startswith("setup: apt-get could not install")
+
+
+def test_bad_use_is_status_2(system):
+    assert set_up(system, "nosuch").returncode == 2
