@@ -121,7 +121,7 @@ std::uint64_t read_bit_by_bit(const Frame& frame, const CanSignal& signal) {
   int bit = signal.start_bit;
   for (int i = 0; i < signal.length_bits; ++i) {
     const auto here = static_cast<std::size_t>(bit);
-    const std::uint64_t one = (frame[here / 8] >> (here % 8)) & 1u;
+    const std::uint64_t one = (unsigned{frame[here / 8]} >> (here % 8)) & 1u;
     if (signal.byte_order == ByteOrder::little_endian) {
       raw |= one << i;
       ++bit;
