@@ -11,7 +11,7 @@ void append_number(std::string& text, double value) {
     text += "nan";
     return;
   }
-  std::array<char, 32> buffer;
+  std::array<char, 32> buffer{};
   const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
   text.append(buffer.data(), end);
 }

@@ -17,7 +17,7 @@ namespace thermocomp {
 namespace {
 
 constexpr std::size_t shown_value_max = 60;
-constexpr std::uintmax_t file_bytes_max = 64u * 1024u * 1024u;
+constexpr std::uintmax_t file_bytes_max = std::uintmax_t{64} * 1024 * 1024;
 
 const toml::table* as_table(const void* node) {
   return static_cast<const toml::table*>(node);
@@ -244,6 +244,7 @@ std::vector<std::string> TomlTable::keys() const {
   }
   std::sort(placed.begin(), placed.end());
   std::vector<std::string> names;
+  names.reserve(placed.size());
   for (auto& entry : placed) names.push_back(std::move(entry.second));
   return names;
 }
