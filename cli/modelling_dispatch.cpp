@@ -55,6 +55,7 @@ int run_modelling(const std::string& command, const std::vector<std::string>& ar
   std::vector<std::string> words{program_name, command};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
 

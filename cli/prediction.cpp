@@ -167,15 +167,20 @@ RunFile as_run_file(const Prediction& prediction) {
   for (const PredictedOutput& output : prediction.outputs) {
     const std::string unit(unit_of(output.name).suffix);
     const std::string stem = output.name.substr(0, output.name.size() - unit.size());
+    const auto column_name = [&](const char* what) {
+      std::string name = stem;
+      return name.append("_").append(what).append(unit);
+    };
     std::vector<double> residual_um;
+    residual_um.reserve(output.predicted_um.size());
     for (std::size_t i = 0; i < output.predicted_um.size(); ++i) {
       residual_um.push_back(output.measured_um[i] - output.predicted_um[i]);
     }
-    file.columns.push_back(stem + "_predicted" + unit);
+    file.columns.push_back(column_name("predicted"));
     file.values.push_back(output.predicted_um);
-    file.columns.push_back(stem + "_measured" + unit);
+    file.columns.push_back(column_name("measured"));
     file.values.push_back(output.measured_um);
-    file.columns.push_back(stem + "_residual" + unit);
+    file.columns.push_back(column_name("residual"));
     file.values.push_back(std::move(residual_um));
   }
   file.selected_end = prediction.time_s.size();
