@@ -53,8 +53,8 @@ struct ControllerState {
   /// longer be what is applied. 0: never connected.
   std::uint32_t link_epoch{0};
   bool online{false};
-  std::array<double, axes_max> applied_um;  ///< offset in effect, order of the axes [um]
-  std::array<double, signals_max> signals;  ///< order of the configuration, unit of the name
+  std::array<double, axes_max> applied_um{};  ///< offset in effect, order of the axes [um]
+  std::array<double, signals_max> signals{};  ///< order of the configuration, unit of the name
 
   ControllerState() noexcept {
     applied_um.fill(not_a_number);
