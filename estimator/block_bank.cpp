@@ -19,9 +19,11 @@ bool same(const SmoothingConfig& a, const SmoothingConfig& b) {
 }  // namespace
 
 BlockBank::Sensor::Sensor(const SensorConfig& sensor_config)
-    : config(sensor_config),
-      screening(sensor_config.screening),
-      smoother(sensor_config.smoothing) {}
+    : screening(sensor_config.screening),
+      smoother(sensor_config.smoothing),
+      reference(sensor_config.reference_sensor ? static_cast<int>(*sensor_config.reference_sensor)
+                                               : no_sensor),
+      config(sensor_config) {}
 
 BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns) {
   for (const SensorConfig& sensor : config.sensors) {
@@ -40,6 +42,7 @@ BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::strin
         throw InvalidValue("block.sensors", block->name, "does not exist");
     blocks_.push_back({block->sensors, std::vector<double>(block->sensors.size(), 0.0)});
   }
+  values_K_.assign(sensors_.size(), not_a_number);
   temps_degC_.assign(columns.size(), not_a_number);
   good_.assign(columns.size(), 0);
 }
@@ -49,7 +52,7 @@ bool BlockBank::step(nanoseconds now, std::span<const Reading> readings) noexcep
   now_ = now;
   // All are looked at before any is smoothed: a difference needs its reference of this very cycle.
   for (std::size_t i = 0; i < sensors_.size(); ++i) look_at(sensors_[i], now, readings[i]);
-  for (Sensor& sensor : sensors_) smooth(sensor, now);
+  for (std::size_t i = 0; i < sensors_.size(); ++i) values_K_[i] = smooth(sensors_[i], now);
   bool all_good = true;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     good_[i] = update(blocks_[i], temps_degC_[i]) ? 1 : 0;
@@ -64,38 +67,39 @@ void BlockBank::look_at(Sensor& sensor, nanoseconds now, const Reading& reading)
   sensor.fault = sensor.screening.fault(now);
 }
 
-void BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
+double BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
   double reference_degC = 0.0;
   bool usable = sensor.screening.usable(now);
-  if (sensor.config.reference_sensor) {
-    const Screening& reference = sensors_[*sensor.config.reference_sensor].screening;
+  if (sensor.reference != no_sensor) {
+    const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
     usable = usable && reference.usable(now);
     reference_degC = reference.good_degC();
   }
   if (sensor.fresh && usable)
     sensor.smoother.add(
         {sensor.screening.good_at(), sensor.screening.good_degC() - reference_degC});
-  sensor.usable = usable && sensor.smoother.has_value();
+  return usable && sensor.smoother.has_value() ? sensor.smoother.value_K() : not_a_number;
 }
 
 bool BlockBank::update(Block& block, double& temp_degC) noexcept {
   double sum_degC = 0.0;
+  double without_deviation_degC = 0.0;  // what the sum is while some are missing
   std::size_t count = 0;
   for (std::size_t i = 0; i < block.sensors.size(); ++i) {
-    const Sensor& sensor = sensors_[block.sensors[i]];
-    if (!sensor.usable) continue;
-    sum_degC += sensor.smoother.value_K() - block.deviation_K[i];
+    const double value_K = values_K_[block.sensors[i]];
+    if (std::isnan(value_K)) continue;
+    sum_degC += value_K;
+    without_deviation_degC += value_K - block.deviation_K[i];
     ++count;
   }
   if (count == 0) return false;
-  if (count == block.sensors.size() && count > 1) {
-    sum_degC = 0.0;
-    for (const std::size_t index : block.sensors) sum_degC += sensors_[index].smoother.value_K();
+  if (count < block.sensors.size()) {
+    temp_degC = without_deviation_degC / static_cast<double>(count);
+    return true;
   }
   temp_degC = sum_degC / static_cast<double>(count);
-  if (count == block.sensors.size() && count > 1)
-    for (std::size_t i = 0; i < block.sensors.size(); ++i)
-      block.deviation_K[i] = sensors_[block.sensors[i]].smoother.value_K() - temp_degC;
+  for (std::size_t i = 0; i < block.sensors.size(); ++i)
+    block.deviation_K[i] = values_K_[block.sensors[i]] - temp_degC;
   return true;
 }
 
@@ -143,15 +147,9 @@ void BlockBank::plan_adoption(const BlockBank& previous) {
   }
 }
 
-int BlockBank::reference_of(const Sensor& sensor) noexcept {
-  const auto& reference = sensor.config.reference_sensor;
-  return reference ? static_cast<int>(*reference) : no_sensor;
-}
-
 int BlockBank::previous_reference(const Sensor& sensor) const noexcept {
-  const int reference = reference_of(sensor);
-  if (reference == no_sensor) return no_sensor;
-  const int previous = sensor_plan_[static_cast<std::size_t>(reference)];
+  if (sensor.reference == no_sensor) return no_sensor;
+  const int previous = sensor_plan_[static_cast<std::size_t>(sensor.reference)];
   return previous < 0 ? unknown_sensor : previous;
 }
 
@@ -165,10 +163,9 @@ void BlockBank::adopt(const BlockBank& previous) noexcept {
     sensor.raw_degC = other.raw_degC;
     sensor.fault = other.fault;
     if (!same(sensor.config.smoothing, other.config.smoothing) ||
-        previous_reference(sensor) != reference_of(other))
+        previous_reference(sensor) != other.reference)
       continue;
     sensor.smoother = other.smoother;  // same sizes: copies into what is there
-    sensor.usable = other.usable;
   }
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (block_plan_[i] < 0) continue;

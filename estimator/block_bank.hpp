@@ -34,15 +34,15 @@ class BlockBank {
  private:
   struct Sensor {
     Sensor(const SensorConfig& sensor_config);
-    SensorConfig config;
     Screening screening;
     Smoother smoother;
+    int reference;  ///< index of the reference sensor, or no_sensor
     double raw_degC{not_a_number};
     Fault fault{Fault::never_read};
-    bool fresh{false};   ///< the newest reading is a new and good one
-    bool usable{false};  ///< the block may use the smoothed value
+    bool fresh{false};    ///< the newest reading is a new and good one
+    SensorConfig config;  ///< last: a step does not touch it
     void visit_state(StateArchive& archive) {
-      archive(screening, smoother, raw_degC, fault, fresh, usable);
+      archive(screening, smoother, raw_degC, fault, fresh);
     }
   };
   struct Block {
@@ -53,15 +53,15 @@ class BlockBank {
   };
 
   static void look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept;
-  void smooth(Sensor& sensor, nanoseconds now) noexcept;
-  /// Index of a sensor's reference sensor, or no_sensor.
-  [[nodiscard]] static int reference_of(const Sensor& sensor) noexcept;
-  /// The same, counted in the previous bank.
+  /// @return the sensor's value for its block; NaN where there is none to be used
+  [[nodiscard]] double smooth(Sensor& sensor, nanoseconds now) noexcept;
+  /// Index of the reference sensor in the previous bank, or no_sensor.
   [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
 
   std::vector<Sensor> sensors_;
-  std::vector<Block> blocks_;  ///< one a column
+  std::vector<double> values_K_;  ///< of this step, one a sensor; NaN: not to be used
+  std::vector<Block> blocks_;     ///< one a column
   std::vector<double> temps_degC_;
   std::vector<std::uint8_t> good_;
   nanoseconds now_{};

@@ -9,6 +9,8 @@
 
 namespace thermocomp {
 
+inline constexpr std::size_t smoothing_samples_max = 32;
+
 /// A sample of a temperature or temperature difference.
 struct Sample {
   nanoseconds at{};
@@ -31,7 +33,7 @@ struct Line {
 };
 
 /// Ordinary least squares; the slope is 0 where all samples have one time. O(n), two passes so that
-/// long uptimes cost no digits. @pre at least one sample
+/// long uptimes cost no digits. @pre 1 to smoothing_samples_max samples
 [[nodiscard]] inline Line fit_line(std::span<const Sample> samples) noexcept {
   Line line;
   line.origin = samples.front().at;

@@ -14,8 +14,7 @@ Screening::Screening(const ScreeningConfig& config)
   config.validate();
 }
 
-bool Screening::look(nanoseconds now, const Reading& reading) noexcept {
-  if (reading.taken_at == seen_at_ && reading.fault == seen_fault_) return false;
+bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   seen_at_ = reading.taken_at;
   seen_fault_ = reading.fault;
   verdict_ = judge(now, reading);
@@ -52,11 +51,6 @@ Fault Screening::judge(nanoseconds now, const Reading& reading) noexcept {
   if (stuck_after_ > nanoseconds{0} && reading.taken_at - same_since_ > stuck_after_)
     return Fault::stuck;
   return Fault::none;
-}
-
-Fault Screening::fault(nanoseconds now) const noexcept {
-  if (verdict_ != Fault::none) return verdict_;
-  return now - good_at_ > stale_after_ ? Fault::stale : Fault::none;
 }
 
 void Screening::adopt(const Screening& previous) noexcept {

@@ -15,14 +15,20 @@ class Screening {
 
   /// Looks at the newest reading.
   /// @return whether it is a new and good one; then good_degC() and good_at() are its
-  bool look(nanoseconds now, const Reading& reading) noexcept;
+  bool look(nanoseconds now, const Reading& reading) noexcept {
+    if (reading.taken_at == seen_at_ && reading.fault == seen_fault_) return false;
+    return take(now, reading);
+  }
 
   /// Whether the last good reading may still be used at `now`.
   [[nodiscard]] bool usable(nanoseconds now) const noexcept {
     return has_good_ && now - good_at_ <= stale_after_;
   }
   /// Why the newest reading is not good: none while it is good and fresh.
-  [[nodiscard]] Fault fault(nanoseconds now) const noexcept;
+  [[nodiscard]] Fault fault(nanoseconds now) const noexcept {
+    if (verdict_ != Fault::none) return verdict_;
+    return now - good_at_ > stale_after_ ? Fault::stale : Fault::none;
+  }
   [[nodiscard]] double good_degC() const noexcept { return good_degC_; }
   [[nodiscard]] nanoseconds good_at() const noexcept { return good_at_; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }
@@ -36,6 +42,7 @@ class Screening {
   }
 
  private:
+  [[nodiscard]] bool take(nanoseconds now, const Reading& reading) noexcept;
   [[nodiscard]] Fault judge(nanoseconds now, const Reading& reading) noexcept;
 
   double min_degC_;

@@ -7,19 +7,11 @@
 
 namespace thermocomp {
 
-void SampleHistory::push(const Sample& sample) noexcept {
-  if (full()) {
-    std::copy(samples_.begin() + 1, samples_.end(), samples_.begin());
-    --size_;
-  }
-  samples_[size_] = sample;
-  ++size_;
-}
-
 double SampleHistory::spread_K(const Line& line) const noexcept {
   std::array<double, smoothing_samples_max> residuals_K{};
-  for (std::size_t i = 0; i < size_; ++i)
-    residuals_K[i] = std::abs(samples_[i].value_K - line.at(samples_[i].at));
+  std::size_t count = 0;
+  for (const Sample& sample : in_a_row())
+    residuals_K[count++] = std::abs(sample.value_K - line.at(sample.at));
   const auto begin = residuals_K.begin();
   const auto middle = begin + static_cast<std::ptrdiff_t>(size_ / 2);
   std::nth_element(begin, middle, begin + static_cast<std::ptrdiff_t>(size_));

@@ -12,27 +12,37 @@
 
 namespace thermocomp {
 
-inline constexpr std::size_t smoothing_samples_max = 32;
-
-/// The last few samples, oldest first.
+/// The last few samples, oldest first. Each is stored twice, n apart in a ring of 2n, so that the
+/// last n always lie in a row and nothing is ever moved.
 class SampleHistory {
  public:
-  explicit SampleHistory(std::size_t capacity) : samples_(capacity) {}
+  explicit SampleHistory(std::size_t capacity) : capacity_(capacity), samples_(2 * capacity) {}
   void clear() noexcept { size_ = 0; }
   /// Drops the oldest sample when full.
-  void push(const Sample& sample) noexcept;
-  [[nodiscard]] bool full() const noexcept { return size_ == samples_.size(); }
+  void push(const Sample& sample) noexcept {
+    samples_[next_] = sample;
+    samples_[next_ + capacity_] = sample;
+    next_ = next_ + 1 == capacity_ ? 0 : next_ + 1;
+    if (size_ < capacity_) ++size_;
+  }
+  [[nodiscard]] bool full() const noexcept { return size_ == capacity_; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   /// @pre not empty
-  [[nodiscard]] const Sample& newest() const noexcept { return samples_[size_ - 1]; }
-  [[nodiscard]] Line line() const noexcept { return fit_line({samples_.data(), size_}); }
+  [[nodiscard]] const Sample& newest() const noexcept { return in_a_row().back(); }
+  [[nodiscard]] Line line() const noexcept { return fit_line(in_a_row()); }
   /// Robust spread of the samples around `line`: 1.4826 times the median absolute residual [K].
   [[nodiscard]] double spread_K(const Line& line) const noexcept;
-  void visit_state(StateArchive& archive) { archive(size_, samples_); }
+  void visit_state(StateArchive& archive) { archive(size_, next_, samples_); }
 
  private:
-  std::vector<Sample> samples_;
+  [[nodiscard]] std::span<const Sample> in_a_row() const noexcept {
+    return {samples_.data() + (next_ + capacity_ - size_), size_};
+  }
+
+  std::size_t capacity_;
   std::size_t size_{0};
+  std::size_t next_{0};  ///< where the next sample goes, below capacity_
+  std::vector<Sample> samples_;
 };
 
 /// Form A. The line through the last n values, extended to the next one's time.
