@@ -1,0 +1,159 @@
+// The cycle and its parts: what is counted, what is left out, what is handed over.
+#include "daemon/cycle/cycle.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "drivers/controllers/dry_run_controller.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+/// Called once a cycle; can be told to be slow, which no real source may be.
+class SlowSource final : public SensorSource {
+ public:
+  void start() override {}
+  void stop() noexcept override {}
+  [[nodiscard]] BusHealth health() const override { return {}; }
+  void newest(std::span<Reading> all) noexcept override {
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    all[0] = {20.0, now, Fault::none};
+    if (stall_once.exchange(false)) std::this_thread::sleep_for(55ms);
+    seen.fetch_add(1);
+  }
+  std::atomic<bool> stall_once{false};
+  std::atomic<int> seen{0};
+};
+
+EstimatorConfig one_sensor() {
+  EstimatorConfig config;
+  config.sensors.push_back({"s", std::nullopt, {}, {}});
+  config.blocks.push_back({"b", "b_degC", {0}});
+  config.axes.push_back({"z", "z_um", 1.0, {}});
+  return config;
+}
+
+ThermalModel one_input(double gain_um_per_K) {
+  ThermalModel model;
+  model.inputs = {"b_degC"};
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {{gain_um_per_K}};
+  return model;
+}
+
+std::unique_ptr<CycleBrain> brain(double gain_um_per_K) {
+  return std::make_unique<CycleBrain>(Estimator(one_sensor(), one_input(gain_um_per_K)));
+}
+
+/// A cycle of 10 ms on a thread of its own, ended with the scope.
+struct RunningCycle {
+  SlowSource source;
+  DryRunController controller{{"none", 1}};
+  Grid grid{std::chrono::steady_clock::now().time_since_epoch(), 10ms};
+  Cycle cycle{grid, {&source}, controller, 1, brain(1.0)};
+  std::thread thread;
+
+  RunningCycle() {
+    controller.start();
+    thread = std::thread([this] { cycle.run(); });
+  }
+  ~RunningCycle() {
+    cycle.stop();
+    thread.join();
+  }
+  template <class Condition>
+  bool eventually(Condition condition) {
+    for (int i = 0; i < 10'000; ++i) {
+      if (condition()) return true;
+      std::this_thread::sleep_for(1ms);
+    }
+    return false;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a histogram's percentiles are those of the samples to 1.6 percent", "[histogram]") {
+  const unsigned seed = GENERATE(range(0u, 20u));
+  std::mt19937 random(seed);
+  std::lognormal_distribution<double> durations(10.0, 2.0);
+  DurationHistogram histogram;
+  std::vector<std::int64_t> samples(5000);
+  for (auto& sample : samples) {
+    sample = static_cast<std::int64_t>(durations(random));
+    histogram.record(std::chrono::nanoseconds(sample));
+  }
+  std::sort(samples.begin(), samples.end());
+  CHECK(histogram.count() == samples.size());
+  CHECK(histogram.max().count() == samples.back());
+  for (const double fraction : {0.01, 0.5, 0.9, 0.99, 0.999, 1.0}) {
+    const auto index = static_cast<std::size_t>(std::ceil(fraction * 5000.0)) - 1;
+    const auto exact = static_cast<double>(samples[index]);
+    const auto found = static_cast<double>(histogram.percentile(fraction).count());
+    CHECK(found >= exact);
+    CHECK(found <= exact * (1.0 + 1.0 / 64) + 1.0);
+  }
+}
+
+TEST_CASE("an empty histogram has no percentile and a negative duration counts as none",
+          "[histogram]") {
+  DurationHistogram histogram;
+  CHECK(histogram.percentile(0.99) == 0ns);
+  histogram.record(-5ns);
+  CHECK(histogram.count() == 1);
+  CHECK(histogram.max() == 0ns);
+  histogram.clear();
+  CHECK(histogram.count() == 0);
+}
+
+TEST_CASE("commands come out as they went in and a full queue refuses", "[cycle]") {
+  CommandQueue queue;
+  Command command;
+  CHECK_FALSE(queue.try_pop(command));
+  int taken = 0;
+  while (queue.try_push({CommandKind::measured, 1, static_cast<double>(taken)})) ++taken;
+  CHECK(taken == 64);
+  for (int i = 0; i < taken; ++i) {
+    REQUIRE(queue.try_pop(command));
+    CHECK(command.value_um == i);
+  }
+  CHECK_FALSE(queue.try_pop(command));
+}
+
+TEST_CASE("cycles that were overrun are counted and the phase is kept", "[cycle]") {
+  RunningCycle running;
+  REQUIRE(running.eventually([&] { return running.source.seen.load() >= 5; }));
+  running.source.stall_once.store(true);
+  REQUIRE(running.eventually([&] { return running.cycle.timing().missed.load() >= 4; }));
+  const int seen = running.source.seen.load();
+  REQUIRE(running.eventually([&] { return running.source.seen.load() >= seen + 20; }));
+  const Report& report = running.cycle.report();
+  // Every step's time lies on the grid, before and after.
+  CHECK((report.now - running.grid.start) % running.grid.period == 0ns);
+}
+
+TEST_CASE("a handed over brain takes the place of the old one at once and bumpless", "[cycle]") {
+  RunningCycle running;
+  REQUIRE(running.eventually([&] { return running.cycle.report().cycle > 0; }));
+  REQUIRE(running.cycle.send({CommandKind::disable, 0, 0.0}));
+  REQUIRE(running.eventually([&] { return running.cycle.report().mode == Mode::disabled; }));
+  auto next = brain(2.0);
+  next->estimator.plan_adoption(running.cycle.brain().estimator);
+  running.cycle.hand_over(std::move(next));
+  std::unique_ptr<CycleBrain> retired;
+  REQUIRE(running.eventually([&] { return (retired = running.cycle.take_retired()) != nullptr; }));
+  CHECK(retired->estimator.model().matrix_um_per_K[0][0] == 1.0);
+  CHECK(running.cycle.brain().estimator.model().matrix_um_per_K[0][0] == 2.0);
+  // The operator's switch and the reference are the machine's, not the configuration's.
+  CHECK(running.cycle.report().mode == Mode::disabled);
+  CHECK(running.cycle.report().inputs[0].reference_degC == 20.0);
+}
