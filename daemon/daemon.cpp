@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <poll.h>
@@ -41,7 +42,7 @@ constexpr std::uint64_t cycles_until_ready = 3;
 
 Grid make_grid(const LoopConfig& loop) {
   const auto now = std::chrono::duration_cast<nanoseconds>(Clock::now().time_since_epoch());
-  return {now, nanoseconds(static_cast<std::int64_t>(1e9 / loop.rate_hz + 0.5))};
+  return {now, nanoseconds(std::llround(1e9 / loop.rate_hz))};
 }
 
 std::vector<std::unique_ptr<SensorSource>> make_sources(const DaemonConfig& config) {
@@ -55,6 +56,7 @@ std::vector<std::unique_ptr<SensorSource>> make_sources(const DaemonConfig& conf
 
 std::vector<SensorSource*> pointers(const std::vector<std::unique_ptr<SensorSource>>& sources) {
   std::vector<SensorSource*> list;
+  list.reserve(sources.size());
   for (const auto& source : sources) list.push_back(source.get());
   return list;
 }

@@ -16,9 +16,10 @@ namespace thermocomp {
 class BusThread {
  public:
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  static constexpr std::size_t stack_bytes = 2048 * 1024;  // the sanitizers' frames are larger
+  static constexpr std::size_t stack_bytes =
+      std::size_t{2048} * 1024;  // the sanitizers' frames are larger
 #else
-  static constexpr std::size_t stack_bytes = 256 * 1024;
+  static constexpr std::size_t stack_bytes = std::size_t{256} * 1024;
 #endif
 
   BusThread() = default;

@@ -122,7 +122,7 @@ struct Estimator::Parts {
   bool stepped{false};
   nanoseconds now{};
   double dt_s{0.0};
-  std::array<double, signals_max> all_signals;
+  std::array<double, signals_max> all_signals{};
   bool controller_online{false};
   std::vector<double> reference_degC;
   std::vector<double> signal_values;      ///< of the model

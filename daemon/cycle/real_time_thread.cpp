@@ -14,12 +14,12 @@ namespace {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr std::size_t stack_bytes = 2048 * 1024;  // the sanitizers' frames are larger
 #else
-constexpr std::size_t stack_bytes = 256 * 1024;
+constexpr std::size_t stack_bytes = std::size_t{256} * 1024;
 #endif
 
 /// Touches the stack once, so that the first deep call does not have to wait for a page.
 void __attribute__((noinline)) touch_stack() noexcept {
-  constexpr std::size_t depth_bytes = 96 * 1024;
+  constexpr std::size_t depth_bytes = std::size_t{96} * 1024;
   char stack[depth_bytes];
   std::memset(stack, 0, sizeof stack);
   // The compiler must believe that somebody looks at it.

@@ -25,10 +25,10 @@ using std::chrono::milliseconds;
 constexpr milliseconds drain_period{50};
 /// Rule of the project: a commit at least every 10 s, with room for the commit itself.
 constexpr double commit_s_max = 9.5;
-constexpr std::size_t chunk_bytes_max = 512 * 1024;
+constexpr std::size_t chunk_bytes_max = std::size_t{512} * 1024;
 constexpr double backoff_s_max = 60.0;
 /// SQLite needs little; the default of 8 MB would count fully once memory is locked.
-constexpr std::size_t stack_bytes = 512 * 1024;
+constexpr std::size_t stack_bytes = std::size_t{512} * 1024;
 
 std::int64_t wall_minus_monotonic_ns() {
   timespec wall{};

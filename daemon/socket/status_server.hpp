@@ -71,7 +71,7 @@ struct SocketStatistics {
 /// (0.1..60 s) until the client disconnects or calls it again.
 class StatusServer {
  public:
-  static constexpr std::size_t line_bytes_max = 64 * 1024;
+  static constexpr std::size_t line_bytes_max = std::size_t{64} * 1024;
   static constexpr std::size_t clients_max = 64;
   static constexpr std::size_t output_bytes_max = 4u << 20;  ///< waiting for a slow reader
 

@@ -33,8 +33,8 @@ class CanSource final : public SensorSource {
   struct Channel {
     CanId id;
     CanSignal signal;
-    std::size_t device;  ///< index in the bus' configuration
-    std::size_t sensor;  ///< index in the whole configuration
+    std::size_t device{0};  ///< index in the bus' configuration
+    std::size_t sensor{0};  ///< index in the whole configuration
   };
 
   void run();

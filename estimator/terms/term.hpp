@@ -44,8 +44,8 @@ struct TermContext {
 /// A kind of term and how it is made. To add one: a file with its registration, and its line in
 /// term_registry.cpp.
 struct TermRegistration {
-  TermKind kind;
-  std::unique_ptr<Term> (*make)(const TermContext& context);
+  TermKind kind{};
+  std::unique_ptr<Term> (*make)(const TermContext& context){nullptr};
 };
 
 [[nodiscard]] const std::vector<TermRegistration>& term_registrations();
