@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <time.h>
 #include <vector>
 
 #include <modbus/modbus.h>
-#include <time.h>
 
 int main(int argc, char** argv) {
   if (argc != 3) {

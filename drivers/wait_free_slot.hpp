@@ -19,8 +19,9 @@ class WaitFreeSlot {
   /// The writer's buffer. Its content is some earlier value: write all of it.
   [[nodiscard]] T& back() noexcept { return buffers_[back_]; }
   void publish() noexcept {
-    back_ = shared_.exchange(static_cast<std::uint8_t>(back_ | fresh_bit),
-                             std::memory_order_acq_rel) & index_mask;
+    back_ =
+        shared_.exchange(static_cast<std::uint8_t>(back_ | fresh_bit), std::memory_order_acq_rel) &
+        index_mask;
   }
 
   /// The reader's side: takes the newest published value if there is one.

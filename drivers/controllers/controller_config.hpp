@@ -16,12 +16,12 @@ struct ModbusValue {
   std::uint16_t address{0};  ///< 0-based, as on the wire
   Encoding encoding{Encoding::int16};
   WordOrder word_order{WordOrder::abcd};
-  double scale{1.0};         ///< value = raw * scale (um for offsets)
+  double scale{1.0};  ///< value = raw * scale (um for offsets)
   bool operator==(const ModbusValue&) const = default;
 };
 
 struct ModbusSignal {
-  std::size_t signal{0};     ///< index of the signal in the configuration
+  std::size_t signal{0};  ///< index of the signal in the configuration
   ModbusValue value;
   bool operator==(const ModbusSignal&) const = default;
 };
@@ -37,17 +37,17 @@ struct ModbusControllerConfig {
   std::string name;
   ModbusLine line;
   int unit{1};
-  double period_s{0.1};                        ///< write and read every so often
-  std::vector<ModbusAxis> axes;                ///< order of the configuration's axes
+  double period_s{0.1};          ///< write and read every so often
+  std::vector<ModbusAxis> axes;  ///< order of the configuration's axes
   std::vector<ModbusSignal> signals;
-  std::optional<ModbusValue> valid_bits;       ///< register: bit i = offset of axis i is valid
-  std::optional<ModbusValue> heartbeat;        ///< register: counts up with every write
+  std::optional<ModbusValue> valid_bits;  ///< register: bit i = offset of axis i is valid
+  std::optional<ModbusValue> heartbeat;   ///< register: counts up with every write
   bool operator==(const ModbusControllerConfig&) const = default;
 };
 
 struct CanAxis {
-  CanSignal offset;                            ///< in a frame we send
-  std::optional<CanSignal> applied;            ///< in a frame the controller sends
+  CanSignal offset;                  ///< in a frame we send
+  std::optional<CanSignal> applied;  ///< in a frame the controller sends
   bool operator==(const CanAxis&) const = default;
 };
 struct CanControllerSignal {
@@ -59,7 +59,7 @@ struct CanControllerConfig {
   std::string name;
   std::string interface;
   double period_s{0.1};
-  double silent_after_s{2.0};                  ///< no frame of the controller for so long: offline
+  double silent_after_s{2.0};  ///< no frame of the controller for so long: offline
   double reconnect_s{0.5};
   std::vector<CanAxis> axes;
   std::vector<CanControllerSignal> signals;

@@ -10,14 +10,14 @@ namespace thermocomp {
 
 struct ControllerHealth {
   std::string name;
-  std::string kind;             ///< "modbus_tcp", "modbus_rtu", "can", "dry_run"
+  std::string kind;  ///< "modbus_tcp", "modbus_rtu", "can", "dry_run"
   bool connected{false};
   std::uint64_t connects{0};
-  std::uint64_t writes{0};      ///< offsets sent
+  std::uint64_t writes{0};  ///< offsets sent
   std::uint64_t write_errors{0};
   std::uint64_t reads{0};
   std::uint64_t read_errors{0};
-  std::string last_error;       ///< empty when the last exchange was good
+  std::string last_error;  ///< empty when the last exchange was good
 };
 
 /// Rule of the link: after every (re)connection and after every write that failed the link takes a
@@ -30,10 +30,10 @@ class ControllerLink {
   ControllerLink& operator=(const ControllerLink&) = delete;
   virtual ~ControllerLink() = default;
 
-  virtual void start() = 0;                                ///< @throws DriverError
-  virtual void stop() noexcept = 0;                        ///< within a second
-  virtual void newest(ControllerState& state) noexcept = 0;      ///< wait-free; one reader
-  virtual void offer(const OffsetCommand& command) noexcept = 0; ///< wait-free; one writer
+  virtual void start() = 0;                                       ///< @throws DriverError
+  virtual void stop() noexcept = 0;                               ///< within a second
+  virtual void newest(ControllerState& state) noexcept = 0;       ///< wait-free; one reader
+  virtual void offer(const OffsetCommand& command) noexcept = 0;  ///< wait-free; one writer
   [[nodiscard]] virtual ControllerHealth health() const = 0;
 };
 

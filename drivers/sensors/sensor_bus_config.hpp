@@ -23,12 +23,12 @@ struct ModbusTcp {
   bool operator==(const ModbusTcp&) const = default;
 };
 struct ModbusRtu {
-  std::string device;         ///< "/dev/ttyUSB0"
+  std::string device;  ///< "/dev/ttyUSB0"
   int baud{9600};
-  char parity{'N'};           ///< 'N', 'E' or 'O'
+  char parity{'N'};  ///< 'N', 'E' or 'O'
   int data_bits{8};
   int stop_bits{1};
-  bool rs485{false};          ///< let the kernel drive the transceiver's direction (TIOCSRS485)
+  bool rs485{false};  ///< let the kernel drive the transceiver's direction (TIOCSRS485)
   bool operator==(const ModbusRtu&) const = default;
 };
 
@@ -36,7 +36,8 @@ struct ModbusRtu {
 struct ModbusLine {
   std::variant<ModbusTcp, ModbusRtu> link;
   double timeout_ms{200.0};           ///< for one answer
-  double inter_frame_delay_ms{-1.0};  ///< silence between frames; negative: 3.5 characters, 1.75 ms above 19200 baud; TCP: 0
+  double inter_frame_delay_ms{-1.0};  ///< silence between frames; negative: 3.5 characters, 1.75 ms
+                                      ///< above 19200 baud; TCP: 0
   double reconnect_s{1.0};            ///< pause before a connection is tried again
   double backoff_s_max{30.0};         ///< longest pause before a dead unit is asked again
   int retries{1};                     ///< further tries of one request before it has failed
@@ -53,20 +54,20 @@ struct Sentinel {
 /// A register or bit beside the value that says whether the value is good.
 struct ModbusStatus {
   ModbusTable table{ModbusTable::discrete_input};
-  std::uint16_t address{0};   ///< 0-based, as on the wire
-  std::uint16_t mask{0xFFFF}; ///< bits looked at (registers only)
+  std::uint16_t address{0};    ///< 0-based, as on the wire
+  std::uint16_t mask{0xFFFF};  ///< bits looked at (registers only)
   /// masked value -> fault; a value not listed and not 0 is device_error
   std::vector<Sentinel> codes;
   bool operator==(const ModbusStatus&) const = default;
 };
 
 struct ModbusChannel {
-  std::size_t sensor{0};       ///< index of the sensor in the configuration
+  std::size_t sensor{0};  ///< index of the sensor in the configuration
   ModbusTable table{ModbusTable::input};
-  std::uint16_t address{0};    ///< 0-based, as on the wire
+  std::uint16_t address{0};  ///< 0-based, as on the wire
   Encoding encoding{Encoding::int16};
   WordOrder word_order{WordOrder::abcd};
-  double scale{1.0};           ///< temp = raw * scale + offset_degC
+  double scale{1.0};  ///< temp = raw * scale + offset_degC
   double offset_degC{0.0};
   std::vector<Sentinel> sentinels;
   std::optional<ModbusStatus> status;
@@ -83,10 +84,10 @@ struct ModbusRenewal {
 
 struct ModbusDeviceConfig {
   std::string name;
-  int unit{1};                       ///< 0..247 (255 on TCP)
-  double period_s{1.0};              ///< read every so often
+  int unit{1};           ///< 0..247 (255 on TCP)
+  double period_s{1.0};  ///< read every so often
   int registers_per_request_max{125};
-  int gap_registers_max{8};          ///< unused registers read along rather than ask twice
+  int gap_registers_max{8};  ///< unused registers read along rather than ask twice
   bool one_register_a_request{false};
   std::optional<ModbusRenewal> renewal;
   std::vector<ModbusChannel> channels;
@@ -108,11 +109,11 @@ struct CanSignal {
   std::uint32_t id{0};
   bool extended_id{false};
   int start_bit{0};
-  int length_bits{16};              ///< 1..64; a float has 32 or 64
+  int length_bits{16};  ///< 1..64; a float has 32 or 64
   ByteOrder byte_order{ByteOrder::little_endian};
   bool is_signed{true};
   bool is_float{false};
-  double scale{1.0};                ///< value = raw * scale + offset
+  double scale{1.0};  ///< value = raw * scale + offset
   double offset{0.0};
   std::vector<Sentinel> sentinels;
   bool operator==(const CanSignal&) const = default;
@@ -132,8 +133,8 @@ struct CanDeviceConfig {
 
 struct CanBusConfig {
   std::string name;
-  std::string interface;        ///< "can0"
-  double reconnect_s{0.5};      ///< pause before the interface is tried again
+  std::string interface;    ///< "can0"
+  double reconnect_s{0.5};  ///< pause before the interface is tried again
   std::vector<CanDeviceConfig> devices;
   bool operator==(const CanBusConfig&) const = default;
 };
