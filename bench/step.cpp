@@ -174,6 +174,8 @@ Comparison compare(double smoothing_period_s) {
   for (int round = 0; round < rounds; ++round) {
     std::vector<double> step_ns;
     std::vector<double> product_ns;
+    step_ns.reserve(steps_of_a_round);
+    product_ns.reserve(steps_of_a_round);
     for (int i = 0; i < steps_of_a_round; ++i) step_ns.push_back(one_step_ns(machine, clock_ns));
     for (int i = 0; i < steps_of_a_round; ++i) product_ns.push_back(one_step_ns(product, clock_ns));
     steps_ns.push_back(median(step_ns));

@@ -154,7 +154,7 @@ std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) c
 }
 
 void DisplacementModel::adopt_terms(DisplacementModel& other, std::span<const int> plan) noexcept {
-  std::array<std::byte, 256> state;
+  std::array<std::byte, 256> state{};
   for (std::size_t i = 0; i < plan.size(); ++i) {
     if (plan[i] < 0) continue;
     StateArchive save{std::span<std::byte>(state)};

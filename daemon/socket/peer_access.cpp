@@ -14,7 +14,7 @@ namespace {
 std::optional<gid_t> group_called(const std::string& name) {
   group entry{};
   group* found = nullptr;
-  std::vector<char> text(16 * 1024);
+  std::vector<char> text(std::size_t{16} * 1024);
   while (getgrnam_r(name.c_str(), &entry, text.data(), text.size(), &found) == ERANGE &&
          text.size() < (4u << 20)) {
     text.resize(text.size() * 2);

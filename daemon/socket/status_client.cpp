@@ -91,7 +91,7 @@ json StatusClient::Parts::receive(Clock::time_point deadline) {
   for (std::size_t searched = 0;;) {
     const std::size_t end = input.find('\n', searched);
     if (end != std::string::npos) {
-      const json message = json::parse(input.substr(0, end), nullptr, false);
+      json message = json::parse(input.substr(0, end), nullptr, false);
       input.erase(0, end + 1);
       if (!message.is_object()) throw ClientError(path + ": answers something else than JSON-RPC");
       return message;
@@ -99,7 +99,7 @@ json StatusClient::Parts::receive(Clock::time_point deadline) {
     searched = input.size();
     if (searched > line_bytes_max) throw ClientError(path + ": answers without an end");
     wait_for(POLLIN, deadline);
-    std::array<char, 64 * 1024> bytes;
+    std::array<char, std::size_t{64} * 1024> bytes{};
     const ssize_t count = recv(fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
     if (count == 0) throw ClientError("the daemon at " + path + " closed the connection");
     if (count < 0 && errno != EAGAIN && errno != EINTR) {

@@ -201,7 +201,7 @@ void StatusServer::Parts::on_client(Client& client, std::uint32_t events) {
 
 /// One read a round, so that a client that never stops sending does not keep the others waiting.
 void StatusServer::Parts::read_some(Client& client) {
-  std::array<char, 16 * 1024> bytes;
+  std::array<char, std::size_t{16} * 1024> bytes{};
   const ssize_t count = recv(client.fd, bytes.data(), bytes.size(), 0);
   if (count > 0) {
     client.input.append(bytes.data(), static_cast<std::size_t>(count));
@@ -305,7 +305,7 @@ json StatusServer::Parts::subscribe(Client& client, const json& params) {
   subscription.period =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period_s));
   subscription.due = Clock::now();
-  const json result = {{"methods", subscription.methods}, {"period_s", period_s}};
+  json result = {{"methods", subscription.methods}, {"period_s", period_s}};
   client.subscription = std::move(subscription);
   set_timer();
   return result;
