@@ -1,0 +1,237 @@
+"""A thermocouple module and a controller on Modbus TCP that do what a test tells them, at once, and
+note every write. Small on purpose, and not the simulator's code."""
+
+import socket
+import struct
+import threading
+import time
+
+
+class PlainDevice:
+    """Tables of one Modbus TCP device. The same port after a restart; registers are then 0."""
+
+    def __init__(self, port):
+        self.port = port
+        self.lock = threading.Lock()
+        self.server = None
+        self.start()
+
+    def start(self):
+        with self.lock:
+            self.tables = {2: {}, 3: {}, 4: {}}
+        self.links = []
+        self.server = socket.create_server(("127.0.0.1", self.port))
+        self.threads = [threading.Thread(target=self.accept, args=(self.server,))]
+        self.threads[0].start()
+
+    def stop(self):
+        """As a switched-off device: connections are closed, new ones refused."""
+        server, self.server = self.server, None
+        if server is None:
+            return
+        server.shutdown(socket.SHUT_RDWR)
+        server.close()
+        for link in list(self.links):
+            try:
+                link.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+        for thread in self.threads:
+            thread.join(20)
+
+    close = stop
+
+    def accept(self, server):
+        while True:
+            try:
+                link, _ = server.accept()
+            except OSError:
+                return
+            self.links.append(link)
+            self.threads.append(threading.Thread(target=self.serve, args=(link,)))
+            self.threads[-1].start()
+
+    def serve(self, link):
+        with link, link.makefile("rb") as stream:
+            try:
+                while len(head := stream.read(7)) == 7:
+                    transaction, _, length, unit = struct.unpack(">HHHB", head)
+                    answer = self.answer(stream.read(length - 1))
+                    link.sendall(struct.pack(">HHHB", transaction, 0, len(answer) + 1, unit) +
+                                 answer)
+            except OSError:
+                pass
+
+    def answer(self, pdu):
+        function, address, count = struct.unpack(">BHH", pdu[:5])
+        with self.lock:
+            if function in (3, 4):
+                words = [self.tables[function].get(address + i, 0) for i in range(count)]
+                return struct.pack(f">BB{count}H", function, 2 * count, *words)
+            if function == 2:
+                bits = sum(self.tables[2].get(address + i, 0) << i for i in range(count))
+                size = (count + 7) // 8
+                return struct.pack(">BB", 2, size) + bits.to_bytes(size, "little")
+            if function == 16:
+                for i, word in enumerate(struct.unpack(f">{count}H", pdu[6:])):
+                    self.tables[3][address + i] = word
+                self.written()
+                return pdu[:5]
+        return bytes([function | 0x80, 1])
+
+    def written(self):
+        pass
+
+
+class PlainModule(PlainDevice):
+    def show(self, *temps_degC):
+        with self.lock:
+            for i, temp in enumerate(temps_degC):
+                self.tables[4][i] = round(100 * temp) & 0xFFFF
+
+
+class PlainController(PlainDevice):
+    """Applies the offset while its valid bit is set."""
+
+    def start(self):
+        self.applied_nm = 0
+        self.order_log = []  # (CLOCK_MONOTONIC [s], offset [um]) of every valid write
+        super().start()
+
+    def written(self):
+        words = self.tables[3]
+        if not words.get(2, 0) & 1:
+            return
+        self.applied_nm, = struct.unpack(">i", struct.pack(">2H", words.get(0, 0),
+                                                           words.get(1, 0)))
+        self.order_log.append((time.monotonic(), 0.001 * self.applied_nm))
+        self.show_applied()
+
+    def show_applied(self):
+        high, low = struct.unpack(">2H", struct.pack(">i", self.applied_nm))
+        self.tables[4].update({10: high, 11: low})
+
+    def switch_compensation_off(self, off):
+        with self.lock:
+            self.tables[2][0] = int(off)
+
+    def force_applied_um(self, offset_um):
+        with self.lock:
+            self.applied_nm = round(1000 * offset_um)
+            self.show_applied()
+
+    def applied_um(self):
+        with self.lock:
+            return 0.001 * self.applied_nm
+
+    def orders(self):
+        with self.lock:
+            return list(self.order_log)
+
+
+RATE_UM_PER_S = 8.0
+MODEL = """format = 1
+inputs = ["column_degC", "spindle_degC"]
+outputs = ["z_um"]
+reference = "first_sample"
+matrix_um_per_K = [[3.0, -1.5]]
+"""
+CONFIG = """format = 1
+@STATE@
+[loop]
+rate_hz = 100
+[model]
+file = "model.toml"
+[[bus]]
+name = "cabinet"
+kind = "modbus_tcp"
+host = "127.0.0.1"
+port = {module}
+[[device]]
+name = "module"
+bus = "cabinet"
+unit = 1
+period_s = 0.02
+table = "input"
+encoding = "int16"
+scale = 0.01
+[[sensor]]
+name = "column"
+device = "module"
+address = 0
+[[sensor]]
+name = "spindle"
+device = "module"
+address = 1
+[screening]
+stale_after_s = 1.0
+rate_allowance_K = 100.0
+[smoothing]
+form = "off"
+[[block]]
+name = "column"
+input = "column_degC"
+sensors = ["column"]
+[[block]]
+name = "spindle"
+input = "spindle_degC"
+sensors = ["spindle"]
+[controller]
+name = "cnc"
+kind = "modbus_tcp"
+host = "127.0.0.1"
+port = {controller}
+unit = 1
+period_s = 0.02
+valid_bits = {{ table = "holding", address = 2, encoding = "uint16" }}
+heartbeat = {{ table = "holding", address = 3, encoding = "uint16" }}
+[[controller.signal]]
+name = "compensation_off_on"
+table = "discrete_input"
+address = 0
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = 60.0
+rate_um_per_s_max = 8.0
+offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
+applied = {{ table = "input", address = 10, encoding = "int32", scale = 0.001 }}
+[compensation]
+disable_signal = "compensation_off_on"
+prove_hold_s = 0.2
+[history]
+@HISTORY@
+offsets_period_s = 0.01
+commit_s = 0.2
+"""
+
+
+class Machine:
+    """Module, controller and a daemon between them; the daemon is started by the test."""
+
+    def __init__(self, lab):
+        from lab import free_port
+        self.module = lab.also_end(PlainModule(free_port()))
+        self.controller = lab.also_end(PlainController(free_port()))
+        self.module.show(20.0, 20.0)
+        self.model = lab.folder / "model.toml"
+        self.model.write_text(MODEL)
+        self.config = CONFIG.format(module=self.module.port, controller=self.controller.port)
+        self.daemon = lab.daemon(self.config)
+
+    def warm_by(self, offset_um):
+        """The column is so warm, over the 20 degC of the reference, that this is the offset."""
+        self.module.show(20.0 - offset_um / 3.0, 20.0)
+
+    def start(self):
+        self.daemon.start().wait_for_mode("compensating")
+        return self.daemon
+
+
+def assert_slewed(orders, slack_s=0.7):
+    """No two orders are farther apart than the slew rate allows; between the computation of an
+    offset and its arrival this machine may have done something else for so long."""
+    assert len(orders) > 1
+    for (earlier_s, earlier), (later_s, later) in zip(orders, orders[1:]):
+        allowed = RATE_UM_PER_S * (later_s - earlier_s + slack_s) + 0.001
+        assert abs(later - earlier) <= allowed, (earlier_s, earlier, later_s, later)

@@ -1,0 +1,179 @@
+"""What an operator does to a running daemon, and what it does in turn."""
+
+import time
+
+import pytest
+
+from lab import Refused, assert_replays_exactly, eventually
+from plain_devices import MODEL, RATE_UM_PER_S, Machine, assert_slewed
+
+
+@pytest.fixture
+def machine(lab):
+    return Machine(lab)
+
+
+def recorded(machine, lab):
+    """(times [s], offsets [um]) of every cycle, after the daemon has ended."""
+    machine.daemon.end()
+    columns = assert_replays_exactly(machine.daemon.history, lab.folder / "out.csv")
+    return columns["time_s"], columns["z_offset_um"]
+
+
+def assert_slewed_exactly(times_s, offsets_um):
+    for i in range(1, len(times_s)):
+        allowed = RATE_UM_PER_S * (times_s[i] - times_s[i - 1])
+        assert abs(offsets_um[i] - offsets_um[i - 1]) <= allowed + 1e-9, times_s[i]
+
+
+def falls_at_the_slew_rate(times_s, offsets_um, high, low):
+    """Whether somewhere the offsets go from high to low, full speed in every recorded cycle."""
+    length = 0.0
+    for i in range(1, len(times_s)):
+        step = offsets_um[i - 1] - offsets_um[i]
+        full = abs(step - RATE_UM_PER_S * (times_s[i] - times_s[i - 1])) <= 1e-9
+        length = length + step if full else 0.0
+        if length >= 0.98 * (high - low):
+            return True
+    return False
+
+
+def test_disabling_and_enabling_ramp_at_the_slew_rate(machine, lab):
+    daemon = machine.start()
+    machine.warm_by(12.0)
+    daemon.wait_for_offset(12.0, 0.05)
+    assert daemon.cli("status")[0] == 0
+    status, out, _ = daemon.cli("disable")
+    assert status == 0 and "off" in out
+    daemon.wait_for_mode("disabled")
+    assert daemon.cli("status")[0] == 1
+    daemon.wait_for_offset(0.0, 0.0)
+    assert daemon.cli("enable")[0] == 0
+    daemon.wait_for_offset(12.0, 0.05)
+    assert daemon.cli("status")[0] == 0
+    assert_slewed(machine.controller.orders())
+    times_s, offsets_um = recorded(machine, lab)
+    assert_slewed_exactly(times_s, offsets_um)
+    assert falls_at_the_slew_rate(times_s, offsets_um, 12.0, 0.0)
+
+
+def test_status_of_no_daemon_is_unreachable(machine):
+    status, _, said = machine.daemon.cli("status")
+    assert status == 2 and len(said.strip().splitlines()) == 1
+    assert str(machine.daemon.socket) in said
+
+
+def test_a_broken_configuration_is_not_taken_over(machine):
+    daemon = machine.start()
+    machine.warm_by(5.0)
+    daemon.wait_for_offset(5.0, 0.05)
+    good = daemon.config.read_text()
+    line = 1 + good.splitlines().index("rate_um_per_s_max = 8.0")
+    daemon.config.write_text(good.replace("rate_um_per_s_max = 8.0", "rate_um_per_s_max = -8.0"))
+    status, _, said = daemon.cli("reload")
+    assert status == 1 and f"thermocompd.toml:{line}: " in said, (status, said)
+    assert "rate_um_per_s_max" in said
+    daemon.hang_up()
+    eventually(lambda: f"thermocompd.toml:{line}: " in daemon.log_text(), "the log says why")
+    assert daemon.status()["mode"] == "compensating"
+    machine.warm_by(7.0)
+    daemon.wait_for_offset(7.0, 0.05)
+
+
+def test_a_broken_model_is_not_taken_over(machine):
+    daemon = machine.start()
+    machine.model.write_text(MODEL.replace("[[3.0, -1.5]]", "[[3.0]]"))
+    line = 1 + MODEL.splitlines().index("matrix_um_per_K = [[3.0, -1.5]]")
+    status, _, said = daemon.cli("reload")
+    assert status == 1 and f"model.toml:{line}: " in said, said
+    assert daemon.status()["mode"] == "compensating"
+
+
+def test_another_bus_needs_a_restart_and_is_said_so(machine):
+    daemon = machine.start()
+    text = daemon.config.read_text()
+    daemon.config.write_text(text.replace(f"port = {machine.module.port}", "port = 1"))
+    status, _, said = daemon.cli("reload")
+    assert status == 1 and "restart" in said and "cabinet" in said, said
+    assert daemon.status()["mode"] == "compensating"
+
+
+def test_a_changed_model_is_taken_over_without_a_jump(machine, lab):
+    daemon = machine.start()
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    before = daemon.status()["model"]["checksum"]
+    machine.model.write_text(MODEL.replace("3.0,", "-3.0,"))
+    status, out, _ = daemon.cli("reload")
+    assert status == 0 and "SHA-256" in out
+    assert daemon.status()["model"]["checksum"] != before
+    daemon.wait_for_offset(-6.0, 0.05)
+    assert_slewed(machine.controller.orders())
+    times_s, offsets_um = recorded(machine, lab)
+    assert_slewed_exactly(times_s, offsets_um)
+
+
+def test_a_new_reference_makes_the_present_state_the_straight_one(machine):
+    daemon = machine.start()
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    assert daemon.cli("reference")[0] == 0
+    daemon.wait_for_offset(0.0, 0.0)
+    assert_slewed(machine.controller.orders())
+
+
+def test_a_reference_is_refused_without_good_sensors(machine):
+    daemon = machine.start()
+    machine.module.stop()
+    daemon.wait_for_mode("holding")
+    status, _, said = daemon.cli("reference")
+    assert status == 1 and "column_degC" in said
+
+
+def test_the_switch_at_the_controller_works_without_a_terminal(machine):
+    daemon = machine.start()
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    machine.controller.switch_compensation_off(True)
+    assert "controller_disabled" in daemon.wait_for_mode("disabled")["reasons"]
+    eventually(lambda: machine.controller.applied_um() == 0.0, "the offset is gone")
+    machine.controller.switch_compensation_off(False)
+    daemon.wait_for_mode("compensating")
+    daemon.wait_for_offset(6.0, 0.05)
+    assert_slewed(machine.controller.orders())
+
+
+def test_proving_moves_one_axis_out_and_back(machine, lab):
+    daemon = machine.start()
+    assert daemon.cli("prove", "z", "4")[0] == 0
+    eventually(lambda: machine.controller.applied_um() == 4.0, "it moved out")
+    eventually(lambda: machine.controller.applied_um() == 0.0, "it came back")
+    assert daemon.cli("prove", "z", "11")[0] == 1
+    assert daemon.cli("prove", "nosuch", "1")[0] in (1, 2)
+    times_s, offsets_um = recorded(machine, lab)
+    assert_slewed_exactly(times_s, offsets_um)
+    assert max(offsets_um) == 4.0
+
+
+def test_measured_and_cycle_end_are_noted(machine, lab):
+    daemon = machine.start()
+    status, out, _ = daemon.cli("measured", "z", "3.25")
+    assert status == 0 and "3.25" in out
+    assert daemon.axis()["measured"] == 3.25
+    assert daemon.cli("cycle-end")[0] == 0
+    assert daemon.status()["cycle_ends"] == 1
+    with pytest.raises(Refused):
+        daemon.call("measured", axis="nosuch", value_um=1.0)
+    recorded(machine, lab)
+
+
+def test_a_second_daemon_on_the_same_socket_is_refused(machine, lab):
+    daemon = machine.start()
+    second = lab.daemon(machine.config, "second")
+    second.start(wait=False)
+    assert second.process.wait(30) == 1
+    said = [line for line in second.log_text().splitlines() if line.startswith("thermocompd: ")]
+    assert len(said) == 1 and str(daemon.socket) in said[0], second.log_text()
+    assert daemon.status()["mode"] == "compensating"
+    time.sleep(0.1)
+    assert daemon.cli("status")[0] == 0

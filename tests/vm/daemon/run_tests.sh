@@ -1,0 +1,10 @@
+#!/bin/sh
+# run_tests.sh BIN: the tests of this folder, with everything they write in the memory of where they
+# run: a guest's view of the host's files has neither sockets nor SQLite's shared memory.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+TMPDIR=$(mktemp -d /dev/shm/thermocomp.XXXXXX)
+trap 'rm -rf "$TMPDIR"' EXIT
+export TMPDIR THERMOCOMP_BIN="$1"
+shift
+/usr/bin/python3 -m pytest -q -s -p no:cacheprovider --basetemp="$TMPDIR/pytest" "$here" "$@"
