@@ -1,0 +1,116 @@
+#include <algorithm>
+
+#include <catch2/catch.hpp>
+
+#include "estimator_world.hpp"
+
+using namespace thermocomp::property;
+
+namespace {
+
+constexpr std::uint64_t seeds = 400;
+
+std::string text_of(const Outcome& outcome) {
+  if (!outcome.violation) return "nothing";
+  const Violation& violation = *outcome.violation;
+  return violation.rule + ", step " + std::to_string(violation.step) + ": " +
+         std::to_string(violation.value) + " beside " + std::to_string(violation.allowed);
+}
+
+/// In how many lives of the seeds a rule notices the planted bug.
+std::size_t noticed(Planted planted) {
+  std::size_t count = 0;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    WorldOptions options;
+    options.planted = planted;
+    if (live(seed, options).violation) ++count;
+  }
+  return count;
+}
+
+/// Whether a life in which all readings become useless differs from one in which they stop coming.
+bool useless_readings_matter(std::uint64_t seed, Planted planted) {
+  WorldOptions useless;
+  useless.planted = planted;
+  useless.lost_from = 200;
+  WorldOptions withheld = useless;
+  withheld.lost_are_withheld = true;
+  return live(seed, useless).trace != live(seed, withheld).trace;
+}
+
+bool loaded_state_matters(std::uint64_t seed, Planted planted) {
+  WorldOptions through;
+  WorldOptions interrupted;
+  interrupted.planted = planted;
+  interrupted.reload_state_at = 250;
+  return live(seed, through).trace != live(seed, interrupted).trace;
+}
+
+}  // namespace
+
+TEST_CASE("whatever happens, offsets keep their bound and slew and are sent only where known",
+          "[property][estimator]") {
+  const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
+  CAPTURE(seed);
+  const Outcome outcome = live(seed, {});
+  INFO(text_of(outcome));
+  CHECK_FALSE(outcome.violation.has_value());
+}
+
+TEST_CASE("the random lives reach what they are meant to test", "[property][estimator]") {
+  Outcome all;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    const Outcome outcome = live(seed, {});
+    all.steps_compensating += outcome.steps_compensating;
+    all.resyncs += outcome.resyncs;
+    all.reloads += outcome.reloads;
+    all.restarts += outcome.restarts;
+    all.largest_offset_um = std::max(all.largest_offset_um, outcome.largest_offset_um);
+  }
+  CHECK(all.steps_compensating > seeds * 60);
+  CHECK(all.resyncs > seeds);
+  CHECK(all.reloads > seeds);
+  CHECK(all.restarts > seeds);
+  CHECK(all.largest_offset_um > 80.0);
+}
+
+TEST_CASE("a stale or impossible reading never moves the axis", "[property][estimator]") {
+  const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
+  CAPTURE(seed);
+  CHECK_FALSE(useless_readings_matter(seed, Planted::nothing));
+}
+
+TEST_CASE("equal seeds give equal bits, and another seed others", "[property][estimator]") {
+  const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
+  CAPTURE(seed);
+  CHECK(live(seed, {}).trace == live(seed, {}).trace);
+  CHECK(live(seed, {}).trace != live(seed + 1, {}).trace);
+}
+
+TEST_CASE("a state saved and loaded in the middle of a life changes no bit",
+          "[property][estimator]") {
+  const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
+  CAPTURE(seed);
+  CHECK_FALSE(loaded_state_matters(seed, Planted::nothing));
+}
+
+TEST_CASE("planted bugs break the rules", "[property][estimator]") {
+  CHECK(noticed(Planted::nothing) == 0);
+  CHECK(noticed(Planted::double_rate) > seeds / 2);
+  CHECK(noticed(Planted::larger_bound) > seeds / 20);
+  CHECK(noticed(Planted::always_valid) > seeds / 2);
+  CHECK(noticed(Planted::epoch_ignored) > seeds / 20);
+  CHECK(noticed(Planted::read_back_hidden) > seeds / 2);
+  CHECK(noticed(Planted::reload_from_nothing) > seeds / 20);
+}
+
+TEST_CASE("hidden faults and a forgotten state are noticed", "[property][estimator]") {
+  std::size_t faults = 0;
+  std::size_t states = 0;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    if (useless_readings_matter(seed, Planted::faults_hidden)) ++faults;
+    if (loaded_state_matters(seed, Planted::forgotten_state)) ++states;
+  }
+  CHECK(faults > seeds / 2);
+  CHECK(states > seeds / 2);
+}

@@ -1,0 +1,507 @@
+#include "estimator_world.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+namespace thermocomp::property {
+namespace {
+
+constexpr std::size_t axes_count = 3;
+constexpr std::size_t sensors_count = 6;
+constexpr double step_s_usual_max = 0.5;
+constexpr double tiny_um = 1e-9;
+constexpr double register_rounding_um = 0.1;
+
+/// A stream of chance of its own for each part of the world, so that withholding readings does not
+/// change what the controller or the operator does.
+class Chance {
+ public:
+  Chance(std::uint64_t seed, std::uint64_t part) : engine_(seed * 1000003u + part) {}
+  // Not std::uniform_*_distribution: their results differ between standard libraries.
+  double between(double low, double high) {
+    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
+  }
+  bool one_in(std::uint64_t count) { return engine_() % count == 0; }
+  std::size_t below(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+nanoseconds from_seconds(double seconds) {
+  return std::chrono::duration_cast<nanoseconds>(seconds_d(seconds));
+}
+
+SmoothingConfig random_smoothing(Chance& chance) {
+  SmoothingConfig smoothing;
+  smoothing.form = static_cast<SmoothingForm>(chance.below(3));
+  smoothing.history = static_cast<SmoothingHistory>(chance.below(2));
+  smoothing.period_s = chance.one_in(2) ? 0.0 : chance.between(0.1, 5.0);
+  smoothing.samples = 3 + chance.below(8);
+  smoothing.half_width_K = chance.between(0.05, 1.0);
+  smoothing.outage_s = chance.between(1.0, 30.0);
+  return smoothing;
+}
+
+EstimatorConfig random_config(Chance& chance) {
+  EstimatorConfig config;
+  const SmoothingConfig smoothing = random_smoothing(chance);
+  for (std::size_t i = 0; i < sensors_count; ++i) {
+    SensorConfig sensor;
+    sensor.name = std::string("s").append(1, static_cast<char>('1' + i));
+    sensor.smoothing = smoothing;
+    sensor.screening.stale_after_s = chance.between(0.5, 5.0);
+    sensor.screening.rate_K_per_s_max = chance.between(0.1, 5.0);
+    sensor.screening.stuck_after_s = chance.one_in(3) ? chance.between(5.0, 50.0) : 0.0;
+    config.sensors.push_back(sensor);
+  }
+  if (chance.one_in(3)) config.sensors[0].reference_sensor = 5;
+  config.blocks = {{"b1", "t1_degC", {0, 1}}, {"b2", "t2_degC", {2, 3, 4}}, {"b3", "t3_degC", {5}}};
+  config.signals = {"spindle_rpm", "y_mm", "cutting_on", "off_on"};
+  const std::array<const char*, axes_count> names{"x", "y", "z"};
+  const std::array<const char*, axes_count> outputs{"x_um", "y_um", "z_um"};
+  for (std::size_t i = 0; i < axes_count; ++i)
+    config.axes.push_back({names[i],
+                           outputs[i],
+                           chance.one_in(2) ? 1.0 : -1.0,
+                           {chance.between(3.0, 100.0), chance.between(0.1, 20.0)}});
+  config.compensation.on_loss = static_cast<LossPolicy>(chance.below(2));
+  config.compensation.hold_s = chance.between(0.0, 20.0);
+  config.compensation.hold_while_cutting = chance.one_in(4);
+  config.compensation.cutting_signal = "cutting_on";
+  config.compensation.disable_signal = "off_on";
+  config.compensation.mismatch_um = chance.between(0.5, 3.0);
+  config.compensation.mismatch_after_s = chance.between(0.5, 3.0);
+  config.compensation.prove_hold_s = chance.between(0.0, 2.0);
+  return config;
+}
+
+ThermalModel random_model(Chance& chance) {
+  ThermalModel model;
+  model.inputs = {"t1_degC", "t2_degC", "t3_degC"};
+  model.outputs = {"x_um", "y_um", "z_um"};
+  const auto row = [&] {
+    return std::vector<double>{chance.between(-9, 9), chance.between(-9, 9), chance.between(-9, 9)};
+  };
+  for (std::size_t i = 0; i < axes_count; ++i) model.matrix_um_per_K.push_back(row());
+  if (chance.one_in(4)) model.reference_degC = {20.0, 21.0, 22.0};
+  if (chance.one_in(2))
+    model.guideways = {{"g", "y_mm", {0.0, 100.0, 500.0}, {{"z_um", {row(), row(), row()}}}}};
+  if (chance.one_in(2))
+    model.terms.push_back({"thermal_lag",
+                           "t1_degC",
+                           {{"tau_s", chance.one_in(2) ? 60.0 : 600.0}},
+                           {{"gain_um_per_K", {{"x_um", chance.between(-5, 5)}}}}});
+  if (chance.one_in(2))
+    model.terms.push_back({"missing_heat_source",
+                           "spindle_rpm",
+                           {{"tau_s", 30.0}, {"power", 2.0}},
+                           {{"gain_um_per_unit", {{"z_um", chance.between(-1e-6, 1e-6)}}}}});
+  return model;
+}
+
+/// A controller and its link: obeys what is valid and of its epoch, tells what it applies.
+struct Controller {
+  std::array<double, axes_count> applied_um{};
+  std::array<double, axes_count> told_um{};  ///< last read-back of the epoch told, NaN: none
+  std::uint32_t epoch{0};
+  bool connected{false};
+  bool exchanging{false};  ///< reads and writes in this step
+  bool rejecting{false};
+  /// What is applied may differ from what is sent by as much as counts as agreement.
+  std::array<bool, axes_count> disturbed{};
+};
+
+class World {
+ public:
+  World(std::uint64_t seed, const WorldOptions& options)
+      : options_(options),
+        shape_(seed, 1),
+        time_(seed, 2),
+        heat_(seed, 3),
+        sensors_(seed, 4),
+        link_(seed, 5),
+        operator_(seed, 6),
+        config_(random_config(shape_)),
+        model_(random_model(shape_)) {
+    if (options_.lost_from) config_.compensation.on_loss = LossPolicy::hold;
+    remember_comparison();
+    estimator_ = std::make_unique<Estimator>(planted(config_), model_);
+    report_ = estimator_->make_report();
+    readings_.resize(sensors_count);
+  }
+
+  Outcome live() {
+    for (step_ = 0; step_ < options_.steps && !outcome_.violation; ++step_) {
+      pass_time();
+      change_estimator();
+      operate();
+      sense();
+      exchange();
+      step();
+      check_offsets();
+      deliver();
+    }
+    return outcome_;
+  }
+
+ private:
+  [[nodiscard]] EstimatorConfig planted(EstimatorConfig config) const {
+    for (AxisConfig& axis : config.axes) {
+      if (options_.planted == Planted::double_rate) axis.limiter.rate_um_per_s_max *= 2;
+      if (options_.planted == Planted::larger_bound) axis.limiter.offset_um_max *= 2;
+    }
+    return config;
+  }
+
+  void pass_time() {
+    double step_s = time_.between(0.05, step_s_usual_max);
+    if (time_.one_in(20)) step_s = 0.0;
+    if (time_.one_in(30)) step_s = time_.between(1.0, 15.0);
+    now_ += from_seconds(step_s);
+    busy_s_ += std::min(step_s, step_s_usual_max);
+    // In whole nanoseconds, as the estimator sees it.
+    dt_s_ = estimator_stepped_ ? 1e-9 * static_cast<double>(from_seconds(step_s).count()) : 0.0;
+    for (double& temp_degC : temps_degC_) temp_degC += heat_.between(-0.05, 0.06);
+  }
+
+  void change_estimator() {
+    if (options_.reload_state_at && *options_.reload_state_at == step_) load_saved_state();
+    if (shape_.one_in(60)) reload();
+    const bool restart_now = shape_.one_in(150);
+    if (restart_now && !options_.lost_from) restart();
+  }
+
+  void load_saved_state() {
+    std::vector<std::byte> state(estimator_->state_size_bytes());
+    estimator_->save_state(state);
+    auto next = std::make_unique<Estimator>(planted(config_), model_);
+    if (options_.planted != Planted::forgotten_state) next->load_state(state);
+    estimator_ = std::move(next);
+  }
+
+  void reload() {
+    ++outcome_.reloads;
+    config_ = random_config(shape_);
+    remember_comparison();
+    if (options_.lost_from) config_.compensation.on_loss = LossPolicy::hold;
+    if (shape_.one_in(2)) model_ = random_model(shape_);
+    auto next = std::make_unique<Estimator>(planted(config_), model_);
+    if (options_.planted != Planted::reload_from_nothing) {
+      next->plan_adoption(*estimator_);
+      next->adopt(*estimator_);
+    }
+    estimator_ = std::move(next);
+    report_ = estimator_->make_report();
+  }
+
+  /// The daemon comes back with what its state file held, perhaps of a while ago; its link is new.
+  void restart() {
+    ++outcome_.restarts;
+    PersistentState state;
+    state.enabled = report_.enabled;
+    const auto columns = model_.temperature_columns();
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      state.reference_degC[columns[i]] = report_.inputs[i].reference_degC;
+    const auto signals = model_.signal_columns();
+    for (std::size_t i = 0; i < signals.size(); ++i)
+      state.reference_signals[signals[i]] = report_.signals[i].reference;
+    for (std::size_t i = 0; i < axes_count; ++i) {
+      double offset_um = command_.offset_um[i];
+      if (shape_.one_in(3)) offset_um = shape_.between(-1.0, 1.0) * 60.0;
+      if (shape_.one_in(20)) offset_um = 1e6;
+      state.offset_um[config_.axes[i].name] = offset_um;
+      before_um_[i] = std::abs(offset_um) <= offset_um_max_of_any_axis ? offset_um : 0.0;
+    }
+    estimator_ = std::make_unique<Estimator>(planted(config_), model_);
+    estimator_->restore(state);
+    report_ = estimator_->make_report();
+    estimator_stepped_ = false;
+    dt_s_ = 0.0;
+    connect();
+  }
+
+  void operate() {
+    if (!operator_.one_in(15)) return;
+    const std::array<double, 5> values{operator_.between(-10, 10), operator_.between(-200, 200),
+                                       not_a_number, 1e300, 0.5};
+    estimator_->apply({static_cast<CommandKind>(operator_.below(6)),
+                       static_cast<std::uint32_t>(operator_.below(5)),
+                       values[operator_.below(values.size())]});
+  }
+
+  void sense() {
+    const bool lost = options_.lost_from && step_ >= *options_.lost_from;
+    for (std::size_t i = 0; i < sensors_count; ++i) {
+      if (lost) {
+        if (!options_.lost_are_withheld) readings_[i] = useless_reading(i);
+      } else if (!sensors_.one_in(5)) {  // else: no news
+        readings_[i] = random_reading(i);
+      }
+    }
+  }
+
+  Reading random_reading(std::size_t sensor) {
+    const double noise_K = sensors_.between(-0.02, 0.02);
+    Reading reading{temps_degC_[sensor] + noise_K, now_ - from_seconds(sensors_.between(0, 0.04)),
+                    Fault::none};
+    if (frozen_until_[sensor] > step_)
+      return readings_[sensor].fault == Fault::none
+                 ? Reading{readings_[sensor].temp_degC, reading.taken_at, Fault::none}
+                 : reading;
+    if (sensors_.one_in(100)) frozen_until_[sensor] = step_ + 5 + sensors_.below(100);
+    if (sensors_.one_in(25)) reading.temp_degC += sensors_.between(-15, 15);
+    if (sensors_.one_in(15)) return useless_reading(sensor);
+    return reading;
+  }
+
+  /// What no estimator may believe, whatever it has seen before.
+  Reading useless_reading(std::size_t sensor) {
+    Reading reading{temps_degC_[sensor] + sensors_.between(-50, 50), now_, Fault::none};
+    switch (sensors_.below(6)) {
+      case 0:
+        reading.fault = static_cast<Fault>(1 + sensors_.below(faults_count - 1));
+        break;
+      case 1:
+        reading.temp_degC = not_a_number;
+        break;
+      case 2:
+        reading.temp_degC = std::numeric_limits<double>::infinity();
+        break;
+      case 3:
+        reading.temp_degC = sensors_.one_in(2) ? -40.0 - sensors_.between(0, 1e6) : 1e4;
+        break;
+      case 4:
+        reading.taken_at = now_ - from_seconds(sensors_.between(6.0, 1e6));
+        break;
+      default:
+        reading.taken_at = now_ + from_seconds(sensors_.between(6.0, 1e6));
+        break;
+    }
+    return reading;
+  }
+
+  void connect() {
+    ++controller_.epoch;
+    controller_.connected = true;
+    controller_.disturbed.fill(false);
+  }
+
+  /// What happens at the controller, and what its link reads of it in this step.
+  void exchange() {
+    if (link_.one_in(40)) {
+      if (controller_.connected)
+        controller_.connected = false;
+      else
+        connect();
+    } else if (!controller_.connected && link_.one_in(8)) {
+      connect();
+    }
+    if (controller_.connected && link_.one_in(50)) rehome();
+    if (link_.one_in(40)) controller_.rejecting = !controller_.rejecting;
+    controller_.exchanging = controller_.connected && !link_.one_in(15);
+    if (!controller_.exchanging || controller_.rejecting) controller_.disturbed.fill(true);
+    if (controller_.exchanging) read_controller();
+    // A new epoch is published together with what was read back in it, not before.
+    state_.online = controller_.connected && state_.link_epoch == controller_.epoch;
+  }
+
+  void rehome() {
+    for (std::size_t i = 0; i < axes_count; ++i) {
+      controller_.applied_um[i] = link_.one_in(2) ? 0.0 : link_.between(-100.0, 100.0);
+      controller_.disturbed[i] = true;
+    }
+  }
+
+  void read_controller() {
+    state_.taken_at = now_;
+    if (state_.link_epoch != controller_.epoch) controller_.told_um.fill(not_a_number);
+    state_.link_epoch = controller_.epoch;
+    for (std::size_t i = 0; i < axes_count; ++i) {
+      state_.applied_um[i] = controller_.applied_um[i];
+      // Whoever is re-homed and cannot be read at the same moment cannot be noticed in time.
+      if (link_.one_in(60) && !controller_.disturbed[i]) {
+        const std::array<double, 5> nonsense{not_a_number, 1e30, -700.0, 501.0,
+                                             std::numeric_limits<double>::infinity()};
+        state_.applied_um[i] = nonsense[link_.below(nonsense.size())];
+      }
+      if (std::isfinite(state_.applied_um[i])) controller_.told_um[i] = state_.applied_um[i];
+    }
+    state_.signals[0] = link_.one_in(50) ? 1e200 : link_.between(0.0, 8000.0);
+    state_.signals[1] = link_.one_in(50) ? not_a_number : link_.between(-100.0, 600.0);
+    state_.signals[2] = link_.one_in(4) ? 1.0 : 0.0;
+    if (link_.one_in(60)) switch_off_ = !switch_off_;
+    state_.signals[3] = switch_off_ ? 1.0 : 0.0;
+  }
+
+  void step() {
+    std::vector<Reading> readings = readings_;
+    if (options_.planted == Planted::faults_hidden)
+      for (Reading& reading : readings)
+        reading = {reading.temp_degC > -30 && reading.temp_degC < 200 ? reading.temp_degC : 25.0,
+                   now_, Fault::none};
+    ControllerState told = state_;
+    if (options_.planted == Planted::read_back_hidden)
+      std::copy(before_um_.begin(), before_um_.end(), told.applied_um.begin());
+    estimator_->step(now_, readings, told, command_);
+    estimator_stepped_ = true;
+    estimator_->report(report_);
+    if (options_.planted == Planted::always_valid) command_.valid.fill(true);
+    if (report_.mode == Mode::compensating) ++outcome_.steps_compensating;
+    for (std::size_t i = 0; i < axes_count; ++i) {
+      outcome_.trace.push_back(std::bit_cast<std::uint64_t>(command_.offset_um[i]));
+      outcome_.trace.push_back(std::bit_cast<std::uint64_t>(report_.axes[i].target_um));
+      outcome_.trace.push_back(command_.valid[i] ? 1 : 0);
+    }
+  }
+
+  void check_offsets() {
+    sent_.push_back({busy_s_, command_.offset_um, command_.offset_um});
+    // An offset that starts from the read-back counts as having been there.
+    for (std::size_t i = 0; i < axes_count; ++i)
+      if (std::abs(command_.offset_um[i] - state_.applied_um[i]) <=
+          step_um_max(i) + register_rounding_um)
+        sent_.back().start_um[i] = state_.applied_um[i];
+    for (std::size_t i = 0; i < axes_count && !outcome_.violation; ++i) {
+      check_offset(i);
+      check_valid(i);
+      before_um_[i] = command_.offset_um[i];
+      outcome_.largest_offset_um = std::max(outcome_.largest_offset_um, std::abs(before_um_[i]));
+    }
+  }
+
+  [[nodiscard]] double step_um_max(std::size_t axis) const {
+    return config_.axes[axis].limiter.rate_um_per_s_max * std::min(dt_s_, 1.0) + tiny_um;
+  }
+
+  void check_offset(std::size_t axis) {
+    const double offset_um = command_.offset_um[axis];
+    const double before_um = before_um_[axis];
+    const double bound_um = config_.axes[axis].limiter.offset_um_max + tiny_um;
+    const double step_um = step_um_max(axis);
+    demand("offset is finite", std::isfinite(offset_um), offset_um, 0);
+    demand("no axis beyond what any configuration allows",
+           std::abs(offset_um) <= offset_um_max_of_any_axis, offset_um, offset_um_max_of_any_axis);
+    // The one leap that is none: the axis already stands where the controller says.
+    if (!(std::abs(offset_um - before_um) <= step_um) ||
+        !(std::abs(offset_um) <= std::max(bound_um, std::abs(before_um)))) {
+      ++outcome_.resyncs;
+      const double from_applied_um = std::abs(offset_um - state_.applied_um[axis]);
+      demand("offset changes at the slew rate, or starts from the read-back",
+             state_.online && command_.valid[axis] &&
+                 from_applied_um <= step_um + register_rounding_um,
+             offset_um - before_um, step_um);
+      return;
+    }
+    const bool may_change = !config_.compensation.hold_while_cutting;
+    if (command_.valid[axis] && may_change && std::abs(before_um) > bound_um &&
+        std::abs(state_.applied_um[axis] - before_um) <= tiny_um)
+      demand("an offset outside a new bound comes in at the slew rate",
+             std::abs(offset_um) <= std::max(bound_um, std::abs(before_um) - step_um + 3 * tiny_um),
+             offset_um, bound_um);
+  }
+
+  void check_valid(std::size_t axis) {
+    if (!command_.valid[axis]) return;
+    const double told_um = controller_.told_um[axis];
+    demand("an axis whose position is not known is not driven",
+           controller_.epoch > 0 && std::isfinite(told_um), told_um, 0);
+    demand("an axis at an impossible position is not driven",
+           !(std::abs(told_um) > offset_um_max_of_any_axis + register_rounding_um), told_um,
+           offset_um_max_of_any_axis);
+  }
+
+  /// The link writes the offsets - unless it has just lost its connection and has a new one.
+  void deliver() {
+    const bool reconnected = controller_.connected && link_.one_in(50);
+    if (reconnected) {
+      connect();
+      if (link_.one_in(2)) controller_.applied_um.fill(0.0);
+    }
+    const bool belongs =
+        command_.link_epoch == controller_.epoch || options_.planted == Planted::epoch_ignored;
+    if (!controller_.exchanging || controller_.rejecting || !belongs) return;
+    for (std::size_t i = 0; i < axes_count && !outcome_.violation; ++i) {
+      if (!command_.valid[i]) continue;
+      const double change_um = std::abs(command_.offset_um[i] - controller_.applied_um[i]);
+      double allowed_um = step_um_max(i) + register_rounding_um;
+      if (controller_.disturbed[i]) allowed_um += undetected_um(i);
+      demand("what the controller applies changes at the slew rate", change_um <= allowed_um,
+             change_um, allowed_um);
+      controller_.applied_um[i] = command_.offset_um[i];
+      controller_.disturbed[i] = false;
+    }
+  }
+
+  /// A controller that does not obey is not noticed while what it applies lies, a tolerance apart,
+  /// among what was sent within the window of comparison (or in the last slots of it).
+  [[nodiscard]] double undetected_um(std::size_t axis) const {
+    // The window's five slots end with a step each; a long step counts as an ordinary one.
+    constexpr std::size_t slots = 8;
+    const double window_s = 1.25 * window_s_ + 5 * step_s_usual_max;
+    double low_um = before_um_[axis];
+    double high_um = before_um_[axis];
+    for (std::size_t i = sent_.size(); i > 0; --i) {
+      if (sent_.size() - i > slots && busy_s_ - sent_[i - 1].busy_s > window_s) break;
+      const Sent& sent = sent_[i - 1];
+      low_um = std::min({low_um, sent.offset_um[axis], sent.start_um[axis]});
+      high_um = std::max({high_um, sent.offset_um[axis], sent.start_um[axis]});
+    }
+    return tolerance_um_ + high_um - low_um;
+  }
+
+  /// After a reload the comparison may still be that of the configuration before.
+  void remember_comparison() {
+    const CompensationConfig& compensation = config_.compensation;
+    window_s_ = std::max(window_s_, compensation.mismatch_after_s);
+    tolerance_um_ = std::max(tolerance_um_, compensation.mismatch_um);
+  }
+
+  void demand(const char* rule, bool holds, double value, double allowed) {
+    if (!holds && !outcome_.violation) outcome_.violation = Violation{rule, step_, value, allowed};
+  }
+
+  WorldOptions options_;
+  Chance shape_;
+  Chance time_;
+  Chance heat_;
+  Chance sensors_;
+  Chance link_;
+  Chance operator_;
+  EstimatorConfig config_;
+  ThermalModel model_;
+  std::unique_ptr<Estimator> estimator_;
+  bool estimator_stepped_{false};
+  Report report_;
+  std::size_t step_{0};
+  double busy_s_{0.0};  ///< time passed, long steps counted as ordinary ones
+  nanoseconds now_{std::chrono::hours(1)};
+  double dt_s_{0.0};
+  std::array<double, sensors_count> temps_degC_{20, 20, 21, 21, 21, 22};
+  std::array<std::size_t, sensors_count> frozen_until_{};
+  std::vector<Reading> readings_;
+  Controller controller_;
+  bool switch_off_{false};
+  ControllerState state_;
+  OffsetCommand command_;
+  struct Sent {
+    double busy_s;
+    std::array<double, axes_max> offset_um;
+    std::array<double, axes_max> start_um;
+  };
+  std::vector<Sent> sent_;
+  std::array<double, axes_count> before_um_{};
+  double window_s_{0.0};
+  double tolerance_um_{0.0};
+  Outcome outcome_;
+};
+
+}  // namespace
+
+Outcome live(std::uint64_t seed, const WorldOptions& options) {
+  return World(seed, options).live();
+}
+
+}  // namespace thermocomp::property
