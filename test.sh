@@ -4,6 +4,7 @@
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
 source scripts/common.sh
+exec </dev/null
 
 usage() {
   echo "usage: ./test.sh [--preset debug|release|asan-ubsan|tsan|coverage] [-- CTEST_OPTION...]"
@@ -42,8 +43,16 @@ case $preset in
     ;;
 esac
 
+# What was left out, and why: a skipped test must not look like one that passed.
+say_what_was_skipped() {
+  local log=build/$preset/Testing/Temporary/LastTest.log
+  [[ -f $log ]] || return 0
+  grep -E '^SKIPPED |: skipped: ' "$log" | sort -u | sed 's/^/left out: /' || true
+}
+
 run_tests() {
   local runner=()
+  export PYTEST_ADDOPTS=-rs  # pytest names what it skips
   if [[ $preset == tsan || $preset == asan-ubsan ]]; then runner=(run_as_sanitizers_need); fi
   if [[ $preset == coverage ]]; then find "build/$preset" -name '*.gcda' -delete; fi
   "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$(nproc)" "${ctest_options[@]}"
@@ -62,5 +71,6 @@ stage "configure $preset" cmake --preset "$preset"
 stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)"
 status=0
 stage "tests $preset" run_tests || status=$?
+say_what_was_skipped
 if [[ $preset == coverage ]]; then stage "coverage" coverage_report; fi
 exit "$status"

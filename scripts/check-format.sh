@@ -3,7 +3,7 @@
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 
-mapfile -d '' files < <(git ls-files -z -- '*.cpp' '*.hpp')
+mapfile -d '' files < <(find . -path ./build -prune -o -type f \( -name '*.cpp' -o -name '*.hpp' \) -print0)
 if [[ ${1:-} == --fix ]]; then
   clang-format -i "${files[@]}"
 else

@@ -37,3 +37,23 @@ run_as_sanitizers_need() {
     "$@"
   fi
 }
+
+# junit_counts FILE: "PASSED FAILED SKIPPED" of the tests in a file of `ctest --output-junit`; zeros
+# where there is none.
+junit_counts() {
+  local total failures skipped
+  if [[ ! -s $1 ]]; then
+    echo "0 0 0"
+    return
+  fi
+  total=$(junit_count "$1" tests) failures=$(junit_count "$1" failures)
+  skipped=$(junit_count "$1" skipped)
+  echo "$((total - failures - skipped)) $failures $skipped"
+}
+
+# The attribute of the file's first element that has it: the test suite's.
+junit_count() {
+  local count
+  count=$(grep -o -m 1 "[[:space:]]$2=\"[0-9]*\"" "$1" | head -n 1 | tr -dc '0-9')
+  echo "${count:-0}"
+}

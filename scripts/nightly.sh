@@ -1,0 +1,31 @@
+#!/bin/bash
+# Everything, which takes some hours: what .ci/run does, but no test left out for its length, then
+# the debug build, line coverage, and every benchmark. Each part runs even when another failed.
+#   scripts/nightly.sh       exit status 0: everything passed and could be measured
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+source scripts/common.sh
+exec </dev/null
+
+failed=()
+part() {
+  local name=$1
+  shift
+  stage "$name" "$@" || failed+=("$name")
+}
+
+for preset in release asan-ubsan tsan debug coverage; do
+  part "$preset" ./test.sh --preset "$preset"
+done
+part "format" scripts/check-format.sh
+part "clang-tidy" scripts/check-tidy.sh
+for benchmark in $(bench/run.sh); do
+  part "bench $benchmark" bench/run.sh "$benchmark"
+done
+
+echo
+if ((${#failed[@]} > 0)); then
+  printf 'failed: %s\n' "${failed[@]}"
+  exit 1
+fi
+echo "everything passed in $((SECONDS / 60)) min"
