@@ -41,6 +41,7 @@ gain_um_per_K = { z_um = 0.1, c_urad = 0.2 }
 matrix_K2 = [[4.0, 1.0], [1.0, 9.0]]
 )";
 
+// NOLINTNEXTLINE(readability-function-size): a table
 const std::vector<Broken>& broken_models() {
   static const std::vector<Broken> table = {
       {"unknown key", "reference =", "refrence = 1\nreference =", "", "refrence",

@@ -35,7 +35,8 @@ std::string warming_run(const char* columns) {
   std::ostringstream text;
   text << "time_s," << columns << "\n";
   for (int row = 0; row < 40; ++row) {
-    const double bed_degC = 20.0 + 0.25 * (row / 4);
+    const int step = row / 4;
+    const double bed_degC = 20.0 + 0.25 * step;
     text << row * 15 << "," << bed_degC << "," << 21.0 << "," << 22.0 << "\n";
   }
   return text.str();

@@ -65,7 +65,6 @@ inline Reply honest(const Request& request) {
     return {Bytes(request.pdu.begin(), request.pdu.begin() + 5)};
   }
   std::vector<std::uint16_t> words;
-  words.reserve(static_cast<std::size_t>(request.count));
   for (int i = 0; i < request.count; ++i) {
     words.push_back(static_cast<std::uint16_t>(request.unit * 1000 + request.address + i));
   }
