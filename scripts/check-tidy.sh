@@ -9,7 +9,9 @@ build=build/release
 [[ -f $build/compile_commands.json ]] || cmake --preset release >/dev/null
 
 folders=("$@")
-if ((${#folders[@]} == 0)); then folders=(config drivers estimator daemon simulator cli bench tests); fi
+if ((${#folders[@]} == 0)); then
+  folders=(config drivers estimator daemon simulator cli bench tests)
+fi
 pattern="$PWD/($(IFS='|' && echo "${folders[*]}"))/.*\.cpp$"
 
 # -quiet still leaves the commands and counts of suppressed warnings; they are no news.

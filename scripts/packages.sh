@@ -17,6 +17,6 @@ packages_demo=("${packages_build[@]}" gnuplot-nox)
 packages_test=(
   "${packages_demo[@]}"
   mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-numpy python3-pytest
-  sqlite3 socat rt-tests user-mode-linux kmod iproute2 valgrind
+  sqlite3 socat rt-tests user-mode-linux kmod iproute2 procps valgrind
   clang-tidy clang-tools clang-format gcovr
 )
