@@ -209,6 +209,10 @@ class Lab:
                 process.kill()
                 process.wait(PATIENCE_S)
         shutil.rmtree(self.sockets, ignore_errors=True)
+        for log in self.folder.glob("*.log"):
+            said = log.read_text(errors="replace")
+            for finding in ("Sanitizer: ", "runtime error: ", "broken promise: "):
+                assert finding not in said, said
 
 
 def read_columns(path):

@@ -97,7 +97,7 @@ def test_faults_commands_reloads_and_power_cuts_are_replayed_bit_for_bit(lab):
     end = time.monotonic() + 24.0
     modes, reasons = set(), set()
     turn = 0
-    while time.monotonic() < end:
+    while time.monotonic() < end or turn < 50:
         status = daemon.status()
         modes.add(status["mode"])
         reasons.update(status["reasons"])
@@ -121,7 +121,6 @@ def test_faults_commands_reloads_and_power_cuts_are_replayed_bit_for_bit(lab):
             daemon.start()
         turn += 1
         time.sleep(0.25)
-    assert turn > 40, "this machine is too busy for anything to be shown"
     daemon.end()
     columns = assert_replays_exactly(daemon.history, lab.folder / "out.csv")
     segments = count_rows(daemon.history)[0]
