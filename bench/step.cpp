@@ -205,7 +205,8 @@ int run() {
       "with a guideway\nof 16 positions; product: Eigen, 96 x 32, double, same flags.\n");
   const Comparison usual = compare(SmoothingConfig{}.period_s);
   std::printf(
-      "smoothing at its default period (no value due): step %.0f ns, product %.0f ns, "
+      "default smoothing (one value a minute, none due in most cycles): step %.0f ns, product %.0f "
+      "ns, "
       "ratio %.2f\n",
       usual.step_ns, usual.product_ns, usual.ratio);
   const Comparison all_due = compare(0.0);
@@ -213,7 +214,7 @@ int run() {
       "all 64 values due for smoothing (sliding line, n = 6): step %.0f ns, product %.0f "
       "ns, ratio %.2f\n",
       all_due.step_ns, all_due.product_ns, all_due.ratio);
-  std::printf("step_over_gemv_usual %.3f ratio\n", usual.ratio);
+  std::printf("step_over_gemv_default_smoothing %.3f ratio\n", usual.ratio);
   std::printf("step_ns %.0f ns\n", all_due.step_ns);
   std::printf("step_over_gemv %.3f ratio\n", all_due.ratio);
   return 0;

@@ -43,7 +43,8 @@ Smoother::Smoother(const SmoothingConfig& config)
     : form_(config.form),
       screened_(config.history == SmoothingHistory::screened),
       period_(std::chrono::duration_cast<nanoseconds>(seconds_d(config.period_s))),
-      outage_(std::chrono::duration_cast<nanoseconds>(seconds_d(config.outage_s))),
+      outage_(std::max(std::chrono::duration_cast<nanoseconds>(seconds_d(config.outage_s)),
+                       2 * period_)),
       half_width_K_(config.half_width_K),
       sliding_line_(config.samples),
       line_of_lines_(config.samples) {
@@ -51,35 +52,17 @@ Smoother::Smoother(const SmoothingConfig& config)
   THERMOCOMP_ENSURE(config.samples <= smoothing_samples_max);
 }
 
-void Smoother::add(const Sample& sample) noexcept {
-  if (form_ == SmoothingForm::off) {
-    value_K_ = sample.value_K;
-    has_value_ = true;
-    return;
-  }
-  if (has_value_ && sample.at - taken_at_ > std::max(outage_, 2 * period_)) restart();
-  if (!due(sample.at)) return;
+void Smoother::take(const Sample& sample) noexcept {
   taken_at_ = sample.at;
   if (form_ == SmoothingForm::sliding_line)
-    take(sliding_line_, sample);
+    take_into(sliding_line_, sample);
   else
-    take(line_of_lines_, sample);
+    take_into(line_of_lines_, sample);
   has_value_ = true;
 }
 
-bool Smoother::due(nanoseconds at) noexcept {
-  if (!has_value_ || period_ <= nanoseconds{0}) {
-    due_at_ = at + period_;
-    return true;
-  }
-  if (at < due_at_) return false;
-  // Whole periods, so that late samples do not shift the grid.
-  due_at_ += period_ * (1 + (at - due_at_) / period_);
-  return true;
-}
-
 template <class Form>
-void Smoother::take(Form& form, const Sample& sample) noexcept {
+void Smoother::take_into(Form& form, const Sample& sample) noexcept {
   if (!form.ready()) {
     value_K_ = sample.value_K;
     clipped_in_a_row_ = 0;

@@ -89,7 +89,15 @@ class Smoother {
   explicit Smoother(const SmoothingConfig& config);
 
   /// A new good value. Takes it when its period has come (always with period 0).
-  void add(const Sample& sample) noexcept;
+  void add(const Sample& sample) noexcept {
+    if (form_ == SmoothingForm::off) {
+      value_K_ = sample.value_K;
+      has_value_ = true;
+      return;
+    }
+    if (has_value_ && sample.at - taken_at_ > outage_) restart();
+    if (due(sample.at)) take(sample);
+  }
 
   [[nodiscard]] bool has_value() const noexcept { return has_value_; }
   [[nodiscard]] double value_K() const noexcept { return value_K_; }
@@ -104,9 +112,19 @@ class Smoother {
   static constexpr double far_factor = 3.0;
 
  private:
-  [[nodiscard]] bool due(nanoseconds at) noexcept;
+  [[nodiscard]] bool due(nanoseconds at) noexcept {
+    if (!has_value_ || period_ <= nanoseconds{0}) {
+      due_at_ = at + period_;
+      return true;
+    }
+    if (at < due_at_) return false;
+    // Whole periods, so that late samples do not shift the grid.
+    due_at_ += period_ * (1 + (at - due_at_) / period_);
+    return true;
+  }
+  void take(const Sample& sample) noexcept;
   template <class Form>
-  void take(Form& form, const Sample& sample) noexcept;
+  void take_into(Form& form, const Sample& sample) noexcept;
   [[nodiscard]] static bool agree(const std::array<Sample, agreeing_values>& far,
                                   double within_K) noexcept;
   template <class Form>
