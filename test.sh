@@ -50,12 +50,39 @@ say_what_was_skipped() {
   grep -E '^SKIPPED |: skipped: ' "$log" | sort -u | sed 's/^/left out: /' || true
 }
 
+# What a sanitizer says of a program that a test starts and then kills would be lost: the reports go
+# to files, and one of them is a failure.
+collect_sanitizer_reports() {
+  reports=$PWD/build/$preset/sanitizer_reports
+  rm -rf "$reports"
+  mkdir "$reports"
+  export ASAN_OPTIONS=log_path=$reports/asan UBSAN_OPTIONS=log_path=$reports/ubsan:print_stacktrace=1
+  export LSAN_OPTIONS=log_path=$reports/lsan TSAN_OPTIONS=log_path=$reports/tsan
+}
+
+show_sanitizer_reports() {
+  local report status=0
+  for report in "$reports"/*; do
+    [[ -e $report ]] || continue
+    echo "== $report"
+    head -n 60 "$report"
+    status=1
+  done
+  return "$status"
+}
+
 run_tests() {
-  local runner=()
+  local runner=() status=0
   export PYTEST_ADDOPTS=-rs  # pytest names what it skips
-  if [[ $preset == tsan || $preset == asan-ubsan ]]; then runner=(run_as_sanitizers_need); fi
+  if [[ $preset == tsan || $preset == asan-ubsan ]]; then
+    runner=(run_as_sanitizers_need)
+    collect_sanitizer_reports
+  fi
   if [[ $preset == coverage ]]; then find "build/$preset" -name '*.gcda' -delete; fi
-  "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$(nproc)" "${ctest_options[@]}"
+  "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$(nproc)" "${ctest_options[@]}" ||
+    status=$?
+  if [[ $preset == tsan || $preset == asan-ubsan ]]; then show_sanitizer_reports || status=1; fi
+  return "$status"
 }
 
 coverage_report() {

@@ -1,6 +1,8 @@
 #!/bin/bash
 # expect_stopped.sh PROGRAM FAULT MESSAGE: passes when PROGRAM FAULT is stopped with MESSAGE.
 set -uo pipefail
+# The report is to be seen here, not among those of the tests.
+unset ASAN_OPTIONS UBSAN_OPTIONS LSAN_OPTIONS TSAN_OPTIONS
 output=$("$1" "$2" 2>&1)
 status=$?
 echo "$output"
