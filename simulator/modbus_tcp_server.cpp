@@ -173,11 +173,13 @@ void ModbusTcpServer::close_connections() {
 }
 
 void ModbusTcpServer::switch_off() {
+  // The listener first: who sees its connection closed must not get another one in the meantime.
+  if (listener_ >= 0) {
+    loop_.unwatch(listener_);
+    ::close(listener_);
+    listener_ = -1;
+  }
   close_connections();
-  if (listener_ < 0) return;
-  loop_.unwatch(listener_);
-  ::close(listener_);
-  listener_ = -1;
 }
 
 void ModbusTcpServer::switch_on() {
