@@ -14,10 +14,13 @@ out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 # Two runs of different length: what they differ by is free of the start and of the first steps.
 count() {
-  valgrind --tool=callgrind --callgrind-out-file="$out/$1" --collect-atstart=no \
-    --toggle-collect='*Machine::step*' "$program" --count "$1" > /dev/null 2> "$out/$1.log"
-  awk '/^(summary|totals):/ { print $2; exit }' "$out/$1"
+  valgrind --tool=callgrind --callgrind-out-file="$out/$2" --collect-atstart=no \
+    --toggle-collect='*Machine::step*' "$program" "$1" "$2" > /dev/null 2> "$out/$2.log"
+  awk '/^(summary|totals):/ { print $2; exit }' "$out/$2"
 }
-few=$(count 200)
-many=$(count 1200)
+few=$(count --count-all-due 200)
+many=$(count --count-all-due 1200)
+echo "instructions_per_step_all_due $(( (many - few) / 1000 )) instructions"
+few=$(count --count 200)
+many=$(count --count 1200)
 echo "instructions_per_step $(( (many - few) / 1000 )) instructions"
