@@ -3,7 +3,8 @@
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 
-mapfile -d '' files < <(find . -path ./build -prune -o -type f \( -name '*.cpp' -o -name '*.hpp' \) -print0)
+mapfile -d '' files < <(
+  find . -path ./build -prune -o -type f \( -name '*.cpp' -o -name '*.hpp' \) -print0)
 if [[ ${1:-} == --fix ]]; then
   clang-format -i "${files[@]}"
 else

@@ -55,7 +55,8 @@ main() {
       exit 2
       ;;
   esac
-  command -v dpkg-query >/dev/null || fail "this is not a Debian system (no dpkg); the packages are listed in scripts/packages.sh"
+  command -v dpkg-query >/dev/null ||
+    fail "this is not a Debian system (no dpkg); the packages are listed in scripts/packages.sh"
 
   local missing
   mapfile -t missing < <(missing_packages "${wanted[@]}")
