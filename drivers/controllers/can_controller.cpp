@@ -77,12 +77,19 @@ void check_config(const CanControllerConfig& config) {
   }
 }
 
+std::vector<double> applied_resolution_um(const CanControllerConfig& config) {
+  std::vector<double> steps_um;
+  for (const CanAxis& axis : config.axes)
+    steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+  return steps_um;
+}
+
 }  // namespace
 
 CanController::CanController(CanControllerConfig config)
     : config_((check_config(config), std::move(config))),
       socket_(config_.interface, received_ids(config_)),
-      gate_(from_seconds(config_.period_s)) {
+      gate_(from_seconds(config_.period_s), applied_resolution_um(config_)) {
   plan_outgoing();
   plan_incoming();
   held_um_.fill(not_a_number);
@@ -203,7 +210,11 @@ void CanController::receive() {
     health_.reads += frames.size();
     health_.last_error = socket_.error();
   }
-  if (gate_.in_sync()) publish(true, monotonic_now());
+  if (!gate_.in_sync()) return;
+  if (gate_.explains(state_.applied_um))
+    publish(true, monotonic_now());
+  else
+    synchronise();  // re-homed or overridden: nothing computed before is sent any more
 }
 
 void CanController::take(const CanFrame& frame) {

@@ -80,6 +80,13 @@ void check_config(const ModbusControllerConfig& config) {
   }
 }
 
+std::vector<double> applied_resolution_um(const ModbusControllerConfig& config) {
+  std::vector<double> steps_um;
+  for (const ModbusAxis& axis : config.axes)
+    steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+  return steps_um;
+}
+
 bool drivable(const OffsetCommand& command, std::size_t axis) noexcept {
   return command.valid[axis] && std::isfinite(command.offset_um[axis]);
 }
@@ -95,7 +102,7 @@ WriteField field_of(const ModbusValue& place, WriteStage stage, double value,
 ModbusController::ModbusController(ModbusControllerConfig config)
     : config_((check_config(config), std::move(config))),
       connection_(config_.line),
-      gate_(from_seconds(config_.period_s)) {
+      gate_(from_seconds(config_.period_s), applied_resolution_um(config_)) {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     if (!config_.axes[axis].applied) continue;
     read_values_.push_back(*config_.axes[axis].applied);
@@ -194,19 +201,23 @@ bool ModbusController::synchronise() {
   return true;
 }
 
-/// One period: write, then read back.
+/// One period: read, and write only while what was read can be explained by what was written. In
+/// this order nothing computed before a re-homing was seen is written after it was.
 void ModbusController::exchange() {
   look_for_command();
-  const SendVerdict verdict = gate_.verdict(monotonic_now());
-  if (verdict == SendVerdict::resynchronise || (verdict == SendVerdict::send && !write_command())) {
-    lose();
+  if (!read_all()) {
+    if (!stopping_.load()) lose();
     return;
   }
-  if (read_all()) {
-    publish(true);
-  } else if (!stopping_.load()) {
-    lose();
+  if (!gate_.explains(state_.applied_um)) {
+    gate_.synchronised();
+    const std::scoped_lock lock(health_mutex_);
+    health_.last_error = "the controller applies what it was not sent: started anew from there";
   }
+  publish(true);
+  const SendVerdict verdict = gate_.verdict(monotonic_now());
+  if (verdict == SendVerdict::resynchronise || (verdict == SendVerdict::send && !write_command()))
+    lose();
 }
 
 void ModbusController::look_for_command() {

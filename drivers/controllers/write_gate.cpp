@@ -1,17 +1,53 @@
 #include "drivers/controllers/write_gate.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace thermocomp {
 
-WriteGate::WriteGate(nanoseconds period) noexcept
-    : stall_max_(std::max<nanoseconds>(5 * period, std::chrono::seconds{1})) {}
+WriteGate::WriteGate(nanoseconds period, const std::vector<double>& resolution_um) noexcept
+    : stall_max_(std::max<nanoseconds>(5 * period, std::chrono::seconds{1})) {
+  applied_um_.fill(not_a_number);
+  slack_um_.fill(unexplained_um);
+  for (std::size_t axis = 0; axis < std::min(resolution_um.size(), axes_max); ++axis)
+    slack_um_[axis] += 2 * resolution_um[axis];
+}
 
 std::uint32_t WriteGate::synchronised() noexcept {
   if (++epoch_ == 0) epoch_ = 1;  // 0 says "never connected"
   in_sync_ = true;
   last_sent_.reset();
+  sent_ = {};
+  applied_um_.fill(not_a_number);
   return epoch_;
+}
+
+void WriteGate::sent(nanoseconds now) noexcept {
+  last_sent_ = now;
+  for (std::size_t axis = 0; axis < axes_max; ++axis) {
+    if (!command_.valid[axis] || !std::isfinite(command_.offset_um[axis])) continue;
+    SentLately& lately = sent_[axis];
+    lately.offset_um[lately.count % SentLately::length] = command_.offset_um[axis];
+    ++lately.count;
+  }
+}
+
+bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcept {
+  bool explained = true;
+  for (std::size_t axis = 0; axis < axes_max; ++axis) {
+    const double before_um = applied_um_[axis];
+    applied_um_[axis] = applied_um[axis];
+    const SentLately& lately = sent_[axis];
+    if (lately.count == 0 || !std::isfinite(applied_um[axis]) || !std::isfinite(before_um))
+      continue;
+    // Anywhere between where it stood and what it was told.
+    const auto end = lately.offset_um.begin() +
+                     static_cast<std::ptrdiff_t>(std::min(lately.count, SentLately::length));
+    const auto [low, high] = std::minmax_element(lately.offset_um.begin(), end);
+    explained = explained && applied_um[axis] >= std::min(*low, before_um) - slack_um_[axis] &&
+                applied_um[axis] <= std::max(*high, before_um) + slack_um_[axis];
+  }
+  return explained;
 }
 
 void WriteGate::offered(const OffsetCommand& command, nanoseconds now) noexcept {

@@ -2,9 +2,12 @@
 /// clock.
 #pragma once
 
+#include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "estimator/types.hpp"
 
@@ -21,8 +24,13 @@ class WriteGate {
   /// A command not renewed for longer is a hung cycle's: the controller's watchdog shall see it.
   static constexpr nanoseconds renewal_max = std::chrono::seconds{1};
 
-  /// @param period  of the link's writes
-  explicit WriteGate(nanoseconds period) noexcept;
+  /// How far from all that was sent lately an axis may stand and still be explained, beside two
+  /// steps of its register [um].
+  static constexpr double unexplained_um = 1.0;
+
+  /// @param period         of the link's writes
+  /// @param resolution_um  an axis' step of the read-back [um]; axes beyond it: 0
+  explicit WriteGate(nanoseconds period, const std::vector<double>& resolution_um = {}) noexcept;
 
   /// Everything has been read back: from here on commands of the new epoch may be sent.
   /// @return the new epoch, never 0
@@ -39,7 +47,13 @@ class WriteGate {
 
   [[nodiscard]] SendVerdict verdict(nanoseconds now) const noexcept;
   /// The command was sent in full.
-  void sent(nanoseconds now) noexcept { last_sent_ = now; }
+  void sent(nanoseconds now) noexcept;
+
+  /// What the controller applies, just read [um], NaN: not told.
+  /// @return false: a driven axis stands where nothing that was sent can have taken it (re-homed,
+  ///         overridden). What is still under way would be a leap from there: synchronised() must
+  ///         come before anything is sent.
+  [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
 
  private:
   nanoseconds stall_max_;
@@ -48,6 +62,17 @@ class WriteGate {
   OffsetCommand command_{};
   nanoseconds offered_at_{};
   std::optional<nanoseconds> last_sent_;  ///< in this epoch
+
+  /// Offsets of one axis in this epoch, newest in a ring: a controller with a ramp or a delay of
+  /// its own may be on its way to any of them.
+  struct SentLately {
+    static constexpr std::size_t length = 16;
+    std::array<double, length> offset_um{};
+    std::size_t count{0};
+  };
+  std::array<SentLately, axes_max> sent_{};
+  std::array<double, axes_max> applied_um_;  ///< as read last
+  std::array<double, axes_max> slack_um_;
 };
 
 }  // namespace thermocomp

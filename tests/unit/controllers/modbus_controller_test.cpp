@@ -160,6 +160,27 @@ TEST_CASE("a controller that applies something else is seen", "[controllers]") {
   CHECK(int32_of(machine, 0) == 800);
 }
 
+TEST_CASE("a re-homed controller gets nothing that was computed before it was seen",
+          "[controllers]") {
+  ModbusMachine machine;
+  machine.mirrored = 6;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 30.0);
+  REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(30.0); }));
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.fixed_epoch = epoch;  // a cycle that has not noticed
+  machine.mirrored = 0;
+  machine.set_input(1, 0);  // the offset is gone, the connection is not
+  REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
+  CHECK(cycle.state().applied_um[0] == 0.0);
+  const int writes = machine.writes;
+  const int reads = machine.reads;
+  REQUIRE(eventually([&] { return machine.reads > reads + 20; }));
+  CHECK(machine.writes == writes);
+}
+
 TEST_CASE("nothing is written without a command of this epoch, not even a heartbeat",
           "[controllers]") {
   ModbusMachine machine;

@@ -93,6 +93,47 @@ TEST_CASE("the wait for the first command of an epoch is no pause", "[controller
   CHECK(gate.verdict(2000s) == SendVerdict::send);
 }
 
+TEST_CASE("an axis on its way to what it was sent lately is explained, one elsewhere is not",
+          "[controllers]") {
+  WriteGate gate(100ms, {0.01});
+  static_cast<void>(gate.synchronised());
+  std::array<double, axes_max> applied_um;
+  applied_um.fill(not_a_number);
+  applied_um[0] = 10.0;
+  CHECK(gate.explains(applied_um));
+  const auto send = [&](double offset_um) {
+    OffsetCommand command = of_epoch(gate.epoch());
+    command.offset_um[0] = offset_um;
+    command.valid[0] = true;
+    gate.offered(command, 0s);
+    gate.sent(0s);
+  };
+  send(14.0);
+  send(12.0);
+  applied_um[0] = 13.9;  // late: still where it was sent before
+  CHECK(gate.explains(applied_um));
+  applied_um[0] = 11.0;
+  CHECK(gate.explains(applied_um));
+  applied_um[0] = not_a_number;  // not told says nothing
+  CHECK(gate.explains(applied_um));
+  applied_um[0] = 11.0;
+  CHECK(gate.explains(applied_um));
+  applied_um[0] = 0.0;  // re-homed
+  CHECK_FALSE(gate.explains(applied_um));
+  // A new epoch begins from there.
+  static_cast<void>(gate.synchronised());
+  CHECK(gate.explains(applied_um));
+}
+
+TEST_CASE("an axis that was never sent anything may go where it likes", "[controllers]") {
+  WriteGate gate(100ms);
+  static_cast<void>(gate.synchronised());
+  std::array<double, axes_max> applied_um{};
+  CHECK(gate.explains(applied_um));
+  applied_um[3] = 200.0;
+  CHECK(gate.explains(applied_um));
+}
+
 TEST_CASE("neighbours are read in one request and far ones are not", "[controllers]") {
   const std::vector<ModbusValue> values{
       value_at(ModbusTable::input, 26),
