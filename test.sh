@@ -87,9 +87,9 @@ run_tests() {
 
 coverage_report() {
   gcovr --root . --object-directory "build/$preset" --exclude 'build/' --exclude 'tests/' \
-    --html-details "build/$preset/coverage.html" --txt "build/$preset/coverage.txt" \
+    --html-details "build/$preset/coverage.html" --json "build/$preset/coverage.json" \
     "build/$preset" &&
-    tail -n 3 "build/$preset/coverage.txt" &&
+    "$python" scripts/coverage_by_folder.py "build/$preset/coverage.json" &&
     echo "line by line: build/$preset/coverage.html"
 }
 
