@@ -56,7 +56,8 @@ collect_sanitizer_reports() {
   reports=$PWD/build/$preset/sanitizer_reports
   rm -rf "$reports"
   mkdir "$reports"
-  export ASAN_OPTIONS=log_path=$reports/asan UBSAN_OPTIONS=log_path=$reports/ubsan:print_stacktrace=1
+  export ASAN_OPTIONS=log_path=$reports/asan
+  export UBSAN_OPTIONS=log_path=$reports/ubsan:print_stacktrace=1
   export LSAN_OPTIONS=log_path=$reports/lsan TSAN_OPTIONS=log_path=$reports/tsan
 }
 

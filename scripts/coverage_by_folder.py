@@ -23,7 +23,8 @@ def main():
                 counts[key] = counts.get(key, 0) + line["count"]
     for folder, counts in sorted(lines.items()):
         covered = sum(1 for count in counts.values() if count > 0)
-        print(f"{folder:<12} {covered:>6} of {len(counts):>6} lines {100 * covered / len(counts):5.1f} %")
+        share = 100 * covered / len(counts)
+        print(f"{folder:<12} {covered:>6} of {len(counts):>6} lines {share:5.1f} %")
 
 
 if __name__ == "__main__":
