@@ -6,8 +6,8 @@ packages_build=(
   cmake ninja-build g++ pkg-config ccache
   libeigen3-dev libmodbus-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
   libsqlite3-dev libsystemd-dev libssl-dev libcli11-dev
-  # Configuring the tree looks for these two, also where only the programs are built.
-  catch2 libbenchmark-dev
+  # Configuring the tree looks for it, also where only the programs are built.
+  catch2
 )
 
 # The demo draws a picture of itself.
