@@ -38,7 +38,11 @@ apt_get() {
 # The package lists are fetched only when the installation does not work with those at hand: on a
 # fresh system there are none, on an old one they name files that are gone.
 install_packages() {
-  if apt_get install -y --no-install-recommends "$@"; then return 0; fi
+  # Asked quietly first: pages of "unable to locate" would only frighten.
+  if apt_get install -y --no-install-recommends --simulate "$@" >/dev/null 2>&1 &&
+    apt_get install -y --no-install-recommends "$@"; then
+    return 0
+  fi
   echo "setup: fetching the package lists (apt-get update)"
   apt_get update || return 1
   apt_get install -y --no-install-recommends "$@"
