@@ -243,6 +243,7 @@ PersistentState Daemon::Parts::persistent_state() {
   const Report& report = cycle->report();
   PersistentState state;
   state.enabled = report.enabled;
+  state.model_reference_degC = cycle->brain().estimator.model_reference_degC();
   const auto columns = config.model.temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)
     if (std::isfinite(report.inputs[i].reference_degC))

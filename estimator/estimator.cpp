@@ -431,6 +431,14 @@ void Estimator::load_state(std::span<const std::byte> in) {
   parts_->visit_state(archive);
 }
 
+std::map<std::string, double> Estimator::model_reference_degC() const {
+  std::map<std::string, double> numbers;
+  const ThermalModel& model = parts_->thermal_model;
+  for (std::size_t i = 0; i < model.reference_degC.size(); ++i)
+    numbers[model.inputs[i]] = model.reference_degC[i];
+  return numbers;
+}
+
 void Estimator::restore(const PersistentState& state) {
   Parts& parts = *parts_;
   parts.enabled = state.enabled;
@@ -439,11 +447,13 @@ void Estimator::restore(const PersistentState& state) {
     const auto found = from.find(name);
     if (found != from.end() && std::isfinite(found->second)) to = found->second;
   };
-  for (std::size_t i = 0; i < parts.columns.size(); ++i)
-    take(state.reference_degC, parts.columns[i], parts.reference_degC[i]);
-  const auto signal_columns = parts.thermal_model.signal_columns();
-  for (std::size_t i = 0; i < signal_columns.size(); ++i)
-    take(state.reference_signals, signal_columns[i], parts.reference_signals[i]);
+  if (state.model_reference_degC == model_reference_degC()) {
+    for (std::size_t i = 0; i < parts.columns.size(); ++i)
+      take(state.reference_degC, parts.columns[i], parts.reference_degC[i]);
+    const auto signal_columns = parts.thermal_model.signal_columns();
+    for (std::size_t i = 0; i < signal_columns.size(); ++i)
+      take(state.reference_signals, signal_columns[i], parts.reference_signals[i]);
+  }
   for (std::size_t i = 0; i < parts.axes.size(); ++i) {
     double offset_um = 0.0;
     take(state.offset_um, parts.config.axes[i].name, offset_um);

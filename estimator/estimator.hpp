@@ -103,7 +103,10 @@ struct Report {
 /// What survives a restart by name (the state file).
 struct PersistentState {
   bool enabled{true};
-  std::map<std::string, double> reference_degC;     ///< by temperature column
+  std::map<std::string, double> reference_degC;  ///< by temperature column
+  /// The numbers that the model file gave as reference at the time, by input; none: first sample.
+  /// Other numbers in the file at a restart are meant, and take the place of the stored ones.
+  std::map<std::string, double> model_reference_degC;
   std::map<std::string, double> reference_signals;  ///< operating signals then, by column
   std::map<std::string, double> offset_um;          ///< by axis, last sent
 };
@@ -136,6 +139,8 @@ class Estimator {
   void load_state(
       std::span<const std::byte> in);  ///< @throws std::runtime_error on another size or layout
 
+  /// The numbers of the model file's reference, as PersistentState keeps them.
+  [[nodiscard]] std::map<std::string, double> model_reference_degC() const;
   void restore(const PersistentState& state);  ///< before the first step; allocates
   /// Bumpless reload: takes over offsets, switches, references, smoothing and lag states by name.
   /// plan_adoption() allocates and may run on any thread while `previous` is not being replaced;

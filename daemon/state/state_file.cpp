@@ -52,6 +52,7 @@ std::string to_text(const PersistentState& state) {
   file["program"] = "thermocomp";
   file["enabled"] = state.enabled;
   file["reference_degC"] = numbers(state.reference_degC);
+  file["model_reference_degC"] = numbers(state.model_reference_degC);
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);
   return file.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
@@ -69,6 +70,7 @@ PersistentState from_text(const std::string& text) {
   PersistentState state;
   state.enabled = file.at("enabled").get<bool>();
   state.reference_degC = numbers(file, "reference_degC");
+  state.model_reference_degC = numbers(file, "model_reference_degC");
   state.reference_signals = numbers(file, "reference_signals");
   state.offset_um = numbers(file, "offset_um");
   return state;

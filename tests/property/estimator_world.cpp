@@ -205,6 +205,7 @@ class World {
     const auto columns = model_.temperature_columns();
     for (std::size_t i = 0; i < columns.size(); ++i)
       state.reference_degC[columns[i]] = report_.inputs[i].reference_degC;
+    state.model_reference_degC = estimator_->model_reference_degC();
     const auto signals = model_.signal_columns();
     for (std::size_t i = 0; i < signals.size(); ++i)
       state.reference_signals[signals[i]] = report_.signals[i].reference;

@@ -15,6 +15,7 @@ PersistentState sample_state() {
   PersistentState state;
   state.enabled = false;
   state.reference_degC = {{"bed_degC", 20.1}, {"spindle_degC", 0.1 + 0.2}};
+  state.model_reference_degC = {{"bed_degC", 20.0}};
   state.reference_signals = {{"spindle_rpm", 1.0 / 3.0}};
   state.offset_um = {{"z", -12.345678901234567}};
   return state;
@@ -31,6 +32,7 @@ TEST_CASE("a state comes back bit for bit", "[state]") {
   CHECK(loaded.warning.empty());
   CHECK(loaded.state.enabled == state.enabled);
   CHECK(loaded.state.reference_degC == state.reference_degC);
+  CHECK(loaded.state.model_reference_degC == state.model_reference_degC);
   CHECK(loaded.state.reference_signals == state.reference_signals);
   CHECK(loaded.state.offset_um == state.offset_um);
 }
@@ -45,7 +47,7 @@ TEST_CASE("no state file is the first start and no warning", "[state]") {
 
 TEST_CASE("an unusable state file is moved aside and said", "[state]") {
   const std::string head = R"({"program":"thermocomp",)";
-  const std::string rest = R"(,"reference_signals":{},"offset_um":{}})";
+  const std::string rest = R"(,"model_reference_degC":{},"reference_signals":{},"offset_um":{}})";
   const std::string good = R"("reference_degC":{})" + rest;
   const std::string text = GENERATE_COPY(
       std::string(), std::string("{"), std::string("[]"), std::string("null"),

@@ -345,6 +345,25 @@ TEST_CASE("a restart goes on with switch, reference and offset", "[estimator]") 
   CHECK(disabled.offset_um() == 0.0);
 }
 
+TEST_CASE("numbers newly written into the model file take the place of the stored reference",
+          "[estimator]") {
+  ThermalModel model = small_model();
+  model.reference_degC = {18.0, 30.0};
+  PersistentState state;
+  state.reference_degC = {{"t1_degC", 20.0}, {"t2_degC", 30.0}};
+  state.model_reference_degC = {{"t1_degC", 18.0}, {"t2_degC", 30.0}};
+  Machine unchanged(small_config(), model);
+  unchanged.estimator.restore(state);
+  unchanged.step({22.0, 30.0});
+  CHECK(unchanged.report().inputs[0].reference_degC == 20.0);  // commanded since, and kept
+
+  model.reference_degC[0] = 17.0;
+  Machine edited(small_config(), model);
+  edited.estimator.restore(state);
+  edited.step({22.0, 30.0});
+  CHECK(edited.report().inputs[0].reference_degC == 17.0);
+}
+
 TEST_CASE("a reload does not move the axis by itself", "[estimator]") {
   Machine machine(small_config(), model_with_growth());
   machine.step({20.0, 30.0});
