@@ -174,6 +174,9 @@ class ModbusConnection::Implementation {
   bool connect_rtu(const ModbusRtu& rtu);
   bool fail(std::string why) noexcept;
   Wait wait_for(int fd, short events, nanoseconds deadline) noexcept;
+  [[nodiscard]] bool tcp_frame_waits() const noexcept;
+  int take_tcp_frame(nanoseconds deadline) noexcept;
+  int take_serial_frame(nanoseconds rest) noexcept;
   [[nodiscard]] int line_fd() const noexcept { return modbus_get_socket(context_.get()); }
 
   bool send(int unit, const Pdu& request) noexcept;
@@ -199,6 +202,8 @@ class ModbusConnection::Implementation {
   nanoseconds line_free_at_{0};
   std::array<LateAnswers, 256> units_;
   std::array<std::uint8_t, frame_bytes_max> frame_{};
+  std::array<std::uint8_t, 2 * frame_bytes_max> stream_{};  ///< TCP: received, not yet taken
+  std::size_t received_{0};                                 ///< bytes of stream_
   std::span<const std::uint8_t> answer_;
 };
 
@@ -331,6 +336,7 @@ bool ModbusConnection::Implementation::open_socket(const SocketAddress& address)
 void ModbusConnection::Implementation::disconnect() noexcept {
   if (!connected_) return;
   connected_ = false;
+  received_ = 0;
   // Bytes that cannot be sent any more would make close() of a serial port wait for them.
   if (serial_) modbus_flush(context_.get());
   modbus_close(context_.get());
@@ -379,6 +385,52 @@ ModbusConnection::Implementation::Frame ModbusConnection::Implementation::classi
   return Frame::ours;
 }
 
+bool ModbusConnection::Implementation::tcp_frame_waits() const noexcept {
+  return received_ >= mbap_bytes && received_ >= word_at(std::span(stream_), 4) + std::size_t{6};
+}
+
+/// The next frame of the stream into frame_: read from the socket itself, because libmodbus reads
+/// it in steps and each step is two system calls.
+/// @return its size; -1 with errno
+int ModbusConnection::Implementation::take_tcp_frame(nanoseconds deadline) noexcept {
+  while (true) {
+    if (received_ >= mbap_bytes) {
+      const std::size_t size = word_at(std::span(stream_), 4) + std::size_t{6};
+      if (size <= mbap_bytes || size > frame_.size()) {
+        errno = EMBBADDATA;
+        return -1;
+      }
+      if (received_ >= size) {
+        std::copy_n(stream_.begin(), size, frame_.begin());
+        std::copy(stream_.begin() + static_cast<std::ptrdiff_t>(size),
+                  stream_.begin() + static_cast<std::ptrdiff_t>(received_), stream_.begin());
+        received_ -= size;
+        return static_cast<int>(size);
+      }
+    }
+    const ssize_t count =
+        ::recv(line_fd(), stream_.data() + received_, stream_.size() - received_, MSG_DONTWAIT);
+    if (count > 0) {
+      received_ += static_cast<std::size_t>(count);
+      continue;
+    }
+    if (count == 0) errno = ECONNRESET;
+    if (count < 0 && errno == EINTR) continue;
+    if (count == 0 || errno != EAGAIN) return -1;
+    const Wait wait = wait_for(line_fd(), POLLIN, deadline);
+    if (wait == Wait::ready) continue;
+    errno = wait == Wait::late ? ETIMEDOUT : ECANCELED;
+    return -1;
+  }
+}
+
+int ModbusConnection::Implementation::take_serial_frame(nanoseconds rest) noexcept {
+  const auto rest_us = std::chrono::duration_cast<std::chrono::microseconds>(rest).count();
+  modbus_set_response_timeout(context_.get(), static_cast<std::uint32_t>(rest_us / 1000000),
+                              static_cast<std::uint32_t>(rest_us % 1000000));
+  return modbus_receive_confirmation(context_.get(), frame_.data());
+}
+
 /// Takes one frame of which the first byte is there. Bounded by the time the rest may take.
 ModbusConnection::Implementation::Frame ModbusConnection::Implementation::receive(
     int unit, std::uint8_t function, std::size_t answer_bytes, const char*& detail) {
@@ -387,10 +439,7 @@ ModbusConnection::Implementation::Frame ModbusConnection::Implementation::receiv
   const nanoseconds rest =
       serial_ ? std::min<nanoseconds>(time_on_line(line_, answer_bytes + 3) + allowance, rest_max)
               : std::min<nanoseconds>(timeout_, rest_max);
-  const auto rest_us = std::chrono::duration_cast<std::chrono::microseconds>(rest).count();
-  modbus_set_response_timeout(context_.get(), static_cast<std::uint32_t>(rest_us / 1000000),
-                              static_cast<std::uint32_t>(rest_us % 1000000));
-  const int received = modbus_receive_confirmation(context_.get(), frame_.data());
+  const int received = serial_ ? take_serial_frame(rest) : take_tcp_frame(monotonic_now() + rest);
   if (received < 0) {
     const int error = errno;
     if (error == EMBBADCRC) detail = "wrong checksum";
@@ -421,7 +470,7 @@ Exchange ModbusConnection::Implementation::await_answer(int unit, std::uint8_t f
       monotonic_now() + timeout_ + time_on_line(line_, answer_bytes < 8 ? 8 : answer_bytes);
   bool foreign_seen = false;
   while (true) {
-    const Wait wait = wait_for(line_fd(), POLLIN, deadline);
+    const Wait wait = tcp_frame_waits() ? Wait::ready : wait_for(line_fd(), POLLIN, deadline);
     if (wait == Wait::cancelled) {
       exchange.outcome = ExchangeOutcome::cancelled;
       return exchange;
