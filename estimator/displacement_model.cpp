@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "estimator/checks.hpp"
+#include "estimator/name_index.hpp"
 #include "estimator/terms/term.hpp"
 
 namespace thermocomp {
@@ -13,13 +14,6 @@ namespace {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector = Eigen::VectorXd;
-
-std::size_t index_of(const std::vector<std::string>& names, const std::string& name,
-                     const char* key, const char* rule) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) throw InvalidValue(key, name, rule);
-  return static_cast<std::size_t>(found - names.begin());
-}
 
 Matrix matrix_from(const std::vector<std::vector<double>>& rows, std::size_t count,
                    std::size_t columns, const char* key) {

@@ -7,16 +7,10 @@
 #include "estimator/block_bank.hpp"
 #include "estimator/checks.hpp"
 #include "estimator/displacement_model.hpp"
+#include "estimator/name_index.hpp"
 
 namespace thermocomp {
 namespace {
-
-std::size_t index_of(const std::vector<std::string>& names, const std::string& name,
-                     const char* key, const char* rule) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) throw InvalidValue(key, name, rule);
-  return static_cast<std::size_t>(found - names.begin());
-}
 
 std::vector<int> plan_names(const std::vector<std::string>& ours,
                             const std::vector<std::string>& theirs) {

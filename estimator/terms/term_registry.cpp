@@ -1,24 +1,20 @@
 #include <algorithm>
 
 #include "estimator/checks.hpp"
+#include "estimator/name_index.hpp"
 #include "estimator/terms/term.hpp"
 
 namespace thermocomp {
 namespace {
 
-std::size_t index_of(const std::vector<std::string>& names, const std::string& name,
-                     const char* rule) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) throw InvalidValue("term.subject", name, rule);
-  return static_cast<std::size_t>(found - names.begin());
-}
-
 std::size_t subject_index(const TermSpec& spec, const TermKind& kind, const ThermalModel& model) {
   if (kind.subject == TermSubject::signal)
-    return index_of(model.signal_columns(), spec.subject, "must be an operating signal");
+    return index_of(model.signal_columns(), spec.subject, "term.subject",
+                    "must be an operating signal");
   if (kind.subject == TermSubject::model_temperature)
-    return index_of(model.inputs, spec.subject, "must be an input of the model");
-  return index_of(model.temperature_columns(), spec.subject, "must be a temperature");
+    return index_of(model.inputs, spec.subject, "term.subject", "must be an input of the model");
+  return index_of(model.temperature_columns(), spec.subject, "term.subject",
+                  "must be a temperature");
 }
 
 }  // namespace
