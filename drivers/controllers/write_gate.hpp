@@ -71,8 +71,8 @@ class WriteGate {
     std::size_t count{0};
   };
   std::array<SentLately, axes_max> sent_{};
-  std::array<double, axes_max> applied_um_;  ///< as read last
-  std::array<double, axes_max> slack_um_;
+  std::array<double, axes_max> applied_um_{};  ///< as read last
+  std::array<double, axes_max> slack_um_{};
 };
 
 }  // namespace thermocomp

@@ -97,7 +97,7 @@ TEST_CASE("an axis on its way to what it was sent lately is explained, one elsew
           "[controllers]") {
   WriteGate gate(100ms, {0.01});
   static_cast<void>(gate.synchronised());
-  std::array<double, axes_max> applied_um;
+  std::array<double, axes_max> applied_um{};
   applied_um.fill(not_a_number);
   applied_um[0] = 10.0;
   CHECK(gate.explains(applied_um));
