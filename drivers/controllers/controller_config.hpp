@@ -59,7 +59,7 @@ struct CanControllerConfig {
   std::string name;
   std::string interface;
   double period_s{0.1};
-  double silent_after_s{2.0};  ///< no frame of the controller for so long: offline
+  double silent_after_s{2.0};  ///< any configured frame missing for so long: offline
   double reconnect_s{0.5};
   std::vector<CanAxis> axes;
   std::vector<CanControllerSignal> signals;
