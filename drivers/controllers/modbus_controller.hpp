@@ -19,8 +19,9 @@
 namespace thermocomp {
 
 /// Each period: reads everything back and publishes it, then writes the newest command (offsets,
-/// then valid bits, then heartbeat, neighbours in one request) - unless an axis stands where nothing
-/// sent lately can have taken it: that begins a new epoch and nothing is written (WriteGate).
+/// then valid bits, then heartbeat, neighbours in one request) - unless an axis stands where
+/// nothing sent lately can have taken it: that begins a new epoch and nothing is written
+/// (WriteGate).
 ///
 /// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
 /// heartbeat counts up with every command written and starts anew when its register is full. Valid
