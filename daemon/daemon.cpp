@@ -39,6 +39,9 @@ constexpr auto offsets_saved_every = 10s;
 /// Longest wait for the cycle to take a command or a new configuration; at 1 Hz it needs up to 2 s.
 constexpr auto cycle_answer_max = 5s;
 constexpr std::uint64_t cycles_until_ready = 3;
+/// Offsets at zero are sent, and read back, for so long before the links are closed.
+constexpr auto zero_settles = 500ms;
+constexpr auto stop_extended_by = 10s;
 
 Grid make_grid(const LoopConfig& loop) {
   const auto now = std::chrono::duration_cast<nanoseconds>(Clock::now().time_since_epoch());
@@ -79,11 +82,14 @@ struct Daemon::Parts {
   void start();
   void wait_until_ready();
   void supervise();
+  void ramp_to_zero();
   void stop() noexcept;
 
+  void turn(bool& stopping);
   void tick();
   void look_at_health();
   void save_state(bool now);
+  [[nodiscard]] bool at_zero();
   [[nodiscard]] PersistentState persistent_state();
   void take_signals(bool& stopping);
   void reload();
@@ -188,18 +194,57 @@ void Daemon::Parts::wait_until_ready() {
 
 void Daemon::Parts::supervise() {
   bool stopping = false;
-  while (!stopping) {
-    pollfd files[] = {{signals, POLLIN, 0}, {server->fd(), POLLIN, 0}};
-    // Rounded up: a rest of a millisecond must be slept, not spun through.
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(next_tick - Clock::now()).count();
-    const int ready = poll(files, 2, static_cast<int>(std::clamp<std::int64_t>(left, 0, 100)));
-    if (ready < 0 && errno != EINTR)
-      throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
-    take_signals(stopping);
-    server->handle(0ms);
-    if (Clock::now() >= next_tick) tick();
+  while (!stopping) turn(stopping);
+  if (config.estimator.compensation.on_stop == StopPolicy::ramp_to_zero) ramp_to_zero();
+}
+
+void Daemon::Parts::turn(bool& stopping) {
+  pollfd files[] = {{signals, POLLIN, 0}, {server->fd(), POLLIN, 0}};
+  // Rounded up: a rest of a millisecond must be slept, not spun through.
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(next_tick - Clock::now()).count();
+  const int ready = poll(files, 2, static_cast<int>(std::clamp<std::int64_t>(left, 0, 100)));
+  if (ready < 0 && errno != EINTR)
+    throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
+  take_signals(stopping);
+  server->handle(0ms);
+  if (Clock::now() >= next_tick) tick();
+}
+
+void Daemon::Parts::ramp_to_zero() {
+  const double longest_s = config.estimator.compensation.stop_ramp_s_max;
+  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(seconds_d(longest_s));
+  service.stopping("taking the offsets to zero");
+  if (!cycle->send({CommandKind::stop, 0, 0.0})) {
+    spdlog::warn("too many commands wait for the cycle: the offsets stay");
+    return;
   }
+  auto moved = Clock::now();
+  auto extended = Clock::time_point{};
+  bool again = false;  // who asks twice does not want to wait
+  while (!again && Clock::now() < end && Clock::now() - moved < zero_settles) {
+    if (Clock::now() - extended > 1s) {
+      service.extend_stop(stop_extended_by);
+      extended = Clock::now();
+    }
+    turn(again);
+    if (!at_zero()) moved = Clock::now();
+  }
+  if (at_zero())
+    spdlog::info("the offsets are at zero");
+  else
+    spdlog::warn("not all offsets are at zero: {}",
+                 again ? "asked to stop at once" : "stop_ramp_s_max is over");
+}
+
+bool Daemon::Parts::at_zero() {
+  const Report& report = cycle->report();
+  // Of what cannot be sent nothing is waited for.
+  if (has_reason(report.reasons, Reason::controller_offline)) return true;
+  const double tolerance_um = config.estimator.compensation.mismatch_um;
+  return std::all_of(report.axes.begin(), report.axes.end(), [=](const AxisReport& axis) {
+    // Negated: what is not read back (NaN) does not count.
+    return !axis.driven || (axis.offset_um == 0.0 && !(std::abs(axis.applied_um) > tolerance_um));
+  });
 }
 
 void Daemon::Parts::take_signals(bool& stopping) {
@@ -336,7 +381,7 @@ StatusView Daemon::Parts::view() {
 }
 
 void Daemon::Parts::stop() noexcept {
-  service.stopping("holding the last offsets");
+  service.stopping("the controller keeps the last offsets");
   cycle->stop();
   thread.join();
   link->stop();

@@ -27,7 +27,12 @@ void ServiceManager::reloading() noexcept {
 }
 
 void ServiceManager::stopping(const std::string& status) noexcept {
+  last_status_ = status;
   sd_notifyf(0, "STOPPING=1\nSTATUS=%s", status.c_str());
+}
+
+void ServiceManager::extend_stop(std::chrono::microseconds time) noexcept {
+  sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%lld", static_cast<long long>(time.count()));
 }
 
 void ServiceManager::status(const std::string& status) noexcept {

@@ -13,6 +13,8 @@ class ServiceManager {
   void ready(const std::string& status) noexcept;
   void reloading() noexcept;
   void stopping(const std::string& status) noexcept;
+  /// A stop that takes its time: not killed for the next `time`.
+  void extend_stop(std::chrono::microseconds time) noexcept;
   void status(const std::string& status) noexcept;  ///< only sent when it has changed
   /// Feeds the watchdog; called only when the cycle has advanced.
   void alive() noexcept;

@@ -129,6 +129,7 @@ struct Estimator::Parts {
   bool ever_good{false};
   nanoseconds lost_since{};
   bool enabled;
+  bool stopping{false};  ///< the daemon is about to end: nowhere but to zero
   Mode mode{Mode::starting};
   nanoseconds mode_since{};
   std::uint32_t reasons{0};
@@ -281,6 +282,8 @@ void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
   Mode next = Mode::compensating;
   if (disabled)
     next = Mode::disabled;
+  else if (stopping)
+    next = Mode::ramping_to_zero;
   else if (!working && config.compensation.on_loss == LossPolicy::ramp_to_zero &&
            at - lost_since > hold)
     next = Mode::ramping_to_zero;
@@ -343,6 +346,10 @@ void Estimator::apply(const Command& command) noexcept {
     case CommandKind::prove:
       if (command.axis < parts.axes.size()) parts.axes[command.axis].prove(command.value_um);
       break;
+    case CommandKind::stop:
+      parts.stopping = true;
+      for (AxisChannel& axis : parts.axes) axis.end_prove();
+      break;
   }
 }
 
@@ -403,7 +410,7 @@ void Estimator::Parts::visit_state(StateArchive& archive) {
   for (AxisChannel& axis : axes) archive(axis);
   archive(cycle, stepped, now, dt_s, all_signals, controller_online, reference_degC, signal_values,
           reference_signals, zero_known, model_um, zero_um, measured_um, predicted, ever_good,
-          lost_since, enabled, mode, mode_since, reasons, cycle_ends);
+          lost_since, enabled, stopping, mode, mode_since, reasons, cycle_ends);
 }
 
 std::size_t Estimator::state_size_bytes() const noexcept {
@@ -497,6 +504,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.ever_good = other.ever_good;
   parts.lost_since = other.lost_since;
   parts.enabled = other.enabled;
+  parts.stopping = other.stopping;
   parts.mode = other.mode;
   parts.mode_since = other.mode_since;
   parts.cycle_ends = other.cycle_ends;

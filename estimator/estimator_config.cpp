@@ -37,6 +37,8 @@ void LimiterConfig::validate() const {
 
 void CompensationConfig::validate() const {
   require(hold_s >= 0 && hold_s <= 1e6, "hold_s", hold_s, "must be in [0, 1e6]");
+  require(stop_ramp_s_max > 0 && stop_ramp_s_max <= 3600, "stop_ramp_s_max", stop_ramp_s_max,
+          "must be in (0, 3600]");
   require(controller_stale_after_s > 0 && controller_stale_after_s <= 3600,
           "controller_stale_after_s", controller_stale_after_s, "must be in (0, 3600]");
   require(mismatch_um > 0 && mismatch_um <= 500, "mismatch_um", mismatch_um, "must be in (0, 500]");

@@ -70,10 +70,13 @@ struct AxisConfig {
 };
 
 enum class LossPolicy { hold, ramp_to_zero };
+enum class StopPolicy { hold, ramp_to_zero };
 
 struct CompensationConfig {
   LossPolicy on_loss{LossPolicy::hold};
-  double hold_s{600.0};  ///< ramp_to_zero: hold this long first
+  double hold_s{600.0};                  ///< ramp_to_zero: hold this long first
+  StopPolicy on_stop{StopPolicy::hold};  ///< where the daemon leaves the offsets when it is stopped
+  double stop_ramp_s_max{120.0};         ///< ramp_to_zero: it ends after so long wherever they are
   bool enabled_at_first_start{true};
   bool hold_while_cutting{false};  ///< the offset changes only while cutting_signal is 0
   std::string cutting_signal;      ///< "cutting_on"; empty: none

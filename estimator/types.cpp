@@ -52,6 +52,8 @@ std::string_view to_string(CommandKind kind) noexcept {
       return "cycle_end";
     case CommandKind::prove:
       return "prove";
+    case CommandKind::stop:
+      return "stop";
   }
   return "unknown";
 }

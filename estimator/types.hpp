@@ -70,8 +70,18 @@ struct OffsetCommand {
   std::uint32_t link_epoch{0};
 };
 
-/// What an operator (or the CNC program) asks of the estimator.
-enum class CommandKind : std::uint8_t { enable, disable, reference, measured, cycle_end, prove };
+/// What an operator (or the CNC program) asks of the estimator, or the daemon that is about to end
+/// (`stop`: offsets to zero and nowhere else; the operator's switch stays as it is).
+enum class CommandKind : std::uint8_t {
+  enable,
+  disable,
+  reference,
+  measured,
+  cycle_end,
+  prove,
+  stop
+};
+inline constexpr std::size_t command_kinds_count = 7;
 [[nodiscard]] std::string_view to_string(CommandKind kind) noexcept;
 
 struct Command {

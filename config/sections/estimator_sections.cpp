@@ -169,8 +169,9 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
 
 CompensationConfig read_compensation(const TomlTable& table,
                                      const std::vector<std::string>& signals) {
-  constexpr std::array<NumberField<CompensationConfig>, 6> fields{{
+  constexpr std::array<NumberField<CompensationConfig>, 7> fields{{
       {"hold_s", &CompensationConfig::hold_s},
+      {"stop_ramp_s_max", &CompensationConfig::stop_ramp_s_max},
       {"controller_stale_after_s", &CompensationConfig::controller_stale_after_s},
       {"mismatch_um", &CompensationConfig::mismatch_um},
       {"mismatch_after_s", &CompensationConfig::mismatch_after_s},
@@ -181,6 +182,9 @@ CompensationConfig read_compensation(const TomlTable& table,
   config.on_loss = table.choice<LossPolicy>(
       "on_loss", {{"hold", LossPolicy::hold}, {"ramp_to_zero", LossPolicy::ramp_to_zero}},
       config.on_loss);
+  config.on_stop = table.choice<StopPolicy>(
+      "on_stop", {{"hold", StopPolicy::hold}, {"ramp_to_zero", StopPolicy::ramp_to_zero}},
+      config.on_stop);
   config.enabled_at_first_start =
       table.flag("enabled_at_first_start", config.enabled_at_first_start);
   config.hold_while_cutting = table.flag("hold_while_cutting", config.hold_while_cutting);

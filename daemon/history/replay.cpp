@@ -76,7 +76,7 @@ class SegmentReplay {
         return after;
       }
       if (record_.kind == RecordKind::command) {
-        if (record_.detail > static_cast<std::uint8_t>(CommandKind::prove)) {
+        if (record_.detail >= command_kinds_count) {
           throw HistoryError("damaged: unknown command");
         }
         estimator_.apply({static_cast<CommandKind>(record_.detail), record_.index, record_.value});

@@ -1,5 +1,6 @@
 """Power cuts, restarts and outages: the axis never jumps, and what must survive does."""
 
+import signal
 import time
 
 import pytest
@@ -82,6 +83,35 @@ def test_sigterm_leaves_the_offsets_where_they_are(machine):
     assert machine.controller.applied_um() == 9.0
     assert {offset for _, offset in machine.controller.orders()[-3:]} == {9.0}
     assert not daemon.socket.exists()
+
+
+def test_sigterm_takes_the_offsets_to_zero_where_it_is_told_to(machine, lab):
+    machine.daemon.write_config(machine.config.replace("[compensation]\n",
+                                                       '[compensation]\non_stop = "ramp_to_zero"\n'))
+    daemon = machine.start()
+    machine.warm_by(9.0)
+    daemon.wait_for_offset(9.0, 0.0)
+    daemon.end()
+    assert machine.controller.applied_um() == 0.0
+    assert_slewed(machine.controller.orders())
+    assert "the offsets are at zero" in daemon.log_text()
+    # The stop was no operator's "off".
+    machine.start().wait_for_offset(9.0, 0.05)
+    daemon.end()
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+
+
+def test_a_second_sigterm_does_not_wait_for_zero(machine):
+    machine.daemon.write_config(machine.config.replace(
+        "[compensation]\n", '[compensation]\non_stop = "ramp_to_zero"\n'))
+    daemon = machine.start()
+    machine.warm_by(50.0)
+    eventually(lambda: daemon.axis()["offset"] > 30.0, "on the way")
+    daemon.process.send_signal(signal.SIGTERM)
+    daemon.wait_for_mode("ramping_to_zero")
+    daemon.end()
+    assert machine.controller.applied_um() > 0.0
+    assert "asked to stop at once" in daemon.log_text()
 
 
 def test_a_controller_that_restarts_from_zero_is_brought_back_slowly(machine, lab):

@@ -193,6 +193,7 @@ TEST_CASE("a reload takes over model, blocks, screening, smoothing, limits and p
       {"form = \"sliding_line\"", "form = \"off\""},
       {"offset_um_max = 60.0", "offset_um_max = 30.0"},
       {"on_loss = \"hold\"", "on_loss = \"ramp_to_zero\""},
+      {"on_stop = \"hold\"", "on_stop = \"ramp_to_zero\""},
   };
   for (const auto& [from, to] : edits) {
     INFO(to);

@@ -140,7 +140,7 @@ class RecordedMachine {
   }
   void give_command() {
     Command command;
-    command.kind = static_cast<CommandKind>(random_() % 6);
+    command.kind = static_cast<CommandKind>(random_() % command_kinds_count);
     command.axis = static_cast<std::uint32_t>(random_() % 2);
     command.value_um = 1.0 + static_cast<double>(random_() % 5);
     estimator_->apply(command);

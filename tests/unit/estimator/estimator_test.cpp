@@ -263,6 +263,25 @@ TEST_CASE("disable and enable move at the slew rate", "[estimator]") {
   }
 }
 
+TEST_CASE("a stop takes the offsets to zero at the slew rate and leaves the switch as it is",
+          "[estimator]") {
+  auto config = small_config();
+  config.axes[0].limiter.rate_um_per_s_max = 1.0;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, 30.0});
+  machine.estimator.apply({CommandKind::stop, 0, 0.0});
+  for (int i = 1; i <= 7; ++i) {
+    machine.step({21.0, 30.0});
+    CHECK(machine.offset_um() == std::min(-5.0 + i, 0.0));
+  }
+  CHECK(machine.report().mode == Mode::ramping_to_zero);
+  CHECK(machine.report().enabled);
+  machine.estimator.apply({CommandKind::enable, 0, 0.0});
+  machine.steps(5, {21.0, 30.0});
+  CHECK(machine.offset_um() == 0.0);
+}
+
 TEST_CASE("the controller's switch disables; unknown, it holds", "[estimator]") {
   Machine machine;
   machine.step({20.0, 30.0});
