@@ -82,7 +82,7 @@ void add_check_command(CLI::App& app, Action& action) {
   CLI::App* sub =
       app.add_subcommand("check", "a daemon's configuration with its model: every problem at once");
   const auto file = std::make_shared<std::string>();
-  sub->add_option("CONFIG", *file, "configuration of thermocompd")->required();
+  sub->add_option("CONFIG", *file, "configuration of thermocompd")->type_name("FILE")->required();
   sub->callback([&action, file] { action = [file] { return run_check(*file); }; });
 }
 

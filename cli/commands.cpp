@@ -1,5 +1,7 @@
 #include "cli/commands.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include "cli/check_command.hpp"
 #include "cli/history_commands.hpp"
 #include "cli/model_commands.hpp"
@@ -9,7 +11,15 @@
 
 namespace thermocomp::cli {
 
-void add_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
+void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) {
+  app.name("thermocomp");
+  app.description("Keeps a CNC machine straight while it warms: the command for its operator");
+  app.set_version_flag("--version", THERMOCOMP_VERSION);
+  app.add_option("--socket", global.socket, "the daemon's status socket")
+      ->type_name("FILE")
+      ->default_str(global.socket);
+  app.require_subcommand(1);
+  app.footer("Exit status: 0 success, 1 the answer is no, 2 bad use, bad input or unreachable.");
   add_check_command(app, action);
   add_observe_commands(app, global, action);
   add_operate_commands(app, global, action);

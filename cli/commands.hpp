@@ -1,10 +1,13 @@
-/// Every subcommand of `thermocomp`.
+/// The command line of `thermocomp`. `--help`, the manual page and the completion of the shell are
+/// all made from what is declared here.
 #pragma once
 
 #include "cli/command.hpp"
 
 namespace thermocomp::cli {
 
-void add_commands(CLI::App& app, const GlobalOptions& global, Action& action);
+/// Name, description, options before the subcommand and every subcommand. Parsing sets `action`.
+/// @param global, action  outlive the parsing and the action
+void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action);
 
 }  // namespace thermocomp::cli

@@ -94,11 +94,14 @@ int run_file_replay(const ReplayOptions& options) {
 void add_history_commands(CLI::App& app, Action& action) {
   const auto export_options = std::make_shared<ExportOptions>();
   CLI::App* sub = app.add_subcommand("export", "a daemon's history as a run file");
-  sub->add_option("HISTORY", export_options->history, "history of thermocompd")->required();
+  sub->add_option("HISTORY", export_options->history, "history of thermocompd")
+      ->type_name("FILE")
+      ->required();
   sub->add_option("--from", export_options->from,
                   "seconds since the history's start, or a time such as 2026-03-01T08:30:00");
   sub->add_option("--to", export_options->to, "end, not included; as --from");
   sub->add_option("-o,--output", export_options->output, "run file; - is standard output")
+      ->type_name("FILE")
       ->required();
   sub->callback([&action, export_options] {
     action = [export_options] { return run_export(*export_options); };
@@ -108,10 +111,13 @@ void add_history_commands(CLI::App& app, Action& action) {
   sub = app.add_subcommand(
       "replay", "the daemon's estimator over its history (exact), or over a run file (--config)");
   sub->add_option("--config", replay_options->config,
-                  "configuration of thermocompd; the input is then a run file");
+                  "configuration of thermocompd; the input is then a run file")
+      ->type_name("FILE");
   sub->add_option("INPUT", replay_options->input, "history of thermocompd, or RUN.csv[@T0:T1]")
+      ->type_name("FILE")
       ->required();
   sub->add_option("-o,--output", replay_options->output, "CSV file; - is standard output")
+      ->type_name("FILE")
       ->required();
   sub->callback([&action, replay_options] {
     action = [replay_options] {

@@ -17,16 +17,10 @@ namespace {
 using namespace thermocomp::cli;
 
 int run(int argc, char** argv) {
-  CLI::App app{"Keeps a CNC machine straight while it warms: the command for its operator"};
-  app.name("thermocomp");
-  app.set_version_flag("--version", THERMOCOMP_VERSION);
+  CLI::App app;
   GlobalOptions global{default_socket()};
-  app.add_option("--socket", global.socket, "the daemon's status socket")
-      ->default_str(global.socket);
-  app.require_subcommand(1);
-  app.footer("Exit status: 0 success, 1 the answer is no, 2 bad use, bad input or unreachable.");
   Action action;
-  add_commands(app, global, action);
+  declare_command_line(app, global, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

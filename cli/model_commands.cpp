@@ -64,9 +64,12 @@ int run_simulate(const SimulateOptions& options) {
 void add_model_commands(CLI::App& app, Action& action) {
   const auto predict_options = std::make_shared<PredictOptions>();
   CLI::App* sub = app.add_subcommand("predict", "the model alone over a run file");
-  sub->add_option("--model", predict_options->model, "model file")->required();
-  sub->add_option("RUN", predict_options->run, "run file, RUN.csv or RUN.csv@T0:T1")->required();
+  sub->add_option("--model", predict_options->model, "model file")->type_name("FILE")->required();
+  sub->add_option("RUN", predict_options->run, "run file, RUN.csv or RUN.csv@T0:T1")
+      ->type_name("FILE")
+      ->required();
   sub->add_option("-o,--output", predict_options->output, "CSV file; - is standard output")
+      ->type_name("FILE")
       ->required();
   sub->callback([&action, predict_options] {
     action = [predict_options] { return run_predict(*predict_options); };
@@ -75,8 +78,10 @@ void add_model_commands(CLI::App& app, Action& action) {
   const auto simulate_options = std::make_shared<SimulateOptions>();
   sub = app.add_subcommand("simulate", "a run file of a simulated machine");
   sub->add_option("MACHINE", simulate_options->machine, "file of the simulated machine")
+      ->type_name("FILE")
       ->required();
   sub->add_option("-o,--output", simulate_options->output, "run file; - is standard output")
+      ->type_name("FILE")
       ->required();
   sub->add_option("--seed", simulate_options->seed, "instead of the machine file's own seed");
   sub->callback([&action, simulate_options] {

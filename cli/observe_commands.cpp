@@ -131,8 +131,10 @@ void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& ac
       ->check(CLI::Range(0.1, 60.0));
   watch->add_option("--for", options->for_s, "end after so many seconds")
       ->check(CLI::PositiveNumber);
-  watch->add_option("--truth", options->truth,
-                    "file that a simulated machine writes its true displacement to");
+  watch
+      ->add_option("--truth", options->truth,
+                   "file that a simulated machine writes its true displacement to")
+      ->type_name("FILE");
   watch->callback([&, options] { action = [&, options] { return run_watch(global, *options); }; });
 }
 

@@ -7,20 +7,14 @@
 #include <CLI/CLI.hpp>
 
 #include "config/problems.hpp"
+#include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/log_setup.hpp"
 
 int main(int argc, char** argv) {
-  CLI::App app{
-      "Compensates the thermal displacement of a machine tool: thermocouples in, axis offsets out"};
-  app.name("thermocompd");
-  app.set_version_flag("--version", THERMOCOMP_VERSION);
+  CLI::App app;
   std::string config_file = "/etc/thermocomp/thermocompd.toml";
-  app.add_option("CONFIG", config_file, "the configuration (TOML)")->capture_default_str();
-  app.footer(
-      "Runs in the foreground until SIGTERM or SIGINT; SIGHUP reloads. Logs to the journal when\n"
-      "started by systemd, else to standard error. Check a configuration with: thermocomp check.\n"
-      "Exit status: 0 stopped as asked, 1 could not start or go on, 2 bad use or configuration.");
+  thermocomp::declare_daemon_command_line(app, config_file);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
