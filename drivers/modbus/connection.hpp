@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "drivers/modbus/port.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
 
 namespace thermocomp {
@@ -58,6 +59,9 @@ class ModbusConnection {
  public:
   /// @throws DriverError as check_line()
   explicit ModbusConnection(const ModbusLine& line);
+  /// Over another port than the line's own; its time is then that of every exchange.
+  /// @throws DriverError as check_line()
+  ModbusConnection(const ModbusLine& line, std::unique_ptr<ModbusPort> port);
   ModbusConnection(const ModbusConnection&) = delete;
   ModbusConnection& operator=(const ModbusConnection&) = delete;
   ~ModbusConnection();
@@ -82,6 +86,7 @@ class ModbusConnection {
   /// come; 0: at any time.
   [[nodiscard]] nanoseconds ready_at(int unit) const noexcept;
 
+  [[nodiscard]] nanoseconds now() const noexcept;  ///< of the port
   /// Waits until `time` (CLOCK_MONOTONIC) without using the processor.
   /// @return false when cancelled
   bool pause_until(nanoseconds time) noexcept;

@@ -1,0 +1,317 @@
+#include "drivers/controllers/modbus_dialogue.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/modbus/register_codec.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// The format of valid bits and heartbeat: plain counts, all bits used.
+NumberFormat raw_format(const ModbusValue& value) noexcept {
+  NumberFormat format{value.encoding, value.word_order, 1.0, 0.0};
+  if (format.encoding == Encoding::int16) format.encoding = Encoding::uint16;
+  if (format.encoding == Encoding::int32) format.encoding = Encoding::uint32;
+  return format;
+}
+
+/// The first count that the register cannot hold exactly.
+std::uint64_t counts_of(Encoding encoding) noexcept {
+  switch (encoding) {
+    case Encoding::int16:
+    case Encoding::uint16:
+      return std::uint64_t{1} << 16;
+    case Encoding::int32:
+    case Encoding::uint32:
+      return std::uint64_t{1} << 32;
+    case Encoding::float32:
+      return std::uint64_t{1} << 24;
+    case Encoding::float64:
+      break;
+  }
+  return std::uint64_t{1} << 53;
+}
+
+void check_place(const ModbusValue& value, const char* key) {
+  const std::size_t end = value.address + words_of(value.table, value.encoding);
+  require(end <= 65536, key, value.address, "the value must end within address 65535");
+  require(std::isfinite(value.scale) && value.scale != 0.0, key, value.scale,
+          "the scale must be finite and not 0");
+}
+
+void check_written(const ModbusValue& value, const char* key) {
+  check_place(value, key);
+  require(value.table == ModbusTable::holding, key, value.address,
+          "only holding registers can be written");
+}
+
+void check_config(const ModbusControllerConfig& config) {
+  require(config.period_s > 0.0 && std::isfinite(config.period_s), "period_s", config.period_s,
+          "must be finite and more than 0");
+  require(config.unit >= 0 && config.unit <= 255, "unit", config.unit, "must be in [0, 255]");
+  require(config.axes.size() <= axes_max, "axes", static_cast<double>(config.axes.size()),
+          "a controller has at most 16 axes");
+  std::vector<std::pair<std::size_t, std::size_t>> written;
+  const auto note = [&written](const ModbusValue& value, const char* key) {
+    check_written(value, key);
+    written.emplace_back(value.address, value.address + registers_of(value.encoding));
+  };
+  for (const ModbusAxis& axis : config.axes) {
+    note(axis.offset, "offset");
+    if (axis.applied) check_place(*axis.applied, "applied");
+  }
+  for (const ModbusSignal& signal : config.signals) {
+    require(signal.signal < signals_max, "signal", static_cast<double>(signal.signal),
+            "a controller has at most 48 signals");
+    check_place(signal.value, "signal");
+  }
+  if (config.valid_bits) note(*config.valid_bits, "valid_bits");
+  if (config.heartbeat) note(*config.heartbeat, "heartbeat");
+  std::sort(written.begin(), written.end());
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    require(written[i - 1].second <= written[i].first, "address",
+            static_cast<double>(written[i].first), "registers that are written must not overlap");
+  }
+}
+
+std::vector<double> applied_resolution_um(const ModbusControllerConfig& config) {
+  std::vector<double> steps_um;
+  for (const ModbusAxis& axis : config.axes)
+    steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+  return steps_um;
+}
+
+bool drivable(const OffsetCommand& command, std::size_t axis) noexcept {
+  return command.valid[axis] && std::isfinite(command.offset_um[axis]);
+}
+
+WriteField field_of(const ModbusValue& place, WriteStage stage, double value,
+                    const NumberFormat& format) {
+  const Encoded encoded = encode(value, format);
+  return {place.address, stage, {encoded.words().begin(), encoded.words().end()}};
+}
+
+}  // namespace
+
+ModbusDialogue::ModbusDialogue(ModbusControllerConfig config, ModbusConnection& connection)
+    : config_((check_config(config), std::move(config))),
+      connection_(connection),
+      gate_(from_seconds(config_.period_s), applied_resolution_um(config_)),
+      next_exchange_at_(connection.now()),
+      retry_at_(connection.now()) {
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
+    if (!config_.axes[axis].applied) continue;
+    read_values_.push_back(*config_.axes[axis].applied);
+    read_targets_.push_back(&state_.applied_um[axis]);
+  }
+  for (const ModbusSignal& signal : config_.signals) {
+    read_values_.push_back(signal.value);
+    read_targets_.push_back(&state_.signals[signal.signal]);
+  }
+  read_plan_ = plan_reads(read_values_);
+  health_.name = config_.name;
+  health_.kind = std::holds_alternative<ModbusTcp>(config_.line.link) ? "modbus_tcp" : "modbus_rtu";
+}
+
+void ModbusDialogue::newest(ControllerState& state) noexcept {
+  states_.fresh();
+  state = states_.front();
+}
+
+void ModbusDialogue::offer(const OffsetCommand& command) noexcept {
+  commands_.back() = command;
+  commands_.publish();
+}
+
+ControllerHealth ModbusDialogue::health() const {
+  const std::scoped_lock lock(health_mutex_);
+  return health_;
+}
+
+nanoseconds ModbusDialogue::next_action_at() const noexcept {
+  return gate_.in_sync() ? next_exchange_at_ : retry_at_;
+}
+
+void ModbusDialogue::act() {
+  if (!gate_.in_sync() && !synchronise()) {
+    retry_at_ = connection_.now() + from_seconds(config_.line.reconnect_s);
+    return;
+  }
+  exchange();
+  const nanoseconds now = connection_.now();
+  retry_at_ = now;
+  // A slow line sets the pace; nothing is caught up.
+  next_exchange_at_ = std::max(next_exchange_at_ + from_seconds(config_.period_s), now);
+}
+
+void ModbusDialogue::end() {
+  look_for_command();
+  if (gate_.verdict(connection_.now()) == SendVerdict::send) write_command();
+  connection_.disconnect();
+}
+
+/// Connects where needed, reads everything, and only then takes the new epoch.
+bool ModbusDialogue::synchronise() {
+  if (!connection_.connected()) {
+    if (!connection_.connect()) {
+      const std::scoped_lock lock(health_mutex_);
+      health_.connected = false;
+      health_.last_error = connection_.last_error();
+      return false;
+    }
+    const std::scoped_lock lock(health_mutex_);
+    ++health_.connects;
+  }
+  if (!read_all()) {
+    lose();
+    return false;
+  }
+  gate_.synchronised();
+  publish(true);
+  const std::scoped_lock lock(health_mutex_);
+  health_.connected = true;
+  health_.last_error.clear();
+  return true;
+}
+
+/// One period: read, and write only while what was read can be explained by what was written. In
+/// this order nothing computed before a re-homing was seen is written after it was.
+void ModbusDialogue::exchange() {
+  look_for_command();
+  if (!read_all()) {
+    if (!ending_.load()) lose();
+    return;
+  }
+  if (!gate_.explains(state_.applied_um)) {
+    gate_.synchronised();
+    const std::scoped_lock lock(health_mutex_);
+    health_.last_error = "the controller applies what it was not sent: started anew from there";
+  }
+  publish(true);
+  const SendVerdict verdict = gate_.verdict(connection_.now());
+  if (verdict == SendVerdict::resynchronise || (verdict == SendVerdict::send && !write_command()))
+    lose();
+}
+
+void ModbusDialogue::look_for_command() {
+  if (commands_.fresh()) gate_.offered(commands_.front(), connection_.now());
+}
+
+std::vector<WriteField> ModbusDialogue::fields_of(const OffsetCommand& command) const {
+  std::vector<WriteField> fields;
+  double valid_bits = 0.0;
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
+    if (!drivable(command, axis)) continue;
+    valid_bits += std::ldexp(1.0, static_cast<int>(axis));
+    const ModbusValue& place = config_.axes[axis].offset;
+    fields.push_back(field_of(place, WriteStage::offset, command.offset_um[axis],
+                              {place.encoding, place.word_order, place.scale, 0.0}));
+  }
+  if (config_.valid_bits) {
+    fields.push_back(field_of(*config_.valid_bits, WriteStage::valid_bits, valid_bits,
+                              raw_format(*config_.valid_bits)));
+  }
+  if (config_.heartbeat) {
+    fields.push_back(field_of(*config_.heartbeat, WriteStage::heartbeat,
+                              static_cast<double>(heartbeat_), raw_format(*config_.heartbeat)));
+  }
+  return fields;
+}
+
+bool ModbusDialogue::write_command() {
+  if (config_.heartbeat) heartbeat_ = (heartbeat_ + 1) % counts_of(config_.heartbeat->encoding);
+  for (const WriteField& request : join_writes(fields_of(gate_.command()))) {
+    if (!write(request)) return false;
+  }
+  gate_.sent(connection_.now());
+  const std::scoped_lock lock(health_mutex_);
+  ++health_.writes;
+  return true;
+}
+
+bool ModbusDialogue::write(const WriteField& request) {
+  const Exchange exchange = with_retries(
+      [&] { return connection_.write_registers(config_.unit, request.address, request.words); });
+  if (exchange.ok()) return true;
+  const std::scoped_lock lock(health_mutex_);
+  ++health_.write_errors;
+  health_.last_error =
+      "writing registers from " + std::to_string(request.address) + ": " + describe(exchange);
+  return false;
+}
+
+template <class Request>
+Exchange ModbusDialogue::with_retries(Request&& request) {
+  Exchange exchange = request();
+  for (int again = 0; again < config_.line.retries; ++again) {
+    if (exchange.ok() || exchange.outcome == ExchangeOutcome::disconnected || ending_.load()) {
+      break;
+    }
+    exchange = request();
+  }
+  return exchange;
+}
+
+std::string ModbusDialogue::describe(const Exchange& exchange) const {
+  if (exchange.outcome == ExchangeOutcome::exception) {
+    return "exception " + std::to_string(exchange.exception_code);
+  }
+  if (*exchange.detail != '\0') return exchange.detail;
+  return connection_.last_error();
+}
+
+/// Reads every value into state_; all of them or, by the time of the first request, none.
+bool ModbusDialogue::read_all() {
+  std::vector<std::vector<std::uint16_t>> answers;
+  nanoseconds taken_at = connection_.now();
+  for (const ReadRequest& request : read_plan_.requests) {
+    answers.emplace_back(request.count);
+    const Exchange exchange = with_retries([&] {
+      return connection_.read(config_.unit, request.table, request.address, answers.back());
+    });
+    if (!exchange.ok()) {
+      const std::scoped_lock lock(health_mutex_);
+      ++health_.read_errors;
+      health_.last_error =
+          "reading from " + std::to_string(request.address) + ": " + describe(exchange);
+      return false;
+    }
+    if (answers.size() == 1) taken_at = exchange.sent_at;
+  }
+  take(answers);
+  state_.taken_at = taken_at;
+  const std::scoped_lock lock(health_mutex_);
+  ++health_.reads;
+  health_.last_error.clear();
+  return true;
+}
+
+void ModbusDialogue::take(std::span<const std::vector<std::uint16_t>> answers) {
+  for (std::size_t i = 0; i < read_values_.size(); ++i) {
+    const ModbusValue& value = read_values_[i];
+    const WordPlace place = read_plan_.places[i];
+    const std::span<const std::uint16_t> words = answers[place.request];
+    const NumberFormat format =
+        format_in(value.table, {value.encoding, value.word_order, value.scale, 0.0});
+    *read_targets_[i] = decode(words.subspan(place.word), format, {}).value;
+  }
+}
+
+void ModbusDialogue::publish(bool online) {
+  state_.online = online;
+  state_.link_epoch = gate_.epoch();
+  states_.back() = state_;
+  states_.publish();
+}
+
+void ModbusDialogue::lose() {
+  gate_.lost();
+  publish(false);
+  const std::scoped_lock lock(health_mutex_);
+  health_.connected = false;
+}
+
+}  // namespace thermocomp

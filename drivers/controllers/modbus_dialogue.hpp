@@ -1,0 +1,80 @@
+/// What is said to a controller over Modbus and when: offsets into its registers, and what it
+/// applies and measures out of them.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "drivers/controllers/controller_config.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/controllers/write_gate.hpp"
+#include "drivers/modbus/connection.hpp"
+#include "drivers/wait_free_slot.hpp"
+
+namespace thermocomp {
+
+/// Each period: reads everything back and publishes it, then writes the newest command (offsets,
+/// then valid bits, then heartbeat, neighbours in one request) - unless an axis stands where
+/// nothing sent lately can have taken it: that begins a new epoch and nothing is written
+/// (WriteGate).
+///
+/// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
+/// heartbeat counts up with every command written and starts anew when its register is full. Valid
+/// bits and heartbeat are raw numbers: their scale is not used.
+class ModbusDialogue {
+ public:
+  /// @param connection  of the configuration's line; outlives the dialogue
+  /// @throws InvalidValue for values that cannot be
+  ModbusDialogue(ModbusControllerConfig config, ModbusConnection& connection);
+
+  /// When act() is to be called next.
+  [[nodiscard]] nanoseconds next_action_at() const noexcept;
+  /// One period's exchange, connecting and reading everything back before it where needed.
+  void act();
+  /// From any thread: the exchange under way does not try again.
+  void end_soon() noexcept { ending_.store(true); }
+  [[nodiscard]] bool ending() const noexcept { return ending_.load(); }
+  /// Writes the last command, if it may be written, and disconnects.
+  void end();
+
+  void newest(ControllerState& state) noexcept;       ///< wait-free; one reader
+  void offer(const OffsetCommand& command) noexcept;  ///< wait-free; one writer
+  [[nodiscard]] ControllerHealth health() const;      ///< any ordinary thread
+
+ private:
+  bool synchronise();
+  void exchange();
+  void look_for_command();
+  bool write_command();
+  bool write(const WriteField& request);
+  std::vector<WriteField> fields_of(const OffsetCommand& command) const;
+  bool read_all();
+  void take(std::span<const std::vector<std::uint16_t>> answers);
+  void publish(bool online);
+  void lose();
+  /// Repeats `exchange` as the line's `retries` say. Notes why it failed in the end.
+  template <class Request>
+  Exchange with_retries(Request&& request);
+  [[nodiscard]] std::string describe(const Exchange& exchange) const;
+
+  const ModbusControllerConfig config_;
+  std::vector<ModbusValue> read_values_;  ///< applied offsets, then signals
+  std::vector<double*> read_targets_;     ///< where each of them goes in state_
+  ReadPlan read_plan_;
+  ModbusConnection& connection_;
+  WriteGate gate_;
+  std::uint64_t heartbeat_{0};
+  ControllerState state_;  ///< the thread's own
+  WaitFreeSlot<ControllerState> states_;
+  WaitFreeSlot<OffsetCommand> commands_;
+  nanoseconds next_exchange_at_;
+  nanoseconds retry_at_;  ///< while not in sync
+  std::atomic<bool> ending_{false};
+  mutable std::mutex health_mutex_;
+  ControllerHealth health_;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,359 @@
+#include "drivers/sensors/modbus_poller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "drivers/driver_error.hpp"
+#include "drivers/modbus/register_codec.hpp"
+#include "drivers/monotonic_clock.hpp"
+
+namespace thermocomp {
+namespace {
+
+using std::chrono::seconds;
+
+constexpr nanoseconds backoff_first = seconds(1);
+
+bool is_serial(const ModbusLine& line) {
+  return std::holds_alternative<ModbusRtu>(line.link);
+}
+
+/// On a slow serial line a long answer would make stop() and the other units wait.
+int registers_max_of(const ModbusLine& line) {
+  if (!is_serial(line)) return registers_per_request_limit;
+  constexpr double answer_s_max = 0.5;
+  const double register_s = static_cast<double>(time_on_line(line, 2).count()) * 1e-9;
+  const double registers = std::floor(answer_s_max / register_s) - 3.0;
+  return static_cast<int>(
+      std::clamp(registers, double{registers_of_value_max}, double{registers_per_request_limit}));
+}
+
+void check_that(const ModbusDeviceConfig& device, bool holds, const std::string& what) {
+  if (!holds) throw DriverError("device " + device.name + ": " + what);
+}
+
+void check_words(const ModbusDeviceConfig& device, std::size_t address, std::size_t words) {
+  check_that(device, address + words <= 65536,
+             "address " + std::to_string(address) + ": the value ends beyond register 65535");
+}
+
+void check_channel(const ModbusDeviceConfig& device, const ModbusChannel& channel) {
+  const std::size_t words = words_of(channel.table, channel.encoding);
+  check_words(device, channel.address, words);
+  check_that(device, static_cast<int>(words) <= device.registers_per_request_max,
+             "registers_per_request_max is smaller than a value");
+  check_that(device, std::isfinite(channel.scale) && channel.scale != 0.0,
+             "scale must be finite and not 0");
+  check_that(device, std::isfinite(channel.offset_degC), "offset_degC must be finite");
+  const NumberFormat format = format_in(channel.table, {channel.encoding, channel.word_order});
+  for (const Sentinel& sentinel : channel.sentinels) {
+    check_that(device, is_representable(sentinel.code, format.encoding),
+               "code " + std::to_string(sentinel.code) + " cannot occur in the encoding");
+  }
+}
+
+void check_device(const ModbusLine& line, const ModbusDeviceConfig& device) {
+  const int unit_min = is_serial(line) ? 1 : 0;
+  const int unit_max = is_serial(line) ? 247 : 255;
+  check_that(device, device.unit >= unit_min && device.unit <= unit_max,
+             "unit " + std::to_string(device.unit) + " must be in " + std::to_string(unit_min) +
+                 ".." + std::to_string(unit_max));
+  check_that(device, device.period_s > 0.0 && device.period_s <= 86400.0,
+             "period_s must be in (0, 86400]");
+  check_that(device,
+             device.registers_per_request_max >= 1 &&
+                 device.registers_per_request_max <= registers_per_request_limit,
+             "registers_per_request_max must be in 1..125");
+  check_that(device, device.gap_registers_max >= 0, "gap_registers_max must not be negative");
+  check_that(device, !device.channels.empty(), "has no channel");
+  for (const ModbusChannel& channel : device.channels) check_channel(device, channel);
+}
+
+std::size_t channels_of(const ModbusBusConfig& config) {
+  std::size_t channels = 0;
+  for (const ModbusDeviceConfig& device : config.devices) channels += device.channels.size();
+  return channels;
+}
+
+nanoseconds longest_pause(const ModbusBusConfig& config) {
+  // A unit alone on its line takes nothing from others by being asked often.
+  const double pause_s = config.devices.size() == 1
+                             ? std::min(config.line.backoff_s_max, config.line.reconnect_s)
+                             : config.line.backoff_s_max;
+  return from_seconds(pause_s);
+}
+
+}  // namespace
+
+ModbusPoller::ModbusPoller(const ModbusBusConfig& config, ModbusConnection& connection)
+    : config_(config),
+      reconnect_(from_seconds(config.line.reconnect_s)),
+      connection_(connection),
+      readings_(channels_of(config)),
+      slot_(readings_) {
+  health_.name = config.name;
+  health_.kind = is_serial(config.line) ? "modbus_rtu" : "modbus_tcp";
+  for (const ModbusDeviceConfig& device_config : config.devices) {
+    check_device(config.line, device_config);
+    Device device{device_config,
+                  plan_requests(device_config, registers_max_of(config.line)),
+                  {},
+                  UnitBackoff(backoff_first, longest_pause(config))};
+    device.first_reading = sensors_.size();
+    for (const PlannedRequest& planned : device.plan.requests) {
+      device.requests.push_back({planned, std::vector<std::uint16_t>(planned.count)});
+    }
+    for (const ModbusChannel& channel : device_config.channels) {
+      sensors_.push_back(channel.sensor);
+    }
+    devices_.push_back(std::move(device));
+    health_.units.emplace_back().name = device_config.name;
+  }
+  if (devices_.empty()) throw DriverError("bus " + config.name + ": has no device");
+  for (Device& device : devices_) device.next_due = connection_.now();
+}
+
+void ModbusPoller::newest(std::span<Reading> all) noexcept {
+  slot_.fresh();
+  const std::vector<Reading>& newest_readings = slot_.front();
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    if (sensors_[i] < all.size()) all[sensors_[i]] = newest_readings[i];
+  }
+}
+
+BusHealth ModbusPoller::health() const {
+  const std::lock_guard lock(health_mutex_);
+  return health_;
+}
+
+// ---- what is done when
+
+nanoseconds ModbusPoller::next_action_at() const noexcept {
+  if (connection_.connected()) return due(devices_[most_due()]);
+  if (lost_ && !loss_told_ && connection_.now() < next_connect_at_) return connection_.now();
+  return next_connect_at_;
+}
+
+void ModbusPoller::act() {
+  if (connection_.connected()) {
+    Device& device = devices_[most_due()];
+    if (connection_.pause_until(due(device))) poll(device);
+  } else if (lost_ && !loss_told_ && connection_.now() < next_connect_at_) {
+    set_lost();  // else closed on purpose: the failed exchanges have said what is wrong
+  } else if (connection_.pause_until(next_connect_at_)) {
+    connect();
+  }
+}
+
+void ModbusPoller::connect() {
+  next_connect_at_ = connection_.now() + reconnect_;
+  const bool connected = connection_.connect();
+  if (connection_.cancelled()) return;
+  {
+    const std::lock_guard lock(health_mutex_);
+    health_.connected = connected;
+    health_.last_error = connection_.last_error();
+    if (connected) ++health_.connects;
+  }
+  answers_since_connect_ = false;
+  if (!connected) {
+    set_lost();
+    return;
+  }
+  if (lost_) {  // whoever was dead may have come back with the line
+    for (Device& device : devices_) {
+      device.backoff.answered();
+      device.next_due = std::min(device.next_due, connection_.now());
+    }
+  }
+  lost_ = false;
+  loss_told_ = false;
+}
+
+/// No line: no reading of the bus may be believed any longer.
+void ModbusPoller::set_lost() {
+  lost_ = true;
+  loss_told_ = true;
+  for (Device& device : devices_) {
+    for (Request& request : device.requests) request.fault = Fault::no_answer;
+    finish_round(device, false);
+  }
+  publish();
+  const std::lock_guard lock(health_mutex_);
+  health_.connected = false;
+  for (UnitHealth& unit : health_.units) unit.answering = false;
+}
+
+nanoseconds ModbusPoller::due(const Device& device) const noexcept {
+  return std::max(
+      {device.next_due, device.backoff.not_before(), connection_.ready_at(device.config.unit)});
+}
+
+std::size_t ModbusPoller::most_due() const noexcept {
+  const auto earlier = [this](const Device& a, const Device& b) { return due(a) < due(b); };
+  return static_cast<std::size_t>(std::min_element(devices_.begin(), devices_.end(), earlier) -
+                                  devices_.begin());
+}
+
+std::size_t ModbusPoller::dead_units() const noexcept {
+  return static_cast<std::size_t>(
+      std::count_if(devices_.begin(), devices_.end(),
+                    [](const Device& device) { return device.backoff.dead(); }));
+}
+
+/// One round over the device's requests, beginning at its cursor: what had no answer last time is
+/// asked first, so that a late answer can only be one to the very same question.
+void ModbusPoller::poll(Device& device) {
+  const nanoseconds began_at = connection_.now();
+  const nanoseconds period = std::max(from_seconds(device.config.period_s), nanoseconds{1});
+  const bool from_start = device.cursor == 0;
+  for (Request& request : device.requests) request.settled = false;
+  const std::size_t begin = device.cursor;
+  device.cursor = 0;
+  Step step = Step::next;
+  for (std::size_t k = 0; k < device.requests.size() && step == Step::next; ++k) {
+    step = ask(device, (begin + k) % device.requests.size());
+  }
+  if (step == Step::line_lost) {
+    if (connection_.cancelled()) return;
+    // A connection that had worked may just have been closed for idling: connecting again decides.
+    if (!answers_since_connect_) set_lost();
+    lost_ = true;
+    return;
+  }
+  if (step != Step::again && device.next_due <= began_at) {
+    device.next_due += period * ((began_at - device.next_due) / period + 1);  // keeps its phase
+  }
+  finish_round(device, from_start);
+  publish();
+}
+
+ModbusPoller::Step ModbusPoller::ask(Device& device, std::size_t index) {
+  Request& request = device.requests[index];
+  const Exchange exchange = connection_.read(device.config.unit, request.planned.table,
+                                             request.planned.address, request.words);
+  if (exchange.outcome == ExchangeOutcome::cancelled) return Step::line_lost;
+  note(static_cast<std::size_t>(&device - devices_.data()), exchange);
+  if (exchange.outcome == ExchangeOutcome::disconnected) {
+    device.cursor = index;
+    return Step::line_lost;
+  }
+  if (!exchange.unit_answered()) return give_up(device, index, exchange);
+  answers_since_connect_ = true;
+  device.tries = 0;
+  device.backoff.answered();
+  request.settled = true;
+  request.fault = exchange.fault();
+  if (exchange.ok()) request.arrived_at = exchange.arrived_at;
+  return Step::next;
+}
+
+/// A request without a usable answer: another try, or the fault.
+ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
+                                         const Exchange& exchange) {
+  const bool gateway = exchange.outcome == ExchangeOutcome::exception;
+  if (!gateway && !device.backoff.dead() && device.tries < config_.line.retries) {
+    ++device.tries;
+    device.cursor = index;
+    return Step::again;
+  }
+  device.tries = 0;
+  device.cursor = (index + 1) % device.requests.size();
+  const bool any_answered = std::any_of(device.requests.begin(), device.requests.end(),
+                                        [](const Request& request) { return request.settled; });
+  // A register range that is never answered does not make the whole unit dead.
+  for (Request& request : device.requests) {
+    if (!request.settled && (!any_answered || &request == &device.requests[index])) {
+      request.fault = exchange.fault();
+    }
+  }
+  if (!any_answered) {
+    const bool was_dead = device.backoff.dead();
+    const nanoseconds now = connection_.now();
+    device.backoff.failed(now, now - exchange.sent_at, dead_units() + (was_dead ? 0 : 1));
+  }
+  return Step::end_of_round;
+}
+
+// ---- answers to readings
+
+bool ModbusPoller::renewed(Device& device, bool whole_from_start) const {
+  if (!device.config.renewal) return true;
+  const Request& request = device.requests[device.plan.renewal->request];
+  if (!whole_from_start || !request.settled || request.fault != Fault::none) return false;
+  const std::uint16_t counter = request.words[device.plan.renewal->offset];
+  const bool moved = !device.counter_known || counter != device.counter;
+  device.counter = counter;
+  device.counter_known = true;
+  return moved;
+}
+
+void ModbusPoller::finish_round(Device& device, bool whole_from_start) {
+  const bool renewed_now = renewed(device, whole_from_start);
+  for (std::size_t i = 0; i < device.config.channels.size(); ++i) {
+    Reading& reading = readings_[device.first_reading + i];
+    reading = evaluate(device, i, reading, renewed_now);
+  }
+}
+
+Reading ModbusPoller::evaluate(const Device& device, std::size_t channel, const Reading& before,
+                               bool renewed_now) const {
+  const ModbusChannel& config = device.config.channels[channel];
+  const ChannelPlace& place = device.plan.channels[channel];
+  const Request& request = device.requests[place.value.request];
+  Fault fault = request.fault;
+  if (fault == Fault::none && place.status) {
+    const Request& status = device.requests[place.status->request];
+    fault = status.fault != Fault::none
+                ? status.fault
+                : decode_status(*config.status, status.words[place.status->offset]);
+  }
+  if (fault != Fault::none) return {not_a_number, before.taken_at, fault};
+  const NumberFormat format = format_in(
+      config.table, {config.encoding, config.word_order, config.scale, config.offset_degC});
+  const auto words = std::span(request.words).subspan(place.value.offset);
+  const Decoded decoded = decode(words, format, config.sentinels);
+  if (decoded.fault != Fault::none) return {not_a_number, before.taken_at, decoded.fault};
+  const bool stamp = renewed_now || before.taken_at == nanoseconds{0};
+  return {decoded.value, stamp ? request.arrived_at : before.taken_at, Fault::none};
+}
+
+void ModbusPoller::publish() noexcept {
+  std::copy(readings_.begin(), readings_.end(), slot_.back().begin());
+  slot_.publish();
+}
+
+void ModbusPoller::note(std::size_t device, const Exchange& exchange) {
+  const std::lock_guard lock(health_mutex_);
+  UnitHealth& unit = health_.units[device];
+  ++unit.requests;
+  unit.answering = exchange.unit_answered();
+  switch (exchange.outcome) {
+    case ExchangeOutcome::ok:
+      ++unit.answers;
+      unit.round_trip_ms =
+          static_cast<double>((exchange.arrived_at - exchange.sent_at).count()) * 1e-6;
+      break;
+    case ExchangeOutcome::exception:
+      ++unit.exceptions;
+      break;
+    case ExchangeOutcome::timeout:
+      ++unit.timeouts;
+      break;
+    case ExchangeOutcome::bad_frame:
+      ++unit.bad_frames;
+      break;
+    case ExchangeOutcome::disconnected:
+      health_.connected = false;
+      health_.last_error = exchange.detail;
+      break;
+    case ExchangeOutcome::cancelled:
+      break;
+  }
+  if (exchange.ok() ? !unit.last_error.empty() : unit.last_error != exchange.detail) {
+    unit.last_error = exchange.detail;
+  }
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,93 @@
+/// What is asked of the units of one Modbus line and when, and what readings the answers are.
+#pragma once
+
+#include <mutex>
+#include <vector>
+
+#include "drivers/modbus/connection.hpp"
+#include "drivers/sensors/modbus_plan.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "drivers/sensors/unit_backoff.hpp"
+#include "drivers/wait_free_slot.hpp"
+
+namespace thermocomp {
+
+/// Each device is read at its period on an absolute schedule. A reading's `taken_at` is when the
+/// last answer that gave it a value arrived (with a renewal counter: the last answer in which the
+/// counter had moved); a reading with a fault keeps it and has no value.
+///
+/// A request that fails is tried again as the line's `retries` say (of a unit that answered until
+/// then); a unit without answer is asked again with growing pauses (UnitBackoff), alone on its
+/// line at least every `reconnect_s` (serial: every 3 s, for the sake of late answers). A lost line
+/// is opened again every `reconnect_s`.
+class ModbusPoller {
+ public:
+  /// @param connection  of the configuration's line; outlives the poller
+  /// @throws DriverError naming the device and what cannot work
+  ModbusPoller(const ModbusBusConfig& config, ModbusConnection& connection);
+
+  /// When act() has something to do next; it then waits until that time by itself.
+  [[nodiscard]] nanoseconds next_action_at() const noexcept;
+  /// One thing: connecting, one device's round of requests, or telling that the line is lost.
+  /// @pre not called again once the connection is cancelled
+  void act();
+
+  /// From the one reading thread: wait-free.
+  void newest(std::span<Reading> all) noexcept;
+  /// From any ordinary thread.
+  [[nodiscard]] BusHealth health() const;
+
+ private:
+  /// What the last answers to one request said.
+  struct Request {
+    PlannedRequest planned;
+    std::vector<std::uint16_t> words;
+    nanoseconds arrived_at{};
+    Fault fault{Fault::never_read};
+    bool settled{false};  ///< in the round under way
+  };
+  struct Device {
+    ModbusDeviceConfig config;
+    ModbusPlan plan;
+    std::vector<Request> requests;
+    UnitBackoff backoff;
+    std::size_t first_reading{0};  ///< of its channels in readings_
+    std::size_t cursor{0};         ///< the request a round begins with
+    int tries{0};                  ///< failed ones of the request at the cursor
+    nanoseconds next_due{};
+    std::uint16_t counter{0};
+    bool counter_known{false};
+  };
+  enum class Step { next, end_of_round, again, line_lost };
+
+  void connect();
+  void set_lost();
+  [[nodiscard]] std::size_t most_due() const noexcept;
+  [[nodiscard]] nanoseconds due(const Device& device) const noexcept;
+  void poll(Device& device);
+  Step ask(Device& device, std::size_t index);
+  Step give_up(Device& device, std::size_t index, const Exchange& exchange);
+  void finish_round(Device& device, bool whole_from_start);
+  [[nodiscard]] bool renewed(Device& device, bool whole_from_start) const;
+  [[nodiscard]] Reading evaluate(const Device& device, std::size_t channel, const Reading& before,
+                                 bool renewed_now) const;
+  void publish() noexcept;
+  void note(std::size_t device, const Exchange& exchange);
+  [[nodiscard]] std::size_t dead_units() const noexcept;
+
+  ModbusBusConfig config_;
+  nanoseconds reconnect_;
+  ModbusConnection& connection_;
+  std::vector<Device> devices_;
+  std::vector<std::size_t> sensors_;  ///< of each reading: its index in the configuration
+  std::vector<Reading> readings_;     ///< the thread's own
+  WaitFreeSlot<std::vector<Reading>> slot_;
+  nanoseconds next_connect_at_{0};
+  bool lost_{true};  ///< no line since it was lost, or never yet
+  bool loss_told_{false};
+  bool answers_since_connect_{false};
+  mutable std::mutex health_mutex_;
+  BusHealth health_;
+};
+
+}  // namespace thermocomp
