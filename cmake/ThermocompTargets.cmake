@@ -15,6 +15,7 @@ endif()
 
 set(THERMOCOMP_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 option(THERMOCOMP_COVERAGE "Instrument for gcovr" OFF)
+option(THERMOCOMP_FUZZ "Build the fuzz targets instead of the tests (clang with libFuzzer)" OFF)
 
 add_library(thermocomp_flags INTERFACE)
 # -ffp-contract=off: replay must give the same bits whichever build made the history.
@@ -28,6 +29,17 @@ if(THERMOCOMP_SANITIZE)
   target_link_options(thermocomp_flags INTERFACE -fsanitize=${THERMOCOMP_SANITIZE})
   # GCC 12 warns wrongly about uninitialised values once the sanitizers have rewritten the code.
   target_compile_options(thermocomp_flags INTERFACE -Wno-maybe-uninitialized)
+endif()
+if(THERMOCOMP_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "THERMOCOMP_FUZZ needs clang++: libFuzzer is a part of it")
+  endif()
+  # Besides what `undefined` stands for: a number that does not fit the integer it is turned into,
+  # and the checked operators of the standard library.
+  target_compile_options(thermocomp_flags INTERFACE
+    -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=all
+    -fno-omit-frame-pointer)
+  target_compile_definitions(thermocomp_flags INTERFACE _GLIBCXX_ASSERTIONS)
 endif()
 if(THERMOCOMP_COVERAGE)
   target_compile_options(thermocomp_flags INTERFACE --coverage)

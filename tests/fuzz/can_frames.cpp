@@ -1,0 +1,131 @@
+/// What a CAN socket hands out, error frames and time stamps included, and what is decoded from it.
+///
+/// Input: signals, then the messages as the kernel would deliver them.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <vector>
+
+#include <linux/can.h>
+#include <sys/socket.h>
+
+#include "drivers/can/can_socket.hpp"
+#include "drivers/can/signal_codec.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "estimator/checks.hpp"
+#include "fuzz.hpp"
+#include "virtual_line.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+std::vector<CanSignal> signals_from(fuzz::ByteFeed& feed) {
+  std::vector<CanSignal> signals(1 + feed.u8() % 4);
+  for (CanSignal& signal : signals) {
+    const std::uint8_t kind = feed.u8();
+    signal.byte_order = (kind & 1) != 0 ? ByteOrder::big_endian : ByteOrder::little_endian;
+    signal.is_signed = (kind & 2) != 0;
+    signal.is_float = (kind & 4) != 0;
+    signal.extended_id = (kind & 8) != 0;
+    signal.id = feed.u16() & (signal.extended_id ? 0xFFFFu : 0x7FFu);
+    signal.start_bit = feed.u8() % 64;
+    signal.length_bits = 1 + feed.u8() % 64;
+    signal.scale = 0.1;
+  }
+  const auto is_bad = [](const CanSignal& signal) {
+    try {
+      check(signal);
+      return false;
+    } catch (const InvalidValue&) {
+      return true;
+    }
+  };
+  signals.erase(std::remove_if(signals.begin(), signals.end(), is_bad), signals.end());
+  return signals;
+}
+
+/// Appends a control message where it fits. @return bytes used
+std::size_t put_control(const msghdr& header, std::size_t used, int type, const void* value,
+                        std::size_t size) {
+  if (used + CMSG_SPACE(size) > header.msg_controllen) return used;
+  cmsghdr part{};
+  part.cmsg_level = SOL_SOCKET;
+  part.cmsg_type = type;
+  part.cmsg_len = CMSG_LEN(size);
+  auto* at = static_cast<std::uint8_t*>(header.msg_control) + used;
+  std::memset(at, 0, CMSG_SPACE(size));
+  std::memcpy(at, &part, sizeof part);
+  std::memcpy(at + CMSG_LEN(0), value, size);
+  return used + CMSG_SPACE(size);
+}
+
+/// One message: a frame of any kind, sometimes with a stamp, sometimes with a count of lost frames,
+/// sometimes shorter or longer than a frame is.
+bool deliver(fuzz::ByteFeed& feed, std::size_t& frames, mmsghdr& message) {
+  if (feed.empty()) return false;
+  const std::uint8_t kind = feed.u8();
+  if ((kind & 0x80) != 0) return false;  // the end of a batch
+  can_frame frame{};
+  frame.can_id = feed.u16();
+  if ((kind & 1) != 0) frame.can_id |= CAN_EFF_FLAG;
+  if ((kind & 2) != 0) frame.can_id |= CAN_ERR_FLAG;
+  if ((kind & 4) != 0) frame.can_id |= CAN_RTR_FLAG;
+  frame.len = feed.u8();
+  for (std::uint8_t& byte : frame.data) byte = feed.u8();
+  std::memcpy(message.msg_hdr.msg_iov[0].iov_base, &frame, sizeof frame);
+  message.msg_len = (kind & 8) != 0 ? feed.u8() : static_cast<unsigned>(CAN_MTU);
+  std::size_t used = 0;
+  if ((kind & 16) != 0) {
+    timespec stamp{};
+    stamp.tv_sec = static_cast<time_t>(feed.u64() >> 31);  // up to far beyond any year
+    stamp.tv_nsec = static_cast<long>(feed.u64() % 1'000'000'000);
+    used = put_control(message.msg_hdr, used, SCM_TIMESTAMPNS, &stamp, sizeof stamp);
+  }
+  if ((kind & 32) != 0) {
+    const auto lost = static_cast<std::uint32_t>(feed.u64());
+    used = put_control(message.msg_hdr, used, SO_RXQ_OVFL, &lost, sizeof lost);
+  }
+  message.msg_hdr.msg_controllen = used;
+  ++frames;
+  return true;
+}
+
+void check_frame(const CanFrame& frame, const std::vector<CanSignal>& signals) {
+  FUZZ_PROMISE(frame.size <= can_bytes_max);
+  FUZZ_PROMISE(frame.id.id <= (frame.id.extended ? 0x1FFFFFFFu : 0x7FFu));
+  const nanoseconds age = monotonic_now() - frame.received_at;
+  FUZZ_PROMISE(age >= nanoseconds{0} && age <= std::chrono::seconds(10));
+  for (const CanSignal& signal : signals) {
+    if (signal.id != frame.id.id || signal.extended_id != frame.id.extended) continue;
+    const CanValue value = decode(frame.payload(), signal);
+    FUZZ_PROMISE(std::isfinite(value.value) == (value.fault == Fault::none));
+    FUZZ_PROMISE(frame.size >= bytes_needed(signal) || value.fault == Fault::bad_frame);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::ByteFeed feed(data, size);
+  const std::vector<CanSignal> signals = signals_from(feed);
+  std::vector<CanId> wanted;
+  for (const CanSignal& signal : signals) wanted.push_back({signal.id, signal.extended_id});
+  std::size_t delivered = 0;
+  const fuzz::VirtualCan bus([&](mmsghdr& message) { return deliver(feed, delivered, message); });
+  CanSocket socket("can0", wanted);
+  FUZZ_PROMISE(socket.open() && !socket.bus_off() && socket.error().empty());
+  std::size_t handed_out = 0;
+  while (!feed.empty()) {
+    const auto frames = socket.receive();
+    FUZZ_PROMISE(frames.size() <= CanSocket::batch_max);
+    handed_out += frames.size();
+    for (const CanFrame& frame : frames) check_frame(frame, signals);
+    FUZZ_PROMISE(socket.is_open());
+    FUZZ_PROMISE(!socket.bus_off() || !socket.error().empty());
+  }
+  FUZZ_PROMISE(handed_out + socket.errors().error_frames <= delivered);
+  return 0;
+}

@@ -1,0 +1,83 @@
+/// CAN frames <-> values: any signal that check() lets pass, any payload.
+#include <bit>
+#include <cmath>
+#include <vector>
+
+#include "drivers/can/signal_codec.hpp"
+#include "estimator/checks.hpp"
+#include "fuzz.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+CanSignal signal_from(fuzz::ByteFeed& feed) {
+  CanSignal signal;
+  const std::uint8_t kind = feed.u8();
+  signal.byte_order = (kind & 1) != 0 ? ByteOrder::big_endian : ByteOrder::little_endian;
+  signal.is_signed = (kind & 2) != 0;
+  signal.is_float = (kind & 4) != 0;
+  signal.extended_id = (kind & 8) != 0;
+  signal.start_bit = static_cast<std::int8_t>(feed.u8());
+  signal.length_bits = static_cast<std::int8_t>(feed.u8());
+  signal.id = static_cast<std::uint32_t>(feed.u16()) << ((kind & 16) != 0 ? 16 : 0);
+  signal.scale = (kind & 0x80) != 0 ? feed.f64() : (feed.u8() + 1) * 0.25;
+  signal.offset = (kind & 0x80) != 0 ? feed.f64() : feed.u8() - 100.0;
+  signal.sentinels.resize(feed.u8() % 4);
+  for (Sentinel& sentinel : signal.sentinels) {
+    sentinel.code = std::bit_cast<std::int64_t>(feed.u64());
+    sentinel.fault = static_cast<Fault>(1 + feed.u8() % (faults_count - 1));
+  }
+  return signal;
+}
+
+/// The bits of the signal come back; every other bit of the frame stays.
+void check_insertion(const CanSignal& signal, std::vector<std::uint8_t> payload,
+                     std::uint64_t raw) {
+  const std::vector<std::uint8_t> before = payload;
+  insert_raw(payload, signal, raw);
+  const std::uint64_t mask = bits_of(signal);
+  for (std::size_t i = 0; i < payload.size(); ++i) {
+    const auto own = static_cast<std::uint8_t>(mask >> (8 * i));
+    FUZZ_PROMISE(((payload[i] ^ before[i]) & static_cast<std::uint8_t>(~own)) == 0);
+  }
+  const std::uint64_t low =
+      signal.length_bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << signal.length_bits) - 1;
+  FUZZ_PROMISE(extract_raw(payload, signal) == (raw & low));
+  FUZZ_PROMISE(std::popcount(mask) == signal.length_bits);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::ByteFeed feed(data, size);
+  CanSignal signal = signal_from(feed);
+  try {
+    check(signal);
+  } catch (const InvalidValue& error) {
+    FUZZ_PROMISE(!error.key().empty() && !error.rule().empty());
+    return 0;
+  }
+  std::vector<std::uint8_t> payload = feed.take(feed.u8() % 9);
+  const CanValue decoded = decode(payload, signal);
+  FUZZ_PROMISE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
+  const bool too_short = payload.size() < bytes_needed(signal);
+  FUZZ_PROMISE(!too_short || decoded.fault == Fault::bad_frame);
+  FUZZ_PROMISE(bytes_needed(signal) >= 1 && bytes_needed(signal) <= can_bytes_max);
+  if (too_short) return 0;
+
+  check_insertion(signal, payload, feed.u64());
+  const double any = feed.f64();
+  const std::vector<std::uint8_t> before = payload;
+  const bool fitted = encode(any, payload, signal);
+  if (std::isnan(any)) FUZZ_PROMISE(!fitted && payload == before);
+  const bool ordinary = std::abs(signal.scale) >= 1e-3 && std::abs(signal.scale) <= 1e3 &&
+                        std::abs(signal.offset) <= 1e3 && !signal.is_float;
+  if (fitted && ordinary && std::abs(any) < 1e9) {
+    signal.sentinels.clear();
+    const CanValue again = decode(payload, signal);
+    FUZZ_PROMISE(again.fault == Fault::none);
+    FUZZ_PROMISE(std::abs(again.value - any) <= 0.5 * resolution(signal) + 1e-6);
+  }
+  return 0;
+}

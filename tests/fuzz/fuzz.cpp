@@ -1,0 +1,97 @@
+#include "fuzz.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdio>
+#include <cstdlib>
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace thermocomp::fuzz {
+
+void broken(const char* promise, const char* file, int line) {
+  std::fprintf(stderr, "%s:%d: broken promise: %s\n", file, line, promise);
+  std::abort();
+}
+
+std::uint8_t ByteFeed::u8() noexcept {
+  if (bytes_.empty()) return 0;
+  const std::uint8_t byte = bytes_.front();
+  bytes_ = bytes_.subspan(1);
+  return byte;
+}
+
+std::uint16_t ByteFeed::u16() noexcept {
+  const unsigned low = u8();
+  return static_cast<std::uint16_t>(low | unsigned{u8()} << 8);
+}
+
+std::uint64_t ByteFeed::u64() noexcept {
+  std::uint64_t value = 0;
+  for (unsigned i = 0; i < 8; ++i) value |= std::uint64_t{u8()} << (8 * i);
+  return value;
+}
+
+double ByteFeed::f64() noexcept {
+  return std::bit_cast<double>(u64());
+}
+
+std::vector<std::uint8_t> ByteFeed::take(std::size_t count) {
+  const auto front = bytes_.first(std::min(count, bytes_.size()));
+  bytes_ = bytes_.subspan(front.size());
+  return {front.begin(), front.end()};
+}
+
+ScratchFile::ScratchFile(std::string_view name) {
+  const bool in_memory = access("/dev/shm", W_OK) == 0;
+  const std::filesystem::path above =
+      in_memory ? std::filesystem::path("/dev/shm") : std::filesystem::temp_directory_path();
+  std::string folder = (above / "thermocomp-fuzz-XXXXXX").string();
+  if (mkdtemp(folder.data()) == nullptr) {
+    std::perror(folder.c_str());
+    std::exit(1);
+  }
+  folder_ = folder;
+  path_ = folder_ / name;
+}
+
+ScratchFile::~ScratchFile() {
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+void ScratchFile::write(std::span<const std::uint8_t> bytes) const {
+  const int fd = open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const bool whole =
+      fd >= 0 && ::write(fd, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+  if (fd >= 0) close(fd);
+  if (whole) return;
+  std::perror(path_.c_str());
+  std::exit(1);
+}
+
+namespace {
+
+int lines_of(std::string_view text) {
+  return 1 + static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+}
+
+}  // namespace
+
+void check_problems(const std::vector<Problem>& problems, std::span<const NamedText> files) {
+  FUZZ_PROMISE(!problems.empty());
+  for (const Problem& problem : problems) {
+    const auto file = std::find_if(files.begin(), files.end(), [&](const NamedText& known) {
+      return known.name == problem.file;
+    });
+    FUZZ_PROMISE(file != files.end());
+    FUZZ_PROMISE(problem.line >= 0);
+    FUZZ_PROMISE(problem.line <= lines_of(file->text));
+    FUZZ_PROMISE(!problem.rule.empty());
+    const bool of_a_key = !problem.key.empty();
+    FUZZ_PROMISE(!of_a_key || !problem.value.empty());
+    FUZZ_PROMISE(to_string(problem).find('\n') == std::string::npos);
+  }
+}
+
+}  // namespace thermocomp::fuzz

@@ -1,0 +1,12 @@
+/// A history whose bytes are anything at all: read, replayed and exported as the commands do.
+#include "fuzz.hpp"
+#include "history_promises.hpp"
+
+using namespace thermocomp;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const fuzz::ScratchFile file("h.db");
+  file.write({data, size});
+  static_cast<void>(fuzz::use_history(file.path(), parse_setup));
+  return 0;
+}

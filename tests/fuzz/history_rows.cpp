@@ -1,0 +1,187 @@
+/// A history that SQLite finds in order, with rows that no daemon wrote: edits of a good one.
+#include <array>
+#include <bit>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <sqlite3.h>
+
+#include "daemon/history/chunk_codec.hpp"
+#include "fuzz.hpp"
+#include "history_promises.hpp"
+#include "recorded_history.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+constexpr std::array segment_columns{
+    "id",        "run",         "setup",      "reason",  "grid_start_ns",
+    "period_ns", "first_cycle", "last_cycle", "wall_ns", "records"};
+constexpr std::array chunk_columns{"segment", "number", "through_cycle", "wall_minus_grid_ns",
+                                   "count"};
+constexpr int edits_max = 8;
+
+/// Statements on the open copy. What fails (a key that is there already) changes nothing.
+class Editor {
+ public:
+  explicit Editor(const std::filesystem::path& file) {
+    FUZZ_PROMISE(sqlite3_open(file.c_str(), &handle_) == SQLITE_OK);
+    run("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY; BEGIN");
+  }
+  ~Editor() {
+    run("COMMIT");
+    sqlite3_close(handle_);
+  }
+  Editor(const Editor&) = delete;
+  Editor& operator=(const Editor&) = delete;
+
+  void run(const char* sql) { sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr); }
+
+  void set_number(const std::string& table, const char* column, unsigned row, std::int64_t value) {
+    set(table, column, row, [&](sqlite3_stmt* at) { sqlite3_bind_int64(at, 1, value); });
+  }
+  void set_blob(const std::string& table, const char* column, unsigned row,
+                const std::vector<std::uint8_t>& bytes) {
+    set(table, column, row, [&](sqlite3_stmt* at) {
+      sqlite3_bind_blob(at, 1, bytes.empty() ? "" : static_cast<const void*>(bytes.data()),
+                        static_cast<int>(bytes.size()), SQLITE_TRANSIENT);
+    });
+  }
+  /// Bytes of a blob from `at` on are overwritten.
+  void splice(const std::string& table, const char* column, unsigned row, std::size_t at,
+              const std::vector<std::uint8_t>& bytes) {
+    std::vector<std::uint8_t> blob = get(table, column, row);
+    if (blob.empty()) return;
+    for (std::size_t i = 0; i < bytes.size(); ++i) blob[(at + i) % blob.size()] = bytes[i];
+    set_blob(table, column, row, blob);
+  }
+
+ private:
+  static std::string nth_row(const std::string& table, unsigned row) {
+    return " WHERE rowid = (SELECT rowid FROM " + table + " ORDER BY rowid LIMIT 1 OFFSET " +
+           std::to_string(row % 4) + ")";
+  }
+  template <class Bind>
+  void set(const std::string& table, const char* column, unsigned row, Bind bind) {
+    const std::string sql =
+        "UPDATE OR IGNORE " + table + " SET " + column + " = ?" + nth_row(table, row);
+    sqlite3_stmt* statement = nullptr;
+    if (sqlite3_prepare_v2(handle_, sql.c_str(), -1, &statement, nullptr) == SQLITE_OK) {
+      bind(statement);
+      sqlite3_step(statement);
+    }
+    sqlite3_finalize(statement);
+  }
+  std::vector<std::uint8_t> get(const std::string& table, const char* column, unsigned row) {
+    const std::string sql =
+        std::string("SELECT ") + column + " FROM " + table + nth_row(table, row);
+    std::vector<std::uint8_t> blob;
+    sqlite3_stmt* statement = nullptr;
+    if (sqlite3_prepare_v2(handle_, sql.c_str(), -1, &statement, nullptr) == SQLITE_OK &&
+        sqlite3_step(statement) == SQLITE_ROW) {
+      blob.resize(static_cast<std::size_t>(sqlite3_column_bytes(statement, 0)));
+      if (!blob.empty()) std::memcpy(blob.data(), sqlite3_column_blob(statement, 0), blob.size());
+    }
+    sqlite3_finalize(statement);
+    return blob;
+  }
+
+  sqlite3* handle_{nullptr};
+};
+
+/// Small numbers mostly, now and then any.
+std::int64_t number_from(fuzz::ByteFeed& feed) {
+  const std::uint8_t kind = feed.u8();
+  if (kind < 0xC0) return kind % 64 - 2;
+  if (kind < 0xE0) return static_cast<std::int64_t>(feed.u16());
+  return std::bit_cast<std::int64_t>(feed.u64());
+}
+
+/// Records as an encoder would write them, in an order and with numbers that no cycle gave.
+std::vector<std::uint8_t> chunk_from(fuzz::ByteFeed& feed, std::uint64_t& count) {
+  ChunkEncoder encoder;
+  count = feed.u8() % 16;
+  std::uint64_t cycle = 0;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    Record record;
+    record.kind = static_cast<RecordKind>(feed.u8() % record_kinds_count);
+    cycle += static_cast<std::uint64_t>(number_from(feed));
+    record.cycle = cycle;
+    record.detail = feed.u8();
+    record.index = static_cast<std::uint32_t>(number_from(feed));
+    record.time_ns = number_from(feed);
+    record.value = static_cast<double>(number_from(feed));
+    encoder.add(record);
+  }
+  const std::vector<std::byte> bytes = encoder.take();
+  const auto* first = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  return {first, first + bytes.size()};
+}
+
+void edit(Editor& editor, fuzz::ByteFeed& feed) {
+  const std::uint8_t kind = feed.u8();
+  const unsigned row = feed.u8();
+  switch (kind % 7) {
+    case 0:
+      editor.set_number("segment", segment_columns[feed.u8() % segment_columns.size()], row,
+                        number_from(feed));
+      break;
+    case 1:
+      editor.set_number("chunk", chunk_columns[feed.u8() % chunk_columns.size()], row,
+                        number_from(feed));
+      break;
+    case 2: {
+      std::uint64_t count = 0;
+      editor.set_blob("chunk", "records", row, chunk_from(feed, count));
+      editor.set_number("chunk", "count", row, static_cast<std::int64_t>(count));
+      break;
+    }
+    case 3: {
+      const std::size_t at = feed.u16();
+      editor.splice("chunk", "records", row, at, feed.take(1 + feed.u8() % 16));
+      break;
+    }
+    case 4: {
+      const std::size_t at = feed.u16();
+      editor.splice("segment", "estimator_state", row, at, feed.take(1 + feed.u8() % 16));
+      break;
+    }
+    case 5: {
+      const std::size_t at = feed.u16();
+      editor.splice("segment", "inputs", row, at, feed.take(1 + feed.u8() % 16));
+      break;
+    }
+    case 6:
+      editor.run((row & 1) == 0 ? "DELETE FROM chunk WHERE number = 0" : "DELETE FROM setup");
+      break;
+  }
+}
+
+/// The texts stay as they are here: parsed once.
+ReplaySetup known_setup(const SegmentSetup& setup) {
+  static const SegmentSetup known{fuzz::small_config_text(), fuzz::small_model_text(), ""};
+  static const ReplaySetup parsed = parse_setup(known);
+  FUZZ_PROMISE(setup.config_text == known.config_text && setup.model_text == known.model_text);
+  return parsed;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const std::vector<std::uint8_t> good = fuzz::recorded_history();
+  static const fuzz::ScratchFile file("h.db");
+  fuzz::ByteFeed feed(data, size);
+  file.write(good);
+  if (!feed.empty()) {
+    Editor editor(file.path());
+    for (int i = 0; i < edits_max && !feed.empty(); ++i) edit(editor, feed);
+  }
+  const fuzz::HistoryUse use = fuzz::use_history(file.path(), known_setup);
+  if (size == 0) {
+    FUZZ_PROMISE(use.replayed && use.exported);
+    FUZZ_PROMISE(use.summary.compared > 0 && use.summary.different == 0);
+  }
+  return 0;
+}

@@ -1,0 +1,66 @@
+#include "model_promises.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <vector>
+
+#include "estimator/displacement_model.hpp"
+#include "fuzz.hpp"
+
+namespace thermocomp::fuzz {
+namespace {
+
+bool same(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+bool same(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](double x, double y) { return same(x, y); });
+}
+bool same(const std::vector<std::vector<double>>& a, const std::vector<std::vector<double>>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const auto& x, const auto& y) { return same(x, y); });
+}
+
+}  // namespace
+
+void check_same(const ThermalModel& a, const ThermalModel& b) {
+  FUZZ_PROMISE(a.inputs == b.inputs);
+  FUZZ_PROMISE(a.outputs == b.outputs);
+  FUZZ_PROMISE(same(a.reference_degC, b.reference_degC));
+  FUZZ_PROMISE(same(a.matrix_um_per_K, b.matrix_um_per_K));
+  FUZZ_PROMISE(same(a.covariance_K2, b.covariance_K2));
+  FUZZ_PROMISE(a.guideways.size() == b.guideways.size());
+  for (std::size_t i = 0; i < a.guideways.size(); ++i) {
+    FUZZ_PROMISE(a.guideways[i].name == b.guideways[i].name);
+    FUZZ_PROMISE(a.guideways[i].axis == b.guideways[i].axis);
+    FUZZ_PROMISE(same(a.guideways[i].positions_mm, b.guideways[i].positions_mm));
+    FUZZ_PROMISE(a.guideways[i].rows_um_per_K == b.guideways[i].rows_um_per_K);
+  }
+  FUZZ_PROMISE(a.terms.size() == b.terms.size());
+  for (std::size_t i = 0; i < a.terms.size(); ++i) {
+    FUZZ_PROMISE(a.terms[i].kind == b.terms[i].kind);
+    FUZZ_PROMISE(a.terms[i].subject == b.terms[i].subject);
+    FUZZ_PROMISE(a.terms[i].shared == b.terms[i].shared);
+    FUZZ_PROMISE(a.terms[i].per_output == b.terms[i].per_output);
+  }
+}
+
+void check_steps(const ThermalModel& model) {
+  DisplacementModel displacement(model);
+  const std::vector<double> reference(model.temperature_columns().size(), 20.0);
+  std::vector<double> temps(reference);
+  std::vector<double> signals(model.signal_columns().size(), 0.0);
+  std::vector<double> result(model.outputs.size());
+  nanoseconds now = std::chrono::hours(1);
+  for (const double temp_degC : {20.0, 21.0, -273.15, 3000.0}) {
+    std::fill(temps.begin(), temps.end(), temp_degC);
+    std::fill(signals.begin(), signals.end(), 1e3 * temp_degC);
+    displacement.step(now, temps, reference, signals, result);
+    now += std::chrono::milliseconds(10);
+  }
+  FUZZ_PROMISE(displacement.plan_terms(displacement).size() == model.terms.size());
+}
+
+}  // namespace thermocomp::fuzz

@@ -1,0 +1,79 @@
+/// Run files: what loads, written and read again, is the same; what is refused is refused by name.
+#include "config/run_file.hpp"
+
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "fuzz.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+constexpr const char* name = "run.csv";
+
+void check_loaded(const RunFile& run) {
+  FUZZ_PROMISE(run.rows() > 0);
+  FUZZ_PROMISE(run.values.size() == run.columns.size());
+  for (const auto& column : run.values) {
+    FUZZ_PROMISE(column.size() == run.rows());
+    for (const double value : column) FUZZ_PROMISE(!std::isinf(value));
+  }
+  const auto& time_s = run.time_s();
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    FUZZ_PROMISE(std::isfinite(time_s[i]) && (i == 0 || time_s[i] > time_s[i - 1]));
+  }
+  FUZZ_PROMISE(run.selected_begin < run.selected_end && run.selected_end <= run.rows());
+}
+
+void check_written(const RunFile& run) {
+  const RunFile again = parse_run(write_run(run), name);
+  FUZZ_PROMISE(again.columns == run.columns && again.rows() == run.rows());
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    for (std::size_t row = 0; row < run.rows(); ++row) {
+      const double a = run.values[i][row];
+      const double b = again.values[i][row];
+      FUZZ_PROMISE(std::isnan(a)
+                       ? std::isnan(b)
+                       : std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b));
+    }
+  }
+}
+
+/// The first line is also an argument of a command line, `FILE@T0:T1`.
+RunSelection selection_from(std::string_view text) {
+  try {
+    const RunSelection selection = parse_selection(text.substr(0, text.find('\n')));
+    FUZZ_PROMISE(selection.from_s < selection.to_s && !selection.file.empty());
+    return selection;
+  } catch (const ConfigurationError& error) {
+    for (const Problem& problem : error.problems()) FUZZ_PROMISE(!problem.rule.empty());
+    return {};
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  const fuzz::NamedText files[] = {{name, text}};
+  bool loads = false;
+  try {
+    const RunFile run = parse_run(text, name);
+    loads = true;
+    check_loaded(run);
+    check_written(run);
+  } catch (const ConfigurationError& error) {
+    FUZZ_PROMISE(!loads);
+    FUZZ_PROMISE(error.problems().size() <= 300);  // the first 100, and the rest of that row
+    fuzz::check_problems(error.problems(), files);
+  }
+  if (!loads) return 0;
+  try {
+    check_loaded(parse_run(text, name, selection_from(text)));
+  } catch (const ConfigurationError& error) {
+    fuzz::check_problems(error.problems(), files);
+  }
+  return 0;
+}

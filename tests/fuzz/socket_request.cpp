@@ -1,0 +1,169 @@
+/// The status socket with the operators' methods behind it: whatever a client sends, in whatever
+/// pieces, every line that comes back is an answer of JSON-RPC, and the next client is served.
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include "daemon/operator_desk.hpp"
+#include "daemon/socket/status_server.hpp"
+#include "estimator/estimator.hpp"
+#include "fuzz.hpp"
+#include "recorded_history.hpp"
+
+using namespace thermocomp;
+using nlohmann::json;
+using std::chrono::milliseconds;
+
+namespace {
+
+constexpr std::uint8_t pause = 0xFF;  ///< is no part of UTF-8: here the client waits a round
+
+/// A daemon without threads: a report that stands still, commands that are checked and counted.
+class Desk {
+ public:
+  Desk()
+      : file_("status.sock"),
+        config_(with_socket(file_.path())),
+        estimator_(config_.estimator, config_.model),
+        report_(estimator_.make_report()),
+        server_(config_.socket) {
+    estimator_.report(report_);
+    add_operator_methods(
+        server_, {[this] { return view(); }, [this](const Command& asked) { take(asked); },
+                  [] {
+                    throw ConfigurationError({{"config.toml", 3, "format", "2", "must be 1"}});
+                  }});
+  }
+  StatusServer& server() { return server_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return file_.path(); }
+
+ private:
+  static DaemonConfig with_socket(const std::filesystem::path& path) {
+    DaemonConfig config = fuzz::small_config();
+    config.socket.path = path;
+    return config;
+  }
+  StatusView view() { return {config_, report_, controller_, timing_, {}, {}, {}, {}, 1.0, false}; }
+  void take(const Command& asked) {
+    FUZZ_PROMISE(asked.axis < config_.estimator.axes.size());
+    FUZZ_PROMISE(std::isfinite(asked.value_um));
+    estimator_.apply(asked);
+  }
+
+  fuzz::ScratchFile file_;
+  DaemonConfig config_;
+  Estimator estimator_;
+  Report report_;
+  ControllerState controller_;
+  CycleTiming timing_;
+  StatusServer server_;
+};
+
+class Client {
+ public:
+  explicit Client(const std::filesystem::path& path)
+      : fd_(socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.string().copy(address.sun_path, sizeof address.sun_path - 1);
+    FUZZ_PROMISE(connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+  }
+  ~Client() { close(fd_); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  void send(std::span<const std::uint8_t> bytes, Desk& desk) {
+    while (!bytes.empty()) {
+      const ssize_t count = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+      if (count < 0 && errno != EAGAIN) return;  // the daemon has cut us off
+      if (count > 0) bytes = bytes.subspan(static_cast<std::size_t>(count));
+      desk.server().handle(milliseconds(0));
+      receive();
+    }
+    desk.server().handle(milliseconds(0));
+    receive();
+  }
+  void end_input(Desk& desk) {
+    shutdown(fd_, SHUT_WR);
+    for (int i = 0; i < 4; ++i) desk.server().handle(milliseconds(0));
+    receive();
+  }
+  [[nodiscard]] const std::string& received() const { return received_; }
+
+ private:
+  void receive() {
+    char bytes[65536];
+    for (ssize_t count = 1; count > 0;) {
+      count = recv(fd_, bytes, sizeof bytes, 0);
+      if (count > 0) received_.append(bytes, static_cast<std::size_t>(count));
+    }
+  }
+
+  int fd_;
+  std::string received_;
+};
+
+void check_answer(const json& answer) {
+  FUZZ_PROMISE(answer.is_object() && answer.value("jsonrpc", "") == "2.0");
+  if (answer.contains("method")) {  // a notification of a subscription
+    FUZZ_PROMISE(answer.contains("params") && !answer.contains("id"));
+    return;
+  }
+  FUZZ_PROMISE(answer.contains("id"));
+  FUZZ_PROMISE(answer.contains("result") != answer.contains("error"));
+  if (!answer.contains("error")) return;
+  const json& error = answer["error"];
+  FUZZ_PROMISE(error.is_object() && error["code"].is_number_integer());
+  FUZZ_PROMISE(error["message"].is_string() && !error["message"].get<std::string>().empty());
+  // Nothing of a client's making is a fault inside the daemon.
+  FUZZ_PROMISE(error["code"] != rpc::internal_error);
+}
+
+void check_answers(const std::string& text) {
+  std::size_t begin = 0;
+  for (std::size_t end = 0; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
+    const json answer = json::parse(text.substr(begin, end - begin), nullptr, false);
+    FUZZ_PROMISE(!answer.is_discarded());
+    check_answer(answer);
+  }
+  FUZZ_PROMISE(begin == text.size());
+}
+
+void check_next_client(Desk& desk) {
+  Client client(desk.path());
+  desk.server().handle(milliseconds(0));
+  const std::string ask = "{\"jsonrpc\":\"2.0\",\"id\":7,\"method\":\"offsets\"}\n";
+  client.send({reinterpret_cast<const std::uint8_t*>(ask.data()), ask.size()}, desk);
+  FUZZ_PROMISE(client.received().find("\"result\"") != std::string::npos);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static Desk desk;
+  static unsigned inputs = 0;
+  std::span<const std::uint8_t> bytes(data, size);
+  {
+    Client client(desk.path());
+    desk.server().handle(milliseconds(0));
+    while (!bytes.empty()) {
+      const auto end = std::find(bytes.begin(), bytes.end(), pause);
+      const auto length = static_cast<std::size_t>(end - bytes.begin());
+      client.send(bytes.first(length), desk);
+      bytes = bytes.subspan(std::min(length + 1, bytes.size()));
+    }
+    client.end_input(desk);
+    check_answers(client.received());
+  }
+  for (int i = 0; i < 3; ++i) desk.server().handle(milliseconds(0));
+  FUZZ_PROMISE(desk.server().statistics().clients == 0);
+  if (++inputs % 16 == 0) check_next_client(desk);
+  return 0;
+}

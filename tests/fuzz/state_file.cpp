@@ -1,0 +1,48 @@
+/// The state file: whatever stands there, the daemon starts - with the file's content, or afresh
+/// and with a warning that says which file and why; and what was read is written unchanged.
+#include "daemon/state/state_file.hpp"
+
+#include <cmath>
+
+#include "fuzz.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+void check_numbers(const std::map<std::string, double>& values) {
+  for (const auto& [name, value] : values) FUZZ_PROMISE(std::isfinite(value));
+}
+
+bool same(const PersistentState& a, const PersistentState& b) {
+  return a.enabled == b.enabled && a.reference_degC == b.reference_degC &&
+         a.model_reference_degC == b.model_reference_degC &&
+         a.reference_signals == b.reference_signals && a.offset_um == b.offset_um;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const fuzz::ScratchFile file("state.json");
+  static const fuzz::ScratchFile copy("state.json");
+  file.write({data, size});
+  PersistentState fallback;
+  fallback.enabled = false;
+  fallback.offset_um["z"] = 12.5;
+  const LoadedState loaded = load_state_file(file.path(), fallback);
+  FUZZ_PROMISE(loaded.found == loaded.warning.empty());
+  if (!loaded.found) {
+    FUZZ_PROMISE(same(loaded.state, fallback));
+    FUZZ_PROMISE(loaded.warning.find(file.path().string()) != std::string::npos);
+    FUZZ_PROMISE(!std::filesystem::exists(file.path()));
+    return 0;
+  }
+  check_numbers(loaded.state.reference_degC);
+  check_numbers(loaded.state.model_reference_degC);
+  check_numbers(loaded.state.reference_signals);
+  check_numbers(loaded.state.offset_um);
+  FUZZ_PROMISE(save_state_file(copy.path(), loaded.state).empty());
+  const LoadedState again = load_state_file(copy.path(), fallback);
+  FUZZ_PROMISE(again.found && same(again.state, loaded.state));
+  return 0;
+}
