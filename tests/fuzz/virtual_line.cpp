@@ -64,7 +64,8 @@ bool VirtualLine::wait_readable(nanoseconds until) {
 ssize_t VirtualLine::read(void* to, std::size_t size) {
   arrive();
   const std::size_t count = std::min(size, arrived_.size() - taken_);
-  std::memcpy(to, arrived_.data() + taken_, count);
+  std::copy_n(arrived_.begin() + static_cast<std::ptrdiff_t>(taken_), count,
+              static_cast<std::uint8_t*>(to));
   taken_ += count;
   if (count > 0 || hung_up_ || size == 0) return static_cast<ssize_t>(count);
   errno = EAGAIN;
@@ -208,7 +209,7 @@ int ioctl(int fd, unsigned long request, ...) noexcept {
   void* argument = va_arg(arguments, void*);
   va_end(arguments);
   if (can == nullptr) return static_cast<int>(syscall(SYS_ioctl, fd, request, argument));
-  static_cast<ifreq*>(argument)->ifr_flags = IFF_UP;
+  static_cast<ifreq*>(argument)->ifr_flags = IFF_UP | IFF_RUNNING;
   return 0;
 }
 
