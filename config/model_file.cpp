@@ -102,15 +102,49 @@ GuidewaySpec read_guideway(const TomlTable& table, const std::string& name,
   return guideway;
 }
 
+void check_two_subjects(const TomlTable& table, TermSubject kind, const SubjectColumns& columns,
+                        const ThermalModel& model) {
+  const bool ordered = columns.first < columns.second;
+  if (kind == TermSubject::two_model_temperatures &&
+      !(ordered && contains(model.inputs, columns.first) &&
+        contains(model.inputs, columns.second))) {
+    table.problem("subject", "must be two of the inputs in lexical order, as \"a_degC|b_degC\": " +
+                                 listed(model.inputs));
+  }
+  const auto position = [](const std::string& name) {
+    return is_column_name(name) && kind_of(name) == QuantityKind::position;
+  };
+  const auto temperature = [](const std::string& name) {
+    return is_column_name(name) && is_temperature(name);
+  };
+  if (kind == TermSubject::temperature_and_position &&
+      !(ordered && ((position(columns.first) && temperature(columns.second)) ||
+                    (temperature(columns.first) && position(columns.second))))) {
+    table.problem("subject",
+                  "must be a temperature and a position in lexical order, as \"a_degC|x_mm\"");
+  }
+}
+
 void check_subject(const TomlTable& table, const TermKind& kind, const std::string& subject,
                    const ThermalModel& model) {
   if (subject.empty()) return;  // a problem already
+  if (kind.subject == TermSubject::two_model_temperatures ||
+      kind.subject == TermSubject::temperature_and_position) {
+    check_two_subjects(table, kind.subject, subject_columns(subject), model);
+    return;
+  }
   const bool is_input = contains(model.inputs, subject);
   if (kind.subject == TermSubject::model_temperature && !is_input) {
     table.problem("subject", "must be one of the inputs: " + listed(model.inputs));
   }
+  if (kind.subject == TermSubject::output && !contains(model.outputs, subject)) {
+    table.problem("subject", "must be one of the outputs: " + listed(model.outputs));
+  }
   if (kind.subject == TermSubject::other_temperature && (is_input || !is_temperature(subject))) {
     table.problem("subject", "must be a temperature (*_degC, *_K) that is not among the inputs");
+  }
+  if (kind.subject == TermSubject::any_temperature && !is_temperature(subject)) {
+    table.problem("subject", "must be a temperature (*_degC, *_K)");
   }
   if (kind.subject == TermSubject::signal && (is_input || !is_operating(subject))) {
     table.problem("subject", "must be an operating signal or a position, not a temperature");
@@ -147,10 +181,12 @@ TermSpec read_term(const TomlTable& table, const ThermalModel& model) {
   TermSpec term;
   term.kind = table.text("kind");
   term.subject = table.text("subject");
-  const TermKind* kind = find_term_kind(term.kind);
+  const TermKind* kind = find_term_kind(term.kind, term.subject);
   if (kind == nullptr) {
     std::vector<std::string> names;
-    for (const TermKind& known : term_kinds()) names.push_back(known.name);
+    for (const TermKind& known : term_kinds()) {
+      if (!contains(names, known.name)) names.push_back(known.name);
+    }
     if (!term.kind.empty()) table.problem("kind", "must be one of: " + listed(names));
     table.ignore_rest();
     return term;

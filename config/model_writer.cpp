@@ -57,7 +57,7 @@ std::string rows(const std::vector<std::vector<double>>& values) {
 }
 
 std::string shared_value(const TermSpec& term, const std::string& name, double value) {
-  const TermKind* kind = find_term_kind(term.kind);
+  const TermKind* kind = find_term_kind(term.kind, term.subject);
   THERMOCOMP_ENSURE(kind != nullptr);
   for (const TermParameter& parameter : kind->parameters) {
     if (parameter.name == name && parameter.whole_number) {

@@ -123,11 +123,14 @@ void DisplacementModel::step(nanoseconds now, std::span<const double> temps_degC
   THERMOCOMP_ENSURE(signals.size() == parts.signals && displacement_um.size() == parts.outputs);
   for (std::size_t i = 0; i < parts.columns; ++i)
     parts.rise_K[static_cast<Eigen::Index>(i)] = temps_degC[i] - reference_degC[i];
+  const std::span<double> rise_K(parts.rise_K.data(), parts.columns);
+  for (auto& term : parts.terms) term->correct_rise(now, rise_K);
   Eigen::Map<Vector> out(displacement_um.data(), static_cast<Eigen::Index>(parts.outputs));
   out.noalias() = parts.matrix_um_per_K * parts.rise_K.head(parts.inputs);
   parts.add_guideways(signals, displacement_um);
-  const TermInput input{now, {parts.rise_K.data(), parts.columns}, signals};
+  const TermInput input{now, rise_K, signals};
   for (auto& term : parts.terms) term->add(input, displacement_um);
+  for (auto& term : parts.terms) term->correct_displacement(displacement_um);
 }
 
 void DisplacementModel::visit_state(StateArchive& archive) {

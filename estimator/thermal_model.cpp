@@ -9,24 +9,42 @@ void add_once(std::vector<std::string>& names, const std::string& name) {
   if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
 }
 
+/// Adds those of the term's columns that are temperatures (or those that are none).
+void add_columns(std::vector<std::string>& names, const TermSpec& term, bool temperatures) {
+  const TermKind* kind = find_term_kind(term.kind, term.subject);
+  if (kind == nullptr || kind->subject == TermSubject::output) return;
+  const SubjectColumns columns = subject_columns(term.subject);
+  for (const std::string& column : {columns.first, columns.second}) {
+    if (column.empty()) continue;
+    const bool is_temperature = kind->subject == TermSubject::temperature_and_position
+                                    ? is_temperature_name(column)
+                                    : kind->subject != TermSubject::signal;
+    if (is_temperature == temperatures) add_once(names, column);
+  }
+}
+
 }  // namespace
+
+SubjectColumns subject_columns(std::string_view subject) {
+  const auto bar = subject.find('|');
+  if (bar == std::string_view::npos) return {std::string(subject), ""};
+  return {std::string(subject.substr(0, bar)), std::string(subject.substr(bar + 1))};
+}
+
+bool is_temperature_name(std::string_view column) noexcept {
+  return column.ends_with("_degC") || column.ends_with("_K");
+}
 
 std::vector<std::string> ThermalModel::temperature_columns() const {
   std::vector<std::string> columns = inputs;
-  for (const TermSpec& term : terms) {
-    const TermKind* kind = find_term_kind(term.kind);
-    if (kind != nullptr && kind->subject != TermSubject::signal) add_once(columns, term.subject);
-  }
+  for (const TermSpec& term : terms) add_columns(columns, term, true);
   return columns;
 }
 
 std::vector<std::string> ThermalModel::signal_columns() const {
   std::vector<std::string> columns;
   for (const GuidewaySpec& guideway : guideways) add_once(columns, guideway.axis);
-  for (const TermSpec& term : terms) {
-    const TermKind* kind = find_term_kind(term.kind);
-    if (kind != nullptr && kind->subject == TermSubject::signal) add_once(columns, term.subject);
-  }
+  for (const TermSpec& term : terms) add_columns(columns, term, false);
   return columns;
 }
 

@@ -13,7 +13,7 @@ namespace thermocomp {
 /// One `[[term]]` of the model file: an extension of the static matrix by a named cause.
 struct TermSpec {
   std::string kind;                      ///< a registered cause, see term_kinds()
-  std::string subject;                   ///< full column name (temperature or operating signal)
+  std::string subject;                   ///< full column name, or two of them: "a|b", a < b
   std::map<std::string, double> shared;  ///< e.g. tau_s
   std::map<std::string, std::map<std::string, double>>
       per_output;  ///< e.g. gain_um_per_K -> output
@@ -56,16 +56,35 @@ struct TermParameter {
   double max{0.0};
   bool whole_number{false};
 };
-enum class TermSubject { model_temperature, other_temperature, signal };
+enum class TermSubject {
+  model_temperature,         ///< an input of the model
+  other_temperature,         ///< a temperature that is no input
+  any_temperature,           ///< either of the two
+  signal,                    ///< an operating signal or a position
+  output,                    ///< an output of the model
+  two_model_temperatures,    ///< "a|b", both inputs
+  temperature_and_position,  ///< "a|b", any temperature and a position, in lexical order
+};
 struct TermKind {
   std::string name;
   TermSubject subject;
   std::vector<TermParameter> parameters;
 };
 
-/// Every kind of term that the daemon evaluates. Names and parameters: CAUSES, fixed.
+/// The columns that a subject names: one, or two with `|` between.
+struct SubjectColumns {
+  std::string first;
+  std::string second;  ///< empty: there is one column
+};
+[[nodiscard]] SubjectColumns subject_columns(std::string_view subject);
+/// Whether a column is called as a temperature is (*_degC, *_K).
+[[nodiscard]] bool is_temperature_name(std::string_view column) noexcept;
+
+/// Every kind of term that the daemon evaluates. Names and parameters: CAUSES, fixed. A name can be
+/// there twice: for outputs and for temperatures.
 [[nodiscard]] const std::vector<TermKind>& term_kinds();
-/// @return the kind called `name`, or nullptr
-[[nodiscard]] const TermKind* find_term_kind(std::string_view name);
+/// @return the kind called `name` that takes such a subject, any kind of that name where none does,
+///         nullptr where there is no such name
+[[nodiscard]] const TermKind* find_term_kind(std::string_view name, std::string_view subject);
 
 }  // namespace thermocomp

@@ -19,14 +19,21 @@ struct TermInput {
   std::span<const double> signals;  ///< signal_columns()
 };
 
+/// A step runs through three stages, each over all terms in the order of the model file. A term
+/// overrides the one in which it acts. No allocation, no exception.
 class Term {
  public:
   Term() = default;
   Term(const Term&) = delete;
   Term& operator=(const Term&) = delete;
   virtual ~Term() = default;
-  /// Adds the term's displacement. No allocation, no exception.
-  virtual void add(const TermInput& input, std::span<double> displacement_um) noexcept = 0;
+  /// What a reading should have been; matrix, guideways and the later stages see the corrected
+  /// rise.
+  virtual void correct_rise(nanoseconds /*now*/, std::span<double> /*rise_K*/) noexcept {}
+  /// Adds the term's displacement to that of matrix and guideways.
+  virtual void add(const TermInput& /*input*/, std::span<double> /*displacement_um*/) noexcept {}
+  /// What the structure makes of the displacement.
+  virtual void correct_displacement(std::span<double> /*displacement_um*/) noexcept {}
   /// Forgets the past: lags start at their input's present value.
   virtual void restart() noexcept = 0;
   virtual void visit_state(StateArchive& archive) = 0;
@@ -35,7 +42,9 @@ class Term {
 /// What a term is made from: its specification with names resolved to indices.
 struct TermContext {
   const TermSpec& spec;
-  std::size_t subject;  ///< index among temperature_columns() or signal_columns()
+  /// Index among temperature_columns(), signal_columns() or outputs; of two columns the first.
+  std::size_t subject;
+  std::size_t second;  ///< of two columns the second; else 0
   /// Values of a per-output parameter in the order of the model's outputs, 0 where not given.
   std::function<std::vector<double>(std::string_view name)> per_output;
   std::function<double(std::string_view name)> shared;
@@ -62,5 +71,12 @@ TermRegistration thermal_lag_registration();
 TermRegistration missing_heat_source_registration();
 TermRegistration missing_temperature_registration();
 TermRegistration speed_growth_registration();
+TermRegistration slow_sensor_registration();
+TermRegistration wrong_coefficient_registration();
+TermRegistration nonlinear_expansion_registration();
+TermRegistration position_dependence_registration();
+TermRegistration output_hysteresis_registration();
+TermRegistration temperature_hysteresis_registration();
+TermRegistration sensor_swap_registration();
 
 }  // namespace thermocomp

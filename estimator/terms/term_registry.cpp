@@ -7,24 +7,55 @@
 namespace thermocomp {
 namespace {
 
-std::size_t subject_index(const TermSpec& spec, const TermKind& kind, const ThermalModel& model) {
-  if (kind.subject == TermSubject::signal)
-    return index_of(model.signal_columns(), spec.subject, "term.subject",
-                    "must be an operating signal");
-  if (kind.subject == TermSubject::model_temperature)
-    return index_of(model.inputs, spec.subject, "term.subject", "must be an input of the model");
-  return index_of(model.temperature_columns(), spec.subject, "term.subject",
-                  "must be a temperature");
+constexpr const char* subject_key = "term.subject";
+
+struct SubjectIndices {
+  std::size_t first{0};
+  std::size_t second{0};
+};
+
+/// @throws InvalidValue when the model has no such subject
+SubjectIndices subject_indices(const TermSpec& spec, TermSubject subject,
+                               const ThermalModel& model) {
+  const auto temperatures = model.temperature_columns();
+  const auto signals = model.signal_columns();
+  const SubjectColumns columns = subject_columns(spec.subject);
+  switch (subject) {
+    case TermSubject::signal:
+      return {index_of(signals, columns.first, subject_key, "must be an operating signal")};
+    case TermSubject::model_temperature:
+      return {index_of(model.inputs, columns.first, subject_key, "must be an input of the model")};
+    case TermSubject::output:
+      return {
+          index_of(model.outputs, columns.first, subject_key, "must be an output of the model")};
+    case TermSubject::two_model_temperatures:
+      return {
+          index_of(model.inputs, columns.first, subject_key, "must be two inputs of the model"),
+          index_of(model.inputs, columns.second, subject_key, "must be two inputs of the model")};
+    case TermSubject::temperature_and_position: {
+      const bool position_first = !is_temperature_name(columns.first);
+      const std::string& place = position_first ? columns.second : columns.first;
+      const std::string& position = position_first ? columns.first : columns.second;
+      return {index_of(temperatures, place, subject_key, "must be a temperature and a position"),
+              index_of(signals, position, subject_key, "must be a temperature and a position")};
+    }
+    case TermSubject::other_temperature:
+    case TermSubject::any_temperature:
+      break;
+  }
+  return {index_of(temperatures, columns.first, subject_key, "must be a temperature")};
 }
 
 }  // namespace
 
 const std::vector<TermRegistration>& term_registrations() {
   static const std::vector<TermRegistration> registrations = {
-      thermal_lag_registration(),
-      missing_heat_source_registration(),
-      missing_temperature_registration(),
-      speed_growth_registration(),
+      thermal_lag_registration(),         missing_heat_source_registration(),
+      missing_temperature_registration(), speed_growth_registration(),
+      slow_sensor_registration(),         wrong_coefficient_registration(),
+      nonlinear_expansion_registration(), position_dependence_registration(),
+      output_hysteresis_registration(),   temperature_hysteresis_registration(),
+      sensor_swap_registration(),
   };
   return registrations;
 }
@@ -39,18 +70,21 @@ const std::vector<TermKind>& term_kinds() {
   return kinds;
 }
 
-const TermKind* find_term_kind(std::string_view name) {
-  const auto& kinds = term_kinds();
-  const auto found = std::find_if(kinds.begin(), kinds.end(),
-                                  [&](const TermKind& kind) { return kind.name == name; });
-  return found == kinds.end() ? nullptr : &*found;
+const TermKind* find_term_kind(std::string_view name, std::string_view subject) {
+  const TermKind* best = nullptr;
+  for (const TermKind& kind : term_kinds()) {
+    if (kind.name != name) continue;
+    const bool fits = (kind.subject == TermSubject::output) != is_temperature_name(subject);
+    if (best == nullptr || fits) best = &kind;
+  }
+  return best;
 }
 
 std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model) {
-  const auto& all = term_registrations();
-  const auto found = std::find_if(all.begin(), all.end(),
-                                  [&](const auto& each) { return each.kind.name == spec.kind; });
-  if (found == all.end()) throw InvalidValue("term.kind", spec.kind, "is not a known kind of term");
+  const TermKind* kind = find_term_kind(spec.kind, spec.subject);
+  if (kind == nullptr) throw InvalidValue("term.kind", spec.kind, "is not a known kind of term");
+  const TermRegistration& registration =
+      term_registrations()[static_cast<std::size_t>(kind - term_kinds().data())];
   const auto shared = [&spec](std::string_view name) {
     const auto value = spec.shared.find(std::string(name));
     if (value == spec.shared.end())
@@ -70,7 +104,8 @@ std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model)
     }
     return values;
   };
-  return found->make({spec, subject_index(spec, found->kind, model), per_output, shared});
+  const SubjectIndices subject = subject_indices(spec, kind->subject, model);
+  return registration.make({spec, subject.first, subject.second, per_output, shared});
 }
 
 }  // namespace thermocomp

@@ -41,6 +41,36 @@ gain_um_per_K = { z_um = 0.1, c_urad = 0.2 }
 matrix_K2 = [[4.0, 1.0], [1.0, 9.0]]
 )";
 
+const std::string with_more_terms = good + R"([[term]]
+kind = "slow_sensor"
+subject = "b_degC"
+tau_s = 60.0
+[[term]]
+kind = "sensor_swap"
+subject = "a_degC|b_degC"
+[[term]]
+kind = "position_dependence"
+subject = "oil_degC|x_mm"
+p0_mm = 50.0
+gain_um_per_K_mm = { z_um = 0.01 }
+[[term]]
+kind = "hysteresis"
+subject = "c_urad"
+width_um = 2.0
+[[term]]
+kind = "hysteresis"
+subject = "a_degC"
+width_K = 0.5
+[[term]]
+kind = "nonlinear_expansion"
+subject = "oil_degC"
+gain_um_per_K2 = { z_um = 0.1 }
+[[term]]
+kind = "wrong_coefficient"
+subject = "b_degC"
+delta_um_per_K = { c_urad = 0.4 }
+)";
+
 // NOLINTNEXTLINE(readability-function-size): a table
 const std::vector<Broken>& broken_models() {
   static const std::vector<Broken> table = {
@@ -123,6 +153,34 @@ const std::vector<Broken>& broken_models() {
   return table;
 }
 
+const std::vector<Broken>& broken_terms() {
+  static const std::vector<Broken> table = {
+      {"swap of one channel", "subject = \"a_degC|b_degC\"", "subject = \"a_degC\" # one", "",
+       "term[5].subject", "two of the inputs"},
+      {"swap in the wrong order", "\"a_degC|b_degC\"", "\"b_degC|a_degC\"", "", "term[5].subject",
+       "lexical order"},
+      {"swap with itself", "\"a_degC|b_degC\"", "\"a_degC|a_degC\"", "", "term[5].subject",
+       "two of the inputs"},
+      {"position with a signal", "\"oil_degC|x_mm\"", "\"oil_degC|x_rpm\"", "", "term[6].subject",
+       "a temperature and a position"},
+      {"position of nothing", "\"oil_degC|x_mm\"", "\"oil_degC|\"", "", "term[6].subject",
+       "a temperature and a position"},
+      {"position of three", "\"oil_degC|x_mm\"", "\"oil_degC|x_mm|y_mm\"", "", "term[6].subject",
+       "a temperature and a position"},
+      {"play of an unknown output", "subject = \"c_urad\"", "subject = \"d_urad\"", "",
+       "term[7].subject", "one of the outputs"},
+      {"play of an output in K too", "width_um = 2.0", "width_um = 2.0\nwidth_K = 2.0",
+       "width_K = 2.0", "term[7].width_K", "unknown key"},
+      {"play of a temperature in um too", "width_K = 0.5", "width_K = 0.5\nwidth_um = 0.5",
+       "width_um = 0.5", "term[8].width_um", "unknown key"},
+      {"play of a negative width", "width_K = 0.5", "width_K = -0.5", "", "term[8].width_K", "[0"},
+      {"square of a signal", "subject = \"oil_degC\"\ngain_um_per_K2",
+       "subject = \"oil_rpm\"\ngain_um_per_K2", "subject = \"oil_rpm\"", "term[9].subject",
+       "must be a temperature"},
+  };
+  return table;
+}
+
 std::filesystem::path spindle_data() {
   const char* given = std::getenv("THERMOCOMP_DATA");
   const std::filesystem::path data =
@@ -137,6 +195,13 @@ TEST_CASE("each broken model is refused with file, line, key, value and rule", "
   CHECK(broken_models().size() >= 30);
   for (const Broken& broken : broken_models()) {
     check_refused(broken, good, "model.toml",
+                  [](const std::string& text) { return parse_model(text, "model.toml"); });
+  }
+}
+
+TEST_CASE("each broken term is refused with file, line, key, value and rule", "[config][model]") {
+  for (const Broken& broken : broken_terms()) {
+    check_refused(broken, with_more_terms, "model.toml",
                   [](const std::string& text) { return parse_model(text, "model.toml"); });
   }
 }
@@ -164,7 +229,8 @@ TEST_CASE("a model is what its file says", "[config][model]") {
 }
 
 TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
-  ThermalModel model = parse_model(good, "model.toml");
+  ThermalModel model = parse_model(with_more_terms, "model.toml");
+  REQUIRE(model.terms.size() == 10);
   model.matrix_um_per_K = {{1.0 / 3.0, -0.0}, {5e-324, 1.7976931348623157e308}};
   model.reference_degC = {20.000000000000004, 1e-5};
   model.guideways[0].name = "slide \"one\"";
@@ -175,6 +241,11 @@ TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
   CHECK(back.guideways[0].name == model.guideways[0].name);
   CHECK(back.terms[1].shared == model.terms[1].shared);
   CHECK(back.terms[2].per_output == model.terms[2].per_output);
+  for (std::size_t i = 0; i < model.terms.size(); ++i) {
+    CHECK(back.terms[i].kind == model.terms[i].kind);
+    CHECK(back.terms[i].subject == model.terms[i].subject);
+    CHECK(back.terms[i].shared == model.terms[i].shared);
+  }
   CHECK(back.covariance_K2 == model.covariance_K2);
   CHECK(write_model(back) == write_model(model));
 }
