@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -101,12 +102,61 @@ std::string inputs_lines(const json& status) {
   for (const json& input : list_of(status, "inputs")) {
     const double temp_degC = number_of(input, "temp_degC");
     const double reference_degC = number_of(input, "reference_degC");
+    const std::string lost = flag_of(input, "estimated")
+                                 ? "  [estimated, +-" + fixed(number_of(input, "sd_K"), 2) + " K]"
+                                 : "  [lost]";
     result += line(text_of(input, "name"), fixed(temp_degC, 2, 8) + " degC, reference " +
                                                fixed(reference_degC, 2, 8) + " degC, rise " +
                                                fixed_signed(temp_degC - reference_degC, 2, 7) +
-                                               " K" + (flag_of(input, "good") ? "" : "  [lost]"));
+                                               " K" + (flag_of(input, "good") ? "" : lost));
   }
   return result;
+}
+
+// What a CAN interface says of itself, where that is trouble; `what` is a bus or the controller.
+std::string can_trouble(const json& what) {
+  const std::string state = text_of(what, "state");
+  const std::string since = " for " + duration_text(number_of(what, "state_s"));
+  if (state == "bus_off") return "bus-off" + since;
+  if (state == "passive") return "error passive" + since;
+  if (state == "warning") return "error warning" + since;
+  return {};
+}
+
+constexpr std::string_view bus_off_remedy =
+    "cable, termination, bit rate; then ip link set IF type can restart, or let restart-ms do it";
+constexpr std::string_view can_remedy = "cable, termination, bit rate";
+
+using AddTrouble = std::function<void(const std::string& what, std::string_view remedy)>;
+
+void add_can_trouble(const std::string& name, const json& what, const AddTrouble& add) {
+  const std::string trouble = can_trouble(what);
+  if (trouble.empty()) return;
+  add(name + ": " + trouble, text_of(what, "state") == "bus_off" ? bus_off_remedy : can_remedy);
+}
+
+// "block head is estimated from 5 others, +-0.40 K (1 sd)", one line a block, then the offsets.
+std::vector<std::string> estimate_lines(const json& answer) {
+  std::vector<std::string> lines;
+  std::vector<std::string> offsets;
+  const json& inputs = list_of(answer, "inputs");
+  const auto measured = std::count_if(inputs.begin(), inputs.end(),
+                                      [](const json& input) { return flag_of(input, "good"); });
+  for (const json& input : inputs) {
+    if (!flag_of(input, "estimated")) continue;
+    lines.push_back("block " + text_of(input, "block") + " is estimated from " +
+                    std::to_string(measured) + (measured == 1 ? " other" : " others") + ", +-" +
+                    fixed(number_of(input, "sd_K"), 2) + " K (1 sd)");
+  }
+  if (lines.empty()) return lines;
+  for (const json& axis : list_of(answer, "axes")) {
+    const double sd = number_of(axis, "offset_sd");
+    const double sd_max = number_of(axis, "offset_sd_max");
+    offsets.push_back(text_of(axis, "name") + " +-" + fixed(sd, 2) + " " + text_of(axis, "unit") +
+                      (sd > sd_max ? " (too uncertain: at most " + fixed(sd_max, 2) + ")" : ""));
+  }
+  lines.push_back("offsets that makes uncertain by (1 sd): " + joined(offsets));
+  return lines;
 }
 
 // Everything that is wrong, worst first: each line says what it is and what to do.
@@ -122,6 +172,7 @@ std::string trouble_lines(const json& status, bool colours) {
     const ReasonText text = reason_text(name);
     add(std::string(text.meaning), text.remedy);
   }
+  for (const std::string& estimate : estimate_lines(status)) add(estimate, "");
   std::vector<std::string> bad;
   for (const json& sensor : list_of(status, "sensors_bad")) {
     if (sensor.is_string()) bad.push_back(sensor.get<std::string>());
@@ -134,11 +185,14 @@ std::string trouble_lines(const json& status, bool colours) {
               text_of(unit, "last_error") + ")",
           "");
     }
-    if (!flag_of(bus, "connected")) {
+    add_can_trouble("bus " + text_of(bus, "name"), bus, add);
+    if (!flag_of(bus, "connected") && text_of(bus, "state") != "bus_off") {
       add("bus " + text_of(bus, "name") + " is not connected (" + text_of(bus, "last_error") + ")",
           "");
     }
   }
+  const json& controller = object_of(status, "controller");
+  add_can_trouble("controller " + text_of(controller, "name"), controller, add);
   for (const json& warning : list_of(status, "warnings")) {
     if (warning.is_string()) add(warning.get<std::string>(), "");
   }
@@ -257,6 +311,8 @@ std::string sensors_text(const json& sensors, bool colours) {
         "  " + fixed(number_of(sensor, "clipped_in_a_row"), 0, 8) + "  " +
         fixed(number_of(sensor, "rejected"), 0, 8) + "  " + state + "\n";
   }
+  for (const std::string& estimate : estimate_lines(sensors))
+    result += coloured(estimate, Colour::yellow, colours) + "\n";
   return result;
 }
 

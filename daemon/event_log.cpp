@@ -1,5 +1,7 @@
 #include "daemon/event_log.hpp"
 
+#include <algorithm>
+
 #include <spdlog/spdlog.h>
 
 namespace thermocomp {
@@ -20,6 +22,32 @@ std::string reason_names(std::uint32_t reasons) {
 }
 
 }  // namespace
+
+void EventLog::note_estimates(const Report& report, const EstimatorConfig& config,
+                              const std::vector<std::string>& columns) {
+  estimated_.resize(report.inputs.size(), false);
+  for (std::size_t i = 0; i < report.inputs.size(); ++i) {
+    const InputReport& input = report.inputs[i];
+    if (input.estimated == estimated_[i]) continue;
+    estimated_[i] = input.estimated;
+    if (input.estimated)
+      spdlog::warn("input {}: lost, estimated from the others", columns[i]);
+    else if (input.good)
+      spdlog::info("input {}: measured again", columns[i]);
+    else
+      spdlog::warn("input {}: lost, and no longer to be estimated", columns[i]);
+  }
+  const bool any = std::find(estimated_.begin(), estimated_.end(), true) != estimated_.end();
+  const bool uncertain = any && has_reason(report.reasons, Reason::block_lost);
+  if (uncertain && !uncertain_)
+    for (std::size_t i = 0; i < report.axes.size(); ++i)
+      if (report.axes[i].offset_sd_um > config.compensation.offset_sd_um_max)
+        spdlog::warn("axis {}: the estimate is too uncertain, {:.2f} um where {:.2f} um is allowed",
+                     config.axes[i].name, report.axes[i].offset_sd_um,
+                     config.compensation.offset_sd_um_max);
+  if (!uncertain && uncertain_ && any) spdlog::info("the estimate is certain enough again");
+  uncertain_ = uncertain;
+}
 
 void EventLog::note_report(const Report& report, const EstimatorConfig& config) {
   // "cutting" comes and goes with every part; it is in the status, not in the log.
@@ -61,8 +89,21 @@ void EventLog::note_link(const std::string& what, bool connected, const std::str
     spdlog::warn("{}: {}", what, error.empty() ? "not connected" : error);
 }
 
+// A bus that is not connected has said so already.
+void EventLog::note_state(const std::string& what, bool connected, const std::string& state) {
+  if (state.empty() || !connected) return;
+  std::string& known = states_.try_emplace(what, "active").first->second;
+  if (known == state) return;
+  known = state;
+  if (state == "active")
+    spdlog::info("{}: without errors again", what);
+  else
+    spdlog::warn("{}: error state {}", what, state);
+}
+
 void EventLog::note_bus(const BusHealth& bus) {
   note_link("bus " + bus.name, bus.connected, bus.last_error);
+  note_state("bus " + bus.name, bus.connected, bus.state);
   if (!bus.connected) return;
   for (const UnitHealth& unit : bus.units)
     if (unit.answering || !unit.last_error.empty())
@@ -71,6 +112,7 @@ void EventLog::note_bus(const BusHealth& bus) {
 
 void EventLog::note_controller(const ControllerHealth& controller) {
   note_link("controller " + controller.name, controller.connected, controller.last_error);
+  note_state("controller " + controller.name, controller.connected, controller.state);
 }
 
 void EventLog::note_missed(std::uint64_t missed) {

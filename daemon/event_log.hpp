@@ -16,19 +16,26 @@ namespace thermocomp {
 class EventLog {
  public:
   void note_report(const Report& report, const EstimatorConfig& config);
+  /// @param columns  names of the report's inputs
+  void note_estimates(const Report& report, const EstimatorConfig& config,
+                      const std::vector<std::string>& columns);
   void note_bus(const BusHealth& bus);
   void note_controller(const ControllerHealth& controller);
   void note_missed(std::uint64_t missed);
 
  private:
   void note_link(const std::string& what, bool connected, const std::string& error);
+  void note_state(const std::string& what, bool connected, const std::string& state);
 
   bool first_{true};
   Mode mode_{Mode::starting};
   std::uint32_t reasons_{0};
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;
+  std::vector<bool> estimated_;
+  bool uncertain_{false};
   std::map<std::string, bool> connected_;
+  std::map<std::string, std::string> states_;  ///< of CAN interfaces
   std::uint64_t missed_{0};
 };
 

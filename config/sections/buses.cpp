@@ -82,7 +82,8 @@ class BusReader {
     CanBusConfig bus;
     bus.name = name;
     bus.interface = read_interface(table);
-    bus.reconnect_s = table.number("reconnect_s", Range::between(0.01, 3600), bus.reconnect_s);
+    // Looking for an interface costs nothing, and a bus that is back shall be read within 2 s.
+    bus.reconnect_s = table.number("reconnect_s", Range::between(0.01, 1), bus.reconnect_s);
     refuse_all(table,
                {"host", "port", "device", "baud", "parity", "data_bits", "stop_bits", "rs485",
                 "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},

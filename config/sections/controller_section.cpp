@@ -204,7 +204,7 @@ class ControllerReader {
     config.silent_after_s =
         table_.number("silent_after_s", Range::between(0.01, 3600), config.silent_after_s);
     config.reconnect_s =
-        table_.number("reconnect_s", Range::between(0.01, 3600), config.reconnect_s);
+        table_.number("reconnect_s", Range::between(0.01, 1), config.reconnect_s);
     refuse_all(table_,
                {"host", "port", "unit", "device", "baud", "parity", "data_bits", "stop_bits",
                 "rs485", "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},

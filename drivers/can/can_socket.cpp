@@ -82,6 +82,22 @@ struct CanSocket::Buffers {
   }
 };
 
+std::string_view to_string(CanState state) noexcept {
+  switch (state) {
+    case CanState::down:
+      return "down";
+    case CanState::active:
+      return "active";
+    case CanState::warning:
+      return "warning";
+    case CanState::passive:
+      return "passive";
+    case CanState::bus_off:
+      return "bus_off";
+  }
+  return "unknown";
+}
+
 std::string can_unavailable() {
   const int probe = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
   if (probe < 0) return said(errno);
@@ -98,6 +114,7 @@ nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now
 CanSocket::CanSocket(std::string interface, std::vector<CanId> wanted)
     : interface_(std::move(interface)),
       wanted_(std::move(wanted)),
+      state_since_(monotonic_now()),
       buffers_(std::make_unique<Buffers>()) {
   if (interface_.empty() || interface_.size() >= IFNAMSIZ) {
     throw InvalidValue("interface", interface_, "must be the name of a network interface");
@@ -114,18 +131,59 @@ CanSocket::~CanSocket() {
 }
 
 void CanSocket::fail(const char* what, int code) {
-  error_ = interface_ + ": " + what + ": " + said(code);
   close();
+  error_ = interface_ + ": " + what + ": " + said(code);
 }
 
 void CanSocket::close() noexcept {
   if (socket_ >= 0) ::close(socket_);
   socket_ = -1;
+  without_carrier_ = false;
+  send_failed_ = false;
+  if (state_ != CanState::down) state_since_ = monotonic_now();
+  state_ = CanState::down;
+}
+
+void CanSocket::enter(CanState state) {
+  if (state == state_) return;
+  state_since_ = monotonic_now();
+  state_ = state;
+  send_failed_ = false;
+  tell_state();
+}
+
+/// Makes error() say what the bus suffers from.
+void CanSocket::tell_state() {
+  switch (state_) {
+    case CanState::bus_off:
+      error_ = interface_ + ": bus-off";
+      break;
+    case CanState::passive:
+      error_ = interface_ + ": error passive";
+      break;
+    case CanState::warning:
+      error_ = interface_ + ": error warning";
+      break;
+    case CanState::active:
+      error_.clear();
+      break;
+    case CanState::down:
+      break;  // the error says why
+  }
+}
+
+void CanSocket::look_for_carrier() {
+  ifreq request{};
+  interface_.copy(std::begin(request.ifr_name), IFNAMSIZ - 1);
+  if (::ioctl(socket_, SIOCGIFFLAGS, &request) < 0) return;  // receiving tells what is wrong
+  const bool none = (request.ifr_flags & IFF_RUNNING) == 0;
+  if (none == without_carrier_) return;
+  without_carrier_ = none;
+  enter(none ? CanState::bus_off : CanState::active);
 }
 
 bool CanSocket::open() {
   close();
-  bus_off_ = false;
   dropped_by_socket_ = 0;
   socket_ = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
   if (socket_ < 0) {
@@ -133,7 +191,8 @@ bool CanSocket::open() {
     return false;
   }
   if (!configure()) return false;
-  error_.clear();
+  enter(CanState::active);
+  look_for_carrier();
   return true;
 }
 
@@ -174,6 +233,7 @@ bool CanSocket::configure() {
 std::span<const CanFrame> CanSocket::receive() {
   received_.clear();
   if (!is_open()) return {};
+  if (without_carrier_) look_for_carrier();
   buffers_->prepare();
   const int count =
       ::recvmmsg(socket_, buffers_->messages.data(), batch_max, MSG_DONTWAIT, nullptr);
@@ -193,8 +253,10 @@ std::span<const CanFrame> CanSocket::receive() {
       note_error_frame(raw.can_id & CAN_ERR_MASK, frame.payload());
       continue;
     }
-    if (bus_off_) error_.clear();
-    bus_off_ = false;
+    if (bus_off()) {
+      without_carrier_ = false;
+      enter(CanState::active);
+    }
     received_.push_back(frame);
   }
   return received_;
@@ -222,23 +284,30 @@ void CanSocket::note_error_frame(std::uint32_t error_class, std::span<const std:
   ++errors_.error_frames;
   if ((error_class & CAN_ERR_BUSOFF) != 0) {
     ++errors_.bus_off;
-    bus_off_ = true;
-    error_ = interface_ + ": bus-off";
+    enter(CanState::bus_off);
   }
   if ((error_class & CAN_ERR_RESTARTED) != 0) {
     ++errors_.restarted;
-    bus_off_ = false;
-    error_.clear();
+    without_carrier_ = false;
+    enter(CanState::active);
   }
-  if ((error_class & CAN_ERR_CRTL) == 0 || data.size() < 2) return;
-  if ((data[1] & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
-    ++errors_.error_passive;
-    if (!bus_off_) error_ = interface_ + ": error passive";
+  if ((error_class & CAN_ERR_CRTL) != 0 && data.size() >= 2) note_error_state(data[1]);
+}
+
+/// @param bits  receiving and transmitting have a counter each: the worse of both is the state
+void CanSocket::note_error_state(unsigned bits) {
+  const bool passive = (bits & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0;
+  const bool warning = (bits & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0;
+  if (passive) ++errors_.error_passive;
+  if (warning) ++errors_.error_warning;
+  if (bus_off()) return;
+  if (passive) {
+    enter(CanState::passive);
+  } else if (warning) {
+    enter(CanState::warning);
+  } else if ((bits & CAN_ERR_CRTL_ACTIVE) != 0) {
+    enter(CanState::active);
   }
-  if ((data[1] & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
-    ++errors_.error_warning;
-  }
-  if ((data[1] & CAN_ERR_CRTL_ACTIVE) != 0 && !bus_off_) error_.clear();
 }
 
 bool CanSocket::send(const CanFrame& frame) {
@@ -248,9 +317,16 @@ bool CanSocket::send(const CanFrame& frame) {
   raw.len = static_cast<std::uint8_t>(frame.size);
   std::copy_n(frame.data.begin(), frame.size, std::begin(raw.data));
   const ssize_t sent = ::send(socket_, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL);
-  if (sent == static_cast<ssize_t>(sizeof raw)) return true;
+  if (sent == static_cast<ssize_t>(sizeof raw)) {
+    if (send_failed_) {
+      send_failed_ = false;
+      tell_state();
+    }
+    return true;
+  }
   // A full queue (bus-off, nobody acknowledges) is a failed write, not a lost link.
   if (errno == EAGAIN || errno == ENOBUFS) {
+    send_failed_ = true;
     error_ = interface_ + ": sending: " + said(errno);
   } else {
     fail("sending", errno);

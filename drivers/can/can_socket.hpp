@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "drivers/can/signal_codec.hpp"
@@ -35,6 +36,16 @@ struct CanFrame {
     return {data.data(), size};
   }
 };
+
+/// What the interface last said of itself; the middle three are the error states of ISO 11898-1.
+enum class CanState {
+  down,  ///< not open: no such interface, or it is not up
+  active,
+  warning,
+  passive,
+  bus_off  ///< it takes no part in the bus until it is restarted
+};
+[[nodiscard]] std::string_view to_string(CanState state) noexcept;
 
 /// What error frames and the kernel told since the object was made.
 struct CanErrors {
@@ -83,8 +94,11 @@ class CanSocket {
   bool send(const CanFrame& frame);
 
   [[nodiscard]] const CanErrors& errors() const noexcept { return errors_; }
+  [[nodiscard]] CanState state() const noexcept { return state_; }
+  /// CLOCK_MONOTONIC when the present state was entered.
+  [[nodiscard]] nanoseconds state_since() const noexcept { return state_since_; }
   /// The controller chip has left the bus and not come back: neither frames nor a restart since.
-  [[nodiscard]] bool bus_off() const noexcept { return bus_off_; }
+  [[nodiscard]] bool bus_off() const noexcept { return state_ == CanState::bus_off; }
   /// Why the last open(), receive() or send() failed, or what the bus suffers from; else empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
 
@@ -92,15 +106,24 @@ class CanSocket {
   struct Buffers;
 
   bool configure();
+  void enter(CanState state);
+  void tell_state();
+  void look_for_carrier();
   void fail(const char* what, int code);
   /// The kernel's time stamp beside a frame; notes its count of dropped frames too.
   std::optional<nanoseconds> read_control(msghdr& header);
   void note_error_frame(std::uint32_t error_class, std::span<const std::uint8_t> data);
+  void note_error_state(unsigned bits);
 
   std::string interface_;
   std::vector<CanId> wanted_;
   int socket_{-1};
-  bool bus_off_{false};
+  CanState state_{CanState::down};
+  nanoseconds state_since_;
+  /// It was opened without a carrier, which is how an interface that is bus-off shows itself; no
+  /// error frame tells of what was before.
+  bool without_carrier_{false};
+  bool send_failed_{false};
   std::string error_;
   CanErrors errors_;
   std::uint32_t dropped_by_socket_{0};  ///< the kernel's counter, which starts with the socket

@@ -182,6 +182,7 @@ void CanController::run() {
     receive();
     const nanoseconds now = monotonic_now();
     supervise(now);
+    note_bus_state();
     if (now < next_send) continue;
     next_send = std::max(next_send + period, now);
     send_command(now);
@@ -198,6 +199,7 @@ void CanController::open_or_pause() {
     health_.last_error = socket_.error();
     if (opened) ++health_.connects;
   }
+  note_bus_state();
   if (!opened) wake_.wait_until(monotonic_now() + from_seconds(config_.reconnect_s));
 }
 
@@ -258,6 +260,14 @@ void CanController::supervise(nanoseconds now) {
   } else if (!gate_.in_sync() && all_seen) {
     synchronise();
   }
+}
+
+void CanController::note_bus_state() {
+  const std::scoped_lock lock(health_mutex_);
+  if (health_.state_since == socket_.state_since()) return;
+  health_.state = to_string(socket_.state());
+  health_.state_since = socket_.state_since();
+  health_.bus_offs = socket_.errors().bus_off;
 }
 
 void CanController::synchronise() {

@@ -61,6 +61,7 @@ class CanController final : public ControllerLink {
   void receive();
   void take(const CanFrame& frame);
   void supervise(nanoseconds now);
+  void note_bus_state();
   void synchronise();
   void send_command(nanoseconds now);
   bool compose_and_send(Outgoing& outgoing);

@@ -18,6 +18,10 @@ struct ControllerHealth {
   std::uint64_t reads{0};
   std::uint64_t read_errors{0};
   std::string last_error;  ///< empty when the last exchange was good
+  /// CAN: "down", "active", "warning", "passive" or "bus_off"; else empty
+  std::string state;
+  nanoseconds state_since{};  ///< CLOCK_MONOTONIC when it was entered
+  std::uint64_t bus_offs{0};  ///< CAN: times the interface left the bus
 };
 
 /// Rule of the link: after every (re)connection and after every write that failed the link takes a

@@ -158,6 +158,8 @@ void CanSource::note_health() {
   const std::scoped_lock lock(health_mutex_);
   health_.connected = connected;
   health_.last_error = socket_.error();
+  health_.state = to_string(socket_.state());
+  health_.state_since = socket_.state_since();
   health_.error_frames = socket_.errors().error_frames;
   health_.bus_offs = socket_.errors().bus_off;
   health_.dropped = socket_.errors().dropped;

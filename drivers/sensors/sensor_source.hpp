@@ -30,6 +30,9 @@ struct BusHealth {
   std::uint64_t connects{0};  ///< times the bus was opened
   std::string last_error;
   std::vector<UnitHealth> units;
+  /// CAN: "down", "active", "warning", "passive" or "bus_off"; else empty
+  std::string state;
+  nanoseconds state_since{};      ///< CLOCK_MONOTONIC when it was entered
   std::uint64_t error_frames{0};  ///< CAN: error frames of every kind
   std::uint64_t bus_offs{0};      ///< CAN: times the interface left the bus
   std::uint64_t dropped{0};       ///< CAN: frames lost because they came faster than they were read

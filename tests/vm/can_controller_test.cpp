@@ -173,8 +173,10 @@ TEST_CASE("a CAN link that goes down, is bus-off or cut takes a new epoch", "[vm
     REQUIRE(eventually([&] { return cycle.state().online && cycle.state().link_epoch >= 2; }));
     CHECK(link.health().connects == 2);
     const std::uint32_t epoch = cycle.state().link_epoch;
+    CHECK(link.health().state == "active");
     REQUIRE(shell("cansend vcan9 20000040#0000000000000000"));
     REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
+    CHECK(link.health().bus_offs == 1);
     REQUIRE(eventually([&] { return cycle.state().online; }));
   }
   REQUIRE(shell("ip link del vcan9"));

@@ -212,6 +212,77 @@ TEST_CASE("error passive and a restart are told", "[vm][source]") {
   CHECK(socket.error().empty());
 }
 
+TEST_CASE("the error state of an interface is told, with the time it was entered", "[vm][source]") {
+  Running bus(two_nodes("vcan0"));
+  CHECK(bus.source.health().state == "active");
+  REQUIRE(shell("cansend vcan0 181#0A001400"));
+  REQUIRE(bus.becomes(0, 1.0));
+  const auto told = [&](const std::string& frame, const std::string& state) {
+    const nanoseconds before = monotonic_now();
+    REQUIRE(shell("cansend vcan0 " + frame));
+    REQUIRE(eventually([&] { return bus.source.health().state == state; }));
+    CHECK(bus.source.health().state_since >= before);
+    CHECK(bus.source.health().state_since <= monotonic_now());
+  };
+  told("20000004#0004000000000000", "warning");  // RX_WARNING
+  CHECK(bus.source.health().last_error == "vcan0: error warning");
+  told("20000004#0030000000000000", "passive");  // RX_PASSIVE and TX_PASSIVE
+  told("20000004#0008000000000000", "warning");  // on the way back
+  told("20000004#0040000000000000", "active");
+  CHECK(bus.source.health().last_error.empty());
+  const nanoseconds since = bus.source.health().state_since;
+  REQUIRE(shell("cansend vcan0 20000004#0001000000000000"));  // an overflow is no change of state
+  REQUIRE(eventually([&] { return bus.source.health().error_frames == 5; }));
+  CHECK(bus.source.health().state == "active");
+  CHECK(bus.source.health().state_since == since);
+  CHECK(bus.source.health().connected);
+  CHECK(bus.newest(0).fault == Fault::none);
+}
+
+TEST_CASE("a bus that is off or down leaves another alone", "[vm][source]") {
+  REQUIRE(shell("ip link add dev vcan7 type vcan && ip link set vcan7 up"));
+  {
+    Running living(two_nodes("vcan0"));
+    Running failing(two_nodes("vcan7"));
+    REQUIRE(shell("cansend vcan0 181#0A001400 && cansend vcan7 181#0A001400"));
+    REQUIRE(living.becomes(0, 1.0));
+    REQUIRE(failing.becomes(0, 1.0));
+    REQUIRE(shell("cansend vcan7 20000040#0000000000000000"));
+    REQUIRE(eventually([&] { return failing.newest(0).fault == Fault::no_answer; }));
+    REQUIRE(shell("cansend vcan0 181#0B001400"));
+    CHECK(living.becomes(0, 1.1));
+    REQUIRE(shell("ip link set vcan7 down"));
+    REQUIRE(eventually([&] { return failing.source.health().state == "down"; }));
+    REQUIRE(shell("cansend vcan0 181#0C001400"));
+    CHECK(living.becomes(0, 1.2));
+    CHECK(living.source.health().connects == 1);
+    CHECK(living.source.health().error_frames == 0);
+  }
+  REQUIRE(shell("ip link del vcan7"));
+}
+
+TEST_CASE("of a full bus' frames of ours none is lost unseen", "[vm][source]") {
+  Running bus(two_nodes("vcan0"));
+  RawSender sender("vcan0");
+  // 1 Mbit/s is some 7700 frames a second of 8 bytes; here 77 at once each 10 ms.
+  std::uint64_t sent = 0;
+  for (int turn = 0; turn < 100; ++turn) {
+    for (int i = 0; i < 77; ++i) sent += sender.send(0x181, {turn, 0, i, 0, 0, 0, 0, 0}) ? 1 : 0;
+    std::this_thread::sleep_for(10ms);
+  }
+  // The kernel tells how many it dropped with the next frame that it does not drop.
+  std::this_thread::sleep_for(300ms);
+  REQUIRE(sender.send(0x181, {100, 0, 77, 0}));
+  ++sent;
+  REQUIRE(bus.becomes(0, 10.0));
+  CHECK(bus.newest(1).temp_degC == Approx(7.7));
+  CHECK(eventually([&] {
+    const BusHealth health = bus.source.health();
+    return health.units[0].answers + health.dropped == sent;
+  }));
+  WARN("of " << sent << " frames " << bus.source.health().dropped << " were dropped");
+}
+
 TEST_CASE("a short frame is a fault of its readings", "[vm][source]") {
   Running bus(two_nodes("vcan0"));
   REQUIRE(shell("cansend vcan0 181#0A0014"));  // three bytes: sensor 0 is whole, sensor 1 is not

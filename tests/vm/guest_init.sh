@@ -1,21 +1,24 @@
 #!/bin/sh
-# First process of the guest that run_in_vm.sh boots. The root file system is the host's own
-# (hostfs). VM_RUN, from the kernel's command line, is the folder that holds the file `command`
-# and takes `stdout`, `stderr`, `started` and `status`. Not to be run by hand.
+# First process of the guests that run_in_vm.sh boots, once the host's own files are the root: under
+# User Mode Linux from the beginning (hostfs), under QEMU after emulated_init.sh (9p). VM_RUN, from
+# the kernel's command line, is the folder that holds the file `command` and takes `stdout`,
+# `stderr`, `started` and `status`. Not to be run by hand.
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
-mount -t proc proc /proc
-mount -t sysfs sysfs /sys
+mountpoint -q /proc || mount -t proc proc /proc
+mountpoint -q /sys || mount -t sysfs sysfs /sys
 mountpoint -q /dev || mount -t devtmpfs dev /dev
 mkdir -p /dev/shm /dev/pts
 mount -t tmpfs tmpfs /dev/shm
 mount -t devpts devpts /dev/pts
 mount -t tmpfs tmpfs /run
 
-modules=/usr/lib/uml/modules/$(uname -r)/kernel
-for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/can-dev \
-              drivers/net/can/vcan; do
-  insmod "$modules/$module.ko" || echo "guest: insmod $module failed"
-done
+uml_modules=/usr/lib/uml/modules/$(uname -r)/kernel
+if [ -d "$uml_modules" ]; then
+  for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/can-dev \
+                drivers/net/can/vcan drivers/net/can/slcan/slcan; do
+    insmod "$uml_modules/$module.ko" || echo "guest: insmod $module failed"
+  done
+fi
 ip link set lo up
 for interface in vcan0 vcan1; do
   ip link add dev "$interface" type vcan && ip link set "$interface" up

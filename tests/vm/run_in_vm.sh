@@ -1,11 +1,16 @@
 #!/bin/bash
-# run_in_vm.sh [--timeout S] [--memory SIZE] [--times] COMMAND [ARGUMENT...]
+# run_in_vm.sh [--emulated] [--timeout S] [--memory SIZE] [--times] COMMAND [ARGUMENT...]
 #
-# Runs COMMAND as root under User Mode Linux (Debian package user-mode-linux), where AF_CAN exists
-# and the virtual CAN interfaces vcan0 and vcan1 are up. The guest's root file system is the host's
-# own, read-write (hostfs); working directory and exported variables are those of the caller; PATH
-# is extended by the sbin folders. /run, /dev and /dev/shm are the guest's own and empty: sockets
-# and FIFOs belong there. One CPU. ASan and TSan programs abort in it. Any number can run at a time.
+# Runs COMMAND as root in a guest where AF_CAN exists and the virtual CAN interfaces vcan0 and vcan1
+# are up. The guest's root file system is the host's own, read-write; working directory and exported
+# variables are those of the caller; PATH is extended by the sbin folders. /run, /dev and /dev/shm
+# are the guest's own and empty: sockets and FIFOs belong there. Any number can run at a time.
+#
+# The guest is User Mode Linux (package user-mode-linux): as fast as the host but for system calls,
+# one CPU; ASan and TSan programs abort in it. With --emulated it is Debian's kernel under QEMU
+# (qemu-system-x86, busybox-static, scripts/guest-kernel.sh): it computes some five times slower,
+# runs whatever the host runs, and has two more CAN interfaces, can0 and can1, which are emulated
+# PCI cards on one bus.
 #
 # Exit status: COMMAND's; 124 after S seconds (default 300); 125 when the guest did not come up or
 # died. --times prints to stderr how long the boot and the command took.
@@ -14,12 +19,14 @@ set -u
 usage() { sed -n '2,4p' "$0" | cut -c3- >&2; exit 125; }
 fail() { echo "run_in_vm.sh: $*" >&2; exit 125; }
 
-limit_s=300 memory=512M times=
+here=$(cd "$(dirname "$0")" && pwd)
+limit_s=300 memory=512M times='' emulated=''
 while [ $# -gt 0 ]; do
   case $1 in
     --timeout) limit_s=${2:-}; shift 2 || usage ;;
     --memory) memory=${2:-}; shift 2 || usage ;;
     --times) times=yes; shift ;;
+    --emulated) emulated=qemu memory=1G; shift ;;
     --) shift; break ;;
     -*) usage ;;
     *) break ;;
@@ -28,12 +35,20 @@ done
 [ $# -gt 0 ] || usage
 [[ $limit_s =~ ^[1-9][0-9]*$ ]] || fail "--timeout $limit_s: must be a whole number of seconds"
 
-kernel=/usr/bin/linux.uml
-[ -x "$kernel" ] || fail "package user-mode-linux is not installed (apt-get install user-mode-linux)"
 PATH=$PATH:/usr/local/sbin:/usr/sbin:/sbin
-for tool in ip insmod; do
-  command -v $tool > /dev/null || fail "$tool is missing (apt-get install iproute2 kmod)"
-done
+need() { # need TOOL PACKAGE
+  command -v "$1" > /dev/null || fail "$1 is missing (apt-get install $2)"
+}
+need ip iproute2
+need insmod kmod
+if [ -n "$emulated" ]; then
+  need qemu-system-x86_64 qemu-system-x86
+  need busybox busybox-static
+  kernel=${THERMOCOMP_GUEST_KERNEL:-$here/../../build/guest-kernel}
+  [ -s "$kernel/vmlinux" ] || fail "there is no $kernel/vmlinux (scripts/guest-kernel.sh makes it)"
+else
+  need linux.uml user-mode-linux
+fi
 
 # The kernel splits its command line at spaces.
 place=${TMPDIR:-/tmp}
@@ -47,28 +62,65 @@ clean_up() {
 trap clean_up EXIT
 trap 'exit 125' HUP INT TERM
 
-cp "$(dirname "$0")/guest_init.sh" "$run/init" && chmod 755 "$run/init" || fail "no guest_init.sh"
+cp "$here/guest_init.sh" "$run/init" && chmod 755 "$run/init" || fail "no guest_init.sh"
 {
   export -p
   echo 'unset TMPDIR'
+  echo "export THERMOCOMP_VM=${emulated:-user-mode-linux}"
   printf 'cd %q || exit 125\n' "$PWD"
   printf 'exec timeout -k 5 %s' "$limit_s"
   printf ' %q' "$@"
   echo
 } > "$run/command"
 
-# The guest's memory is a sparse file; on a tmpfs it never meets a disk.
-memory_place=/dev/shm
-needed_kB=$(numfmt --from=iec "$memory") && needed_kB=$((needed_kB / 1024)) \
-  || fail "--memory $memory: must be a size such as 512M"
-free_kB=$(df --output=avail /dev/shm 2> /dev/null | tail -n 1)
-[ "${free_kB:-0}" -gt "$needed_kB" ] || memory_place=$place
+boot_user_mode_linux() {
+  # The guest's memory is a sparse file; on a tmpfs it never meets a disk.
+  local memory_place=/dev/shm needed_kB free_kB
+  needed_kB=$(($(numfmt --from=iec "$memory") / 1024))
+  free_kB=$(df --output=avail /dev/shm 2> /dev/null | tail -n 1)
+  [ "${free_kB:-0}" -gt "$needed_kB" ] || memory_place=$place
+  TMPDIR=$memory_place exec timeout -k 5 $((limit_s + 60)) linux.uml "mem=$memory" \
+    rootfstype=hostfs rootflags=/ rw con=null con0=null,fd:1 quiet loglevel=3 noreboot \
+    "uml_dir=$run" umid=vm "init=$run/init" "VM_RUN=$run"
+}
 
+# What the guest needs before it sees the host's files.
+make_initramfs() {
+  local tree=$run/initramfs version module
+  version=$(cat "$kernel/version")
+  mkdir -p "$tree"/{bin,proc,sys,dev,root,modules}
+  cp "$(command -v busybox)" "$tree/bin/busybox" && cp "$here/emulated_init.sh" "$tree/init" &&
+    chmod 755 "$tree/init" || return 1
+  for module in virtio_pci 9pnet_virtio 9p can-raw can-bcm vcan slcan kvaser_pci; do
+    modprobe -d "$kernel" -S "$version" --show-depends "$module" || return 1
+  done | awk '$1 == "insmod" && !seen[$2]++ { print $2 }' > "$run/modules"
+  while read -r module; do
+    cp "$module" "$tree/modules/" && basename "$module" >> "$tree/modules/order" || return 1
+  done < "$run/modules"
+  (cd "$tree" && find . | busybox cpio -o -H newc > "$run/initramfs.cpio" 2> /dev/null)
+}
+
+boot_qemu() {
+  local acceleration=tcg,thread=multi
+  exec timeout -k 5 $((limit_s + 120)) qemu-system-x86_64 -nodefaults -no-user-config -M pc \
+    -accel "$acceleration" -cpu max -smp 2 -m "$memory" -no-reboot -display none -serial stdio \
+    -kernel "$kernel/vmlinux" -initrd "$run/initramfs.cpio" \
+    -fsdev local,id=host,path=/,security_model=none,multidevs=remap \
+    -device virtio-9p-pci,fsdev=host,mount_tag=host \
+    -object can-bus,id=bus -device kvaser_pci,canbus=bus -device kvaser_pci,canbus=bus \
+    -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check audit=0 \
+apparmor=0 VM_RUN=$run"
+}
+
+numfmt --from=iec "$memory" > /dev/null 2>&1 || fail "--memory $memory: must be a size such as 512M"
+boot=boot_user_mode_linux
+if [ -n "$emulated" ]; then
+  make_initramfs || fail "the initramfs could not be made (modules of $(cat "$kernel/version"))"
+  boot=boot_qemu
+fi
 begin=$(date +%s.%N)
 # Not --foreground: the guest's processes are a group of their own, which ends as a whole.
-TMPDIR=$memory_place timeout -k 5 $((limit_s + 60)) "$kernel" "mem=$memory" rootfstype=hostfs \
-  rootflags=/ rw con=null con0=null,fd:1 quiet loglevel=3 noreboot "uml_dir=$run" umid=vm \
-  "init=$run/init" "VM_RUN=$run" < /dev/null > "$run/console" 2>&1 &
+$boot < /dev/null > "$run/console" 2>&1 &
 vm_pid=$!
 wait "$vm_pid"
 vm_pid=

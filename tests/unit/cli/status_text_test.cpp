@@ -91,6 +91,24 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
   CHECK_THAT(text, Contains("bus cabinet is not connected (refused)"));
 }
 
+TEST_CASE("the error state of a CAN interface is told with its age and a remedy", "[cli][status]") {
+  json status = good_status();
+  status["buses"] = json::parse(R"([{"name": "body", "kind": "can", "connected": false,
+    "last_error": "can0: bus-off", "state": "bus_off", "state_s": 3.2, "units": []},
+    {"name": "table", "kind": "can", "connected": true, "state": "passive", "state_s": 61,
+     "last_error": "can1: error passive", "units": []}])");
+  status["controller"]["state"] = "warning";
+  status["controller"]["state_s"] = 0.5;
+  const std::string text = status_text(status, false);
+  CHECK_THAT(text, Contains("bus body: bus-off for 3 s -> cable, termination, bit rate; then"));
+  CHECK_THAT(text, Contains("bus table: error passive for 1 min 1 s -> cable"));
+  CHECK_THAT(text, Contains(": error warning for 0 s -> cable"));
+  CHECK_THAT(text, !Contains("not connected"));
+  status["buses"][0]["state"] = "active";
+  status["buses"][0]["connected"] = true;
+  CHECK_THAT(status_text(status, false), !Contains("bus body"));
+}
+
 TEST_CASE("an answer of an unexpected shape is shown, not fatal", "[cli][status]") {
   for (const char* text : {"{}", "[]", "null", "7", R"({"axes": 5, "cycle": [], "mode": 3})"}) {
     const json odd = json::parse(text);

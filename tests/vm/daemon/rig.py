@@ -1,0 +1,298 @@
+"""A daemon whose two CAN buses fail, and a watch over what it does meanwhile.
+
+Thermocouples of the block "body" come over the first interface; one of the block "table", and the
+controller, are on the second. Each bus has a thermocomp-sim of its own. All temperatures rise
+steadily, so that the offset has something to catch up with after every outage."""
+
+import contextlib
+import dataclasses
+import signal
+import socket
+import struct
+import subprocess
+import threading
+import time
+
+from lab import BIN, assert_replays_exactly, eventually, first_cycle_s
+
+RISE_K_PER_S = 0.05
+RATE_UM_PER_S_MAX = 1.5
+STALE_AFTER_S = 1.0
+SILENT_AFTER_S = 0.5
+# What the daemon must stay below, as its documentation says (docs/operating.md). Not asserted: a
+# shared machine may stand still for longer.
+RECOVERED_WITHIN_S = 2.0
+BUS_OFF, CONTROLLER_PROBLEM, RESTARTED = 0x40, 0x04, 0x100
+PASSIVE_BITS, WARNING_BITS, ACTIVE_BITS = 0x20, 0x08, 0x40
+
+MODEL = """
+format = 1
+inputs = ["body_degC", "table_degC"]
+outputs = ["z_um"]
+reference = [20.0, 20.0]
+matrix_um_per_K = [[8.0, 3.0]]
+"""
+COLUMNS = ("front_degC", "back_degC", "table_degC")
+PLACES = """
+valid_bits = { id = 0x200, start_bit = 32, length_bits = 8 }
+heartbeat = { id = 0x200, start_bit = 40, length_bits = 8 }
+"""
+AXIS = """
+[[axis]]
+name = "z"
+output = "z_um"
+@LIMITS@
+offset = { id = 0x200, start_bit = 0, length_bits = 32, scale = 0.001 }
+applied = { id = 0x300, start_bit = 0, length_bits = 32, scale = 0.001 }
+"""
+LIMITS = f"offset_um_max = 450.0\nrate_um_per_s_max = {RATE_UM_PER_S_MAX}"
+
+
+def bus_text(name, interface, more=""):
+    return f'[[bus]]\nname = "{name}"\nkind = "can"\ninterface = "{interface}"\n{more}'
+
+
+def device_text(kind, name, bus, frame, places, period_s=None):
+    text = f'[[device]]\nname = "{name}"\nbus = "{bus}"\nid = {frame}\nscale = 0.001\n'
+    text += "offset_degC = 25.0\n" + (f"period_s = {period_s}\n" if period_s else "")
+    return text + "".join(f'[[{kind}]]\nname = "{place}"\ndevice = "{name}"\nstart_bit = {16 * i}\n'
+                          for i, place in enumerate(places))
+
+
+def body_machine(interface):
+    """For thermocomp-sim: the sensors of the first bus."""
+    return ("format = 1\n" + bus_text("body", interface) +
+            device_text("channel", "body_node", "body", 0x181, ("front", "back"), 0.05))
+
+
+def table_machine(interface):
+    """For thermocomp-sim: the second bus."""
+    return ("format = 1\n" + bus_text("table", interface) + '[controller]\nname = "cnc"\n'
+            f'kind = "can"\ninterface = "{interface}"\nperiod_s = 0.05\n' + PLACES +
+            AXIS.replace("@LIMITS@\n", "") +
+            device_text("channel", "table_node", "table", 0x182, ("table",), 0.05))
+
+
+def daemon_text(interface, controller_interface):
+    return ("format = 1\n@STATE@\n[loop]\nrate_hz = 100\n[model]\nfile = \"model.toml\"\n" +
+            bus_text("body", interface) + bus_text("table", controller_interface) +
+            device_text("sensor", "body_node", "body", 0x181, ("front", "back")) +
+            device_text("sensor", "table_node", "table", 0x182, ("table",)) +
+            f'[screening]\nstale_after_s = {STALE_AFTER_S}\nrate_allowance_K = 10.0\n'
+            '[smoothing]\nform = "off"\n'
+            '[[block]]\nname = "body"\ninput = "body_degC"\nsensors = ["front", "back"]\n'
+            '[[block]]\nname = "table"\ninput = "table_degC"\nsensors = ["table"]\n'
+            f'[controller]\nname = "cnc"\nkind = "can"\ninterface = "{controller_interface}"\n'
+            f'period_s = 0.05\nsilent_after_s = {SILENT_AFTER_S}\n' + PLACES +
+            AXIS.replace("@LIMITS@", LIMITS) +
+            "[history]\n@HISTORY@\noffsets_period_s = 0.01\ncommit_s = 0.5\n")
+
+
+def write_rising_run(path, rows=6000, period_s=0.1):
+    with path.open("w") as out:
+        out.write("time_s," + ",".join(COLUMNS) + "\n")
+        for i in range(rows):
+            value = f"{20.0 + RISE_K_PER_S * period_s * i:.4f}"
+            out.write(f"{period_s * i:.1f}," + ",".join([value] * len(COLUMNS)) + "\n")
+
+
+def ip(*arguments):
+    subprocess.run(["ip", "link", *arguments], check=True, timeout=60, stdin=subprocess.DEVNULL)
+
+
+def write_frame(interface, identifier, data=bytes(8)):
+    with socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
+        bus.bind((interface,))
+        bus.send(struct.pack("=IB3x8s", identifier, len(data), data))
+
+
+def write_error_frame(interface, error_class, controller_bits=0):
+    """As the driver of a CAN controller would: class in the identifier, detail in the data."""
+    write_frame(interface, socket.CAN_ERR_FLAG | error_class,
+                bytes([0, controller_bits, 0, 0, 0, 0, 0, 0]))
+
+
+@dataclasses.dataclass
+class Recovery:
+    """Times count from before the command that ends the fault."""
+    fault: str
+    bus: str
+    reading_s: float
+    compensating_s: float
+    held_um: float  # spread of the offset while it was held
+    step_um: float  # largest in 10 ms, from the fault's begin until it had recovered
+
+    def __str__(self):
+        return (f"recovery: {self.fault:34s} {self.bus:10s} first reading {self.reading_s:5.2f} s, "
+                f"compensating {self.compensating_s:5.2f} s, held within {self.held_um:.3f} um")
+
+
+class Rig:
+    """The daemon, its machine and the faults of the run."""
+
+    def __init__(self, lab, interfaces, machine_interfaces=None):
+        self.lab = lab
+        self.windows = []
+        (lab.folder / "model.toml").write_text(MODEL)
+        write_rising_run(lab.folder / "run.csv")
+        theirs = machine_interfaces or interfaces
+        self.monitor = lab.also_end(Monitor(theirs[1]))
+        self.machines = {
+            name: self.start_machine(name, text(interface)) for name, text, interface in
+            zip(("body", "table"), (body_machine, table_machine), theirs)}
+        self.daemon = lab.daemon(daemon_text(*interfaces)).start()
+        self.daemon.wait_for_mode("compensating")
+
+    def start_machine(self, name, text):
+        folder = self.lab.folder / name
+        folder.mkdir()
+        simulator = Simulated(folder, text, self.lab.folder / "run.csv")
+        return self.lab.also_end(simulator)
+
+    def sensor(self, name):
+        sensors = self.daemon.call("sensors")["sensors"]
+        return next(each for each in sensors if each["name"] == name)
+
+    def bus(self, name):
+        return next(each for each in self.daemon.status()["buses"] if each["name"] == name)
+
+    def is_good(self, sensor):
+        return self.sensor(sensor)["fault"] == "none"
+
+    def outage(self, fault, bus, begin, end):
+        """One fault from begin() to end(), until the daemon compensates again. `bus`: "body",
+        "table" or "both"."""
+        lost = "table" if bus == "table" else "front"
+        began = time.monotonic()
+        begin()
+        eventually(lambda: not self.is_good(lost), f"{fault}: the reading is lost")
+        eventually(lambda: self.daemon.status()["mode"] != "compensating", f"{fault}: held")
+        if bus == "body":
+            assert self.is_good("table") and self.daemon.status()["controller"]["online"]
+        else:
+            eventually(lambda: not self.daemon.status()["controller"]["online"],
+                       f"{fault}: the controller is offline")
+            assert bus == "both" or self.is_good("front")
+        time.sleep(0.2)
+        holding = time.monotonic()
+        time.sleep(1.0)
+        assert self.daemon.status()["mode"] != "compensating"
+        ending = time.monotonic()
+        end()
+        reading_s, compensating_s = self.wait_until_recovered(fault, lost, ending)
+        self.windows.append((fault, bus, began, holding, ending, reading_s, compensating_s))
+        print(f"{fault}, {bus}: first reading after {reading_s:.2f} s, compensating after "
+              f"{compensating_s:.2f} s")
+
+    def wait_until_recovered(self, fault, sensor, since):
+        eventually(lambda: self.is_good(sensor), f"{fault}: a reading again")
+        reading_s = time.monotonic() - since
+
+        def compensating():
+            status = self.daemon.status()
+            return (status["mode"] == "compensating" and status["controller"]["online"] and
+                    status["axes"][0]["driven"])
+
+        eventually(compensating, f"{fault}: compensating again")
+        return reading_s, time.monotonic() - since
+
+    def finish(self):
+        """Ends the daemon; every outage with what the history says of it."""
+        self.daemon.committed()
+        self.daemon.end()
+        columns = assert_replays_exactly(self.daemon.history, self.lab.folder / "out.csv")
+        begin = first_cycle_s(self.daemon.history)
+        offsets = [(begin + time_s, offset) for time_s, offset in
+                   zip(columns["time_s"], columns["z_offset_um"])]
+        assert_slewed(offsets)
+        assert_no_jump_on_the_bus(self.monitor.offsets)
+        return [self.recovery(offsets, *window) for window in self.windows]
+
+    @staticmethod
+    def recovery(offsets, fault, bus, began, holding, ending, reading_s, compensating_s):
+        held = [offset for at, offset in offsets if holding <= at <= ending]
+        assert held, f"{fault}: no record of the time without data"
+        around = [offset for at, offset in offsets if began <= at <= ending + compensating_s]
+        steps = [abs(b - a) for a, b in zip(around, around[1:])]
+        return Recovery(fault, bus, reading_s, compensating_s, max(held) - min(held), max(steps))
+
+
+class Simulated:
+    """thermocomp-sim, that can be stopped and continued as if its cable were out."""
+
+    def __init__(self, folder, machine, run):
+        (folder / "machine.toml").write_text(machine)
+        self.log = (folder / "thermocomp-sim.log").open("a")
+        self.process = subprocess.Popen(
+            [str(BIN / "thermocomp-sim"), str(folder / "machine.toml"), "--replay", str(run),
+             "--row-period-ms", "100", "--stay"], stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=self.log, text=True, cwd=folder)
+        line = self.process.stdout.readline()
+        assert '"unavailable":{}' in line, line + (folder / "thermocomp-sim.log").read_text()
+
+    def cable_out(self):
+        self.process.send_signal(signal.SIGSTOP)
+
+    def cable_in(self):
+        self.process.send_signal(signal.SIGCONT)
+
+
+def assert_slewed(offsets):
+    """Recorded offsets never change faster than allowed; a new epoch starts from what is applied,
+    which is known to 0.001 um."""
+    for (before, a), (after, b) in zip(offsets, offsets[1:]):
+        bound = RATE_UM_PER_S_MAX * (after - before) + 0.002
+        assert abs(b - a) <= bound, f"{a} -> {b} um in {after - before:.3f} s"
+
+
+class Monitor:
+    """The offset frames as anybody on the bus sees them: (time, um, heartbeat) of valid ones."""
+
+    def __init__(self, interface):
+        self.interface = interface
+        self.offsets = []
+        self.ending = threading.Event()
+        self.thread = threading.Thread(target=self.run)
+        self.thread.start()
+
+    def run(self):
+        while not self.ending.is_set():
+            with contextlib.suppress(OSError), socket.socket(socket.PF_CAN, socket.SOCK_RAW,
+                                                             socket.CAN_RAW) as bus:
+                bus.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER,
+                               struct.pack("=II", 0x200, socket.CAN_SFF_MASK))
+                bus.settimeout(0.2)
+                bus.bind((self.interface,))
+                self.listen(bus)
+            self.ending.wait(0.05)
+
+    def listen(self, bus):
+        while not self.ending.is_set():
+            with contextlib.suppress(TimeoutError):
+                note_offset(self.offsets, bus.recv(16)[8:])
+
+    def close(self):
+        self.ending.set()
+        self.thread.join(20)
+
+
+def note_offset(offsets, data):
+    offset, valid, heartbeat = struct.unpack("<iBB", data[:6])
+    if valid & 1:
+        offsets.append((time.monotonic(), 0.001 * offset, heartbeat))
+
+
+def assert_no_jump_on_the_bus(offsets):
+    """An offset is where the last one was, or as far from it as the slew rate allows in the time
+    between; after an outage in no more than 1 s. Half a second is for a machine that stands still
+    meanwhile."""
+    assert len(offsets) > 50
+    for (before, a, _), (after, b, _) in zip(offsets, offsets[1:]):
+        bound = RATE_UM_PER_S_MAX * min(after - before + 0.5, 1.0) + 0.002
+        assert abs(b - a) <= bound, f"{a} -> {b} um in {after - before:.3f} s"
+
+
+def cpu_s(process):
+    """Processor time that a process has used."""
+    fields = (open(f"/proc/{process.pid}/stat").read().rpartition(")")[2]).split()
+    return (int(fields[11]) + int(fields[12])) / 100.0

@@ -1,0 +1,140 @@
+"""Buses that fail while the daemon compensates: the offset is held, the other bus goes on, and
+everything comes back by itself. Each fault on the sensors' and on the controller's bus."""
+
+import pathlib
+import subprocess
+import sys
+import time
+
+import pytest
+
+import rig as rigs
+from lab import Lab, eventually
+from rig import ip, write_error_frame
+
+pytestmark = pytest.mark.skipif(not pathlib.Path("/sys/class/net/vcan1").exists(),
+                                reason="there is no vcan1 (tests/vm/run_with_can.sh makes one)")
+INTERFACES = {"body": "vcan0", "table": "vcan1"}
+BUSES = ("body", "table")
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """One daemon for all faults: what one of them leaves behind must not harm at the next."""
+    lab = Lab(tmp_path_factory.mktemp("faults"))
+    try:
+        made = rigs.Rig(lab, tuple(INTERFACES.values()))
+        yield made
+        recoveries = made.finish()
+        for recovery in recoveries:
+            print(recovery)
+            assert recovery.held_um == 0.0, str(recovery)
+    finally:
+        lab.end()
+
+
+def test_error_passive_is_told_and_changes_nothing(rig):
+    for bus, interface in INTERFACES.items():
+        write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.PASSIVE_BITS)
+        eventually(lambda: rig.bus(bus)["state"] == "passive", "the state is told")
+        assert rig.bus(bus)["connected"]
+        assert rig.daemon.status()["mode"] == "compensating"
+        assert f"bus {bus}: error passive for " in rig.daemon.cli("status")[1]
+        write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.WARNING_BITS)
+        eventually(lambda: rig.bus(bus)["state"] == "warning", "the state is told")
+        write_error_frame(interface, rigs.CONTROLLER_PROBLEM, rigs.ACTIVE_BITS)
+        eventually(lambda: rig.bus(bus)["state"] == "active", "the state is told")
+        assert rig.bus(bus)["last_error"] == ""
+    assert "error state passive" in rig.daemon.log_text()
+
+
+@pytest.mark.parametrize("bus", BUSES)
+def test_bus_off_and_restart(rig, bus):
+    interface, machine = INTERFACES[bus], rig.machines[bus]
+    before = rig.bus(bus)["bus_offs"]
+
+    def begin():
+        machine.cable_out()
+        write_error_frame(interface, rigs.BUS_OFF)
+        eventually(lambda: rig.bus(bus)["state"] == "bus_off", "the state is told")
+        assert not rig.bus(bus)["connected"]
+        assert f"bus {bus}: bus-off for " in rig.daemon.cli("status")[1]
+
+    def end():
+        machine.cable_in()
+        write_error_frame(interface, rigs.RESTARTED)
+
+    rig.outage("bus-off, restart", bus, begin, end)
+    assert rig.bus(bus)["bus_offs"] == before + 1
+
+
+@pytest.mark.parametrize("bus", BUSES)
+def test_interface_down_and_up(rig, bus):
+    def begin():
+        ip("set", INTERFACES[bus], "down")
+        eventually(lambda: rig.bus(bus)["state"] == "down", "the state is told")
+
+    rig.outage("interface down, up", bus, begin, lambda: ip("set", INTERFACES[bus], "up"))
+
+
+@pytest.mark.parametrize("bus", BUSES)
+def test_interface_removed_and_made_anew(rig, bus):
+    def end():
+        ip("add", "dev", INTERFACES[bus], "type", "vcan")
+        ip("set", INTERFACES[bus], "up")
+
+    rig.outage("interface removed, made anew", bus, lambda: ip("del", INTERFACES[bus]), end)
+
+
+@pytest.mark.parametrize("bus", BUSES)
+def test_cable_out_and_in(rig, bus):
+    """No frame, and no error that would say why."""
+    machine = rig.machines[bus]
+    rig.outage("cable out, in (silence)", bus, machine.cable_out, machine.cable_in)
+
+
+SENDER = """
+import socket, struct, sys, time
+interface, seconds, a_second = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+bus = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+bus.bind((interface,))
+frames = [struct.pack("=IB3x8s", 0x400 + i % 0x80, 8, bytes(8)) for i in range(a_second // 100)]
+begin = time.monotonic()
+sent, turn = 0, 0
+while time.monotonic() < begin + seconds:
+    for frame in frames:
+        try:
+            sent += bus.send(frame) > 0
+        except OSError:
+            pass
+    turn += 1
+    time.sleep(max(0.0, begin + 0.01 * turn - time.monotonic()))
+print(sent / (time.monotonic() - begin))
+"""
+
+
+def test_a_bus_full_of_others_frames_costs_nothing(rig):
+    """1 Mbit/s is some 7700 frames a second of 8 bytes with 11-bit identifiers. The kernel's
+    filters keep them from the daemon; ours between them all arrive."""
+    seconds = 5.0
+    frames_before = rig.bus("body")["units"][0]["answers"]
+    used = rigs.cpu_s(rig.daemon.process)
+    senders = [subprocess.Popen([sys.executable, "-c", SENDER, interface, str(seconds), "7700"],
+                                stdout=subprocess.PIPE, text=True)
+               for interface in INTERFACES.values()]
+    modes = set()
+    ages_s = []
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        modes.add(rig.daemon.status()["mode"])
+        ages_s.append(rig.sensor("front")["age_s"])
+        time.sleep(0.1)
+    rates = [float(sender.communicate(timeout=120)[0]) for sender in senders]
+    used = (rigs.cpu_s(rig.daemon.process) - used) / seconds
+    frames = rig.bus("body")["units"][0]["answers"] - frames_before
+    print(f"full buses: {rates[0]:.0f} and {rates[1]:.0f} frames a second of others, "
+          f"{frames / seconds:.0f} of ours, oldest reading {max(ages_s):.2f} s, "
+          f"daemon {100 * used:.1f} % CPU")
+    assert modes == {"compensating"}
+    assert rig.bus("body")["dropped"] == 0 and rig.bus("table")["dropped"] == 0
+    assert frames > seconds  # of 100 sent

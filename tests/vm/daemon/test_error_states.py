@@ -1,0 +1,92 @@
+"""The error states of a real CAN interface, told by its driver: a serial adapter on a pseudo
+terminal that goes to error warning, error passive and bus-off."""
+
+import pytest
+
+import rig as rigs
+import serial_adapter
+from lab import Lab, eventually
+from rig import ip
+
+pytestmark = pytest.mark.skipif(not serial_adapter.is_possible(),
+                                reason="the kernel has no slcan (tests/vm/run_with_can.sh)")
+
+
+class OneBusRig(rigs.Rig):
+    """Sensors and controller behind one adapter."""
+
+    def __init__(self, lab, adapter):
+        self.lab = lab
+        self.windows = []
+        self.monitor = adapter
+        (lab.folder / "model.toml").write_text(rigs.MODEL)
+        self.daemon = lab.daemon(rigs.daemon_text(adapter.name, adapter.name)).start()
+        self.daemon.wait_for_mode("compensating")
+
+
+@pytest.fixture(scope="module")
+def adapter(tmp_path_factory):
+    lab = Lab(tmp_path_factory.mktemp("states"))
+    try:
+        made = lab.also_end(serial_adapter.SerialAdapter())
+        serial_adapter.set_up(made.name)
+        made.rig = OneBusRig(lab, made)
+        yield made
+        for recovery in made.rig.finish():
+            print(recovery)
+            assert recovery.held_um == 0.0, str(recovery)
+    finally:
+        lab.end()
+
+
+def test_warning_and_passive_are_told_and_change_nothing(adapter):
+    rig = adapter.rig
+    for letter, state in (("w", "warning"), ("p", "passive"), ("w", "warning"), ("a", "active")):
+        adapter.tell_state(letter)
+        eventually(lambda: rig.bus("body")["state"] == state, state + " is told")
+        status = rig.daemon.status()
+        assert status["mode"] == "compensating" and rig.bus("body")["connected"]
+        eventually(lambda: rig.daemon.status()["controller"]["state"] == state, "so is the other's")
+    assert rig.bus("body")["last_error"] == ""
+    assert rig.bus("body")["error_frames"] >= 4
+
+
+def bus_off(adapter):
+    adapter.tell_state("b")
+    eventually(lambda: adapter.rig.bus("body")["state"] == "bus_off", "bus-off is told")
+    eventually(lambda: adapter.rig.daemon.status()["controller"]["state"] == "bus_off",
+               "by the controller's link too")
+    said = adapter.rig.daemon.cli("status")[1]
+    assert "bus body: bus-off for " in said and "controller cnc: bus-off for " in said
+
+
+def down_and_up(adapter):
+    ip("set", adapter.name, "down")
+    ip("set", adapter.name, "up")
+
+
+def test_bus_off_until_the_interface_is_restarted(adapter):
+    adapter.rig.outage("bus-off (slcan), down and up", "both", lambda: bus_off(adapter),
+                       lambda: down_and_up(adapter))
+    assert adapter.rig.bus("body")["bus_offs"] == 1
+    assert adapter.rig.daemon.status()["controller"]["bus_offs"] == 1
+
+
+def test_cable_out_and_in(adapter):
+    def cut(out):
+        adapter.cut = out
+
+    adapter.rig.outage("cable out, in (slcan)", "both", lambda: cut(True), lambda: cut(False))
+
+
+def test_a_daemon_that_starts_on_a_bus_that_is_off_says_so(adapter):
+    """No error frame tells what was before: the missing carrier does."""
+    rig = adapter.rig
+    bus_off(adapter)
+    rig.daemon.end()
+    rig.daemon.start()
+    eventually(lambda: rig.bus("body")["state"] == "bus_off", "bus-off is told")
+    assert not rig.bus("body")["connected"]
+    down_and_up(adapter)
+    rig.daemon.wait_for_mode("compensating")
+    assert rig.bus("body")["state"] == "active"
