@@ -54,9 +54,14 @@ Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLin
       static_cast<std::uint64_t>(std::max<std::int64_t>(1, report_period / grid.period));
 }
 
-void Cycle::run() noexcept {
-  std::uint64_t cycle = newest_due(now_on_clock());
+std::uint64_t Cycle::begin(nanoseconds now) noexcept {
+  const std::uint64_t cycle = newest_due(now);
   if (brain_->recorder) brain_->recorder->begin(cycle, brain_->estimator, SegmentReason::start);
+  return cycle;
+}
+
+void Cycle::run() noexcept {
+  std::uint64_t cycle = begin(now_on_clock());
   while (!stop_.load(std::memory_order_relaxed)) {
     const nanoseconds wake = grid_.time_of(cycle);
     sleep_until(wake);

@@ -59,6 +59,14 @@ class Cycle {
 
   /// Until stop(); the first cycle is the grid's newest.
   void run() noexcept;
+  /// What run() does by the system's clock, for who has a time of his own: begin() once, then
+  /// step() and next_after() in turn.
+  /// @return the first cycle to step
+  [[nodiscard]] std::uint64_t begin(nanoseconds now) noexcept;
+  void step(std::uint64_t cycle) noexcept;
+  /// @param now  when the step of `cycle` was done
+  /// @return the next cycle to step; those between are counted as missed
+  [[nodiscard]] std::uint64_t next_after(std::uint64_t cycle, nanoseconds now) noexcept;
   void stop() noexcept { stop_.store(true, std::memory_order_relaxed); }
 
   /// Main's side. @return false when 64 commands wait already
@@ -82,11 +90,9 @@ class Cycle {
   [[nodiscard]] CycleBrain& brain() noexcept { return *observed_; }
 
  private:
-  void step(std::uint64_t cycle) noexcept;
   void take_over(std::uint64_t cycle) noexcept;
   void publish(bool at_once) noexcept;
   [[nodiscard]] std::uint64_t newest_due(nanoseconds now) const noexcept;
-  [[nodiscard]] std::uint64_t next_after(std::uint64_t cycle, nanoseconds now) noexcept;
 
   Grid grid_;
   std::vector<SensorSource*> sources_;

@@ -33,12 +33,6 @@ constexpr const char* tables =
     "CREATE UNIQUE INDEX chunk_of_segment ON chunk (segment, number);"
     "INSERT INTO meta VALUES ('format', 'thermocomp history'), ('schema_version', '1');";
 
-std::int64_t wall_now_ns() {
-  return std::chrono::duration_cast<nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 std::string utc_stamp() {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
@@ -187,7 +181,7 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
   Transaction transaction(*database_);
   if (prove) {
     Statement statement(*database_, "INSERT OR REPLACE INTO meta VALUES ('opened_wall_ns', ?)");
-    statement.bind(std::string_view(std::to_string(wall_now_ns()))).run();
+    statement.bind(std::string_view(std::to_string(wall_().count()))).run();
   }
   for (const PendingRows::Row& row : pending.rows()) {
     if (const auto* segment = std::get_if<SegmentRow>(&row)) {
@@ -255,7 +249,7 @@ void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
   Statement update(*database_,
                    "UPDATE segment SET last_cycle = ?, last_wall_ns = ?, records = records + ?,"
                    " bytes = bytes + ? WHERE id = ?");
-  update.bind(row.through_cycle).bind(wall_now_ns()).bind(static_cast<std::int64_t>(row.count));
+  update.bind(row.through_cycle).bind(wall_().count()).bind(static_cast<std::int64_t>(row.count));
   update.bind(static_cast<std::int64_t>(row.records.size())).bind(segment->second).run();
 }
 
@@ -291,7 +285,7 @@ void HistoryStore::keep_within_bounds(std::int64_t current_token) {
     const std::int64_t oldest = oldest_other_than(current, last_wall_ns);
     if (oldest == 0) break;
     const bool is_old = last_wall_ns > clock_unset_before_ns &&
-                        static_cast<double>(wall_now_ns() - last_wall_ns) > age_ns_max;
+                        static_cast<double>(wall_().count() - last_wall_ns) > age_ns_max;
     if (!(used * page_bytes > delete_at * bytes_max) && !is_old) break;
     delete_segment(oldest);
   }

@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -72,7 +73,9 @@ class PendingRows {
 
 class HistoryStore {
  public:
-  explicit HistoryStore(const HistoryConfig& config) : config_(config) {}
+  /// @param wall  the wall clock, since 1970
+  HistoryStore(const HistoryConfig& config, std::function<nanoseconds()> wall)
+      : config_(config), wall_(std::move(wall)) {}
 
   /// @param needed_token  a segment that must be in the file already; 0: none
   /// @return false when that segment is not in the file: its rows have no place there
@@ -104,6 +107,7 @@ class HistoryStore {
   [[nodiscard]] std::int64_t oldest_other_than(std::int64_t current, std::int64_t& last_wall_ns);
 
   HistoryConfig config_;
+  std::function<nanoseconds()> wall_;
   std::unique_ptr<Database> database_;
   dev_t device_{0};
   ino_t inode_{0};

@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <condition_variable>
-#include <ctime>
 #include <mutex>
 #include <optional>
 #include <pthread.h>
@@ -19,7 +18,6 @@
 namespace thermocomp {
 namespace {
 
-using SteadyClock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds drain_period{50};
@@ -29,14 +27,6 @@ constexpr std::size_t chunk_bytes_max = std::size_t{512} * 1024;
 constexpr double backoff_s_max = 60.0;
 /// SQLite needs little; the default of 8 MB would count fully once memory is locked.
 constexpr std::size_t stack_bytes = std::size_t{512} * 1024;
-
-std::int64_t wall_minus_monotonic_ns() {
-  timespec wall{};
-  timespec monotonic{};
-  clock_gettime(CLOCK_REALTIME, &wall);
-  clock_gettime(CLOCK_MONOTONIC, &monotonic);
-  return (wall.tv_sec - monotonic.tv_sec) * 1'000'000'000LL + (wall.tv_nsec - monotonic.tv_nsec);
-}
 
 nanoseconds as_duration(double seconds) {
   return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(seconds));
@@ -64,6 +54,7 @@ struct HistoryWriter::Parts {
   HistoryConfig config;
   Grid grid;
   std::string program_version;
+  WriterClocks clocks;
   RecordRing ring;
 
   // Shared between threads.
@@ -73,7 +64,7 @@ struct HistoryWriter::Parts {
   std::vector<KnownSession> sessions;
   std::uint16_t next_session{1};
   HistoryStatistics statistics;
-  std::optional<SteadyClock::time_point> last_commit;
+  std::optional<nanoseconds> last_commit;
 
   // The writer's thread only (and start() before it runs).
   HistoryStore store;
@@ -88,17 +79,22 @@ struct HistoryWriter::Parts {
   bool lost_before{false};  ///< the next segment begins after a gap
   bool requested{false};    ///< a snapshot was asked for and has not come yet
   double backoff_s{0.0};
-  SteadyClock::time_point next_commit{};
+  nanoseconds next_commit{};
 
   Parts(const HistoryConfig& config_in, const Grid& grid_in, std::string version,
-        std::size_t ring_records)
+        std::size_t ring_records, WriterClocks clocks_in)
       : config(config_in),
         grid(grid_in),
         program_version(std::move(version)),
+        clocks(std::move(clocks_in)),
         ring(ring_records),
-        store(config_in) {}
+        store(config_in, clocks.wall) {}
 
   void run();
+  void work();
+  [[nodiscard]] std::int64_t wall_minus_monotonic_ns() const {
+    return (clocks.wall() - clocks.monotonic()).count();
+  }
   void drain();
   void take(const Record& record);
   void begin_segment(const Record& record);
@@ -116,19 +112,22 @@ struct HistoryWriter::Parts {
 };
 
 void HistoryWriter::Parts::run() {
-  next_commit = SteadyClock::now();
   std::unique_lock lock(mutex);
   while (!stopping) {
     wake.wait_for(lock, drain_period, [this] { return stopping; });
     lock.unlock();
-    drain();
-    if (SteadyClock::now() >= next_commit) commit();
+    work();
     lock.lock();
   }
   lock.unlock();
   drain();
   commit();
   store.close();
+}
+
+void HistoryWriter::Parts::work() {
+  drain();
+  if (clocks.monotonic() >= next_commit) commit();
 }
 
 void HistoryWriter::Parts::drain() {
@@ -217,11 +216,11 @@ void HistoryWriter::Parts::commit() {
   cut_chunk();
   if (write()) {
     backoff_s = 0.0;
-    next_commit = SteadyClock::now() + as_duration(std::min(config.commit_s, commit_s_max));
+    next_commit = clocks.monotonic() + as_duration(std::min(config.commit_s, commit_s_max));
     request_if_due();
   } else {
     backoff_s = std::clamp(2.0 * backoff_s, 0.5, backoff_s_max);
-    next_commit = SteadyClock::now() + as_duration(backoff_s);
+    next_commit = clocks.monotonic() + as_duration(backoff_s);
   }
 }
 
@@ -264,7 +263,7 @@ void HistoryWriter::Parts::written(std::uint64_t records) {
   statistics.records += records;
   ++statistics.commits;
   statistics.lost = ring.lost() + dropped;
-  last_commit = SteadyClock::now();
+  last_commit = clocks.monotonic();
 }
 
 void HistoryWriter::Parts::failed(const std::string& message) {
@@ -314,8 +313,10 @@ KnownSession HistoryWriter::Parts::find_session(std::uint16_t id) {
 }
 
 HistoryWriter::HistoryWriter(const HistoryConfig& config, const Grid& grid,
-                             std::string program_version, std::size_t ring_records)
-    : parts_(std::make_unique<Parts>(config, grid, std::move(program_version), ring_records)) {}
+                             std::string program_version, std::size_t ring_records,
+                             WriterClocks clocks)
+    : parts_(std::make_unique<Parts>(config, grid, std::move(program_version), ring_records,
+                                     std::move(clocks))) {}
 
 HistoryWriter::~HistoryWriter() {
   stop();
@@ -333,8 +334,12 @@ std::unique_ptr<CycleRecorder> HistoryWriter::make_recorder(const HistorySetup& 
                                          as_duration(parts_->config.offsets_period_s), estimator);
 }
 
-void HistoryWriter::start() {
-  THERMOCOMP_ENSURE(!parts_->running);
+WriterClocks system_clocks() {
+  return {[] { return std::chrono::steady_clock::now().time_since_epoch(); },
+          [] { return std::chrono::system_clock::now().time_since_epoch(); }};
+}
+
+void HistoryWriter::open() {
   try {
     static_cast<void>(parts_->store.open_if_closed(0));
   } catch (const DatabaseError& error) {
@@ -343,6 +348,15 @@ void HistoryWriter::start() {
     if (error.is_damage()) parts_->store.move_aside(error.what());
     parts_->failed(error.what());
   }
+}
+
+void HistoryWriter::work() {
+  parts_->work();
+}
+
+void HistoryWriter::start() {
+  THERMOCOMP_ENSURE(!parts_->running);
+  open();
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
   pthread_attr_setstacksize(&attributes, stack_bytes);
@@ -375,7 +389,7 @@ HistoryStatistics HistoryWriter::statistics() const {
   HistoryStatistics copy = parts_->statistics;
   if (parts_->last_commit) {
     copy.last_commit_age_s =
-        std::chrono::duration<double>(SteadyClock::now() - *parts_->last_commit).count();
+        std::chrono::duration<double>(parts_->clocks.monotonic() - *parts_->last_commit).count();
   }
   return copy;
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -33,6 +34,13 @@ struct HistorySetup {
   std::string model_checksum;
 };
 
+/// Where the writer has its times from.
+struct WriterClocks {
+  std::function<nanoseconds()> monotonic;  ///< the grid's
+  std::function<nanoseconds()> wall;       ///< since 1970, may be stepped
+};
+[[nodiscard]] WriterClocks system_clocks();
+
 /// Drains the ring on a thread of its own. Not on main, where the watchdog is fed and the
 /// operators' socket answered: fsync on a worn SD card or a disk that spins up takes seconds, and a
 /// stalled disk must neither get the daemon killed nor leave an operator without an answer.
@@ -48,7 +56,7 @@ class HistoryWriter {
 
   /// Opens nothing yet.
   HistoryWriter(const HistoryConfig& config, const Grid& grid, std::string program_version,
-                std::size_t ring_records = 65536);
+                std::size_t ring_records = 65536, WriterClocks clocks = system_clocks());
   ~HistoryWriter();
   HistoryWriter(const HistoryWriter&) = delete;
   HistoryWriter& operator=(const HistoryWriter&) = delete;
@@ -61,6 +69,10 @@ class HistoryWriter {
   /// a disk that does not work is tried again for ever.
   /// @throws HistoryError when the file is of a newer version or of another program
   void start();
+  /// What start() does before it starts the thread, and what the thread does every 50 ms: for who
+  /// has a time of his own and no thread.
+  void open();
+  void work();
   /// Writes what is left and closes the file. Gives up on a disk that does not work after one try.
   void stop() noexcept;
   [[nodiscard]] HistoryStatistics statistics() const;
