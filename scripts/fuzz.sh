@@ -1,0 +1,135 @@
+#!/bin/bash
+# Runs the fuzz targets of tests/fuzz (libFuzzer, address and undefined-behaviour sanitizers) and
+# prints a table: inputs executed, coverage, and what was broken.
+#   scripts/fuzz.sh [--minutes M | --seconds S] [--jobs N] [--no-build] [TARGET...]
+#   scripts/fuzz.sh --list | --build
+# Default: 10 minutes for each target, as many at a time as there are processors. Inputs that reach
+# something new are kept in build/fuzz/runs/TARGET/corpus and used again by the next run; what breaks
+# a target is written to build/fuzz/runs/TARGET/artifacts.
+# Exit status 0: nothing broke; 1: something did; 2: bad use or no build; 77: there is no clang here.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+source scripts/common.sh
+
+usage() { sed -n 's/^# \{0,1\}//; 4,5p' "${BASH_SOURCE[0]}"; }
+
+runs=build/fuzz/runs
+readonly input_seconds_max=5     # one input may take so long
+readonly memory_MB_max=2048      # of the process, with the sanitizer's own
+readonly allocation_MB_max=512   # asked for at once
+mapfile -t known < <(sed -n 's/^fuzz_target(\([a-z_]*\).*/\1/p' tests/fuzz/CMakeLists.txt)
+
+fail() {
+  echo "fuzz.sh: $*" >&2
+  exit 2
+}
+
+seconds=600 jobs=$(build_jobs) builds=yes only=
+targets=()
+while (($#)); do
+  case $1 in
+    --minutes | --seconds | --jobs)
+      [[ ${2:-} =~ ^[1-9][0-9]*$ ]] || fail "$1 takes a whole number"
+      case $1 in
+        --minutes) seconds=$(($2 * 60)) ;;
+        --seconds) seconds=$2 ;;
+        --jobs) jobs=$2 ;;
+      esac
+      shift
+      ;;
+    --no-build) builds=no ;;
+    --build) only=build ;;
+    --list) only=list ;;
+    -h | --help) usage && exit 0 ;;
+    -*) usage >&2 && exit 2 ;;
+    *)
+      [[ " ${known[*]} " == *" $1 "* ]] || fail "no target called $1; there are: ${known[*]}"
+      targets+=("$1")
+      ;;
+  esac
+  shift
+done
+if ((${#targets[@]} == 0)); then targets=("${known[@]}"); fi
+if [[ $only == list ]]; then
+  printf '%s\n' "${targets[@]}"
+  exit 0
+fi
+if ! command -v clang++ >/dev/null; then
+  echo "fuzz: skipped: there is no clang++ (packages clang and libclang-rt-dev)"
+  exit 77
+fi
+
+build() {
+  local log=build/fuzz/build.log
+  mkdir -p build/fuzz
+  if cmake --preset fuzz >"$log" 2>&1 &&
+    cmake --build --preset fuzz -j "$(build_jobs)" >>"$log" 2>&1; then
+    return 0
+  fi
+  tail -n 60 "$log" >&2
+  fail "the targets could not be built (all of it: $log)"
+}
+
+# run TARGET: its log tells how it went; nothing here fails.
+run() {
+  local target=$1 words=tests/fuzz/dictionaries/$1.dict options=()
+  mkdir -p "$runs/$target/corpus" "$runs/$target/artifacts"
+  rm -f "$runs/$target/artifacts"/*
+  if [[ -f $words ]]; then options=("-dict=$words"); fi
+  "build/fuzz/bin/fuzz_$target" -max_total_time="$seconds" -timeout="$input_seconds_max" \
+    -rss_limit_mb="$memory_MB_max" -malloc_limit_mb="$allocation_MB_max" -print_final_stats=1 \
+    "${options[@]}" -artifact_prefix="$runs/$target/artifacts/" \
+    "$runs/$target/corpus" "tests/fuzz/seeds/$target" >"$runs/$target/log" 2>&1 || true
+}
+
+# of TARGET STATISTIC: a number of libFuzzer's closing lines.
+statistic() { sed -n "s/^stat::$2: *//p" "$runs/$1/log" | tail -n 1; }
+
+# A line of the table. @return 1 when the target broke
+report() {
+  local target=$1 log=$runs/$1/log status=0 coverage features broken
+  broken=$(find "$runs/$target/artifacts" -type f | wc -l)
+  # Without the closing line the program ended by itself, whatever it left behind.
+  if ! grep -q '^Done ' "$log" && ((broken == 0)); then broken=1; fi
+  coverage=$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$log" | tail -n 1)
+  features=$(sed -n 's/.* ft: \([0-9]*\) .*/\1/p' "$log" | tail -n 1)
+  printf '%-18s %12s %8s %8s %9s %7s %8s\n' "$target" \
+    "$(statistic "$target" number_of_executed_units)" \
+    "$(statistic "$target" average_exec_per_sec)" "${coverage:--}" "${features:--}" \
+    "$(find "$runs/$target/corpus" -type f | wc -l)" "$broken"
+  if ((broken > 0)); then
+    grep -E 'broken promise|runtime error|ERROR: |SUMMARY|aborts|terminat' "$log" | head -n 8 ||
+      tail -n 20 "$log"
+    find "$runs/$target/artifacts" -type f -printf \
+      "  again: build/fuzz/bin/fuzz_$target %p\n"
+    status=1
+  fi
+  return "$status"
+}
+
+if [[ $builds == yes ]]; then build; fi
+if [[ $only == build ]]; then exit 0; fi
+
+# Files in memory that a target which broke could not remove.
+above=/dev/shm
+[[ -w $above ]] || above=${TMPDIR:-/tmp}
+THERMOCOMP_FUZZ_SCRATCH=$(mktemp -d "$above/thermocomp-fuzz-XXXXXX")
+export THERMOCOMP_FUZZ_SCRATCH
+trap 'rm -rf "$THERMOCOMP_FUZZ_SCRATCH"; kill $(jobs -p) 2>/dev/null || true' EXIT
+
+began=$SECONDS
+for target in "${targets[@]}"; do
+  while (($(jobs -rp | wc -l) >= jobs)); do wait -n || true; done
+  run "$target" &
+done
+wait
+
+printf '%-18s %12s %8s %8s %9s %7s %8s\n' target executed per_s edges features corpus broken
+status=0 executed=0
+for target in "${targets[@]}"; do
+  report "$target" || status=1
+  executed=$((executed + $(statistic "$target" number_of_executed_units || true) + 0))
+done
+echo "fuzz: ${#targets[@]} targets, $seconds s each, $executed inputs executed in" \
+  "$(((SECONDS - began + 30) / 60)) min; $([[ $status == 0 ]] && echo "nothing broke" || echo "BROKEN")"
+exit "$status"

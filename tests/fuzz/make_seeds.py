@@ -1,0 +1,257 @@
+#!/usr/bin/python3
+"""Writes the seeds and dictionaries of the fuzz targets from the examples and the sources.
+
+    tests/fuzz/make_seeds.py [HISTORY.db]
+
+HISTORY.db: of the program make_history_seed; without it the seed of history_file stays. Inputs that
+were found to break something, seeds/TARGET/found-*, are never touched.
+"""
+
+import json
+import pathlib
+import re
+import struct
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+SEEDS = HERE / "seeds"
+DICTIONARIES = HERE / "dictionaries"
+
+
+def write(target, name, content):
+    folder = SEEDS / target
+    folder.mkdir(parents=True, exist_ok=True)
+    data = content if isinstance(content, bytes) else content.encode()
+    (folder / name).write_bytes(data)
+
+
+def bare(path):
+    """A TOML file without comments and empty lines: shorter inputs are mutated better."""
+    lines = (re.sub(r"\s*#[^\"]*$", "", line) for line in path.read_text().splitlines())
+    return "".join(line + "\n" for line in lines if line.strip())
+
+
+def toml_seeds():
+    examples = sorted((ROOT / "config/examples").glob("*.toml"))
+    examples += sorted((ROOT / "config/demo").glob("*.toml"))
+    models = {path: bare(path) for path in examples if "matrix_um_per_K" in path.read_text()}
+    for path, text in models.items():
+        write("model_file", f"{path.parent.name}_{path.name}", text)
+    for path in examples:
+        text = bare(path)
+        name = f"{path.parent.name}_{path.name}"
+        if path in models:
+            continue
+        if "machine" in path.name and "[model]" not in text:
+            write("machine_file", name, text)
+        elif "[model]" in text:
+            model = path.parent / re.search(r'\[model\]\s*file = "([^"]+)"', text).group(1)
+            write("daemon_config", name, text + "#### model\n" + bare(model))
+    write("model_file", "reference_numbers.toml",
+          'format = 1\ninputs = ["a_degC", "b_K"]\noutputs = ["z_um", "b_urad"]\n'
+          "reference = [20.0, -1e-3]\nmatrix_um_per_K = [[1, -2.5e300], [0.1, 0]]\n"
+          "[covariance]\nmatrix_K2 = [[4.0, 1.5], [1.5, 9.0]]\n")
+    write("model_file", "names_escaped.toml",
+          'format = 1\ninputs = ["\\u00e4 b.c_degC"]\noutputs = ["\\"z_um"]\n'
+          'reference = "first_sample"\nmatrix_um_per_K = [[1.0]]\n')
+    for name, text in {"deep.toml": "a = " + "[" * 300, "dates.toml":
+                       "a = 1979-05-27T07:32:00.999999-07:00\nb = 07:32:00\nc = 0xFFFFFFFFFFFFFFFF\n",
+                       "dotted.toml": "a.b.c.d = 1\n[a.b]\n[[a.b.e]]\n'' = {}\n"}.items():
+        for target in ("model_file", "daemon_config", "machine_file"):
+            write(target, name, text)
+
+
+def run_seeds():
+    write("run_file", "plain.csv", "# a comment\ntime_s,t1_degC,z_um,spindle_rpm,door_on\n"
+          "0,20.0,0,0,1\n1.5,20.25,,1e3,0\n3,nan,-0.125,2000,1\n")
+    write("run_file", "crlf.csv", "time_s,t1_degC\r\n0,20\r\n1,21\r\n\r\n")
+    write("run_file", "selection.csv", "run.csv@0.5:2\ntime_s,a_K\n0,1\n1,2\n2,3\n")
+    write("run_file", "comment_selection.csv", "#r@1:\ntime_s,a b_K\n0,1\n1,2\n")
+    write("run_file", "many_problems.csv", "time_s,a_K,b\n" + "x,inf,\"y\"\n" * 120)
+    write("run_file", "one_column.csv", "time_s\n-1e308\n0\n1e-320\n1e308\n")
+    write("run_file", "wide.csv", ",".join(["time_s"] + [f"t{i}_degC" for i in range(40)]) + "\n" +
+          ",".join("0" * 41) + "\n")
+
+
+def request(method, params=None, number=1):
+    message = {"jsonrpc": "2.0", "id": number, "method": method}
+    if params is not None:
+        message["params"] = params
+    return json.dumps(message) + "\n"
+
+
+def socket_seeds():
+    for method in ("status", "sensors", "offsets", "timing", "model", "reference", "enable",
+                   "disable", "cycle_end", "reload", "controller_state"):
+        write("socket_request", method, request(method, {}))
+    write("socket_request", "measured", request("measured", {"axis": "z", "value_um": -3.5}))
+    write("socket_request", "prove", request("prove", {"axis": "z", "value_um": 5}))
+    write("socket_request", "wrong_axis", request("prove", {"axis": "q", "value_um": 1e300}))
+    write("socket_request", "subscribe", request("subscribe", {"methods": ["status"],
+                                                               "period_s": 0.1}))
+    write("socket_request", "in_pieces", b'{"jsonrpc":"2.0",\xff"id":"x",\xff"method":"timing"}'
+          b'\n\xff{"jsonrpc":"2.0","method":"enable"}\r\n\n')
+    write("socket_request", "half", b'{"jsonrpc":"2.0","id":1,"method":"sta')
+    write("socket_request", "deep", b'{"jsonrpc":"2.0","id":1,"method":"status","params":' +
+          b"[" * 3000 + b"\n")
+    write("socket_request", "deep_object", b'{"a":' * 1500 + b"1" + b"}" * 1500 + b"\n")
+    write("socket_request", "too_long", b'{"jsonrpc":"2.0","id":1,"method":"' + b"x" * 66000)
+    write("socket_request", "kinds", b'[]\n{}\nnull\n"\xc3"\n{"jsonrpc":"2.0","id":[],"method":1}\n'
+          b'{"jsonrpc":"2.0","id":1e999,"method":"status"}\n'
+          b'{"jsonrpc":"2.0","id":null,"method":"status","params":[]}\n')
+
+
+def state_seeds():
+    state = {"format": 1, "program": "thermocomp", "enabled": True,
+             "reference_degC": {"bed_degC": 20.5, "spindle_degC": 21},
+             "model_reference_degC": {"bed_degC": 20.0}, "reference_signals": {"spindle_rpm": 0},
+             "offset_um": {"z": -12.25}}
+    write("state_file", "good", json.dumps(state, indent=2))
+    write("state_file", "newer", json.dumps(dict(state, format=2)))
+    write("state_file", "format_large", json.dumps(dict(state, format=1e300)))
+    write("state_file", "enabled_number", json.dumps(dict(state, enabled=1)))
+    write("state_file", "no_number", json.dumps(dict(state, offset_um={"z": None})))
+    write("state_file", "deep", "[" * 5000)
+    write("state_file", "empty", "")
+
+
+def piece(wrapping, body, delay=0, halves=False):
+    head = wrapping | delay << 2 | (0x80 if halves else 0)
+    return bytes([head, len(body)]) + body
+
+
+def modbus_seeds():
+    """Line, then exchanges: what, table, address, count - 1, pieces (see modbus_answer.cpp)."""
+    framed, for_request, hang_up = 1, 2, 3
+    read = bytes([0, 3, 0, 0, 1])  # two input registers
+    words = bytes([4, 0, 210, 1, 4])
+    bits = bytes([0, 0, 5, 0, 9])  # ten coils
+    for serial in (0, 1):
+        line = bytes([serial])
+        name = "rtu" if serial else "tcp"
+
+        def put(what, content):
+            write("modbus_answer", f"{name}_{what}", line + content)
+
+        put("read", read + bytes([1]) + piece(for_request, words))
+        put("bits", bits + bytes([1]) + piece(for_request, bytes([2, 0x55, 0x01])))
+        put("halves", read + bytes([1]) + piece(for_request, words, halves=True))
+        put("wrong_length", read + bytes([1]) + piece(for_request, words[:-1]))
+        put("late", (read + bytes([1]) + piece(for_request, words, delay=5)) * 2)
+        put("nothing", read + bytes([0]) + read + bytes([1]) + piece(for_request, words))
+        put("twice", read + bytes([2]) + piece(for_request, words) + piece(for_request, words) +
+            read + bytes([0]))
+        put("hang_up", read + bytes([1]) + piece(hang_up, words))
+        put("exception", read + bytes([1]) + piece(framed, bytes([1, 0x84, 2])))
+        put("exception_0", read + bytes([1]) + piece(framed, bytes([1, 0x84, 0])))
+        put("exception_200", (read + bytes([1]) + piece(framed, bytes([1, 0x84, 200]))) * 2)
+        put("other_unit", read + bytes([2]) + piece(framed, bytes([2, 4]) + words) +
+            piece(for_request, words))
+        put("rubbish", read + bytes([1]) + piece(0, bytes(range(60)), halves=True))
+        put("write", bytes([2, 7, 0, 1]) + bytes([1]) + piece(for_request, bytes([0, 7, 0, 2])))
+        put("coil", bytes([3, 7, 0, 1]) + bytes([1]) + piece(for_request, bytes([0, 7, 0xFF, 0])))
+        put("longest", bytes([0, 3, 0, 0, 124]) + bytes([1]) +
+            piece(for_request, bytes([250]) + bytes(250)))
+
+
+def can_seeds():
+    def message(kind, number, data, length=None):
+        return (bytes([kind]) + struct.pack("<HB", number, len(data) if length is None else length) +
+                data.ljust(8, b"\0"))
+
+    two = bytes([1, 2]) + struct.pack("<HBB", 0x100, 0, 15) + bytes([3]) + struct.pack(
+        "<HBB", 0x101, 7, 31)
+    write("can_frames", "frames", two + message(0, 0x100, b"\x10\x02" * 4) +
+          message(0, 0x101, bytes(8)) + b"\x80" + message(1, 0x100, b"\1"))
+    errors = b"".join(message(2, kind, bytes([0, state]))
+                      for kind, state in ((0x40, 0), (0x100, 0), (4, 0x30), (4, 0x0C), (4, 0x40)))
+    write("can_frames", "errors", two + errors)
+    write("can_frames", "stamps", two + message(16, 0x100, bytes(8)) + bytes(16) +
+          message(48, 0x100, bytes(8)) + b"\xff" * 24)
+    write("can_frames", "odd_sizes", two + message(8, 0x100, bytes(8), 255) + b"\x08" +
+          message(4, 0x100, bytes(8)))
+    write("can_signal", "intel", bytes([2, 0, 16, 0, 1, 3, 100, 0, 8]) + bytes(range(8)) + bytes(16))
+    write("can_signal", "motorola", bytes([1, 7, 32, 0, 1, 3, 100, 0, 8]) + bytes(range(24)))
+    write("can_signal", "float", bytes([0x84, 0, 64, 0, 1]) + struct.pack("<dd", 0.5, -1.0) +
+          bytes([1]) + struct.pack("<qB", -1, 3) + bytes([8]) + struct.pack("<d", 12.5) + bytes(16))
+    write("modbus_registers", "int16", bytes([3, 0, 0, 120, 1]) + struct.pack("<qBH", 32767, 2, 210))
+    for encoding in range(6):
+        write("modbus_registers", f"encoding_{encoding}", bytes([2, encoding + 6, 9, 100, 0]) +
+              struct.pack("<d", 20.5) + struct.pack("<dH", 1e9, 0xFF))
+    write("modbus_registers", "any_scale", bytes([3, 0x80 + 5]) + struct.pack("<dd", 1e-300, 1e300) +
+          bytes(30))
+
+
+def history_seeds(history):
+    # kind, detail, cycle, index, time, value: see chunk_codec.hpp
+    records = bytes([0, 0, 0, 0, 2, 0x62, 0x34, 0x40]) + bytes([0, 0, 2, 0, 2, 0])
+    write("history_chunk", "readings", bytes([0, 2, 0]) + records)
+    write("history_chunk", "every_kind", bytes([0, 9, 0]) +
+          b"".join(bytes([kind, 1, 2, 1, 4, 0x71, 0x3F]) for kind in range(9)))
+    write("history_chunk", "inputs", bytes([1, 1]) + struct.pack("<d", 20.5) + bytes([2, 0]) +
+          bytes([4, 1, 1]) + bytes(64 * 8))
+    write("history_rows", "good", b"")
+    for kind in range(7):
+        write("history_rows", f"edit_{kind}", bytes([kind, 0, 1, 0, 2, 5, 9, 200, 0, 1, 7, 7, 7]))
+    records = bytes([2, 0, 4]) + b"".join(
+        struct.pack("<BBBBBB", kind, 2, 0, 2, 20, 5) for kind in (0, 1, 5, 6))
+    write("history_rows", "records", records)
+    for column in range(10):
+        write("history_rows", f"segment_{column}", bytes([0, 0, column, 0xFF]) + b"\xff" * 7 + b"\x7f")
+    if history:
+        data = pathlib.Path(history).read_bytes()
+        write("history_file", "good.db", data)
+        write("history_file", "cut.db", data[: len(data) // 2])
+        write("history_file", "header.db", data[:100])
+        write("history_file", "no_history", "time_s,a_K\n0,1\n")
+
+
+def dictionary(name, words):
+    lines = []
+    for word in sorted(words):
+        text = "".join(c if 32 <= ord(c) < 127 and c not in '"\\' else "\\x%02x" % ord(c)
+                       for c in word)
+        lines.append(f'"{text}"\n')
+    (DICTIONARIES / f"{name}.dict").write_text("".join(lines))
+
+
+def literals(*patterns):
+    words = set()
+    for pattern in patterns:
+        for path in ROOT.glob(pattern):
+            words.update(re.findall(r'"([A-Za-z_][A-Za-z_0-9]{1,40})"', path.read_text()))
+    return words
+
+
+def dictionaries():
+    DICTIONARIES.mkdir(exist_ok=True)
+    toml = {"[[", "]]", " = ", "true", "false", "nan", "-inf", "1e300", '"""', "0x", "{ ", " }", "\n[",
+            "\\u0000", "1979-05-27T07:32:00Z"}
+    model = literals("config/model_file.cpp", "estimator/terms/*.cpp", "config/units.cpp")
+    dictionary("model_file", toml | model)
+    dictionary("daemon_config", toml | model | {"#### model\n"} |
+               literals("config/daemon_config.cpp", "config/sections/*.cpp"))
+    dictionary("machine_file", toml | literals("simulator/*_file.cpp", "config/sections/*.cpp"))
+    dictionary("run_file", {"time_s", "_degC", "_um", ",", "nan", "inf", "1e308", "1e-320", "\r\n",
+                            "# ", "@", ":", "-0"})
+    dictionary("socket_request", {'{"jsonrpc":"2.0","id":1,"method":"', '"params":{', "}\n", "\xff",
+                                  "\r\n", "1e999", "null", '\\ud800'} |
+               literals("daemon/operator_desk.cpp", "daemon/socket/*.cpp"))
+    dictionary("state_file", {"1e300", "null", "\\ud800", '{"'} |
+               literals("daemon/state/state_file.cpp"))
+    dictionary("history_file", {"SQLite format 3", "thco", "segment", "chunk", "setup", "meta"})
+
+
+def main():
+    toml_seeds()
+    run_seeds()
+    socket_seeds()
+    state_seeds()
+    modbus_seeds()
+    can_seeds()
+    history_seeds(sys.argv[1] if len(sys.argv) > 1 else None)
+    dictionaries()
+
+
+main()
