@@ -1,12 +1,17 @@
 #include "daemon/socket/listening_socket.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
 #include <string>
+#include <time.h>
 #include <unistd.h>
 #include <utility>
 
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/select.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -28,6 +33,35 @@ sockaddr_un address_of(const std::filesystem::path& path) {
   return address;
 }
 
+/// Connections that wait to be accepted; more wait in connect(). The kernel may allow fewer.
+constexpr int backlog = 256;
+/// Of one connection, in the kernel. Its default of 208 KiB would be 250 MB for all of them.
+constexpr int send_buffer_bytes = 32 * 1024;
+/// What the daemon needs beside its clients: buses, history, log, epoll.
+constexpr rlim_t other_descriptors = 128;
+
+/// Of two daemons started at once, the second must see the first listening. The lock is on the
+/// socket's folder, so that no file is left; whoever can read the folder could hold it, so it is
+/// not waited for longer than another start takes.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder)
+      : fd_(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    const timespec pause{0, 20'000'000};
+    for (int i = 0; fd_ >= 0 && i < 50 && flock(fd_, LOCK_EX | LOCK_NB) != 0; ++i) {
+      nanosleep(&pause, nullptr);
+    }
+  }
+  ~FolderLock() {
+    if (fd_ >= 0) close(fd_);
+  }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int fd_;
+};
+
 [[noreturn]] void fail(const std::filesystem::path& path) {
   throw SocketError("status socket " + path.string() + ": " + std::strerror(errno));
 }
@@ -36,13 +70,15 @@ sockaddr_un address_of(const std::filesystem::path& path) {
 
 ListeningSocket::ListeningSocket(std::filesystem::path path) : path_(std::move(path)) {
   const sockaddr_un address = address_of(path_);
+  const FolderLock lock(path_.parent_path());
   remove_stale();
   fd_ = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) fail(path_);
   struct stat status {};
   const bool listens =
       bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
-      chmod(path_.c_str(), 0666) == 0 && listen(fd_, 64) == 0 && stat(path_.c_str(), &status) == 0;
+      chmod(path_.c_str(), 0666) == 0 && listen(fd_, backlog) == 0 &&
+      stat(path_.c_str(), &status) == 0;
   if (!listens) {
     const int error = errno;
     close(fd_);
@@ -90,7 +126,29 @@ int ListeningSocket::accept_one() noexcept {
     if (refused >= 0) close(refused);
     reserve_fd_ = open("/dev/null", O_RDONLY | O_CLOEXEC);
   }
-  return fd;
+  if (fd < 0) return fd;
+  setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &send_buffer_bytes, sizeof send_buffer_bytes);
+  if (fd >= FD_SETSIZE) return fd;
+  const int high = fcntl(fd, F_DUPFD_CLOEXEC, FD_SETSIZE);
+  if (high < 0) return fd;
+  close(fd);
+  return high;
+}
+
+std::size_t places_for_descriptors(std::size_t wanted) noexcept {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return std::min<std::size_t>(wanted, 64);
+  const rlim_t needed = FD_SETSIZE + wanted + other_descriptors;
+  if (limit.rlim_cur < needed) {
+    rlimit raised = limit;
+    raised.rlim_cur = std::min(limit.rlim_max, needed);
+    if (setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
+  }
+  if (limit.rlim_cur >= needed) return wanted;
+  // Some may have to share the low numbers with the buses then: half of them is theirs.
+  const rlim_t half = std::min<rlim_t>(limit.rlim_cur, FD_SETSIZE) / 2;
+  const rlim_t beyond = limit.rlim_cur > FD_SETSIZE ? limit.rlim_cur - FD_SETSIZE : 0;
+  return std::min<std::size_t>(wanted, std::max(half, beyond));
 }
 
 }  // namespace thermocomp

@@ -2,6 +2,7 @@
 /// files.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 
 #include <sys/types.h>
@@ -17,7 +18,9 @@ class ListeningSocket {
   ListeningSocket& operator=(const ListeningSocket&) = delete;
 
   [[nodiscard]] int fd() const noexcept { return fd_; }
-  /// The next connection, non-blocking; -1 when there is none.
+  /// The next connection, non-blocking; -1 when there is none. Its number is beyond those that
+  /// select() can wait for, where the limit of open files allows it: libmodbus waits with select(),
+  /// and the buses shall not run out of such numbers because many clients are connected.
   [[nodiscard]] int accept_one() noexcept;
 
  private:
@@ -29,5 +32,9 @@ class ListeningSocket {
   dev_t device_{0};
   ino_t inode_{0};
 };
+
+/// Raises the process' soft limit of open files, as far as it may, to what so many connections need
+/// beside the rest of the daemon. @return for how many connections there is room, at most `wanted`
+[[nodiscard]] std::size_t places_for_descriptors(std::size_t wanted) noexcept;
 
 }  // namespace thermocomp

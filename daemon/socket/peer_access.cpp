@@ -10,7 +10,6 @@
 namespace thermocomp {
 namespace {
 
-/// Looked up for every connection, so that a group made later counts without a restart.
 std::optional<gid_t> group_called(const std::string& name) {
   group entry{};
   group* found = nullptr;
@@ -67,18 +66,22 @@ std::optional<Peer> peer_of(int socket_fd) {
   return peer;
 }
 
-PeerAccess access_of(const Peer& peer, uid_t daemon_user, const SocketConfig& config) {
+AccessGroups look_up_groups(const SocketConfig& config) {
+  return {group_called(config.read_group), group_called(config.operator_group),
+          group_called(config.bridge_group)};
+}
+
+PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& groups) {
   if (peer.user == 0) return {true, true, true};
   const bool is_own_user = peer.user == daemon_user;
-  const auto allowed = [&](const std::string& name) {
-    const std::optional<gid_t> group = group_called(name);
+  const auto allowed = [&](const std::optional<gid_t>& group) {
     // Without the groups this is a development daemon, and its own user stands for all of them.
     return group ? is_member(peer, *group) : is_own_user;
   };
   PeerAccess access;
-  access.operate = allowed(config.operator_group);
-  access.bridge = allowed(config.bridge_group);
-  access.read = is_own_user || access.operate || access.bridge || allowed(config.read_group);
+  access.operate = allowed(groups.operate);
+  access.bridge = allowed(groups.bridge);
+  access.read = is_own_user || access.operate || access.bridge || allowed(groups.read);
   return access;
 }
 

@@ -9,6 +9,7 @@
 #include <sys/types.h>
 
 #include "config/daemon_config.hpp"
+#include "daemon/socket/rpc.hpp"
 
 namespace thermocomp {
 
@@ -18,15 +19,18 @@ struct Peer {
   std::vector<gid_t> groups;  ///< supplementary
 };
 
-struct PeerAccess {
-  bool read{false};
-  bool operate{false};
-  bool bridge{false};
+/// The groups of the configuration as the system knows them; nothing for those it does not know.
+struct AccessGroups {
+  std::optional<gid_t> read;
+  std::optional<gid_t> operate;
+  std::optional<gid_t> bridge;
 };
 
+/// Asks the system, which may ask a server of the site: not for every connection of many.
+[[nodiscard]] AccessGroups look_up_groups(const SocketConfig& config);
 /// As the kernel noted them at connect(). @return nothing when it does not tell
 [[nodiscard]] std::optional<Peer> peer_of(int socket_fd);
 /// @param daemon_user  the effective user of the daemon
-[[nodiscard]] PeerAccess access_of(const Peer& peer, uid_t daemon_user, const SocketConfig& config);
+[[nodiscard]] PeerAccess access_of(const Peer& peer, uid_t daemon_user, const AccessGroups& groups);
 
 }  // namespace thermocomp

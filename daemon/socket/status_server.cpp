@@ -2,140 +2,66 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cmath>
+#include <deque>
 #include <map>
 #include <optional>
 #include <unistd.h>
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/timerfd.h>
 
 #include "daemon/socket/listening_socket.hpp"
 #include "daemon/socket/peer_access.hpp"
+#include "daemon/socket/request_desk.hpp"
+#include "daemon/socket/served_client.hpp"
 
 namespace thermocomp {
 namespace {
 
-using nlohmann::json;
 using Clock = std::chrono::steady_clock;
+using ClientId = std::uint64_t;
+using Alarms = std::multimap<Clock::time_point, ClientId>;
 
-constexpr double period_s_min = 0.1;
-constexpr double period_s_max = 60.0;
-constexpr std::size_t subscribed_methods_max = 16;
+// What epoll gives back for what is no client.
+constexpr ClientId listener_id = 0;
+constexpr ClientId timer_id = 1;
+constexpr ClientId first_client_id = 2;
 
-struct Subscription {
-  std::vector<std::string> methods;
-  Clock::duration period{};
-  Clock::time_point due{};
-};
+constexpr int accepted_a_turn = 64;
+constexpr auto time_outs_checked_every = std::chrono::milliseconds(250);
+constexpr auto groups_known_for = std::chrono::seconds(5);
 
-struct Client {
-  int fd{-1};
-  PeerAccess access;
-  std::string input;
-  std::string output;
-  std::size_t sent{0};      ///< bytes at the front of `output` that are gone already
-  bool input_ended{false};  ///< the peer sends no more; answers may still be owed
-  bool close_when_sent{false};
-  bool broken{false};          ///< to be closed at the end of the round
-  bool waits_for_room{false};  ///< epoll tells when it can be written to
-  std::optional<Subscription> subscription;
-};
-
-struct Method {
-  AccessClass access{AccessClass::read};
-  RpcHandler handler;
-};
-
-/// NaN becomes null; bytes that are no UTF-8 (a device's answer in an error text) are replaced.
-std::string to_line(const json& message) {
-  return message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
-}
-
-json error_message(const json& id, int code, const std::string& text) {
-  return {{"jsonrpc", "2.0"}, {"id", id}, {"error", {{"code", code}, {"message", text}}}};
-}
-
-bool is_allowed(const PeerAccess& access, AccessClass needed) {
-  switch (needed) {
-    case AccessClass::read:
-      return access.read;
-    case AccessClass::operate:
-      return access.operate;
-    case AccessClass::bridge:
-      return access.bridge;
-  }
-  return false;
-}
-
-/// A request that has the shape of one.
-struct Request {
-  json id;  ///< null where there is none
-  bool is_notification{false};
-  std::string method;
-  json params = json::object();
-};
-
-/// @throws RpcError; `out.id` is set as soon as it is known
-void parse_request(const std::string& line, Request& out) {
-  const json message = json::parse(line, nullptr, false);
-  if (message.is_discarded()) throw RpcError(rpc::parse_error, "this line is no JSON");
-  if (message.is_array()) {
-    throw RpcError(rpc::invalid_request, "batches are not supported: send one object a line");
-  }
-  if (!message.is_object()) throw RpcError(rpc::invalid_request, "a request must be an object");
-  const auto id = message.find("id");
-  out.is_notification = id == message.end();
-  if (!out.is_notification) {
-    if (!id->is_string() && !id->is_number() && !id->is_null()) {
-      throw RpcError(rpc::invalid_request, "id must be a string, a number or null");
-    }
-    out.id = *id;
-  }
-  const auto version = message.find("jsonrpc");
-  if (version == message.end() || *version != "2.0") {
-    throw RpcError(rpc::invalid_request, "jsonrpc must be \"2.0\"");
-  }
-  const auto method = message.find("method");
-  if (method == message.end() || !method->is_string()) {
-    throw RpcError(rpc::invalid_request, "method must be a string");
-  }
-  out.method = method->get<std::string>();
-  const auto params = message.find("params");
-  if (params == message.end()) return;
-  if (!params->is_object()) throw RpcError(rpc::invalid_params, "params must be an object");
-  out.params = *params;
+std::string seconds_text(Clock::duration duration) {
+  return std::to_string(std::chrono::ceil<std::chrono::seconds>(duration).count()) + " s";
 }
 
 }  // namespace
 
 struct StatusServer::Parts {
   SocketConfig config;
+  SocketLimits limits;
   ListeningSocket listener;
+  RequestDesk desk;
   int epoll_fd{-1};
   int timer_fd{-1};
-  std::map<int, Client> clients;
-  std::map<std::string, Method, std::less<>> methods;
+  std::map<ClientId, ServedClient> clients;
+  ClientId next_id{first_client_id};
+  std::size_t strangers{0};
+  TokenBucket all_tokens;
+  std::deque<ClientId> ready;  ///< have a whole request; each one's turn comes
+  Alarms resting;              ///< the same, but over their rate until then
+  Alarms subscribers;          ///< when they are to be told next
+  std::vector<ClientId> broken;
+  AccessGroups groups;
+  std::optional<Clock::time_point> groups_asked;
+  Clock::time_point time_outs_checked_next{};
   SocketStatistics statistics;
 
-  explicit Parts(const SocketConfig& config_in) : config(config_in), listener(config_in.path) {
-    epoll_fd = epoll_create1(EPOLL_CLOEXEC);
-    timer_fd = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
-    if (epoll_fd < 0 || timer_fd < 0 || !watch(listener.fd(), EPOLLIN, EPOLL_CTL_ADD) ||
-        !watch(timer_fd, EPOLLIN, EPOLL_CTL_ADD)) {
-      close_own();
-      throw SocketError("status socket: epoll is not available");
-    }
-  }
-  ~Parts() {
-    for (const auto& [fd, client] : clients) close(fd);
-    close_own();
-  }
+  Parts(const SocketConfig& config_in, const SocketLimits& limits_in);
+  ~Parts() { close_own(); }
   Parts(const Parts&) = delete;
   Parts& operator=(const Parts&) = delete;
 
@@ -143,272 +69,351 @@ struct StatusServer::Parts {
     if (epoll_fd >= 0) close(epoll_fd);
     if (timer_fd >= 0) close(timer_fd);
   }
-  [[nodiscard]] bool watch(int fd, std::uint32_t events, int operation) const noexcept {
-    epoll_event event{};
-    event.events = events;
-    event.data.fd = fd;
-    return epoll_ctl(epoll_fd, operation, fd, &event) == 0;
-  }
+  [[nodiscard]] bool watch(int fd, ClientId id, std::uint32_t events, int operation) const noexcept;
+  [[nodiscard]] ServedClient* find(ClientId id);
 
-  void accept_all();
-  void refuse(int fd);
-  void on_client(Client& client, std::uint32_t events);
-  void read_some(Client& client);
-  void take_lines(Client& client);
-  void answer(Client& client, const std::string& line);
-  [[nodiscard]] json call(Client& client, const Request& request);
-  [[nodiscard]] json subscribe(Client& client, const json& params);
-  void send(Client& client, const std::string& text);
-  void flush(Client& client);
-  void rewatch(Client& client);
-  void notify_due();
-  void set_timer();
+  void accept_some();
+  void take(int fd, Clock::time_point now);
+  void refuse(int fd, const std::string& why);
+  [[nodiscard]] PeerAccess access(const Peer& peer, Clock::time_point now);
+  [[nodiscard]] bool make_room(Clock::time_point now);
+  void on_client(ClientId id, std::uint32_t events);
+  void arrange(ClientId id, ServedClient& client);
+  void serve(Clock::time_point turn_end);
+  void answer_one(ClientId id, ServedClient& client, Clock::time_point now);
+  void wake_rested(Clock::time_point now);
+  void notify(Clock::time_point turn_end);
+  void tell(ServedClient& client, std::map<std::string, std::string>& lines, Clock::time_point now);
+  void check_time_outs(Clock::time_point now);
+  void cut_off(ClientId id, ServedClient& client, const std::string& why, int code = rpc::cut_off);
+  void keep_memory_bounded();
+  void end(ClientId id, ServedClient& client);
   void close_broken();
+  void set_timer();
 };
 
-void StatusServer::Parts::accept_all() {
-  for (int fd = listener.accept_one(); fd >= 0; fd = listener.accept_one()) {
-    const std::optional<Peer> peer = peer_of(fd);
-    if (clients.size() >= clients_max || !peer || !watch(fd, EPOLLIN, EPOLL_CTL_ADD)) {
-      refuse(fd);
-      continue;
-    }
-    Client client;
-    client.fd = fd;
-    client.access = access_of(*peer, geteuid(), config);
-    clients.emplace(fd, std::move(client));
-    ++statistics.accepted;
+StatusServer::Parts::Parts(const SocketConfig& config_in, const SocketLimits& limits_in)
+    : config(config_in),
+      limits(limits_in),
+      listener(config_in.path),
+      desk(config_in),
+      all_tokens(limits.all_requests_per_s, limits.all_requests_burst) {
+  limits.clients_max = places_for_descriptors(limits.clients_max);
+  limits.operator_places = std::min(limits.operator_places, limits.clients_max / 4);
+  epoll_fd = epoll_create1(EPOLL_CLOEXEC);
+  timer_fd = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
+  if (epoll_fd < 0 || timer_fd < 0 || !watch(listener.fd(), listener_id, EPOLLIN, EPOLL_CTL_ADD) ||
+      !watch(timer_fd, timer_id, EPOLLIN, EPOLL_CTL_ADD)) {
+    close_own();
+    throw SocketError("status socket: epoll is not available");
   }
 }
 
-void StatusServer::Parts::refuse(int fd) {
-  const std::string line = to_line(error_message(
-      nullptr, rpc::refused,
-      "the daemon has " + std::to_string(clients_max) + " clients already; try again later"));
+bool StatusServer::Parts::watch(int fd, ClientId id, std::uint32_t events,
+                                int operation) const noexcept {
+  epoll_event event{};
+  event.events = events;
+  event.data.u64 = id;
+  return epoll_ctl(epoll_fd, operation, fd, &event) == 0;
+}
+
+ServedClient* StatusServer::Parts::find(ClientId id) {
+  const auto found = clients.find(id);
+  return found == clients.end() || found->second.broken ? nullptr : &found->second;
+}
+
+// ---- who is new
+
+void StatusServer::Parts::accept_some() {
+  const Clock::time_point now = Clock::now();
+  for (int i = 0; i < accepted_a_turn; ++i) {
+    const int fd = listener.accept_one();
+    if (fd < 0) return;
+    take(fd, now);
+  }
+}
+
+void StatusServer::Parts::take(int fd, Clock::time_point now) {
+  const std::optional<Peer> peer = peer_of(fd);
+  const PeerAccess allowed = peer ? access(*peer, now) : PeerAccess{};
+  if (!allowed.any() && strangers >= limits.strangers_max) {
+    return refuse(fd, "only for members of " + config.read_group);
+  }
+  const std::size_t places = limits.clients_max - (allowed.operate ? 0 : limits.operator_places);
+  if (clients.size() >= places && !make_room(now)) {
+    return refuse(fd, "the daemon has " + std::to_string(clients.size()) +
+                          " clients already; try again later");
+  }
+  const ClientId id = next_id++;
+  if (!watch(fd, id, EPOLLIN, EPOLL_CTL_ADD)) return refuse(fd, "no resources left");
+  ServedClient& client =
+      clients
+          .try_emplace(id, fd, allowed, TokenBucket(limits.requests_per_s, limits.requests_burst),
+                       now)
+          .first->second;
+  client.watched = EPOLLIN;
+  if (!allowed.any()) ++strangers;
+  ++statistics.accepted;
+}
+
+void StatusServer::Parts::refuse(int fd, const std::string& why) {
+  const std::string line = error_line(rpc::refused, why);
   // A fresh socket's buffer always has room for a line; if not, closing says enough.
-  static_cast<void>(::send(fd, line.data(), line.size(), MSG_NOSIGNAL));
+  static_cast<void>(::send(fd, line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
   close(fd);
   ++statistics.refused;
 }
 
-void StatusServer::Parts::on_client(Client& client, std::uint32_t events) {
-  if ((events & EPOLLIN) != 0) read_some(client);
-  if ((events & EPOLLOUT) != 0) flush(client);
-  if ((events & EPOLLERR) != 0 || ((events & EPOLLHUP) != 0 && (events & EPOLLIN) == 0)) {
-    client.broken = true;
+/// A group made later counts without a restart, within seconds.
+PeerAccess StatusServer::Parts::access(const Peer& peer, Clock::time_point now) {
+  if (peer.user == 0) return {true, true, true};
+  if (!groups_asked || now - *groups_asked > groups_known_for) {
+    groups = look_up_groups(config);
+    groups_asked = Clock::now();
   }
+  return access_of(peer, geteuid(), groups);
 }
 
-/// One read a round, so that a client that never stops sending does not keep the others waiting.
-void StatusServer::Parts::read_some(Client& client) {
-  std::array<char, std::size_t{16} * 1024> bytes{};
-  const ssize_t count = recv(client.fd, bytes.data(), bytes.size(), 0);
-  if (count > 0) {
-    client.input.append(bytes.data(), static_cast<std::size_t>(count));
-    take_lines(client);
-  } else if (count == 0) {
-    client.input_ended = true;
-    if (client.output.empty() && !client.subscription) client.broken = true;
-    rewatch(client);
-  } else if (errno != EAGAIN && errno != EINTR) {
-    client.broken = true;
-  }
-}
-
-void StatusServer::Parts::take_lines(Client& client) {
-  std::size_t begin = 0;
-  while (!client.broken && !client.close_when_sent) {
-    const std::size_t end = client.input.find('\n', begin);
-    const std::size_t length = (end == std::string::npos ? client.input.size() : end) - begin;
-    if (length > line_bytes_max) {
-      ++statistics.dropped;
-      ++statistics.errors;
-      client.close_when_sent = true;
-      send(client, to_line(error_message(
-                       nullptr, rpc::invalid_request,
-                       "a line has at most " + std::to_string(line_bytes_max) + " bytes")));
-      break;
-    }
-    if (end == std::string::npos) break;
-    std::string line = client.input.substr(begin, length);
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (!line.empty()) answer(client, line);
-    begin = end + 1;
-  }
-  client.input.erase(0, begin);
-}
-
-void StatusServer::Parts::answer(Client& client, const std::string& line) {
-  ++statistics.requests;
-  Request request;
-  json reply;
-  bool is_parsed = false;
-  try {
-    parse_request(line, request);
-    is_parsed = true;
-    reply = {{"jsonrpc", "2.0"}, {"id", request.id}, {"result", call(client, request)}};
-  } catch (const RpcError& error) {
-    reply = error_message(request.id, error.code(), error.what());
-  } catch (const json::exception& error) {
-    reply = error_message(request.id, rpc::invalid_params, error.what());
-  } catch (const std::exception& error) {
-    reply = error_message(request.id, rpc::internal_error, error.what());
-  }
-  if (reply.contains("error")) ++statistics.errors;
-  if (is_parsed && request.is_notification) return;  // as the protocol wants it
-  send(client, to_line(reply));
-}
-
-json StatusServer::Parts::call(Client& client, const Request& request) {
-  if (request.method == "subscribe") return subscribe(client, request.params);
-  const auto method = methods.find(request.method);
-  if (method == methods.end()) {
-    throw RpcError(rpc::method_not_found, "there is no method of this name");
-  }
-  if (!is_allowed(client.access, method->second.access)) {
-    const AccessClass needed = method->second.access;
-    const std::string who = needed == AccessClass::read      ? "members of " + config.read_group
-                            : needed == AccessClass::operate ? "members of " + config.operator_group
-                                                             : "members of " + config.bridge_group;
-    throw RpcError(rpc::not_permitted, request.method + ": only for root and " + who);
-  }
-  return method->second.handler(request.params);
-}
-
-json StatusServer::Parts::subscribe(Client& client, const json& params) {
-  if (!client.access.read) {
-    throw RpcError(rpc::not_permitted,
-                   "subscribe: only for root and members of " + config.read_group);
-  }
-  for (const auto& [key, value] : params.items()) {
-    if (key != "methods" && key != "period_s") {
-      throw RpcError(rpc::invalid_params, "subscribe takes methods and period_s");
+/// Ends the client that has been idle longest, if that is long.
+bool StatusServer::Parts::make_room(Clock::time_point now) {
+  auto oldest = clients.end();
+  for (auto each = clients.begin(); each != clients.end(); ++each) {
+    if (!each->second.is_idle() || each->second.broken) continue;
+    if (oldest == clients.end() || each->second.last_request < oldest->second.last_request) {
+      oldest = each;
     }
   }
-  const json period = params.value("period_s", json(1.0));
-  const double period_s = period.is_number() ? period.get<double>() : not_a_number;
-  if (!(period_s >= period_s_min && period_s <= period_s_max)) {
-    throw RpcError(rpc::invalid_params, "period_s must be a number in [0.1, 60]");
+  if (oldest == clients.end() || now - oldest->second.last_request < limits.replaceable_after) {
+    return false;
   }
-  const json names = params.value("methods", json::array({"status"}));
-  if (!names.is_array() || names.empty() || names.size() > subscribed_methods_max) {
-    throw RpcError(rpc::invalid_params, "methods must be a list of 1 to 16 names");
-  }
-  Subscription subscription;
-  for (const json& name : names) {
-    const auto method = name.is_string() ? methods.find(name.get<std::string>()) : methods.end();
-    if (method == methods.end() || method->second.access != AccessClass::read) {
-      throw RpcError(rpc::invalid_params, "methods may name reading methods only");
-    }
-    subscription.methods.push_back(method->first);
-  }
-  subscription.period =
-      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period_s));
-  subscription.due = Clock::now();
-  json result = {{"methods", subscription.methods}, {"period_s", period_s}};
-  client.subscription = std::move(subscription);
-  set_timer();
-  return result;
+  cut_off(oldest->first, oldest->second, "idle, and its place is needed");
+  close_broken();
+  return true;
 }
 
-void StatusServer::Parts::send(Client& client, const std::string& text) {
-  if (client.broken) return;
-  if (client.output.size() - client.sent + text.size() > output_bytes_max) {
-    ++statistics.dropped;
-    client.broken = true;
+// ---- what clients want
+
+void StatusServer::Parts::on_client(ClientId id, std::uint32_t events) {
+  ServedClient* client = find(id);
+  if (client == nullptr) return;
+  const Clock::time_point now = Clock::now();
+  if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
+    // epoll would report it for ever; what was sent before is still read and done.
+    client->hung_up = true;
+    epoll_ctl(epoll_fd, EPOLL_CTL_DEL, client->fd, nullptr);
+  } else if ((events & EPOLLOUT) != 0) {
+    client->flush(now);
+  } else if ((events & EPOLLIN) != 0) {
+    client->receive(now);
+  }
+  arrange(id, *client);
+}
+
+/// Decides what the client waits for: its turn, its bytes, its reading, or its end.
+void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
+  if (client.input.is_too_long() && !client.close_when_sent) {
+    return cut_off(id, client,
+                   "a line has at most " + std::to_string(LineBuffer::line_bytes_max) + " bytes",
+                   rpc::invalid_request);
+  }
+  while (client.hung_up && !client.input_ended && !client.input.has_line() && !client.broken) {
+    client.receive(Clock::now());
+    if (client.input.is_too_long()) client.broken = true;
+  }
+  const std::size_t held = client.held_bytes();
+  statistics.buffered_bytes += held - client.counted_bytes;
+  client.counted_bytes = held;
+
+  std::uint32_t events = 0;
+  if (client.broken || (client.hung_up && client.owes())) {
+    return end(id, client);
+  } else if (client.owes()) {
+    events = EPOLLOUT;
+  } else if (client.close_when_sent) {
+    return end(id, client);
+  } else if (client.input.has_line()) {
+    if (!client.queued) ready.push_back(id);
+    client.queued = true;
+  } else if (client.input_ended) {
+    if (!client.subscription || client.hung_up) return end(id, client);
+  } else {
+    events = EPOLLIN;
+  }
+  if (events == client.watched || client.hung_up) return;
+  client.watched = events;
+  if (!watch(client.fd, id, events, EPOLL_CTL_MOD)) end(id, client);
+}
+
+void StatusServer::Parts::serve(Clock::time_point turn_end) {
+  // The first one always: commands may take longer than a turn.
+  for (Clock::time_point now = Clock::now(); !ready.empty(); now = Clock::now()) {
+    if (!all_tokens.try_take(now)) return;
+    const ClientId id = ready.front();
+    ready.pop_front();
+    ServedClient* client = find(id);
+    if (client == nullptr) {
+      all_tokens.give_back();
+    } else if (!client->tokens.try_take(now)) {
+      all_tokens.give_back();
+      resting.emplace(client->tokens.next(now), id);
+      ++statistics.delayed;
+    } else {
+      client->queued = false;
+      answer_one(id, *client, now);
+    }
+    if (Clock::now() >= turn_end) return;
+  }
+}
+
+void StatusServer::Parts::answer_one(ClientId id, ServedClient& client, Clock::time_point now) {
+  std::string line;
+  if (client.input.take(line) && !line.empty()) {
+    ++statistics.requests;
+    Answer answer = desk.answer(client.access, line);
+    now = Clock::now();
+    client.last_request = now;
+    client.line_begun = now;
+    if (answer.is_error) ++statistics.errors;
+    if (answer.subscription) {
+      client.subscription = std::move(answer.subscription);
+      client.notified_next = now;
+      subscribers.emplace(now, id);
+    }
+    if (!client.access.any()) client.close_when_sent = true;
+    client.send(answer.text, now);
+  }
+  arrange(id, client);
+}
+
+void StatusServer::Parts::wake_rested(Clock::time_point now) {
+  while (!resting.empty() && resting.begin()->first <= now) {
+    ready.push_back(resting.begin()->second);
+    resting.erase(resting.begin());
+  }
+}
+
+// ---- subscriptions
+
+void StatusServer::Parts::notify(Clock::time_point turn_end) {
+  std::map<std::string, std::string> lines;  // each method is asked once, however many subscribed
+  while (!subscribers.empty()) {
+    const Clock::time_point now = Clock::now();
+    const auto [due, id] = *subscribers.begin();
+    if (due > now || now >= turn_end) return;
+    subscribers.erase(subscribers.begin());
+    ServedClient* client = find(id);
+    // Another time in the client: this entry was of the subscription before.
+    if (client == nullptr || client->notified_next != due) continue;
+    tell(*client, lines, now);
+    client->notified_next = std::max(due + client->subscription->period, now);
+    subscribers.emplace(client->notified_next, id);
+    arrange(id, *client);
+  }
+}
+
+void StatusServer::Parts::tell(ServedClient& client, std::map<std::string, std::string>& lines,
+                               Clock::time_point now) {
+  if (client.owes()) {
+    ++client.missed;
+    ++statistics.missed;
     return;
   }
-  client.output += text;
-  flush(client);
+  std::string text;
+  if (client.missed > 0) text = missed_line(std::exchange(client.missed, 0));
+  for (const std::string& name : client.subscription->methods) {
+    auto line = lines.find(name);
+    if (line == lines.end()) line = lines.emplace(name, desk.notification(name)).first;
+    text += line->second;
+  }
+  client.send(text, now);
 }
 
-void StatusServer::Parts::flush(Client& client) {
-  while (client.sent < client.output.size()) {
-    const ssize_t count = ::send(client.fd, client.output.data() + client.sent,
-                                 client.output.size() - client.sent, MSG_NOSIGNAL);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0 && errno != EAGAIN) client.broken = true;
-    if (count < 0) break;
-    client.sent += static_cast<std::size_t>(count);
-  }
-  if (client.sent == client.output.size()) {
-    client.output.clear();
-    client.sent = 0;
-    if (client.close_when_sent || (client.input_ended && !client.subscription)) {
-      client.broken = true;
+// ---- bounds
+
+void StatusServer::Parts::check_time_outs(Clock::time_point now) {
+  if (now < time_outs_checked_next) return;
+  time_outs_checked_next = now + time_outs_checked_every;
+  for (auto& [id, client] : clients) {
+    if (client.broken) continue;
+    if (client.owes() && now - client.last_taken > limits.unread_max) {
+      cut_off(id, client, "nothing was read for " + seconds_text(limits.unread_max));
+    } else if (client.input.is_partial() && !client.queued && !client.owes() &&
+               now - client.line_begun > limits.partial_line_max) {
+      cut_off(id, client,
+              "a request must be whole within " + seconds_text(limits.partial_line_max));
+    } else if (!client.access.any() && now - client.last_request > limits.stranger_max) {
+      cut_off(id, client, "only for members of " + config.read_group);
+    } else if (client.is_idle() && now - client.last_request > limits.idle_max) {
+      cut_off(id, client, "no request for " + seconds_text(limits.idle_max));
     }
-  } else if (client.sent > output_bytes_max / 4) {
-    client.output.erase(0, client.sent);
-    client.sent = 0;
-  }
-  rewatch(client);
-}
-
-void StatusServer::Parts::rewatch(Client& client) {
-  client.waits_for_room = !client.output.empty();
-  const bool reads = !client.input_ended && !client.close_when_sent;
-  const std::uint32_t events = (reads ? std::uint32_t{EPOLLIN} : 0u) |
-                               (client.waits_for_room ? std::uint32_t{EPOLLOUT} : 0u);
-  if (!watch(client.fd, events, EPOLL_CTL_MOD)) client.broken = true;
-}
-
-void StatusServer::Parts::notify_due() {
-  const Clock::time_point now = Clock::now();
-  std::map<std::string, std::string> lines;  // each method is asked once, however many subscribed
-  for (auto& [fd, client] : clients) {
-    if (!client.subscription || client.broken || client.subscription->due > now) continue;
-    for (const std::string& name : client.subscription->methods) {
-      auto line = lines.find(name);
-      if (line == lines.end()) {
-        json message = {{"jsonrpc", "2.0"}, {"method", name}};
-        try {
-          message["params"] = methods.at(name).handler(json::object());
-        } catch (const std::exception& error) {
-          message["params"] = {{"error", error.what()}};
-        }
-        line = lines.emplace(name, to_line(message)).first;
-      }
-      send(client, line->second);
-    }
-    Subscription& subscription = *client.subscription;
-    subscription.due += subscription.period;
-    if (subscription.due <= now) subscription.due = now + subscription.period;
   }
 }
 
-void StatusServer::Parts::set_timer() {
-  std::optional<Clock::time_point> next;
-  for (const auto& [fd, client] : clients) {
-    if (!client.subscription) continue;
-    next = next ? std::min(*next, client.subscription->due) : client.subscription->due;
+/// Says why, as far as the peer still reads, and ends it.
+void StatusServer::Parts::cut_off(ClientId id, ServedClient& client, const std::string& why,
+                                  int code) {
+  ++statistics.cut_off;
+  // In the middle of an answer there is no place for another line.
+  if (!client.owes()) client.send(error_line(code, why), Clock::now());
+  end(id, client);
+}
+
+void StatusServer::Parts::keep_memory_bounded() {
+  while (statistics.buffered_bytes > limits.buffered_bytes_max) {
+    const auto most =
+        std::max_element(clients.begin(), clients.end(), [](const auto& a, const auto& b) {
+          return a.second.counted_bytes < b.second.counted_bytes;
+        });
+    if (most == clients.end()) return;
+    cut_off(most->first, most->second, "all clients together hold too much memory");
+    close_broken();
   }
-  itimerspec when{};
-  if (next) {
-    const auto wait = std::max<std::int64_t>(
-        1, std::chrono::duration_cast<std::chrono::nanoseconds>(*next - Clock::now()).count());
-    when.it_value.tv_sec = wait / 1'000'000'000;
-    when.it_value.tv_nsec = wait % 1'000'000'000;
-  }
-  timerfd_settime(timer_fd, 0, &when, nullptr);
+}
+
+void StatusServer::Parts::end(ClientId id, ServedClient& client) {
+  client.broken = true;
+  if (std::exchange(client.ended, true)) return;
+  statistics.buffered_bytes -= std::exchange(client.counted_bytes, 0);
+  broken.push_back(id);
 }
 
 void StatusServer::Parts::close_broken() {
-  for (auto client = clients.begin(); client != clients.end();) {
-    if (client->second.broken) {
-      close(client->first);
-      client = clients.erase(client);
-    } else {
-      ++client;
-    }
+  for (const ClientId id : broken) {
+    const auto client = clients.find(id);
+    if (client == clients.end()) continue;
+    if (!client->second.access.any()) --strangers;
+    clients.erase(client);
   }
-  statistics.clients = clients.size();
+  broken.clear();
 }
 
-StatusServer::StatusServer(const SocketConfig& config) : parts_(std::make_unique<Parts>(config)) {}
+void StatusServer::Parts::set_timer() {
+  const Clock::time_point now = Clock::now();
+  std::optional<Clock::time_point> next;
+  const auto wake_at = [&](Clock::time_point when) { next = next ? std::min(*next, when) : when; };
+  if (!ready.empty()) wake_at(all_tokens.next(now));
+  if (!resting.empty()) wake_at(resting.begin()->first);
+  if (!subscribers.empty()) wake_at(subscribers.begin()->first);
+  if (!clients.empty()) wake_at(time_outs_checked_next);
+  itimerspec when{};
+  if (next) {
+    // Absolute; zero would disarm it.
+    const std::int64_t at_ns = std::max<std::int64_t>(
+        1, std::chrono::duration_cast<std::chrono::nanoseconds>(next->time_since_epoch()).count());
+    when.it_value.tv_sec = at_ns / 1'000'000'000;
+    when.it_value.tv_nsec = at_ns % 1'000'000'000;
+  }
+  timerfd_settime(timer_fd, TFD_TIMER_ABSTIME, &when, nullptr);
+}
+
+// ---- from outside
+
+StatusServer::StatusServer(const SocketConfig& config, const SocketLimits& limits)
+    : parts_(std::make_unique<Parts>(config, limits)) {}
 StatusServer::~StatusServer() = default;
 
 void StatusServer::add_method(const std::string& name, AccessClass access, RpcHandler handler) {
-  parts_->methods[name] = {access, std::move(handler)};
+  parts_->desk.add_method(name, access, std::move(handler));
 }
 
 int StatusServer::fd() const noexcept {
@@ -416,31 +421,28 @@ int StatusServer::fd() const noexcept {
 }
 
 void StatusServer::handle(std::chrono::milliseconds timeout) {
-  std::array<epoll_event, 32> events{};
-  const int count = epoll_wait(parts_->epoll_fd, events.data(), static_cast<int>(events.size()),
+  Parts& parts = *parts_;
+  std::array<epoll_event, 64> events{};
+  const int count = epoll_wait(parts.epoll_fd, events.data(), static_cast<int>(events.size()),
                                static_cast<int>(timeout.count()));
-  bool is_timer = false;
+  const Clock::time_point now = Clock::now();
+  const Clock::time_point turn_end = now + parts.limits.turn_max;
   bool is_listener = false;
   for (int i = 0; i < count; ++i) {
     const epoll_event& event = events[static_cast<std::size_t>(i)];
-    if (event.data.fd == parts_->timer_fd) {
-      std::uint64_t expirations = 0;
-      is_timer = read(parts_->timer_fd, &expirations, sizeof expirations) > 0;
-    } else if (event.data.fd == parts_->listener.fd()) {
-      is_listener = true;
-    } else if (const auto client = parts_->clients.find(event.data.fd);
-               client != parts_->clients.end()) {
-      parts_->on_client(client->second, event.events);
-    }
+    is_listener = is_listener || event.data.u64 == listener_id;
+    if (event.data.u64 >= first_client_id) parts.on_client(event.data.u64, event.events);
   }
-  if (is_timer) {
-    parts_->notify_due();
-    parts_->set_timer();
-  }
-  // First what is over, then who is new: a descriptor's number is not used twice in one round.
-  parts_->close_broken();
-  if (is_listener) parts_->accept_all();
-  parts_->statistics.clients = parts_->clients.size();
+  parts.wake_rested(now);
+  // Half of the turn each, so that neither questions nor subscriptions starve the other.
+  parts.notify(now + parts.limits.turn_max / 2);
+  parts.serve(turn_end);
+  parts.check_time_outs(now);
+  parts.close_broken();
+  parts.keep_memory_bounded();
+  if (is_listener) parts.accept_some();
+  parts.set_timer();
+  parts.statistics.clients = parts.clients.size();
 }
 
 SocketStatistics StatusServer::statistics() const noexcept {

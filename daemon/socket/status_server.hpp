@@ -4,14 +4,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
 
-#include <nlohmann/json_fwd.hpp>
-
 #include "config/daemon_config.hpp"
+#include "daemon/socket/rpc.hpp"
 
 namespace thermocomp {
 
@@ -20,43 +18,36 @@ class SocketError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Who may call a method. root always may.
-enum class AccessClass {
-  read,     ///< read_group, operator_group, bridge_group, and the daemon's own user
-  operate,  ///< operator_group
-  bridge    ///< bridge_group
-};
-
-namespace rpc {
-inline constexpr int parse_error = -32700;
-inline constexpr int invalid_request = -32600;
-inline constexpr int method_not_found = -32601;
-inline constexpr int invalid_params = -32602;
-inline constexpr int internal_error = -32603;
-inline constexpr int not_permitted = -32001;
-inline constexpr int refused = -32002;  ///< understood, but not now (the message says why)
-}  // namespace rpc
-
-/// Thrown by a handler: becomes the error of the answer.
-class RpcError : public std::runtime_error {
- public:
-  RpcError(int code, const std::string& message) : std::runtime_error(message), code_(code) {}
-  [[nodiscard]] int code() const noexcept { return code_; }
-
- private:
-  int code_;
-};
-
-/// Gets `params` (an object; an empty one where the request has none), returns the result.
-using RpcHandler = std::function<nlohmann::json(const nlohmann::json& params)>;
-
 struct SocketStatistics {
   std::uint64_t clients{0};  ///< connected now
   std::uint64_t accepted{0};
-  std::uint64_t refused{0};  ///< beyond clients_max
+  std::uint64_t refused{0};  ///< not taken: no place left
   std::uint64_t requests{0};
   std::uint64_t errors{0};   ///< answered with an error
-  std::uint64_t dropped{0};  ///< clients cut off: too slow, line too long
+  std::uint64_t cut_off{0};  ///< ended by the server: line too long, time out, memory, place needed
+  std::uint64_t delayed{0};  ///< times that a client over its rate had to wait
+  std::uint64_t missed{0};   ///< notifications left out because a subscriber had not read
+  std::uint64_t buffered_bytes{0};  ///< held for all clients now
+};
+
+/// What any number of clients may cost. Tests shorten the times.
+struct SocketLimits {
+  using Duration = std::chrono::steady_clock::duration;
+
+  std::size_t clients_max{1200};
+  std::size_t operator_places{32};  ///< of clients_max; only for who may change something
+  std::size_t strangers_max{16};    ///< who may do nothing: one answer and good-bye
+  std::size_t buffered_bytes_max{std::size_t{16} << 20};  ///< for all clients together
+  double requests_per_s{100.0};                           ///< of one client; above it is read later
+  double requests_burst{200.0};
+  double all_requests_per_s{2000.0};
+  double all_requests_burst{200.0};
+  Duration partial_line_max{std::chrono::seconds(10)};  ///< a line that has begun
+  Duration unread_max{std::chrono::seconds(30)};        ///< an answer of which nothing is taken
+  Duration idle_max{std::chrono::minutes(10)};          ///< no request and no subscription
+  Duration stranger_max{std::chrono::seconds(5)};
+  Duration replaceable_after{std::chrono::seconds(1)};  ///< idle so long: makes room for another
+  Duration turn_max{std::chrono::milliseconds(10)};     ///< of handle(); one request more at most
 };
 
 /// Single-threaded; whoever owns it calls handle() when fd() is readable, or in a loop.
@@ -66,18 +57,19 @@ struct SocketStatistics {
 /// them (user, group and supplementary groups at connect). A development daemon, not run by root
 /// and without those groups on the system, takes its own user for all of them.
 ///
+/// Fair: clients take turns, one request each; a client is read from only when its answers are
+/// gone and its rate allows, so what it sends too fast waits in its own socket.
+///
 /// `subscribe` {"methods": ["status", ...], "period_s": 1.0}: the results of these reading methods
 /// (default: status) are sent as notifications {"method": NAME, "params": RESULT} every period
-/// (0.1..60 s) until the client disconnects or calls it again.
+/// (0.1..60 s) until the client disconnects or calls it again. One that does not read in time is
+/// told later how many it missed: {"method": "missed", "params": {"notifications": N}}.
 class StatusServer {
  public:
-  static constexpr std::size_t line_bytes_max = std::size_t{64} * 1024;
-  static constexpr std::size_t clients_max = 64;
-  static constexpr std::size_t output_bytes_max = 4u << 20;  ///< waiting for a slow reader
-
-  /// Binds and listens. A socket file nobody listens on any more is replaced.
+  /// Binds and listens. A socket file nobody listens on any more is replaced. Raises the process'
+  /// soft limit of open files as far as it needs and may; with fewer it takes fewer clients.
   /// @throws SocketError: another daemon listens there, folder missing, path too long, ...
-  explicit StatusServer(const SocketConfig& config);
+  explicit StatusServer(const SocketConfig& config, const SocketLimits& limits = {});
   ~StatusServer();  ///< closes and removes the socket file
   StatusServer(const StatusServer&) = delete;
   StatusServer& operator=(const StatusServer&) = delete;
@@ -85,7 +77,8 @@ class StatusServer {
   void add_method(const std::string& name, AccessClass access, RpcHandler handler);
   /// Readable when there is something to do: for the owner's epoll or poll.
   [[nodiscard]] int fd() const noexcept;
-  /// Waits up to `timeout` for something to do and does it. Throws nothing of a client's making.
+  /// Waits up to `timeout` for something to do and does it, or a part of it: what is left makes
+  /// fd() readable again. Throws nothing of a client's making.
   void handle(std::chrono::milliseconds timeout);
   [[nodiscard]] SocketStatistics statistics() const noexcept;
 
