@@ -267,7 +267,7 @@ TEST_CASE("of a full bus' frames of ours none is lost unseen", "[vm][source]") {
   // 1 Mbit/s is some 7700 frames a second of 8 bytes; here 77 at once each 10 ms.
   std::uint64_t sent = 0;
   for (int turn = 0; turn < 100; ++turn) {
-    for (int i = 0; i < 77; ++i) sent += sender.send(0x181, {turn, 0, i, 0, 0, 0, 0, 0}) ? 1 : 0;
+    for (int i = 0; i < 77; ++i) sent += sender.send(0x181, {turn, 0, i, 0, 0, 0, 0, 0}) ? 1u : 0u;
     std::this_thread::sleep_for(10ms);
   }
   // The kernel tells how many it dropped with the next frame that it does not drop.

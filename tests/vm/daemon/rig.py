@@ -54,7 +54,8 @@ def bus_text(name, interface, more=""):
 
 def device_text(kind, name, bus, frame, places, period_s=None):
     text = f'[[device]]\nname = "{name}"\nbus = "{bus}"\nid = {frame}\nscale = 0.001\n'
-    text += "offset_degC = 25.0\n" + (f"period_s = {period_s}\n" if period_s else "")
+    text += "offset_degC = 25.0\nlength_bits = 16\n"
+    text += f"period_s = {period_s}\n" if period_s else ""
     return text + "".join(f'[[{kind}]]\nname = "{place}"\ndevice = "{name}"\nstart_bit = {16 * i}\n'
                           for i, place in enumerate(places))
 
