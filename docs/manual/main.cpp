@@ -1,0 +1,142 @@
+// thermocomp-manual EXAMPLES FOLDER: writes the manual pages and the completion of bash into
+// FOLDER. A tool of the build; what it writes is installed, it is not.
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.hpp"
+#include "config/daemon_config.hpp"
+#include "daemon/command_line.hpp"
+#include "docs/manual/command_page.hpp"
+#include "docs/manual/completion.hpp"
+#include "docs/manual/format_page.hpp"
+#include "simulator/command_line.hpp"
+
+namespace {
+
+using namespace thermocomp;
+using namespace thermocomp::manual;
+namespace fs = std::filesystem;
+
+const std::string config_path = "/etc/thermocomp/thermocompd.toml";
+const std::string example_folder = "/usr/share/doc/thermocomp/examples/";
+
+std::string content(const fs::path& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in) throw std::runtime_error("cannot read " + file.string());
+  return text.str();
+}
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  out.close();
+  if (!out) throw std::runtime_error("cannot write " + file.string());
+}
+
+void write_program(const fs::path& folder, const CLI::App& app, const PageExtras& extras) {
+  const std::string name = app.get_name();
+  write(folder / (name + "." + std::to_string(extras.section)), command_page(app, extras));
+  write(folder / (name + ".bash"), bash_completion(app));
+}
+
+void write_command(const fs::path& folder) {
+  CLI::App app;
+  cli::GlobalOptions global{SocketConfig{}.path.string()};
+  cli::Action action;
+  cli::declare_command_line(app, global, action);
+  PageExtras extras;
+  extras.environment = {
+      {"THERMOCOMP_SOCKET", "the daemon's status socket, instead of the default"}};
+  extras.files = {{global.socket, "the daemon's status socket"},
+                  {HistoryConfig{}.file.string(), "the daemon's history"}};
+  extras.see_also = {"thermocompd(8)", "thermocompd.toml(5)", "thermocomp-sim(1)"};
+  write_program(folder, app, extras);
+}
+
+void write_daemon(const fs::path& folder) {
+  CLI::App app;
+  std::string config_file = config_path;
+  declare_daemon_command_line(app, config_file);
+  const DaemonConfig defaults;
+  PageExtras extras;
+  extras.section = 8;
+  extras.files = {{config_path, "the configuration; the service does not start without it"},
+                  {example_folder, "commented examples"},
+                  {defaults.state_file.string(),
+                   "reference state, operator's switch and last offsets; kept over restarts"},
+                  {defaults.history.file.string(), "what was measured and sent (SQLite)"},
+                  {defaults.socket.path.string(), "the status socket, for thermocomp(1)"}};
+  extras.see_also = {"thermocomp(1)", "thermocompd.toml(5)", "systemctl(1)", "journalctl(1)"};
+  write_program(folder, app, extras);
+}
+
+void write_simulator(const fs::path& folder) {
+  CLI::App app;
+  SimulatorArguments arguments;
+  declare_simulator_command_line(app, arguments);
+  PageExtras extras;
+  extras.files = {{"/usr/share/doc/thermocomp-simulator/examples/machine.toml",
+                   "a machine with every key of the file explained"}};
+  extras.see_also = {"thermocomp(1)", "thermocompd(8)"};
+  write_program(folder, app, extras);
+}
+
+void write_formats(const fs::path& examples, const fs::path& folder) {
+  FormatPage page;
+  page.name = "thermocompd.toml";
+  page.what = "configuration of thermocompd";
+  page.text =
+      "The file is TOML, and is read strictly: an unknown key, a wrong type, a missing key, a "
+      "value\n"
+      "out of range or a name that refers to nothing is an error, and all of them are shown by\n"
+      "\n"
+      " thermocomp check " +
+      config_path +
+      "\n\n"
+      "Units are the end of a name. Register addresses count from 0, as on the wire. Paths are\n"
+      "relative to the folder of the file. After a change \"thermocomp reload\" takes over model,\n"
+      "blocks, screening, smoothing, limits and the rules of the compensation, without a jump of "
+      "the\n"
+      "axes; it says when a restart is needed instead.\n"
+      "\n"
+      "The commented examples below are the reference; every key is shown with its default. They "
+      "are\n"
+      "installed in " +
+      example_folder + ".\n";
+  page.examples = {
+      {"THE CONFIGURATION", content(examples / "small_machine.toml")},
+      {"THE MODEL FILE", content(examples / "small_machine_model.toml")},
+      {"SENSORS AND CONTROLLER ON A CAN BUS", content(examples / "can.toml")},
+  };
+  page.see_also = {"thermocompd(8)", "thermocomp(1)"};
+  write(folder / "thermocompd.toml.5", format_page(page));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fprintf(stderr, "usage: thermocomp-manual EXAMPLES FOLDER\n");
+    return 2;
+  }
+  try {
+    const fs::path folder = argv[2];
+    fs::create_directories(folder);
+    write_command(folder);
+    write_daemon(folder);
+    write_simulator(folder);
+    write_formats(argv[1], folder);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "thermocomp-manual: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

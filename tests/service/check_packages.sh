@@ -1,0 +1,43 @@
+#!/bin/bash
+# check_packages.sh SOURCE FOLDER: builds the packages of SOURCE in FOLDER/packages (build_packages.sh),
+# and the root file system that they are tested in (build_rootfs.sh, as root); lintian must find no
+# error and no warning. Prints the sizes. Exit status 77, with the reason, where it cannot.
+set -euo pipefail
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+source_tree=${1:?the source tree} folder=${2:?a folder}
+for tool in dpkg-buildpackage dh lintian mmdebstrap; do
+  if ! command -v "$tool" >/dev/null; then
+    echo "check_packages.sh: skipped: $tool is missing (scripts/setup.sh test)"
+    exit 77
+  fi
+done
+mkdir -p "$folder"
+packages=$folder/packages
+
+began=$SECONDS
+if ! "$here/build_packages.sh" "$source_tree" "$packages" > "$folder/packages.log" 2>&1; then
+  tail -n 60 "$folder/packages.log"
+  exit 1
+fi
+echo "packages built in $((SECONDS - began)) s"
+
+lintian --allow-root --fail-on error,warning --no-tag-display-limit "$packages"/*.changes
+echo "lintian: no error, no warning"
+
+needed=$(for file in "$packages"/*.deb; do dpkg-deb -f "$file" Depends; done |
+  tr ',' '\n' | sed 's/|.*//; s/(.*//; s/ //g' | sort -u | grep -v '^thermocomp')
+if [[ $(id -u) -eq 0 ]]; then
+  # shellcheck disable=SC2086
+  "$here/build_rootfs.sh" "$folder" $needed
+fi
+
+for file in "$packages"/*.deb; do
+  printf '%-28s %8d kB to fetch %8d KiB installed\n' "$(dpkg-deb -f "$file" Package)" \
+    "$(($(stat -c %s "$file") / 1000))" "$(dpkg-deb -f "$file" Installed-Size)"
+done
+if [[ -s $folder/dependencies ]]; then
+  own=$(dpkg-deb -f "$packages"/thermocomp_*.deb Installed-Size)
+  awk -v own="$own" '{ text = text " " $1; sum += $2 } END {
+    printf "on a minimal Debian with systemd thermocomp needs besides:%s, %d KiB; together %.1f MB\n",
+      text, sum, (sum + own) * 1.024 / 1000 }' "$folder/dependencies"
+fi

@@ -1,0 +1,36 @@
+import pytest
+
+import service
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "step: a part of one story; what follows builds on it")
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    outcome = yield
+    report = outcome.get_result()
+    if report.when == "call" and report.failed:
+        said = service.run("journalctl", "-b", "--no-pager", "-o", "short-monotonic", "-n", "120",
+                           check=False).stdout
+        report.sections.append(("journal of the guest", said))
+
+
+@pytest.fixture(scope="session")
+def machine():
+    """Module and controller for all tests; the service is installed by the first one."""
+    made = service.Machine()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def running(machine):
+    """The service, compensating, with an offset of 9 um that has settled."""
+    service.write_config(machine.config())
+    if not service.active():
+        service.start()
+    service.wait_for_mode("compensating")
+    machine.settled_at(9.0)
+    return machine

@@ -1,0 +1,159 @@
+"""What goes wrong while it runs, as systemd and the controller see it."""
+
+import os
+import signal
+import time
+
+import pytest
+
+import service
+from lab import eventually
+from service import STATE, UNIT, run, show
+
+
+def wait_for_restart(count):
+    eventually(lambda: service.restarts() > count and service.active(), "started again", 60.0)
+    service.wait_for_mode("compensating")
+
+
+def stayed_at(orders, offset_um):
+    assert orders, "no order since"
+    return max(abs(order - offset_um) for _, order in orders) < 0.01
+
+
+def hang_the_process(_):
+    os.kill(service.main_pid(), signal.SIGSTOP)
+
+
+def plant(name):
+    return lambda _: (STATE / name).touch()
+
+
+@pytest.mark.parametrize("what, hang", [
+    ("the cycle blocks", plant("plant-cycle-blocks")),
+    ("the cycle spins at its real-time priority", plant("plant-cycle-spins")),
+    ("the main thread blocks", plant("plant-main-blocks")),
+    ("the whole process is stopped", hang_the_process),
+])
+def test_the_watchdog_ends_a_hang_and_the_offset_stays(running, what, hang):
+    restarts, orders, began = service.restarts(), running.count(), time.monotonic()
+    hang(running)
+    wait_for_restart(restarts)
+    took_s = time.monotonic() - began
+    assert service.restarts() == restarts + 1
+    eventually(lambda: running.orders_since(orders), "orders")
+    time.sleep(0.5)
+    print(f"{what}: compensating again after {took_s:.1f} s, "
+          f"largest step {service.largest_step_um(running.orders_since(orders - 1)):.3f} um")
+    assert stayed_at(running.orders_since(orders), 9.0)
+    assert "Watchdog timeout" in service.journal()
+
+
+def test_a_restart_is_bumpless(running):
+    pid, orders = service.main_pid(), running.count()
+    run("systemctl", "restart", UNIT)
+    assert service.main_pid() != pid
+    service.wait_for_mode("compensating")
+    eventually(lambda: len(running.orders_since(orders)) > 20, "orders")
+    assert stayed_at(running.orders_since(orders), 9.0)
+
+
+def test_a_restart_on_the_way_goes_on_from_where_the_axis_is(running):
+    orders = running.count()
+    running.warm_by(25.0)
+    for stop_um in (13.0, 18.0):
+        eventually(lambda: running.controller.applied_um() > stop_um, f"{stop_um} um")
+        run("systemctl", "restart", UNIT)
+    running.settled_at(25.0)
+    service.assert_slewed(running.orders_since(orders))
+    print(f"largest step {service.largest_step_um(running.orders_since(orders)):.3f} um, "
+          f"slew {service.SLEW_UM_PER_S} um/s, an order each {service.ORDER_PERIOD_S} s")
+    running.settled_at(9.0)
+
+
+def test_kill_9_loses_nothing_that_was_committed(running):
+    reference = [each["reference_degC"] for each in service.status()["inputs"]]
+    restarts, orders = service.restarts(), running.count()
+    rows = []
+    for _ in range(3):
+        rows.append(service.committed_rows())
+        os.kill(service.main_pid(), signal.SIGKILL)
+        eventually(lambda: service.restarts() == restarts + len(rows) and service.active(),
+                   "started again")
+        running.warm_by(7.0)  # cooler: to take this for straight would be wrong
+        service.wait_for_mode("compensating")
+        assert service.committed_rows() >= rows[-1]
+        assert [each["reference_degC"] for each in service.status()["inputs"]] == reference
+        running.settled_at(9.0)
+    service.assert_slewed(running.orders_since(orders))
+    print(f"committed rows at the kills {rows}, at the end {service.committed_rows()}; "
+          f"largest step {service.largest_step_um(running.orders_since(orders)):.3f} um")
+    out = service.FILES / "out.csv"
+    said = run("thermocomp", "replay", service.HISTORY, "-o", out).stderr
+    print(said.strip())
+    assert ", 0 differ" in said
+
+
+def test_kill_9_leaves_the_operators_switch_as_it_was(running):
+    run("thermocomp", "disable")
+    os.kill(service.main_pid(), signal.SIGKILL)
+    restarts = service.restarts()
+    eventually(lambda: service.restarts() > restarts and service.active(), "started again")
+    service.wait_for_mode("disabled")
+    run("thermocomp", "enable")
+    running.settled_at(9.0)
+
+
+def test_reload_takes_over_without_a_jump_and_a_bad_file_changes_nothing(running):
+    pid, orders = service.main_pid(), running.count()
+    service.write_config(running.config().replace("offset_um_max = 60.0", "offset_um_max = 5.0"))
+    run("systemctl", "reload", UNIT)
+    service.wait_for_offset(5.0)
+    service.CONFIG.write_text("broken = ")
+    run("systemctl", "reload", UNIT)
+    eventually(lambda: "reload refused" in service.journal(), "the refusal is logged")
+    assert service.active()
+    service.write_config(running.config())
+    run("systemctl", "reload", UNIT)
+    running.settled_at(9.0)
+    assert service.main_pid() == pid
+    service.assert_slewed(running.orders_since(orders))
+
+
+def test_a_stop_holds(running):
+    orders = running.count()
+    run("systemctl", "stop", UNIT)
+    assert show("Result") == "success"
+    time.sleep(0.3)
+    assert running.controller.applied_um() == pytest.approx(9.0, abs=0.01)
+    assert stayed_at(running.orders_since(orders) or [(0, 9.0)], 9.0)
+
+
+def test_a_stop_ramps_to_zero_where_that_is_configured(running):
+    # Longer than TimeoutStopSec: the daemon asks for the time it needs.
+    service.write_config(running.config('[compensation]\non_stop = "ramp_to_zero"\n'))
+    run("systemctl", "reload", UNIT)
+    running.settled_at(36.0)
+    orders, began = running.count(), time.monotonic()
+    run("systemctl", "stop", UNIT)
+    took_s = time.monotonic() - began
+    assert show("Result") == "success"
+    assert running.controller.applied_um() == 0.0
+    service.assert_slewed(running.orders_since(orders))
+    print(f"36 um to zero in {took_s:.1f} s, TimeoutStopSec {show('TimeoutStopUSec')}")
+    assert took_s > 15.0
+    service.write_config(running.config())
+
+
+def test_the_simulated_machine_over_a_serial_line_is_served(running):
+    run("systemctl", "stop", UNIT)
+    run("dpkg", "-i", service.package("thermocomp-simulator"))
+    with service.simulated_line() as line:
+        service.write_config(service.serial_config(line))
+        service.stop_and_forget()
+        service.start()
+        sensors = {each["name"]: each for each in service.ask("sensors")["sensors"]}
+        assert sensors["column"]["fault"] == "none", sensors
+        run("systemctl", "stop", UNIT)
+    run("dpkg", "-P", "thermocomp-simulator")
+    service.write_config(running.config())

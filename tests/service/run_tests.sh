@@ -1,0 +1,37 @@
+#!/bin/bash
+# run_tests.sh nspawn|uml FOLDER PLANTED_HANG [PYTEST_OPTION...]
+#
+# The tests of guest/ in a booted systemd, on the packages that build_packages.sh left in
+# FOLDER/packages and the root file system of build_rootfs.sh in FOLDER. Exit status 77, with the
+# reason, where this machine cannot.
+set -euo pipefail
+kind=${1:?nspawn or uml} folder=$(cd -- "${2:?a folder}" && pwd) planted_hang=${3:?planted_hang.so}
+shift 3
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+skip() {
+  echo "run_tests.sh: skipped: $*"
+  exit 77
+}
+[[ $(id -u) -eq 0 ]] || skip "systemd is booted as root only"
+case $kind in
+  nspawn)
+    command -v systemd-nspawn >/dev/null || skip "systemd-container is not installed"
+    tests=(test_1_install_and_start.py test_2_survive.py test_3_sandbox.py
+      test_4_upgrade_and_remove.py)
+    ;;
+  uml)
+    command -v linux.uml >/dev/null || skip "user-mode-linux is not installed"
+    tests=(test_can.py)
+    ;;
+esac
+
+files=$(mktemp -d)
+trap 'rm -rf "$files"' EXIT
+mkdir "$files/packages"
+cp "$folder"/packages/*.deb "$files/packages/"
+rm -f "$files"/packages/*-dbgsym_*
+cp "$here"/guest/*.py "$here"/../integration/daemon/{lab,plain_devices}.py "$files/"
+cp "$here/../../systemd/site.conf" "$files/"
+cp "$planted_hang" "$files/planted_hang.so"
+"$here/run_in_systemd.sh" "$kind" "$folder/rootfs" "$files" \
+  /usr/bin/python3 -m pytest -v -rA -p no:cacheprovider --tb=short "$@" "${tests[@]}"
