@@ -1,0 +1,43 @@
+/// Residuals of thermal models wander: noise that is white plus a first-order wandering part. Data
+/// whitened with it can be judged by ordinary least squares.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace thermocomp::diagnosis {
+
+/// Covariance of two rows: sigma^2 (1[i = j] + ratio exp(-|t_i - t_j| / tau_s)).
+struct NoiseShape {
+  double ratio{0.0};  ///< variance of the wandering part over that of the white one
+  double tau_s{1.0};
+};
+
+/// Rows [begin, end) that are correlated with each other and with no other rows.
+struct Block {
+  Eigen::Index begin{0};
+  Eigen::Index end{0};
+};
+
+/// The Kalman filter of the wandering part: its innovations, divided by their spread, are white.
+/// The gains depend on the times alone, so that every column is whitened by the same few
+/// multiplications a row.
+class Whitener {
+ public:
+  /// @param present  rows without a value are left out: their whitened value is 0
+  Whitener(const NoiseShape& shape, const Eigen::VectorXd& time_s, const std::vector<Block>& blocks,
+           const Eigen::Array<bool, Eigen::Dynamic, 1>& present);
+
+  [[nodiscard]] Eigen::VectorXd apply(const Eigen::Ref<const Eigen::VectorXd>& column) const;
+  /// Logarithm of the determinant of the covariance, sigma = 1.
+  [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
+
+ private:
+  Eigen::VectorXd keep_;   ///< factor of the state from the row before; 0 at a block's start
+  Eigen::VectorXd gain_;   ///< 0 in rows without a value
+  Eigen::VectorXd scale_;  ///< 1 / spread of the innovation; 0 in rows without a value
+  double log_determinant_{0.0};
+};
+
+}  // namespace thermocomp::diagnosis

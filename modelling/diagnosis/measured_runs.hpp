@@ -1,0 +1,62 @@
+/// Measured runs beside what the model says of them: the material of a diagnosis.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "config/run_file.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp::diagnosis {
+
+using Column = Eigen::VectorXd;
+
+/// One run: its rows in which no input of the model is missing, from the file's first such row to
+/// the end of the selection. Missing values of other columns are held at the last one.
+struct MeasuredRun {
+  std::string name;  ///< the argument as given
+  Column time_s;
+  Eigen::Index begin{0};  ///< first selected row
+  std::vector<Column> inputs_K;   ///< rise over the reference, order of the model's inputs
+  std::vector<Column> others_K;   ///< rise of MeasuredData::others
+  std::vector<Column> others_degC;
+  std::vector<Column> inputs_degC;
+  std::vector<Column> signals;    ///< order of MeasuredData::signals
+  std::vector<Column> model_um;   ///< order of the outputs, relative to the output's first row
+  std::vector<Column> measured_um;  ///< the same; NaN: missing
+  [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }
+};
+
+struct MeasuredData {
+  ThermalModel model;
+  std::vector<std::string> others;   ///< temperatures that the model does not use
+  std::vector<std::string> signals;  ///< operating signals and positions
+  std::vector<MeasuredRun> runs;
+
+  /// The model's coefficient of an input [um/K] in each row: matrix and guideways.
+  [[nodiscard]] Column coefficient(const MeasuredRun& run, std::size_t output,
+                                   std::size_t input) const;
+};
+
+/// Columns that every one of the runs has.
+struct SharedColumns {
+  std::vector<std::string> others;
+  std::vector<std::string> signals;
+};
+[[nodiscard]] SharedColumns shared_columns(const ThermalModel& model,
+                                           const std::vector<RunFile>& runs);
+
+/// The model at every row of the run, in the estimator's own arithmetic; shape (outputs, rows).
+[[nodiscard]] std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
+                                             const MeasuredData& data);
+
+/// @param names  the runs' arguments as given
+/// @throws ConfigurationError when a run lacks an input or signal of the model, or has no measured
+///         value of any output
+[[nodiscard]] MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
+                                         const std::vector<std::string>& names,
+                                         const SharedColumns& columns);
+
+}  // namespace thermocomp::diagnosis

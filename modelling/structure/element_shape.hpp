@@ -1,0 +1,89 @@
+/// Isoparametric shapes: shape functions, their slopes, quadrature rules and faces.
+///
+/// Order of nodes: corners, then the middles of edges, as in Abaqus, CalculiX and VTK. Local
+/// coordinates: hexahedra and quadrilaterals in [-1, 1], tetrahedra and triangles r, s, t >= 0 with
+/// r + s + t <= 1.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace thermocomp::structure {
+
+using Vec3 = std::array<double, 3>;
+using Index = std::uint32_t;  ///< of a node, an element, a degree of freedom
+
+enum class Shape : std::uint8_t { tet4, tet10, hex8, hex20, tri3, tri6, quad4, quad8 };
+
+constexpr std::size_t shape_nodes_max = 20;
+
+struct ShapeValues {
+  std::array<double, shape_nodes_max> n{};    ///< shape functions
+  std::array<Vec3, shape_nodes_max> slope{};  ///< derivatives by local coordinates
+};
+
+struct RulePoint {
+  Vec3 local{};
+  double weight{0.0};
+  ShapeValues at;
+};
+using Rule = std::vector<RulePoint>;
+
+struct ShapeFace {
+  Shape shape{};
+  std::vector<std::uint8_t> nodes;  ///< of the element; normal outwards
+};
+
+struct ShapeInfo {
+  std::string_view name;  ///< "tet10"
+  std::size_t dimension{0};
+  std::size_t nodes{0};
+  std::size_t corners{0};
+  std::vector<Vec3> node_locals;
+  std::vector<std::array<std::uint8_t, 2>> edges;  ///< corners beside the middle nodes
+  std::vector<ShapeFace> faces;                    ///< none for a face
+  /// Exact for products of two slopes (and what is used for a stiffness) in a straight element.
+  Rule slope_rule;
+  /// Exact for products of a shape function with a slope or with a shape function there.
+  Rule product_rule;
+};
+
+[[nodiscard]] const ShapeInfo& shape_info(Shape shape);
+[[nodiscard]] ShapeValues shape_values(Shape shape, const Vec3& local);
+[[nodiscard]] std::optional<Shape> volume_shape_of(std::string_view name);
+/// The nearest point of the reference element.
+[[nodiscard]] Vec3 clamped_local(Shape shape, Vec3 local);
+
+/// Gradients by x, y, z and the volume (weight times determinant) at one point of an element.
+struct Gradients {
+  std::array<Vec3, shape_nodes_max> gradient;
+  double volume{0.0};  ///< not above zero: the element is inverted there
+};
+/// @param corners  coordinates of the element's nodes [m], shape (nodes)
+[[nodiscard]] Gradients gradients_at(std::span<const Vec3> nodes_m, const RulePoint& point);
+
+/// Normal times area (weight included) of a face at one point [m^2].
+[[nodiscard]] Vec3 area_vector_at(std::span<const Vec3> nodes_m, const RulePoint& point);
+
+[[nodiscard]] inline Vec3 operator-(const Vec3& a, const Vec3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+[[nodiscard]] inline Vec3 operator+(const Vec3& a, const Vec3& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+[[nodiscard]] inline Vec3 operator*(double factor, const Vec3& a) {
+  return {factor * a[0], factor * a[1], factor * a[2]};
+}
+[[nodiscard]] inline double dot(const Vec3& a, const Vec3& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+[[nodiscard]] inline Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+[[nodiscard]] double length(const Vec3& a);
+
+}  // namespace thermocomp::structure
