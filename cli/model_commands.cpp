@@ -2,15 +2,21 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <optional>
+#include <sstream>
 
 #include <CLI/CLI.hpp>
 
+#include "cli/covariance_fit.hpp"
 #include "cli/output_file.hpp"
 #include "cli/prediction.hpp"
+#include "cli/terminal.hpp"
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
+#include "config/toml_reader.hpp"
+#include "daemon/history/replay.hpp"
 #include "simulator/machine_file.hpp"
 #include "simulator/simulate.hpp"
 
@@ -59,6 +65,64 @@ int run_simulate(const SimulateOptions& options) {
   return exit_success;
 }
 
+struct CovarianceOptions {
+  std::string model;
+  std::vector<std::string> records;
+  std::string output;
+};
+
+/// A run file, or a daemon's history as one.
+RunFile load_record(const std::string& argument) {
+  constexpr std::string_view sqlite = "SQLite format 3";
+  std::string head(sqlite.size(), ' ');
+  std::ifstream file(argument, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  if (!file || head != sqlite) return load_run(parse_selection(argument));
+  std::ostringstream text;
+  Progress progress("reading " + argument);
+  static_cast<void>(export_run(argument, std::nullopt, std::nullopt, text,
+                               [&progress](double fraction) { progress.update(fraction); }));
+  return parse_run(text.str(), argument);
+}
+
+int run_covariance(const CovarianceOptions& options) {
+  const std::string text = read_text_file(options.model);
+  ThermalModel model = parse_model(text, options.model);
+  if (model.inputs.size() > covariance_inputs_max) {
+    throw Failure(options.model + ": a covariance is for at most " +
+                  std::to_string(covariance_inputs_max) + " inputs");
+  }
+  std::vector<RunFile> runs;
+  for (const std::string& record : options.records) runs.push_back(load_record(record));
+  const CovarianceFit fit = fit_covariance(runs, model.inputs);
+  model.covariance_K2 = fit.matrix_K2;
+  model.covariance_growth = fit.growth;
+  OutputFile file(options.output);
+  file.stream() << with_covariance(text, model);
+  file.commit();
+  std::fprintf(stderr, "%zu rows, %.1f h; an input lost alone, after an hour (1 sd):\n", fit.rows,
+               fit.hours);
+  for (std::size_t i = 0; i < model.inputs.size(); ++i) {
+    std::fprintf(stderr, "%s %.3f K\n", model.inputs[i].c_str(), fit.sd_1h_K[i]);
+  }
+  return exit_success;
+}
+
+void add_covariance_command(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<CovarianceOptions>();
+  CLI::App* sub = app.add_subcommand(
+      "covariance",
+      "what estimates a lost block: the covariance of a model's inputs, from records");
+  sub->add_option("--model", options->model, "model file")->required();
+  sub->add_option("RECORD", options->records, "run files, RUN.csv[@T0:T1], or histories")
+      ->required();
+  sub->add_option("-o,--output", options->output,
+                  "the model file with its table [covariance]; may be the same file; - is standard "
+                  "output")
+      ->required();
+  sub->callback([&action, options] { action = [options] { return run_covariance(*options); }; });
+}
+
 }  // namespace
 
 void add_model_commands(CLI::App& app, Action& action) {
@@ -87,6 +151,8 @@ void add_model_commands(CLI::App& app, Action& action) {
   sub->callback([&action, simulate_options] {
     action = [simulate_options] { return run_simulate(*simulate_options); };
   });
+
+  add_covariance_command(app, action);
 }
 
 }  // namespace thermocomp::cli

@@ -7,7 +7,7 @@ namespace thermocomp::cli {
 
 namespace {
 
-constexpr std::array<ReasonText, 11> reasons{{
+constexpr std::array<ReasonText, 12> reasons{{
     {"operator_disabled", "switched off by an operator", "thermocomp enable"},
     {"controller_disabled", "switched off at the controller",
      "release the switch that the configuration names as disable_signal"},
@@ -28,6 +28,8 @@ constexpr std::array<ReasonText, 11> reasons{{
      "check the sensors and the reference; if the warming is real, look at offset_um_max"},
     {"applied_out_of_bound", "the controller applies an offset beyond every bound of ours",
      "that axis is not driven; set the offset at the controller to zero and look for who set it"},
+    {"block_estimated", "an input of the model has no good sensor left and is estimated",
+     "compensation goes on; thermocomp sensors says which and why; mend the sensor"},
 }};
 
 constexpr std::array<ReasonText, 12> faults{{

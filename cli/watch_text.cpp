@@ -97,7 +97,11 @@ std::string inputs_table(const json& status, bool colours) {
     const double reference_degC = number_of(input, "reference_degC");
     result += padded(text_of(input, "name"), static_cast<int>(width)) + fixed(temp_degC, 2, 9) +
               fixed(reference_degC, 2, 11) + fixed_signed(temp_degC - reference_degC, 2, 9);
-    if (!flag_of(input, "good")) result += coloured("  lost", Colour::red, colours);
+    if (flag_of(input, "estimated"))
+      result += coloured("  estimated +-" + fixed(number_of(input, "sd_K"), 2) + " K",
+                         Colour::yellow, colours);
+    else if (!flag_of(input, "good"))
+      result += coloured("  lost", Colour::red, colours);
     result += '\n';
   }
   return result;
@@ -162,8 +166,9 @@ std::string watch_line(const json& status, const TruthRow* truth) {
   std::string result = fixed(number_of(status, "uptime_s"), 0, 4) + "  " +
                        padded(text_of(status, "mode").substr(0, 15), 15);
   for (const json& input : list_of(status, "inputs")) {
-    result += flag_of(input, "good") ? fixed(number_of(input, "temp_degC"), 2, column_width)
-                                     : right("lost", column_width);
+    result += flag_of(input, "good") || flag_of(input, "estimated")
+                  ? fixed(number_of(input, "temp_degC"), 2, column_width)
+                  : right("lost", column_width);
   }
   result += " |";
   for (const json& axis : axes) result += fixed_signed(number_of(axis, "offset"), 2, column_width);

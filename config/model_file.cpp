@@ -218,11 +218,31 @@ void check_covariance(const TomlTable& table, const Rows& rows) {
   }
 }
 
+std::vector<double> read_factors(const TomlTable& table, std::string_view key, std::size_t inputs) {
+  std::vector<double> factors = table.numbers(key, Range::between(0, 1e6), {});
+  if (table.has(key) && factors.size() != inputs) {
+    table.problem(key, std::to_string(factors.size()) + " values",
+                  "must have one value an input (" + std::to_string(inputs) + ")");
+  }
+  return factors;
+}
+
 void read_covariance(const TomlTable& root, ThermalModel& model) {
   if (!root.has("covariance")) return;
   const TomlTable table = root.table("covariance");
   model.covariance_K2 = table.matrix("matrix_K2", model.inputs.size(), model.inputs.size());
   if (!model.covariance_K2.empty()) check_covariance(table, model.covariance_K2);
+  if (model.inputs.size() > covariance_inputs_max) {
+    table.problem("matrix_K2", std::to_string(model.inputs.size()) + " inputs",
+                  "must be for at most " + std::to_string(covariance_inputs_max) + " inputs");
+  }
+  CovarianceGrowth& growth = model.covariance_growth;
+  growth.noise_K = table.number("noise_K", Range::above(0, 10), growth.noise_K);
+  growth.drift_time_s = table.number("drift_time_s", Range::between(0, 1e9), growth.drift_time_s);
+  growth.scatter_time_s =
+      table.number("scatter_time_s", Range::between(0, 1e9), growth.scatter_time_s);
+  growth.drift_factor = read_factors(table, "drift_factor", model.inputs.size());
+  growth.scatter_factor = read_factors(table, "scatter_factor", model.inputs.size());
 }
 
 /// @return whether the names could be read

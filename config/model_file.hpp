@@ -30,6 +30,9 @@ struct ModelReading {
 /// @pre the model keeps the rules of the file
 [[nodiscard]] std::string write_model(const ThermalModel& model);
 
+/// Its `[covariance]` table alone. @pre the model has a covariance
+[[nodiscard]] std::string write_covariance(const ThermalModel& model);
+
 /// SHA-256 of the bytes, 64 hexadecimal digits in small letters.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
 

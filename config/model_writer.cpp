@@ -97,6 +97,24 @@ std::string guideway_text(const GuidewaySpec& guideway) {
 
 }  // namespace
 
+std::string write_covariance(const ThermalModel& model) {
+  const CovarianceGrowth& growth = model.covariance_growth;
+  const CovarianceGrowth plain;
+  std::string text = "[covariance]\nmatrix_K2 = " + rows(model.covariance_K2);
+  const auto add = [&text](const char* name, double value, double otherwise) {
+    if (value != otherwise) text.append(name).append(" = ").append(number(value)).append("\n");
+  };
+  const auto add_list = [&text](const char* name, const std::vector<double>& values) {
+    if (!values.empty()) text.append(name).append(" = ").append(list(values, number)).append("\n");
+  };
+  add("noise_K", growth.noise_K, plain.noise_K);
+  add_list("drift_factor", growth.drift_factor);
+  add("drift_time_s", growth.drift_time_s, plain.drift_time_s);
+  add_list("scatter_factor", growth.scatter_factor);
+  add("scatter_time_s", growth.scatter_time_s, plain.scatter_time_s);
+  return text;
+}
+
 std::string write_model(const ThermalModel& model) {
   std::string text = "format = 1\ninputs = " + list(model.inputs, toml_string);
   text.append("\noutputs = ").append(list(model.outputs, toml_string)).append("\nreference = ");
@@ -105,9 +123,7 @@ std::string write_model(const ThermalModel& model) {
   text.append("\nmatrix_um_per_K = ").append(rows(model.matrix_um_per_K));
   for (const GuidewaySpec& guideway : model.guideways) text += guideway_text(guideway);
   for (const TermSpec& term : model.terms) text += term_text(term);
-  if (!model.covariance_K2.empty()) {
-    text.append("\n[covariance]\nmatrix_K2 = ").append(rows(model.covariance_K2));
-  }
+  if (!model.covariance_K2.empty()) text.append("\n").append(write_covariance(model));
   return text;
 }
 

@@ -269,6 +269,7 @@ void Daemon::Parts::tick() {
   if (cycles != cycles_seen) service.alive();
   cycles_seen = cycles;
   events.note_report(cycle->report(), config.estimator);
+  events.note_estimates(cycle->report(), config.estimator, config.model.temperature_columns());
   if (Clock::now() >= next_health) look_at_health();
   save_state(Clock::now() >= next_offsets_saved);
 }
@@ -290,9 +291,12 @@ PersistentState Daemon::Parts::persistent_state() {
   state.enabled = report.enabled;
   state.model_reference_degC = cycle->brain().estimator.model_reference_degC();
   const auto columns = config.model.temperature_columns();
-  for (std::size_t i = 0; i < columns.size(); ++i)
-    if (std::isfinite(report.inputs[i].reference_degC))
-      state.reference_degC[columns[i]] = report.inputs[i].reference_degC;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const InputReport& input = report.inputs[i];
+    if (std::isfinite(input.reference_degC))
+      state.reference_degC[columns[i]] = input.reference_degC;
+    if (input.good || input.estimated) state.temp_degC[columns[i]] = input.temp_degC;
+  }
   const auto signal_columns = config.model.signal_columns();
   for (std::size_t i = 0; i < signal_columns.size(); ++i)
     if (std::isfinite(report.signals[i].reference))

@@ -50,9 +50,18 @@ json axes(const StatusView& view) {
                     {"driven", axis.driven},
                     {"mismatch", axis.mismatch},
                     {"at_bound", axis.at_bound},
-                    {"proving", axis.proving}});
+                    {"proving", axis.proving},
+                    {"offset_sd", number(axis.offset_sd_um)},
+                    {"offset_sd_max", view.config.estimator.compensation.offset_sd_um_max}});
   }
   return list;
+}
+
+/// The block that the model's temperature column is bound to.
+std::string block_of(const StatusView& view, const std::string& column) {
+  for (const BlockConfig& block : view.config.estimator.blocks)
+    if (block.input == column) return block.name;
+  return column;
 }
 
 json inputs(const StatusView& view) {
@@ -63,9 +72,16 @@ json inputs(const StatusView& view) {
     list.push_back({{"name", columns[i]},
                     {"temp_degC", number(input.temp_degC)},
                     {"reference_degC", number(input.reference_degC)},
-                    {"good", input.good}});
+                    {"good", input.good},
+                    {"block", block_of(view, columns[i])},
+                    {"estimated", input.estimated},
+                    {"sd_K", number(input.sd_K)}});
   }
   return list;
+}
+
+json age_s(const StatusView& view, nanoseconds since) {
+  return number(std::max(0.0, seconds(view.report.now - since)));
 }
 
 json buses(const StatusView& view) {
@@ -88,6 +104,12 @@ json buses(const StatusView& view) {
                     {"connects", bus.connects},
                     {"last_error", bus.last_error},
                     {"units", units}});
+    if (bus.state.empty()) continue;
+    list.back().update({{"state", bus.state},
+                        {"state_s", age_s(view, bus.state_since)},
+                        {"error_frames", bus.error_frames},
+                        {"bus_offs", bus.bus_offs},
+                        {"dropped", bus.dropped}});
   }
   return list;
 }
@@ -97,17 +119,22 @@ json controller(const StatusView& view) {
   for (std::size_t i = 0; i < view.config.estimator.signals.size(); ++i)
     signals[view.config.estimator.signals[i]] = number(view.controller.signals[i]);
   const ControllerHealth& health = view.controller_health;
-  return {{"name", health.name},
-          {"kind", health.kind},
-          {"connected", health.connected},
-          {"online", !has_reason(view.report.reasons, Reason::controller_offline)},
-          {"connects", health.connects},
-          {"writes", health.writes},
-          {"write_errors", health.write_errors},
-          {"reads", health.reads},
-          {"read_errors", health.read_errors},
-          {"last_error", health.last_error},
-          {"signals", signals}};
+  json told = {{"name", health.name},
+               {"kind", health.kind},
+               {"connected", health.connected},
+               {"online", !has_reason(view.report.reasons, Reason::controller_offline)},
+               {"connects", health.connects},
+               {"writes", health.writes},
+               {"write_errors", health.write_errors},
+               {"reads", health.reads},
+               {"read_errors", health.read_errors},
+               {"last_error", health.last_error},
+               {"signals", signals}};
+  if (!health.state.empty())
+    told.update({{"state", health.state},
+                 {"state_s", age_s(view, health.state_since)},
+                 {"bus_offs", health.bus_offs}});
+  return told;
 }
 
 json history(const StatusView& view) {
@@ -167,7 +194,7 @@ json sensors_json(const StatusView& view) {
          {"clipped", sensor.clipped},
          {"rejected", sensor.rejected}});
   }
-  return {{"sensors", list}};
+  return {{"sensors", list}, {"inputs", inputs(view)}, {"axes", axes(view)}};
 }
 
 json offsets_json(const StatusView& view) {

@@ -24,6 +24,7 @@ class BlockBank {
   /// first.
   [[nodiscard]] std::span<const double> temps_degC() const noexcept { return temps_degC_; }
   [[nodiscard]] bool good(std::size_t column) const noexcept { return good_[column] != 0; }
+  [[nodiscard]] std::span<const std::uint8_t> good() const noexcept { return good_; }
 
   void report(std::span<SensorReport> sensors) const noexcept;
   void visit_state(StateArchive& archive);

@@ -7,6 +7,8 @@
 #include "estimator/block_bank.hpp"
 #include "estimator/checks.hpp"
 #include "estimator/displacement_model.hpp"
+#include "estimator/input_gains.hpp"
+#include "estimator/lost_blocks.hpp"
 #include "estimator/name_index.hpp"
 
 namespace thermocomp {
@@ -33,6 +35,25 @@ constexpr int no_signal = -1;
 /// No operating signal is larger; a value beyond is a garbled register, and its square would stay
 /// in the lags for ever.
 constexpr double signal_magnitude_max = 1e9;
+
+/// An estimate that became too uncertain serves again below this share of the limit: at the limit
+/// itself a moving slide would switch it on and off.
+constexpr double certain_again = 0.9;
+
+/// The model as LostBlocks is to see it.
+ThermalModel estimating_model(const ThermalModel& model, const EstimatorConfig& config) {
+  ThermalModel seen = model;
+  if (!config.compensation.estimate_lost_blocks) seen.covariance_K2.clear();
+  return seen;
+}
+
+/// The longest that a working sensor may take until its first reading.
+nanoseconds settling_time(const EstimatorConfig& config) {
+  double longest_s = 0.0;
+  for (const SensorConfig& sensor : config.sensors)
+    longest_s = std::max(longest_s, sensor.screening.stale_after_s);
+  return std::chrono::duration_cast<nanoseconds>(seconds_d(longest_s));
+}
 
 }  // namespace
 
@@ -76,6 +97,8 @@ std::string_view to_string(Reason reason) noexcept {
       return "at_bound";
     case Reason::applied_out_of_bound:
       return "applied_out_of_bound";
+    case Reason::block_estimated:
+      return "block_estimated";
   }
   return "unknown";
 }
@@ -85,6 +108,8 @@ struct Estimator::Parts {
   Parts(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model);
 
   void take_signals(nanoseconds now, const ControllerState& controller) noexcept;
+  [[nodiscard]] bool estimate_lost(nanoseconds now) noexcept;
+  [[nodiscard]] bool certain() noexcept;
   void take_references() noexcept;
   void predict(nanoseconds now) noexcept;
   void decide_mode(nanoseconds now, bool data_good) noexcept;
@@ -101,6 +126,8 @@ struct Estimator::Parts {
   ThermalModel thermal_model;
   std::vector<std::string> columns;
   BlockBank blocks;
+  LostBlocks lost;
+  InputGains gains;
   DisplacementModel displacement;
   DisplacementModel at_reference;  ///< the same model, only ever asked for the zero
   std::vector<AxisChannel> axes;
@@ -125,7 +152,9 @@ struct Estimator::Parts {
   bool zero_known{false};
   std::vector<double> zero_um;  ///< of the outputs: the model at the reference state
   std::vector<double> measured_um;
-  bool predicted{false};  ///< model_um is from this step
+  std::vector<double> offset_sd_um;  ///< one an axis
+  bool uncertain{false};             ///< the estimate does not serve
+  bool predicted{false};             ///< model_um is from this step
   bool ever_good{false};
   nanoseconds lost_since{};
   bool enabled;
@@ -134,6 +163,9 @@ struct Estimator::Parts {
   nanoseconds mode_since{};
   std::uint32_t reasons{0};
   std::uint64_t cycle_ends{0};
+
+  std::vector<double> rise_K;         ///< scratch, one a column
+  std::vector<double> gain_um_per_K;  ///< scratch, one a column
 
   // how a reload takes over
   std::vector<int> column_plan;
@@ -148,6 +180,8 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
       thermal_model(model),
       columns(model.temperature_columns()),
       blocks(config, columns),
+      lost(estimating_model(model, config), settling_time(config)),
+      gains(model),
       displacement(model),
       at_reference(model),
       controller_stale_after(std::chrono::duration_cast<nanoseconds>(
@@ -184,6 +218,9 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
   reference_signals.assign(model_signals.size(), model.reference_degC.empty() ? not_a_number : 0.0);
   zero_um.assign(model.outputs.size(), not_a_number);
   measured_um.assign(config.axes.size(), not_a_number);
+  offset_sd_um.assign(config.axes.size(), 0.0);
+  rise_K.assign(columns.size(), 0.0);
+  gain_um_per_K.assign(columns.size(), 0.0);
 }
 
 Estimator::Estimator(const EstimatorConfig& config, const ThermalModel& model)
@@ -203,12 +240,14 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
   ++parts.cycle;
   parts.reasons = 0;
 
-  const bool blocks_good = parts.blocks.step(now, readings);
-  if (!blocks_good) parts.add(Reason::block_lost);
+  bool blocks_good = parts.blocks.step(now, readings);
   parts.take_signals(now, controller);
   const bool signals_good = !has_reason(parts.reasons, Reason::signal_lost);
   parts.take_references();
   const bool referenced = !has_reason(parts.reasons, Reason::no_reference);
+  const bool estimated = parts.estimate_lost(now) && !blocks_good;
+  if (!blocks_good) parts.add(estimated ? Reason::block_estimated : Reason::block_lost);
+  blocks_good = blocks_good || estimated;
   parts.predicted = blocks_good && signals_good && referenced;
   if (parts.predicted) parts.predict(now);
   parts.decide_mode(now, parts.predicted);
@@ -241,6 +280,35 @@ void Estimator::Parts::take_signals(nanoseconds at, const ControllerState& contr
     add(Reason::signal_lost);
 }
 
+/// @return whether every column is measured, or estimated well enough
+bool Estimator::Parts::estimate_lost(nanoseconds at) noexcept {
+  lost.step(at, blocks.temps_degC(), blocks.good());
+  return certain() && lost.complete();
+}
+
+bool Estimator::Parts::certain() noexcept {
+  std::fill(offset_sd_um.begin(), offset_sd_um.end(), 0.0);
+  if (!lost.complete()) return false;
+  if (lost.lost_count() == 0) {
+    uncertain = false;
+    return true;
+  }
+  // Without positions or a reference nothing is compensated, and nothing can be said.
+  if (has_reason(reasons, Reason::signal_lost) || has_reason(reasons, Reason::no_reference))
+    return !uncertain;
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    rise_K[i] = lost.temps_degC()[i] - reference_degC[i];
+  const double limit_um = config.compensation.offset_sd_um_max * (uncertain ? certain_again : 1.0);
+  uncertain = false;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    gains.of_output(axis_output[i], rise_K, signal_values, gain_um_per_K);
+    offset_sd_um[i] = lost.sd_of(gain_um_per_K);
+    // Negated so that NaN is uncertain.
+    if (!(offset_sd_um[i] <= limit_um)) uncertain = true;
+  }
+  return !uncertain;
+}
+
 void Estimator::Parts::take_references() noexcept {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (!std::isfinite(reference_degC[i]) && blocks.good(i)) {
@@ -263,7 +331,7 @@ void Estimator::Parts::predict(nanoseconds at) noexcept {
     at_reference.step(at, reference_degC, reference_degC, reference_signals, zero_um);
     zero_known = true;
   }
-  displacement.step(at, blocks.temps_degC(), reference_degC, signal_values, model_um);
+  displacement.step(at, lost.temps_degC(), reference_degC, signal_values, model_um);
 }
 
 void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
@@ -384,7 +452,8 @@ void Estimator::report(Report& out) const noexcept {
   out.cycle_ends = parts.cycle_ends;
   parts.blocks.report(out.sensors);
   for (std::size_t i = 0; i < parts.columns.size(); ++i)
-    out.inputs[i] = {parts.blocks.temps_degC()[i], parts.reference_degC[i], parts.blocks.good(i)};
+    out.inputs[i] = {parts.lost.temps_degC()[i], parts.reference_degC[i], parts.blocks.good(i),
+                     parts.lost.estimated(i), parts.lost.sd_K(i)};
   for (std::size_t i = 0; i < parts.model_um.size(); ++i)
     out.displacement_um[i] = parts.model_um[i] - parts.zero_um[i];
   for (std::size_t i = 0; i < parts.signal_values.size(); ++i)
@@ -402,15 +471,17 @@ void Estimator::report(Report& out) const noexcept {
     line.mismatch = axis.mismatch();
     line.at_bound = axis.at_bound();
     line.proving = axis.proving();
+    line.offset_sd_um = parts.offset_sd_um[i];
   }
 }
 
 void Estimator::Parts::visit_state(StateArchive& archive) {
-  archive(blocks, displacement);
+  archive(blocks, lost, displacement);
   for (AxisChannel& axis : axes) archive(axis);
   archive(cycle, stepped, now, dt_s, all_signals, controller_online, reference_degC, signal_values,
-          reference_signals, zero_known, model_um, zero_um, measured_um, predicted, ever_good,
-          lost_since, enabled, stopping, mode, mode_since, reasons, cycle_ends);
+          reference_signals, zero_known, model_um, zero_um, measured_um, offset_sd_um, uncertain,
+          predicted, ever_good, lost_since, enabled, stopping, mode, mode_since, reasons,
+          cycle_ends);
 }
 
 std::size_t Estimator::state_size_bytes() const noexcept {
@@ -455,6 +526,11 @@ void Estimator::restore(const PersistentState& state) {
     for (std::size_t i = 0; i < signal_columns.size(); ++i)
       take(state.reference_signals, signal_columns[i], parts.reference_signals[i]);
   }
+  for (std::size_t i = 0; i < parts.columns.size(); ++i) {
+    double temp_degC = not_a_number;
+    take(state.temp_degC, parts.columns[i], temp_degC);
+    parts.lost.restore(i, temp_degC);
+  }
   for (std::size_t i = 0; i < parts.axes.size(); ++i) {
     double offset_um = 0.0;
     take(state.offset_um, parts.config.axes[i].name, offset_um);
@@ -471,6 +547,7 @@ void Estimator::plan_adoption(const Estimator& previous) {
     return names;
   };
   parts.blocks.plan_adoption(other.blocks);
+  parts.lost.plan_adoption(other.lost);
   parts.column_plan = plan_names(parts.columns, other.columns);
   parts.signal_plan =
       plan_names(parts.thermal_model.signal_columns(), other.thermal_model.signal_columns());
@@ -484,6 +561,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   Parts& parts = *parts_;
   const Parts& other = *previous.parts_;
   parts.blocks.adopt(other.blocks);
+  parts.lost.adopt(other.lost);
   parts.displacement.adopt_terms(previous.parts_->displacement, parts.term_plan);
   if (parts.keep_reference) {
     take_by_plan(parts.column_plan, other.reference_degC, parts.reference_degC);
@@ -507,6 +585,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.stopping = other.stopping;
   parts.mode = other.mode;
   parts.mode_since = other.mode_since;
+  parts.uncertain = other.uncertain;
   parts.cycle_ends = other.cycle_ends;
 }
 

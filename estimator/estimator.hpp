@@ -39,9 +39,10 @@ enum class Reason : std::uint32_t {
   mismatch = 1u << 7,    ///< applied and sent differ
   cutting = 1u << 8,     ///< hold_while_cutting holds the offset
   at_bound = 1u << 9,
-  applied_out_of_bound = 1u << 10  ///< read-back beyond any bound of ours: axis is not driven
+  applied_out_of_bound = 1u << 10,  ///< read-back beyond any bound of ours: axis is not driven
+  block_estimated = 1u << 11        ///< a warning: compensating, with an estimate for a lost block
 };
-inline constexpr std::size_t reasons_count = 11;
+inline constexpr std::size_t reasons_count = 12;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
 /// Of a set of reasons (Report::reasons), whether one is in it.
@@ -62,7 +63,9 @@ struct SensorReport {
 struct InputReport {  ///< a temperature column of the model
   double temp_degC{not_a_number};
   double reference_degC{not_a_number};
-  bool good{false};
+  bool good{false};       ///< measured
+  bool estimated{false};  ///< lost, and temp_degC is an estimate from the others
+  double sd_K{0.0};       ///< standard deviation of the estimate
 };
 
 struct SignalReport {  ///< an operating signal or position of the model
@@ -81,6 +84,8 @@ struct AxisReport {
   bool mismatch{false};
   bool at_bound{false};
   bool proving{false};
+  /// Standard deviation that estimated blocks give the offset; 0 where all are measured.
+  double offset_sd_um{0.0};
 };
 
 /// All that an operator or the history may want to know after a step. Made once by
@@ -109,6 +114,7 @@ struct PersistentState {
   std::map<std::string, double> model_reference_degC;
   std::map<std::string, double> reference_signals;  ///< operating signals then, by column
   std::map<std::string, double> offset_um;          ///< by axis, last sent
+  std::map<std::string, double> temp_degC;          ///< in use then, by temperature column
 };
 
 /// Pure: no clock, no I/O, no thread; no allocation after construction except where said.

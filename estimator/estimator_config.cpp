@@ -44,6 +44,8 @@ void CompensationConfig::validate() const {
   require(mismatch_um > 0 && mismatch_um <= 500, "mismatch_um", mismatch_um, "must be in (0, 500]");
   require(mismatch_after_s > 0 && mismatch_after_s <= 3600, "mismatch_after_s", mismatch_after_s,
           "must be in (0, 3600]");
+  require(offset_sd_um_max > 0 && offset_sd_um_max <= 500, "offset_sd_um_max", offset_sd_um_max,
+          "must be in (0, 500]");
   require(prove_um_max > 0 && prove_um_max <= 50, "prove_um_max", prove_um_max,
           "must be in (0, 50]");
   require(prove_hold_s >= 0 && prove_hold_s <= 60, "prove_hold_s", prove_hold_s,

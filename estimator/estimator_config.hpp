@@ -84,6 +84,9 @@ struct CompensationConfig {
   double controller_stale_after_s{2.0};
   double mismatch_um{2.0};       ///< applied and sent may differ by this much
   double mismatch_after_s{3.0};  ///< ... or longer by more for this long
+  /// A block without a good sensor is estimated where the model has a covariance.
+  bool estimate_lost_blocks{true};
+  double offset_sd_um_max{5.0};  ///< of any axis; beyond, an estimate does not serve: hold
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
   void validate() const;  ///< @throws InvalidValue

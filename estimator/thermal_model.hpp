@@ -30,6 +30,22 @@ struct GuidewaySpec {
   std::map<std::string, std::vector<std::vector<double>>> rows_um_per_K;
 };
 
+/// Rows that a covariance of inputs may have: what is estimated must be so within a cycle.
+inline constexpr std::size_t covariance_inputs_max = 64;
+/// Without a figure in the model file: sqrt(2), since the residual at the moment of loss and that
+/// of now differ, times sqrt(2) for a covariance that was itself estimated from a short record.
+inline constexpr double drift_factor_default = 2.0;
+
+/// `[covariance]` beside its matrix: how the error of an estimated input grows (LostBlocks).
+struct CovarianceGrowth {
+  double noise_K{0.02};              ///< of a block's temperature; keeps the matrix regular
+  double drift_time_s{0.0};          ///< 0: at once
+  double scatter_time_s{0.0};        ///< 0: at once
+  std::vector<double> drift_factor;  ///< one an input; empty: drift_factor_default
+  std::vector<double> scatter_factor;  ///< one an input; empty: 0
+  void validate(std::size_t inputs) const;  ///< @throws InvalidValue
+};
+
 /// delta = P (T - T_ref) + guideway rows + terms. Shapes: matrix (outputs, inputs).
 struct ThermalModel {
   std::vector<std::string> inputs;   ///< temperature columns, e.g. "t1_degC"
@@ -41,6 +57,7 @@ struct ThermalModel {
   std::vector<TermSpec> terms;
   /// Covariance of the inputs [K^2], shape (inputs, inputs), or empty.
   std::vector<std::vector<double>> covariance_K2;
+  CovarianceGrowth covariance_growth;
 
   /// Inputs, then every further temperature that a term names, in order of first use.
   [[nodiscard]] std::vector<std::string> temperature_columns() const;

@@ -169,12 +169,13 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
 
 CompensationConfig read_compensation(const TomlTable& table,
                                      const std::vector<std::string>& signals) {
-  constexpr std::array<NumberField<CompensationConfig>, 7> fields{{
+  constexpr std::array<NumberField<CompensationConfig>, 8> fields{{
       {"hold_s", &CompensationConfig::hold_s},
       {"stop_ramp_s_max", &CompensationConfig::stop_ramp_s_max},
       {"controller_stale_after_s", &CompensationConfig::controller_stale_after_s},
       {"mismatch_um", &CompensationConfig::mismatch_um},
       {"mismatch_after_s", &CompensationConfig::mismatch_after_s},
+      {"offset_sd_um_max", &CompensationConfig::offset_sd_um_max},
       {"prove_um_max", &CompensationConfig::prove_um_max},
       {"prove_hold_s", &CompensationConfig::prove_hold_s},
   }};
@@ -187,6 +188,7 @@ CompensationConfig read_compensation(const TomlTable& table,
       config.on_stop);
   config.enabled_at_first_start =
       table.flag("enabled_at_first_start", config.enabled_at_first_start);
+  config.estimate_lost_blocks = table.flag("estimate_lost_blocks", config.estimate_lost_blocks);
   config.hold_while_cutting = table.flag("hold_while_cutting", config.hold_while_cutting);
   read_fields(table, fields, CompensationConfig{}, config);
   const auto read_signal = [&](std::string_view key) {

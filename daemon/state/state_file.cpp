@@ -55,6 +55,7 @@ std::string to_text(const PersistentState& state) {
   file["model_reference_degC"] = numbers(state.model_reference_degC);
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);
+  file["temp_degC"] = numbers(state.temp_degC);
   return file.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
@@ -73,6 +74,8 @@ PersistentState from_text(const std::string& text) {
   state.model_reference_degC = numbers(file, "model_reference_degC");
   state.reference_signals = numbers(file, "reference_signals");
   state.offset_um = numbers(file, "offset_um");
+  // Files of earlier versions have none.
+  if (file.contains("temp_degC")) state.temp_degC = numbers(file, "temp_degC");
   return state;
 }
 
