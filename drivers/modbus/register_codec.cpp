@@ -143,12 +143,20 @@ Fault decode_status(const ModbusStatus& status, std::uint16_t word) noexcept {
   return masked == 0 ? Fault::none : Fault::device_error;
 }
 
+namespace {
+
+/// Whether `number`, to which `code` was rounded, is the code itself. The greatest codes are
+/// rounded to 2^63, which is none.
+bool is_exactly(double number, std::int64_t code) noexcept {
+  return number < 0x1p63 && static_cast<std::int64_t>(number) == code;
+}
+
+}  // namespace
+
 bool is_representable(std::int64_t code, Encoding encoding) noexcept {
-  if (encoding == Encoding::float64) {
-    return static_cast<std::int64_t>(static_cast<double>(code)) == code;
-  }
+  if (encoding == Encoding::float64) return is_exactly(static_cast<double>(code), code);
   if (encoding == Encoding::float32) {
-    return static_cast<double>(static_cast<float>(code)) == static_cast<double>(code);
+    return is_exactly(static_cast<double>(static_cast<float>(code)), code);
   }
   const Limits limits = limits_of(encoding);
   return code >= limits.lowest && code <= limits.highest;

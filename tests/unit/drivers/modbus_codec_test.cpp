@@ -167,4 +167,12 @@ TEST_CASE("a code that cannot occur in the encoding is recognised", "[codec]") {
   CHECK(is_representable(4294967295, Encoding::uint32));
   CHECK(is_representable(9999, Encoding::float32));
   CHECK_FALSE(is_representable(16777217, Encoding::float32));
+  // 2^53 + 1 has no neighbour in a double either; 2^63 - 1 is rounded to what no code is.
+  constexpr std::int64_t between = (std::int64_t{1} << 53) + 1;
+  constexpr std::int64_t greatest = std::numeric_limits<std::int64_t>::max();
+  for (const Encoding encoding : {Encoding::float32, Encoding::float64}) {
+    CHECK_FALSE(is_representable(between, encoding));
+    CHECK_FALSE(is_representable(greatest, encoding));
+    CHECK(is_representable(std::numeric_limits<std::int64_t>::min(), encoding));
+  }
 }
