@@ -70,6 +70,15 @@ void unpack_words(std::span<const std::uint8_t> data, std::span<std::uint16_t> w
   for (std::size_t i = 0; i < words.size(); ++i) words[i] = word_at(data, 2 * i);
 }
 
+/// Static text. Beyond the protocol's own codes libmodbus would name errors of its own, or hand out
+/// a buffer that its next call overwrites.
+const char* exception_text(int code) noexcept {
+  constexpr int not_defined = 9;
+  const bool is_known = code >= 1 && code <= MODBUS_EXCEPTION_GATEWAY_TARGET && code != not_defined;
+  return is_known ? modbus_strerror(MODBUS_ENOBASE + code)
+                  : "an exception that the protocol does not know";
+}
+
 }  // namespace
 
 Fault Exchange::fault() const noexcept {
@@ -126,6 +135,7 @@ class ModbusConnection::Implementation {
   Frame classify_tcp(std::size_t size, int unit, const char*& detail) noexcept;
   Exchange await_answer(int unit, std::uint8_t function, std::size_t answer_bytes,
                         Exchange exchange);
+  void take_exception(Exchange& exchange) const noexcept;
   void settle(int unit, Exchange& exchange) noexcept;
 
   ModbusLine line_;
@@ -348,13 +358,20 @@ Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request
   } else {
     exchange.detail = "the request could not be sent";
   }
-  if (exchange.ok() && (answer_[0] & exception_bit) != 0) {
-    exchange.outcome = ExchangeOutcome::exception;
-    exchange.exception_code = answer_.size() > 1 ? answer_[1] : 0;
-    exchange.detail = modbus_strerror(MODBUS_ENOBASE + exchange.exception_code);
-  }
+  if (exchange.ok() && (answer_[0] & exception_bit) != 0) take_exception(exchange);
   settle(unit, exchange);
   return exchange;
+}
+
+void ModbusConnection::Implementation::take_exception(Exchange& exchange) const noexcept {
+  if (answer_.size() != 2 || answer_[1] == 0) {
+    exchange.outcome = ExchangeOutcome::bad_frame;
+    exchange.detail = "an exception without a code";
+    return;
+  }
+  exchange.outcome = ExchangeOutcome::exception;
+  exchange.exception_code = answer_[1];
+  exchange.detail = exception_text(answer_[1]);
 }
 
 /// What an exchange's end means for the ones to come.

@@ -90,6 +90,14 @@ TEST_CASE("exceptions, silence and wrong answers are told apart", "[connection]"
   CHECK(gateway.fault() == Fault::no_answer);
   CHECK_FALSE(gateway.unit_answered());
 
+  const Exchange own = outcome_of([](const auto& r) { return peer::exception(r, 13); });
+  const Exchange other = outcome_of([](const auto& r) { return peer::exception(r, 200); });
+  CHECK(own.exception_code == 13);
+  CHECK(other.exception_code == 200);
+  CHECK_THAT(own.detail, Catch::Contains("does not know"));
+  const Exchange without_code = outcome_of([](const auto& r) { return peer::exception(r, 0); });
+  CHECK(without_code.outcome == ExchangeOutcome::bad_frame);
+
   const Exchange silent = outcome_of([](const auto&) { return peer::Reply{}; });
   CHECK(silent.outcome == ExchangeOutcome::timeout);
   CHECK(silent.fault() == Fault::no_answer);
