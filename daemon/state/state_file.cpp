@@ -64,9 +64,12 @@ PersistentState from_text(const std::string& text) {
   if (!file.is_object() || file.value("program", "") != "thermocomp") {
     throw std::runtime_error("is not a state file of thermocomp");
   }
-  if (file.at("format").get<int>() != format) {
-    throw std::runtime_error("is of format " + file.at("format").dump() + ", not " +
-                             std::to_string(format));
+  // Compared and shown as JSON: any number may stand there, or lists as deep as the file is long.
+  const json& its_format = file.at("format");
+  if (its_format != format) {
+    throw std::runtime_error("is of format " +
+                             (its_format.is_number() ? its_format.dump() : "(no number)") +
+                             ", not " + std::to_string(format));
   }
   PersistentState state;
   state.enabled = file.at("enabled").get<bool>();

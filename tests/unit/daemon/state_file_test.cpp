@@ -53,6 +53,9 @@ TEST_CASE("an unusable state file is moved aside and said", "[state]") {
       std::string(), std::string("{"), std::string("[]"), std::string("null"),
       std::string(R"({"enabled": true})"), std::string(R"({"program":"other","format":1})"),
       head + R"("format":2,"enabled":true,)" + good, head + R"("format":1,"enabled":1,)" + good,
+      head + R"("format":1e300,"enabled":true,)" + good,
+      head + R"("format":)" + std::string(400000, '[') + std::string(400000, ']') +
+          R"(,"enabled":true,)" + good,
       head + R"("format":1,"enabled":true,"reference_degC":{"a":"hot"})" + rest,
       head + R"("format":1,"enabled":true,"reference_degC":3)" + rest);
   const TempFolder folder;
