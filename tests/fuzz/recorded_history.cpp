@@ -138,6 +138,8 @@ kind = "dry_run"
 [[axis]]
 name = "z"
 output = "z_um"
+offset_um_max = 60.0
+rate_um_per_s_max = 0.5
 )";
 }
 
