@@ -26,8 +26,8 @@ constexpr std::size_t rows_min = 200;      ///< in all
 constexpr Index half_rows_min = 40;        ///< a shorter run's growth cannot be seen
 constexpr int horizons = 16;
 constexpr Index shortest_horizon = 4;  ///< cells
-/// t(0.975, 4 degrees of freedom) / 1.96.
-constexpr double small_sample = 1.416;
+/// t(0.975, 3 degrees of freedom) / 1.96.
+constexpr double small_sample = 1.624;
 constexpr double hour_s = 3600.0;
 constexpr std::array<double, 5> scatter_shares{1.0 / 800, 1.0 / 400, 1.0 / 200, 1.0 / 100,
                                                1.0 / 50};

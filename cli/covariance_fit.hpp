@@ -27,7 +27,7 @@ struct CovarianceFit {
 ///
 /// is fitted (relative least squares; g = 1 - exp(-h), S_ii the conditional variance by the whole
 /// covariance). Half a run is a handful of warm-ups, so the factors are widened by the ratio of the
-/// 97.5 % points of Student's t with 4 degrees of freedom and of the normal distribution.
+/// 97.5 % points of Student's t with 3 degrees of freedom and of the normal distribution.
 /// Rows outside a run's selection, and rows with a missing input, are left out.
 /// @throws ConfigurationError when a run lacks an input, or there are too few rows in all
 [[nodiscard]] CovarianceFit fit_covariance(std::span<const RunFile> runs,

@@ -178,6 +178,8 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
     lost_[i] = 1;
     lost_since_[i] = now;
     for (std::size_t k = 0; k < inputs_; ++k) drift_K2_[at(i, k)] = drift_K2_[at(k, i)] = 0.0;
+    // The value it had last was not exact, and what it would show now would not be either.
+    drift_K2_[at(i, i)] = 2.0 * growth_.noise_K * growth_.noise_K;
   }
   // A lost one: what was last measured, or estimated.
   for (std::size_t i = 0; i < inputs_; ++i)

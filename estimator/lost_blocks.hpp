@@ -18,15 +18,16 @@ namespace thermocomp {
 ///     x_L = a_L + B (x_O - a_O),   B = -S Q_LO,   S = (Q_LL)^-1,   Q = (C + noise^2 I)^-1
 ///
 /// So an estimate begins at the last good value, and needs neither mean nor reference. The
-/// covariance of its error grows from 0 at the moment of loss. For the lost inputs i, k:
+/// covariance of its error grows from W = 2 noise^2 on the diagonal at the moment of loss. For the
+/// lost inputs i, k:
 ///
 ///     V_ik(h) = W_ik + S_ik (d_i d_k g(h / drift_time) + s_i s_k sqrt(g_i g_k)),  g = 1 - exp(-h)
 ///
-/// d, s: drift_factor and scatter_factor of the model file; W: the drift so far, carried over when
-/// L changes; g_i: with the time since input i was lost over scatter_time. An input that comes back
-/// tells how wrong its estimate was, and the others still lost are corrected by what that says of
-/// them: x_i += W_ik / V_kk (x_k - estimate of x_k).
-/// Source: the conditional distribution of a Gaussian vector by blocks of its precision matrix.
+/// d, s: drift_factor and scatter_factor of the model file; W: also the drift so far, carried over
+/// when L changes; g_i: with the time since input i was lost over scatter_time. An input that comes
+/// back tells how wrong its estimate was, and the others still lost are corrected by what that says
+/// of them: x_i += W_ik / V_kk (x_k - estimate of x_k). Source: the conditional distribution of a
+/// Gaussian vector by blocks of its precision matrix.
 class LostBlocks {
  public:
   /// Without a covariance in the model it only passes on what it is given.

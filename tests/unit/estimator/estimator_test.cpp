@@ -496,3 +496,127 @@ TEST_CASE("configuration and model that do not fit are refused", "[estimator]") 
   refused([](auto& config, auto&) { config.compensation.mismatch_um = not_a_number; });
   refused([](auto&, auto& model) { model.matrix_um_per_K[0].pop_back(); });
 }
+
+namespace {
+
+/// Both blocks warm together; the column's effect on z is 1 um/K.
+ThermalModel model_with_covariance() {
+  auto model = small_model();
+  model.covariance_K2 = {{4.0, 3.9}, {3.9, 4.0}};
+  model.covariance_growth.drift_time_s = 1e5;
+  return model;
+}
+
+}  // namespace
+
+TEST_CASE("a lost block is estimated, and compensation goes on with a stated uncertainty",
+          "[estimator]") {
+  Machine machine(small_config(), model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 31.0});
+  CHECK(machine.report().axes[0].offset_sd_um == 0.0);
+  machine.steps(10, {21.0, lost});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.says(Reason::block_estimated));
+  CHECK_FALSE(machine.says(Reason::block_lost));
+  CHECK(machine.offset_um() == -6.0);  // begins where it was
+  machine.steps(100, {23.0, lost});
+  const InputReport column = machine.report().inputs[1];
+  CHECK(column.estimated);
+  CHECK_FALSE(column.good);
+  CHECK(column.temp_degC == Approx(31.0 + 2.0 * 3.9 / 4.0).epsilon(1e-3));
+  CHECK(column.sd_K > 0.0);
+  CHECK(machine.report().axes[0].offset_sd_um == Approx(column.sd_K));
+  CHECK(machine.offset_um() == Approx(-5.0 * 3.0 - (column.temp_degC - 30.0)));
+  machine.step({23.0, 33.0});
+  CHECK(machine.report().reasons == 0);
+  CHECK(machine.report().axes[0].offset_sd_um == 0.0);
+}
+
+TEST_CASE("beyond offset_sd_um_max, or told not to estimate, the offset holds", "[estimator]") {
+  auto config = small_config();
+  const bool too_uncertain = GENERATE(true, false);
+  if (too_uncertain)
+    config.compensation.offset_sd_um_max = 0.1;
+  else
+    config.compensation.estimate_lost_blocks = false;
+  Machine machine(config, model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 31.0});
+  machine.steps(2000, {21.0, lost});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::block_lost));
+  CHECK_FALSE(machine.says(Reason::block_estimated));
+  CHECK(machine.report().inputs[1].estimated == too_uncertain);
+  if (too_uncertain) CHECK(machine.report().axes[0].offset_sd_um > 0.1);
+  const double held_um = machine.offset_um();
+  machine.steps(20, {25.0, lost});
+  CHECK(machine.offset_um() == held_um);
+  machine.steps(20, {25.0, 31.0});
+  CHECK(machine.offset_um() == -26.0);
+}
+
+TEST_CASE("no reference is taken while a block is estimated", "[estimator]") {
+  Machine machine(small_config(), model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, lost});
+  machine.estimator.apply({CommandKind::reference, 0, 0.0});
+  machine.step({21.0, lost});
+  CHECK(machine.report().inputs[0].reference_degC == 20.0);
+}
+
+TEST_CASE("a reload and a saved state carry an estimate on", "[estimator]") {
+  Machine machine(small_config(), model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, lost});
+  const double sd_um = machine.report().axes[0].offset_sd_um;
+  const double offset_um = machine.offset_um();
+  std::vector<std::byte> state(machine.estimator.state_size_bytes());
+  machine.estimator.save_state(state);
+  Machine twin(small_config(), model_with_covariance());
+  twin.estimator.load_state(state);
+  twin.now = machine.now;
+  twin.controller = machine.controller;
+  reload(machine, small_config(), model_with_covariance());
+  machine.step({21.0, lost});
+  CHECK(machine.offset_um() == Approx(offset_um).margin(1e-9));
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.report().axes[0].offset_sd_um >= sd_um);
+  twin.step({21.0, lost});
+  CHECK(twin.offset_um() == Approx(offset_um).margin(1e-9));
+}
+
+TEST_CASE("a restart with a sensor still lost goes on from the stored temperatures",
+          "[estimator]") {
+  auto config = small_config();
+  Machine machine(config, model_with_covariance());
+  PersistentState state;
+  state.reference_degC = {{"t1_degC", 20.0}, {"t2_degC", 30.0}};
+  state.temp_degC = {{"t1_degC", 22.0}, {"t2_degC", 32.0}};
+  state.offset_um = {{"z", -12.0}};
+  machine.estimator.restore(state);
+  machine.controller.applied_um[0] = -12.0;
+  machine.step({22.0, lost});
+  CHECK(machine.report().mode == Mode::starting);
+  machine.steps(10, {22.0, lost});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == Approx(-12.0));
+  CHECK(machine.report().inputs[1].sd_K > 0.3);
+}
+
+TEST_CASE("the spread of an offset knows guideways and terms", "[estimator]") {
+  auto model = model_with_covariance();
+  auto config = small_config();
+  config.compensation.offset_sd_um_max = 500.0;
+  config.signals.emplace_back("x_mm");
+  model.guideways = {{"g", "x_mm", {0.0, 100.0}, {{"z_um", {{0.0, 0.0}, {0.0, 4.0}}}}}};
+  model.terms = {
+      {"thermal_lag", "t2_degC", {{"tau_s", 100.0}}, {{"gain_um_per_K", {{"z_um", -2.0}}}}}};
+  Machine machine(config, model);
+  machine.controller.signals[3] = 50.0;
+  machine.step({20.0, 30.0});
+  machine.steps(20, {20.0, lost});
+  const double sd_K = machine.report().inputs[1].sd_K;
+  // 1 of the matrix, 2 half-way along the guideway, and 2 more until the lag has caught up.
+  CHECK(machine.report().axes[0].offset_sd_um == Approx(5.0 * sd_K));
+}
