@@ -292,7 +292,7 @@ bool ModbusDialogue::read_all() {
 void ModbusDialogue::take(std::span<const std::vector<std::uint16_t>> answers) {
   for (std::size_t i = 0; i < read_values_.size(); ++i) {
     const ModbusValue& value = read_values_[i];
-    const WordPlace place = read_plan_.places[i];
+    const ValuePlace place = read_plan_.places[i];
     const std::span<const std::uint16_t> words = answers[place.request];
     const NumberFormat format =
         format_in(value.table, {value.encoding, value.word_order, value.scale, 0.0});

@@ -17,14 +17,14 @@ struct ReadRequest {
 };
 
 /// Where a value's first word stands in the answers.
-struct WordPlace {
+struct ValuePlace {
   std::size_t request{0};
   std::size_t word{0};
 };
 
 struct ReadPlan {
   std::vector<ReadRequest> requests;
-  std::vector<WordPlace> places;  ///< one a value, in the order given
+  std::vector<ValuePlace> places;  ///< one a value, in the order given
 };
 
 /// Few requests that cover all values: neighbours of one table are joined over at most `gap_max`

@@ -1,0 +1,103 @@
+/// Which faults a life has, and when: drawn from its seed before it begins, then only looked up.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "chance.hpp"
+
+namespace thermocomp::faults {
+
+using std::chrono::nanoseconds;
+
+enum class FaultKind : std::uint8_t {
+  sensor_open,
+  sensor_short,
+  sensor_stuck,
+  sensor_spiking,
+  sensor_drifting,
+  sensors_swapped,
+  frames_lost,
+  frames_doubled,
+  frames_late,
+  frames_reordered,
+  frames_garbled,
+  frames_truncated,
+  unit_dead,
+  unit_reboot,
+  unit_busy,
+  bus_down,
+  controller_off,
+  controller_rehomed,
+  controller_rejecting,
+  controller_applies_other,
+  wall_clock_stepped,
+  cycle_overrun,
+  model_reload,
+  daemon_killed,
+  history_disk_full
+};
+inline constexpr std::size_t fault_kinds = 25;
+/// Unordered, a kind with itself (another subject or time) among them.
+inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
+
+[[nodiscard]] std::string_view name_of(FaultKind kind) noexcept;
+[[nodiscard]] std::size_t pair_index(FaultKind a, FaultKind b) noexcept;
+
+struct FaultEvent {
+  FaultKind kind{};
+  nanoseconds begin{};
+  nanoseconds end{};        ///< what happens at once lasts for as long as its consequences may
+  std::size_t subject{0};   ///< sensor, line or unit; the user takes it modulo what there is
+  double strength{0.0};     ///< 0..1
+  std::uint64_t number{0};  ///< of its own in the life
+
+  [[nodiscard]] bool on_at(nanoseconds time) const noexcept { return begin <= time && time < end; }
+};
+
+/// Faults that begin close together; nothing else happens until the next one.
+struct Episode {
+  nanoseconds begin{};
+  nanoseconds end{};  ///< of its last fault
+  std::vector<FaultEvent> faults;
+};
+
+struct ScheduleOptions {
+  nanoseconds start{};
+  nanoseconds length{};
+  double seconds_scale{1.0};     ///< shorter for campaigns at a higher rate
+  std::size_t directed_pair{0};  ///< the first two faults of each episode take the pairs in turn
+};
+
+class FaultSchedule {
+ public:
+  FaultSchedule(std::uint64_t seed, const ScheduleOptions& options);
+
+  [[nodiscard]] const std::vector<Episode>& episodes() const noexcept { return episodes_; }
+  /// The fault of this kind (and subject, out of `subjects`) in force at a time, or nullptr.
+  /// Quick where the times asked for run forwards.
+  [[nodiscard]] const FaultEvent* find(FaultKind kind, nanoseconds time) const noexcept;
+  [[nodiscard]] const FaultEvent* find(FaultKind kind, nanoseconds time, std::size_t subject,
+                                       std::size_t subjects) const noexcept;
+  /// The episode under way or next; nullptr after the last.
+  [[nodiscard]] const Episode* episode_at(nanoseconds time) const noexcept;
+  /// End of the last fault at or before `time`; `start` where there was none.
+  [[nodiscard]] nanoseconds quiet_since(nanoseconds time) const noexcept;
+  [[nodiscard]] std::bitset<fault_pairs> pairs() const;
+  [[nodiscard]] std::array<std::uint64_t, fault_kinds> counts() const;
+
+ private:
+  [[nodiscard]] FaultEvent draw(Chance& chance, FaultKind kind, nanoseconds begin, double scale);
+
+  nanoseconds start_;
+  std::vector<Episode> episodes_;
+  mutable std::size_t cursor_{0};
+  std::uint64_t numbers_{0};
+};
+
+}  // namespace thermocomp::faults

@@ -1,0 +1,260 @@
+#include "invariants.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace thermocomp::faults {
+namespace {
+
+constexpr double tiny_um = 1e-9;
+constexpr double register_rounding_um = 0.1;
+
+nanoseconds from_s(double time_s) {
+  return nanoseconds{static_cast<nanoseconds::rep>(time_s * 1e9)};
+}
+double to_s(nanoseconds time) {
+  return 1e-9 * static_cast<double>(time.count());
+}
+
+}  // namespace
+
+Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
+                       const Thermocouples& thermocouples)
+    : schedule_(schedule), thermocouples_(thermocouples) {
+  for (const UnitPlace& place : unit_places()) {
+    const double timeout_s = 1e-3 * shape.buses[place.bus].line.timeout_ms;
+    for (const std::size_t sensor : place.sensors) {
+      // A serial answer carries no number: one to the same question may be up to 3 s old.
+      slack_[sensor] = from_s(timeout_s + (place.bus == 0 ? 0.05 : 3.1));
+      stale_after_[sensor] = from_s(shape.estimator.sensors[sensor].screening.stale_after_s);
+      has_counter_[sensor] = place.has_counter;
+    }
+  }
+  link_period_s_ = shape.controller.period_s;
+  smoothing_off_ = shape.estimator.sensors[0].smoothing.form == SmoothingForm::off;
+  resolution_um_ = shape.offsets_are_float ? 1e-4 : 0.1;
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    largest_bound_um_[i] = shape.estimator.axes[i].limiter.offset_um_max;
+    rate_um_per_s_[i] = shape.estimator.axes[i].limiter.rate_um_per_s_max;
+  }
+}
+
+void Invariants::demand(bool holds, const char* invariant, nanoseconds at,
+                        const std::string& detail) {
+  if (!holds && !broken_) broken_ = Broken{invariant, at, detail};
+}
+
+void Invariants::booted(nanoseconds now) {
+  boot_ = now;
+  last_ = now;
+  last_compensating_ = now;
+  first_ = true;
+  lost_before_ = false;
+  last_readings_ = {};
+  last_used_.fill(nanoseconds{-1});
+}
+
+void Invariants::reloaded(const MachineShape& shape) {
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    const LimiterConfig& limiter = shape.estimator.axes[i].limiter;
+    largest_bound_um_[i] = std::max(largest_bound_um_[i], limiter.offset_um_max);
+    // What was computed before may still be under way.
+    rate_um_per_s_[i] = std::max(rate_um_per_s_[i], limiter.rate_um_per_s_max);
+  }
+}
+
+void Invariants::restored(const PersistentState& saved, const Report& report, nanoseconds now) {
+  demand(report.enabled == saved.enabled, "state_survives_restart", now, "the operator's switch");
+  std::size_t i = 0;
+  for (const auto& [column, reference_degC] : saved.reference_degC) {
+    demand(i < report.inputs.size() && report.inputs[i].reference_degC == reference_degC,
+           "state_survives_restart", now, "reference of " + column);
+    ++i;
+  }
+  for (std::size_t axis = 0; axis < axes_count; ++axis) {
+    offset_um_[axis] = report.axes[axis].offset_um;
+    const auto found = saved.offset_um.find(std::string(1, static_cast<char>('x' + axis)));
+    demand(found == saved.offset_um.end() || found->second == offset_um_[axis],
+           "state_survives_restart", now, "offset of an axis");
+  }
+}
+
+void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
+                       SimulatedController& controller) {
+  check_readings(seen);
+  check_sensors_used(seen);
+  for (const Move& move : moves) check_move(seen, move, controller);
+  moves.clear();
+  check_hold(seen);
+  check_command(seen);
+  check_recovery(seen, controller);
+  for (std::size_t i = 0; i < axes_count; ++i) offset_um_[i] = seen.command->offset_um[i];
+  last_ = seen.now;
+  first_ = false;
+}
+
+void Invariants::check_readings(const CycleSeen& seen) {
+  for (std::size_t i = 0; i < sensors_count; ++i) {
+    const Reading& reading = seen.readings[i];
+    Reading& before = last_readings_[i];
+    const bool new_one = reading.taken_at != before.taken_at ||
+                         reading.temp_degC != before.temp_degC || reading.fault != before.fault;
+    if (!new_one) continue;
+    before = reading;
+    if (reading.fault != Fault::none) continue;
+    demand(reading.taken_at <= seen.now, "reading_is_what_was_given", seen.now,
+           fmt::format("sensor {}: taken {:.3f} s ahead of the cycle", i + 1,
+                       to_s(reading.taken_at - seen.now)));
+    const nanoseconds to = has_counter_[i] ? seen.now : reading.taken_at;
+    const Sample* sample =
+        thermocouples_.given(i, reading.temp_degC, reading.taken_at - slack_of(i), to);
+    if (sample != nullptr) continue;
+    demand(false, "reading_is_what_was_given", seen.now,
+           fmt::format("sensor {}: {:.6f} degC, said to be of {:.3f} s before the cycle", i + 1,
+                       reading.temp_degC, to_s(seen.now - reading.taken_at)));
+  }
+}
+
+bool Invariants::fresh(std::size_t sensor, nanoseconds now) const {
+  const nanoseconds given_at = thermocouples_.last_good(sensor);
+  return given_at >= nanoseconds{0} && now - given_at <= stale_after_[sensor] + slack_of(sensor);
+}
+
+bool Invariants::any_block_lost(nanoseconds now) const {
+  static const std::array<std::vector<std::size_t>, 3> blocks{{{0, 4}, {1, 2}, {3, 5, 6}}};
+  return std::any_of(blocks.begin(), blocks.end(), [&](const std::vector<std::size_t>& block) {
+    return std::none_of(block.begin(), block.end(),
+                        [&](std::size_t sensor) { return fresh(sensor, now); });
+  });
+}
+
+void Invariants::check_sensors_used(const CycleSeen& seen) {
+  for (std::size_t i = 0; i < sensors_count; ++i) {
+    const SensorReport& sensor = seen.report->sensors[i];
+    if (sensor.fault != Fault::none) continue;
+    demand(fresh(i, seen.now), "no_stale_reading_used", seen.now,
+           fmt::format("sensor {}: last given out {:.3f} s ago", i + 1,
+                       to_s(seen.now - thermocouples_.last_good(i))));
+    if (!smoothing_off_ || broken_) continue;
+    const Sample* sample = thermocouples_.given(i, sensor.smoothed_degC,
+                                                seen.now - stale_after_[i] - slack_of(i), seen.now);
+    if (sample == nullptr) {
+      demand(false, "no_faulty_reading_used", seen.now,
+             fmt::format("sensor {}: {:.4f} degC was not given out of late", i + 1,
+                         sensor.smoothed_degC));
+      return;
+    }
+    constexpr double believable_after_s = 130.0;
+    const bool first = last_used_[i] < nanoseconds{0};
+    if (sample->impossible && !first && to_s(seen.now - last_used_[i]) < believable_after_s)
+      demand(false, "no_faulty_reading_used", seen.now,
+             fmt::format("sensor {}: a spike of {:.2f} degC is used", i + 1, sensor.smoothed_degC));
+    last_used_[i] = seen.now;
+  }
+}
+
+void Invariants::check_command(const CycleSeen& seen) {
+  const double dt_s = first_ ? 0.0 : std::min(to_s(seen.now - last_), 1.0);
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    const double offset_um = seen.command->offset_um[i];
+    demand(std::isfinite(offset_um), "only_finite_numbers", seen.now, "offset");
+    const LimiterConfig& limiter = seen.shape->estimator.axes[i].limiter;
+    const double step_um = limiter.rate_um_per_s_max * dt_s + tiny_um;
+    const double told_um = seen.told->applied_um[i];
+    const bool from_applied = std::abs(told_um) <= largest_bound_um_[i] + register_rounding_um &&
+                              std::abs(offset_um - told_um) <= step_um + register_rounding_um;
+    double bound_um = std::max(limiter.offset_um_max, std::abs(offset_um_[i]));
+    if (from_applied) bound_um = std::max(bound_um, std::abs(told_um));
+    demand(std::abs(offset_um) <= bound_um + tiny_um, "offset_within_bound", seen.now,
+           fmt::format("axis {}: {:.4f} um beside {:.4f}", i, offset_um, bound_um));
+    demand(std::abs(offset_um - offset_um_[i]) <= step_um || from_applied, "slew_kept_by_command",
+           seen.now,
+           fmt::format("axis {}: from {:.4f} to {:.4f} um in {:.3f} s, applied {:.4f}", i,
+                       offset_um_[i], offset_um, dt_s, told_um));
+  }
+}
+
+void Invariants::check_hold(const CycleSeen& seen) {
+  const CompensationConfig& policy = seen.shape->estimator.compensation;
+  const Report& report = *seen.report;
+  const bool lost = any_block_lost(seen.now);
+  const bool twice = lost && lost_before_;
+  lost_before_ = lost;
+  demand(!lost || report.mode != Mode::compensating, "no_offset_from_invalid_model", seen.now,
+         "compensating although a block has no reading");
+  if (report.mode == Mode::compensating) last_compensating_ = seen.now;
+  const bool disabled = report.mode == Mode::disabled;
+  const bool cutting = seen.told->online && seen.told->signals[0] >= 0.5;
+  const bool proving = std::any_of(report.axes.begin(), report.axes.end(),
+                                   [](const AxisReport& axis) { return axis.proving; });
+  if (first_ || disabled || proving) return;
+  const double held_s = to_s(seen.now - last_compensating_);
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    const double change_um = seen.command->offset_um[i] - offset_um_[i];
+    const double rate_um = seen.shape->estimator.axes[i].limiter.rate_um_per_s_max;
+    const bool from_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
+                              rate_um + register_rounding_um;
+    if (change_um == 0.0 || (from_applied && report.axes[i].mismatch)) continue;
+    const bool resynced = from_applied && !twice;
+    if (cutting && policy.hold_while_cutting && !from_applied)
+      demand(false, "hold_policy_kept", seen.now, fmt::format("axis {} moves mid-cut", i));
+    if (!twice || resynced) continue;
+    const bool may_ramp = policy.on_loss == LossPolicy::ramp_to_zero && held_s >= policy.hold_s;
+    const bool inwards = std::abs(seen.command->offset_um[i]) < std::abs(offset_um_[i]);
+    // At a new epoch the offset starts from the read-back.
+    const bool at_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
+                            register_rounding_um + rate_um * (may_ramp ? 1.0 : 0.0);
+    demand(at_applied || (may_ramp && inwards && !cutting), "hold_policy_kept", seen.now,
+           fmt::format("axis {}: {:+.4f} um after {:.1f} s without data{}", i, change_um, held_s,
+                       cutting ? ", mid-cut" : ""));
+  }
+}
+
+void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& controller) {
+  if (controller.switched_off(seen.now)) switched_off_last_ = seen.now;
+  const nanoseconds limit = from_s(recovery_s_max);
+  const nanoseconds begun = std::max({schedule_.quiet_since(seen.now), boot_, switched_off_last_});
+  const Episode* episode = schedule_.episode_at(seen.now);
+  if (seen.now - begun < limit || (episode != nullptr && episode->begin <= seen.now)) return;
+  demand(seen.report->mode == Mode::compensating, "recovered_in_time", seen.now,
+         fmt::format("{} {:.0f} s after the last fault's end, reasons {:#x}",
+                     to_string(seen.report->mode), to_s(seen.now - begun), seen.report->reasons));
+  for (std::size_t i = 0; i < sensors_count; ++i) {
+    const Fault fault = seen.report->sensors[i].fault;
+    demand(fault == Fault::none, "recovered_in_time", seen.now,
+           fmt::format("sensor {} is still {}", i + 1, to_string(fault)));
+  }
+}
+
+void Invariants::check_move(const CycleSeen& seen, const Move& move,
+                            const SimulatedController& controller) {
+  demand(std::isfinite(move.to_um), "only_finite_numbers", seen.now, "register of the controller");
+  Budget& budget = budgets_[move.axis];
+  const double rate_um = rate_um_per_s_[move.axis];
+  const double stall_s = std::max(5.0 * link_period_s_, 1.0) + 2.0 * period_s_;
+  const double elapsed_s = to_s(move.at - budget.at);
+  budget.um = std::min(budget.um + rate_um * elapsed_s, rate_um * stall_s);
+  budget.at = move.at;
+  const double change_um = std::abs(move.to_um - move.from_um);
+  double allowed_um = budget.um + 2.0 * resolution_um_;
+  if (move.disturbed) {
+    // What lies among the offsets sent of late cannot be told from obedience.
+    const auto end = budget.told_um.begin() +
+                     static_cast<std::ptrdiff_t>(std::min<std::size_t>(budget.count, 16));
+    const auto [low, high] = std::minmax_element(budget.told_um.begin(), end);
+    allowed_um += 3.0 + 2.0 * resolution_um_ + (budget.count == 0 ? 0.0 : *high - *low);
+  }
+  const bool knowable = !move.disturbed || move.seen;
+  if (knowable && !controller.applies_other(move.at))
+    demand(change_um <= allowed_um, "slew_kept_at_controller", seen.now,
+           fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed", move.axis,
+                       move.to_um, move.from_um, allowed_um));
+  budget.um = std::max(0.0, budget.um - std::max(0.0, change_um - 2.0 * resolution_um_));
+  budget.told_um[budget.count++ % 16] = move.to_um;
+  demand(std::abs(move.to_um) <= largest_bound_um_[move.axis] + register_rounding_um,
+         "offset_within_bound", seen.now,
+         fmt::format("axis {}: the controller is told {:.4f} um", move.axis, move.to_um));
+}
+
+}  // namespace thermocomp::faults

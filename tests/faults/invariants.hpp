@@ -1,0 +1,96 @@
+/// What must hold in every step, whatever happens. Judged from what the simulated machine gave out
+/// and was told, not from what the code under test believes.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/estimator.hpp"
+#include "machine.hpp"
+
+namespace thermocomp::faults {
+
+struct Broken {
+  std::string invariant;
+  nanoseconds at{};
+  std::string detail;
+};
+
+inline constexpr std::array<const char*, 13> invariant_names{
+    "offset_within_bound",      "slew_kept_at_controller",      "slew_kept_by_command",
+    "only_finite_numbers",      "reading_is_what_was_given",    "no_stale_reading_used",
+    "no_faulty_reading_used",   "no_offset_from_invalid_model", "hold_policy_kept",
+    "recovered_in_time",        "state_survives_restart",       "replay_is_exact",
+    "no_committed_history_lost"};
+
+/// One cycle as it was.
+struct CycleSeen {
+  nanoseconds now{};
+  std::span<const Reading> readings;
+  const ControllerState* told{nullptr};  ///< of the controller, as the estimator got it
+  const OffsetCommand* command{nullptr};
+  const Report* report{nullptr};
+  const MachineShape* shape{nullptr};  ///< the configuration in force
+};
+
+class Invariants {
+ public:
+  static constexpr double recovery_s_max = 95.0;
+
+  Invariants(const MachineShape& shape, const FaultSchedule& schedule,
+             const Thermocouples& thermocouples);
+
+  void booted(nanoseconds now);
+  void reloaded(const MachineShape& shape);
+  void restored(const PersistentState& saved, const Report& report, nanoseconds now);
+  void check(const CycleSeen& seen, std::vector<Move>& moves, SimulatedController& controller);
+  void demand(bool holds, const char* invariant, nanoseconds at, const std::string& detail);
+  [[nodiscard]] const std::optional<Broken>& broken() const noexcept { return broken_; }
+
+ private:
+  void check_readings(const CycleSeen& seen);
+  void check_sensors_used(const CycleSeen& seen);
+  void check_command(const CycleSeen& seen);
+  void check_hold(const CycleSeen& seen);
+  void check_recovery(const CycleSeen& seen, SimulatedController& controller);
+  void check_move(const CycleSeen& seen, const Move& move, const SimulatedController& controller);
+  [[nodiscard]] bool fresh(std::size_t sensor, nanoseconds now) const;
+  [[nodiscard]] bool any_block_lost(nanoseconds now) const;
+  [[nodiscard]] nanoseconds slack_of(std::size_t sensor) const { return slack_[sensor]; }
+
+  const FaultSchedule& schedule_;
+  const Thermocouples& thermocouples_;
+  std::optional<Broken> broken_;
+  std::array<nanoseconds, sensors_count> slack_{};  ///< from the unit to the time of the reading
+  std::array<nanoseconds, sensors_count> stale_after_{};
+  std::array<bool, sensors_count> has_counter_{};
+  std::array<Reading, sensors_count> last_readings_{};
+  std::array<nanoseconds, sensors_count> last_used_{};
+  double period_s_{1.0};
+  double link_period_s_{1.0};
+  bool smoothing_off_{false};
+  double resolution_um_{0.0};
+
+  nanoseconds boot_{};
+  nanoseconds last_{};
+  nanoseconds last_compensating_{};
+  nanoseconds switched_off_last_{};
+  bool first_{true};
+  bool lost_before_{false};
+  std::array<double, axes_count> offset_um_{};  ///< sent in the cycle before
+  std::array<double, axes_count> largest_bound_um_{};
+  std::array<double, axes_count> rate_um_per_s_{};  ///< the larger one across a reload
+
+  struct Budget {
+    double um{0.0};
+    nanoseconds at{};
+    std::array<double, 16> told_um{};
+    std::size_t count{0};
+  };
+  std::array<Budget, axes_count> budgets_{};
+};
+
+}  // namespace thermocomp::faults

@@ -1,0 +1,259 @@
+#include "life.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <fmt/format.h>
+#include <memory>
+
+#include "estimator/checks.hpp"
+#include "history_disk.hpp"
+#include "recorded_twin.hpp"
+#include "simulated_daemon.hpp"
+
+namespace thermocomp::faults {
+namespace {
+
+constexpr nanoseconds life_begin = std::chrono::hours(1);
+constexpr nanoseconds saved_every = std::chrono::seconds(10);
+
+double to_s(nanoseconds time) {
+  return 1e-9 * static_cast<double>(time.count());
+}
+
+class Life {
+ public:
+  explicit Life(const LifeOptions& options)
+      : options_(options),
+        shape_(options.seed, options.cycle_hz),
+        schedule_(options.seed,
+                  {life_begin, nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)},
+                   1.0, static_cast<std::size_t>(options.seed * 17 % fault_pairs)}),
+        world_(options.seed, shape_, schedule_),
+        chance_(options.seed, 5),
+        judge_(shape_, schedule_, world_.thermocouples),
+        end_(life_begin + nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)}) {
+    world_.now = life_begin;
+    saved_.enabled = true;
+    if (!options.history_folder.empty())
+      disk_ = std::make_unique<HistoryDisk>(options.history_folder, options.seed, schedule_);
+  }
+
+  LifeResult live() {
+    while (world_.now < end_ && !judge_.broken()) run_daemon();
+    if (disk_ && !judge_.broken()) {
+      const std::string lost = disk_->verify();
+      judge_.demand(lost.empty(), "no_committed_history_lost", world_.now, lost);
+      result_.commits = disk_->commits();
+    }
+    result_.machine_hours = to_s(world_.now - life_begin) / 3600.0;
+    result_.faults = schedule_.counts();
+    result_.pairs = schedule_.pairs();
+    result_.broken = judge_.broken();
+    return result_;
+  }
+
+ private:
+  void run_daemon() {
+    const nanoseconds period{static_cast<nanoseconds::rep>(1e9 / options_.cycle_hz)};
+    grid_ = {world_.now, period};
+    for (nanoseconds& clock : world_.clocks) clock = std::max(clock, world_.now);
+    twin_ = disk_ ? nullptr : std::make_unique<RecordedTwin>(grid_);
+    if (disk_) disk_->boot(grid_, world_.now);
+    auto brain = make_brain();
+    brain->estimator.restore(saved_);
+    report_ = brain->estimator.make_report();
+    judge_.booted(world_.now);
+    if (restarted_) judge_.restored(saved_, report_, world_.now);
+    SimulatedDaemon daemon(shape_, world_, grid_, std::move(brain));
+    daemon_ = &daemon;
+    std::uint64_t cycle = daemon.cycle().begin(world_.now);
+    while (!judge_.broken()) {
+      world_.now = grid_.time_of(cycle);
+      if (world_.now >= end_ || killed()) break;
+      step(cycle);
+      cycle = daemon.cycle().next_after(cycle, done_at());
+    }
+    finish();
+    daemon_ = nullptr;
+    restarted_ = true;
+    ++result_.restarts;
+    wait_for_restart();
+  }
+
+  std::unique_ptr<CycleBrain> make_brain() {
+    auto brain = std::make_unique<CycleBrain>(Estimator(shape_.estimator, shape_.model));
+    brain->recorder =
+        disk_ ? disk_->make_recorder(brain->estimator) : twin_->make_recorder(brain->estimator);
+    return brain;
+  }
+
+  void step(std::uint64_t cycle) {
+    say_faults();
+    operate();
+    reload();
+    daemon_->cycle().step(cycle);
+    static_cast<void>(daemon_->cycle().take_retired());
+    daemon_->cycle().brain().estimator.report(report_);
+    world_.controller.advance(world_.now);
+    const CycleSeen seen{world_.now,
+                         daemon_->readings(),
+                         &daemon_->link().seen(),
+                         &daemon_->link().offered(),
+                         &report_,
+                         &shape_};
+    judge_.check(seen, world_.controller.moves(), world_.controller);
+    save_state();
+    if (report_.mode == Mode::compensating) ++result_.compensating;
+    ++result_.cycles;
+    if (disk_) {
+      disk_->work(world_.now);
+    } else if (const auto different = twin_->stepped(cycle, daemon_->link().offered())) {
+      judge_.demand(false, "replay_is_exact", world_.now,
+                    fmt::format("cycle {} came out different", *different));
+    }
+  }
+
+  [[nodiscard]] bool killed() {
+    const FaultEvent* kill = schedule_.find(FaultKind::daemon_killed, world_.now);
+    if (kill == nullptr || kill->number == last_kill_) return false;
+    last_kill_ = kill->number;
+    return true;
+  }
+
+  void wait_for_restart() {
+    if (world_.now >= end_) return;
+    const FaultEvent* kill = schedule_.find(FaultKind::daemon_killed, world_.now);
+    if (kill != nullptr) world_.now = kill->end;
+    if (options_.verbose) fmt::print("{:>10.1f} s  the daemon starts again\n", life_s());
+  }
+
+  void finish() {
+    if (disk_) {
+      disk_->kill(world_.now);
+    } else if (const auto different = twin_->finish(); different && !judge_.broken()) {
+      judge_.demand(false, "replay_is_exact", world_.now,
+                    fmt::format("cycle {} came out different", *different));
+    }
+    if (twin_) result_.replayed += twin_->replayed();
+    twin_.reset();
+  }
+
+  [[nodiscard]] nanoseconds done_at() const {
+    const FaultEvent* overrun = schedule_.find(FaultKind::cycle_overrun, world_.now);
+    return overrun != nullptr ? overrun->end : world_.now + grid_.period / 100;
+  }
+
+  void operate() {
+    if (!chance_.one_in(static_cast<std::uint64_t>(1500.0 * options_.cycle_hz))) return;
+    Command command;
+    command.kind = chance_.one_in(2)   ? CommandKind::measured
+                   : chance_.one_in(2) ? CommandKind::cycle_end
+                                       : CommandKind::prove;
+    command.axis = static_cast<std::uint32_t>(chance_.below(axes_count));
+    command.value_um = chance_.between(-8.0, 8.0);
+    static_cast<void>(daemon_->cycle().send(command));
+  }
+
+  /// At the begin of the fault another configuration and model; a broken one is refused.
+  void reload() {
+    const FaultEvent* fault = schedule_.find(FaultKind::model_reload, world_.now);
+    if (fault == nullptr || fault->number == last_reload_) return;
+    last_reload_ = fault->number;
+    ++result_.reloads;
+    refuse_broken_model();
+    shape_.change_for_reload(chance_);
+    judge_.reloaded(shape_);
+    auto brain = make_brain();
+    brain->estimator.plan_adoption(daemon_->cycle().brain().estimator);
+    daemon_->cycle().hand_over(std::move(brain));
+  }
+
+  void refuse_broken_model() {
+    ThermalModel broken = shape_.model;
+    switch (chance_.below(3)) {
+      case 0:
+        broken.matrix_um_per_K[1][2] = not_a_number;
+        break;
+      case 1:
+        broken.matrix_um_per_K.pop_back();
+        break;
+      default:
+        broken.reference_degC = {20.0, not_a_number, 20.0};
+        break;
+    }
+    try {
+      const Estimator estimator(shape_.estimator, broken);
+      judge_.demand(false, "no_offset_from_invalid_model", world_.now,
+                    "a model that cannot be was taken");
+    } catch (const InvalidValue&) {
+    }
+  }
+
+  /// As the daemon does: switches and references at once, offsets every 10 s.
+  void save_state() {
+    bool now = world_.now >= next_save_ || report_.enabled != saved_.enabled;
+    for (std::size_t i = 0; i < report_.inputs.size() && !now; ++i) {
+      const double reference_degC = report_.inputs[i].reference_degC;
+      const auto found = saved_.reference_degC.find(shape_.model.inputs[i]);
+      now = std::isfinite(reference_degC) &&
+            (found == saved_.reference_degC.end() || found->second != reference_degC);
+    }
+    if (!now) return;
+    next_save_ = world_.now + saved_every;
+    saved_.enabled = report_.enabled;
+    saved_.model_reference_degC = daemon_->cycle().brain().estimator.model_reference_degC();
+    for (std::size_t i = 0; i < report_.inputs.size(); ++i)
+      if (std::isfinite(report_.inputs[i].reference_degC))
+        saved_.reference_degC[shape_.model.inputs[i]] = report_.inputs[i].reference_degC;
+    for (std::size_t i = 0; i < axes_count; ++i)
+      saved_.offset_um[shape_.estimator.axes[i].name] = report_.axes[i].offset_um;
+  }
+
+  [[nodiscard]] double life_s() const { return to_s(world_.now - life_begin); }
+
+  void say_faults() {
+    if (!options_.verbose) return;
+    if (const Episode* episode = schedule_.episode_at(world_.now)) {
+      for (const FaultEvent& fault : episode->faults) {
+        if (fault.number <= said_ || fault.begin > world_.now) continue;
+        said_ = fault.number;
+        fmt::print("{:>10.1f} s  {} until {:.1f} s, subject {}\n", to_s(fault.begin - life_begin),
+                   name_of(fault.kind), to_s(fault.end - life_begin), fault.subject);
+      }
+    }
+    if (report_.mode == said_mode_) return;
+    said_mode_ = report_.mode;
+    fmt::print("{:>10.1f} s  mode {}, reasons {:#x}, offsets {:.3f} {:.3f} {:.3f} um\n", life_s(),
+               to_string(report_.mode), report_.reasons, report_.axes[0].offset_um,
+               report_.axes[1].offset_um, report_.axes[2].offset_um);
+  }
+
+  LifeOptions options_;
+  MachineShape shape_;
+  FaultSchedule schedule_;
+  World world_;
+  Chance chance_;
+  Invariants judge_;
+  nanoseconds end_;
+  Grid grid_;
+  std::unique_ptr<RecordedTwin> twin_;
+  std::unique_ptr<HistoryDisk> disk_;
+  SimulatedDaemon* daemon_{nullptr};
+  Report report_;
+  PersistentState saved_;
+  bool restarted_{false};
+  nanoseconds next_save_{};
+  std::uint64_t last_kill_{0};
+  std::uint64_t last_reload_{0};
+  std::uint64_t said_{0};
+  Mode said_mode_{Mode::starting};
+  LifeResult result_;
+};
+
+}  // namespace
+
+LifeResult live(const LifeOptions& options) {
+  return Life(options).live();
+}
+
+}  // namespace thermocomp::faults

@@ -1,0 +1,217 @@
+#include "machine.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+namespace thermocomp::faults {
+namespace {
+
+constexpr nanoseconds conversion_period = std::chrono::milliseconds(500);
+constexpr double seconds_of(nanoseconds time) {
+  return 1e-9 * static_cast<double>(time.count());
+}
+
+}  // namespace
+
+Thermocouples::Thermocouples(std::uint64_t seed, const FaultSchedule& schedule)
+    : seed_(seed), schedule_(schedule) {
+  Chance chance(seed, 2);
+  for (Course& course : courses_)
+    course = {chance.between(19.0, 30.0), chance.between(0.5, 6.0),
+              6.283 / chance.between(3600.0, 18000.0), chance.between(0.0, 6.283)};
+  last_good_.fill(nanoseconds{-1});
+}
+
+double Thermocouples::true_degC(std::size_t sensor, nanoseconds time) const noexcept {
+  const Course& course = courses_[sensor];
+  return course.mean_degC +
+         course.swing_K * std::sin(course.rate_per_s * seconds_of(time) + course.phase);
+}
+
+Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexcept {
+  Sample sample;
+  sample.given_at = time;
+  const FaultEvent* stuck = schedule_.find(FaultKind::sensor_stuck, time, sensor, sensors_count);
+  const nanoseconds at = stuck != nullptr ? stuck->begin : time;
+  std::size_t seen = sensor;  // the wire that is connected where this one should be
+  const FaultEvent* swapped = schedule_.find(FaultKind::sensors_swapped, at);
+  if (swapped != nullptr) {
+    const std::size_t a = swapped->subject % sensors_count;
+    const std::size_t b = (a + 1) % sensors_count;
+    if (sensor == a || sensor == b) seen = sensor == a ? b : a;
+  }
+  const std::int64_t conversion = at / conversion_period;
+  sample.converted_at = conversion * conversion_period;
+  const std::uint64_t noise =
+      scramble(seed_ + static_cast<std::uint64_t>(conversion) * 97u + sensor);
+  sample.temp_degC = true_degC(seen, sample.converted_at) +
+                     0.04 * (static_cast<double>(noise >> 11) * 0x1p-53 - 0.5);
+  const FaultEvent* drift = schedule_.find(FaultKind::sensor_drifting, at, sensor, sensors_count);
+  if (drift != nullptr)
+    sample.temp_degC += (drift->strength - 0.5) * 0.05 * seconds_of(at - drift->begin);
+  const FaultEvent* spikes = schedule_.find(FaultKind::sensor_spiking, at, sensor, sensors_count);
+  if (spikes != nullptr && noise % 3 == 0) {
+    sample.temp_degC += spikes->strength < 0.5 ? 70.0 : 300.0;
+    sample.impossible = true;
+  }
+  sample.good = schedule_.find(FaultKind::sensor_open, time, sensor, sensors_count) == nullptr &&
+                schedule_.find(FaultKind::sensor_short, time, sensor, sensors_count) == nullptr;
+  return sample;
+}
+
+void Thermocouples::put(const UnitPlace& place, std::span<std::uint16_t> value,
+                        const Sample& sample) const {
+  if (place.floats) {
+    const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(sample.temp_degC));
+    const auto high = static_cast<std::uint16_t>(bits >> 16);
+    const auto low = static_cast<std::uint16_t>(bits & 0xFFFFu);
+    value[0] = place.words_low_first ? low : high;
+    value[1] = place.words_low_first ? high : low;
+  } else {
+    value[0] = static_cast<std::uint16_t>(static_cast<std::int16_t>(
+        std::clamp(std::lround(sample.temp_degC * 100.0), -32000L, 32000L)));
+  }
+}
+
+void Thermocouples::read(std::size_t unit, std::size_t address, std::span<std::uint16_t> words,
+                         nanoseconds time) {
+  const UnitPlace& place = unit_places()[unit];
+  std::array<std::uint16_t, 32> image{};
+  image[0] = static_cast<std::uint16_t>((time / conversion_period) & 0xFFFF);
+  for (std::size_t i = 0; i < place.sensors.size(); ++i) {
+    const std::size_t sensor = place.sensors[i];
+    const std::size_t at = 10 + 4 * i;
+    if (address > at || address + words.size() <= at) continue;
+    Sample sample = convert(sensor, time);
+    const std::span<std::uint16_t> value = std::span(image).subspan(at, 2);
+    put(place, value, sample);
+    if (place.floats)
+      sample.temp_degC = static_cast<double>(static_cast<float>(sample.temp_degC));
+    else
+      sample.temp_degC = 0.01 * static_cast<double>(static_cast<std::int16_t>(value[0]));
+    if (!sample.good) {
+      const bool open =
+          schedule_.find(FaultKind::sensor_open, time, sensor, sensors_count) != nullptr;
+      if (place.floats)
+        put(place, value, {.temp_degC = open ? 3000.0 : -3000.0});
+      else if (place.has_status)
+        image[at + 2] = open ? 1 : 2;
+      else
+        value[0] = open ? 0x7FFF : 0x8000;
+    }
+    remember(sensor, sample);
+  }
+  for (std::size_t i = 0; i < words.size(); ++i)
+    words[i] = address + i < image.size() ? image[address + i] : std::uint16_t{0};
+}
+
+void Thermocouples::remember(std::size_t sensor, const Sample& sample) noexcept {
+  samples_[sensor][given_[sensor]++ % kept] = sample;
+  if (sample.good && !sample.impossible)
+    last_good_[sensor] = std::max(last_good_[sensor], sample.given_at);
+}
+
+const Sample* Thermocouples::given(std::size_t sensor, double temp_degC, nanoseconds from,
+                                   nanoseconds to) const noexcept {
+  const Sample* found = nullptr;
+  for (std::size_t back = 1; back <= std::min(kept, given_[sensor]); ++back) {
+    const Sample& sample = samples_[sensor][(given_[sensor] - back) % kept];
+    if (sample.given_at > to) continue;
+    if (sample.given_at < from) break;
+    if (!sample.good || !(std::abs(sample.temp_degC - temp_degC) < 1e-6)) continue;
+    if (found == nullptr || !sample.impossible) found = &sample;
+    if (!sample.impossible) break;
+  }
+  return found;
+}
+
+// ---- the controller
+
+SimulatedController::SimulatedController(std::uint64_t seed, const FaultSchedule& schedule,
+                                         bool floats)
+    : seed_(seed), schedule_(schedule), floats_(floats) {}
+
+bool SimulatedController::powered(nanoseconds time) const noexcept {
+  return schedule_.find(FaultKind::controller_off, time) == nullptr;
+}
+
+bool SimulatedController::cutting(nanoseconds time) noexcept {
+  return (time / std::chrono::seconds(1)) % 60 < 40;
+}
+
+bool SimulatedController::switched_off(nanoseconds time) const noexcept {
+  const std::int64_t slot = time / std::chrono::minutes(2);
+  return scramble(seed_ * 31u + static_cast<std::uint64_t>(slot)) % 24 == 0;
+}
+
+void SimulatedController::disturb(std::size_t axis, double applied_um) {
+  applied_um_[axis] = applied_um;
+  disturbed_[axis] = true;
+  seen_[axis] = false;
+}
+
+void SimulatedController::advance(nanoseconds time) {
+  const bool on = powered(time);
+  if (on && !on_ && scramble(seed_ + static_cast<std::uint64_t>(time.count() / 1000000000)) % 2) {
+    for (std::size_t axis = 0; axis < axes_count; ++axis) disturb(axis, 0.0);
+  }
+  on_ = on;
+  const FaultEvent* rehoming = schedule_.find(FaultKind::controller_rehomed, time);
+  if (rehoming == nullptr || rehoming->number == last_rehoming_) return;
+  last_rehoming_ = rehoming->number;
+  for (std::size_t axis = 0; axis < axes_count; ++axis) {
+    if (rehoming->subject % 4 != 3 && rehoming->subject % 4 != axis) continue;
+    disturb(axis, rehoming->strength < 0.6 ? 0.0 : 100.0 * (rehoming->strength - 0.8));
+  }
+}
+
+void SimulatedController::read(std::size_t address, std::span<std::uint16_t> words,
+                               nanoseconds time) {
+  advance(time);
+  std::array<std::uint16_t, 8> image{};
+  for (std::size_t axis = 0; axis < axes_count; ++axis) {
+    if (floats_) {
+      const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(applied_um_[axis]));
+      image[2 * axis] = static_cast<std::uint16_t>(bits >> 16);
+      image[2 * axis + 1] = static_cast<std::uint16_t>(bits & 0xFFFFu);
+    } else {
+      image[axis] = static_cast<std::uint16_t>(
+          static_cast<std::int16_t>(std::lround(applied_um_[axis] * 10.0)));
+    }
+  }
+  image[6] = cutting(time) ? 1 : 0;
+  image[7] = switched_off(time) ? 1 : 0;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    words[i] =
+        address + i >= 100 && address + i < 108 ? image[address + i - 100] : std::uint16_t{0};
+  seen_.fill(true);
+}
+
+bool SimulatedController::write(std::size_t address, std::span<const std::uint16_t> words,
+                                nanoseconds time) {
+  advance(time);
+  if (schedule_.find(FaultKind::controller_rejecting, time) != nullptr) return false;
+  if (address < 200 || address + words.size() > 216) return false;
+  std::copy(words.begin(), words.end(),
+            written_.begin() + static_cast<std::ptrdiff_t>(address - 200));
+  const std::size_t valid_at = words_an_offset() * axes_count;
+  if (address + words.size() <= 200 + valid_at) return true;  // the mark of validity comes later
+  for (std::size_t axis = 0; axis < axes_count; ++axis) {
+    if ((written_[valid_at] >> axis & 1u) == 0) continue;
+    const std::size_t at = words_an_offset() * axis;
+    double told_um = 0.1 * static_cast<double>(static_cast<std::int16_t>(written_[at]));
+    if (floats_)
+      told_um = static_cast<double>(
+          std::bit_cast<float>(static_cast<std::uint32_t>(written_[at]) << 16 | written_[at + 1]));
+    moves_.push_back({axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis]});
+    applied_um_[axis] = told_um;
+    disturbed_[axis] = false;
+    seen_[axis] = true;
+    if (applies_other(time)) disturb(axis, 0.6 * told_um + 4.0);
+  }
+  return true;
+}
+
+}  // namespace thermocomp::faults

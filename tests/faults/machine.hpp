@@ -1,0 +1,143 @@
+/// A small machine as it truly is: temperatures, the units that read them, the controller. All of
+/// it a function of time and seed, and a memory of what was really given out.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "drivers/controllers/controller_config.hpp"
+#include "drivers/sensors/sensor_bus_config.hpp"
+#include "estimator/estimator_config.hpp"
+#include "estimator/thermal_model.hpp"
+#include "fault_schedule.hpp"
+
+namespace thermocomp::faults {
+
+inline constexpr std::size_t sensors_count = 7;
+inline constexpr std::size_t buses_count = 2;
+inline constexpr std::size_t units_count = 4;
+inline constexpr std::size_t axes_count = 3;
+
+/// The configuration of a life, drawn from its seed.
+struct MachineShape {
+  MachineShape(std::uint64_t seed, double cycle_hz);
+
+  std::array<ModbusBusConfig, buses_count> buses;
+  ModbusControllerConfig controller;
+  EstimatorConfig estimator;
+  ThermalModel model;
+  bool offsets_are_float{false};
+
+  /// What an operator might change while the daemon runs: bounds, slew, matrix, policy.
+  void change_for_reload(Chance& chance);
+};
+
+/// How the registers of one simulated unit are laid out; the same as in MachineShape, told apart so
+/// that what the drivers decode is checked against another encoder than theirs.
+struct UnitPlace {
+  std::size_t bus{0};
+  int unit{1};
+  std::vector<std::size_t> sensors;
+  bool floats{false};  ///< else int16 of 0.01 K
+  bool words_low_first{false};
+  bool has_counter{false};
+  bool has_status{false};
+};
+[[nodiscard]] const std::array<UnitPlace, units_count>& unit_places();
+
+/// A value that a unit gave out for a sensor.
+struct Sample {
+  nanoseconds given_at{-1};
+  nanoseconds converted_at{-1};
+  double temp_degC{0.0};
+  bool good{false};        ///< not marked as a fault by the unit
+  bool impossible{false};  ///< a spike no structure can follow
+};
+
+class Thermocouples {
+ public:
+  Thermocouples(std::uint64_t seed, const FaultSchedule& schedule);
+
+  /// Registers `address`.. of a unit as they stand at `time`; remembers what was given out.
+  void read(std::size_t place, std::size_t address, std::span<std::uint16_t> words,
+            nanoseconds time);
+  /// A good sample of the sensor with this value given out in [from, to]; nullptr: none.
+  [[nodiscard]] const Sample* given(std::size_t sensor, double temp_degC, nanoseconds from,
+                                    nanoseconds to) const noexcept;
+  /// When the newest good value that was given out of this sensor was converted; -1: never.
+  [[nodiscard]] nanoseconds last_good(std::size_t sensor) const noexcept {
+    return last_good_[sensor];
+  }
+
+ private:
+  static constexpr std::size_t kept = 64;
+  [[nodiscard]] double true_degC(std::size_t sensor, nanoseconds time) const noexcept;
+  [[nodiscard]] Sample convert(std::size_t sensor, nanoseconds time) const noexcept;
+  void put(const UnitPlace& place, std::span<std::uint16_t> value, const Sample& sample) const;
+  void remember(std::size_t sensor, const Sample& sample) noexcept;
+
+  std::uint64_t seed_;
+  const FaultSchedule& schedule_;
+  struct Course {
+    double mean_degC;
+    double swing_K;
+    double rate_per_s;
+    double phase;
+  };
+  std::array<Course, sensors_count> courses_{};
+  std::array<std::array<Sample, kept>, sensors_count> samples_{};
+  std::array<std::size_t, sensors_count> given_{};
+  std::array<nanoseconds, sensors_count> last_good_{};
+};
+
+/// What the controller takes and shows; a write that reaches it is one `Move` an axis.
+struct Move {
+  std::size_t axis{0};
+  nanoseconds at{};
+  double from_um{0.0};  ///< applied until now
+  double to_um{0.0};    ///< told
+  /// The controller changed something by itself since our last accepted write.
+  bool disturbed{false};
+  bool seen{false};  ///< ... and has told it since (a read-back was served)
+};
+
+class SimulatedController {
+ public:
+  SimulatedController(std::uint64_t seed, const FaultSchedule& schedule, bool floats);
+
+  /// Registers as they stand at `time`.
+  void read(std::size_t address, std::span<std::uint16_t> words, nanoseconds time);
+  /// @return false: refused
+  bool write(std::size_t address, std::span<const std::uint16_t> words, nanoseconds time);
+
+  [[nodiscard]] bool powered(nanoseconds time) const noexcept;
+  [[nodiscard]] bool applies_other(nanoseconds time) const noexcept {
+    return schedule_.find(FaultKind::controller_applies_other, time) != nullptr;
+  }
+  [[nodiscard]] static bool cutting(nanoseconds time) noexcept;
+  [[nodiscard]] bool switched_off(nanoseconds time) const noexcept;
+  [[nodiscard]] double applied_um(std::size_t axis) const noexcept { return applied_um_[axis]; }
+  /// Moves since the last call.
+  [[nodiscard]] std::vector<Move>& moves() noexcept { return moves_; }
+  void advance(nanoseconds time);
+
+ private:
+  void disturb(std::size_t axis, double applied_um);
+  [[nodiscard]] std::size_t words_an_offset() const noexcept { return floats_ ? 2 : 1; }
+
+  std::uint64_t seed_;
+  const FaultSchedule& schedule_;
+  bool floats_;
+  bool on_{true};
+  std::uint64_t last_rehoming_{0};
+  std::array<double, axes_count> applied_um_{};
+  std::array<bool, axes_count> disturbed_{};
+  std::array<bool, axes_count> seen_{};
+  std::array<std::uint16_t, 16> written_{};
+  std::vector<Move> moves_;
+};
+
+}  // namespace thermocomp::faults

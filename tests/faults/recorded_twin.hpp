@@ -1,0 +1,56 @@
+/// What the recorder hands over, through the chunk codec and back, into a second estimator: it must
+/// give the first one's offsets to the last bit in every cycle.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "daemon/history/chunk_codec.hpp"
+#include "daemon/history/cycle_recorder.hpp"
+#include "daemon/history/record.hpp"
+#include "daemon/history/segment_walk.hpp"
+#include "estimator/estimator.hpp"
+
+namespace thermocomp::faults {
+
+class RecordedTwin {
+ public:
+  explicit RecordedTwin(const Grid& grid) : grid_(grid) {}
+
+  /// A recorder for an estimator that is about to be used.
+  [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const Estimator& estimator);
+  /// After each cycle: what the first estimator sent.
+  /// @return the cycle that came out different, if one did
+  std::optional<std::uint64_t> stepped(std::uint64_t cycle, const OffsetCommand& command);
+  /// What is left.
+  std::optional<std::uint64_t> finish();
+  [[nodiscard]] std::uint64_t replayed() const noexcept { return replayed_; }
+
+ private:
+  struct Expected {
+    std::uint64_t cycle;
+    OffsetCommand command;
+  };
+  struct Session {
+    std::shared_ptr<RecordingSession> recording;
+    EstimatorConfig config;
+    ThermalModel model;
+  };
+  std::optional<std::uint64_t> drain();
+  std::optional<std::uint64_t> replay(std::uint64_t before);
+  void begin(const Record& record);
+
+  Grid grid_;
+  RecordRing ring_{8192};
+  std::map<std::uint16_t, Session> sessions_;
+  std::uint16_t next_session_{1};
+  ChunkEncoder encoder_;
+  std::vector<Expected> expected_;
+  std::unique_ptr<Estimator> twin_;
+  InputsInForce inputs_;
+  std::uint64_t replayed_{0};
+};
+
+}  // namespace thermocomp::faults

@@ -1,0 +1,112 @@
+/// One run of the daemon, from its start to its end: the real connections, polling, controller
+/// dialogue and cycle, over simulated lines and without a thread.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "daemon/cycle/cycle.hpp"
+#include "drivers/controllers/modbus_dialogue.hpp"
+#include "drivers/modbus/connection.hpp"
+#include "drivers/sensors/modbus_poller.hpp"
+#include "simulated_line.hpp"
+
+namespace thermocomp::faults {
+
+/// What outlives a run of the daemon.
+struct World {
+  World(std::uint64_t seed, const MachineShape& shape, const FaultSchedule& fault_schedule)
+      : schedule(fault_schedule),
+        thermocouples(seed, fault_schedule),
+        controller(seed, fault_schedule, shape.offsets_are_float),
+        units{SensorUnits{0, thermocouples, fault_schedule},
+              SensorUnits{1, thermocouples, fault_schedule}},
+        controller_unit(controller),
+        chance(seed, 3) {}
+
+  const FaultSchedule& schedule;
+  Thermocouples thermocouples;
+  SimulatedController controller;
+  std::array<SensorUnits, buses_count> units;
+  ControllerUnit controller_unit;
+  Chance chance;
+  nanoseconds now{};                              ///< of the cycle
+  std::array<nanoseconds, lines_count> clocks{};  ///< of each line
+};
+
+/// A bus that runs behind the cycle and catches up when the cycle looks: what it publishes is seen
+/// from the moment at which it was published, never earlier.
+class SteppedSource final : public SensorSource {
+ public:
+  SteppedSource(const ModbusBusConfig& config, std::size_t line, World& world);
+  void start() override {}
+  void stop() noexcept override {}
+  void newest(std::span<Reading> all) noexcept override;
+  [[nodiscard]] BusHealth health() const override { return poller_.health(); }
+
+ private:
+  World& world_;
+  nanoseconds& clock_;
+  ModbusConnection connection_;
+  ModbusPoller poller_;
+  std::vector<std::size_t> sensors_;
+  std::vector<Reading> seen_;
+};
+
+class SteppedLink final : public ControllerLink {
+ public:
+  SteppedLink(const ModbusControllerConfig& config, World& world);
+  void start() override {}
+  void stop() noexcept override {}
+  void newest(ControllerState& state) noexcept override;
+  void offer(const OffsetCommand& command) noexcept override {
+    offered_ = command;
+    dialogue_.offer(command);
+  }
+  [[nodiscard]] ControllerHealth health() const override { return dialogue_.health(); }
+  [[nodiscard]] const OffsetCommand& offered() const noexcept { return offered_; }
+  [[nodiscard]] const ControllerState& seen() const noexcept { return seen_; }
+
+ private:
+  World& world_;
+  nanoseconds& clock_;
+  ModbusConnection connection_;
+  ModbusDialogue dialogue_;
+  ControllerState seen_;
+  OffsetCommand offered_;
+};
+
+/// Keeps what the cycle got from all buses, for the judge.
+class ReadingsTap final : public SensorSource {
+ public:
+  explicit ReadingsTap(std::vector<Reading>& readings) : readings_(readings) {}
+  void start() override {}
+  void stop() noexcept override {}
+  void newest(std::span<Reading> all) noexcept override {
+    std::copy(all.begin(), all.end(), readings_.begin());
+  }
+  [[nodiscard]] BusHealth health() const override { return {}; }
+
+ private:
+  std::vector<Reading>& readings_;
+};
+
+class SimulatedDaemon {
+ public:
+  SimulatedDaemon(const MachineShape& shape, World& world, const Grid& grid,
+                  std::unique_ptr<CycleBrain> brain);
+
+  [[nodiscard]] Cycle& cycle() noexcept { return cycle_; }
+  [[nodiscard]] SteppedLink& link() noexcept { return link_; }
+  [[nodiscard]] const std::vector<Reading>& readings() const noexcept { return readings_; }
+
+ private:
+  std::vector<Reading> readings_;
+  std::array<std::unique_ptr<SteppedSource>, buses_count> sources_;
+  ReadingsTap tap_;
+  SteppedLink link_;
+  Cycle cycle_;
+};
+
+}  // namespace thermocomp::faults
