@@ -23,7 +23,9 @@ std::vector<double> precision_of(const std::vector<std::vector<double>>& rows, d
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j)
       covariance_K2(i, j) = rows[static_cast<std::size_t>(i)].at(static_cast<std::size_t>(j));
-  covariance_K2.diagonal().array() += noise_K * noise_K;
+  // The file's matrix may be negative by what rounding does to large numbers.
+  const double rounding_K2 = 1e-8 * static_cast<double>(n) * covariance_K2.cwiseAbs().maxCoeff();
+  covariance_K2.diagonal().array() += std::max(noise_K * noise_K, rounding_K2);
   const Eigen::LLT<Matrix> llt(covariance_K2);
   if (llt.info() != Eigen::Success)
     throw InvalidValue("covariance.matrix_K2", std::to_string(n) + " rows",

@@ -62,12 +62,14 @@ TEST_CASE("the random lives reach what they are meant to test", "[property][esti
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     const Outcome outcome = live(seed, {});
     all.steps_compensating += outcome.steps_compensating;
+    all.steps_estimating += outcome.steps_estimating;
     all.resyncs += outcome.resyncs;
     all.reloads += outcome.reloads;
     all.restarts += outcome.restarts;
     all.largest_offset_um = std::max(all.largest_offset_um, outcome.largest_offset_um);
   }
   CHECK(all.steps_compensating > seeds * 60);
+  CHECK(all.steps_estimating > seeds * 10);
   CHECK(all.resyncs > seeds);
   CHECK(all.reloads > seeds);
   CHECK(all.restarts > seeds);

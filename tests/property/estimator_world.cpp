@@ -75,7 +75,23 @@ EstimatorConfig random_config(Chance& chance) {
   config.compensation.mismatch_um = chance.between(0.5, 3.0);
   config.compensation.mismatch_after_s = chance.between(0.5, 3.0);
   config.compensation.prove_hold_s = chance.between(0.0, 2.0);
+  config.compensation.estimate_lost_blocks = !chance.one_in(5);
+  config.compensation.offset_sd_um_max = chance.between(0.5, 50.0);
   return config;
+}
+
+/// Three inputs that mostly move together; at times exactly.
+void add_covariance(Chance& chance, ThermalModel& model) {
+  const double own_K2 = chance.one_in(4) ? 0.0 : chance.between(0.0, 1.0);
+  std::array<double, 3> together_K{};
+  for (double& each : together_K) each = chance.between(-2.0, 2.0);
+  for (std::size_t i = 0; i < together_K.size(); ++i) {
+    auto& row = model.covariance_K2.emplace_back();
+    for (std::size_t j = 0; j < together_K.size(); ++j)
+      row.push_back(together_K[i] * together_K[j] + (i == j ? own_K2 : 0.0));
+  }
+  model.covariance_growth.drift_time_s = chance.one_in(3) ? 0.0 : chance.between(1.0, 1000.0);
+  if (chance.one_in(2)) model.covariance_growth.scatter_factor = {0.5, 0.0, 2.0};
 }
 
 ThermalModel random_model(Chance& chance) {
@@ -99,6 +115,7 @@ ThermalModel random_model(Chance& chance) {
                            "spindle_rpm",
                            {{"tau_s", 30.0}, {"power", 2.0}},
                            {{"gain_um_per_unit", {{"z_um", chance.between(-1e-6, 1e-6)}}}}});
+  if (!chance.one_in(3)) add_covariance(chance, model);
   return model;
 }
 
@@ -203,8 +220,11 @@ class World {
     PersistentState state;
     state.enabled = report_.enabled;
     const auto columns = model_.temperature_columns();
-    for (std::size_t i = 0; i < columns.size(); ++i)
-      state.reference_degC[columns[i]] = report_.inputs[i].reference_degC;
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const InputReport& input = report_.inputs[i];
+      state.reference_degC[columns[i]] = input.reference_degC;
+      if (input.good || input.estimated) state.temp_degC[columns[i]] = input.temp_degC;
+    }
     state.model_reference_degC = estimator_->model_reference_degC();
     const auto signals = model_.signal_columns();
     for (std::size_t i = 0; i < signals.size(); ++i)
@@ -365,12 +385,33 @@ class World {
       if (std::abs(command_.offset_um[i] - state_.applied_um[i]) <=
           step_um_max(i) + register_rounding_um)
         sent_.back().start_um[i] = state_.applied_um[i];
+    check_estimates();
     for (std::size_t i = 0; i < axes_count && !outcome_.violation; ++i) {
       check_offset(i);
       check_valid(i);
       before_um_[i] = command_.offset_um[i];
       outcome_.largest_offset_um = std::max(outcome_.largest_offset_um, std::abs(before_um_[i]));
     }
+  }
+
+  void check_estimates() {
+    const bool estimating = has_reason(report_.reasons, Reason::block_estimated);
+    if (estimating) ++outcome_.steps_estimating;
+    demand("a lost block is either estimated or holds the offset",
+           !(estimating && has_reason(report_.reasons, Reason::block_lost)), 0, 0);
+    for (const InputReport& input : report_.inputs) {
+      demand("the spread of an estimate is a finite number, none of what is measured",
+             input.sd_K >= 0 && input.sd_K < 1e6 && !(input.good && input.sd_K > 0), input.sd_K, 0);
+      demand("an estimate is a finite number", !input.estimated || std::isfinite(input.temp_degC),
+             input.temp_degC, 0);
+      demand("what is compensated with is measured or estimated",
+             report_.mode != Mode::compensating || input.good || input.estimated, 0, 0);
+    }
+    const double most_um = config_.compensation.offset_sd_um_max;
+    for (const AxisReport& axis : report_.axes)
+      demand("what is too uncertain is not compensated with",
+             axis.offset_sd_um >= 0 && !(estimating && axis.offset_sd_um > most_um),
+             axis.offset_sd_um, most_um);
   }
 
   [[nodiscard]] double step_um_max(std::size_t axis) const {

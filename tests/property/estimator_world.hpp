@@ -53,6 +53,7 @@ struct Outcome {
   std::vector<std::uint64_t> trace;
   double largest_offset_um{0.0};
   std::size_t steps_compensating{0};
+  std::size_t steps_estimating{0};
   std::size_t resyncs{0};
   std::size_t reloads{0};
   std::size_t restarts{0};

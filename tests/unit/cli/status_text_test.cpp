@@ -91,6 +91,29 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
   CHECK_THAT(text, Contains("bus cabinet is not connected (refused)"));
 }
 
+TEST_CASE("an estimated block is told with how sure it is", "[cli][status]") {
+  json status = good_status();
+  status["reasons"] = {"block_estimated"};
+  status["inputs"].push_back({{"name", "head_degC"},
+                              {"block", "head"},
+                              {"temp_degC", 30.0},
+                              {"reference_degC", 21.0},
+                              {"good", false},
+                              {"estimated", true},
+                              {"sd_K", 0.4}});
+  status["axes"][0]["offset_sd"] = 0.8;
+  status["axes"][0]["offset_sd_max"] = 5.0;
+  CHECK(is_compensating(status));
+  const std::string text = status_text(status, false);
+  CHECK_THAT(text, Contains("block head is estimated from 1 other, +-0.40 K (1 sd)"));
+  CHECK_THAT(text, Contains("z +-0.80 um"));
+  CHECK_THAT(text, !Contains("too uncertain"));
+  CHECK_THAT(watch_screen(status, nullptr, false), Contains("estimated +-0.40 K"));
+  CHECK_THAT(sensors_text(status, false), Contains("block head is estimated"));
+  status["axes"][0]["offset_sd"] = 6.0;
+  CHECK_THAT(status_text(status, false), Contains("z +-6.00 um (too uncertain: at most 5.00)"));
+}
+
 TEST_CASE("the error state of a CAN interface is told with its age and a remedy", "[cli][status]") {
   json status = good_status();
   status["buses"] = json::parse(R"([{"name": "body", "kind": "can", "connected": false,

@@ -147,6 +147,13 @@ const std::vector<Broken>& broken_models() {
        "covariance.matrix_K2", "symmetric"},
       {"covariance not positive", "[[4.0, 1.0], [1.0, 9.0]]", "[[4.0, 7.0], [7.0, 9.0]]", "",
        "covariance.matrix_K2", "positive semidefinite"},
+      {"covariance with a factor too few", "[covariance]", "[covariance]\ndrift_factor = [1.0]",
+       "drift_factor = [1.0]", "covariance.drift_factor", "must have one value an input"},
+      {"covariance with a factor below 0", "[covariance]",
+       "[covariance]\nscatter_factor = [1.0, -1.0]", "scatter_factor", "covariance.scatter_factor",
+       "must be in [0, "},
+      {"covariance without noise", "[covariance]", "[covariance]\nnoise_K = 0.0", "noise_K",
+       "covariance.noise_K", "must be in (0, 10]"},
       {"covariance with an unknown key", "[covariance]", "[covariance]\nunit = \"K2\"",
        "unit = \"K2\"", "covariance.unit", "unknown key"},
   };
@@ -248,6 +255,23 @@ TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
   }
   CHECK(back.covariance_K2 == model.covariance_K2);
   CHECK(write_model(back) == write_model(model));
+}
+
+TEST_CASE("how estimates grow uncertain is read and written bit for bit", "[config][model]") {
+  const std::string text =
+      "format = 1\ninputs = [\"a_degC\", \"b_degC\"]\noutputs = [\"z_um\"]\n"
+      "reference = \"first_sample\"\nmatrix_um_per_K = [[1.0, 2.0]]\n[covariance]\n"
+      "matrix_K2 = [[4.0, 1.0], [1.0, 9.0]]\nnoise_K = 0.05\ndrift_factor = [3.1, 0.1]\n"
+      "drift_time_s = 7200\nscatter_factor = [0.3, 0.0]\nscatter_time_s = 71.3\n";
+  const ThermalModel model = parse_model(text, "m");
+  CHECK(model.covariance_growth.drift_factor == std::vector<double>{3.1, 0.1});
+  CHECK(model.covariance_growth.noise_K == 0.05);
+  const ThermalModel back = parse_model(write_model(model), "back");
+  CHECK(back.covariance_growth.noise_K == model.covariance_growth.noise_K);
+  CHECK(back.covariance_growth.drift_factor == model.covariance_growth.drift_factor);
+  CHECK(back.covariance_growth.drift_time_s == 7200.0);
+  CHECK(back.covariance_growth.scatter_factor == model.covariance_growth.scatter_factor);
+  CHECK(back.covariance_growth.scatter_time_s == 71.3);
 }
 
 TEST_CASE("a covariance that is only just semidefinite is accepted", "[config][model]") {

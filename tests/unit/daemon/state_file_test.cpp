@@ -18,6 +18,7 @@ PersistentState sample_state() {
   state.model_reference_degC = {{"bed_degC", 20.0}};
   state.reference_signals = {{"spindle_rpm", 1.0 / 3.0}};
   state.offset_um = {{"z", -12.345678901234567}};
+  state.temp_degC = {{"bed_degC", 21.7}};
   return state;
 }
 
@@ -35,6 +36,7 @@ TEST_CASE("a state comes back bit for bit", "[state]") {
   CHECK(loaded.state.model_reference_degC == state.model_reference_degC);
   CHECK(loaded.state.reference_signals == state.reference_signals);
   CHECK(loaded.state.offset_um == state.offset_um);
+  CHECK(loaded.state.temp_degC == state.temp_degC);
 }
 
 TEST_CASE("no state file is the first start and no warning", "[state]") {
