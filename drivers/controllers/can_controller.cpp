@@ -95,6 +95,8 @@ CanController::CanController(CanControllerConfig config)
   held_um_.fill(not_a_number);
   health_.name = config_.name;
   health_.kind = "can";
+  health_.state = to_string(socket_.state());
+  health_.state_since = socket_.state_since();
 }
 
 CanController::~CanController() {

@@ -45,6 +45,8 @@ CanSource::CanSource(CanBusConfig config)
                    [](const Channel& a, const Channel& b) { return a.id < b.id; });
   health_.name = config_.name;
   health_.kind = "can";
+  health_.state = to_string(socket_.state());
+  health_.state_since = socket_.state_since();
 }
 
 CanSource::~CanSource() {

@@ -7,7 +7,6 @@ import pathlib
 import pty
 import select
 import struct
-import subprocess
 import threading
 import time
 import tty
@@ -96,9 +95,3 @@ class SerialAdapter:
 def is_possible():
     """In the guests only: the interface belongs to the first network namespace."""
     return "THERMOCOMP_VM" in os.environ and pathlib.Path("/sys/module/slcan").exists()
-
-
-def set_up(name):
-    subprocess.run(["ip", "link", "set", name, "type", "can", "bitrate", "250000"], check=True,
-                   timeout=60)
-    subprocess.run(["ip", "link", "set", name, "up"], check=True, timeout=60)

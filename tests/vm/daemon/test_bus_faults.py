@@ -10,7 +10,7 @@ import pytest
 
 import rig as rigs
 from lab import Lab, eventually
-from rig import ip, write_error_frame
+from rig import ip, set_up, write_error_frame
 
 pytestmark = pytest.mark.skipif(not pathlib.Path("/sys/class/net/vcan1").exists(),
                                 reason="there is no vcan1 (tests/vm/run_with_can.sh makes one)")
@@ -74,16 +74,14 @@ def test_interface_down_and_up(rig, bus):
         ip("set", INTERFACES[bus], "down")
         eventually(lambda: rig.bus(bus)["state"] == "down", "the state is told")
 
-    rig.outage("interface down, up", bus, begin, lambda: ip("set", INTERFACES[bus], "up"))
+    rig.outage("interface down, up", bus, begin, lambda: set_up(INTERFACES[bus]))
 
 
 @pytest.mark.parametrize("bus", BUSES)
 def test_interface_removed_and_made_anew(rig, bus):
-    def end():
-        ip("add", "dev", INTERFACES[bus], "type", "vcan")
-        ip("set", INTERFACES[bus], "up")
-
-    rig.outage("interface removed, made anew", bus, lambda: ip("del", INTERFACES[bus]), end)
+    rig.outage("interface removed, made anew", bus, lambda: ip("del", INTERFACES[bus]),
+               lambda: set_up(INTERFACES[bus]),
+               lambda: ip("add", "dev", INTERFACES[bus], "type", "vcan"))
 
 
 @pytest.mark.parametrize("bus", BUSES)

@@ -6,7 +6,7 @@ import pytest
 import rig as rigs
 import serial_adapter
 from lab import Lab, eventually
-from rig import ip
+from rig import ip, set_up
 
 pytestmark = pytest.mark.skipif(not serial_adapter.is_possible(),
                                 reason="the kernel has no slcan (tests/vm/run_with_can.sh)")
@@ -29,7 +29,8 @@ def adapter(tmp_path_factory):
     lab = Lab(tmp_path_factory.mktemp("states"))
     try:
         made = lab.also_end(serial_adapter.SerialAdapter())
-        serial_adapter.set_up(made.name)
+        ip("set", made.name, "type", "can", "bitrate", "250000")
+        set_up(made.name)
         made.rig = OneBusRig(lab, made)
         yield made
         for recovery in made.rig.finish():
@@ -60,14 +61,9 @@ def bus_off(adapter):
     assert "bus body: bus-off for " in said and "controller cnc: bus-off for " in said
 
 
-def down_and_up(adapter):
-    ip("set", adapter.name, "down")
-    ip("set", adapter.name, "up")
-
-
 def test_bus_off_until_the_interface_is_restarted(adapter):
     adapter.rig.outage("bus-off (slcan), down and up", "both", lambda: bus_off(adapter),
-                       lambda: down_and_up(adapter))
+                       lambda: set_up(adapter.name), lambda: ip("set", adapter.name, "down"))
     assert adapter.rig.bus("body")["bus_offs"] == 1
     assert adapter.rig.daemon.status()["controller"]["bus_offs"] == 1
 
@@ -87,6 +83,7 @@ def test_a_daemon_that_starts_on_a_bus_that_is_off_says_so(adapter):
     rig.daemon.start()
     eventually(lambda: rig.bus("body")["state"] == "bus_off", "bus-off is told")
     assert not rig.bus("body")["connected"]
-    down_and_up(adapter)
+    ip("set", adapter.name, "down")
+    set_up(adapter.name)
     rig.daemon.wait_for_mode("compensating")
     assert rig.bus("body")["state"] == "active"

@@ -2,23 +2,20 @@
 The daemon is on can0, its machine on can1; both cards are on one bus."""
 
 import pathlib
-import subprocess
 
 import pytest
 
 import rig as rigs
 from lab import Lab, eventually
-from rig import ip
+from rig import ip, set_up
 
 CARD, PEER = "can0", "can1"
 pytestmark = pytest.mark.skipif(not pathlib.Path(f"/sys/class/net/{PEER}/device").exists(),
                                 reason="there are no CAN cards (tests/vm/run_in_vm.sh --emulated)")
 
 
-def set_up(interface):
-    subprocess.run(["ip", "link", "set", interface, "type", "can", "bitrate", "500000",
-                    "restart-ms", "100"], check=True, timeout=60)
-    ip("set", interface, "up")
+def configure(interface):
+    ip("set", interface, "type", "can", "bitrate", "500000", "restart-ms", "100")
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +23,7 @@ def rig(tmp_path_factory):
     lab = Lab(tmp_path_factory.mktemp("card"))
     try:
         for interface in (CARD, PEER):
+            configure(interface)
             set_up(interface)
         made = rigs.Rig(lab, (CARD, CARD), (PEER, PEER))
         yield made
@@ -42,7 +40,7 @@ def test_link_down_and_up(rig):
         eventually(lambda: rig.bus("body")["state"] == "down", "the state is told")
         assert rig.bus("body")["last_error"].startswith(CARD)
 
-    rig.outage("link down, up (kvaser_pci)", "both", begin, lambda: ip("set", CARD, "up"))
+    rig.outage("link down, up (kvaser_pci)", "both", begin, lambda: set_up(CARD))
 
 
 def test_card_removed_and_found_again(rig):
@@ -52,10 +50,10 @@ def test_card_removed_and_found_again(rig):
         (card / "remove").write_text("1")
         assert not pathlib.Path(f"/sys/class/net/{CARD}").exists()
 
-    def end():
+    def prepare():
         pathlib.Path("/sys/bus/pci/rescan").write_text("1")
         eventually(lambda: pathlib.Path(f"/sys/class/net/{CARD}").exists(), "the card is found")
-        set_up(CARD)
+        configure(CARD)
 
-    rig.outage("card removed, rescan (kvaser_pci)", "both", begin, end)
+    rig.outage("card removed, rescan (kvaser_pci)", "both", begin, lambda: set_up(CARD), prepare)
     assert rig.bus("body")["connects"] >= 3
