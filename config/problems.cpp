@@ -1,15 +1,12 @@
 #include "config/problems.hpp"
 
 #include <algorithm>
+#include <set>
+#include <tuple>
 #include <utility>
 
 namespace thermocomp {
 namespace {
-
-bool same(const Problem& a, const Problem& b) {
-  return a.file == b.file && a.line == b.line && a.key == b.key && a.value == b.value &&
-         a.rule == b.rule;
-}
 
 std::vector<Problem> in_order(std::vector<Problem> problems) {
   std::vector<std::string> files;
@@ -23,11 +20,13 @@ std::vector<Problem> in_order(std::vector<Problem> problems) {
   };
   std::stable_sort(problems.begin(), problems.end(),
                    [&](const Problem& a, const Problem& b) { return rank(a) < rank(b); });
+  // A set, as a file can have a hundred thousand problems.
+  std::set<std::tuple<std::string, int, std::string, std::string, std::string>> seen;
   std::vector<Problem> once;
   for (Problem& problem : problems) {
-    const bool seen = std::any_of(once.begin(), once.end(),
-                                  [&](const Problem& other) { return same(problem, other); });
-    if (!seen) once.push_back(std::move(problem));
+    const bool is_new =
+        seen.emplace(problem.file, problem.line, problem.key, problem.value, problem.rule).second;
+    if (is_new) once.push_back(std::move(problem));
   }
   return once;
 }

@@ -70,6 +70,7 @@ class RunParser {
 
  private:
   void add(int line, std::string key, std::string_view value, std::string rule) {
+    if (problems_.size() >= problems_max) return;  // also within a row of many columns
     constexpr std::size_t shown_max = 40;
     std::string shown(value.substr(0, shown_max));
     if (value.size() > shown_max) shown += " ...";

@@ -153,3 +153,18 @@ TEST_CASE("a column that is asked for and missing is named with its file", "[con
   CHECK(problems.front().file == "run.csv");
   CHECK(problems.front().key == "t9_degC");
 }
+
+TEST_CASE("a row or a header of very many columns is refused with the first 100 problems",
+          "[run_file]") {
+  std::string header = "time_s";
+  std::string row = "0";
+  for (int i = 0; i < 100000; ++i) {
+    header.append(",c").append(std::to_string(i));
+    row += ",x";
+  }
+  const auto of_row = problems_of([&] { return parse_run(header + "\n" + row + "\n", "run.csv"); });
+  CHECK(of_row.size() == 100);
+  const std::string commas(100000, ',');
+  const auto of_header = problems_of([&] { return parse_run("time_s" + commas + "\n0\n", "r"); });
+  CHECK(of_header.size() == 100);
+}
