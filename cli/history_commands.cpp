@@ -43,6 +43,10 @@ int run_export(const ExportOptions& options) {
   file.commit();
   std::fprintf(stderr, "%llu rows, %zu columns\n", static_cast<unsigned long long>(summary.rows),
                summary.columns.size());
+  if (summary.gaps > 0) {
+    std::fprintf(stderr, "%llu gap%s, each told by a comment line in the file\n",
+                 static_cast<unsigned long long>(summary.gaps), summary.gaps == 1 ? "" : "s");
+  }
   return exit_success;
 }
 

@@ -282,6 +282,7 @@ void Daemon::Parts::look_at_health() {
   controller_health = link->health();
   events.note_controller(controller_health);
   events.note_missed(cycle->timing().missed.load());
+  events.note_socket(server->statistics());
   service.status(status_line(view()));
 }
 
@@ -333,8 +334,13 @@ void Daemon::Parts::command(const Command& asked) {
       asked.kind == CommandKind::measured || asked.kind == CommandKind::prove
           ? fmt::format(" {} {} um", config.estimator.axes[asked.axis].name, asked.value_um)
           : "");
-  // Answered only when it would survive a power cut.
+  // Called done only when it would survive a power cut.
   save_state(true);
+  const bool is_kept = asked.kind == CommandKind::enable || asked.kind == CommandKind::disable ||
+                       asked.kind == CommandKind::reference;
+  if (is_kept && !save_error.empty())
+    throw RpcError(rpc::internal_error,
+                   "carried out, but not saved, so that a restart would undo it: " + save_error);
 }
 
 void Daemon::Parts::reload() {
@@ -381,7 +387,8 @@ StatusView Daemon::Parts::view() {
           statistics,
           std::move(all),
           std::chrono::duration<double>(Clock::now() - started).count(),
-          real_time};
+          real_time,
+          server->statistics()};
 }
 
 void Daemon::Parts::stop() noexcept {

@@ -120,4 +120,17 @@ void EventLog::note_missed(std::uint64_t missed) {
   missed_ = missed;
 }
 
+void EventLog::note_socket(const SocketStatistics& statistics) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < socket_next_) return;
+  const std::uint64_t refused = statistics.refused - socket_.refused;
+  const std::uint64_t cut_off = statistics.cut_off - socket_.cut_off;
+  const std::uint64_t missed = statistics.missed - socket_.missed;
+  if (refused + cut_off + missed == 0) return;
+  spdlog::warn("status socket: {} clients refused, {} cut off, {} notifications missed; {} clients",
+               refused, cut_off, missed, statistics.clients);
+  socket_ = statistics;
+  socket_next_ = now + std::chrono::minutes(1);
+}
+
 }  // namespace thermocomp

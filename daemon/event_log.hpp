@@ -2,10 +2,12 @@
 /// has to log.
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "daemon/socket/status_server.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "estimator/estimator.hpp"
@@ -22,6 +24,9 @@ class EventLog {
   void note_bus(const BusHealth& bus);
   void note_controller(const ControllerHealth& controller);
   void note_missed(std::uint64_t missed);
+  /// Clients that were refused, cut off or missed notifications: at most one line a minute, since
+  /// whoever can connect could otherwise fill the log.
+  void note_socket(const SocketStatistics& statistics);
 
  private:
   void note_link(const std::string& what, bool connected, const std::string& error);
@@ -37,6 +42,8 @@ class EventLog {
   std::map<std::string, bool> connected_;
   std::map<std::string, std::string> states_;  ///< of CAN interfaces
   std::uint64_t missed_{0};
+  SocketStatistics socket_;
+  std::chrono::steady_clock::time_point socket_next_{};
 };
 
 }  // namespace thermocomp

@@ -149,6 +149,18 @@ json history(const StatusView& view) {
           {"last_error", statistics.last_error}};
 }
 
+json socket(const SocketStatistics& statistics) {
+  return {{"clients", statistics.clients},
+          {"accepted", statistics.accepted},
+          {"refused", statistics.refused},
+          {"requests", statistics.requests},
+          {"errors", statistics.errors},
+          {"cut_off", statistics.cut_off},
+          {"delayed", statistics.delayed},
+          {"missed_notifications", statistics.missed},
+          {"buffered_bytes", statistics.buffered_bytes}};
+}
+
 }  // namespace
 
 json status_json(const StatusView& view) {
@@ -175,6 +187,7 @@ json status_json(const StatusView& view) {
           {"buses", buses(view)},
           {"controller", controller(view)},
           {"history", history(view)},
+          {"socket", socket(view.socket)},
           {"warnings", view.warnings}};
 }
 

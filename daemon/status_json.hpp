@@ -10,6 +10,7 @@
 #include "config/daemon_config.hpp"
 #include "daemon/cycle/cycle.hpp"
 #include "daemon/history/history_writer.hpp"
+#include "daemon/socket/status_server.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "estimator/estimator.hpp"
@@ -28,6 +29,7 @@ struct StatusView {
   std::vector<std::string> warnings;
   double uptime_s{0.0};
   bool real_time{false};
+  SocketStatistics socket;
 };
 
 /// NaN becomes null. Units are the ends of the keys; axes and outputs name theirs.

@@ -28,6 +28,8 @@ class DatabaseError : public HistoryError {
   [[nodiscard]] bool is_damage() const noexcept {
     return (code_ & 0xFF) == SQLITE_CORRUPT || (code_ & 0xFF) == SQLITE_NOTADB;
   }
+  /// No room for more; the connection is as good as before.
+  [[nodiscard]] bool is_full() const noexcept { return (code_ & 0xFF) == SQLITE_FULL; }
 
  private:
   int code_;

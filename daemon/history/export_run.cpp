@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <ctime>
 #include <ostream>
 #include <stdexcept>
@@ -156,6 +158,21 @@ class SegmentExport {
   bool has_record_{false};
 };
 
+/// A comment line where nothing is known between two segments; empty where they join.
+std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const SegmentInfo& after,
+                     double first_s) {
+  const double from_s =
+      clock.seconds_at(before, static_cast<std::uint64_t>(before.last_cycle + 1)) - first_s;
+  const double to_s = clock.seconds_at(after, after.first_cycle) - first_s;
+  const double period_s = std::chrono::duration<double>(after.grid.period).count();
+  if (!(to_s - from_s > 0.5 * period_s)) return {};
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "# nothing is recorded from %.3f s to %.3f s: %s\n",
+                from_s, to_s,
+                after.reason == SegmentReason::gap ? "lost" : "the daemon ended and began again");
+  return text.data();
+}
+
 bool is_before(double time_s, std::int64_t wall_ns, const HistoryTime& bound) {
   return bound.seconds ? time_s < *bound.seconds : wall_ns < *bound.wall_ns;
 }
@@ -252,11 +269,12 @@ ExportSummary export_run(const std::filesystem::path& history,
   std::map<std::int64_t, SetupColumns> places;
   for (const auto& [id, setup] : setups.all()) places[id] = columns_for(setup.estimator, columns);
 
-  ExportSummary summary{0, columns.names()};
+  ExportSummary summary{0, 0, columns.names()};
   std::string text;
   append_header(text, columns.names());
   std::vector<double> row(columns.names().size());
   std::optional<double> first_s;
+  const SegmentInfo* last_written = nullptr;
   std::size_t segments_done = 0;
   for (const SegmentInfo& segment : reader.segments()) {
     SegmentExport walk(reader, segment, setups.of(segment), places.at(segment.setup));
@@ -268,6 +286,11 @@ ExportSummary export_run(const std::filesystem::path& history,
       std::fill(row.begin(), row.end(), not_a_number);
       walk.fill(row);
       row[0] = time_s - *first_s;
+      if (last_written != nullptr && last_written != &segment) {
+        text = gap_line(clock, *last_written, segment, *first_s);
+        if (!text.empty()) ++summary.gaps;
+      }
+      last_written = &segment;
       append_row(text, row);
       out << text;
       text.clear();

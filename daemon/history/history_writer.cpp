@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <spdlog/spdlog.h>
+#include <sys/statvfs.h>
 
 #include "daemon/history/chunk_codec.hpp"
 #include "daemon/history/history_store.hpp"
@@ -27,6 +28,16 @@ constexpr std::size_t chunk_bytes_max = std::size_t{512} * 1024;
 constexpr double backoff_s_max = 60.0;
 /// SQLite needs little; the default of 8 MB would count fully once memory is locked.
 constexpr std::size_t stack_bytes = std::size_t{512} * 1024;
+
+/// Where opening fails for want of room, SQLite speaks of an I/O error; a person needs the cause.
+std::string disk_note(const std::filesystem::path& file) {
+  constexpr std::uint64_t room_bytes_min = std::uint64_t{256} * 1024;
+  struct statvfs disk {};
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  if (statvfs(folder.c_str(), &disk) != 0) return {};
+  const std::uint64_t room_bytes = std::uint64_t{disk.f_bavail} * disk.f_frsize;
+  return room_bytes < room_bytes_min ? " (its disk is full)" : "";
+}
 
 nanoseconds as_duration(double seconds) {
   return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(seconds));
@@ -104,7 +115,7 @@ struct HistoryWriter::Parts {
   bool write();
   [[nodiscard]] bool is_working() const;
   void written(std::uint64_t records);
-  void failed(const std::string& message);
+  void failed(const std::string& why);
   void drop_pending();
   void request(SegmentReason reason);
   void request_if_due();
@@ -236,9 +247,12 @@ bool HistoryWriter::Parts::write() {
     store.keep_within_bounds(segment ? segment->token : 0);
   } catch (const DatabaseError& error) {
     if (error.is_damage()) store.move_aside(error.what());
+    // On a full disk it stays open: opening anew would need room, for this thread as for a reader.
+    if (!error.is_full()) store.close();
     failed(error.what());
     return false;
   } catch (const std::exception& error) {
+    store.close();
     failed(error.what());
     return false;
   }
@@ -266,16 +280,18 @@ void HistoryWriter::Parts::written(std::uint64_t records) {
   last_commit = clocks.monotonic();
 }
 
-void HistoryWriter::Parts::failed(const std::string& message) {
-  store.close();
-  const std::lock_guard lock(mutex);
-  if (statistics.last_error != message) {
-    spdlog::warn("history: {}; the compensation goes on, tried again", message);
+void HistoryWriter::Parts::failed(const std::string& why) {
+  const std::string message = why + disk_note(config.file);
+  bool is_news = false;
+  {
+    const std::lock_guard lock(mutex);
+    is_news = statistics.last_error != message;
+    statistics.working = false;
+    statistics.last_error = message;
+    ++statistics.errors;
+    statistics.lost = ring.lost() + dropped;
   }
-  statistics.working = false;
-  statistics.last_error = message;
-  ++statistics.errors;
-  statistics.lost = ring.lost() + dropped;
+  if (is_news) spdlog::warn("history: {}; the compensation goes on, tried again", message);
 }
 
 void HistoryWriter::Parts::drop_pending() {
@@ -346,6 +362,7 @@ void HistoryWriter::open() {
     // The thread tries again. Any other HistoryError says that the file is not ours to write,
     // which the caller must know.
     if (error.is_damage()) parts_->store.move_aside(error.what());
+    parts_->store.close();
     parts_->failed(error.what());
   }
 }

@@ -69,6 +69,7 @@ struct HistoryTime {
 
 struct ExportSummary {
   std::uint64_t rows{0};
+  std::uint64_t gaps{0};  ///< between rows of the file, each told by a comment line
   std::vector<std::string> columns;
 };
 /// The column of a run file that holds a sensor's readings: `<sensor>_degC`.
@@ -78,7 +79,8 @@ struct ExportSummary {
 /// (since the first row), `<sensor>_degC` (as the driver gave it; missing where it had a fault),
 /// the model's inputs that no sensor column is called like (mean of the block's good sensors), the
 /// controller's signals, `<axis>_offset_um`, `<axis>_applied_um` and, in the first row after an
-/// operator gave one, `<axis>_measured_um`.
+/// operator gave one, `<axis>_measured_um`. Where cycles are missing between two rows, because the
+/// daemon did not run or because it could not write and memory was full, a comment line says so.
 ExportSummary export_run(const std::filesystem::path& history,
                          const std::optional<HistoryTime>& from,
                          const std::optional<HistoryTime>& to, std::ostream& out,

@@ -1,0 +1,20 @@
+"""kill -9 at random moments; the long run of the same is `bench/run.sh kill9`."""
+
+import os
+import time
+
+from kill_rounds import KillRounds
+
+ROUNDS = int(os.environ.get("THERMOCOMP_KILL_ROUNDS", "25"))
+
+
+def test_kills_at_random_moments_lose_nothing_and_the_axis_never_jumps(lab):
+    seed = int(os.environ.get("THERMOCOMP_KILL_SEED", time.time_ns() % 1_000_000))
+    print(f"seed {seed}: THERMOCOMP_KILL_SEED={seed} draws the same moments")
+    kills = KillRounds(lab, seed)
+    begun = time.monotonic()
+    kills.run(ROUNDS)
+    kills.print_figures(ROUNDS, time.monotonic() - begun)
+    assert kills.lost == 0
+    assert kills.restarts_wrong == []
+    assert len(kills.rows) > ROUNDS
