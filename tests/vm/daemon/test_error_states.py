@@ -86,4 +86,4 @@ def test_a_daemon_that_starts_on_a_bus_that_is_off_says_so(adapter):
     ip("set", adapter.name, "down")
     set_up(adapter.name)
     rig.daemon.wait_for_mode("compensating")
-    assert rig.bus("body")["state"] == "active"
+    eventually(lambda: rig.bus("body")["state"] == "active", "the carrier is back")
