@@ -215,6 +215,8 @@ class KillRounds:
         print(f"committed_rows_lost {self.lost} rows")
         print(f"restarts_wrong {len(self.restarts_wrong)} restarts")
         print(f"slew_times_period {RATE_UM_PER_S * PERIOD_S + RESOLUTION_UM:.3f} um")
+        beyond = sum(step > RATE_UM_PER_S * PERIOD_S + RESOLUTION_UM for step in self.steps_um)
+        print(f"restart_steps_beyond_it {beyond} restarts")
         print(f"restart_step_median {statistics.median(self.steps_um):.3f} um")
         print(f"restart_step_largest {max(self.steps_um):.3f} um")
         print(f"step_over_allowed_largest {max(self.shares):.3f} ratio")

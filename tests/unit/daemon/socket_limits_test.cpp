@@ -267,3 +267,43 @@ TEST_CASE("what was sent before hanging up is done", "[socket]") {
   CHECK(calls == 7);
   CHECK(server.statistics().clients == 0);
 }
+
+TEST_CASE("supplementary groups of the peer count, as the kernel tells them",
+          "[socket][permission]") {
+  if (geteuid() != 0) {
+    WARN("skipped: only root can take another user");
+    return;
+  }
+  const TempFolder folder;
+  std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
+  // Groups of every Debian system stand for those of the package.
+  StatusServer server(SocketConfig{folder / "s", "users", "disk", "dialout"});
+  server.add_method("status", AccessClass::read, [](const json&) { return json(true); });
+  server.add_method("enable", AccessClass::operate, [](const json&) { return json(true); });
+  server.add_method("controller_state", AccessClass::bridge,
+                    [](const json&) { return json(true); });
+  const auto allowed = [&](const char* group) {
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      const gid_t extra = getgrnam(group)->gr_gid;
+      if (setgroups(1, &extra) != 0 || setgid(65534) != 0 || setuid(65534) != 0) _exit(100);
+      int bits = 0;
+      int bit = 1;
+      for (const char* method : {"status", "enable", "controller_state"}) {
+        RawClient client(folder / "s");
+        client.send(std::string(R"({"jsonrpc":"2.0","id":1,"method":")") + method + "\"}\n");
+        if (client.error_code() == 0) bits |= bit;
+        bit *= 2;
+      }
+      _exit(bits);
+    }
+    int status = 0;
+    while (waitpid(child, &status, WNOHANG) == 0) server.handle(milliseconds(5));
+    return WEXITSTATUS(status);
+  };
+  CHECK(allowed("users") == 1);
+  CHECK(allowed("disk") == 1 + 2);
+  CHECK(allowed("dialout") == 1 + 4);
+  CHECK(allowed("games") == 0);
+}
