@@ -52,6 +52,9 @@ class ProbeSource final : public SensorSource {
     for (std::size_t i = 0; i + 1 < all.size(); ++i)
       all[i] = {20.0 + 1e-3 * static_cast<double>((cycle_ + i) % 100), nanoseconds(now()),
                 Fault::none};
+    // Blocks come and go: both sensors of the third, and all but the last two blocks.
+    if (cycle_ / 700 % 3 == 1) lose(all.subspan(4, 2));
+    if (cycle_ / 700 % 3 == 2) lose(all.first(sensors - 4));
   }
 
   std::atomic<bool> done{false};
@@ -59,6 +62,10 @@ class ProbeSource final : public SensorSource {
 
  private:
   static nanoseconds now() noexcept { return std::chrono::steady_clock::now().time_since_epoch(); }
+  static void lose(std::span<Reading> readings) noexcept {
+    for (Reading& reading : readings)
+      reading = {not_a_number, reading.taken_at, Fault::open_circuit};
+  }
   void commit_the_plant() noexcept {
     if (plant_ == Plant::allocation) std::free(std::malloc(64));
     if (plant_ == Plant::lock) std::lock_guard guard(mutex_);
@@ -92,6 +99,7 @@ EstimatorConfig make_config() {
     SensorConfig sensor;
     sensor.name = numbered("s", i);
     sensor.smoothing.period_s = 0.01;
+    sensor.screening.stale_after_s = 0.2;
     sensor.smoothing.form = i % 2 == 0 ? SmoothingForm::sliding_line : SmoothingForm::line_of_lines;
     config.sensors.push_back(sensor);
     // The last sensor is on the Modbus line, where nobody answers; it shares a block.
@@ -108,6 +116,10 @@ ThermalModel make_model(double gain_um_per_K) {
   for (std::size_t i = 0; i < sensors / 2; ++i) model.inputs.push_back(input_name(i));
   model.outputs = {"x_um", "y_um", "z_um"};
   model.matrix_um_per_K.assign(3, std::vector<double>(sensors / 2, gain_um_per_K));
+  for (std::size_t i = 0; i < sensors / 2; ++i) {
+    model.covariance_K2.emplace_back(sensors / 2, 1.0);
+    model.covariance_K2.back()[i] = 1.1;
+  }
   model.terms.push_back(
       {"thermal_lag", "b0_degC", {{"tau_s", 5.0}}, {{"gain_um_per_K", {{"x_um", 1.0}}}}});
   return model;
