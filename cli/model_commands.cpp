@@ -113,12 +113,14 @@ void add_covariance_command(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand(
       "covariance",
       "what estimates a lost block: the covariance of a model's inputs, from records");
-  sub->add_option("--model", options->model, "model file")->required();
+  sub->add_option("--model", options->model, "model file")->type_name("FILE")->required();
   sub->add_option("RECORD", options->records, "run files, RUN.csv[@T0:T1], or histories")
+      ->type_name("FILE")
       ->required();
   sub->add_option("-o,--output", options->output,
                   "the model file with its table [covariance]; may be the same file; - is standard "
                   "output")
+      ->type_name("FILE")
       ->required();
   sub->callback([&action, options] { action = [options] { return run_covariance(*options); }; });
 }
