@@ -26,8 +26,8 @@ namespace thermocomp {
 /// d, s: drift_factor and scatter_factor of the model file; W: also the drift so far, carried over
 /// when L changes; g_i: with the time since input i was lost over scatter_time. An input that comes
 /// back tells how wrong its estimate was, and the others still lost are corrected by what that says
-/// of them: x_i += W_ik / V_kk (x_k - estimate of x_k). Source: the conditional distribution of a
-/// Gaussian vector by blocks of its precision matrix.
+/// of them: x_i += W_ik / V_kk (x_k - estimate of x_k).
+/// Source: the conditional distribution of a Gaussian vector by blocks of its precision matrix.
 class LostBlocks {
  public:
   /// Without a covariance in the model it only passes on what it is given.
