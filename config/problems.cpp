@@ -53,7 +53,11 @@ std::string to_string(const Problem& problem) {
   } else if (!problem.value.empty()) {
     text += problem.value + ": ";
   }
-  return text + problem.rule;
+  text += problem.rule;
+  // A quoted name may hold anything; a problem stays on its line and commands no terminal.
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
+  std::replace_if(text.begin(), text.end(), is_control, ' ');
+  return text;
 }
 
 ConfigurationError::ConfigurationError(std::vector<Problem> problems)

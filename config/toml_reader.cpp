@@ -205,7 +205,7 @@ void TomlTable::problem(std::string_view key, std::string_view rule) const {
 void TomlTable::problem(std::string_view key, std::string_view value, std::string_view rule) const {
   if (silent_) return;
   static_cast<void>(find(key));
-  state_->add(line(key), full(key), shortened(std::string(value)), rule);
+  state_->add(line(key), full(key), value.empty() ? "\"\"" : shortened(std::string(value)), rule);
 }
 
 void TomlTable::missing(std::string_view key) const {

@@ -1,5 +1,6 @@
 #include "config/toml_reader.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include "config/number_text.hpp"
@@ -125,4 +126,16 @@ TEST_CASE("numbers are written so that they read back to the same bits", "[confi
     CHECK(std::strtod(number_text(value).c_str(), nullptr) == value);
   }
   CHECK(number_text(-std::numeric_limits<double>::quiet_NaN()) == "nan");
+}
+
+TEST_CASE("a problem stays on its line whatever its names hold, and shows an empty name",
+          "[config][toml]") {
+  const TomlDocument read = document("\"a\\nb\\u001b[2J\" = 1\nname = \"x\"\n");
+  read.root().problem("name", "", "is no name");
+  const std::vector<std::string> lines = told(read);
+  REQUIRE(lines.size() == 2);
+  for (const std::string& line : lines) {
+    CHECK(std::none_of(line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }));
+  }
+  CHECK(lines[1] == "a.toml:2: name = \"\": is no name");
 }
