@@ -66,6 +66,8 @@ cp "$here/guest_init.sh" "$run/init" && chmod 755 "$run/init" || fail "no guest_
 {
   export -p
   echo 'unset TMPDIR'
+  # Emulated programs on a busy machine may take their time.
+  if [ -n "$emulated" ]; then echo 'export THERMOCOMP_PATIENCE_S=120'; fi
   echo "export THERMOCOMP_VM=${emulated:-user-mode-linux}"
   printf 'cd %q || exit 125\n' "$PWD"
   printf 'exec timeout -k 5 %s' "$limit_s"

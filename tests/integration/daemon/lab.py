@@ -18,7 +18,7 @@ BIN = pathlib.Path(os.environ.get("THERMOCOMP_BIN", "build/release/bin")).resolv
 SOURCE = pathlib.Path(__file__).resolve().parents[3]
 DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
 # What a busy machine or a sanitizer may take before something that must happen has happened.
-PATIENCE_S = 30.0
+PATIENCE_S = float(os.environ.get("THERMOCOMP_PATIENCE_S", "30"))
 
 
 def eventually(check, what, patience_s=PATIENCE_S):

@@ -59,10 +59,10 @@ class Cycle {
   std::thread thread_;
 };
 
-/// Waits until `holds` for at most 20 s.
+/// Waits until `holds` for at most a minute.
 template <class Condition>
 bool eventually(Condition&& holds) {
-  const auto until = monotonic_now() + std::chrono::seconds{20};
+  const auto until = monotonic_now() + std::chrono::minutes{1};
   while (!holds()) {
     if (monotonic_now() > until) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds{5});
