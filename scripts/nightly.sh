@@ -7,6 +7,9 @@ cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh
 exec </dev/null
 
+# The kills fall at other moments each night; the seed is printed.
+export SEED=${SEED:-$RANDOM}
+
 failed=()
 part() {
   local name=$1
