@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <poll.h>
 #include <thread>
@@ -42,6 +43,8 @@ constexpr std::uint64_t cycles_until_ready = 3;
 /// Offsets at zero are sent, and read back, for so long before the links are closed.
 constexpr auto zero_settles = 500ms;
 constexpr auto stop_extended_by = 10s;
+/// At 1 Hz it ends within a second.
+constexpr auto cycle_ends_within = 3s;
 
 Grid make_grid(const LoopConfig& loop) {
   const auto now = std::chrono::duration_cast<nanoseconds>(Clock::now().time_since_epoch());
@@ -394,7 +397,13 @@ StatusView Daemon::Parts::view() {
 void Daemon::Parts::stop() noexcept {
   service.stopping("the controller keeps the last offsets");
   cycle->stop();
-  thread.join();
+  if (!thread.join_within(cycle_ends_within)) {
+    // Nothing of it can be trusted, and it may stand in the midst of anything: what a kill would
+    // leave is what is left, and the service manager need not wait for a time-out.
+    spdlog::critical("the cycle hangs; ending without it");
+    spdlog::shutdown();
+    std::_Exit(EXIT_FAILURE);
+  }
   link->stop();
   for (const auto& source : sources) source->stop();
   if (CycleRecorder* recorder = cycle->brain().recorder.get())

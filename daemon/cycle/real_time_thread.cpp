@@ -5,6 +5,7 @@
 #include <cstring>
 #include <malloc.h>
 #include <sched.h>
+#include <time.h>
 
 #include <sys/mman.h>
 
@@ -95,6 +96,15 @@ void RealTimeThread::join() noexcept {
   if (!running_) return;
   pthread_join(thread_, nullptr);
   running_ = false;
+}
+
+bool RealTimeThread::join_within(std::chrono::seconds patience) noexcept {
+  if (!running_) return true;
+  timespec until{};
+  clock_gettime(CLOCK_MONOTONIC, &until);
+  until.tv_sec += patience.count();
+  running_ = pthread_clockjoin_np(thread_, nullptr, CLOCK_MONOTONIC, &until) != 0;
+  return !running_;
 }
 
 }  // namespace thermocomp

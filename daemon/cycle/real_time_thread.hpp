@@ -1,6 +1,7 @@
 /// A thread with a real-time schedule, and memory that is not paged out.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <pthread.h>
 #include <stdexcept>
@@ -35,6 +36,8 @@ class RealTimeThread {
   /// @throws RealTimeError when no thread could be made at all
   [[nodiscard]] std::string start(const RealTimeThreadConfig& config, std::function<void()> body);
   void join() noexcept;
+  /// @return false: it has not ended within `patience`, and is still to be joined
+  [[nodiscard]] bool join_within(std::chrono::seconds patience) noexcept;
 
  private:
   static void* enter(void* self) noexcept;
