@@ -21,7 +21,7 @@ if ! "$here/build_packages.sh" "$source_tree" "$packages" > "$folder/packages.lo
 fi
 echo "packages built in $((SECONDS - began)) s"
 
-lintian --allow-root --fail-on error,warning --no-tag-display-limit "$packages"/*.changes
+lintian --allow-root --fail-on error,warning --tag-display-limit 0 "$packages"/*.changes
 echo "lintian: no error, no warning"
 
 needed=$(for file in "$packages"/*.deb; do dpkg-deb -f "$file" Depends; done |

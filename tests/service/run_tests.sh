@@ -27,11 +27,12 @@ esac
 
 files=$(mktemp -d)
 trap 'rm -rf "$files"' EXIT
-mkdir "$files/packages"
+chmod 755 "$files"  # the service reads the planted hang
+mkdir "$files/packages" "$files/guest"
 cp "$folder"/packages/*.deb "$files/packages/"
 rm -f "$files"/packages/*-dbgsym_*
-cp "$here"/guest/*.py "$here"/../integration/daemon/{lab,plain_devices}.py "$files/"
+cp "$here"/guest/*.py "$here"/../integration/daemon/{lab,plain_devices}.py "$files/guest/"
 cp "$here/../../systemd/site.conf" "$files/"
 cp "$planted_hang" "$files/planted_hang.so"
 "$here/run_in_systemd.sh" "$kind" "$folder/rootfs" "$files" \
-  /usr/bin/python3 -m pytest -v -rA -p no:cacheprovider --tb=short "$@" "${tests[@]}"
+  /usr/bin/python3 -m pytest -v -rA -p no:cacheprovider --tb=short "$@" "${tests[@]/#/guest/}"

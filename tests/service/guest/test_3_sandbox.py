@@ -6,7 +6,7 @@ import pathlib
 import service
 from service import STATE, UNIT, run
 
-PROBE = pathlib.Path("/opt/service-test/probe.py")
+PROBE = pathlib.Path("/opt/service-test/guest/probe.py")
 
 
 def probe():
