@@ -41,6 +41,12 @@ std::int64_t plus(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
 }
 
+nanoseconds time_from(std::uint64_t written) {
+  const std::int64_t time_ns = unzigzag(written);
+  if (!is_grid_time(time_ns)) throw HistoryError("damaged: an impossible time");
+  return nanoseconds(time_ns);
+}
+
 Fault fault_from(std::uint8_t code) {
   if (code >= faults_count) throw HistoryError("damaged: unknown fault");
   return static_cast<Fault>(code);
@@ -105,6 +111,37 @@ bool ChunkDecoder::next(Record& out) {
   return true;
 }
 
+namespace {
+
+constexpr std::size_t seal_bytes = 8;
+
+/// FNV-1a, 64 bits. Source: draft-eastlake-fnv, section 2.
+std::uint64_t hash_of(std::span<const std::byte> bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const std::byte byte : bytes) {
+    hash = (hash ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3u;
+  }
+  return hash;
+}
+
+}  // namespace
+
+void add_seal(std::vector<std::byte>& bytes) {
+  const std::uint64_t hash = hash_of(bytes);
+  for (std::size_t i = 0; i < seal_bytes; ++i) {
+    bytes.push_back(static_cast<std::byte>(hash >> (8 * i)));
+  }
+}
+
+void take_seal(std::vector<std::byte>& bytes) {
+  if (bytes.size() < seal_bytes) throw HistoryError("damaged: the estimator's state is cut short");
+  std::vector<std::byte> state(bytes.begin(), bytes.end() - seal_bytes);
+  add_seal(state);
+  if (state != bytes)
+    throw HistoryError("damaged: the estimator's state does not fit its checksum");
+  bytes.resize(bytes.size() - seal_bytes);
+}
+
 std::vector<std::byte> encode_inputs(std::span<const Reading> readings,
                                      const ControllerState& controller) {
   ByteWriter writer;
@@ -130,10 +167,10 @@ void decode_inputs(std::span<const std::byte> bytes, std::vector<Reading>& readi
   readings.assign(count, Reading{});
   for (Reading& reading : readings) {
     reading.temp_degC = reader.f64();
-    reading.taken_at = nanoseconds(unzigzag(reader.varint()));
+    reading.taken_at = time_from(reader.varint());
     reading.fault = fault_from(reader.u8());
   }
-  controller.taken_at = nanoseconds(unzigzag(reader.varint()));
+  controller.taken_at = time_from(reader.varint());
   controller.link_epoch = static_cast<std::uint32_t>(reader.varint());
   controller.online = reader.u8() != 0;
   for (double& value : controller.applied_um) value = reader.f64();

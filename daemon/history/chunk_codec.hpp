@@ -61,6 +61,18 @@ class ChunkDecoder {
   std::uint64_t left_;
 };
 
+/// A time on the daemon's grid that can be: not before the start of the system, nor centuries
+/// later.
+[[nodiscard]] constexpr bool is_grid_time(std::int64_t time_ns) noexcept {
+  return time_ns >= 0 && time_ns <= (std::int64_t{1} << 61);
+}
+
+/// The estimator's state has inner counts and places that are believed when it is loaded. So its
+/// bytes carry a checksum, and bytes that changed on the disk are refused.
+void add_seal(std::vector<std::byte>& bytes);
+/// Takes the checksum off. @throws HistoryError when it does not fit
+void take_seal(std::vector<std::byte>& bytes);
+
 /// The inputs in force at the start of a segment.
 [[nodiscard]] std::vector<std::byte> encode_inputs(std::span<const Reading> readings,
                                                    const ControllerState& controller);

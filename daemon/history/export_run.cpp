@@ -173,6 +173,17 @@ std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const
   return text.data();
 }
 
+/// @throws HistoryError with file and segment for whatever `step` throws
+template <class Step>
+auto named(const HistoryReader& reader, const SegmentInfo& segment, Step step) {
+  try {
+    return step();
+  } catch (const std::exception& error) {
+    throw HistoryError(reader.file().string() + ": segment " + std::to_string(segment.id) +
+                       " cannot be exported: " + error.what());
+  }
+}
+
 bool is_before(double time_s, std::int64_t wall_ns, const HistoryTime& bound) {
   return bound.seconds ? time_s < *bound.seconds : wall_ns < *bound.wall_ns;
 }
@@ -263,7 +274,7 @@ ExportSummary export_run(const std::filesystem::path& history,
                          const Progress& progress, const SetupParser& parser) {
   const HistoryReader reader(history);
   const ParsedSetups setups(reader, parser);
-  const HistoryClock clock(reader.segments());
+  const HistoryClock clock(reader);
   RunColumns columns;
   columns.column("time_s");
   std::map<std::int64_t, SetupColumns> places;
@@ -277,8 +288,10 @@ ExportSummary export_run(const std::filesystem::path& history,
   const SegmentInfo* last_written = nullptr;
   std::size_t segments_done = 0;
   for (const SegmentInfo& segment : reader.segments()) {
-    SegmentExport walk(reader, segment, setups.of(segment), places.at(segment.setup));
-    for (std::uint64_t cycle = 0; walk.next(cycle);) {
+    SegmentExport walk = named(reader, segment, [&] {
+      return SegmentExport(reader, segment, setups.of(segment), places.at(segment.setup));
+    });
+    for (std::uint64_t cycle = 0; named(reader, segment, [&] { return walk.next(cycle); });) {
       const double time_s = clock.seconds_at(segment, cycle);
       if (from && is_before(time_s, walk.wall_ns(cycle), *from)) continue;
       if (to && !is_before(time_s, walk.wall_ns(cycle), *to)) continue;

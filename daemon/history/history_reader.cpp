@@ -1,5 +1,6 @@
 #include "daemon/history/history_reader.hpp"
 
+#include <cstdlib>
 #include <optional>
 #include <utility>
 
@@ -16,6 +17,30 @@ SegmentReason reason_from(std::int64_t code) {
   return static_cast<SegmentReason>(code);
 }
 
+/// What no history can be: without these limits the arithmetic of times would overflow, and a
+/// replay would never end.
+constexpr std::int64_t grid_ns_max = std::int64_t{1} << 60;  ///< 36 years since the system started
+constexpr std::int64_t span_ns_max = std::int64_t{1} << 55;  ///< a year; segments last a week
+constexpr std::int64_t wall_ns_max = std::int64_t{1} << 62;  ///< in the year 2116
+constexpr std::int64_t period_ns_min = 100'000;
+constexpr std::int64_t period_ns_max = 3'600'000'000'000;
+
+void require(bool holds, const char* damage) {
+  if (!holds) throw HistoryError(std::string("damaged: ") + damage);
+}
+
+void check_times(const SegmentInfo& segment) {
+  const std::int64_t period_ns = segment.grid.period.count();
+  const std::int64_t start_ns = segment.grid.start.count();
+  const auto first = static_cast<std::int64_t>(segment.first_cycle);
+  require(period_ns >= period_ns_min && period_ns <= period_ns_max, "a period that cannot be");
+  require(start_ns >= 0 && start_ns <= grid_ns_max, "the start of a grid that cannot be");
+  require(segment.wall_ns >= 0 && segment.wall_ns <= wall_ns_max, "a wall time that cannot be");
+  require(first >= 0 && first <= (grid_ns_max - start_ns) / period_ns, "a cycle that cannot be");
+  require(segment.last_cycle >= first - 1 && segment.last_cycle - first < span_ns_max / period_ns,
+          "a segment's last cycle cannot be");
+}
+
 SegmentInfo segment_from(const Statement& row) {
   SegmentInfo segment;
   segment.id = row.number(0);
@@ -30,7 +55,7 @@ SegmentInfo segment_from(const Statement& row) {
   segment.records = static_cast<std::uint64_t>(row.number(9));
   segment.bytes = static_cast<std::uint64_t>(row.number(10));
   segment.program_version = row.text(11);
-  if (segment.grid.period.count() <= 0) throw HistoryError("damaged: a period is not positive");
+  check_times(segment);
   return segment;
 }
 
@@ -63,7 +88,15 @@ HistoryReader::HistoryReader(const std::filesystem::path& file) {
   Statement rows(parts_->database,
                  "SELECT id, run, setup, reason, grid_start_ns, period_ns, first_cycle, last_cycle,"
                  " wall_ns, records, bytes, program_version FROM segment ORDER BY id");
-  while (rows.step()) parts_->segments.push_back(segment_from(rows));
+  while (rows.step()) {
+    try {
+      parts_->segments.push_back(segment_from(rows));
+    } catch (const DatabaseError&) {
+      throw;  // names the file
+    } catch (const HistoryError& error) {
+      throw HistoryError(file.string() + ": " + error.what());
+    }
+  }
 }
 
 HistoryReader::~HistoryReader() = default;
@@ -96,6 +129,7 @@ SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
   }
   SegmentStart start;
   start.estimator_state = row.blob(0);
+  take_seal(start.estimator_state);
   decode_inputs(row.blob(1), start.readings, start.controller);
   return start;
 }
@@ -112,6 +146,7 @@ struct RecordCursor::Parts {
   std::int64_t next_chunk{0};
   std::int64_t through{-1};  ///< last cycle that the chunks read so far hold whole
   std::int64_t wall_minus_grid_ns{0};
+  std::uint64_t newest_cycle{0};  ///< of the records so far
   std::optional<ChunkDecoder> chunk;
 };
 
@@ -119,6 +154,7 @@ RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segme
     : parts_(std::make_unique<Parts>(reader.parts_->database, segment)) {
   parts_->wall_minus_grid_ns = segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
   parts_->through = static_cast<std::int64_t>(segment.first_cycle) - 1;
+  parts_->newest_cycle = segment.first_cycle;
 }
 RecordCursor::~RecordCursor() = default;
 RecordCursor::RecordCursor(RecordCursor&&) noexcept = default;
@@ -131,8 +167,10 @@ bool RecordCursor::next(Record& out) {
   Parts& parts = *parts_;
   for (;;) {
     if (parts.chunk && parts.chunk->next(out)) {
-      if (static_cast<std::int64_t>(out.cycle) <= parts.segment.last_cycle) return true;
-      return false;  // what follows was cut off before its cycle was whole
+      require(out.cycle >= parts.newest_cycle, "records are out of order");
+      parts.newest_cycle = out.cycle;
+      // What follows the last cycle was cut off before its cycle was whole.
+      return out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
     }
     parts.chunk.reset();
     // A statement of its own for each chunk: a read transaction that stays open would keep the
@@ -151,6 +189,8 @@ bool RecordCursor::next(Record& out) {
     ++parts.next_chunk;
     parts.through = row.number(2);
     parts.wall_minus_grid_ns = row.number(3);
+    require(std::abs(parts.wall_minus_grid_ns / 2) <= wall_ns_max / 2,
+            "a wall time that cannot be");
     parts.chunk.emplace(row.blob(0), static_cast<std::uint64_t>(row.number(1)));
   }
 }

@@ -178,6 +178,7 @@ void HistoryWriter::Parts::begin_segment(const Record& record) {
   row.wall_ns = grid.time_of(record.cycle).count() + wall_minus_monotonic_ns();
   row.program_version = program_version;
   row.estimator_state = snapshot.estimator_state;
+  add_seal(row.estimator_state);
   row.inputs = encode_inputs(snapshot.readings, snapshot.controller);
   snapshot.taken.store(false, std::memory_order_release);
 

@@ -33,6 +33,11 @@ class SegmentReplay {
         summary_(summary) {
     SegmentStart start = reader.start(segment);
     estimator_.load_state(start.estimator_state);
+    Report report = estimator_.make_report();
+    estimator_.report(report);
+    if (segment.grid.time_of(segment.first_cycle) < report.now) {
+      throw HistoryError("damaged: the state at its start is of a later time");
+    }
     if (start.readings.size() != estimator_.config().sensors.size()) {
       throw HistoryError("damaged: the inputs at its start do not fit its configuration");
     }
@@ -144,7 +149,7 @@ std::uint64_t cycles_of(const SegmentInfo& segment) {
 ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups,
                          const OffsetSink& sink, const Progress& progress) {
   ReplaySummary summary;
-  const HistoryClock clock(reader.segments());
+  const HistoryClock clock(reader);
   std::uint64_t total = 0;
   for (const SegmentInfo& segment : reader.segments()) total += cycles_of(segment);
   std::uint64_t done = 0;

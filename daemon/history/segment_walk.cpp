@@ -4,10 +4,13 @@
 #include <cmath>
 
 #include "config/number_text.hpp"
+#include "daemon/history/chunk_codec.hpp"
 
 namespace thermocomp {
 
 void InputsInForce::apply(const Record& record) {
+  const bool has_time = record.kind == RecordKind::reading || record.kind == RecordKind::link;
+  if (has_time && !is_grid_time(record.time_ns)) throw HistoryError("damaged: an impossible time");
   const auto require_below = [&](std::size_t size) {
     if (record.index >= size) throw HistoryError("damaged: a record names what does not exist");
   };
@@ -36,7 +39,16 @@ void InputsInForce::apply(const Record& record) {
   }
 }
 
-HistoryClock::HistoryClock(const std::vector<SegmentInfo>& segments) {
+HistoryClock::HistoryClock(const HistoryReader& reader) {
+  try {
+    place(reader.segments());
+  } catch (const HistoryError& error) {
+    throw HistoryError(reader.file().string() + ": " + error.what());
+  }
+}
+
+void HistoryClock::place(const std::vector<SegmentInfo>& segments) {
+  constexpr std::int64_t end_ns_max = std::int64_t{1} << 62;  // no sum of two overflows
   std::int64_t end_ns = 0;  // of the segments so far, in the history's time
   for (const SegmentInfo& segment : segments) {
     const std::int64_t begin_ns = segment.grid.time_of(segment.first_cycle).count();
@@ -44,8 +56,13 @@ HistoryClock::HistoryClock(const std::vector<SegmentInfo>& segments) {
       const std::int64_t by_wall_ns = segment.wall_ns - segments.front().wall_ns;
       grid_to_history_ns_[segment.run] = std::max(by_wall_ns, end_ns) - begin_ns;
     }
+    if (begin_ns + grid_to_history_ns_[segment.run] < end_ns) {
+      throw HistoryError("damaged: segment " + std::to_string(segment.id) +
+                         " begins before the one in front of it ends");
+    }
     const auto next_cycle = static_cast<std::uint64_t>(segment.last_cycle + 1);
     end_ns = segment.grid.time_of(next_cycle).count() + grid_to_history_ns_[segment.run];
+    if (end_ns > end_ns_max) throw HistoryError("damaged: the times of its segments cannot be");
   }
 }
 

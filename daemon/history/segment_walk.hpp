@@ -24,10 +24,12 @@ struct InputsInForce {
 /// two of them the wall clock does, but time never runs backwards.
 class HistoryClock {
  public:
-  explicit HistoryClock(const std::vector<SegmentInfo>& segments);
+  /// @throws HistoryError when the segments' times cannot be those of one history
+  explicit HistoryClock(const HistoryReader& reader);
   [[nodiscard]] double seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const;
 
  private:
+  void place(const std::vector<SegmentInfo>& segments);
   std::map<std::int64_t, std::int64_t> grid_to_history_ns_;  ///< by run
 };
 

@@ -81,6 +81,63 @@ TEST_CASE("replay notices a history that was changed", "[history][replay]") {
   CHECK(summary.first_different_cycle.has_value());
 }
 
+TEST_CASE(
+    "a history with rows that no daemon wrote is refused by name, and never replayed for ever",
+    "[history][damage]") {
+  const std::string damage = GENERATE(
+      as<std::string>(), "UPDATE segment SET period_ns = 1",
+      "UPDATE segment SET last_cycle = 9223372036854775807", "UPDATE segment SET first_cycle = -5",
+      "UPDATE segment SET grid_start_ns = -1", "UPDATE segment SET wall_ns = -9223372036854775807",
+      "UPDATE segment SET reason = 77",
+      "UPDATE segment SET estimator_state = substr(estimator_state, 1, 40)",
+      "UPDATE segment SET estimator_state = zeroblob(length(estimator_state))",
+      "UPDATE segment SET inputs = x'00'", "UPDATE chunk SET records = x'0000000000', count = 1",
+      "UPDATE chunk SET wall_minus_grid_ns = -9223372036854775807",
+      // a reading taken at -1 ns; two records of which the second is of an earlier cycle
+      "UPDATE chunk SET records = x'00000000' || x'0100', count = 1",
+      "UPDATE chunk SET records = x'020004000000' || x'020001000000', count = 2");
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 3);
+  machine.start();
+  machine.run(500);
+  machine.stop();
+  run_sql(config.file, damage.c_str());
+  INFO(damage);
+  const auto names_file = Catch::Contains(config.file.string());
+  std::ostringstream out;
+  const bool only_replay = damage.find("estimator_state") != std::string::npos;
+  CHECK_THROWS_WITH(replay_quietly(config.file), names_file);
+  if (only_replay) return;
+  CHECK_THROWS_WITH(export_run(config.file, {}, {}, out, {}, parse_test_setup), names_file);
+}
+
+TEST_CASE("a state of a later time than its first cycle is refused", "[history][damage]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 3);
+  machine.start();
+  machine.run(500);
+  machine.reload(3.0);
+  machine.run(500);
+  machine.stop();
+  run_sql(config.file, "UPDATE segment SET grid_start_ns = grid_start_ns - 3600000000000");
+  CHECK_THROWS_WITH(replay_quietly(config.file), Catch::Contains("of a later time"));
+}
+
+TEST_CASE("segments that overlap in time are no history", "[history][damage]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 3);
+  machine.start();
+  machine.run(500);
+  machine.reload(3.0);
+  machine.run(500);
+  machine.stop();
+  run_sql(config.file, "UPDATE segment SET first_cycle = 0 WHERE id = 2");
+  CHECK_THROWS_WITH(replay_quietly(config.file), Catch::Contains("before the one in front"));
+}
+
 TEST_CASE("a ring that overflows leaves a gap and a replay that still agrees", "[history]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
