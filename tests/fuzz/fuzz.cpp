@@ -9,7 +9,14 @@
 
 namespace thermocomp::fuzz {
 
+namespace {
+
+const Problem* told = nullptr;  ///< the one that is being looked at
+
+}  // namespace
+
 void broken(const char* promise, const char* file, int line) {
+  if (told != nullptr) std::fprintf(stderr, "of: %s\n", to_string(*told).c_str());
   std::fprintf(stderr, "%s:%d: broken promise: %s\n", file, line, promise);
   std::abort();
 }
@@ -89,6 +96,7 @@ int lines_of(std::string_view text) {
 void check_problems(const std::vector<Problem>& problems, std::span<const NamedText> files) {
   FUZZ_PROMISE(!problems.empty());
   for (const Problem& problem : problems) {
+    told = &problem;
     const auto file = std::find_if(files.begin(), files.end(), [&](const NamedText& known) {
       return known.name == problem.file;
     });
@@ -100,6 +108,7 @@ void check_problems(const std::vector<Problem>& problems, std::span<const NamedT
     FUZZ_PROMISE(!of_a_key || !problem.value.empty());
     FUZZ_PROMISE(to_string(problem).find('\n') == std::string::npos);
   }
+  told = nullptr;
 }
 
 }  // namespace thermocomp::fuzz

@@ -23,7 +23,7 @@ using std::chrono::milliseconds;
 
 namespace {
 
-constexpr std::uint8_t pause = 0xFF;  ///< is no part of UTF-8: here the client waits a round
+constexpr std::uint8_t waits = 0xFF;  ///< is no part of UTF-8: here the client waits a round
 
 /// A daemon without threads: a report that stands still, commands that are checked and counted.
 class Desk {
@@ -33,7 +33,7 @@ class Desk {
         config_(with_socket(file_.path())),
         estimator_(config_.estimator, config_.model),
         report_(estimator_.make_report()),
-        server_(config_.socket) {
+        server_(config_.socket, without_rates()) {
     estimator_.report(report_);
     add_operator_methods(
         server_, {[this] { return view(); }, [this](const Command& asked) { take(asked); },
@@ -50,7 +50,10 @@ class Desk {
     config.socket.path = path;
     return config;
   }
-  StatusView view() { return {config_, report_, controller_, timing_, {}, {}, {}, {}, 1.0, false}; }
+  StatusView view() {
+    return {config_, report_, controller_,         timing_, {}, {}, {}, {},
+            1.0,     false,   server_.statistics()};
+  }
   void take(const Command& asked) {
     FUZZ_PROMISE(asked.axis < config_.estimator.axes.size());
     FUZZ_PROMISE(std::isfinite(asked.value_um));
@@ -90,10 +93,13 @@ class Client {
     desk.server().handle(milliseconds(0));
     receive();
   }
-  void end_input(Desk& desk) {
+  /// The server then answers what is left, a request a round, and closes unless we subscribed.
+  void end_input(Desk& desk, std::size_t rounds) {
     shutdown(fd_, SHUT_WR);
-    for (int i = 0; i < 4; ++i) desk.server().handle(milliseconds(0));
-    receive();
+    for (std::size_t i = 0; i < rounds && !closed_; ++i) {
+      desk.server().handle(milliseconds(0));
+      receive();
+    }
   }
   [[nodiscard]] const std::string& received() const { return received_; }
 
@@ -103,11 +109,13 @@ class Client {
     for (ssize_t count = 1; count > 0;) {
       count = recv(fd_, bytes, sizeof bytes, 0);
       if (count > 0) received_.append(bytes, static_cast<std::size_t>(count));
+      closed_ = closed_ || count == 0 || (count < 0 && errno == ECONNRESET);
     }
   }
 
   int fd_;
   std::string received_;
+  bool closed_{false};
 };
 
 void check_answer(const json& answer) {
@@ -154,15 +162,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     Client client(desk.path());
     desk.server().handle(milliseconds(0));
     while (!bytes.empty()) {
-      const auto end = std::find(bytes.begin(), bytes.end(), pause);
+      const auto end = std::find(bytes.begin(), bytes.end(), waits);
       const auto length = static_cast<std::size_t>(end - bytes.begin());
       client.send(bytes.first(length), desk);
       bytes = bytes.subspan(std::min(length + 1, bytes.size()));
     }
-    client.end_input(desk);
+    const auto lines = std::count(data, data + size, std::uint8_t{'\n'});
+    client.end_input(desk, 8 + 2 * static_cast<std::size_t>(lines));
     check_answers(client.received());
   }
-  for (int i = 0; i < 3; ++i) desk.server().handle(milliseconds(0));
+  for (int i = 0; i < 8; ++i) desk.server().handle(milliseconds(0));
   FUZZ_PROMISE(desk.server().statistics().clients == 0);
   if (++inputs % 16 == 0) check_next_client(desk);
   return 0;
