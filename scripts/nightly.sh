@@ -22,6 +22,7 @@ for preset in release asan-ubsan tsan debug coverage; do
 done
 part "format" scripts/check-format.sh
 part "clang-tidy" scripts/check-tidy.sh
+part "fuzz" scripts/fuzz.sh --minutes 10
 for benchmark in $(bench/run.sh); do
   part "bench $benchmark" bench/run.sh "$benchmark"
 done

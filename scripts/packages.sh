@@ -23,6 +23,8 @@ packages_test=(
   mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-numpy python3-pytest
   sqlite3 socat rt-tests user-mode-linux kmod iproute2 procps valgrind
   clang-tidy clang-tools clang-format gcovr
+  # The fuzz targets: the compiler, libFuzzer and the sanitizers' runtime.
+  clang libclang-rt-14-dev
   # Sanitizer builds on real CAN, with the kernel that guest-kernel.sh fetches.
   qemu-system-x86 busybox-static
   # The Debian packages, and the booted systemd that they are tested in.
