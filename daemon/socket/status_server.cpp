@@ -224,13 +224,13 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   statistics.buffered_bytes += held - client.counted_bytes;
   client.counted_bytes = held;
 
+  // Who is owed an answer is waited for while it can still read; who is not may be done with.
+  if (client.broken || (client.owes() ? client.hung_up : client.close_when_sent)) {
+    return end(id, client);
+  }
   std::uint32_t events = 0;
-  if (client.broken || (client.hung_up && client.owes())) {
-    return end(id, client);
-  } else if (client.owes()) {
+  if (client.owes()) {
     events = EPOLLOUT;
-  } else if (client.close_when_sent) {
-    return end(id, client);
   } else if (client.input.has_line()) {
     if (!client.queued) ready.push_back(id);
     client.queued = true;
