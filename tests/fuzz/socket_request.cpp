@@ -50,6 +50,13 @@ class Desk {
     config.socket.path = path;
     return config;
   }
+  /// Time stands still between two inputs here: rates would only make clients wait.
+  static SocketLimits without_rates() {
+    SocketLimits limits;
+    limits.requests_per_s = limits.requests_burst = 1e9;
+    limits.all_requests_per_s = limits.all_requests_burst = 1e9;
+    return limits;
+  }
   StatusView view() {
     return {config_, report_, controller_,         timing_, {}, {}, {}, {},
             1.0,     false,   server_.statistics()};
