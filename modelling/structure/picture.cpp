@@ -1,0 +1,176 @@
+#include "modelling/structure/picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+namespace thermocomp::structure {
+namespace {
+
+constexpr double panel_px = 360.0;
+constexpr double margin_px = 24.0;
+constexpr std::size_t panels_in_a_row = 4;
+constexpr double shown_of_size = 0.08;          ///< greatest displacement in the picture
+constexpr std::size_t faces_with_edges = 4000;  ///< with more, edges would hide the colours
+
+/// Isometric: to the right, upwards, towards the viewer.
+const Vec3 right{std::sqrt(0.5), -std::sqrt(0.5), 0.0};
+const Vec3 up{-std::sqrt(1.0 / 6), -std::sqrt(1.0 / 6), std::sqrt(2.0 / 3)};
+const Vec3 viewer{std::sqrt(1.0 / 3), std::sqrt(1.0 / 3), std::sqrt(1.0 / 3)};
+
+/// Colours of equal strength around the circle; neighbours in number are far apart in hue.
+std::string colour(Index block, double light) {
+  const double hue = std::fmod(137.508 * static_cast<double>(block), 360.0);
+  char text[40];
+  std::snprintf(text, sizeof text, "hsl(%.0f,55%%,%.0f%%)", hue, 38.0 + 34.0 * light);
+  return text;
+}
+
+std::string xml(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '&') {
+      result += "&amp;";
+    } else if (c == '<') {
+      result += "&lt;";
+    } else {
+      result += c;
+    }
+  }
+  return result;
+}
+
+class Picture {
+ public:
+  explicit Picture(const Structure& structure)
+      : structure_(structure),
+        surface_(surface_of(structure.mesh)),
+        box_(bounds_of(structure.mesh.nodes_m)) {}
+
+  void add_panel(const std::string& title, const std::vector<double>& displacement_m) {
+    const double factor = enlargement(displacement_m);
+    std::vector<Vec3> points = structure_.mesh.nodes_m;
+    for (std::size_t i = 0; i < displacement_m.size(); ++i) {
+      points[i / 3][i % 3] += factor * displacement_m[i];
+    }
+    const auto column = static_cast<double>(panels_ % panels_in_a_row);
+    const auto row = static_cast<double>(panels_ / panels_in_a_row);
+    ++panels_;
+    char text[160];
+    std::snprintf(text, sizeof text, "<g transform=\"translate(%.0f %.0f)\">\n", column * panel_px,
+                  row * panel_px);
+    body_ += text;
+    draw_faces(points);
+    std::snprintf(text, sizeof text, "<text x=\"%.0f\" y=\"%.0f\">", margin_px, panel_px - 8.0);
+    body_.append(text).append(xml(title));
+    if (factor > 0.0) {
+      std::snprintf(text, sizeof text, " +1 K, displacement x %.2g", factor);
+      body_ += text;
+    }
+    body_ += "</text>\n</g>\n";
+  }
+
+  [[nodiscard]] std::string text() const {
+    const std::size_t rows = (panels_ + panels_in_a_row - 1) / panels_in_a_row;
+    const std::size_t columns = std::min(panels_, panels_in_a_row);
+    char head[320];
+    std::snprintf(head, sizeof head,
+                  "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
+                  "font-family=\"sans-serif\" font-size=\"12\">\n"
+                  "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
+                  panel_px * static_cast<double>(columns), panel_px * static_cast<double>(rows));
+    return head + body_ + "</svg>\n";
+  }
+
+ private:
+  /// 0 where nothing moves.
+  [[nodiscard]] double enlargement(const std::vector<double>& displacement_m) const {
+    double largest = 0.0;
+    for (const double value : displacement_m) largest = std::max(largest, std::fabs(value));
+    return largest > 0.0 ? shown_of_size * box_.diagonal_m() / largest : 0.0;
+  }
+
+  /// Pixels of a point in a panel; the scale and the middle are those of the undeformed structure.
+  [[nodiscard]] std::array<double, 2> pixel(const Vec3& point) const {
+    const Vec3 from_middle = point - 0.5 * (box_.low_m + box_.high_m);
+    const double scale = (panel_px - 2.0 * margin_px) / (box_.diagonal_m() * 1.1);
+    return {0.5 * panel_px + scale * dot(from_middle, right),
+            0.5 * panel_px - scale * dot(from_middle, up)};
+  }
+
+  /// From back to front, only those that look at the viewer.
+  void draw_faces(const std::vector<Vec3>& points) {
+    struct Seen {
+      const Face* face;
+      double depth;
+      double light;
+    };
+    std::vector<Seen> seen;
+    for (const Face& face : surface_) {
+      const std::size_t corners = shape_info(face.shape).corners;
+      const auto at = [&](std::size_t i) { return points[face.nodes[i]]; };
+      const Vec3 normal =
+          corners == 3 ? cross(at(1) - at(0), at(2) - at(0)) : cross(at(2) - at(0), at(3) - at(1));
+      const double facing = dot(normal, viewer) / std::max(length(normal), 1e-300);
+      if (!(facing > 0.0)) continue;
+      double depth = 0.0;
+      for (std::size_t i = 0; i < corners; ++i) {
+        depth += dot(at(i), viewer) / static_cast<double>(corners);
+      }
+      seen.push_back({&face, depth, light_of(normal)});
+    }
+    std::sort(seen.begin(), seen.end(),
+              [](const Seen& a, const Seen& b) { return a.depth < b.depth; });
+    body_ += seen.size() <= faces_with_edges ? "<g stroke=\"#222\" stroke-width=\"0.3\">\n"
+                                             : "<g stroke-width=\"0.5\">\n";
+    for (const Seen& one : seen) {
+      draw(*one.face, points, one.light, seen.size() > faces_with_edges);
+    }
+    body_ += "</g>\n";
+  }
+
+  static double light_of(const Vec3& normal) {
+    const Vec3 lamp{0.2, 0.55, 0.8};
+    return std::clamp(dot(normal, lamp) / std::max(length(normal) * length(lamp), 1e-300), 0.0,
+                      1.0);
+  }
+
+  void draw(const Face& face, const std::vector<Vec3>& points, double light, bool own_edges) {
+    // The block that most of the corners belong to.
+    const std::size_t corners = shape_info(face.shape).corners;
+    std::vector<Index> blocks;
+    for (std::size_t i = 0; i < corners; ++i) {
+      blocks.push_back(structure_.block_of_node[face.nodes[i]]);
+    }
+    std::sort(blocks.begin(), blocks.end());
+    const std::string fill = colour(blocks[corners / 2], light);
+    body_ += "<path d=\"";
+    char text[48];
+    for (std::size_t i = 0; i < corners; ++i) {
+      const auto [x, y] = pixel(points[face.nodes[i]]);
+      std::snprintf(text, sizeof text, "%c%.1f %.1f", i == 0 ? 'M' : 'L', x, y);
+      body_ += text;
+    }
+    body_.append("Z\" fill=\"").append(fill);
+    if (own_edges) body_.append("\" stroke=\"").append(fill);
+    body_ += "\"/>\n";
+  }
+
+  const Structure& structure_;
+  std::vector<Face> surface_;
+  Box box_;
+  std::string body_;
+  std::size_t panels_{0};
+};
+
+}  // namespace
+
+std::string svg_picture(const Structure& structure, const std::vector<BlockShape>& shapes) {
+  Picture picture(structure);
+  picture.add_panel(std::to_string(structure.block_names.size()) + " blocks", {});
+  for (const BlockShape& shape : shapes) picture.add_panel(shape.block, shape.displacement_m);
+  return picture.text();
+}
+
+}  // namespace thermocomp::structure
