@@ -173,21 +173,20 @@ ControllerHealth CanController::health() const {
 }
 
 void CanController::run() {
-  const nanoseconds period = from_seconds(config_.period_s);
-  nanoseconds next_send = monotonic_now();
+  next_send_ = monotonic_now();
   while (!stopping_.load()) {
     if (!socket_.is_open()) {
       open_or_pause();
       continue;
     }
-    wake_.wait_until(next_send, socket_.descriptor());
+    wake_.wait_until(next_send_, socket_.descriptor());
     receive();
     const nanoseconds now = monotonic_now();
     supervise(now);
     note_bus_state();
-    if (now < next_send) continue;
-    next_send = std::max(next_send + period, now);
+    if (now < next_send_) continue;
     send_command(now);
+    next_send_ = std::max(next_send_ + gate_.next_pause(), now);
   }
   const nanoseconds now = monotonic_now();
   if (socket_.is_open()) send_command(now);
@@ -275,7 +274,9 @@ void CanController::note_bus_state() {
 void CanController::synchronise() {
   gate_.synchronised();
   held_um_ = state_.applied_um;
-  publish(true, monotonic_now());
+  const nanoseconds now = monotonic_now();
+  next_send_ = now + gate_.next_pause();
+  publish(true, now);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
   health_.last_error.clear();

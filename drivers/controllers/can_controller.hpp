@@ -75,6 +75,7 @@ class CanController final : public ControllerLink {
   CanSocket socket_;
   WriteGate gate_;
   std::uint64_t heartbeat_{0};
+  nanoseconds next_send_{};
   std::array<double, axes_max> held_um_{};  ///< what an axis that is not valid goes on sending
   WaitFreeSlot<ControllerState> states_;
   WaitFreeSlot<OffsetCommand> commands_;

@@ -136,15 +136,18 @@ nanoseconds ModbusDialogue::next_action_at() const noexcept {
 }
 
 void ModbusDialogue::act() {
-  if (!gate_.in_sync() && !synchronise()) {
-    retry_at_ = connection_.now() + from_seconds(config_.line.reconnect_s);
-    return;
+  if (!gate_.in_sync()) {
+    if (!synchronise()) {
+      retry_at_ = connection_.now() + from_seconds(config_.line.reconnect_s);
+      return;
+    }
+    next_exchange_at_ = connection_.now();
   }
   exchange();
   const nanoseconds now = connection_.now();
   retry_at_ = now;
   // A slow line sets the pace; nothing is caught up.
-  next_exchange_at_ = std::max(next_exchange_at_ + from_seconds(config_.period_s), now);
+  next_exchange_at_ = std::max(next_exchange_at_ + gate_.next_pause(), now);
 }
 
 void ModbusDialogue::end() {

@@ -6,7 +6,7 @@
 namespace thermocomp {
 
 WriteGate::WriteGate(nanoseconds period, const std::vector<double>& resolution_um) noexcept
-    : stall_max_(std::max<nanoseconds>(5 * period, std::chrono::seconds{1})) {
+    : period_(period), stall_max_(std::max<nanoseconds>(5 * period, std::chrono::seconds{1})) {
   applied_um_.fill(not_a_number);
   slack_um_.fill(unexplained_um);
   for (std::size_t axis = 0; axis < std::min(resolution_um.size(), axes_max); ++axis)
@@ -17,6 +17,7 @@ std::uint32_t WriteGate::synchronised() noexcept {
   if (++epoch_ == 0) epoch_ = 1;  // 0 says "never connected"
   in_sync_ = true;
   last_sent_.reset();
+  looks_ = 0;
   sent_ = {};
   applied_um_.fill(not_a_number);
   return epoch_;
@@ -30,6 +31,12 @@ void WriteGate::sent(nanoseconds now) noexcept {
     lately.offset_um[lately.count % SentLately::length] = command_.offset_um[axis];
     ++lately.count;
   }
+}
+
+nanoseconds WriteGate::next_pause() noexcept {
+  if (!in_sync_ || last_sent_ || looks_ == first_looks) return period_;
+  ++looks_;
+  return period_ / first_looks;
 }
 
 bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcept {

@@ -28,6 +28,9 @@ class WriteGate {
   /// steps of its register [um].
   static constexpr double unexplained_um = 1.0;
 
+  /// Of a period: how soon the first command of an epoch is looked for, and how often.
+  static constexpr int first_looks = 4;
+
   /// @param period         of the link's writes
   /// @param resolution_um  an axis' step of the read-back [um]; axes beyond it: 0
   explicit WriteGate(nanoseconds period, const std::vector<double>& resolution_um = {}) noexcept;
@@ -49,6 +52,11 @@ class WriteGate {
   /// The command was sent in full.
   void sent(nanoseconds now) noexcept;
 
+  /// How long to wait until the link's next turn; asked once a turn. A period, but a quarter of it
+  /// in the first turns of an epoch in which nothing has been sent: the cycle has been moving away
+  /// from what is applied since it saw the epoch, and the first step shall be a small one.
+  [[nodiscard]] nanoseconds next_pause() noexcept;
+
   /// What the controller applies, just read [um], NaN: not told.
   /// @return false: a driven axis stands where nothing that was sent can have taken it (re-homed,
   ///         overridden). What is still under way would be a leap from there: synchronised() must
@@ -56,12 +64,14 @@ class WriteGate {
   [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
 
  private:
+  nanoseconds period_;
   nanoseconds stall_max_;
   bool in_sync_{false};
   std::uint32_t epoch_{0};
   OffsetCommand command_{};
   nanoseconds offered_at_{};
   std::optional<nanoseconds> last_sent_;  ///< in this epoch
+  int looks_{0};                          ///< for the first command of this epoch
 
   /// Offsets of one axis in this epoch, newest in a ring: a controller with a ramp or a delay of
   /// its own may be on its way to any of them.

@@ -93,6 +93,19 @@ TEST_CASE("the wait for the first command of an epoch is no pause", "[controller
   CHECK(gate.verdict(2000s) == SendVerdict::send);
 }
 
+TEST_CASE("the first command of an epoch is looked for early, a few times", "[controllers]") {
+  WriteGate gate(100ms);
+  CHECK(gate.next_pause() == 100ms);
+  gate.synchronised();
+  for (int look = 0; look < WriteGate::first_looks; ++look) CHECK(gate.next_pause() == 25ms);
+  CHECK(gate.next_pause() == 100ms);
+  gate.synchronised();
+  CHECK(gate.next_pause() == 25ms);
+  gate.offered(of_epoch(gate.epoch()), 1s);
+  gate.sent(1s);
+  CHECK(gate.next_pause() == 100ms);
+}
+
 TEST_CASE("an axis on its way to what it was sent lately is explained, one elsewhere is not",
           "[controllers]") {
   WriteGate gate(100ms, {0.01});
