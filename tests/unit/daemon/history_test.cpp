@@ -95,7 +95,9 @@ TEST_CASE(
       "UPDATE chunk SET wall_minus_grid_ns = -9223372036854775807",
       // a reading taken at -1 ns; two records of which the second is of an earlier cycle
       "UPDATE chunk SET records = x'00000000' || x'0100', count = 1",
-      "UPDATE chunk SET records = x'020004000000' || x'020001000000', count = 2");
+      "UPDATE chunk SET records = x'020004000000' || x'020001000000', count = 2",
+      // an input of a cycle after the offset that came out of its step
+      "UPDATE chunk SET records = x'060100000200' || x'020000000000', count = 2");
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
   RecordedMachine machine(config, 3);
