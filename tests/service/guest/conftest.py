@@ -11,7 +11,7 @@ def pytest_configure(config):
 def pytest_runtest_makereport(item, call):
     outcome = yield
     report = outcome.get_result()
-    if report.when == "call" and report.failed:
+    if report.failed:
         said = service.run("journalctl", "-b", "--no-pager", "-o", "short-monotonic", "-n", "120",
                            check=False).stdout
         report.sections.append(("journal of the guest", said))

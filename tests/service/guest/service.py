@@ -97,8 +97,10 @@ def wait_for_mode(mode):
 
 
 def wait_for_offset(offset_um):
-    return eventually(lambda: abs(status()["axes"][0]["offset"] - offset_um) < 0.01,
-                      f"offset {offset_um} um")
+    try:
+        eventually(lambda: abs(status()["axes"][0]["offset"] - offset_um) < 0.01, "the offset")
+    except AssertionError as error:
+        raise AssertionError(f"offset {offset_um} um was not reached: {status()}") from error
 
 
 MODEL = """format = 1
@@ -322,6 +324,6 @@ def serial_config(device):
     sensors = "".join(f'[[sensor]]\nname = "{name}"\ndevice = "module"\naddress = {i}\n'
                       for i, name in enumerate(("column", "spindle")))
     line = LINE.replace("/run/service-test-line", str(device)).replace(
-        "encoding", 'table = "input"\nencoding')
+        "encoding", 'table = "input"\nencoding').replace("baud", 'parity = "none"\nbaud')
     return (COMMON + line + sensors + '[controller]\nname = "none"\nkind = "dry_run"\n'
             '[[axis]]\nname = "z"\noutput = "z_um"\n' + LIMITS)

@@ -146,14 +146,17 @@ def test_a_stop_ramps_to_zero_where_that_is_configured(running):
 
 
 def test_the_simulated_machine_over_a_serial_line_is_served(running):
-    run("systemctl", "stop", UNIT)
+    service.stop_and_forget()
     run("dpkg", "-i", service.package("thermocomp-simulator"))
-    with service.simulated_line() as line:
-        service.write_config(service.serial_config(line))
+    try:
+        with service.simulated_line() as line:
+            service.write_config(service.serial_config(line))
+            now = service.start()
+            assert [each["temp_degC"] for each in now["inputs"]] == [21.0, 22.0]
+    finally:
+        # The reference was that machine's.
         service.stop_and_forget()
+        service.write_config(running.config())
+        running.warm_by(0.0)
+        run("dpkg", "-P", "thermocomp-simulator")
         service.start()
-        sensors = {each["name"]: each for each in service.ask("sensors")["sensors"]}
-        assert sensors["column"]["fault"] == "none", sensors
-        run("systemctl", "stop", UNIT)
-    run("dpkg", "-P", "thermocomp-simulator")
-    service.write_config(running.config())

@@ -62,7 +62,7 @@ def test_a_removal_stops_it_and_keeps_configuration_history_and_reference(runnin
     assert CONFIG.exists() and HISTORY.exists() and (STATE / "state.json").exists()
     assert running.controller.applied_um() == pytest.approx(9.0, abs=0.01)
     # Installed again it goes on with what it knew, once it is started.
-    run("dpkg", "-i", service.package("thermocomp"))
+    run("dpkg", "--force-confold", "-i", service.package("thermocomp"))
     assert show("ActiveState") == "inactive"
     service.start()
     assert [each["reference_degC"] for each in service.status()["inputs"]] == reference
