@@ -56,7 +56,7 @@ mkdir -p "$place" && cp -a "$files/." "$place/" || fail "the files cannot be cop
     done
     sysctl -q kernel.sched_rt_runtime_us=-1
     # On the host'"'"'s files everything new belongs to root.
-    mount -t tmpfs tmpfs /mnt && cp -a /var/lib/. /mnt/ && mount --move /mnt /var/lib
+    mount -t tmpfs tmpfs /mnt && cp -a /var/lib/. /mnt/ && mount --bind /mnt /var/lib
     ip link add dev vcan0 type vcan && ip link set vcan0 up'
   fi
   printf '%q ' "$@"

@@ -13,6 +13,7 @@ skip() {
   exit 77
 }
 [[ $(id -u) -eq 0 ]] || skip "systemd is booted as root only"
+[[ -e $folder/rootfs.stamp ]] || skip "there is no root file system (the test packages makes it)"
 case $kind in
   nspawn)
     command -v systemd-nspawn >/dev/null || skip "systemd-container is not installed"
