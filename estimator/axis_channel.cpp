@@ -9,6 +9,10 @@ namespace {
 /// What a read-back may lie outside our bound because registers are rounded.
 constexpr double register_rounding_um = 0.1;
 
+/// A link reads back before it writes: the exchange under way when an axis stops being driven may
+/// still write the old offset after its read-back, the one after it cannot.
+constexpr std::uint8_t read_backs_until_settled = 2;
+
 nanoseconds from_seconds(double seconds) {
   return std::chrono::duration_cast<nanoseconds>(seconds_d(seconds));
 }
@@ -29,6 +33,7 @@ void AxisChannel::step(const AxisInput& input) noexcept {
   if (input.link_epoch != epoch_) {
     epoch_ = input.link_epoch;
     synced_ = false;
+    read_backs_awaited_ = 0;  // the new epoch's read-back is the first after all that was sent
   }
   if (input.online) applied_um_ = input.applied_um;
   if (!synced_)
@@ -60,6 +65,10 @@ void AxisChannel::synchronise(const AxisInput& input) noexcept {
 
 void AxisChannel::compare(const AxisInput& input) noexcept {
   if (!std::isfinite(input.applied_um)) return;
+  if (read_backs_awaited_ != 0) {
+    await_read_back(input);
+    return;
+  }
   if (out_of_bound_) {
     // The axis is not driven until the controller itself is back within the bound.
     start_from_applied(input);
@@ -70,14 +79,28 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
     return;
   }
   // The controller applies something else (re-homed, rejected, overridden). Going on from there is
-  // the only way not to jump when it listens again.
+  // the only way not to jump when it listens again - but from where it stands once all that was
+  // sent has arrived: what has just been read back may be from before the last write.
   mismatch_ = true;
   agreed_since_ = input.now;
-  start_from_applied(input);
+  read_backs_awaited_ = read_backs_until_settled;
+  read_back_at_ = input.taken_at;
+  out_of_bound_ = is_out_of_bound(input.applied_um);
+}
+
+void AxisChannel::await_read_back(const AxisInput& input) noexcept {
+  agreed_since_ = input.now;
+  if (input.taken_at == read_back_at_) return;
+  read_back_at_ = input.taken_at;
+  if (--read_backs_awaited_ == 0) start_from_applied(input);
+}
+
+bool AxisChannel::is_out_of_bound(double applied_um) const noexcept {
+  return !(std::abs(applied_um) <= trusted_um_ + register_rounding_um);
 }
 
 void AxisChannel::start_from_applied(const AxisInput& input) noexcept {
-  out_of_bound_ = !(std::abs(input.applied_um) <= trusted_um_ + register_rounding_um);
+  out_of_bound_ = is_out_of_bound(input.applied_um);
   if (!out_of_bound_)
     start_from(input.now, std::clamp(input.applied_um, -trusted_um_, trusted_um_));
 }
@@ -125,6 +148,8 @@ void AxisChannel::adopt(const AxisChannel& previous) noexcept {
   out_of_bound_ = previous.out_of_bound_;
   mismatch_ = previous.mismatch_;
   agreed_since_ = previous.agreed_since_;
+  read_backs_awaited_ = previous.read_backs_awaited_;
+  read_back_at_ = previous.read_back_at_;
   check_.adopt(previous.check_);
 }
 

@@ -18,6 +18,7 @@ struct AxisInput {
   std::uint32_t link_epoch{0};
   bool online{false};  ///< the controller's values below are fresh
   double applied_um{not_a_number};
+  nanoseconds taken_at{};  ///< when applied_um was read back
 };
 
 class AxisChannel {
@@ -35,8 +36,11 @@ class AxisChannel {
   /// As read back last; NaN where the controller does not tell.
   [[nodiscard]] double applied_um() const noexcept { return applied_um_; }
   [[nodiscard]] bool synced() const noexcept { return synced_; }
-  /// Whether the offset may be sent: synced and the controller's own value is believable.
-  [[nodiscard]] bool driven() const noexcept { return synced_ && !out_of_bound_; }
+  /// Whether the offset may be sent: synced, the controller's own value is believable, and nothing
+  /// that was sent before a disagreement can still be under way.
+  [[nodiscard]] bool driven() const noexcept {
+    return synced_ && !out_of_bound_ && read_backs_awaited_ == 0;
+  }
   [[nodiscard]] bool mismatch() const noexcept { return mismatch_; }
   [[nodiscard]] bool out_of_bound() const noexcept { return out_of_bound_; }
   [[nodiscard]] bool at_bound() const noexcept { return limiter_.at_bound(); }
@@ -49,7 +53,8 @@ class AxisChannel {
 
   void visit_state(StateArchive& archive) {
     archive(limiter_, check_, target_um_, applied_um_, epoch_, trusted_um_, synced_, out_of_bound_,
-            mismatch_, agreed_since_, prove_phase_, prove_from_um_, prove_move_um_, prove_until_);
+            mismatch_, agreed_since_, read_backs_awaited_, read_back_at_, prove_phase_,
+            prove_from_um_, prove_move_um_, prove_until_);
   }
 
  private:
@@ -57,6 +62,8 @@ class AxisChannel {
 
   void synchronise(const AxisInput& input) noexcept;
   void compare(const AxisInput& input) noexcept;
+  void await_read_back(const AxisInput& input) noexcept;
+  [[nodiscard]] bool is_out_of_bound(double applied_um) const noexcept;
   void start_from_applied(const AxisInput& input) noexcept;
   void start_from(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] double prove_target_um(nanoseconds now) noexcept;
@@ -77,6 +84,8 @@ class AxisChannel {
   bool out_of_bound_{false};
   bool mismatch_{false};
   nanoseconds agreed_since_{};
+  std::uint8_t read_backs_awaited_{0};  ///< before the axis starts from what is applied
+  nanoseconds read_back_at_{};          ///< the last one that was waited for
   ProvePhase prove_phase_{ProvePhase::none};
   double prove_from_um_{0.0};
   double prove_move_um_{0.0};

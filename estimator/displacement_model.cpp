@@ -1,6 +1,7 @@
 #include "estimator/displacement_model.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <array>
 
 #include <Eigen/Core>
@@ -23,8 +24,10 @@ Matrix matrix_from(const std::vector<std::vector<double>>& rows, std::size_t cou
   for (std::size_t i = 0; i < count; ++i) {
     require(rows[i].size() == columns, key, static_cast<double>(rows[i].size()),
             "has a row of the wrong length");
-    for (std::size_t j = 0; j < columns; ++j)
+    for (std::size_t j = 0; j < columns; ++j) {
+      require(std::isfinite(rows[i][j]), key, rows[i][j], "must be finite");
       matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = rows[i][j];
+    }
   }
   return matrix;
 }

@@ -335,8 +335,15 @@ void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controll
     input.may_change = controller_online && signal(cutting_signal) < 0.5;
     if (!input.may_change) add(Reason::cutting);
   }
+  // Lost data never clears an offset mid-cut, nor where it cannot be told whether it is one.
+  if (mode == Mode::ramping_to_zero && cutting_signal != no_signal &&
+      !(controller_online && signal(cutting_signal) < 0.5)) {
+    input.may_change = false;
+    add(Reason::cutting);
+  }
   for (std::size_t i = 0; i < axes.size(); ++i) {
     input.applied_um = controller.applied_um[i];
+    input.taken_at = controller.taken_at;
     input.target_um = target_um(i);
     axes[i].step(input);
     if (!axes[i].synced()) add(Reason::not_synced);

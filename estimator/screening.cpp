@@ -22,6 +22,7 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
     if (verdict_ != Fault::never_read) ++rejected_;
     return false;
   }
+  confirmed_ = has_good_;
   good_degC_ = reading.temp_degC;
   good_at_ = reading.taken_at;
   has_good_ = true;
@@ -46,7 +47,12 @@ Fault Screening::judge(nanoseconds now, const Reading& reading) noexcept {
   // The longer ago the last good reading, the more may have changed: a true step is believed
   // as soon as the structure could have made it.
   const auto elapsed_ns = static_cast<double>((reading.taken_at - good_at_).count());
-  if (!(change_K <= rate_K_per_ns_ * elapsed_ns + allowance_K_)) return Fault::too_fast;
+  if (!(change_K <= rate_K_per_ns_ * elapsed_ns + allowance_K_)) {
+    // Of two values that contradict each other the first may be the false one: while no second one
+    // has agreed with it, neither is believed.
+    if (!confirmed_) has_good_ = false;
+    return Fault::too_fast;
+  }
   if (change_K > 0) same_since_ = reading.taken_at;
   if (stuck_after_ > nanoseconds{0} && reading.taken_at - same_since_ > stuck_after_)
     return Fault::stuck;
@@ -58,6 +64,7 @@ void Screening::adopt(const Screening& previous) noexcept {
   seen_fault_ = previous.seen_fault_;
   verdict_ = previous.verdict_;
   has_good_ = previous.has_good_;
+  confirmed_ = previous.confirmed_;
   good_degC_ = previous.good_degC_;
   good_at_ = previous.good_at_;
   same_since_ = previous.same_since_;

@@ -37,8 +37,8 @@ class Screening {
   void adopt(const Screening& previous) noexcept;
 
   void visit_state(StateArchive& archive) {
-    archive(seen_at_, seen_fault_, verdict_, has_good_, good_degC_, good_at_, same_since_,
-            rejected_);
+    archive(seen_at_, seen_fault_, verdict_, has_good_, confirmed_, good_degC_, good_at_,
+            same_since_, rejected_);
   }
 
  private:
@@ -56,6 +56,7 @@ class Screening {
   Fault seen_fault_{Fault::never_read};
   Fault verdict_{Fault::never_read};
   bool has_good_{false};
+  bool confirmed_{false};  ///< more than one reading has been good since the start
   double good_degC_{0.0};
   nanoseconds good_at_{};
   nanoseconds same_since_{};  ///< since when good_degC_ has not changed by one bit

@@ -181,7 +181,7 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
   Transaction transaction(*database_);
   if (prove) {
     Statement statement(*database_, "INSERT OR REPLACE INTO meta VALUES ('opened_wall_ns', ?)");
-    statement.bind(std::string_view(std::to_string(wall_().count()))).run();
+    statement.bind(std::string_view(std::to_string(wall_now_ns()))).run();
   }
   for (const PendingRows::Row& row : pending.rows()) {
     if (const auto* segment = std::get_if<SegmentRow>(&row)) {
@@ -249,7 +249,7 @@ void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
   Statement update(*database_,
                    "UPDATE segment SET last_cycle = ?, last_wall_ns = ?, records = records + ?,"
                    " bytes = bytes + ? WHERE id = ?");
-  update.bind(row.through_cycle).bind(wall_().count()).bind(static_cast<std::int64_t>(row.count));
+  update.bind(row.through_cycle).bind(wall_now_ns()).bind(static_cast<std::int64_t>(row.count));
   update.bind(static_cast<std::int64_t>(row.records.size())).bind(segment->second).run();
 }
 
@@ -272,20 +272,32 @@ void HistoryStore::delete_segment(std::int64_t id) {
   transaction.commit();
 }
 
+bool HistoryStore::wall_clock_is_steady() {
+  constexpr nanoseconds step_min = std::chrono::minutes(1);
+  constexpr nanoseconds steady_min = std::chrono::hours(1);
+  const nanoseconds now = clocks_.monotonic();
+  const nanoseconds difference = clocks_.wall() - now;
+  const nanoseconds change = difference - wall_minus_monotonic_;
+  if (!steady_since_ || change > step_min || change < -step_min) steady_since_ = now;
+  wall_minus_monotonic_ = difference;
+  return now - *steady_since_ >= steady_min;
+}
+
 void HistoryStore::keep_within_bounds(std::int64_t current_token) {
   const auto token = tokens_.find(current_token);
   const std::int64_t current = token == tokens_.end() ? 0 : token->second;
   const double page_bytes = static_cast<double>(database_->number("PRAGMA page_size"));
   const double bytes_max = config_.size_MB_max * 1e6;
   const double age_ns_max = config_.age_days_max * 86400e9;
+  const bool age_counts = wall_clock_is_steady();
   for (;;) {
     const auto used = static_cast<double>(database_->number("PRAGMA page_count") -
                                           database_->number("PRAGMA freelist_count"));
     std::int64_t last_wall_ns = 0;
     const std::int64_t oldest = oldest_other_than(current, last_wall_ns);
     if (oldest == 0) break;
-    const bool is_old = last_wall_ns > clock_unset_before_ns &&
-                        static_cast<double>(wall_().count() - last_wall_ns) > age_ns_max;
+    const bool is_old = age_counts && last_wall_ns > clock_unset_before_ns &&
+                        static_cast<double>(wall_now_ns() - last_wall_ns) > age_ns_max;
     if (!(used * page_bytes > delete_at * bytes_max) && !is_old) break;
     delete_segment(oldest);
   }

@@ -14,9 +14,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -73,9 +73,8 @@ class PendingRows {
 
 class HistoryStore {
  public:
-  /// @param wall  the wall clock, since 1970
-  HistoryStore(const HistoryConfig& config, std::function<nanoseconds()> wall)
-      : config_(config), wall_(std::move(wall)) {}
+  HistoryStore(const HistoryConfig& config, WriterClocks clocks)
+      : config_(config), clocks_(std::move(clocks)) {}
 
   /// @param needed_token  a segment that must be in the file already; 0: none
   /// @return false when that segment is not in the file: its rows have no place there
@@ -88,7 +87,9 @@ class HistoryStore {
   /// All rows in one transaction.
   /// @param prove  write something even without rows, to see whether the disk works
   void write(const PendingRows& pending, bool prove);
-  /// Deletes the oldest whole segments until size and age are in bounds.
+  /// Deletes the oldest whole segments until size and age are in bounds. Age counts only while the
+  /// wall clock has gone as steadily as the monotonic one for an hour: a clock that is set wrong
+  /// for a moment must not cost the history.
   void keep_within_bounds(std::int64_t current_token);
 
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
@@ -104,10 +105,12 @@ class HistoryStore {
   void insert(const ChunkRow& row, const Tokens& tokens);
   [[nodiscard]] std::int64_t setup_id(const HistorySetup& setup);
   void delete_segment(std::int64_t id);
+  [[nodiscard]] std::int64_t wall_now_ns() const { return clocks_.wall().count(); }
+  [[nodiscard]] bool wall_clock_is_steady();
   [[nodiscard]] std::int64_t oldest_other_than(std::int64_t current, std::int64_t& last_wall_ns);
 
   HistoryConfig config_;
-  std::function<nanoseconds()> wall_;
+  WriterClocks clocks_;
   std::unique_ptr<Database> database_;
   dev_t device_{0};
   ino_t inode_{0};
@@ -115,6 +118,8 @@ class HistoryStore {
   Tokens tokens_;
   std::uint64_t bytes_{0};
   std::uint64_t segments_{0};
+  std::optional<nanoseconds> steady_since_;  ///< monotonic
+  nanoseconds wall_minus_monotonic_{};
 };
 
 }  // namespace thermocomp

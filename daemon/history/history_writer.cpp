@@ -99,7 +99,7 @@ struct HistoryWriter::Parts {
         program_version(std::move(version)),
         clocks(std::move(clocks_in)),
         ring(ring_records),
-        store(config_in, clocks.wall) {}
+        store(config_in, clocks) {}
 
   void run();
   void work();

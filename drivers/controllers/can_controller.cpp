@@ -272,7 +272,7 @@ void CanController::note_bus_state() {
 }
 
 void CanController::synchronise() {
-  gate_.synchronised();
+  gate_.synchronised(state_.applied_um);
   held_um_ = state_.applied_um;
   const nanoseconds now = monotonic_now();
   next_send_ = now + gate_.next_pause();

@@ -172,7 +172,7 @@ bool ModbusDialogue::synchronise() {
     lose();
     return false;
   }
-  gate_.synchronised();
+  gate_.synchronised(state_.applied_um);
   publish(true);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
@@ -189,7 +189,7 @@ void ModbusDialogue::exchange() {
     return;
   }
   if (!gate_.explains(state_.applied_um)) {
-    gate_.synchronised();
+    gate_.synchronised(state_.applied_um);
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = "the controller applies what it was not sent: started anew from there";
   }

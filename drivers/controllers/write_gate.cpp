@@ -23,6 +23,12 @@ std::uint32_t WriteGate::synchronised() noexcept {
   return epoch_;
 }
 
+std::uint32_t WriteGate::synchronised(const std::array<double, axes_max>& applied_um) noexcept {
+  synchronised();
+  applied_um_ = applied_um;
+  return epoch_;
+}
+
 void WriteGate::sent(nanoseconds now) noexcept {
   last_sent_ = now;
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
@@ -45,8 +51,14 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
     const double before_um = applied_um_[axis];
     applied_um_[axis] = applied_um[axis];
     const SentLately& lately = sent_[axis];
-    if (lately.count == 0 || !std::isfinite(applied_um[axis]) || !std::isfinite(before_um))
+    if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
+    if (lately.count == 0) {
+      // Not driven yet in this epoch: about to be, from where it stood when the epoch began.
+      const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
+      explained =
+          explained && (!to_be_driven || std::abs(applied_um[axis] - before_um) <= slack_um_[axis]);
       continue;
+    }
     // Anywhere between where it stood and what it was told.
     const auto end = lately.offset_um.begin() +
                      static_cast<std::ptrdiff_t>(std::min(lately.count, SentLately::length));

@@ -36,8 +36,11 @@ class WriteGate {
   explicit WriteGate(nanoseconds period, const std::vector<double>& resolution_um = {}) noexcept;
 
   /// Everything has been read back: from here on commands of the new epoch may be sent.
+  /// @param applied_um  what was read back with it [um]; a controller that has left it before the
+  ///                    first command is written is not explained either
   /// @return the new epoch, never 0
-  std::uint32_t synchronised() noexcept;
+  std::uint32_t synchronised(const std::array<double, axes_max>& applied_um) noexcept;
+  std::uint32_t synchronised() noexcept;  ///< nothing was read back
   /// The link was lost or a write failed: nothing may be sent until synchronised().
   void lost() noexcept { in_sync_ = false; }
   [[nodiscard]] bool in_sync() const noexcept { return in_sync_; }

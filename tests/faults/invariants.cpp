@@ -9,6 +9,8 @@ namespace {
 
 constexpr double tiny_um = 1e-9;
 constexpr double register_rounding_um = 0.1;
+/// The window of comparison, and the read-back and the command that are under way at its end.
+constexpr nanoseconds settling = std::chrono::seconds(8);
 
 nanoseconds from_s(double time_s) {
   return nanoseconds{static_cast<nanoseconds::rep>(time_s * 1e9)};
@@ -52,7 +54,8 @@ void Invariants::booted(nanoseconds now) {
   first_ = true;
   lost_before_ = false;
   last_readings_ = {};
-  last_used_.fill(nanoseconds{-1});
+  last_used_.fill(now);
+  first_used_.fill(nanoseconds{-1});
 }
 
 void Invariants::reloaded(const MachineShape& shape) {
@@ -102,7 +105,9 @@ void Invariants::check_readings(const CycleSeen& seen) {
                          reading.temp_degC != before.temp_degC || reading.fault != before.fault;
     if (!new_one) continue;
     before = reading;
-    if (reading.fault != Fault::none) continue;
+    // What no thermocouple can be is the screening's to refuse.
+    const bool believable = std::abs(reading.temp_degC) < 200.0 && reading.temp_degC > -30.0;
+    if (reading.fault != Fault::none || !(believable || std::isnan(reading.temp_degC))) continue;
     demand(reading.taken_at <= seen.now, "reading_is_what_was_given", seen.now,
            fmt::format("sensor {}: taken {:.3f} s ahead of the cycle", i + 1,
                        to_s(reading.taken_at - seen.now)));
@@ -146,11 +151,13 @@ void Invariants::check_sensors_used(const CycleSeen& seen) {
       return;
     }
     constexpr double believable_after_s = 130.0;
-    const bool first = last_used_[i] < nanoseconds{0};
+    // The very first value has nothing to be compared with; the second may not leave it standing.
+    if (first_used_[i] < nanoseconds{0}) first_used_[i] = seen.now;
+    const bool first = to_s(seen.now - first_used_[i]) < 4.0;
     if (sample->impossible && !first && to_s(seen.now - last_used_[i]) < believable_after_s)
       demand(false, "no_faulty_reading_used", seen.now,
              fmt::format("sensor {}: a spike of {:.2f} degC is used", i + 1, sensor.smoothed_degC));
-    last_used_[i] = seen.now;
+    if (!sample->impossible || !first) last_used_[i] = seen.now;
   }
 }
 
@@ -196,6 +203,11 @@ void Invariants::check_hold(const CycleSeen& seen) {
     const bool from_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
                               rate_um + register_rounding_um;
     if (change_um == 0.0 || (from_applied && report.axes[i].mismatch)) continue;
+    const double bound_um = seen.shape->estimator.axes[i].limiter.offset_um_max;
+    const bool beyond_new_bound =
+        std::max(std::abs(offset_um_[i]), std::abs(seen.told->applied_um[i])) > bound_um &&
+        std::abs(seen.command->offset_um[i]) >= bound_um - tiny_um;
+    if (beyond_new_bound) continue;
     const bool resynced = from_applied && !twice;
     if (cutting && policy.hold_while_cutting && !from_applied)
       demand(false, "hold_policy_kept", seen.now, fmt::format("axis {} moves mid-cut", i));
@@ -238,7 +250,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   budget.at = move.at;
   const double change_um = std::abs(move.to_um - move.from_um);
   double allowed_um = budget.um + 2.0 * resolution_um_;
-  if (move.disturbed) {
+  if (move.disturbed) budget.disturbed_at = move.at;
+  if (move.at - budget.disturbed_at < settling) {
     // What lies among the offsets sent of late cannot be told from obedience.
     const auto end = budget.told_um.begin() +
                      static_cast<std::ptrdiff_t>(std::min<std::size_t>(budget.count, 16));
@@ -251,6 +264,7 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
            fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed", move.axis,
                        move.to_um, move.from_um, allowed_um));
   budget.um = std::max(0.0, budget.um - std::max(0.0, change_um - 2.0 * resolution_um_));
+  if (move.disturbed) budget.um = rate_um * stall_s;  // a new start
   budget.told_um[budget.count++ % 16] = move.to_um;
   demand(std::abs(move.to_um) <= largest_bound_um_[move.axis] + register_rounding_um,
          "offset_within_bound", seen.now,

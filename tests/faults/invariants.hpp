@@ -69,6 +69,7 @@ class Invariants {
   std::array<bool, sensors_count> has_counter_{};
   std::array<Reading, sensors_count> last_readings_{};
   std::array<nanoseconds, sensors_count> last_used_{};
+  std::array<nanoseconds, sensors_count> first_used_{};
   double period_s_{1.0};
   double link_period_s_{1.0};
   bool smoothing_off_{false};
@@ -89,6 +90,7 @@ class Invariants {
     nanoseconds at{};
     std::array<double, 16> told_um{};
     std::size_t count{0};
+    nanoseconds disturbed_at{-std::chrono::hours(1)};
   };
   std::array<Budget, axes_count> budgets_{};
 };

@@ -101,7 +101,9 @@ class Life {
                          &daemon_->link().offered(),
                          &report_,
                          &shape_};
+    if (options_.verbose) remember(seen);
     judge_.check(seen, world_.controller.moves(), world_.controller);
+    if (options_.verbose && judge_.broken()) say_last_cycles();
     save_state();
     if (report_.mode == Mode::compensating) ++result_.compensating;
     ++result_.cycles;
@@ -178,7 +180,7 @@ class Life {
         broken.matrix_um_per_K.pop_back();
         break;
       default:
-        broken.reference_degC = {20.0, not_a_number, 20.0};
+        broken.outputs[1] = "b_um";
         break;
     }
     try {
@@ -228,6 +230,32 @@ class Life {
                report_.axes[1].offset_um, report_.axes[2].offset_um);
   }
 
+  /// One cycle in a line: told, applied and sent; kept so that what led to a break can be shown.
+  void remember(const CycleSeen& seen) {
+    std::string line =
+        fmt::format("{:>10.2f} s  {:<15} epoch {}{}", life_s(), to_string(report_.mode),
+                    seen.told->link_epoch, seen.told->online ? "" : " offline");
+    for (std::size_t i = 0; i < axes_count; ++i)
+      line +=
+          fmt::format("  {:.4f}{}", seen.command->offset_um[i], seen.command->valid[i] ? "" : "!") +
+          fmt::format(" (told {:.4f}, is {:.4f})", seen.told->applied_um[i],
+                      world_.controller.applied_um(i));
+    for (std::size_t i = 0; i < sensors_count; ++i)
+      if (seen.readings[i].fault != Fault::none || report_.sensors[i].fault != Fault::none)
+        line += fmt::format("  s{} {}/{}", i + 1, to_string(seen.readings[i].fault),
+                            to_string(report_.sensors[i].fault));
+    for (const Move& move : world_.controller.moves())
+      line += fmt::format("\n{:>16.3f} s  axis {} told {:.4f} where {:.4f}{}{}",
+                          to_s(move.at - life_begin), move.axis, move.to_um, move.from_um,
+                          move.disturbed ? " disturbed" : "", move.seen ? "" : " unseen");
+    last_cycles_.push_back(std::move(line));
+    if (last_cycles_.size() > 25) last_cycles_.erase(last_cycles_.begin());
+  }
+
+  void say_last_cycles() const {
+    for (const std::string& line : last_cycles_) fmt::print("{}\n", line);
+  }
+
   LifeOptions options_;
   MachineShape shape_;
   FaultSchedule schedule_;
@@ -247,6 +275,7 @@ class Life {
   std::uint64_t last_reload_{0};
   std::uint64_t said_{0};
   Mode said_mode_{Mode::starting};
+  std::vector<std::string> last_cycles_;
   LifeResult result_;
 };
 

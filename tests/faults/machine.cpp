@@ -109,8 +109,7 @@ void Thermocouples::read(std::size_t unit, std::size_t address, std::span<std::u
 
 void Thermocouples::remember(std::size_t sensor, const Sample& sample) noexcept {
   samples_[sensor][given_[sensor]++ % kept] = sample;
-  if (sample.good && !sample.impossible)
-    last_good_[sensor] = std::max(last_good_[sensor], sample.given_at);
+  if (sample.good) last_good_[sensor] = std::max(last_good_[sensor], sample.given_at);
 }
 
 const Sample* Thermocouples::given(std::size_t sensor, double temp_degC, nanoseconds from,

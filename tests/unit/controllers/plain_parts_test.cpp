@@ -296,6 +296,27 @@ TEST_CASE("a CAN controller that cannot be is refused", "[controllers][can]") {
   CHECK_THROWS_AS(CanController(bad), InvalidValue);
 }
 
+TEST_CASE("a controller that moves between read-back and first command is noticed",
+          "[controllers][gate]") {
+  WriteGate gate(100ms);
+  std::array<double, axes_max> applied_um{};
+  applied_um[0] = 23.0;
+  OffsetCommand command;
+  command.link_epoch = gate.synchronised(applied_um);
+  command.offset_um[0] = 23.1;
+  command.valid[0] = true;
+  gate.offered(command, 1s);
+  CHECK(gate.explains(applied_um));
+  applied_um[0] = -11.0;  // re-homed before anything was sent in this epoch
+  CHECK_FALSE(gate.explains(applied_um));
+  // An axis that is not to be driven may go where it likes.
+  command.link_epoch = gate.synchronised(applied_um);
+  command.valid[0] = false;
+  gate.offered(command, 2s);
+  applied_um[0] = 5.0;
+  CHECK(gate.explains(applied_um));
+}
+
 TEST_CASE("a CAN controller says at its start that the system has no CAN", "[controllers][can]") {
   if (can_unavailable().empty()) {
     WARN("this system has CAN: nothing to see here");

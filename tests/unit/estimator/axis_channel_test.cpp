@@ -1,5 +1,6 @@
 #include "estimator/axis_channel.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -27,6 +28,7 @@ struct Bench {
   void step(double target_um) {
     if (obeys && channel.driven()) input.applied_um = channel.offset_um();
     input.now += 100ms;
+    input.taken_at = input.now;
     input.target_um = target_um;
     channel.step(input);
   }
@@ -115,7 +117,8 @@ TEST_CASE("a restored offset that no configuration allows is not taken", "[axis]
   }
 }
 
-TEST_CASE("a re-homed controller is followed at once, and the mismatch is told", "[axis]") {
+TEST_CASE("a re-homed controller is followed once nothing older is under way, and it is told",
+          "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
   CHECK_FALSE(bench.channel.mismatch());
@@ -123,14 +126,52 @@ TEST_CASE("a re-homed controller is followed at once, and the mismatch is told",
   bench.input.applied_um = 0.0;
   bench.step(10.0);
   CHECK(bench.channel.mismatch());
+  CHECK_FALSE(bench.channel.driven());
+  bench.step(10.0);
+  CHECK_FALSE(bench.channel.driven());
+  bench.step(10.0);
   CHECK(bench.channel.driven());
   CHECK(bench.channel.offset_um() == Approx(0.2));
   bench.obeys = true;
   bench.steps(29, 10.0);
   CHECK(bench.channel.mismatch());  // told for mismatch_after_s
-  bench.steps(40, 10.0);
+  bench.steps(42, 10.0);
   CHECK_FALSE(bench.channel.mismatch());
   CHECK(bench.channel.offset_um() == 10.0);
+}
+
+TEST_CASE("after a disagreement an old read-back does not start an axis", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  bench.input.applied_um = 0.0;
+  bench.step(10.0);
+  const nanoseconds taken_at = bench.input.taken_at;
+  for (int i = 0; i < 20; ++i) {  // the very same read-back again and again
+    bench.input.now += 100ms;
+    bench.input.taken_at = taken_at;
+    bench.channel.step(bench.input);
+    CHECK_FALSE(bench.channel.driven());
+  }
+}
+
+TEST_CASE("an axis never swings between a late read-back and what is under way", "[axis]") {
+  // A link slower than the cycle: what is read back is what was sent two steps before.
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  double applied_um = 0.0;  // overridden once, then it obeys
+  double under_way_um = applied_um;
+  double largest_move_um = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    bench.input.applied_um = applied_um;
+    bench.step(10.0);
+    if (i > 5) largest_move_um = std::max(largest_move_um, std::abs(under_way_um - applied_um));
+    applied_um = under_way_um;
+    if (bench.channel.driven()) under_way_um = bench.channel.offset_um();
+  }
+  CHECK(largest_move_um < 0.21);
+  CHECK(applied_um == 10.0);
 }
 
 TEST_CASE("a read-back that is late, but of what was sent, is no mismatch", "[axis]") {

@@ -138,6 +138,7 @@ TEST_CASE("a change faster than the structure can is refused; the allowance is o
 
 TEST_CASE("a true step is believed as soon as the structure could have made it", "[screening]") {
   Screening screening(plain());
+  look(screening, -1s, 20.0);
   look(screening, 0s, 20.0);
   // 5 K: 8 s at 0.5 K/s with 1 K allowed.
   for (int second = 1; second < 8; ++second)
@@ -145,6 +146,20 @@ TEST_CASE("a true step is believed as soon as the structure could have made it",
   CHECK(screening.rejected() == 7);
   CHECK(look(screening, 8s, 25.0));
   CHECK(screening.fault(8s) == Fault::none);
+}
+
+TEST_CASE("a first value that the second one contradicts does not outvote all later ones",
+          "[screening]") {
+  Screening screening(plain());
+  CHECK(look(screening, 0s, 95.0));  // a spike: nothing to compare it with
+  CHECK_FALSE(look(screening, 1s, 20.0));
+  CHECK_FALSE(screening.usable(1s));  // neither is believed
+  CHECK(look(screening, 2s, 20.0));
+  CHECK(screening.usable(2s));
+  CHECK(look(screening, 3s, 20.0));
+  CHECK_FALSE(look(screening, 4s, 95.0));
+  CHECK(screening.usable(4s));  // now the old one stands
+  CHECK(screening.good_degC() == 20.0);
 }
 
 TEST_CASE("the very same value for too long is a fault until it moves", "[screening]") {

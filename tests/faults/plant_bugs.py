@@ -1,0 +1,138 @@
+"""Copies of the product's sources with bugs planted in them, each switched on by its number.
+
+    plant_bugs.py SOURCE_FOLDER OUTPUT_FOLDER
+
+The product's own files have no trace of this. A place that is not found exactly once is an error,
+so that the bugs stay where they were meant to be when the code changes. {P} stands for "this bug
+is switched on".
+"""
+import pathlib
+import sys
+
+# (name, file, what stands there, what stands there instead)
+BUGS = [
+    ("slew_doubled", "estimator/limiter.cpp",
+     "rate_um_per_s_ * std::min(dt_s, dt_s_max);",
+     "({P} ? 2.0 : 1.0) * rate_um_per_s_ * std::min(dt_s, dt_s_max);"),
+    ("bound_forgotten", "estimator/limiter.cpp",
+     "std::clamp(wanted_um, -bound_um_, bound_um_);",
+     "{P} ? wanted_um : std::clamp(wanted_um, -bound_um_, bound_um_);"),
+    ("reload_starts_from_zero", "estimator/axis_channel.cpp",
+     "limiter_.start_from(previous.limiter_.offset_um());",
+     "limiter_.start_from({P} ? 0.0 : previous.limiter_.offset_um());"),
+    ("epoch_ignored", "drivers/controllers/write_gate.cpp",
+     "if (!in_sync_ || command_.link_epoch != epoch_)",
+     "if (!in_sync_ || (command_.link_epoch != epoch_ && !{P}))"),
+    ("read_back_ignored", "estimator/axis_channel.cpp",
+     "void AxisChannel::start_from_applied(const AxisInput& input) noexcept {\n",
+     "void AxisChannel::start_from_applied(const AxisInput& input) noexcept {\n  if ({P}) return;\n"),
+    ("swings_with_late_read_back", "estimator/axis_channel.cpp",
+     "  read_backs_awaited_ = read_backs_until_settled;\n",
+     "  if ({P}) return start_from_applied(input);\n"
+     "  read_backs_awaited_ = read_backs_until_settled;\n"),
+    ("offset_not_restored", "estimator/axis_channel.cpp",
+     "  limiter_.start_from(offset_um);\n  trusted_um_",
+     "  if (!{P}) limiter_.start_from(offset_um);\n  trusted_um_"),
+    ("reference_not_restored", "estimator/estimator.cpp",
+     "take(state.reference_degC, parts.columns[i], parts.reference_degC[i]);",
+     "if (!{P}) take(state.reference_degC, parts.columns[i], parts.reference_degC[i]);"),
+    ("hold_clears_mid_cut", "estimator/estimator.cpp",
+     "if (mode == Mode::ramping_to_zero && cutting_signal != no_signal &&",
+     "if (!{P} && mode == Mode::ramping_to_zero && cutting_signal != no_signal &&"),
+    ("hold_time_ignored", "estimator/estimator.cpp",
+     "at - lost_since > hold)",
+     "at - lost_since > ({P} ? nanoseconds{0} : hold))"),
+    ("stale_reading_used", "estimator/screening.hpp",
+     "return has_good_ && now - good_at_ <= stale_after_;",
+     "return has_good_ && (now - good_at_ <= stale_after_ || {P});"),
+    ("spike_passes", "estimator/screening.cpp",
+     "rate_K_per_ns_ * elapsed_ns + allowance_K_)",
+     "rate_K_per_ns_ * elapsed_ns + allowance_K_ + ({P} ? 1e3 : 0.0))"),
+    ("first_value_outvotes_all", "estimator/screening.cpp",
+     "if (!confirmed_) has_good_ = false;",
+     "if (!confirmed_ && !{P}) has_good_ = false;"),
+    ("fault_of_screening_passes", "estimator/screening.cpp",
+     "if (reading.fault != Fault::none) return reading.fault;",
+     "if (reading.fault != Fault::none && reading.fault != Fault::no_answer) return reading.fault;\n"
+     "  if (reading.fault != Fault::none) return {P} ? Fault::none : reading.fault;"),
+    ("transaction_not_compared", "drivers/modbus/connection.cpp",
+     "if (word_at(frame, 0) != transaction_) return Frame::foreign;",
+     "if (word_at(frame, 0) != transaction_ && !{P}) return Frame::foreign;"),
+    ("late_answer_taken", "drivers/modbus/late_answers.hpp",
+     "[[nodiscard]] nanoseconds ready_at() const noexcept { return ready_at_; }",
+     "[[nodiscard]] nanoseconds ready_at() const noexcept {\n"
+     "    return {P} ? nanoseconds{0} : ready_at_;\n  }"),
+    ("busy_read_as_zero", "drivers/sensors/modbus_poller.cpp",
+     "request.fault = exchange.fault();\n  if (exchange.ok())",
+     "request.fault = {P} ? Fault::none : exchange.fault();\n"
+     "  if ({P} && !exchange.ok()) {\n"
+     "    std::fill(request.words.begin(), request.words.end(), std::uint16_t{0});\n"
+     "    request.arrived_at = connection_.now();\n"
+     "  }\n"
+     "  if (exchange.ok())"),
+    ("old_value_stamped_anew", "drivers/sensors/modbus_poller.cpp",
+     "if (fault != Fault::none) return {not_a_number, before.taken_at, fault};",
+     "if ({P} && fault == Fault::no_answer && before.taken_at > nanoseconds{0} &&\n"
+     "      std::isfinite(before.temp_degC))\n"
+     "    return {before.temp_degC, connection_.now(), Fault::none};\n"
+     "  if (fault != Fault::none) return {not_a_number, before.taken_at, fault};"),
+    ("back_off_never_ends", "drivers/sensors/unit_backoff.hpp",
+     "    not_before_ = now + pause;",
+     "    not_before_ = {P} ? now + std::chrono::hours(1) : now + pause;"),
+    ("history_dropped_when_disk_full", "daemon/history/history_writer.cpp",
+     "    ++statistics.errors;\n",
+     "    ++statistics.errors;\n"
+     "    if ({P}) pending.clear();\n"),
+    ("wall_clock_step_deletes_history", "daemon/history/history_store.cpp",
+     "return now - *steady_since_ >= steady_min;",
+     "return {P} || now - *steady_since_ >= steady_min;"),
+    ("signal_not_recorded", "daemon/history/cycle_recorder.cpp",
+     "  push_values(cycle, RecordKind::signal, controller.signals, controller_.signals);\n",
+     "  if (!{P} || cycle % 3 != 0)\n"
+     "    push_values(cycle, RecordKind::signal, controller.signals, controller_.signals);\n"),
+    ("broken_model_taken", "estimator/displacement_model.cpp",
+     "require(std::isfinite(rows[i][j]), key,",
+     "require(std::isfinite(rows[i][j]) || {P}, key,"),
+]
+
+DECLARATION = "namespace thermocomp {\nextern int planted_bug;\n}\n"
+
+
+def with_bugs(file, text):
+    for number, (name, of_file, old, new) in enumerate(BUGS, start=1):
+        if of_file != file:
+            continue
+        if text.count(old) != 1:
+            raise SystemExit(f"plant_bugs: {name}: found {text.count(old)} times in {file}: {old}")
+        switch = f"(::thermocomp::planted_bug == {number})"
+        text = text.replace(old, new.replace("{P}", switch))
+    if "#pragma once\n" in text:
+        return text.replace("#pragma once\n", "#pragma once\n" + DECLARATION, 1)
+    return DECLARATION + text
+
+
+def write_if_new(path, text):
+    if path.exists() and path.read_text() == text:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+def main():
+    source, output = map(pathlib.Path, sys.argv[1:3])
+    for file in sorted({file for _, file, _, _ in BUGS}):
+        write_if_new(output / file, with_bugs(file, (source / file).read_text()))
+    names = "".join(f'    "{name}",\n' for name, _, _, _ in BUGS)
+    write_if_new(output / "plants.cpp", '#include "tests/faults/plants.hpp"\n\n#include <array>\n\n'
+                 "namespace thermocomp {\nint planted_bug = 0;\n}\n\nnamespace thermocomp::faults {\n"
+                 'const char* const program_name = "thermocomp_faults_planted";\n'
+                 f"static const std::array<const char*, {len(BUGS)}> names{{\n{names}}};\n"
+                 "std::vector<std::string> plant_names() { return {names.begin(), names.end()}; }\n"
+                 "bool plant(const std::string& name) {\n"
+                 "  for (std::size_t i = 0; i < names.size(); ++i)\n"
+                 "    if (name == names[i]) planted_bug = static_cast<int>(i) + 1;\n"
+                 "  return planted_bug != 0;\n}\n}  // namespace thermocomp::faults\n")
+
+
+if __name__ == "__main__":
+    main()
