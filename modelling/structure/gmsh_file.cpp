@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <cstdio>
 #include <gmsh.h>
+#include <iostream>
+#include <unistd.h>
 #include <unordered_map>
 
 #include "modelling/structure/file_mesh.hpp"
