@@ -159,11 +159,6 @@ class Reader {
     material.youngs_modulus_Pa = 1e9 * table.number("youngs_modulus_GPa", Range::above(0, 2000));
     material.poisson_ratio = table.number("poisson_ratio", Range::between(0, 0.49));
     material.expansion_per_K = um * table.number("expansion_um_per_m_K", Range::between(-50, 200));
-    material.conductivity_W_per_m_K =
-        table.number("conductivity_W_per_m_K", Range::above(0, 5000), 50.0);
-    material.density_kg_per_m3 = table.number("density_kg_per_m3", Range::above(0, 30000), 7800.0);
-    material.heat_capacity_J_per_kg_K =
-        table.number("heat_capacity_J_per_kg_K", Range::above(0, 10000), 460.0);
     spec_.materials.push_back(material);
   }
 

@@ -262,3 +262,17 @@ TEST_CASE("the picture has a panel for the blocks and one a shape, the VTU file 
         std::string::npos);
   CHECK(vtu.find("a&lt;b_degC_um_per_K") != std::string::npos);
 }
+
+TEST_CASE("the commented example is a structure that can be computed", "[structure][model]") {
+  const StructureSpec spec =
+      load_structure(std::filesystem::path(THERMOCOMP_EXAMPLES) / "structure.toml");
+  const Structure s = build_structure(spec, [](std::string_view) {});
+  const Statics statics(s.mesh, s.material_of_part, s.reduction, s.springs);
+  const ThermalModel model = block_model(spec, s, statics.sensitivities(s.rows));
+  CHECK(model.inputs.size() == 6);
+  CHECK(model.guideways.at(0).rows_um_per_K.at("y_um").size() == 4);
+  const std::string report = structure_report(s, statics, model);
+  CHECK(report.find("a_urad: ") != std::string::npos);
+  CHECK(report.find(" urad/K") != std::string::npos);
+  CHECK(report.find("condition number: ") != std::string::npos);
+}
