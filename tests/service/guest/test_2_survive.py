@@ -60,11 +60,11 @@ def test_a_restart_is_bumpless(running):
 
 def test_a_restart_on_the_way_goes_on_from_where_the_axis_is(running):
     orders = running.count()
-    running.warm_by(25.0)
+    running.warm_by(24.0)
     for stop_um in (13.0, 18.0):
         eventually(lambda: running.controller.applied_um() > stop_um, f"{stop_um} um")
         run("systemctl", "restart", UNIT)
-    running.settled_at(25.0)
+    running.settled_at(24.0)
     service.assert_slewed(running.orders_since(orders))
     print(f"largest step {service.largest_step_um(running.orders_since(orders)):.3f} um, "
           f"slew {service.SLEW_UM_PER_S} um/s, an order each {service.ORDER_PERIOD_S} s")
@@ -80,7 +80,7 @@ def test_kill_9_loses_nothing_that_was_committed(running):
         os.kill(service.main_pid(), signal.SIGKILL)
         eventually(lambda: service.restarts() == restarts + len(rows) and service.active(),
                    "started again")
-        running.warm_by(7.0)  # cooler: to take this for straight would be wrong
+        running.warm_by(6.0)  # cooler: to take this for straight would be wrong
         service.wait_for_mode("compensating")
         assert service.committed_rows() >= rows[-1]
         assert [each["reference_degC"] for each in service.status()["inputs"]] == reference
