@@ -19,6 +19,68 @@ SEEDS = HERE / "seeds"
 DICTIONARIES = HERE / "dictionaries"
 
 
+EVERY_TERM = """format = 1
+inputs = ["a_degC", "b_degC"]
+outputs = ["z_um", "c_urad"]
+reference = "first_sample"
+matrix_um_per_K = [[5.37, 0.5], [0.1, -0.2]]
+[guideway.x]
+axis = "x_mm"
+positions_mm = [0.0, 250.0, 500.0]
+rows_um_per_K = { z_um = [[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]] }
+[[term]]
+kind = "thermal_lag"
+subject = "a_degC"
+tau_s = 900.0
+gain_um_per_K = { z_um = 1.2 }
+[[term]]
+kind = "missing_heat_source"
+subject = "spindle_rpm"
+tau_s = 1800.0
+power = 2
+gain_um_per_unit = { z_um = 1e-7 }
+[[term]]
+kind = "missing_temperature"
+subject = "oil_degC"
+tau_s = 0.0
+gain_um_per_K = { z_um = 0.1, c_urad = 0.2 }
+[[term]]
+kind = "speed_growth"
+subject = "spindle_rpm"
+gain_um_per_unit2 = { z_um = 1e-9 }
+[[term]]
+kind = "slow_sensor"
+subject = "b_degC"
+tau_s = 60.0
+[[term]]
+kind = "sensor_swap"
+subject = "a_degC|b_degC"
+[[term]]
+kind = "position_dependence"
+subject = "oil_degC|x_mm"
+p0_mm = 50.0
+gain_um_per_K_mm = { z_um = 0.01 }
+[[term]]
+kind = "hysteresis"
+subject = "c_urad"
+width_um = 2.0
+[[term]]
+kind = "hysteresis"
+subject = "a_degC"
+width_K = 0.5
+[[term]]
+kind = "nonlinear_expansion"
+subject = "oil_degC"
+gain_um_per_K2 = { z_um = 0.1 }
+[[term]]
+kind = "wrong_coefficient"
+subject = "b_degC"
+delta_um_per_K = { c_urad = 0.4 }
+[covariance]
+matrix_K2 = [[4.0, 1.0], [1.0, 9.0]]
+"""
+
+
 def write(target, name, content):
     folder = SEEDS / target
     folder.mkdir(parents=True, exist_ok=True)
@@ -55,6 +117,15 @@ def toml_seeds():
     write("model_file", "names_escaped.toml",
           'format = 1\ninputs = ["\\u00e4 b.c_degC"]\noutputs = ["\\"z_um"]\n'
           'reference = "first_sample"\nmatrix_um_per_K = [[1.0]]\n')
+    write("model_file", "every_term.toml", EVERY_TERM)
+    # In the daemon, the terms of the sensors and outputs that the short example has.
+    parts = re.split(r"(?=^\[)", EVERY_TERM, flags=re.M)
+    own = "".join(part for part in parts
+                  if not re.search("oil_degC|spindle_rpm|x_mm", part) or "inputs" in part)
+    own = own.replace("a_degC", "column_degC").replace("b_degC", "spindle_degC")
+    own = own.replace("c_urad", "x_um")
+    example = bare(ROOT / "config/examples/modbus_tcp.toml")
+    write("daemon_config", "terms.toml", example + "#### model\n" + own)
     for name, text in {"deep.toml": "a = " + "[" * 300, "dates.toml":
                        "a = 1979-05-27T07:32:00.999999-07:00\nb = 07:32:00\nc = 0xFFFFFFFFFFFFFFFF\n",
                        "dotted.toml": "a.b.c.d = 1\n[a.b]\n[[a.b.e]]\n'' = {}\n"}.items():
