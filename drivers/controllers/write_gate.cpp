@@ -49,8 +49,9 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
   bool explained = true;
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     const double before_um = applied_um_[axis];
-    applied_um_[axis] = applied_um[axis];
     const SentLately& lately = sent_[axis];
+    // Until something is sent it is where the epoch began that a command starts from.
+    if (lately.count != 0 || !std::isfinite(before_um)) applied_um_[axis] = applied_um[axis];
     if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
     if (lately.count == 0) {
       // Not driven yet in this epoch: about to be, from where it stood when the epoch began.

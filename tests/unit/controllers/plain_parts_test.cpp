@@ -309,6 +309,7 @@ TEST_CASE("a controller that moves between read-back and first command is notice
   CHECK(gate.explains(applied_um));
   applied_um[0] = -11.0;  // re-homed before anything was sent in this epoch
   CHECK_FALSE(gate.explains(applied_um));
+  CHECK_FALSE(gate.explains(applied_um));  // nor is it the next time
   // An axis that is not to be driven may go where it likes.
   command.link_epoch = gate.synchronised(applied_um);
   command.valid[0] = false;
