@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "daemon/history/history_reader.hpp"
@@ -36,7 +37,9 @@ struct HistoryDisk::Parts {
   std::uint64_t commits_seen{0};
   std::uint64_t commits_all{0};
   std::uint64_t lost_seen{0};
-  std::uint64_t next_cycle{0};  ///< first one that no commit has seen
+  std::uint64_t next_cycle{0};                              ///< first one that no commit has seen
+  std::uint64_t stepped{0};                                 ///< the cycle stepped last
+  std::map<std::int64_t, std::set<std::uint64_t>> skipped;  ///< by an overrun; of each run
 
   Parts(std::uint64_t seed, const FaultSchedule& fault_schedule)
       : schedule(fault_schedule), chance(seed, 11) {}
@@ -93,6 +96,7 @@ void HistoryDisk::boot(const Grid& grid, nanoseconds now) {
   parts.commits_seen = 0;
   parts.lost_seen = 0;
   parts.next_cycle = 0;
+  parts.stepped = 0;
 }
 
 std::unique_ptr<CycleRecorder> HistoryDisk::make_recorder(const Estimator& estimator) {
@@ -106,6 +110,9 @@ void HistoryDisk::work(nanoseconds now) {
   parts.now = now;
   parts.disk.full = parts.schedule.find(FaultKind::history_disk_full, now) != nullptr;
   parts.writer->work();
+  const auto cycle_now = static_cast<std::uint64_t>((now - parts.grid.start) / parts.grid.period);
+  while (++parts.stepped < cycle_now) parts.skipped[parts.grid.start.count()].insert(parts.stepped);
+  parts.stepped = cycle_now;
   const HistoryStatistics statistics = parts.writer->statistics();
   const bool lost = statistics.lost != parts.lost_seen;
   if (statistics.commits == parts.commits_seen && !lost) return;
@@ -150,12 +157,25 @@ std::string HistoryDisk::verify() {
       held[segment.grid.start.count()].emplace_back(segment.first_cycle, segment.last_cycle);
     for (const Committed& span : parts.committed) {
       std::uint64_t next = span.from;
+      const auto& left_out = parts.skipped[span.grid_start.count()];
+      const auto pass_skipped = [&] {
+        while (left_out.contains(next)) ++next;
+      };
+      pass_skipped();
       for (const auto& [first, last] : held[span.grid_start.count()])
-        if (first <= next && last >= static_cast<std::int64_t>(next))
+        if (first <= next && last >= static_cast<std::int64_t>(next)) {
           next = static_cast<std::uint64_t>(last) + 1;
+          pass_skipped();
+        }
       if (next <= span.to)
-        return fmt::format("cycle {} (of {}..{}) of the run from {:.0f} s is not in the file", next,
-                           span.from, span.to, 1e-9 * static_cast<double>(span.grid_start.count()));
+        return fmt::format("cycle {} (of {}..{}) of the run from {:.0f} s is not in the file{}",
+                           next, span.from, span.to,
+                           1e-9 * static_cast<double>(span.grid_start.count()), [&] {
+                             std::string all;
+                             for (const auto& [first, last] : held[span.grid_start.count()])
+                               all += fmt::format(" {}..{}", first, last);
+                             return all;
+                           }());
     }
     const ReplaySummary summary =
         replay(file, {}, {}, [&parts](const SegmentSetup& setup) -> ReplaySetup {

@@ -150,7 +150,7 @@ void Invariants::check_sensors_used(const CycleSeen& seen) {
                          sensor.smoothed_degC));
       return;
     }
-    constexpr double believable_after_s = 130.0;
+    constexpr double believable_after_s = 90.0;
     // The very first value has nothing to be compared with; the second may not leave it standing.
     if (first_used_[i] < nanoseconds{0}) first_used_[i] = seen.now;
     const bool first = to_s(seen.now - first_used_[i]) < 4.0;

@@ -64,6 +64,8 @@ class Thermocouples {
   /// Registers `address`.. of a unit as they stand at `time`; remembers what was given out.
   void read(std::size_t place, std::size_t address, std::span<std::uint16_t> words,
             nanoseconds time);
+  /// A daemon that has just started has nothing to tell its first value from a spike by.
+  void no_spikes_before(nanoseconds time) noexcept { spikes_from_ = time; }
   /// A good sample of the sensor with this value given out in [from, to]; nullptr: none.
   [[nodiscard]] const Sample* given(std::size_t sensor, double temp_degC, nanoseconds from,
                                     nanoseconds to) const noexcept;
@@ -87,6 +89,7 @@ class Thermocouples {
     double rate_per_s;
     double phase;
   };
+  nanoseconds spikes_from_{};
   std::array<Course, sensors_count> courses_{};
   std::array<std::array<Sample, kept>, sensors_count> samples_{};
   std::array<std::size_t, sensors_count> given_{};
