@@ -31,6 +31,11 @@ void check_same(const ThermalModel& a, const ThermalModel& b) {
   FUZZ_PROMISE(same(a.reference_degC, b.reference_degC));
   FUZZ_PROMISE(same(a.matrix_um_per_K, b.matrix_um_per_K));
   FUZZ_PROMISE(same(a.covariance_K2, b.covariance_K2));
+  FUZZ_PROMISE(same(a.covariance_growth.noise_K, b.covariance_growth.noise_K));
+  FUZZ_PROMISE(same(a.covariance_growth.drift_time_s, b.covariance_growth.drift_time_s));
+  FUZZ_PROMISE(same(a.covariance_growth.scatter_time_s, b.covariance_growth.scatter_time_s));
+  FUZZ_PROMISE(same(a.covariance_growth.drift_factor, b.covariance_growth.drift_factor));
+  FUZZ_PROMISE(same(a.covariance_growth.scatter_factor, b.covariance_growth.scatter_factor));
   FUZZ_PROMISE(a.guideways.size() == b.guideways.size());
   for (std::size_t i = 0; i < a.guideways.size(); ++i) {
     FUZZ_PROMISE(a.guideways[i].name == b.guideways[i].name);
