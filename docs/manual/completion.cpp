@@ -74,6 +74,7 @@ std::string offers(const Words& words, const std::string& commands) {
 std::string bash_completion(const CLI::App& app) {
   const auto subcommands = app.get_subcommands([](const CLI::App*) { return true; });
   std::vector<std::string> names;
+  names.reserve(subcommands.size());
   for (const CLI::App* command : subcommands) names.push_back(command->get_name());
   const Words global = words_of(app);
   std::vector<std::string> skipped = global.with_file;
