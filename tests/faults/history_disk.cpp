@@ -38,7 +38,7 @@ struct HistoryDisk::Parts {
   std::uint64_t commits_all{0};
   std::uint64_t lost_seen{0};
   std::uint64_t next_cycle{0};                              ///< first one that no commit has seen
-  std::uint64_t stepped{0};                                 ///< the cycle stepped last
+  std::uint64_t last_step{0};                               ///< the cycle stepped last
   std::map<std::int64_t, std::set<std::uint64_t>> skipped;  ///< by an overrun; of each run
 
   Parts(std::uint64_t seed, const FaultSchedule& fault_schedule)
@@ -96,7 +96,7 @@ void HistoryDisk::boot(const Grid& grid, nanoseconds now) {
   parts.commits_seen = 0;
   parts.lost_seen = 0;
   parts.next_cycle = 0;
-  parts.stepped = 0;
+  parts.last_step = 0;
 }
 
 std::unique_ptr<CycleRecorder> HistoryDisk::make_recorder(const Estimator& estimator) {
@@ -111,8 +111,9 @@ void HistoryDisk::work(nanoseconds now) {
   parts.disk.full = parts.schedule.find(FaultKind::history_disk_full, now) != nullptr;
   parts.writer->work();
   const auto cycle_now = static_cast<std::uint64_t>((now - parts.grid.start) / parts.grid.period);
-  while (++parts.stepped < cycle_now) parts.skipped[parts.grid.start.count()].insert(parts.stepped);
-  parts.stepped = cycle_now;
+  while (++parts.last_step < cycle_now)
+    parts.skipped[parts.grid.start.count()].insert(parts.last_step);
+  parts.last_step = cycle_now;
   const HistoryStatistics statistics = parts.writer->statistics();
   const bool lost = statistics.lost != parts.lost_seen;
   if (statistics.commits == parts.commits_seen && !lost) return;
