@@ -42,7 +42,7 @@ void write(const fs::path& file, const std::string& text) {
 }
 
 void write_program(const fs::path& folder, const CLI::App& app, const PageExtras& extras) {
-  const std::string name = app.get_name();
+  const std::string& name = app.get_name();
   write(folder / (name + "." + std::to_string(extras.section)), command_page(app, extras));
   write(folder / (name + ".bash"), bash_completion(app));
 }
