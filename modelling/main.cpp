@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "config/problems.hpp"
+#include "modelling/diagnosis/diagnose_command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/structure/structure_command.hpp"
 #endif
@@ -34,6 +35,7 @@ int run(int argc, char** argv) {
   CLI::App app("thermocomp-modelling: what leads to a model, and what a model gets wrong");
   app.require_subcommand(1);
   std::function<int()> action;
+  thermocomp::diagnosis::add_diagnose_command(app, action);
   add_structure(app, action);
   try {
     app.parse(argc, argv);

@@ -38,8 +38,8 @@ std::vector<std::size_t> usable_rows(const RunFile& run, const std::vector<std::
 /// The column at the rows; missing values are held at the last one, at the start at the first.
 Column taken(const std::vector<double>& values, const std::vector<std::size_t>& rows) {
   Column column(static_cast<Eigen::Index>(rows.size()));
-  const auto first = std::find_if(values.begin(), values.end(),
-                                  [](double value) { return std::isfinite(value); });
+  const auto first =
+      std::find_if(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
   double last = first == values.end() ? 0.0 : *first;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (std::isfinite(values[rows[i]])) last = values[rows[i]];
@@ -49,8 +49,8 @@ Column taken(const std::vector<double>& values, const std::vector<std::size_t>& 
 }
 
 double first_value(const std::vector<double>& values) {
-  const auto first = std::find_if(values.begin(), values.end(),
-                                  [](double value) { return std::isfinite(value); });
+  const auto first =
+      std::find_if(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
   return first == values.end() ? 0.0 : *first;
 }
 
@@ -105,9 +105,8 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
   for (const std::string& signal : data.signals)
     run.signals.push_back(taken(file.column(signal), rows));
   take_displacements(file, rows, data, run);
-  const bool any = std::any_of(run.measured_um.begin(), run.measured_um.end(), [](const auto& um) {
-    return um.array().isFinite().any();
-  });
+  const bool any = std::any_of(run.measured_um.begin(), run.measured_um.end(),
+                               [](const auto& um) { return um.array().isFinite().any(); });
   if (!any) refuse(data.model.outputs.front(), "must have a measured value of an output");
   return run;
 }
@@ -169,8 +168,8 @@ std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run
   for (Eigen::Index row = 0; row < run.rows(); ++row) {
     for (std::size_t i = 0; i < temperatures.size(); ++i) rise_K[i] = (*temperatures[i])[row];
     for (std::size_t i = 0; i < signals.size(); ++i) signal_values[i] = (*signals[i])[row];
-    const auto now = std::chrono::duration_cast<nanoseconds>(
-        std::chrono::duration<double>(run.time_s[row]));
+    const auto now =
+        std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(run.time_s[row]));
     displacement.step(now, rise_K, reference_K, signal_values, out);
     for (std::size_t i = 0; i < out.size(); ++i) result[i][row] = out[i];
   }

@@ -18,13 +18,13 @@ using Column = Eigen::VectorXd;
 struct MeasuredRun {
   std::string name;  ///< the argument as given
   Column time_s;
-  Eigen::Index begin{0};  ///< first selected row
-  std::vector<Column> inputs_K;   ///< rise over the reference, order of the model's inputs
-  std::vector<Column> others_K;   ///< rise of MeasuredData::others
+  Eigen::Index begin{0};         ///< first selected row
+  std::vector<Column> inputs_K;  ///< rise over the reference, order of the model's inputs
+  std::vector<Column> others_K;  ///< rise of MeasuredData::others
   std::vector<Column> others_degC;
   std::vector<Column> inputs_degC;
-  std::vector<Column> signals;    ///< order of MeasuredData::signals
-  std::vector<Column> model_um;   ///< order of the outputs, relative to the output's first row
+  std::vector<Column> signals;      ///< order of MeasuredData::signals
+  std::vector<Column> model_um;     ///< order of the outputs, relative to the output's first row
   std::vector<Column> measured_um;  ///< the same; NaN: missing
   [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }
 };
@@ -55,7 +55,8 @@ struct SharedColumns {
 /// @param names  the runs' arguments as given
 /// @throws ConfigurationError when a run lacks an input or signal of the model, or has no measured
 ///         value of any output
-[[nodiscard]] MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
+[[nodiscard]] MeasuredData measured_data(const ThermalModel& model,
+                                         const std::vector<RunFile>& runs,
                                          const std::vector<std::string>& names,
                                          const SharedColumns& columns);
 

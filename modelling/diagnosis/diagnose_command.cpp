@@ -1,0 +1,103 @@
+#include "modelling/diagnosis/diagnose_command.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/output_file.hpp"
+#include "config/model_file.hpp"
+#include "config/run_file.hpp"
+#include "modelling/diagnosis/diagnosis.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+struct Options {
+  std::string model;
+  std::vector<std::string> train;
+  std::vector<std::string> test;
+  std::string folder;
+  std::string json;
+  bool weighed{false};
+};
+
+std::vector<RunFile> load_runs(const std::vector<std::string>& arguments) {
+  std::vector<RunFile> runs;
+  runs.reserve(arguments.size());
+  for (const std::string& argument : arguments) runs.push_back(load_run(parse_selection(argument)));
+  return runs;
+}
+
+void write(const std::string& destination, const std::string& text) {
+  cli::OutputFile file(destination);
+  file.stream() << text;
+  file.commit();
+}
+
+void print(const Diagnosis& diagnosis) {
+  std::printf("verdict: %s\n", diagnosis.verdict.c_str());
+  for (const NamedFinding& finding : diagnosis.findings) {
+    std::printf("%s of %s", finding.cause.c_str(), finding.subject.c_str());
+    if (finding.run) std::printf(" in %s", finding.run->c_str());
+    std::printf(": %s\n", finding.evidence.c_str());
+    for (const Parameter& parameter : finding.parameters)
+      for (const auto& [output, value] : parameter.values)
+        std::printf("  %s%s%s = %.6g\n", parameter.name.c_str(), output.empty() ? "" : " ",
+                    output.c_str(), value);
+    for (const auto& [output, gain] : finding.test)
+      std::printf("  %s, test rows: RMS %.3f -> %.3f (%.0f %%, 95 %%: %.0f to %.0f)\n",
+                  output.c_str(), gain.before_um, gain.after_um, 100 * gain.reduction,
+                  100 * gain.ci95.low, 100 * gain.ci95.high);
+    for (const Alternative& other : finding.alternatives)
+      std::printf("  or: %s of %s (support %.2g)\n", other.cause.c_str(), other.subject.c_str(),
+                  other.relative_support);
+  }
+  for (const auto& [output, figures] : diagnosis.outputs)
+    std::printf("%s: RMS train %.3f, test %.3f, extended %.3f; unexplained %.0f %%\n",
+                output.c_str(), figures.train_rms_um, figures.test_rms_um,
+                figures.extended_test_rms_um, 100 * figures.unexplained_fraction);
+}
+
+void print_weighed(const Diagnosis& diagnosis) {
+  for (const Weighed& each : diagnosis.weighed)
+    std::printf("weighed %zu: %s of %s: 2 ln L %.0f, left-out rows %.0f %%\n", each.round,
+                each.cause.c_str(), each.subject.c_str(), each.score, 100 * each.left_out_gain);
+}
+
+int run(const Options& options) {
+  const ThermalModel model = load_model(options.model);
+  const Diagnosis diagnosis = diagnose(model, load_runs(options.train), options.train,
+                                       load_runs(options.test), options.test);
+  if (!options.folder.empty()) {
+    std::filesystem::create_directories(options.folder);
+    write((std::filesystem::path(options.folder) / "model.toml").string(),
+          write_model(diagnosis.extended));
+  }
+  if (!options.json.empty()) write(options.json, diagnosis_json(diagnosis));
+  if (options.json != "-") print(diagnosis);
+  if (options.json != "-" && options.weighed) print_weighed(diagnosis);
+  return 0;
+}
+
+}  // namespace
+
+void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("diagnose", "what a model gets wrong in measured runs, and why");
+  command->add_option("--model", options->model, "model file")->required();
+  command
+      ->add_option("--train", options->train, "runs from which causes are found: RUN.csv[@T0:T1]")
+      ->required();
+  command->add_option("--test", options->test, "runs on which the gain is measured")->required();
+  command->add_option("--out", options->folder, "folder for the extended model");
+  command->add_option("--json", options->json, "file for the answer as JSON; - is the output");
+  command->add_flag("--weighed", options->weighed, "also print what came into question");
+  command->callback([options, &action] { action = [options] { return run(*options); }; });
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,88 @@
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "modelling/diagnosis/diagnosis.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json interval(const Interval& interval) {
+  return Json::array({number(interval.low), number(interval.high)});
+}
+
+Json value_json(const Parameter& parameter) {
+  const auto whole = parameter.name == "power";
+  if (parameter.values.contains("")) {
+    const double value = parameter.values.at("");
+    return whole ? Json(static_cast<int>(std::lround(value))) : number(value);
+  }
+  Json table = Json::object();
+  for (const auto& [output, value] : parameter.values) table[output] = number(value);
+  return table;
+}
+
+Json ci_json(const Parameter& parameter) {
+  if (parameter.ci95.contains("")) return interval(parameter.ci95.at(""));
+  Json table = Json::object();
+  for (const auto& [output, value] : parameter.ci95) table[output] = interval(value);
+  return table;
+}
+
+Json finding_json(const NamedFinding& finding) {
+  Json parameters = Json::object();
+  Json ci95 = Json::object();
+  if (finding.run) parameters["run"] = *finding.run;
+  for (const Parameter& parameter : finding.parameters) {
+    parameters[parameter.name] = value_json(parameter);
+    if (!parameter.ci95.empty()) ci95[parameter.name] = ci_json(parameter);
+  }
+  Json alternatives = Json::array();
+  for (const Alternative& other : finding.alternatives)
+    alternatives.push_back({{"cause", other.cause},
+                            {"subject", other.subject},
+                            {"relative_support", number(other.relative_support)}});
+  Json test = Json::object();
+  for (const auto& [output, gain] : finding.test)
+    test[output] = {{"before", number(gain.before_um)},
+                    {"after", number(gain.after_um)},
+                    {"reduction", number(gain.reduction)},
+                    {"ci95", interval(gain.ci95)}};
+  return {
+      {"cause", finding.cause},       {"subject", finding.subject},
+      {"outputs", finding.outputs},   {"parameters", parameters},
+      {"parameters_ci95", ci95},      {"evidence", finding.evidence},
+      {"alternatives", alternatives}, {"test_rms_um", finding.test.empty() ? Json(nullptr) : test}};
+}
+
+}  // namespace
+
+std::string diagnosis_json(const Diagnosis& diagnosis) {
+  Json baseline = Json::object();
+  Json extended = Json::object();
+  Json unexplained = Json::object();
+  for (const auto& [output, figures] : diagnosis.outputs) {
+    baseline[output] = {{"train_rms_um", number(figures.train_rms_um)},
+                        {"test_rms_um", number(figures.test_rms_um)},
+                        {"test_peak_um", number(figures.test_peak_um)}};
+    extended[output] = {{"test_rms_um", number(figures.extended_test_rms_um)},
+                        {"test_peak_um", number(figures.extended_test_peak_um)}};
+    unexplained[output] = number(figures.unexplained_fraction);
+  }
+  Json findings = Json::array();
+  for (const NamedFinding& finding : diagnosis.findings) findings.push_back(finding_json(finding));
+  const Json answer = {{"verdict", diagnosis.verdict},
+                       {"baseline", baseline},
+                       {"findings", findings},
+                       {"extended", extended},
+                       {"unexplained_fraction", unexplained}};
+  return answer.dump(2) + "\n";
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,173 @@
+#include "modelling/diagnosis/evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr double offset_sd_um = 1e4;
+constexpr double accepted_sd_um = 1e4;
+/// A noise that is below the least digit anybody measures would make every misfit significant.
+constexpr double noise_um_min = 1e-3;
+
+/// White noise, or a wandering part of at most a third of the residual: what is larger than that
+/// is what a diagnosis has to explain, not noise.
+std::vector<NoiseShape> noise_shapes(double residual_um, double noise_um) {
+  std::vector<NoiseShape> shapes = {{0.0, 1.0}};
+  for (const double share : {0.1, 0.3}) {
+    const double wander_um = share * residual_um;
+    for (const double tau_s : {1200.0, 3600.0, 10800.0})
+      shapes.push_back({wander_um * wander_um / (noise_um * noise_um), tau_s});
+  }
+  return shapes;
+}
+
+/// The noise of single values: second differences leave nothing of what changes slowly. The median
+/// keeps jumps out.
+double noise_of(const Column& residual, const Eigen::Array<bool, Eigen::Dynamic, 1>& present,
+                const std::vector<Block>& runs) {
+  std::vector<double> differences;
+  for (const Block& run : runs)
+    for (Eigen::Index row = run.begin + 1; row + 1 < run.end; ++row)
+      if (present[row - 1] && present[row] && present[row + 1])
+        differences.push_back(
+            std::abs(residual[row + 1] - 2.0 * residual[row] + residual[row - 1]));
+  if (differences.empty()) return noise_um_min;
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return std::max(noise_um_min, *middle / (0.6745 * std::sqrt(6.0)));
+}
+
+}  // namespace
+
+Setting::Setting(const NoiseShape& shape, const StackedRows& rows,
+                 const Eigen::Array<bool, Eigen::Dynamic, 1>& present, const Column& residual,
+                 const Eigen::MatrixXd& common, const Eigen::VectorXd& precision)
+    : whitener_(shape, rows.time_s, rows.blocks, present),
+      common_(common.rows(), common.cols()),
+      residual_(whitener_.apply(residual)),
+      precision_(precision),
+      present_rows_(static_cast<double>(present.count())) {
+  for (Eigen::Index column = 0; column < common.cols(); ++column)
+    common_.col(column) = whitener_.apply(common.col(column));
+  Eigen::MatrixXd square = common_.transpose() * common_;
+  square.diagonal() += precision;
+  factor_.compute(square);
+  common_residual_ = factor_.matrixL().solve(common_.transpose() * residual_);
+  squares_ = residual_.squaredNorm() - common_residual_.squaredNorm();
+  log_determinant_ = whitener_.log_determinant() - precision.array().log().sum() +
+                     2.0 * factor_.matrixLLT().diagonal().array().log().sum();
+}
+
+Setting::Equations Setting::equations(const Eigen::MatrixXd& columns) const {
+  Eigen::MatrixXd white(columns.rows(), columns.cols());
+  for (Eigen::Index column = 0; column < columns.cols(); ++column)
+    white.col(column) = whitener_.apply(columns.col(column));
+  const Eigen::MatrixXd shared = factor_.matrixL().solve(common_.transpose() * white);
+  return {white.transpose() * white - shared.transpose() * shared,
+          white.transpose() * residual_ - shared.transpose() * common_residual_};
+}
+
+double Setting::twice_log_likelihood(double squares) const {
+  const double floor = 1e-9 * present_rows_;
+  return -present_rows_ * std::log(std::max(squares, floor) / present_rows_) - log_determinant_;
+}
+
+OutputEvidence::OutputEvidence(const MeasuredData& data, const StackedRows& rows,
+                               std::size_t output)
+    : rows_(rows),
+      output_(output),
+      present_(rows.time_s.size()),
+      measured_residual_(Column::Zero(rows.time_s.size())),
+      offsets_(
+          Eigen::MatrixXd::Zero(rows.time_s.size(), static_cast<Eigen::Index>(data.runs.size()))) {
+  for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    const MeasuredRun& run = data.runs[i];
+    const Block& block = rows.runs[i];
+    const Eigen::Index count = block.end - block.begin;
+    const Column residual = (run.measured_um[output] - run.model_um[output]).tail(count);
+    present_.segment(block.begin, count) = residual.array().isFinite();
+    measured_residual_.segment(block.begin, count) =
+        residual.array().isFinite().select(residual, 0.0);
+    offsets_.block(block.begin, static_cast<Eigen::Index>(i), count, 1).setOnes();
+  }
+  residual_ = measured_residual_;
+  noise_um_ = noise_of(residual_, present_, rows.runs);
+  accept({});
+}
+
+double OutputEvidence::centred_rms() const {
+  double sum = 0.0;
+  for (const Block& run : rows_.runs) {
+    const Eigen::Index count = run.end - run.begin;
+    const auto present = present_.segment(run.begin, count);
+    const auto values = residual_.segment(run.begin, count).array();
+    const double n = std::max(1.0, static_cast<double>(present.count()));
+    const double mean = present.select(values, 0.0).sum() / n;
+    sum += present.select((values - mean).square(), 0.0).sum();
+  }
+  return std::sqrt(sum / std::max(1.0, static_cast<double>(present_.count())));
+}
+
+Column OutputEvidence::measured(const MeasuredData& data) const {
+  Column all(rows_.time_s.size());
+  for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    const Block& block = rows_.runs[i];
+    all.segment(block.begin, block.end - block.begin) =
+        data.runs[i].measured_um[output_].tail(block.end - block.begin);
+  }
+  return present_.select(all, 0.0);
+}
+
+void OutputEvidence::accept(const std::vector<Explanation>& found) {
+  residual_ = measured_residual_;
+  std::vector<Eigen::MatrixXd> free;
+  Eigen::Index free_columns = 0;
+  for (const Explanation& each : found) {
+    if (each.gains[output_].size() == 0) continue;
+    const Eigen::MatrixXd columns = columns_of(*each.hypothesis, each.shape, *this);
+    if (each.hypothesis->form == Form::own_gains) {
+      // In um, so that one prior fits all units.
+      const double scale = std::max(1e-12, columns.cwiseAbs().maxCoeff());
+      free.emplace_back(columns / scale);
+      free_columns += columns.cols();
+    } else {
+      residual_ -= columns * each.gains[output_];
+    }
+  }
+  Eigen::MatrixXd common(rows_.time_s.size(), offsets_.cols() + free_columns);
+  common.leftCols(offsets_.cols()) = offsets_;
+  Eigen::Index at = offsets_.cols();
+  for (const Eigen::MatrixXd& columns : free) {
+    common.middleCols(at, columns.cols()) = columns;
+    at += columns.cols();
+  }
+  for (Eigen::Index row = 0; row < common.rows(); ++row)
+    if (!present_[row]) common.row(row).setZero();
+  settings_.clear();
+  const double variance = noise_um_ * noise_um_;
+  Eigen::VectorXd precision =
+      Eigen::VectorXd::Constant(common.cols(), variance / (accepted_sd_um * accepted_sd_um));
+  precision.head(offsets_.cols()).setConstant(variance / (offset_sd_um * offset_sd_um));
+  for (const NoiseShape& shape : noise_shapes(centred_rms(), noise_um_))
+    settings_.push_back(
+        std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision));
+  const auto likelihood = [](const auto& setting) {
+    return setting->twice_log_likelihood(setting->squares());
+  };
+  setting_ =
+      std::max_element(settings_.begin(), settings_.end(), [&](const auto& a, const auto& b) {
+        return likelihood(a) < likelihood(b);
+      })->get();
+}
+
+Eigen::MatrixXd columns_of(const Hypothesis& hypothesis, const std::vector<double>& shape,
+                           const OutputEvidence& evidence) {
+  Eigen::MatrixXd columns = hypothesis.columns(shape, evidence.output());
+  for (Eigen::Index row = 0; row < columns.rows(); ++row)
+    if (!evidence.present()[row]) columns.row(row).setZero();
+  return columns;
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,107 @@
+/// How much a hypothesis explains: likelihood of the residuals with wandering noise and free
+/// offsets a run.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "modelling/diagnosis/coloured_noise.hpp"
+#include "modelling/diagnosis/hypothesis.hpp"
+
+namespace thermocomp::diagnosis {
+
+class Setting;
+
+/// A hypothesis with its shape and gains settled.
+struct Explanation {
+  const Hypothesis* hypothesis{nullptr};
+  std::vector<double> shape;
+  std::vector<Eigen::VectorXd> gains;    ///< one an output; empty: the output has no share
+  double score{0.0};                     ///< gain of 2 ln L, the price of its parameters taken off
+  std::vector<const Setting*> settings;  ///< one an output: under which it is likeliest
+  double left_out_gain{0.0};  ///< share of the RMS that it takes from rows it was not fitted to
+};
+
+/// One output's residual over the stacked rows under one noise shape, whitened, with everything
+/// that any hypothesis has to compete with.
+///
+///   residual = offset of the run + accepted columns + hypothesis + noise
+class Setting {
+ public:
+  /// @param common  shape (rows, m): offsets, accepted columns
+  /// @param precision  shape (m): sigma^2 over the prior variance of each
+  Setting(const NoiseShape& shape, const StackedRows& rows,
+          const Eigen::Array<bool, Eigen::Dynamic, 1>& present, const Column& residual,
+          const Eigen::MatrixXd& common, const Eigen::VectorXd& precision);
+
+  /// Normal equations of columns, the common ones taken out. S is the sum of squares without them.
+  struct Equations {
+    Eigen::MatrixXd square;
+    Eigen::VectorXd right;
+  };
+  [[nodiscard]] Equations equations(const Eigen::MatrixXd& columns) const;
+  [[nodiscard]] double squares() const noexcept { return squares_; }
+  [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
+  [[nodiscard]] double present_rows() const noexcept { return present_rows_; }
+  /// 2 ln L for a sum of squares, constants left out.
+  [[nodiscard]] double twice_log_likelihood(double squares) const;
+  [[nodiscard]] const Whitener& whitener() const noexcept { return whitener_; }
+  [[nodiscard]] const Eigen::MatrixXd& common() const noexcept { return common_; }
+  [[nodiscard]] const Column& residual() const noexcept { return residual_; }
+  [[nodiscard]] const Eigen::VectorXd& precision() const noexcept { return precision_; }
+
+ private:
+  Whitener whitener_;
+  Eigen::MatrixXd common_;  ///< whitened
+  Column residual_;         ///< whitened
+  Eigen::VectorXd precision_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::VectorXd common_residual_;  ///< factor^-1 common' residual
+  double squares_{0.0};
+  double log_determinant_{0.0};
+  double present_rows_{0.0};
+};
+
+/// Everything known of one output while causes are sought.
+class OutputEvidence {
+ public:
+  OutputEvidence(const MeasuredData& data, const StackedRows& rows, std::size_t output);
+
+  /// Takes the explanations as found: their columns become free, or are subtracted.
+  void accept(const std::vector<Explanation>& found);
+  /// The noise under which the residual is likeliest.
+  [[nodiscard]] const Setting& setting() const { return *setting_; }
+  /// The settings among which settle() chooses.
+  [[nodiscard]] const std::vector<std::unique_ptr<Setting>>& settings() const { return settings_; }
+  [[nodiscard]] const Column& residual() const noexcept { return residual_; }
+  [[nodiscard]] const Eigen::Array<bool, Eigen::Dynamic, 1>& present() const { return present_; }
+  /// RMS of the residual, each run's mean taken off.
+  [[nodiscard]] double centred_rms() const;
+  [[nodiscard]] const Column& measured_residual() const noexcept { return measured_residual_; }
+  /// The measured displacement over the stacked rows; 0 where missing.
+  [[nodiscard]] Column measured(const MeasuredData& data) const;
+  [[nodiscard]] bool measured() const { return present_.count() > 8; }
+  [[nodiscard]] double noise_um() const noexcept { return noise_um_; }
+  [[nodiscard]] std::size_t output() const noexcept { return output_; }
+
+ private:
+  const StackedRows& rows_;
+  std::size_t output_;
+  Eigen::Array<bool, Eigen::Dynamic, 1> present_;
+  Column measured_residual_;  ///< measured - model; 0 where missing
+  Column residual_;           ///< explanations without a gain subtracted
+  Eigen::MatrixXd offsets_;
+  double noise_um_{0.0};  ///< of a single value, from the residual's second differences
+  std::vector<std::unique_ptr<Setting>> settings_;
+  const Setting* setting_{nullptr};
+};
+
+/// The columns over the stacked rows, 0 where the output has no value.
+[[nodiscard]] Eigen::MatrixXd columns_of(const Hypothesis& hypothesis,
+                                         const std::vector<double>& shape,
+                                         const OutputEvidence& evidence);
+
+}  // namespace thermocomp::diagnosis

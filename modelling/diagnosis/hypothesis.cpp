@@ -1,0 +1,538 @@
+#include "modelling/diagnosis/hypothesis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+#include "config/units.hpp"
+#include "estimator/low_pass.hpp"
+#include "estimator/play.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+using Shape = std::vector<double>;
+
+constexpr std::size_t blocks_wanted = 8;
+constexpr double block_rows_min = 12;
+
+std::vector<double> logarithmic_grid(double low, double high, std::size_t count) {
+  std::vector<double> grid;
+  for (std::size_t i = 0; i < count; ++i)
+    grid.push_back(low *
+                   std::pow(high / low, static_cast<double>(i) / static_cast<double>(count - 1)));
+  return grid;
+}
+
+std::vector<double> linear_grid(double low, double high, std::size_t count) {
+  std::vector<double> grid;
+  for (std::size_t i = 0; i < count; ++i)
+    grid.push_back(low + (high - low) * static_cast<double>(i) / static_cast<double>(count - 1));
+  return grid;
+}
+
+nanoseconds at_time(double time_s) {
+  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
+}
+
+/// The column through one of the estimator's filters.
+template <class Filter>
+Column through(Filter filter, const Column& time_s, const Column& input) {
+  Column out(input.size());
+  for (Eigen::Index row = 0; row < input.size(); ++row) {
+    if constexpr (requires { filter.step(nanoseconds{}, 0.0); })
+      out[row] = filter.step(at_time(time_s[row]), input[row]);
+    else
+      out[row] = filter.step(input[row]);
+  }
+  return out;
+}
+
+/// The series shifted by `shift_s` (positive: late), interpolated, held at the ends.
+Column shifted(const Column& time_s, const Column& values, double shift_s) {
+  Column out(values.size());
+  Eigen::Index row = 0;
+  const Eigen::Index last = values.size() - 1;
+  for (Eigen::Index i = 0; i <= last; ++i) {
+    const double t = time_s[i] - shift_s;
+    while (row > 0 && time_s[row] > t) --row;
+    while (row < last && time_s[row + 1] <= t) ++row;
+    if (row == last || t <= time_s[row]) {
+      out[i] = values[row];
+      continue;
+    }
+    const double share = (t - time_s[row]) / (time_s[row + 1] - time_s[row]);
+    out[i] = values[row] + share * (values[row + 1] - values[row]);
+  }
+  return out;
+}
+
+/// The derivative of the values smoothed forwards and backwards with tau_s, which shifts nothing.
+Column slope_per_s(const Column& time_s, const Column& values, double tau_s) {
+  const Column backwards_s = -time_s.reverse();
+  const Column there = through(LowPass(tau_s), time_s, values).reverse();
+  const Column smooth = through(LowPass(tau_s), backwards_s, there).reverse();
+  const Eigen::Index last = values.size() - 1;
+  Column slope = Column::Zero(values.size());
+  for (Eigen::Index row = 0; row <= last && last > 0; ++row) {
+    const Eigen::Index low = std::max<Eigen::Index>(0, row - 1);
+    const Eigen::Index high = std::min(last, row + 1);
+    slope[row] = (smooth[high] - smooth[low]) / (time_s[high] - time_s[low]);
+  }
+  return slope;
+}
+
+double median_step_s(const MeasuredData& data) {
+  std::vector<double> steps;
+  for (const MeasuredRun& run : data.runs)
+    for (Eigen::Index row = run.begin + 1; row < run.rows(); ++row)
+      steps.push_back(run.time_s[row] - run.time_s[row - 1]);
+  if (steps.empty()) return 1.0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+bool moves(const Column& column) {
+  return column.size() > 1 && column.maxCoeff() > column.minCoeff();
+}
+
+/// Writes the catalogue for one set of data.
+class Catalogue {
+ public:
+  Catalogue(const MeasuredData& data, const StackedRows& rows) : data_(data), rows_(rows) {
+    step_s_ = median_step_s(data);
+    for (const MeasuredRun& run : data.runs)
+      length_s_ = std::max(length_s_, run.time_s[run.rows() - 1] - run.time_s[run.begin]);
+  }
+
+  std::vector<Hypothesis> all() {
+    for (std::size_t input = 0; input < data_.model.inputs.size(); ++input) add_input(input);
+    for (std::size_t other = 0; other < data_.others.size(); ++other) add_other(other);
+    for (std::size_t signal = 0; signal < data_.signals.size(); ++signal) add_signal(signal);
+    for (std::size_t output = 0; output < data_.model.outputs.size(); ++output) add_output(output);
+    for (std::size_t run = 0; run < data_.runs.size(); ++run) add_run_faults(run);
+    return std::move(found_);
+  }
+
+ private:
+  template <class Make>
+  Column stacked(Make make) const {
+    Column out(rows_.time_s.size());
+    for (std::size_t i = 0; i < data_.runs.size(); ++i) {
+      const Column whole = make(data_.runs[i]);
+      const Block& block = rows_.runs[i];
+      out.segment(block.begin, block.end - block.begin) =
+          whole.segment(data_.runs[i].begin, block.end - block.begin);
+    }
+    return out;
+  }
+
+  /// Zero outside of one run.
+  template <class Make>
+  Column in_run(std::size_t run, Make make) const {
+    Column out = Column::Zero(rows_.time_s.size());
+    const Block& block = rows_.runs[run];
+    out.segment(block.begin, block.end - block.begin) =
+        make(data_.runs[run]).segment(data_.runs[run].begin, block.end - block.begin);
+    return out;
+  }
+
+  [[nodiscard]] bool moves_anywhere(
+      const std::function<const Column&(const MeasuredRun&)>& of) const {
+    return std::any_of(data_.runs.begin(), data_.runs.end(), [&](const MeasuredRun& run) {
+      return moves(of(run).tail(run.rows() - run.begin));
+    });
+  }
+
+  [[nodiscard]] ShapeParameter lag_times(double low_s, double high_s, std::size_t count) const {
+    const double low = std::max(low_s, 0.5 * step_s_);
+    const double high = std::max(2.0 * low, std::min(high_s, 0.5 * length_s_));
+    return {"tau_s", logarithmic_grid(low, high, count), true, false};
+  }
+
+  Hypothesis& add(Hypothesis hypothesis) {
+    found_.push_back(std::move(hypothesis));
+    return found_.back();
+  }
+
+  Column coefficient_times(std::size_t input, std::size_t output,
+                           const std::function<Column(const MeasuredRun&)>& rise_K) const {
+    return stacked([&](const MeasuredRun& run) -> Column {
+      return data_.coefficient(run, output, input).cwiseProduct(rise_K(run));
+    });
+  }
+
+  void add_input(std::size_t input);
+  void add_reading_errors(std::size_t input);
+  void add_swaps(std::size_t input);
+  void add_positions(const std::string& name,
+                     const std::function<const Column&(const MeasuredRun&)>& rise_K);
+  void add_square(const std::string& name,
+                  const std::function<const Column&(const MeasuredRun&)>& rise_K);
+  void add_other(std::size_t other);
+  void add_signal(std::size_t signal);
+  void add_output(std::size_t output);
+  void add_period(std::size_t output);
+  void add_run_faults(std::size_t run);
+  void add_displacement_faults(std::size_t run, std::size_t output);
+  void add_sensor_faults(std::size_t run, std::size_t input);
+  [[nodiscard]] ShapeParameter onsets(std::size_t run, const char* name, double first, double last,
+                                      std::size_t count) const;
+
+  const MeasuredData& data_;
+  const StackedRows& rows_;
+  double step_s_{1.0};
+  double length_s_{0.0};
+  std::vector<Hypothesis> found_;
+};
+
+void Catalogue::add_input(std::size_t input) {
+  const std::string& name = data_.model.inputs[input];
+  const auto rise_K = [input](const MeasuredRun& run) -> const Column& {
+    return run.inputs_K[input];
+  };
+  if (!moves_anywhere(rise_K)) return;
+  const auto whole = [this, rise_K](const Shape&, std::size_t) -> Eigen::MatrixXd {
+    return stacked(rise_K);
+  };
+  add({"wrong_coefficient", name, Form::own_gains, {}, {"delta_um_per_K"}}).columns = whole;
+  Hypothesis& lag = add(
+      {"thermal_lag", name, Form::own_gains, {lag_times(60.0, 4 * 3600.0, 20)}, {"gain_um_per_K"}});
+  lag.columns = [this, rise_K](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+    return stacked([&](const MeasuredRun& run) -> Column {
+      return through(LowPass(shape[0]), run.time_s, rise_K(run)) - rise_K(run);
+    });
+  };
+  if (data_.model.guideways.empty()) {
+    lag.possible = [this, input](double gain, std::size_t output) {
+      const double share = gain / data_.model.matrix_um_per_K[output][input];
+      return share > 0.0 && share <= 1.1;
+    };
+  }
+  add_square(name, rise_K);
+  add_positions(name, rise_K);
+  add_reading_errors(input);
+  add_swaps(input);
+}
+
+void Catalogue::add_reading_errors(std::size_t input) {
+  const std::string& name = data_.model.inputs[input];
+  Hypothesis& slow = add({"slow_sensor", name, Form::no_gain, {lag_times(20.0, 3600.0, 16)}});
+  slow.in_every_output = true;
+  slow.columns = [this, input](const Shape& shape, std::size_t output) -> Eigen::MatrixXd {
+    return coefficient_times(input, output, [&](const MeasuredRun& run) -> Column {
+      return shape[0] * slope_per_s(run.time_s, run.inputs_K[input], 0.25 * shape[0]);
+    });
+  };
+  double range_K = 0.0;
+  for (const MeasuredRun& run : data_.runs) {
+    const Column& rise_K = run.inputs_K[input];
+    range_K = std::max(range_K, rise_K.maxCoeff() - rise_K.minCoeff());
+  }
+  Hypothesis& play = add({"hysteresis",
+                          name,
+                          Form::no_gain,
+                          {{"width_K", linear_grid(0.04 * range_K, 0.8 * range_K, 16)}}});
+  play.in_every_output = true;
+  play.columns = [this, input](const Shape& shape, std::size_t output) -> Eigen::MatrixXd {
+    return coefficient_times(input, output, [&](const MeasuredRun& run) -> Column {
+      const Column& rise_K = run.inputs_K[input];
+      return through(Play(shape[0]), run.time_s, rise_K) - rise_K;
+    });
+  };
+}
+
+void Catalogue::add_swaps(std::size_t input) {
+  for (std::size_t other = 0; other < data_.model.inputs.size(); ++other) {
+    const auto& names = data_.model.inputs;
+    if (!(names[input] < names[other])) continue;
+    Hypothesis& swap = add({"sensor_swap", names[input] + "|" + names[other], Form::no_gain});
+    swap.in_every_output = true;
+    swap.columns = [this, input, other](const Shape&, std::size_t output) -> Eigen::MatrixXd {
+      return stacked([&](const MeasuredRun& run) -> Column {
+        const Column weight =
+            data_.coefficient(run, output, input) - data_.coefficient(run, output, other);
+        return weight.cwiseProduct(run.inputs_K[other] - run.inputs_K[input]);
+      });
+    };
+  }
+}
+
+void Catalogue::add_square(const std::string& name,
+                           const std::function<const Column&(const MeasuredRun&)>& rise_K) {
+  add({"nonlinear_expansion", name, Form::own_gains, {}, {"gain_um_per_K2"}}).columns =
+      [this, rise_K](const Shape&, std::size_t) -> Eigen::MatrixXd {
+    return stacked([&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
+  };
+}
+
+void Catalogue::add_positions(const std::string& name,
+                              const std::function<const Column&(const MeasuredRun&)>& rise_K) {
+  for (std::size_t signal = 0; signal < data_.signals.size(); ++signal) {
+    const std::string& position = data_.signals[signal];
+    if (kind_of(position) != QuantityKind::position) continue;
+    if (!moves_anywhere(
+            [signal](const MeasuredRun& run) -> const Column& { return run.signals[signal]; }))
+      continue;
+    const std::string subject = std::min(name, position) + "|" + std::max(name, position);
+    add({"position_dependence", subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}})
+        .columns = [this, rise_K, signal](const Shape&, std::size_t) -> Eigen::MatrixXd {
+      Eigen::MatrixXd both(rows_.time_s.size(), 2);
+      both.col(0) = stacked([&](const MeasuredRun& run) -> Column {
+        return run.signals[signal].cwiseProduct(rise_K(run));
+      });
+      both.col(1) = stacked(rise_K);
+      return both;
+    };
+  }
+}
+
+void Catalogue::add_other(std::size_t other) {
+  const std::string& name = data_.others[other];
+  const auto rise_K = [other](const MeasuredRun& run) -> const Column& {
+    return run.others_K[other];
+  };
+  if (!moves_anywhere(rise_K)) return;
+  ShapeParameter lag = lag_times(60.0, 6 * 3600.0, 20);
+  lag.grid.insert(lag.grid.begin(), 0.0);
+  add({"missing_temperature", name, Form::own_gains, {lag}, {"gain_um_per_K"}}).columns =
+      [this, rise_K](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+    return stacked([&](const MeasuredRun& run) -> Column {
+      return through(LowPass(shape[0]), run.time_s, rise_K(run));
+    });
+  };
+  add_square(name, rise_K);
+  add_positions(name, rise_K);
+}
+
+void Catalogue::add_signal(std::size_t signal) {
+  const std::string& name = data_.signals[signal];
+  const auto values = [signal](const MeasuredRun& run) -> const Column& {
+    return run.signals[signal];
+  };
+  if (kind_of(name) != QuantityKind::signal || !moves_anywhere(values)) return;
+  const ShapeParameter power{"power", {1.0, 2.0}, false, true};
+  Hypothesis& heat = add({"missing_heat_source",
+                          name,
+                          Form::own_gains,
+                          {lag_times(120.0, 6 * 3600.0, 22), power},
+                          {"gain_um_per_unit"}});
+  heat.columns = [this, values](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+    return stacked([&](const MeasuredRun& run) -> Column {
+      const Column& u = values(run);
+      return through(LowPass(shape[0]), run.time_s,
+                     shape[1] > 1.5 ? Column(u.array().square()) : u);
+    });
+  };
+  const auto unit = unit_of(name).suffix;
+  if (unit != "_rpm" && unit != "_mm_per_min" && !unit.empty()) return;
+  add({"speed_growth", name, Form::own_gains, {}, {"gain_um_per_unit2"}}).columns =
+      [this, values](const Shape&, std::size_t) -> Eigen::MatrixXd {
+    return stacked([&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
+  };
+}
+
+void Catalogue::add_output(std::size_t output) {
+  const std::string& name = data_.model.outputs[output];
+  const auto model_um = [output](const MeasuredRun& run) -> const Column& {
+    return run.model_um[output];
+  };
+  double range_um = 0.0;
+  for (const MeasuredRun& run : data_.runs)
+    range_um = std::max(range_um, model_um(run).maxCoeff() - model_um(run).minCoeff());
+  if (range_um > 0) {
+    Hypothesis& play = add({"hysteresis",
+                            name,
+                            Form::no_gain,
+                            {{"width_um", linear_grid(0.03 * range_um, 0.7 * range_um, 20)}}});
+    play.output = output;
+    play.columns = [this, model_um](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+      return stacked([&](const MeasuredRun& run) -> Column {
+        return through(Play(shape[0]), run.time_s, model_um(run)) - model_um(run);
+      });
+    };
+    std::vector<double> shifts = logarithmic_grid(std::max(5.0, 0.2 * step_s_), 3600.0, 14);
+    for (std::size_t i = 0, count = shifts.size(); i < count; ++i)
+      shifts.insert(shifts.begin(), -shifts[2 * i]);
+    Hypothesis& shift = add({"time_shift", name, Form::no_gain, {{"shift_s", shifts}}});
+    shift.output = output;
+    shift.columns = [this, model_um](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+      return stacked([&](const MeasuredRun& run) -> Column {
+        return shifted(run.time_s, model_um(run), shape[0]) - model_um(run);
+      });
+    };
+  }
+  add_period(output);
+}
+
+void Catalogue::add_period(std::size_t output) {
+  // At least five whole periods in the longest run; the grid is fine enough that a neighbour of the
+  // true period is at most a fifth of a turn off at the run's end.
+  const double longest_s = length_s_ / 5.0;
+  const double shortest_s = 5.0 * step_s_;
+  if (!(longest_s > 2.0 * shortest_s)) return;
+  std::vector<double> periods;
+  for (double frequency = 1.0 / longest_s; frequency <= 1.0 / shortest_s && periods.size() < 400;
+       frequency += std::max(0.4 / length_s_, 0.004 * frequency))
+    periods.push_back(1.0 / frequency);
+  std::vector<std::string> gains;
+  for (std::size_t run = 0; run < data_.runs.size(); ++run)
+    gains.insert(gains.end(), {"sine_um", "cosine_um"});
+  Hypothesis& period = add({"periodic_disturbance",
+                            data_.model.outputs[output],
+                            Form::own_gains,
+                            {{"period_s", periods, true, false}},
+                            gains});
+  period.output = output;
+  period.columns = [this](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+    constexpr double turn = 6.283185307179586;
+    Eigen::MatrixXd waves = Eigen::MatrixXd::Zero(rows_.time_s.size(),
+                                                  2 * static_cast<Eigen::Index>(data_.runs.size()));
+    for (std::size_t run = 0; run < data_.runs.size(); ++run) {
+      const auto column = 2 * static_cast<Eigen::Index>(run);
+      const auto phase = [&](const MeasuredRun& of) -> Column {
+        return turn / shape[0] * of.time_s;
+      };
+      waves.col(column) =
+          in_run(run, [&](const MeasuredRun& of) -> Column { return phase(of).array().sin(); });
+      waves.col(column + 1) =
+          in_run(run, [&](const MeasuredRun& of) -> Column { return phase(of).array().cos(); });
+    }
+    return waves;
+  };
+}
+
+ShapeParameter Catalogue::onsets(std::size_t run, const char* name, double first, double last,
+                                 std::size_t count) const {
+  const MeasuredRun& of = data_.runs[run];
+  const double begin_s = of.time_s[of.begin];
+  const double span_s = of.time_s[of.rows() - 1] - begin_s;
+  return {name, linear_grid(begin_s + first * span_s, begin_s + last * span_s, count)};
+}
+
+void Catalogue::add_run_faults(std::size_t run) {
+  const Block& rows = rows_.runs[run];
+  if (static_cast<double>(rows.end - rows.begin) < 2 * block_rows_min) return;
+  for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
+    add_displacement_faults(run, output);
+  for (std::size_t input = 0; input < data_.model.inputs.size(); ++input)
+    add_sensor_faults(run, input);
+}
+
+void Catalogue::add_displacement_faults(std::size_t run, std::size_t output) {
+  const std::string& name = data_.model.outputs[output];
+  Hypothesis& step = add({"displacement_step",
+                          name,
+                          Form::own_gains,
+                          {onsets(run, "at_s", 0.02, 0.98, 64)},
+                          {"step_um"},
+                          output,
+                          run});
+  step.columns = [this, run](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+    return in_run(run, [&](const MeasuredRun& of) -> Column {
+      return (of.time_s.array() >= shape[0]).cast<double>();
+    });
+  };
+  Hypothesis& drift =
+      add({"displacement_drift", name, Form::own_gains, {}, {"rate_um_per_h"}, output, run});
+  drift.columns = [this, run](const Shape&, std::size_t) -> Eigen::MatrixXd {
+    return in_run(run, [&](const MeasuredRun& of) -> Column {
+      return (of.time_s.array() - of.time_s[of.begin]) / 3600.0;
+    });
+  };
+}
+
+void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
+  const std::string& name = data_.model.inputs[input];
+  const auto fault = [&](const char* cause, const char* onset, const char* gain, double first,
+                         std::size_t count) -> Hypothesis& {
+    Hypothesis& added =
+        add({cause, name, Form::shared_gain, {onsets(run, onset, first, 0.95, count)}, {gain}});
+    added.run = run;
+    added.sensor = input;
+    added.in_every_output = true;
+    return added;
+  };
+  // What a false reading adds to model and reading alike is missing in the measured displacement.
+  const auto column = [this, run, input](std::size_t output, const auto& reading_K) {
+    return Eigen::MatrixXd(in_run(run, [&](const MeasuredRun& of) -> Column {
+      return -data_.coefficient(of, output, input).cwiseProduct(reading_K(of));
+    }));
+  };
+  fault("sensor_step", "at_s", "step_K", 0.02, 64).columns = [column](const Shape& shape,
+                                                                      std::size_t output) {
+    return column(output, [&](const MeasuredRun& of) -> Column {
+      return (of.time_s.array() >= shape[0]).cast<double>();
+    });
+  };
+  fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24).columns = [column](const Shape& shape,
+                                                                               std::size_t output) {
+    return column(output, [&](const MeasuredRun& of) -> Column {
+      return ((of.time_s.array() - shape[0]) / 3600.0).max(0.0);
+    });
+  };
+  // reading = room + gain (T - room): the reading misses (1 / gain - 1) (reading - room).
+  const auto named_room = [](const std::string& column_name) {
+    return column_name.find("room") != std::string::npos ||
+           column_name.find("ambient") != std::string::npos ||
+           column_name.find("air") != std::string::npos;
+  };
+  const auto& others = data_.others;
+  const auto& inputs = data_.model.inputs;
+  const auto other = std::find_if(others.begin(), others.end(), named_room) - others.begin();
+  const auto room = std::find_if(inputs.begin(), inputs.end(), named_room) - inputs.begin();
+  if (static_cast<std::size_t>(room) == input) return;
+  Hypothesis& loose = fault("sensor_loose", "at_s", "gain", 0.03, 48);
+  loose.columns = [column, input, other, room, n_others = others.size(), n_inputs = inputs.size()](
+                      const Shape& shape, std::size_t output) {
+    return column(output, [&](const MeasuredRun& of) -> Column {
+      Column room_degC = Column::Constant(of.rows(), of.inputs_degC[input][0]);
+      if (static_cast<std::size_t>(other) < n_others)
+        room_degC = of.others_degC[static_cast<std::size_t>(other)];
+      else if (static_cast<std::size_t>(room) < n_inputs)
+        room_degC = of.inputs_degC[static_cast<std::size_t>(room)];
+      const Column loss = (of.time_s.array() >= shape[0]).cast<double>();
+      return -loss.cwiseProduct(of.inputs_degC[input] - room_degC);
+    });
+  };
+  loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
+}
+
+}  // namespace
+
+StackedRows stacked_rows(const MeasuredData& data) {
+  StackedRows rows;
+  Eigen::Index total = 0;
+  for (const MeasuredRun& run : data.runs) total += run.rows() - run.begin;
+  rows.time_s.resize(total);
+  Eigen::Index at = 0;
+  const double block_rows =
+      std::max(block_rows_min, static_cast<double>(total) / static_cast<double>(blocks_wanted));
+  for (const MeasuredRun& run : data.runs) {
+    const Eigen::Index count = run.rows() - run.begin;
+    rows.time_s.segment(at, count) = run.time_s.tail(count);
+    rows.runs.push_back({at, at + count});
+    const auto parts = std::max<Eigen::Index>(
+        1, static_cast<Eigen::Index>(std::lround(static_cast<double>(count) / block_rows)));
+    for (Eigen::Index part = 0; part < parts; ++part)
+      rows.blocks.push_back({at + count * part / parts, at + count * (part + 1) / parts});
+    at += count;
+  }
+  return rows;
+}
+
+std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& rows) {
+  // The hypotheses keep the writer, which knows the rows, alive.
+  const auto catalogue = std::make_shared<Catalogue>(data, rows);
+  std::vector<Hypothesis> all = catalogue->all();
+  for (Hypothesis& hypothesis : all)
+    hypothesis.columns = [catalogue, columns = std::move(hypothesis.columns)](
+                             const std::vector<double>& shape, std::size_t output) {
+      return columns(shape, output);
+    };
+  return all;
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,58 @@
+/// Hypotheses of what is wrong: a cause with a subject, and the displacement that it would explain.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "modelling/diagnosis/coloured_noise.hpp"
+#include "modelling/diagnosis/measured_runs.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// How the columns of a hypothesis enter the displacement.
+enum class Form {
+  own_gains,    ///< each output has gains of its own
+  shared_gain,  ///< one gain for all outputs; the column of an output carries its coefficient
+  no_gain,      ///< nothing is free but the shape
+};
+
+/// One shape parameter of a hypothesis, searched over a grid.
+struct ShapeParameter {
+  std::string name;
+  std::vector<double> grid;
+  bool logarithmic{false};  ///< refined between grid points on a logarithmic scale
+  bool discrete{false};     ///< not refined
+};
+
+/// A place of the rows of all selected runs, one below the other.
+struct StackedRows {
+  std::vector<Block> runs;    ///< rows of each run
+  std::vector<Block> blocks;  ///< rows of each block that can be left out, run by run
+  Column time_s;
+};
+[[nodiscard]] StackedRows stacked_rows(const MeasuredData& data);
+
+struct Hypothesis {
+  std::string cause{};
+  std::string subject{};
+  Form form{Form::own_gains};
+  std::vector<ShapeParameter> shape{};
+  std::vector<std::string> gains{};     ///< names of the gains, one a column
+  std::optional<std::size_t> output{};  ///< acts on this output alone
+  std::optional<std::size_t> run{};     ///< a fault of this run alone
+  std::optional<std::size_t> sensor{};  ///< a fault of the reading of this input
+  bool in_every_output{false};          ///< an output without its share speaks against it
+  /// Columns for an output over the stacked rows, shape (rows, gains or 1).
+  std::function<Eigen::MatrixXd(const std::vector<double>& shape, std::size_t output)> columns{};
+  /// Whether a gain is physically possible; empty: all are.
+  std::function<bool(double gain, std::size_t output)> possible{};
+};
+
+/// Every cause of the catalogue with every subject that it can have in these data.
+[[nodiscard]] std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& rows);
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,219 @@
+#include "modelling/diagnosis/left_out.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+namespace thermocomp::diagnosis {
+namespace {
+
+/// Whitened cross products of one output, block by block: common columns, hypothesis, residual.
+struct BlockProducts {
+  std::vector<Eigen::MatrixXd> blocks;
+  Eigen::MatrixXd total;
+  Eigen::Index common{0};
+  Eigen::Index free{0};
+};
+
+BlockProducts products(const Setting& setting, const Eigen::MatrixXd& columns,
+                       const StackedRows& rows) {
+  BlockProducts result;
+  result.common = setting.common().cols();
+  result.free = columns.cols();
+  Eigen::MatrixXd all(columns.rows(), result.common + result.free + 1);
+  all.leftCols(result.common) = setting.common();
+  for (Eigen::Index i = 0; i < result.free; ++i)
+    all.col(result.common + i) = setting.whitener().apply(columns.col(i));
+  all.rightCols(1) = setting.residual();
+  result.total = Eigen::MatrixXd::Zero(all.cols(), all.cols());
+  for (Eigen::Index i = 0; i < result.common; ++i) result.total(i, i) = setting.precision()[i];
+  for (const Block& block : rows.blocks) {
+    const auto part = all.middleRows(block.begin, block.end - block.begin);
+    result.blocks.emplace_back(part.transpose() * part);
+    result.total += result.blocks.back();
+  }
+  return result;
+}
+
+/// Normal equations of the hypothesis without one block, the common columns taken out.
+struct Reduced {
+  Eigen::MatrixXd square;
+  Eigen::VectorXd right;
+  double squares{0.0};
+};
+
+Reduced without_block(const BlockProducts& products, std::size_t block) {
+  const Eigen::MatrixXd rest = products.total - products.blocks[block];
+  const Eigen::Index n = products.common;
+  const Eigen::Index m = products.free + 1;
+  const Eigen::MatrixXd carried = rest.topLeftCorner(n, n).ldlt().solve(rest.topRightCorner(n, m));
+  const Eigen::MatrixXd reduced =
+      rest.bottomRightCorner(m, m) - rest.bottomLeftCorner(m, n) * carried;
+  return {reduced.topLeftCorner(products.free, products.free),
+          reduced.topRightCorner(products.free, 1), reduced(m - 1, m - 1)};
+}
+
+/// Finer grids than this are only searched anew around the peak.
+constexpr std::size_t whole_grid_max = 40;
+constexpr std::ptrdiff_t near_points = 3;
+
+bool near(const ShapeParameter& parameter, double value, double peak) {
+  const auto closer = [peak](double a, double b) {
+    return std::abs(a - peak) < std::abs(b - peak);
+  };
+  const auto& grid = parameter.grid;
+  const auto nearest = std::min_element(grid.begin(), grid.end(), closer) - grid.begin();
+  const auto at = std::find(grid.begin(), grid.end(), value) - grid.begin();
+  return std::abs(at - nearest) <= near_points;
+}
+
+std::vector<std::vector<double>> shapes_of(const Explanation& explanation) {
+  std::vector<std::vector<double>> shapes = {{}};
+  for (std::size_t i = 0; i < explanation.hypothesis->shape.size(); ++i) {
+    const ShapeParameter& parameter = explanation.hypothesis->shape[i];
+    std::vector<std::vector<double>> longer;
+    for (const auto& shape : shapes)
+      for (const double value : parameter.grid) {
+        if (parameter.grid.size() > whole_grid_max && !near(parameter, value, explanation.shape[i]))
+          continue;
+        longer.push_back(shape);
+        longer.back().push_back(value);
+      }
+    shapes = std::move(longer);
+  }
+  if (!explanation.shape.empty()) shapes.push_back(explanation.shape);
+  return shapes;
+}
+
+/// What is left of `before` and `after` in a block when each run's mean outside of it is taken off.
+struct Squares {
+  double before{0.0};
+  double after{0.0};
+};
+
+Squares squares_in_block(const OutputEvidence& evidence, const Column& explained,
+                         const StackedRows& rows, const Block& block) {
+  Squares sum;
+  for (const Block& run : rows.runs) {
+    if (block.begin < run.begin || block.begin >= run.end) continue;
+    const bool alone = block.begin == run.begin && block.end == run.end;
+    double before_um = 0.0;
+    double after_um = 0.0;
+    double count = 0.0;
+    for (Eigen::Index row = run.begin; row < run.end; ++row) {
+      const bool inside = row >= block.begin && row < block.end;
+      if (!evidence.present()[row] || (inside && !alone)) continue;
+      before_um += evidence.residual()[row];
+      after_um += evidence.residual()[row] - explained[row];
+      count += 1.0;
+    }
+    if (!(count > 0)) continue;
+    for (Eigen::Index row = block.begin; row < block.end; ++row) {
+      if (!evidence.present()[row]) continue;
+      const double before = evidence.residual()[row] - before_um / count;
+      const double after = evidence.residual()[row] - explained[row] - after_um / count;
+      sum.before += before * before;
+      sum.after += after * after;
+    }
+  }
+  return sum;
+}
+
+/// Gains of the hypothesis from the rows without a block, and what 2 ln L loses by the misfit.
+struct BlockFit {
+  double misfit{std::numeric_limits<double>::infinity()};
+  std::vector<Eigen::VectorXd> gains;
+};
+
+BlockFit fit_without(const Explanation& explanation, const std::vector<std::size_t>& acting,
+                     const std::vector<BlockProducts>& products, std::size_t block) {
+  std::vector<Reduced> reduced;
+  for (const BlockProducts& each : products) reduced.push_back(without_block(each, block));
+  BlockFit fit{0.0, {}};
+  double square = 0.0;
+  double right = 0.0;
+  for (std::size_t i = 0; i < acting.size(); ++i) {
+    const double variance = explanation.settings[acting[i]]->squares();
+    square += reduced[i].square(0, 0) / variance;
+    right += reduced[i].right[0] / variance;
+  }
+  for (std::size_t i = 0; i < acting.size(); ++i) {
+    Eigen::VectorXd gains = Eigen::VectorXd::Ones(1);
+    if (explanation.hypothesis->form == Form::own_gains)
+      gains = reduced[i].square.ldlt().solve(reduced[i].right);
+    else if (explanation.hypothesis->form == Form::shared_gain)
+      gains *= square > 0 ? right / square : 0.0;
+    const double squares = reduced[i].squares - 2.0 * gains.dot(reduced[i].right) +
+                           gains.dot(reduced[i].square * gains);
+    fit.misfit +=
+        explanation.settings[acting[i]]->present_rows() * std::log(std::max(squares, 1e-12));
+    fit.gains.push_back(gains);
+  }
+  return fit;
+}
+
+std::vector<std::size_t> acting_outputs(const Explanation& explanation) {
+  std::vector<std::size_t> acting;
+  for (std::size_t i = 0; i < explanation.gains.size(); ++i)
+    if (explanation.gains[i].size() > 0) acting.push_back(i);
+  return acting;
+}
+
+double gain_of(const Squares& squares) {
+  return squares.before > 0 ? 1.0 - std::sqrt(squares.after / squares.before) : 0.0;
+}
+
+}  // namespace
+
+double gain_on_left_out_blocks(const Explanation& explanation, const StackedRows& rows,
+                               const std::vector<OutputEvidence>& outputs) {
+  const std::vector<std::size_t> acting = acting_outputs(explanation);
+  const std::size_t blocks = rows.blocks.size();
+  if (blocks < 2) return 0.0;
+  std::vector<BlockFit> best(blocks);
+  std::vector<std::vector<double>> best_shape(blocks);
+  for (const std::vector<double>& shape : shapes_of(explanation)) {
+    std::vector<BlockProducts> all;
+    for (const std::size_t output : acting)
+      all.push_back(products(*explanation.settings[output],
+                             columns_of(*explanation.hypothesis, shape, outputs[output]), rows));
+    for (std::size_t block = 0; block < blocks; ++block) {
+      BlockFit fit = fit_without(explanation, acting, all, block);
+      if (!(fit.misfit < best[block].misfit)) continue;
+      best[block] = std::move(fit);
+      best_shape[block] = shape;
+    }
+  }
+  Squares sum;
+  for (std::size_t block = 0; block < blocks; ++block) {
+    for (std::size_t i = 0; i < best[block].gains.size(); ++i) {
+      const OutputEvidence& evidence = outputs[acting[i]];
+      const Column explained =
+          columns_of(*explanation.hypothesis, best_shape[block], evidence) * best[block].gains[i];
+      const Squares part = squares_in_block(evidence, explained, rows, rows.blocks[block]);
+      sum.before += part.before;
+      sum.after += part.after;
+    }
+  }
+  return gain_of(sum);
+}
+
+double gain_on_fitted_rows(const Explanation& explanation, const StackedRows& rows,
+                           const std::vector<OutputEvidence>& outputs) {
+  Squares sum;
+  for (const std::size_t output : acting_outputs(explanation)) {
+    const Column explained =
+        columns_of(*explanation.hypothesis, explanation.shape, outputs[output]) *
+        explanation.gains[output];
+    for (const Block& run : rows.runs) {
+      const Squares part = squares_in_block(outputs[output], explained, rows, run);
+      sum.before += part.before;
+      sum.after += part.after;
+    }
+  }
+  return gain_of(sum);
+}
+
+}  // namespace thermocomp::diagnosis

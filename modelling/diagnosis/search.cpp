@@ -1,0 +1,455 @@
+#include "modelling/diagnosis/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "modelling/diagnosis/left_out.hpp"
+#include "modelling/diagnosis/sensor_witness.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr std::size_t shortlist_of_each = 20;
+/// An output counts as acted on when its 2 ln L gains this much beyond the price of its gains.
+constexpr double output_gain_min = 6.0;
+/// Structure is called unexplained when its RMS is above this share of the measured motion's ...
+constexpr double structure_share_min = 0.05;
+/// ... and this many times the noise.
+constexpr double structure_noises_min = 2.0;
+constexpr int refit_rounds = 2;
+/// Explanations are as good as each other when what they leave differs by less than this share.
+constexpr double tie_share = 0.1;
+constexpr std::size_t weighed_shown = 6;
+
+std::vector<std::vector<double>> grid_of(const Hypothesis& hypothesis) {
+  std::vector<std::vector<double>> points = {{}};
+  for (const ShapeParameter& parameter : hypothesis.shape) {
+    std::vector<std::vector<double>> longer;
+    for (const auto& point : points)
+      for (const double value : parameter.grid) {
+        longer.push_back(point);
+        longer.back().push_back(value);
+      }
+    points = std::move(longer);
+  }
+  return points;
+}
+
+double root_mean_square(const Column& values,
+                        const Eigen::Array<bool, Eigen::Dynamic, 1>& present) {
+  const double count = static_cast<double>(present.count());
+  return count > 0 ? std::sqrt(values.squaredNorm() / count) : 0.0;
+}
+
+/// The residual without each run's mean.
+Column centred(const Column& values, const OutputEvidence& evidence, const StackedRows& rows) {
+  Column out = values;
+  for (const Block& run : rows.runs) {
+    const Eigen::Index count = run.end - run.begin;
+    const auto present = evidence.present().segment(run.begin, count);
+    const double n = static_cast<double>(present.count());
+    if (!(n > 0)) continue;
+    const double mean = present.select(values.segment(run.begin, count).array(), 0.0).sum() / n;
+    out.segment(run.begin, count) =
+        present.select(values.segment(run.begin, count).array() - mean, 0.0);
+  }
+  return out;
+}
+
+}  // namespace
+
+Search::Search(const MeasuredData& data, const Thresholds& thresholds)
+    : data_(data),
+      thresholds_(thresholds),
+      rows_(stacked_rows(data)),
+      hypotheses_(hypotheses(data, rows_)) {
+  for (std::size_t output = 0; output < data.model.outputs.size(); ++output) {
+    outputs_.emplace_back(data, rows_, output);
+    if (outputs_.back().measured()) measured_.push_back(output);
+  }
+}
+
+bool Search::concerns(const Hypothesis& hypothesis, std::size_t output) const {
+  return outputs_[output].measured() && (!hypothesis.output || *hypothesis.output == output);
+}
+
+double Search::price(const Hypothesis& hypothesis) const {
+  const double rows = static_cast<double>(rows_.time_s.size());
+  double sum = 0.0;
+  for (const ShapeParameter& parameter : hypothesis.shape)
+    if (!parameter.discrete) sum += std::log(rows);
+  if (hypothesis.form == Form::shared_gain) sum += std::log(rows);
+  return sum;
+}
+
+Search::Trial Search::weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
+                            const Settings& settings) const {
+  Trial trial;
+  trial.gains.resize(outputs_.size());
+  std::vector<Setting::Equations> equations(outputs_.size());
+  double square = 0.0;
+  double right = 0.0;
+  for (const std::size_t output : measured_) {
+    if (!concerns(hypothesis, output)) continue;
+    equations[output] =
+        settings[output]->equations(columns_of(hypothesis, shape, outputs_[output]));
+    const double variance = settings[output]->squares();
+    square += equations[output].square(0, 0) / variance;
+    right += equations[output].right[0] / variance;
+  }
+  const double shared = square > 0 ? right / square : 0.0;
+  if (hypothesis.form == Form::shared_gain && hypothesis.possible &&
+      !hypothesis.possible(shared, 0))
+    return trial;
+  for (const std::size_t output : measured_) {
+    const Setting::Equations& of = equations[output];
+    if (of.right.size() == 0) continue;
+    Eigen::VectorXd gains = Eigen::VectorXd::Ones(1);
+    double gain_price = 0.0;
+    if (hypothesis.form == Form::own_gains) {
+      gains = of.square.ldlt().solve(of.right);
+      if (!gains.allFinite()) continue;
+      if (hypothesis.possible && !hypothesis.possible(gains[0], output)) continue;
+      gain_price = static_cast<double>(gains.size()) * std::log(settings[output]->present_rows());
+    } else if (hypothesis.form == Form::shared_gain) {
+      gains *= shared;
+    }
+    const double squares =
+        settings[output]->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
+    const double gain = settings[output]->twice_log_likelihood(squares) -
+                        settings[output]->twice_log_likelihood(settings[output]->squares()) -
+                        gain_price;
+    if (hypothesis.form == Form::own_gains && gain < output_gain_min) continue;
+    trial.score += gain;
+    trial.gains[output] = gains;
+  }
+  return trial;
+}
+
+bool Search::acts(const Explanation& explanation) {
+  return std::any_of(explanation.gains.begin(), explanation.gains.end(),
+                     [](const Eigen::VectorXd& gains) { return gains.size() > 0; });
+}
+
+Explanation Search::profile(const Hypothesis& hypothesis, const Settings& settings) const {
+  const std::vector<std::vector<double>> grid = grid_of(hypothesis);
+  Explanation best{&hypothesis, grid.front(), std::vector<Eigen::VectorXd>(outputs_.size()),
+                   0.0,         settings,     0.0};
+  for (const std::vector<double>& shape : grid) {
+    Trial trial = weigh(hypothesis, shape, settings);
+    if (!(trial.score > best.score)) continue;
+    best.score = trial.score;
+    best.shape = shape;
+    best.gains = std::move(trial.gains);
+  }
+  best.score -= price(hypothesis);
+  return best;
+}
+
+Search::Settings Search::likeliest_settings(const Explanation& explanation) const {
+  Settings settings = explanation.settings;
+  for (const std::size_t output : measured_) {
+    if (!concerns(*explanation.hypothesis, output)) continue;
+    const Eigen::MatrixXd columns =
+        columns_of(*explanation.hypothesis, explanation.shape, outputs_[output]);
+    const Eigen::VectorXd& fixed = explanation.gains[output];
+    double best = -std::numeric_limits<double>::infinity();
+    for (const auto& setting : outputs_[output].settings()) {
+      const Setting::Equations of = setting->equations(columns);
+      Eigen::VectorXd gains = fixed;
+      if (explanation.hypothesis->form == Form::own_gains) gains = of.square.ldlt().solve(of.right);
+      if (gains.size() == 0) continue;
+      const double squares =
+          setting->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
+      const double likelihood = setting->twice_log_likelihood(squares);
+      if (!(likelihood > best)) continue;
+      best = likelihood;
+      settings[output] = setting.get();
+    }
+  }
+  return settings;
+}
+
+void Search::refine(Explanation& explanation) const {
+  const Hypothesis& hypothesis = *explanation.hypothesis;
+  for (std::size_t i = 0; i < hypothesis.shape.size(); ++i) {
+    const ShapeParameter& parameter = hypothesis.shape[i];
+    if (parameter.discrete || parameter.grid.size() < 2) continue;
+    const auto value_of = [&](double x) { return parameter.logarithmic ? std::exp(x) : x; };
+    const auto x_of = [&](double value) { return parameter.logarithmic ? std::log(value) : value; };
+    const auto above = std::upper_bound(parameter.grid.begin(), parameter.grid.end(),
+                                        explanation.shape[i] * (1.0 + 1e-12));
+    const auto below =
+        std::lower_bound(parameter.grid.begin(), parameter.grid.end(), explanation.shape[i]);
+    double low = below == parameter.grid.begin() ? parameter.grid.front() : *(below - 1);
+    double high = above == parameter.grid.end() ? parameter.grid.back() : *above;
+    if (parameter.logarithmic && !(low > 0)) continue;  // no lag at all is a point of its own
+    low = x_of(low);
+    high = x_of(high);
+    Trial best = weigh(hypothesis, explanation.shape, explanation.settings);
+    double best_x = x_of(explanation.shape[i]);
+    constexpr int points = 6;
+    for (int round = 0; round < 4; ++round) {
+      const double step = (high - low) / (points + 1);
+      for (int k = 1; k <= points; ++k) {
+        std::vector<double> shape = explanation.shape;
+        shape[i] = value_of(low + step * k);
+        Trial trial = weigh(hypothesis, shape, explanation.settings);
+        if (!(trial.score > best.score)) continue;
+        best = std::move(trial);
+        best_x = low + step * k;
+      }
+      low = std::max(low, best_x - step);
+      high = std::min(high, best_x + step);
+    }
+    explanation.shape[i] = value_of(best_x);
+    explanation.gains = std::move(best.gains);
+  }
+}
+
+void Search::settle(Explanation& explanation) const {
+  const Hypothesis& hypothesis = *explanation.hypothesis;
+  // Near the peak first: under wandering noise a jump that is a few rows off explains nothing.
+  refine(explanation);
+  for (int round = 0; round < 2; ++round) {
+    explanation.settings = likeliest_settings(explanation);
+    explanation.gains = weigh(hypothesis, explanation.shape, explanation.settings).gains;
+    if (!acts(explanation)) return;
+    refine(explanation);
+  }
+  Trial trial = weigh(hypothesis, explanation.shape, explanation.settings);
+  explanation.gains = std::move(trial.gains);
+  explanation.score = trial.score - price(hypothesis);
+  // The other noise has a price too: what counts is against the likeliest without the hypothesis.
+  for (const std::size_t output : measured_) {
+    if (explanation.gains[output].size() == 0) continue;
+    const Setting& without = outputs_[output].setting();
+    const Setting& with = *explanation.settings[output];
+    explanation.score +=
+        with.twice_log_likelihood(with.squares()) - without.twice_log_likelihood(without.squares());
+  }
+}
+
+std::vector<Explanation> Search::ranked() {
+  Settings likeliest(outputs_.size(), nullptr);
+  Settings plain(outputs_.size(), nullptr);
+  for (const std::size_t output : measured_) {
+    likeliest[output] = &outputs_[output].setting();
+    plain[output] = outputs_[output].settings().front().get();
+  }
+  std::vector<Explanation> candidates;
+  for (const Settings& settings : {likeliest, plain}) {
+    std::vector<Explanation> all;
+    for (const Hypothesis& hypothesis : hypotheses_) {
+      Explanation best = profile(hypothesis, settings);
+      if (best.score > 0) all.push_back(std::move(best));
+    }
+    const auto better = [](const auto& a, const auto& b) { return a.score > b.score; };
+    std::sort(all.begin(), all.end(), better);
+    all.resize(std::min(all.size(), shortlist_of_each));
+    candidates.insert(candidates.end(), all.begin(), all.end());
+  }
+  for (Explanation& candidate : candidates) {
+    settle(candidate);
+    if (candidate.hypothesis->sensor) candidate.score += sensor_says(data_, rows_, candidate);
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const auto& a, const auto& b) { return a.score > b.score; });
+  std::vector<Explanation> once;
+  for (Explanation& candidate : candidates) {
+    const bool known = std::any_of(once.begin(), once.end(), [&](const Explanation& each) {
+      return each.hypothesis == candidate.hypothesis;
+    });
+    if (!known) once.push_back(std::move(candidate));
+  }
+  std::erase_if(once, [](const Explanation& each) { return !acts(each); });
+  choose(once);
+  return once;
+}
+
+/// By what each takes from rows it was not fitted to; among those that leave nearly the same, by
+/// likelihood.
+void Search::choose(std::vector<Explanation>& candidates) const {
+  for (Explanation& each : candidates) each.left_out_gain = left_out_gain(each);
+  const auto gains_more = [](const auto& a, const auto& b) {
+    return a.left_out_gain > b.left_out_gain;
+  };
+  std::sort(candidates.begin(), candidates.end(), gains_more);
+  if (candidates.empty()) return;
+  const double left = 1.0 - candidates.front().left_out_gain;
+  const auto tie = std::find_if(candidates.begin(), candidates.end(), [&](const auto& each) {
+    return 1.0 - each.left_out_gain > (1.0 + tie_share) * left;
+  });
+  std::sort(candidates.begin(), tie,
+            [](const auto& a, const auto& b) { return a.score > b.score; });
+}
+
+double Search::left_out_gain(const Explanation& explanation) const {
+  return explanation.hypothesis->run ? gain_on_fitted_rows(explanation, rows_, outputs_)
+                                     : gain_on_left_out_blocks(explanation, rows_, outputs_);
+}
+
+void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
+  std::vector<Explanation> found;
+  for (std::size_t i = 0; i < findings.size(); ++i)
+    if (i != but) found.push_back(findings[i].explanation);
+  for (OutputEvidence& output : outputs_) output.accept(found);
+}
+
+void Search::refit(std::vector<Finding>& findings) {
+  for (int round = 0; findings.size() > 1 && round < refit_rounds; ++round) {
+    for (std::size_t i = 0; i < findings.size(); ++i) {
+      accept(findings, i);
+      Explanation& each = findings[i].explanation;
+      for (const std::size_t output : measured_)
+        each.settings[output] = &outputs_[output].setting();
+      const double left_out = each.left_out_gain;
+      each = profile(*each.hypothesis, each.settings);
+      settle(each);
+      each.left_out_gain = left_out;
+      if (!acts(each)) findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i--));
+    }
+  }
+}
+
+/// From the curvature of 2 ln L at its peak: it falls by 1 a standard deviation away.
+double Search::shape_sd(const Explanation& explanation, std::size_t parameter) const {
+  const ShapeParameter& of = explanation.hypothesis->shape[parameter];
+  if (of.discrete || !(explanation.score > 0)) return 0.0;
+  const double value = explanation.shape[parameter];
+  if (of.logarithmic && !(value > 0)) return 0.0;
+  const double range = of.logarithmic ? 1.0 : of.grid.back() - of.grid.front();
+  const auto at = [&](double move) {
+    std::vector<double> shape = explanation.shape;
+    shape[parameter] = of.logarithmic ? value * std::exp(move) : value + move;
+    return weigh(*explanation.hypothesis, shape, explanation.settings).score;
+  };
+  const double peak = at(0.0);
+  // The curvature is taken where it can be seen above rounding: a fall of a few units.
+  for (double step = 1e-3 * range; step < range; step *= 2.0) {
+    const double fall = peak - 0.5 * (at(step) + at(-step));
+    if (fall > 4.0) return step / std::sqrt(fall);
+  }
+  return range;
+}
+
+void Search::measure_spread(std::vector<Finding>& findings) {
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    accept(findings, i);
+    Finding& finding = findings[i];
+    Explanation& each = finding.explanation;
+    for (const std::size_t output : measured_) each.settings[output] = &outputs_[output].setting();
+    settle(each);
+    if (!acts(each)) {
+      findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i--));
+      continue;
+    }
+    finding.shape_sd.clear();
+    for (std::size_t k = 0; k < each.shape.size(); ++k)
+      finding.shape_sd.push_back(shape_sd(each, k));
+    finding.gain_sd.assign(outputs_.size(), Eigen::VectorXd());
+    for (const std::size_t output : measured_) {
+      if (each.gains[output].size() == 0) continue;
+      const Setting& setting = *each.settings[output];
+      const Setting::Equations of =
+          setting.equations(columns_of(*each.hypothesis, each.shape, outputs_[output]));
+      const double squares = setting.squares() - 2.0 * each.gains[output].dot(of.right) +
+                             each.gains[output].dot(of.square * each.gains[output]);
+      const double variance = std::max(0.0, squares) / setting.present_rows();
+      finding.gain_sd[output] = (variance * of.square.inverse().diagonal()).array().sqrt();
+    }
+  }
+}
+
+double Search::carried_share(const std::vector<Finding>& findings, std::size_t output) const {
+  const OutputEvidence& evidence = outputs_[output];
+  Column left = evidence.measured_residual();
+  for (const Finding& finding : findings) {
+    const Explanation& each = finding.explanation;
+    if (each.gains[output].size() == 0) continue;
+    left -= columns_of(*each.hypothesis, each.shape, evidence) * each.gains[output];
+  }
+  const double noise = evidence.noise_um() * evidence.noise_um();
+  const auto variance = [&](const Column& values) {
+    const double rms = root_mean_square(centred(values, evidence, rows_), evidence.present());
+    return std::max(0.0, rms * rms - noise);
+  };
+  const double before = variance(evidence.measured_residual());
+  return before > 0 ? 1.0 - variance(left) / before : 0.0;
+}
+
+double Search::centred_rms_um(const Column& values, std::size_t output) const {
+  const OutputEvidence& evidence = outputs_[output];
+  return root_mean_square(centred(values, evidence, rows_), evidence.present());
+}
+
+/// Whether what it explains can be seen beside noise and motion in one of the outputs.
+bool Search::matters(const Explanation& explanation) const {
+  return std::any_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
+    const Eigen::VectorXd& gains = explanation.gains[output];
+    if (gains.size() == 0) return false;
+    const OutputEvidence& evidence = outputs_[output];
+    const Column explained =
+        columns_of(*explanation.hypothesis, explanation.shape, evidence) * gains;
+    const double motion_um = centred_rms_um(evidence.measured(data_), output);
+    return centred_rms_um(explained, output) >
+           std::max(evidence.noise_um(), thresholds_.motion_share_min * motion_um);
+  });
+}
+
+bool Search::structure_left() const {
+  return std::any_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
+    const OutputEvidence& evidence = outputs_[output];
+    const double noise_um = evidence.noise_um();
+    const double residual_um = centred_rms_um(evidence.measured_residual(), output);
+    const double structure_um =
+        std::sqrt(std::max(0.0, residual_um * residual_um - noise_um * noise_um));
+    const double motion_um = centred_rms_um(evidence.measured(data_), output);
+    return structure_um > structure_share_min * motion_um &&
+           structure_um > structure_noises_min * noise_um;
+  });
+}
+
+SearchResult Search::run() {
+  SearchResult result;
+  while (result.findings.size() < thresholds_.findings_max) {
+    accept(result.findings, result.findings.size());
+    const std::vector<Explanation> candidates = ranked();
+    for (std::size_t i = 0; i < std::min(weighed_shown, candidates.size()); ++i)
+      result.weighed.push_back({result.findings.size() + 1, candidates[i].hypothesis->cause,
+                                candidates[i].hypothesis->subject, candidates[i].score,
+                                candidates[i].left_out_gain});
+    if (candidates.empty() || !matters(candidates.front())) break;
+    if (candidates.front().left_out_gain < thresholds_.left_out_gain_min) break;
+    Finding finding{candidates.front(), {}, {}, {}};
+    for (std::size_t i = 1; i < candidates.size(); ++i) {
+      const Hypothesis& other = *candidates[i].hypothesis;
+      if (other.cause != candidates.front().hypothesis->cause ||
+          other.subject != candidates.front().hypothesis->subject)
+        finding.alternatives.push_back(candidates[i]);
+    }
+    result.findings.push_back(std::move(finding));
+    refit(result.findings);
+  }
+  measure_spread(result.findings);
+  accept(result.findings, result.findings.size());
+  double left_variance = 1.0;
+  for (const Finding& finding : result.findings)
+    left_variance *= std::pow(1.0 - finding.explanation.left_out_gain, 2);
+  result.unexplained_share.assign(outputs_.size(), 0.0);
+  for (const std::size_t output : measured_)
+    result.unexplained_share[output] =
+        std::clamp(1.0 - carried_share(result.findings, output), 0.0, 1.0);
+  if (1.0 - left_variance < thresholds_.carried_share_min) {
+    result.findings.clear();
+    for (const std::size_t output : measured_) result.unexplained_share[output] = 1.0;
+    result.unexplained = structure_left();
+  }
+  return result;
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,93 @@
+/// The search for what a model gets wrong: profile of every hypothesis, choice, joint refit.
+#pragma once
+
+#include <vector>
+
+#include "modelling/diagnosis/evidence.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// What counts as a finding.
+struct Thresholds {
+  /// Least share of the RMS that a cause must take from rows it was not fitted to.
+  double left_out_gain_min{0.12};
+  /// Least RMS of what a cause explains, as a share of the measured motion's; never below the noise
+  /// of a single value.
+  double motion_share_min{0.025};
+  /// All findings together must take this share of the variance of left-out rows.
+  double carried_share_min{0.45};
+  std::size_t findings_max{4};
+};
+
+struct Finding {
+  Explanation explanation;
+  /// Spread of the shape parameters (of the logarithm where the grid is logarithmic) and gains.
+  std::vector<double> shape_sd;
+  std::vector<Eigen::VectorXd> gain_sd;   ///< one an output
+  std::vector<Explanation> alternatives;  ///< best first, of other causes or subjects
+};
+
+/// What was weighed for a finding, whether it became one or not.
+struct Weighed {
+  std::size_t round{0};  ///< 1: for the first finding
+  std::string cause{};
+  std::string subject{};
+  double score{0.0};
+  double left_out_gain{0.0};
+};
+
+struct SearchResult {
+  std::vector<Finding> findings;  ///< in order of gain
+  /// Share of an output's residual variance, noise taken out, that is left.
+  std::vector<double> unexplained_share;
+  /// Structure is left that is large against noise and motion, and nothing carries it.
+  bool unexplained{false};
+  std::vector<Weighed> weighed;  ///< the best few of every round
+};
+
+/// Seeks causes in the training rows.
+class Search {
+ public:
+  Search(const MeasuredData& data, const Thresholds& thresholds);
+  [[nodiscard]] SearchResult run();
+  /// The explanations under consideration for the next finding, best first.
+  [[nodiscard]] std::vector<Explanation> ranked();
+
+ private:
+  struct Trial {
+    double score{0.0};
+    std::vector<Eigen::VectorXd> gains;
+  };
+  using Settings = std::vector<const Setting*>;
+
+  [[nodiscard]] Trial weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
+                            const Settings& settings) const;
+  [[nodiscard]] Explanation profile(const Hypothesis& hypothesis, const Settings& settings) const;
+  [[nodiscard]] Settings likeliest_settings(const Explanation& explanation) const;
+  void refine(Explanation& explanation) const;
+  void settle(Explanation& explanation) const;
+  [[nodiscard]] double price(const Hypothesis& hypothesis) const;
+  [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
+  void choose(std::vector<Explanation>& candidates) const;
+  [[nodiscard]] double left_out_gain(const Explanation& explanation) const;
+  void accept(const std::vector<Finding>& findings, std::size_t but);
+  void refit(std::vector<Finding>& findings);
+  void measure_spread(std::vector<Finding>& findings);
+  [[nodiscard]] double shape_sd(const Explanation& explanation, std::size_t parameter) const;
+  [[nodiscard]] double carried_share(const std::vector<Finding>& findings,
+                                     std::size_t output) const;
+  /// Whether any output has a share.
+  [[nodiscard]] static bool acts(const Explanation& explanation);
+  [[nodiscard]] bool matters(const Explanation& explanation) const;
+  [[nodiscard]] double centred_rms_um(const Column& values, std::size_t output) const;
+  [[nodiscard]] bool structure_left() const;
+
+  const MeasuredData& data_;
+  Thresholds thresholds_;
+  StackedRows rows_;
+  std::vector<Hypothesis> hypotheses_;
+  std::vector<OutputEvidence> outputs_;
+  std::vector<std::size_t> measured_;  ///< outputs with values
+};
+
+}  // namespace thermocomp::diagnosis

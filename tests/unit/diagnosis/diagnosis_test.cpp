@@ -1,0 +1,180 @@
+#include "modelling/diagnosis/diagnosis.hpp"
+
+#include <cmath>
+#include <random>
+
+#include <Eigen/Cholesky>
+#include <catch2/catch.hpp>
+
+#include "config/model_file.hpp"
+#include "config/problems.hpp"
+#include "config/run_file.hpp"
+#include "modelling/diagnosis/coloured_noise.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::diagnosis;
+
+namespace {
+
+using Present = Eigen::Array<bool, Eigen::Dynamic, 1>;
+
+ThermalModel one_input() {
+  ThermalModel model;
+  model.inputs = {"t1_degC"};
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {{5.0}};
+  return model;
+}
+
+/// A run of `rows` minutes: t1 follows the speed's steps; z = 5 t1 + hidden(speed, rise, row).
+template <class Hidden>
+RunFile run_with(unsigned seed, int rows, Hidden hidden) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 0.1);
+  std::uniform_int_distribution<int> speed(0, 3);
+  RunFile run;
+  run.name = "run.csv";
+  run.columns = {"time_s", "t1_degC", "spindle_rpm", "z_um"};
+  run.values.resize(4);
+  double rise_K = 0.0;
+  double rpm = 0.0;
+  for (int row = 0; row < rows; ++row) {
+    if (row % 50 == 20) rpm = 1500.0 * speed(random);
+    rise_K += (rpm / 500.0 - rise_K) / 40.0;
+    run.values[0].push_back(60.0 * row);
+    run.values[1].push_back(20.0 + rise_K);
+    run.values[2].push_back(rpm);
+    run.values[3].push_back(5.0 * rise_K + hidden(rpm, rise_K, row) + noise(random));
+  }
+  run.selected_end = run.rows();
+  return run;
+}
+
+template <class Hidden>
+Diagnosis diagnosis_of(Hidden hidden) {
+  return diagnose(one_input(), {run_with(1, 600, hidden)}, {"train.csv"},
+                  {run_with(2, 400, hidden)}, {"test.csv"});
+}
+
+}  // namespace
+
+TEST_CASE("whitened columns give the generalised least squares of the covariance",
+          "[diagnosis][noise]") {
+  const Eigen::Index n = 40;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd time_s(n);
+  Eigen::VectorXd a(n);
+  Eigen::VectorXd b(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    time_s[i] = 60.0 * static_cast<double>(i) + (i % 3 == 0 ? 20.0 : 0.0);
+    a[i] = normal(random);
+    b[i] = normal(random);
+  }
+  const NoiseShape shape{4.0, 300.0};
+  const std::vector<Block> blocks = {{0, 15}, {15, n}};
+  Present present = Present::Constant(n, true);
+  present[7] = present[20] = false;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(n, n);
+  for (const Block& block : blocks)
+    for (Eigen::Index i = block.begin; i < block.end; ++i)
+      for (Eigen::Index j = block.begin; j < block.end; ++j)
+        covariance(i, j) += shape.ratio * std::exp(-std::abs(time_s[i] - time_s[j]) / shape.tau_s);
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (present[i]) rows.push_back(i);
+  const Eigen::MatrixXd seen = covariance(rows, rows);
+  const double expected = a(rows).dot(seen.llt().solve(b(rows)));
+  for (const Eigen::Index i : {7, 20}) a[i] = b[i] = 0.0;
+  const Whitener whitener(shape, time_s, blocks, present);
+  CHECK(whitener.apply(a).dot(whitener.apply(b)) == Approx(expected));
+  const double log_determinant =
+      2.0 * Eigen::MatrixXd(seen.llt().matrixL()).diagonal().array().log().sum();
+  CHECK(whitener.log_determinant() == Approx(log_determinant));
+}
+
+TEST_CASE("growth with the squared speed is named, with its size and its gain", "[diagnosis]") {
+  const Diagnosis answer = diagnosis_of([](double rpm, double, int) { return 4e-7 * rpm * rpm; });
+  REQUIRE(answer.verdict == "effect");
+  REQUIRE(answer.findings.size() == 1);
+  const NamedFinding& finding = answer.findings.front();
+  CHECK(finding.cause == "speed_growth");
+  CHECK(finding.subject == "spindle_rpm");
+  REQUIRE(finding.parameters.size() == 1);
+  CHECK(finding.parameters[0].values.at("z_um") == Approx(4e-7).epsilon(0.02));
+  CHECK(finding.parameters[0].ci95.at("z_um").low < 4e-7);
+  CHECK(finding.parameters[0].ci95.at("z_um").high > 4e-7);
+  CHECK(finding.test.at("z_um").after_um < 0.2);
+  CHECK(finding.test.at("z_um").ci95.low > 0.8);
+  CHECK(answer.extended.terms.size() == 1);
+  CHECK(answer.outputs.at("z_um").extended_test_rms_um == Approx(finding.test.at("z_um").after_um));
+  // What was found is a model file.
+  CHECK_NOTHROW(parse_model(write_model(answer.extended), "extended"));
+}
+
+TEST_CASE("play of the joint is named with the width of its dead band", "[diagnosis]") {
+  // A hidden state of its own: the play of 5 T with a width of 6 um.
+  double state = 0.0;
+  const auto hidden = [&state](double, double rise_K, int row) {
+    if (row == 0) state = 5.0 * rise_K;
+    state = std::min(std::max(state, 5.0 * rise_K - 3.0), 5.0 * rise_K + 3.0);
+    return state - 5.0 * rise_K;
+  };
+  const Diagnosis answer = diagnosis_of(hidden);
+  REQUIRE_FALSE(answer.findings.empty());
+  CHECK(answer.findings[0].cause == "hysteresis");
+  const Parameter& width = answer.findings[0].parameters.front();
+  // With one input, play of the output and of the temperature are the same.
+  CHECK(width.values.at("") * (width.name == "width_K" ? 5.0 : 1.0) == Approx(6.0).epsilon(0.05));
+}
+
+TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "[diagnosis]") {
+  RunFile train = run_with(1, 600, [](double, double, int row) { return row >= 300 ? 8.0 : 0.0; });
+  const RunFile test = run_with(2, 400, [](double, double, int) { return 0.0; });
+  const Diagnosis answer = diagnose(one_input(), {train}, {"train.csv@0:"}, {test}, {"test.csv"});
+  REQUIRE(answer.findings.size() == 1);
+  CHECK(answer.findings[0].cause == "displacement_step");
+  CHECK(answer.findings[0].run == "train.csv@0:");
+  CHECK(answer.findings[0].test.empty());
+  CHECK(answer.extended.terms.empty());
+}
+
+TEST_CASE("nothing is said where there is nothing", "[diagnosis]") {
+  const Diagnosis answer = diagnosis_of([](double, double, int) { return 0.0; });
+  CHECK(answer.verdict == "none");
+  CHECK(answer.findings.empty());
+  CHECK(answer.outputs.at("z_um").test_rms_um == answer.outputs.at("z_um").extended_test_rms_um);
+}
+
+TEST_CASE("what lies in the test runs changes no finding and no parameter", "[diagnosis]") {
+  const auto hidden = [](double rpm, double, int) { return 4e-7 * rpm * rpm; };
+  const RunFile train = run_with(1, 600, hidden);
+  const RunFile same = run_with(2, 400, hidden);
+  const RunFile other = run_with(3, 200, [](double, double, int row) { return 0.3 * row; });
+  const Diagnosis a = diagnose(one_input(), {train}, {"a"}, {same}, {"b"});
+  const Diagnosis b = diagnose(one_input(), {train}, {"a"}, {other}, {"b"});
+  REQUIRE(a.findings.size() == b.findings.size());
+  CHECK(write_model(a.extended) == write_model(b.extended));
+}
+
+TEST_CASE("missing values are left out, and a run without any is refused", "[diagnosis]") {
+  RunFile train = run_with(1, 600, [](double rpm, double, int) { return 4e-7 * rpm * rpm; });
+  for (std::size_t row = 0; row < train.rows(); row += 3) train.values[3][row] = NAN;
+  for (std::size_t row = 100; row < 110; ++row) train.values[1][row] = NAN;
+  const RunFile test = run_with(2, 400, [](double, double, int) { return 0.0; });
+  const Diagnosis answer = diagnose(one_input(), {train}, {"a"}, {test}, {"b"});
+  REQUIRE_FALSE(answer.findings.empty());
+  CHECK(answer.findings[0].cause == "speed_growth");
+  train.values[3].assign(train.rows(), NAN);
+  CHECK_THROWS_AS(diagnose(one_input(), {train}, {"a"}, {test}, {"b"}), ConfigurationError);
+}
+
+TEST_CASE("the answer as JSON has the parts that others read", "[diagnosis]") {
+  const std::string json =
+      diagnosis_json(diagnosis_of([](double rpm, double, int) { return 4e-7 * rpm * rpm; }));
+  for (const char* key :
+       {"\"verdict\": \"effect\"", "\"baseline\"", "\"train_rms_um\"", "\"findings\"",
+        "\"parameters_ci95\"", "\"alternatives\"", "\"test_rms_um\"", "\"reduction\"",
+        "\"extended\"", "\"unexplained_fraction\""})
+    CHECK_THAT(json, Catch::Contains(key));
+}
