@@ -10,8 +10,8 @@ packages_build=(
   catch2
 )
 
-# Besides, for thermocomp-modelling. OpenBLAS: with the reference BLAS a factorisation takes seven
-# times as long.
+# Besides, for thermocomp-modelling. OpenBLAS: with the reference BLAS a factorisation takes
+# several times as long.
 packages_modelling=("${packages_build[@]}" libsuitesparse-dev libopenblas-dev libgmsh-dev)
 
 # The demo draws a picture of itself.

@@ -67,6 +67,7 @@ void add_from_corners(Mesh& mesh, GridNodes& nodes, Index part, Shape shape,
                       const std::vector<Place>& corners, Index number) {
   const ShapeInfo& info = shape_info(shape);
   std::vector<Index> all;
+  all.reserve(info.nodes);
   for (const Place& corner : corners) all.push_back(nodes.at(corner));
   if (info.nodes > info.corners) {
     for (const auto& [a, b] : info.edges) {

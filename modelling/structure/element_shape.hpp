@@ -60,7 +60,7 @@ struct ShapeInfo {
 
 /// Gradients by x, y, z and the volume (weight times determinant) at one point of an element.
 struct Gradients {
-  std::array<Vec3, shape_nodes_max> gradient;
+  std::array<Vec3, shape_nodes_max> gradient{};
   double volume{0.0};  ///< not above zero: the element is inverted there
 };
 /// @param corners  coordinates of the element's nodes [m], shape (nodes)

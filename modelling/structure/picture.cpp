@@ -55,7 +55,8 @@ class Picture {
       points[i / 3][i % 3] += factor * displacement_m[i];
     }
     const auto column = static_cast<double>(panels_ % panels_in_a_row);
-    const auto row = static_cast<double>(panels_ / panels_in_a_row);
+    const std::size_t rows_above = panels_ / panels_in_a_row;
+    const auto row = static_cast<double>(rows_above);
     ++panels_;
     char text[160];
     std::snprintf(text, sizeof text, "<g transform=\"translate(%.0f %.0f)\">\n", column * panel_px,

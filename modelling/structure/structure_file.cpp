@@ -79,6 +79,7 @@ class Reader {
                                     [&](const auto& item) { return item.name == name; });
     if (found != items.end()) return static_cast<Index>(found - items.begin());
     std::vector<std::string> known;
+    known.reserve(items.size());
     for (const auto& item : items) known.push_back(item.name);
     const std::string meant = nearest_name(name, known);
     std::string rule = "there is no ";
