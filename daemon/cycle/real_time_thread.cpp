@@ -88,7 +88,9 @@ int RealTimeThread::create(const RealTimeThreadConfig& config, bool fifo) {
 void* RealTimeThread::enter(void* self) noexcept {
   pthread_setname_np(pthread_self(), "cycle");
   touch_stack();
-  static_cast<RealTimeThread*>(self)->body_();
+  auto* thread = static_cast<RealTimeThread*>(self);
+  thread->body_();
+  thread->ended_.release();
   return nullptr;
 }
 
@@ -100,11 +102,9 @@ void RealTimeThread::join() noexcept {
 
 bool RealTimeThread::join_within(std::chrono::seconds patience) noexcept {
   if (!running_) return true;
-  timespec until{};
-  clock_gettime(CLOCK_MONOTONIC, &until);
-  until.tv_sec += patience.count();
-  running_ = pthread_clockjoin_np(thread_, nullptr, CLOCK_MONOTONIC, &until) != 0;
-  return !running_;
+  if (!ended_.try_acquire_for(patience)) return false;
+  join();
+  return true;
 }
 
 }  // namespace thermocomp

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <pthread.h>
+#include <semaphore>
 #include <stdexcept>
 #include <string>
 
@@ -46,6 +47,7 @@ class RealTimeThread {
   std::function<void()> body_;
   pthread_t thread_{};
   bool running_{false};
+  std::binary_semaphore ended_{0};  ///< the body has returned
 };
 
 }  // namespace thermocomp
