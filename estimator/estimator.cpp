@@ -335,16 +335,18 @@ void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controll
     input.may_change = controller_online && signal(cutting_signal) < 0.5;
     if (!input.may_change) add(Reason::cutting);
   }
-  // Lost data never clears an offset mid-cut, nor where it cannot be told whether it is one.
+  // Lost data never clears an offset mid-cut, nor where it cannot be told whether it is one: it is
+  // held as in Mode::holding, so that one outside a smaller bound still comes in.
+  bool clearing_waits = false;
   if (mode == Mode::ramping_to_zero && cutting_signal != no_signal &&
       !(controller_online && signal(cutting_signal) < 0.5)) {
-    input.may_change = false;
+    clearing_waits = true;
     add(Reason::cutting);
   }
   for (std::size_t i = 0; i < axes.size(); ++i) {
     input.applied_um = controller.applied_um[i];
     input.taken_at = controller.taken_at;
-    input.target_um = target_um(i);
+    input.target_um = clearing_waits ? not_a_number : target_um(i);
     axes[i].step(input);
     if (!axes[i].synced()) add(Reason::not_synced);
     if (axes[i].mismatch()) add(Reason::mismatch);

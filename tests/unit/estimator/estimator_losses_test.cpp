@@ -1,0 +1,223 @@
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "estimator/estimator.hpp"
+#include "small_machine.hpp"
+
+using namespace thermocomp;
+
+TEST_CASE("lost data hold the offset; it goes on from there when they return", "[estimator]") {
+  Machine machine;
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 30.0});
+  machine.steps(5, {21.0, lost});
+  CHECK(machine.report().mode == Mode::compensating);  // the last good reading still serves
+  machine.steps(1000, {lost, lost});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::block_lost));
+  CHECK(machine.offset_um() == -5.0);
+  machine.step({22.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == -10.0);
+}
+
+TEST_CASE("the ramp policy holds for hold_s, then goes to zero at the slew rate", "[estimator]") {
+  auto config = small_config();
+  config.compensation.on_loss = LossPolicy::ramp_to_zero;
+  config.compensation.hold_s = 30;
+  config.axes[0].limiter.rate_um_per_s_max = 1.0;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, 30.0});
+  REQUIRE(machine.offset_um() == -5.0);
+  int held = 0;
+  while (machine.report().mode != Mode::ramping_to_zero && held < 100) {
+    machine.step({lost, 30.0});
+    if (machine.report().mode == Mode::holding) CHECK(machine.offset_um() == -5.0);
+    ++held;
+  }
+  CHECK(held == 5 + 31);  // five seconds until stale, more than thirty held
+  CHECK(machine.offset_um() == -4.0);
+  machine.steps(4, {lost, 30.0});
+  CHECK(machine.offset_um() == 0.0);
+  machine.step({21.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == -1.0);
+}
+
+namespace {
+
+/// Lost data at -30 um with the ramp policy and no time to hold, in the middle of a cut.
+Machine lost_mid_cut(EstimatorConfig& config) {
+  config.compensation.on_loss = LossPolicy::ramp_to_zero;
+  config.compensation.hold_s = 0;
+  config.compensation.cutting_signal = "cutting_on";
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(30, {26.0, 30.0});
+  REQUIRE(machine.offset_um() == -30.0);
+  machine.controller.signals[1] = 1.0;
+  machine.steps(10, {lost, 30.0});
+  REQUIRE(machine.report().mode == Mode::ramping_to_zero);
+  return machine;
+}
+
+}  // namespace
+
+TEST_CASE("lost data never clear an offset mid-cut, nor where no signal tells whether it is one",
+          "[estimator]") {
+  auto config = small_config();
+  Machine machine = lost_mid_cut(config);
+  CHECK(machine.offset_um() == -30.0);
+  CHECK(machine.says(Reason::cutting));
+  machine.controller.signals[1] = not_a_number;
+  machine.steps(100, {lost, 30.0});
+  CHECK(machine.offset_um() == -30.0);
+  machine.controller.signals[1] = 0.0;
+  machine.step({lost, 30.0});
+  CHECK(machine.offset_um() == -20.0);
+  CHECK_FALSE(machine.says(Reason::cutting));
+}
+
+TEST_CASE(
+    "an offset outside a new, smaller bound comes in at the slew rate mid-cut too, and waits "
+    "there",
+    "[estimator]") {
+  auto config = small_config();
+  Machine machine = lost_mid_cut(config);
+  config.axes[0].limiter = {12.0, 2.0};
+  reload(machine, config, small_model());
+  for (int i = 1; i <= 20; ++i) {
+    machine.step({lost, 30.0});
+    CHECK(machine.offset_um() == std::min(-30.0 + 2.0 * i, -12.0));
+  }
+  CHECK(machine.report().mode == Mode::ramping_to_zero);
+  CHECK(machine.says(Reason::cutting));
+}
+
+namespace {
+
+/// Both blocks warm together; the column's effect on z is 1 um/K.
+ThermalModel model_with_covariance() {
+  auto model = small_model();
+  model.covariance_K2 = {{4.0, 3.9}, {3.9, 4.0}};
+  model.covariance_growth.drift_time_s = 1e5;
+  return model;
+}
+
+}  // namespace
+
+TEST_CASE("a lost block is estimated, and compensation goes on with a stated uncertainty",
+          "[estimator]") {
+  Machine machine(small_config(), model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 31.0});
+  CHECK(machine.report().axes[0].offset_sd_um == 0.0);
+  machine.steps(10, {21.0, lost});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.says(Reason::block_estimated));
+  CHECK_FALSE(machine.says(Reason::block_lost));
+  CHECK(machine.offset_um() == -6.0);  // begins where it was
+  machine.steps(100, {23.0, lost});
+  const InputReport column = machine.report().inputs[1];
+  CHECK(column.estimated);
+  CHECK_FALSE(column.good);
+  CHECK(column.temp_degC == Approx(31.0 + 2.0 * 3.9 / 4.0).epsilon(1e-3));
+  CHECK(column.sd_K > 0.0);
+  CHECK(machine.report().axes[0].offset_sd_um == Approx(column.sd_K));
+  CHECK(machine.offset_um() == Approx(-5.0 * 3.0 - (column.temp_degC - 30.0)));
+  machine.step({23.0, 33.0});
+  CHECK(machine.report().reasons == 0);
+  CHECK(machine.report().axes[0].offset_sd_um == 0.0);
+}
+
+TEST_CASE("beyond offset_sd_um_max, or told not to estimate, the offset holds", "[estimator]") {
+  auto config = small_config();
+  const bool too_uncertain = GENERATE(true, false);
+  if (too_uncertain)
+    config.compensation.offset_sd_um_max = 0.1;
+  else
+    config.compensation.estimate_lost_blocks = false;
+  Machine machine(config, model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 31.0});
+  machine.steps(2000, {21.0, lost});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::block_lost));
+  CHECK_FALSE(machine.says(Reason::block_estimated));
+  CHECK(machine.report().inputs[1].estimated == too_uncertain);
+  if (too_uncertain) CHECK(machine.report().axes[0].offset_sd_um > 0.1);
+  const double held_um = machine.offset_um();
+  machine.steps(20, {25.0, lost});
+  CHECK(machine.offset_um() == held_um);
+  machine.steps(20, {25.0, 31.0});
+  CHECK(machine.offset_um() == -26.0);
+}
+
+TEST_CASE("no reference is taken while a block is estimated", "[estimator]") {
+  Machine machine(small_config(), model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, lost});
+  machine.estimator.apply({CommandKind::reference, 0, 0.0});
+  machine.step({21.0, lost});
+  CHECK(machine.report().inputs[0].reference_degC == 20.0);
+}
+
+TEST_CASE("a reload and a saved state carry an estimate on", "[estimator]") {
+  Machine machine(small_config(), model_with_covariance());
+  machine.step({20.0, 30.0});
+  machine.steps(20, {21.0, lost});
+  const double sd_um = machine.report().axes[0].offset_sd_um;
+  const double offset_um = machine.offset_um();
+  std::vector<std::byte> state(machine.estimator.state_size_bytes());
+  machine.estimator.save_state(state);
+  Machine twin(small_config(), model_with_covariance());
+  twin.estimator.load_state(state);
+  twin.now = machine.now;
+  twin.controller = machine.controller;
+  reload(machine, small_config(), model_with_covariance());
+  machine.step({21.0, lost});
+  CHECK(machine.offset_um() == Approx(offset_um).margin(1e-9));
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.report().axes[0].offset_sd_um >= sd_um);
+  twin.step({21.0, lost});
+  CHECK(twin.offset_um() == Approx(offset_um).margin(1e-9));
+}
+
+TEST_CASE("a restart with a sensor still lost goes on from the stored temperatures",
+          "[estimator]") {
+  auto config = small_config();
+  Machine machine(config, model_with_covariance());
+  PersistentState state;
+  state.reference_degC = {{"t1_degC", 20.0}, {"t2_degC", 30.0}};
+  state.temp_degC = {{"t1_degC", 22.0}, {"t2_degC", 32.0}};
+  state.offset_um = {{"z", -12.0}};
+  machine.estimator.restore(state);
+  machine.controller.applied_um[0] = -12.0;
+  machine.step({22.0, lost});
+  CHECK(machine.report().mode == Mode::starting);
+  machine.steps(10, {22.0, lost});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == Approx(-12.0));
+  CHECK(machine.report().inputs[1].sd_K > 0.3);
+}
+
+TEST_CASE("the spread of an offset knows guideways and terms", "[estimator]") {
+  auto model = model_with_covariance();
+  auto config = small_config();
+  config.compensation.offset_sd_um_max = 500.0;
+  config.signals.emplace_back("x_mm");
+  model.guideways = {{"g", "x_mm", {0.0, 100.0}, {{"z_um", {{0.0, 0.0}, {0.0, 4.0}}}}}};
+  model.terms = {
+      {"thermal_lag", "t2_degC", {{"tau_s", 100.0}}, {{"gain_um_per_K", {{"z_um", -2.0}}}}}};
+  Machine machine(config, model);
+  machine.controller.signals[3] = 50.0;
+  machine.step({20.0, 30.0});
+  machine.steps(20, {20.0, lost});
+  const double sd_K = machine.report().inputs[1].sd_K;
+  // 1 of the matrix, 2 half-way along the guideway, and 2 more until the lag has caught up.
+  CHECK(machine.report().axes[0].offset_sd_um == Approx(5.0 * sd_K));
+}
