@@ -82,13 +82,14 @@ function(thermocomp_program name)
   target_link_libraries(${name} PRIVATE thermocomp_flags ${arg_LINKS})
 endfunction()
 
-# thermocomp_test(NAME SOURCES file... LINKS target... [TIMEOUT s] [LABELS label...])
-# One Catch2 program and one ctest entry.
+# thermocomp_test(NAME SOURCES file... LINKS target... [TIMEOUT s] [LABELS label...]
+#                 [ARGUMENTS argument...])
+# One Catch2 program and one ctest entry; ARGUMENTS are Catch2's, to select tests.
 function(thermocomp_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE thermocomp_flags thermocomp_catch_main ${arg_LINKS})
-  add_test(NAME ${name} COMMAND ${name})
+  add_test(NAME ${name} COMMAND ${name} ${arg_ARGUMENTS})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()

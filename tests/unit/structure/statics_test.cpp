@@ -293,7 +293,7 @@ double le11_stress_MPa(Shape shape, double elements) {
 }  // namespace
 
 TEST_CASE("NAFEMS LE11: -105 MPa at the inner edge, nearer on finer meshes",
-          "[structure][statics]") {
+          "[structure][statics][fine]") {
   const double coarse = le11_stress_MPa(Shape::hex20, 1);
   const double middle = le11_stress_MPa(Shape::hex20, 2);
   const double fine = le11_stress_MPa(Shape::hex20, 3);
