@@ -183,6 +183,7 @@ PortBytes SimulatedLine::receive(std::span<std::uint8_t> into, nanoseconds rest)
       clock_ += rest;
       return {PortBytes::Kind::broke_off};
     }
+    if (frame.cut) frames_.clear();  // late frames do not fill up the gap either
     if (serial_ && frame.spoiled) return {PortBytes::Kind::wrong_checksum};
     const std::size_t size = std::min(into.size(), frame.bytes.size());
     std::copy_n(frame.bytes.begin(), size, into.begin());
