@@ -42,11 +42,6 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
   }
 }
 
-void Invariants::demand(bool holds, const char* invariant, nanoseconds at,
-                        const std::string& detail) {
-  if (!holds && !broken_) broken_ = Broken{invariant, at, detail};
-}
-
 void Invariants::booted(nanoseconds now) {
   boot_ = now;
   last_ = now;
@@ -72,7 +67,7 @@ void Invariants::restored(const PersistentState& saved, const Report& report, na
   std::size_t i = 0;
   for (const auto& [column, reference_degC] : saved.reference_degC) {
     demand(i < report.inputs.size() && report.inputs[i].reference_degC == reference_degC,
-           "state_survives_restart", now, "reference of " + column);
+           "state_survives_restart", now, [&] { return "reference of " + column; });
     ++i;
   }
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
@@ -108,9 +103,10 @@ void Invariants::check_readings(const CycleSeen& seen) {
     // What no thermocouple can be is the screening's to refuse.
     const bool believable = std::abs(reading.temp_degC) < 200.0 && reading.temp_degC > -30.0;
     if (reading.fault != Fault::none || !(believable || std::isnan(reading.temp_degC))) continue;
-    demand(reading.taken_at <= seen.now, "reading_is_what_was_given", seen.now,
-           fmt::format("sensor {}: taken {:.3f} s ahead of the cycle", i + 1,
-                       to_s(reading.taken_at - seen.now)));
+    demand(reading.taken_at <= seen.now, "reading_is_what_was_given", seen.now, [&] {
+      return fmt::format("sensor {}: taken {:.3f} s ahead of the cycle", i + 1,
+                         to_s(reading.taken_at - seen.now));
+    });
     const nanoseconds to = has_counter_[i] ? seen.now : reading.taken_at;
     const Sample* sample =
         thermocouples_.given(i, reading.temp_degC, reading.taken_at - slack_of(i), to);
@@ -138,9 +134,10 @@ void Invariants::check_sensors_used(const CycleSeen& seen) {
   for (std::size_t i = 0; i < sensors_count; ++i) {
     const SensorReport& sensor = seen.report->sensors[i];
     if (sensor.fault != Fault::none) continue;
-    demand(fresh(i, seen.now), "no_stale_reading_used", seen.now,
-           fmt::format("sensor {}: last given out {:.3f} s ago", i + 1,
-                       to_s(seen.now - thermocouples_.last_good(i))));
+    demand(fresh(i, seen.now), "no_stale_reading_used", seen.now, [&] {
+      return fmt::format("sensor {}: last given out {:.3f} s ago", i + 1,
+                         to_s(seen.now - thermocouples_.last_good(i)));
+    });
     if (!smoothing_off_ || broken_) continue;
     const Sample* sample = thermocouples_.given(i, sensor.smoothed_degC,
                                                 seen.now - stale_after_[i] - slack_of(i), seen.now);
@@ -174,11 +171,12 @@ void Invariants::check_command(const CycleSeen& seen) {
     double bound_um = std::max(limiter.offset_um_max, std::abs(offset_um_[i]));
     if (from_applied) bound_um = std::max(bound_um, std::abs(told_um));
     demand(std::abs(offset_um) <= bound_um + tiny_um, "offset_within_bound", seen.now,
-           fmt::format("axis {}: {:.4f} um beside {:.4f}", i, offset_um, bound_um));
+           [&] { return fmt::format("axis {}: {:.4f} um beside {:.4f}", i, offset_um, bound_um); });
     demand(std::abs(offset_um - offset_um_[i]) <= step_um || from_applied, "slew_kept_by_command",
-           seen.now,
-           fmt::format("axis {}: from {:.4f} to {:.4f} um in {:.3f} s, applied {:.4f}", i,
-                       offset_um_[i], offset_um, dt_s, told_um));
+           seen.now, [&] {
+             return fmt::format("axis {}: from {:.4f} to {:.4f} um in {:.3f} s, applied {:.4f}", i,
+                                offset_um_[i], offset_um, dt_s, told_um);
+           });
   }
 }
 
@@ -217,9 +215,10 @@ void Invariants::check_hold(const CycleSeen& seen) {
     // At a new epoch the offset starts from the read-back.
     const bool at_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
                             register_rounding_um + rate_um * (may_ramp ? 1.0 : 0.0);
-    demand(at_applied || (may_ramp && inwards && !cutting), "hold_policy_kept", seen.now,
-           fmt::format("axis {}: {:+.4f} um after {:.1f} s without data{}", i, change_um, held_s,
-                       cutting ? ", mid-cut" : ""));
+    demand(at_applied || (may_ramp && inwards && !cutting), "hold_policy_kept", seen.now, [&] {
+      return fmt::format("axis {}: {:+.4f} um after {:.1f} s without data{}", i, change_um, held_s,
+                         cutting ? ", mid-cut" : "");
+    });
   }
 }
 
@@ -229,13 +228,14 @@ void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& cont
   const nanoseconds begun = std::max({schedule_.quiet_since(seen.now), boot_, switched_off_last_});
   const Episode* episode = schedule_.episode_at(seen.now);
   if (seen.now - begun < limit || (episode != nullptr && episode->begin <= seen.now)) return;
-  demand(seen.report->mode == Mode::compensating, "recovered_in_time", seen.now,
-         fmt::format("{} {:.0f} s after the last fault's end, reasons {:#x}",
-                     to_string(seen.report->mode), to_s(seen.now - begun), seen.report->reasons));
+  demand(seen.report->mode == Mode::compensating, "recovered_in_time", seen.now, [&] {
+    return fmt::format("{} {:.0f} s after the last fault's end, reasons {:#x}",
+                       to_string(seen.report->mode), to_s(seen.now - begun), seen.report->reasons);
+  });
   for (std::size_t i = 0; i < sensors_count; ++i) {
     const Fault fault = seen.report->sensors[i].fault;
     demand(fault == Fault::none, "recovered_in_time", seen.now,
-           fmt::format("sensor {} is still {}", i + 1, to_string(fault)));
+           [&] { return fmt::format("sensor {} is still {}", i + 1, to_string(fault)); });
   }
 }
 
@@ -260,15 +260,17 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   }
   const bool knowable = !move.disturbed || move.seen;
   if (knowable && !controller.applies_other(move.at))
-    demand(change_um <= allowed_um, "slew_kept_at_controller", seen.now,
-           fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed", move.axis,
-                       move.to_um, move.from_um, allowed_um));
+    demand(change_um <= allowed_um, "slew_kept_at_controller", seen.now, [&] {
+      return fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed",
+                         move.axis, move.to_um, move.from_um, allowed_um);
+    });
   budget.um = std::max(0.0, budget.um - std::max(0.0, change_um - 2.0 * resolution_um_));
   if (move.disturbed) budget.um = rate_um * stall_s;  // a new start
   budget.told_um[budget.count++ % 16] = move.to_um;
   demand(std::abs(move.to_um) <= largest_bound_um_[move.axis] + register_rounding_um,
-         "offset_within_bound", seen.now,
-         fmt::format("axis {}: the controller is told {:.4f} um", move.axis, move.to_um));
+         "offset_within_bound", seen.now, [&] {
+           return fmt::format("axis {}: the controller is told {:.4f} um", move.axis, move.to_um);
+         });
 }
 
 }  // namespace thermocomp::faults

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "estimator/estimator.hpp"
@@ -47,7 +48,15 @@ class Invariants {
   void reloaded(const MachineShape& shape);
   void restored(const PersistentState& saved, const Report& report, nanoseconds now);
   void check(const CycleSeen& seen, std::vector<Move>& moves, SimulatedController& controller);
-  void demand(bool holds, const char* invariant, nanoseconds at, const std::string& detail);
+  /// @param detail  a text, or what makes one: that is only called where it does not hold
+  template <typename Detail>
+  void demand(bool holds, const char* invariant, nanoseconds at, const Detail& detail) {
+    if (holds || broken_) return;
+    if constexpr (std::is_invocable_v<Detail>)
+      broken_ = Broken{invariant, at, detail()};
+    else
+      broken_ = Broken{invariant, at, detail};
+  }
   [[nodiscard]] const std::optional<Broken>& broken() const noexcept { return broken_; }
 
  private:
