@@ -69,8 +69,9 @@ inline ReplaySetup parse_test_setup(const SegmentSetup& setup) {
 
 class RecordedMachine {
  public:
-  RecordedMachine(const HistoryConfig& config, unsigned seed, std::size_t ring_records = 65536)
-      : random_(seed), writer_(config, grid_, "test", ring_records), readings_(3) {
+  RecordedMachine(const HistoryConfig& config, unsigned seed, std::size_t ring_records = 65536,
+                  const WriterClocks& clocks = system_clocks())
+      : random_(seed), writer_(config, grid_, "test", ring_records, clocks), readings_(3) {
     use(2.0);
   }
 
@@ -79,6 +80,11 @@ class RecordedMachine {
 
   void start() {
     writer_.start();
+    recorder_->begin(0, *estimator_, SegmentReason::start);
+  }
+  /// Without the writer's thread: writer().work() is then the test's to call.
+  void open() {
+    writer_.open();
     recorder_->begin(0, *estimator_, SegmentReason::start);
   }
   void stop() {

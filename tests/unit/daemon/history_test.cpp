@@ -212,6 +212,47 @@ TEST_CASE("the file keeps to its size by losing the oldest segments", "[history]
   CHECK(replay_quietly(config.file).different == 0);
 }
 
+TEST_CASE("a wall clock that is set wrong for a moment costs no history, age does", "[history]") {
+  using std::chrono::hours;
+  using std::chrono::minutes;
+  using std::chrono::seconds;
+  const TempFolder folder;
+  HistoryConfig config = history_config(folder / "h.db");
+  config.segment_h = 10.0 / 3600.0;
+  config.age_days_max = 90.0;
+  nanoseconds now = hours(7);
+  nanoseconds stepped{0};
+  const nanoseconds wall_minus_now = seconds(1'780'000'000);
+  RecordedMachine machine(config, 9, 65536,
+                          {[&] { return now; }, [&] { return wall_minus_now + now + stepped; }});
+  const auto segments_after = [&](nanoseconds time) {
+    machine.run(1100);
+    now += time;
+    machine.writer().work();
+    return machine.writer().statistics().segments;
+  };
+  machine.open();
+  std::uint64_t segments = 0;
+  for (int i = 0; i < 10; ++i) segments = segments_after(minutes(10));
+  REQUIRE(segments >= 8);
+  for (const nanoseconds wrong : {nanoseconds(hours(24 * 400)), nanoseconds(-wall_minus_now)}) {
+    stepped = wrong;
+    for (int i = 0; i < 3; ++i) {
+      const std::uint64_t before = segments;
+      segments = segments_after(minutes(10));
+      CHECK(segments >= before);
+    }
+    stepped = nanoseconds{0};
+    segments = segments_after(minutes(10));
+  }
+  // Ahead for good: then the old segments are old.
+  stepped = hours(24 * 400);
+  static_cast<void>(segments_after(minutes(10)));
+  CHECK(segments_after(minutes(61)) < segments);
+  machine.stop();
+  CHECK(replay_quietly(config.file).different == 0);
+}
+
 TEST_CASE("a file that is no database is moved aside and a new one begun", "[history]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
