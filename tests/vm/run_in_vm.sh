@@ -4,7 +4,9 @@
 # Runs COMMAND as root in a guest where AF_CAN exists and the virtual CAN interfaces vcan0 and vcan1
 # are up. The guest's root file system is the host's own, read-write; working directory and exported
 # variables are those of the caller; PATH is extended by the sbin folders. /run, /dev and /dev/shm
-# are the guest's own and empty: sockets and FIFOs belong there. Any number can run at a time.
+# are the guest's own and empty: sockets and FIFOs belong there. TMPDIR is /dev/shm, because the
+# host's files seen from a guest lack what temporary files need (a file that is deleted while it is
+# open cannot be truncated). Any number can run at a time.
 #
 # The guest is User Mode Linux (package user-mode-linux): as fast as the host but for system calls,
 # one CPU; ASan and TSan programs abort in it. With --emulated it is Debian's kernel under QEMU
@@ -65,7 +67,7 @@ trap 'exit 125' HUP INT TERM
 cp "$here/guest_init.sh" "$run/init" && chmod 755 "$run/init" || fail "no guest_init.sh"
 {
   export -p
-  echo 'unset TMPDIR'
+  echo 'export TMPDIR=/dev/shm'
   # Emulated programs on a busy machine may take their time.
   if [ -n "$emulated" ]; then echo 'export THERMOCOMP_PATIENCE_S=120'; fi
   echo "export THERMOCOMP_VM=${emulated:-user-mode-linux}"
