@@ -23,6 +23,7 @@ class Conduction {
   Conduction(const Mesh& mesh, std::span<const Material> material_of_part,
              const Reduction& reduction, std::span<const Coupling> couplings);
 
+  [[nodiscard]] std::size_t nodes() const noexcept { return reduction_.full_size(); }
   /// L T = q. @throws FactorisationError where nothing sets the level of the temperature
   [[nodiscard]] std::vector<double> steady_degC(const HeatInput& input) const;
   /// Heat held at `temps_degC` [J], above 0 degC.

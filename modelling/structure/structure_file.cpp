@@ -6,22 +6,15 @@
 #include <set>
 
 #include "config/number_text.hpp"
-#include "config/toml_reader.hpp"
 #include "config/units.hpp"
+#include "modelling/structure/structure_reading.hpp"
 
 namespace thermocomp::structure {
 namespace {
 
-constexpr double mm = 1e-3;
 constexpr double um = 1e-6;
-constexpr double far_mm = 1e6;  ///< no machine is a kilometre long
 constexpr double infinite = std::numeric_limits<double>::infinity();
-constexpr std::array<const char*, 3> range_keys{"x_mm", "y_mm", "z_mm"};
 constexpr double cells_max = 5e6;
-
-Range length_range() {
-  return Range::between(-far_mm, far_mm);
-}
 
 class Reader {
  public:
@@ -45,82 +38,11 @@ class Reader {
       root_.problem("block", "there must be a [[block]] or a [[division]]");
     }
     check_outputs();
+    read_heat_sections(root_, spec_);
     return std::move(spec_);
   }
 
  private:
-  // ---------------------------------------------------------------- small things
-
-  static Origin origin(const TomlTable& table, std::string_view key, std::string value = {}) {
-    Origin origin{table.line(key), table.path(), std::move(value)};
-    if (!key.empty()) origin.key.append(".").append(key);
-    return origin;
-  }
-
-  /// Three numbers, in mm in the file.
-  static Vec3 point_m(const TomlTable& table, std::string_view key) {
-    const std::vector<double> values = table.numbers(key, length_range());
-    if (values.size() == 3) return {values[0] * mm, values[1] * mm, values[2] * mm};
-    if (table.has(key)) table.problem(key, "must be three numbers: x, y, z");
-    return {};
-  }
-
-  std::string unique_name(const TomlTable& table, std::set<std::string>& names) {
-    std::string name = table.text("name");
-    if (!name.empty() && !names.insert(name).second) table.problem("name", "is used twice");
-    return name;
-  }
-
-  template <class Items>
-  Index index_of(const TomlTable& table, std::string_view key, const Items& items,
-                 std::string_view what) const {
-    const std::string name = table.text(key);
-    const auto found = std::find_if(items.begin(), items.end(),
-                                    [&](const auto& item) { return item.name == name; });
-    if (found != items.end()) return static_cast<Index>(found - items.begin());
-    std::vector<std::string> known;
-    known.reserve(items.size());
-    for (const auto& item : items) known.push_back(item.name);
-    const std::string meant = nearest_name(name, known);
-    std::string rule = "there is no ";
-    rule.append(what).append(" of this name");
-    if (!meant.empty()) rule.append("; did you mean \"").append(meant).append("\"?");
-    if (!name.empty()) table.problem(key, rule);
-    return 0;
-  }
-
-  Region read_region(const TomlTable& parent, std::string_view key) const {
-    const TomlTable table = parent.table(key);
-    Region region;
-    region.within_m = {{-infinite, -infinite, -infinite}, {infinite, infinite, infinite}};
-    std::string shown;
-    if (table.has("part")) {
-      region.part = spec_.parts[index_of(table, "part", spec_.parts, "part")].name;
-      shown.append("part ").append(*region.part);
-    }
-    if (table.has("group")) {
-      region.group = table.text("group");
-      shown.append(shown.empty() ? "" : ", ").append("group ").append(*region.group);
-    }
-    for (std::size_t d = 0; d < 3; ++d) {
-      if (!table.has(range_keys[d])) continue;
-      const std::vector<double> range = table.numbers(range_keys[d], length_range());
-      if (range.size() != 2 || !(range[0] <= range[1])) {
-        table.problem(range_keys[d], "must be a range: [from, to]");
-        continue;
-      }
-      region.within_m.low_m[d] = range[0] * mm;
-      region.within_m.high_m[d] = range[1] * mm;
-      shown.append(shown.empty() ? "" : ", ").append(range_keys[d]).append(" ");
-      shown.append(number_text(range[0])).append("..").append(number_text(range[1]));
-    }
-    if (table && shown.empty()) {
-      parent.problem(key, "must say where: part, group, x_mm, y_mm or z_mm");
-    }
-    region.origin = origin(parent, key, shown);
-    return region;
-  }
-
   static Vec3 read_stiffness(const TomlTable& table) {
     const auto values = table.numbers("stiffness_N_per_um", Range::between(0.0, 1e9));
     if (values.size() != 3) {
@@ -156,18 +78,29 @@ class Reader {
 
   void read_material(const TomlTable& table) {
     Material material;
-    material.name = unique_name(table, material_names_);
+    material.name = read_unique_name(table, material_names_);
     material.youngs_modulus_Pa = 1e9 * table.number("youngs_modulus_GPa", Range::above(0, 2000));
     material.poisson_ratio = table.number("poisson_ratio", Range::between(0, 0.49));
     material.expansion_per_K = um * table.number("expansion_um_per_m_K", Range::between(-50, 200));
+    read_thermal_constants(table, material);
     spec_.materials.push_back(material);
+  }
+
+  /// Only heat conduction asks for them; 0 where they are left out.
+  static void read_thermal_constants(const TomlTable& table, Material& material) {
+    const auto constant = [&](std::string_view key, double most) {
+      return table.has(key) ? table.number(key, Range::above(0, most)) : 0.0;
+    };
+    material.conductivity_W_per_m_K = constant("conductivity_W_per_m_K", 5000);
+    material.density_kg_per_m3 = constant("density_kg_per_m3", 50000);
+    material.heat_capacity_J_per_kg_K = constant("heat_capacity_J_per_kg_K", 20000);
   }
 
   void read_part(const TomlTable& table) {
     PartSpec part;
-    part.name = unique_name(table, part_names_);
-    part.origin = origin(table, "name", part.name);
-    part.material = index_of(table, "material", spec_.materials, "material");
+    part.name = read_unique_name(table, part_names_);
+    part.origin = origin_of(table, "name", part.name);
+    part.material = read_index(table, "material", names_of(spec_.materials), "material");
     if (table.has("mesh") == table.has("box")) {
       table.problem("mesh", "a part must have either a mesh or [[part.box]]");
       table.ignore_rest();
@@ -190,7 +123,7 @@ class Reader {
 
   void read_mesh(const TomlTable& table, PartSpec& part) const {
     part.mesh = folder_ / table.text("mesh");
-    part.origin = origin(table, "mesh", part.mesh.string());
+    part.origin = origin_of(table, "mesh", part.mesh.string());
     const std::string ending = part.mesh.extension().string();
     if (table.has("group")) part.group = table.text("group");
     if (ending == ".step" || ending == ".stp") {
@@ -217,7 +150,8 @@ class Reader {
     size_mm.resize(3, 1.0);
     for (std::size_t d = 0; d < 3; ++d) part.size_m[d] = size_mm[d] * mm;
     for (const TomlTable& box : table.tables_required("box")) {
-      BoxShape shape{{point_m(box, "from_mm"), point_m(box, "to_mm")}, box.flag("cut", false)};
+      BoxShape shape{{read_point_m(box, "from_mm"), read_point_m(box, "to_mm")},
+                     box.flag("cut", false)};
       for (std::size_t d = 0; d < 3; ++d) {
         if (!(shape.box.low_m[d] < shape.box.high_m[d])) {
           box.problem("to_mm", "must be greater than from_mm in x, y and z");
@@ -235,7 +169,7 @@ class Reader {
   // ---------------------------------------------------------------- what holds
 
   void read_support(const TomlTable& table) {
-    SupportSpec support{read_region(table, "on"), {}};
+    SupportSpec support{read_region(table, "on", spec_.parts), {}};
     const auto directions = table.texts("directions", {"x", "y", "z"});
     if (directions.empty()) table.problem("directions", "must name at least one of x, y, z");
     for (const std::string& direction : directions) {
@@ -249,7 +183,7 @@ class Reader {
   }
 
   void read_spring(const TomlTable& table) {
-    spec_.springs.push_back({read_region(table, "on"), read_stiffness(table)});
+    spec_.springs.push_back({read_region(table, "on", spec_.parts), read_stiffness(table)});
     if (table.has("stiffness_N_per_um") && spec_.springs.back().stiffness_N_per_m == Vec3{}) {
       table.problem("stiffness_N_per_um", "must be above 0 in some direction");
     }
@@ -257,11 +191,14 @@ class Reader {
 
   void read_joint(const TomlTable& table) {
     JointSpec joint;
-    joint.name = unique_name(table, joint_names_);
-    joint.from = read_region(table, "from");
-    joint.to = read_region(table, "to");
+    joint.name = read_unique_name(table, joint_names_);
+    joint.from = read_region(table, "from", spec_.parts);
+    joint.to = read_region(table, "to", spec_.parts);
     joint.bonded = table.choice<bool>("kind", {{"bonded", true}, {"spring", false}}, true);
     if (!joint.bonded) joint.stiffness_N_per_m = read_stiffness(table);
+    if (table.has("conductance_W_per_m2_K")) {
+      joint.conductance_W_per_m2_K = table.number("conductance_W_per_m2_K", Range::between(0, 1e6));
+    }
     joint.gap_m = mm * table.number("gap_mm", Range::between(0, 100), 0.1);
     spec_.joints.push_back(std::move(joint));
   }
@@ -282,16 +219,16 @@ class Reader {
     block.rest = table.flag("rest", false);
     if (block.rest) {
       table.refuse("on", "a block of the rest takes what the others leave");
-      block.on.origin = origin(table, "rest", "true");
+      block.on.origin = origin_of(table, "rest", "true");
     } else {
-      block.on = read_region(table, "on");
+      block.on = read_region(table, "on", spec_.parts);
     }
     spec_.blocks.push_back(std::move(block));
   }
 
   /// Planes that cut a part: names in order, along x first, then y, then z.
   void read_division(const TomlTable& table) {
-    const Index part = index_of(table, "part", spec_.parts, "part");
+    const Index part = read_index(table, "part", names_of(spec_.parts), "part");
     std::array<std::vector<double>, 3> cuts;
     std::size_t count = 1;
     for (std::size_t d = 0; d < 3; ++d) {
@@ -312,7 +249,7 @@ class Reader {
       add_block_name(table, "names", names[i]);
       BlockSpec block{names[i], {}, false};
       block.on.part = part < spec_.parts.size() ? spec_.parts[part].name : "";
-      block.on.origin = origin(table, "names", names[i]);
+      block.on.origin = origin_of(table, "names", names[i]);
       std::size_t place = i;
       for (std::size_t d = 0; d < 3; ++d) {
         const std::size_t at = place % (cuts[d].size() + 1);
@@ -330,23 +267,23 @@ class Reader {
     const TomlTable table = parent.table(key);
     PlaceSpec place;
     place.sign = key == "work" ? -1.0 : 1.0;
-    place.part = index_of(table, "part", spec_.parts, "part");
+    place.part = read_index(table, "part", names_of(spec_.parts), "part");
     if (tilt) {
-      place.at_m = {point_m(table, "from_mm"), point_m(table, "to_mm")};
+      place.at_m = {read_point_m(table, "from_mm"), read_point_m(table, "to_mm")};
       if (table.has("to_mm") && !(length(place.at_m[1] - place.at_m[0]) > 0.0)) {
         table.problem("to_mm", "must be another point than from_mm");
       }
     } else {
-      place.at_m = {point_m(table, "at_mm")};
+      place.at_m = {read_point_m(table, "at_mm")};
     }
     place.tolerance_m = mm * table.number("tolerance_mm", Range::between(0, 100), 0.1);
-    place.origin = origin(parent, key);
+    place.origin = origin_of(parent, key);
     return place;
   }
 
   void read_output(const TomlTable& table) {
     OutputSpec output;
-    output.name = unique_name(table, output_names_);
+    output.name = read_unique_name(table, output_names_);
     if (!output.name.empty() && !is_output(output.name)) {
       table.problem("name", "must be a displacement (*_um) or a tilt (*_urad)");
     }
@@ -363,14 +300,14 @@ class Reader {
 
   void read_guideway(const TomlTable& table) {
     GuidewayRows guideway;
-    guideway.name = unique_name(table, guideway_names_);
+    guideway.name = read_unique_name(table, guideway_names_);
     guideway.axis = table.text("axis");
     if (!guideway.axis.empty() && kind_of(guideway.axis) != QuantityKind::position) {
       table.problem("axis", "must be a position, a column *_mm");
     }
-    const Index part = index_of(table, "part", spec_.parts, "part");
-    const Vec3 from_m = point_m(table, "from_mm");
-    const Vec3 to_m = point_m(table, "to_mm");
+    const Index part = read_index(table, "part", names_of(spec_.parts), "part");
+    const Vec3 from_m = read_point_m(table, "from_mm");
+    const Vec3 to_m = read_point_m(table, "to_mm");
     guideway.positions_mm = table.numbers("positions_mm", length_range());
     const std::vector<double>& at = guideway.positions_mm;
     if (table.has("positions_mm") &&
@@ -387,7 +324,7 @@ class Reader {
       place.at_m = {from_m + fraction * (to_m - from_m)};
       place.tolerance_m = tolerance_m;
       place.sign = tool ? 1.0 : -1.0;
-      place.origin = origin(table, "positions_mm", number_text(position));
+      place.origin = origin_of(table, "positions_mm", number_text(position));
       guideway.places.push_back(std::move(place));
     }
     const TomlTable outputs = table.table("outputs");

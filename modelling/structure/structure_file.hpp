@@ -60,6 +60,9 @@ struct JointSpec {
   bool bonded{true};
   Vec3 stiffness_N_per_m{};  ///< of the whole joint, where it is not bonded
   double gap_m{0.0};         ///< greatest distance between the faces
+  /// Heat through the faces; none: a bonded joint conducts as if it were not there, one by springs
+  /// not at all.
+  std::optional<double> conductance_W_per_m2_K;
 };
 
 /// Nodes whose temperature is one input of the model.
@@ -92,6 +95,37 @@ struct GuidewayRows {
   std::map<std::string, Vec3> outputs;  ///< name -> direction
 };
 
+/// Heat between faces and the air or the coolant.
+struct ConvectionSpec {
+  Region on;
+  double coefficient_W_per_m2_K{0.0};
+  bool to_coolant{false};
+};
+
+/// heat = heat_W (|signal| / at)^exponent into faces or, with `inside`, the volume.
+struct HeatSpec {
+  std::string name;
+  Region on;
+  bool inside{false};
+  double heat_W{0.0};
+  std::optional<std::string> signal;  ///< none: constant
+  double at{1.0};
+  double exponent{1.0};
+};
+
+/// One thermal analysis, from everything at the temperature of the room.
+struct LoadCaseSpec {
+  std::string name;
+  bool steady{false};
+  double duration_s{0.0};
+  double step_s{0.0};
+  std::vector<double> at_s;               ///< moments that count, increasing
+  std::map<std::string, double> signals;  ///< others are 0
+  double room_change_K{0.0};              ///< evenly over the duration
+  bool coolant_on{false};
+  bool left_out{false};  ///< judges a placement and takes no part in it
+};
+
 struct StructureSpec {
   std::filesystem::path file;
   std::vector<Material> materials;
@@ -102,6 +136,12 @@ struct StructureSpec {
   std::vector<BlockSpec> blocks;
   std::vector<OutputSpec> outputs;
   std::vector<GuidewayRows> guideways;
+  double room_degC{20.0};
+  double coolant_degC{20.0};
+  std::vector<ConvectionSpec> convections;
+  std::vector<HeatSpec> heats;
+  std::vector<LoadCaseSpec> load_cases;
+  bool sensors_on_surface{true};  ///< a sensor is screwed on, not cast in
 };
 
 /// @throws ConfigurationError with every problem of the file

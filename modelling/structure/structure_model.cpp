@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
+#include <optional>
 
 #include "config/number_text.hpp"
 #include "modelling/structure/file_mesh.hpp"
+#include "modelling/structure/joints.hpp"
 #include "modelling/structure/locate.hpp"
 
 namespace thermocomp::structure {
 namespace {
 
 constexpr std::size_t inverted_shown_max = 10;
-constexpr double weight_least = 1e-12;
 constexpr double m_to_mm = 1e3;
 
 std::string place_text(const Vec3& point_m) {
@@ -31,20 +31,18 @@ class Builder {
 
   Structure build() {
     read_meshes();
-    tolerance_m_ = coincidence_m(mesh_);
-    surface_ = surface_of(mesh_);
+    finder_.emplace(mesh_, spec_.file.string());
     progress_("supports, joints, blocks and outputs");
     Structure structure{{}, {}, Reduction(node_count(), 3), {}, {}, {}, {}};
     for (const PartSpec& part : spec_.parts) {
       structure.material_of_part.push_back(spec_.materials[part.material]);
-      part_has_.push_back(nodes_of_part(mesh_, static_cast<Index>(part_has_.size())));
     }
     for (const SupportSpec& support : spec_.supports) hold(support, structure.reduction);
     for (const SpringSpec& spring : spec_.springs) add_spring(spring, structure.springs);
     for (const JointSpec& joint : spec_.joints) add_joint(joint, structure);
     assign_blocks(structure);
     add_rows(structure);
-    throw_problems();
+    finder_->throw_problems();
     structure.reduction.finish();
     for (const std::string& line : free_motions(mesh_, structure.reduction, structure.springs)) {
       problems_.push_back(
@@ -118,160 +116,38 @@ class Builder {
     return part.mesh.extension() == ".inp" ? read_inp(part.mesh) : read_msh(part.mesh);
   }
 
-  // ---------------------------------------------------------------- regions
-
-  [[nodiscard]] bool inside(const Region& region, Index node) const {
-    for (std::size_t d = 0; d < 3; ++d) {
-      const double at = mesh_.nodes_m[node][d];
-      if (!(at >= region.within_m.low_m[d] - tolerance_m_ &&
-            at <= region.within_m.high_m[d] + tolerance_m_)) {
-        return false;
-      }
-    }
-    return !region.part || part_has_[part_index(*region.part)][node];
-  }
-
-  [[nodiscard]] Index part_index(const std::string& name) const {
-    const auto found = std::find(mesh_.part_names.begin(), mesh_.part_names.end(), name);
-    return static_cast<Index>(found - mesh_.part_names.begin());
-  }
-
-  /// The groups of that name, of the region's part or of all; a problem where there is none.
-  std::vector<const Group*> groups_of(const Region& region) {
-    std::vector<const Group*> found;
-    std::set<std::string> known;
-    for (Index part = 0; part < mesh_.groups.size(); ++part) {
-      if (region.part && part != part_index(*region.part)) continue;
-      for (const auto& [name, group] : mesh_.groups[part]) {
-        known.insert(name);
-        if (name == *region.group) found.push_back(&group);
-      }
-    }
-    if (found.empty()) {
-      std::string rule = "there is no group \"" + *region.group + "\" in the mesh; there are:";
-      for (const std::string& name : known) rule.append(" ").append(name);
-      problem(region.origin, known.empty() ? rule + " none" : rule);
-    }
-    return found;
-  }
-
-  std::vector<Index> nodes_in(const Region& region) {
-    std::vector<bool> chosen(mesh_.nodes_m.size(), !region.group);
-    if (region.group) {
-      const auto groups = groups_of(region);
-      if (groups.empty()) return {};
-      for (const Group* group : groups) {
-        for (const Index node : group->nodes) chosen[node] = true;
-      }
-    }
-    std::vector<Index> nodes;
-    for (Index node = 0; node < chosen.size(); ++node) {
-      if (chosen[node] && inside(region, node)) nodes.push_back(node);
-    }
-    if (nodes.empty()) problem(region.origin, "no node of the mesh is there");
-    return nodes;
-  }
-
-  std::vector<Face> faces_in(const Region& region) {
-    std::vector<Face> candidates;
-    std::vector<bool> chosen(mesh_.nodes_m.size(), true);
-    if (region.group) {
-      const auto groups = groups_of(region);
-      if (groups.empty()) return {};
-      chosen.assign(chosen.size(), false);
-      for (const Group* group : groups) {
-        candidates.insert(candidates.end(), group->faces.begin(), group->faces.end());
-        for (const Index node : group->nodes) chosen[node] = true;
-      }
-    }
-    if (candidates.empty()) candidates = surface_;
-    std::erase_if(candidates, [&](const Face& face) {
-      const auto nodes = nodes_of(face);
-      return !std::all_of(nodes.begin(), nodes.end(),
-                          [&](Index node) { return chosen[node] && inside(region, node); });
-    });
-    if (candidates.empty()) problem(region.origin, "no face of the mesh's surface is there");
-    return candidates;
-  }
-
   // ---------------------------------------------------------------- what holds
 
   void hold(const SupportSpec& support, Reduction& reduction) {
-    for (const Index node : nodes_in(support.on)) {
+    for (const Index node : finder_->nodes_in(support.on)) {
       for (Index c = 0; c < 3; ++c) {
         if (support.directions[c]) reduction.hold(node, c);
       }
     }
   }
 
-  /// One coupling a quadrature point of the faces, as strong as its share of the area.
-  /// `complete` adds what the point is coupled to; false: the point is left out.
-  template <class Complete>
-  void add_couplings(const std::vector<Face>& faces, const Vec3& total,
-                     std::vector<Coupling>& couplings, const Complete& complete) {
-    const std::size_t first = couplings.size();
-    double area_m2 = 0.0;
-    for (const Face& face : faces) {
-      const auto nodes = nodes_of(face);
-      const NodeCoordinates at = coordinates_of(mesh_, nodes);
-      for (const RulePoint& point : shape_info(face.shape).product_rule) {
-        Coupling coupling;
-        coupling.add(nodes, point.at.n, 1.0);
-        Vec3 place{};
-        for (std::size_t i = 0; i < nodes.size(); ++i) place = place + point.at.n[i] * at[i];
-        if (!complete(place, coupling)) continue;
-        const double share_m2 = length(area_vector_at({at.data(), nodes.size()}, point));
-        coupling.strength = share_m2 * total;
-        area_m2 += share_m2;
-        couplings.push_back(coupling);
-      }
-    }
-    for (std::size_t i = first; i < couplings.size(); ++i) {
-      couplings[i].strength = (1.0 / area_m2) * couplings[i].strength;
-    }
-  }
-
   void add_spring(const SpringSpec& spring, std::vector<Coupling>& couplings) {
-    add_couplings(faces_in(spring.on), spring.stiffness_N_per_m, couplings,
-                  [](const Vec3&, Coupling&) { return true; });
+    append_shared(couplings_on(mesh_, finder_->faces_in(spring.on)), spring.stiffness_N_per_m,
+                  couplings);
   }
 
   void add_joint(const JointSpec& joint, Structure& structure) {
-    const std::vector<Face> from = faces_in(joint.from);
-    const std::vector<Face> to = faces_in(joint.to);
-    if (from.empty() || to.empty()) return;  // a problem already
-    const FaceSearch search(mesh_, to);
-    const double gap_m = joint.gap_m + tolerance_m_;
-    std::size_t met = 0;
     if (joint.bonded) {
-      std::set<Index> nodes;
-      for (const Face& face : from) {
-        const auto its = nodes_of(face);
-        nodes.insert(its.begin(), its.end());
-      }
-      for (const Index node : nodes) {
-        auto found = search.nearest(mesh_.nodes_m[node], gap_m);
-        if (!found) continue;
-        std::erase_if(found->nodes,
-                      [](const Weighted& w) { return std::fabs(w.weight) < weight_least; });
-        static_cast<void>(structure.reduction.tie(node, found->nodes));
-        ++met;
-      }
+      tie_faces(*finder_, mesh_, joint, structure.reduction);
     } else {
-      add_couplings(from, joint.stiffness_N_per_m, structure.springs,
-                    [&](const Vec3& place, Coupling& coupling) {
-                      const auto found = search.nearest(place, gap_m);
-                      if (!found) return false;
-                      for (const Weighted& other : found->nodes) {
-                        coupling.add({&other.node, 1}, {&other.weight, 1}, -1.0);
-                      }
-                      ++met;
-                      return true;
-                    });
+      append_shared(couplings_between(*finder_, mesh_, joint), joint.stiffness_N_per_m,
+                    structure.springs);
     }
-    if (met == 0) {
-      problem(joint.from.origin,
-              "the faces of joint " + joint.name + " are nowhere nearer to each other than gap_mm");
+  }
+
+  /// Shares `total` out over couplings that are as strong as their area.
+  static void append_shared(std::vector<Coupling> shares, const Vec3& total,
+                            std::vector<Coupling>& couplings) {
+    double area_m2 = 0.0;
+    for (const Coupling& share : shares) area_m2 += share.strength[0];
+    for (Coupling& share : shares) {
+      share.strength = (share.strength[0] / area_m2) * total;
+      couplings.push_back(share);
     }
   }
 
@@ -283,27 +159,29 @@ class Builder {
     for (const bool rest : {false, true}) {
       for (Index block = 0; block < spec_.blocks.size(); ++block) {
         if (spec_.blocks[block].rest != rest) continue;
-        const auto nodes = rest ? every_node() : nodes_in(spec_.blocks[block].on);
+        const auto nodes = rest ? every_node() : finder_->nodes_in(spec_.blocks[block].on);
         for (const Index node : nodes) {
           if (structure.block_of_node[node] != no_part) continue;
           structure.block_of_node[node] = block;
           ++count[block];
         }
         if (count[block] == 0 && !nodes.empty()) {
-          problem(spec_.blocks[block].on.origin, "block " + spec_.blocks[block].name +
-                                                     " has no nodes: earlier blocks have them all");
+          finder_->problem(
+              spec_.blocks[block].on.origin,
+              "block " + spec_.blocks[block].name + " has no nodes: earlier blocks have them all");
         }
       }
     }
     for (const BlockSpec& block : spec_.blocks) structure.block_names.push_back(block.name);
     const auto& blocks = structure.block_of_node;
     const auto left = std::count(blocks.begin(), blocks.end(), no_part);
-    if (left == 0 || !problems_.empty()) return;
+    if (left == 0 || finder_->has_problems()) return;
     const auto first = static_cast<Index>(
         std::distance(blocks.begin(), std::find(blocks.begin(), blocks.end(), no_part)));
-    problem({0, "block", ""}, std::to_string(left) + " nodes are in no block, the first at " +
-                                  place_text(mesh_.nodes_m[first]) +
-                                  "; a block with rest = true takes them");
+    finder_->problem({0, "block", ""}, std::to_string(left) +
+                                           " nodes are in no block, the first at " +
+                                           place_text(mesh_.nodes_m[first]) +
+                                           "; a block with rest = true takes them");
   }
 
   [[nodiscard]] std::vector<Index> every_node() const {
@@ -318,12 +196,12 @@ class Builder {
     const bool tilt = place.at_m.size() == 2;
     const double scale = place.sign / (tilt ? length(place.at_m[1] - place.at_m[0]) : 1.0);
     for (std::size_t i = 0; i < place.at_m.size(); ++i) {
-      const auto found =
-          locate_in_part(mesh_, place.part, place.at_m[i], place.tolerance_m + tolerance_m_);
+      const auto found = locate_in_part(mesh_, place.part, place.at_m[i],
+                                        place.tolerance_m + finder_->tolerance_m());
       if (!found) {
-        problem(place.origin, "the point " + place_text(place.at_m[i]) + " is outside part " +
-                                  mesh_.part_names[place.part] +
-                                  ", further away than tolerance_mm");
+        finder_->problem(place.origin, "the point " + place_text(place.at_m[i]) +
+                                           " is outside part " + mesh_.part_names[place.part] +
+                                           ", further away than tolerance_mm");
         continue;
       }
       row.add(found->nodes, (tilt && i == 0 ? -scale : scale) * direction);
@@ -347,9 +225,7 @@ class Builder {
   const StructureSpec& spec_;
   const Progress& progress_;
   Mesh mesh_;
-  std::vector<Face> surface_;
-  std::vector<std::vector<bool>> part_has_;
-  double tolerance_m_{0.0};
+  std::optional<RegionFinder> finder_;  ///< from when the mesh is there
   std::vector<Problem> problems_;
 };
 

@@ -1,0 +1,42 @@
+/// Heat conduction of a whole structure, as its file describes it, and its load cases.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "modelling/structure/conduction.hpp"
+#include "modelling/structure/structure_model.hpp"
+
+namespace thermocomp::structure {
+
+/// Everything that conducts and carries heat, bound to a structure's mesh.
+struct HeatModel {
+  Reduction reduction;               ///< bonded joints
+  std::vector<Coupling> dry;         ///< contacts and convection to the room
+  std::vector<Coupling> flooded;     ///< the same and convection to the coolant
+  std::vector<double> room_W_per_K;  ///< heat a kelvin of the room's air brings in, shape (nodes)
+  std::vector<double> coolant_W_per_K;  ///< the same of the coolant
+  /// For each [[heat]] how it spreads over the nodes, adding up to 1. Shape (heats)(nodes).
+  std::vector<std::vector<double>> shares;
+};
+
+/// @throws ConfigurationError: regions without faces or nodes, parts that no heat can leave
+[[nodiscard]] HeatModel build_heat_model(const StructureSpec& spec, const Structure& structure);
+
+/// A temperature field of a load case: the rise of every node since the start [K].
+struct RiseField {
+  std::size_t load_case{0};  ///< in the spec
+  double time_s{0.0};
+  std::vector<double> rise_K;
+};
+
+/// Runs the load cases, each from everything at the temperature of the room.
+[[nodiscard]] std::vector<RiseField> run_load_cases(const StructureSpec& spec,
+                                                    const Structure& structure,
+                                                    const HeatModel& heat,
+                                                    const Progress& progress);
+
+/// Heat of a source where its signal has a value [W].
+[[nodiscard]] double heat_W(const HeatSpec& heat, double signal);
+
+}  // namespace thermocomp::structure

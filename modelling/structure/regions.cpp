@@ -1,0 +1,100 @@
+#include "modelling/structure/regions.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace thermocomp::structure {
+
+RegionFinder::RegionFinder(const Mesh& mesh, std::string file)
+    : mesh_(mesh),
+      file_(std::move(file)),
+      tolerance_m_(coincidence_m(mesh)),
+      surface_(surface_of(mesh)) {
+  for (Index part = 0; part < mesh.part_names.size(); ++part) {
+    part_has_.push_back(nodes_of_part(mesh, part));
+  }
+}
+
+void RegionFinder::problem(const Origin& origin, std::string rule) {
+  problems_.push_back({file_, origin.line, origin.key, origin.value, std::move(rule)});
+}
+
+void RegionFinder::throw_problems() {
+  if (!problems_.empty()) throw ConfigurationError(std::move(problems_));
+}
+
+bool RegionFinder::inside(const Region& region, Index node) const {
+  for (std::size_t d = 0; d < 3; ++d) {
+    const double at = mesh_.nodes_m[node][d];
+    if (!(at >= region.within_m.low_m[d] - tolerance_m_ &&
+          at <= region.within_m.high_m[d] + tolerance_m_)) {
+      return false;
+    }
+  }
+  return !region.part || part_has_[part_index(*region.part)][node];
+}
+
+Index RegionFinder::part_index(const std::string& name) const {
+  const auto found = std::find(mesh_.part_names.begin(), mesh_.part_names.end(), name);
+  return static_cast<Index>(found - mesh_.part_names.begin());
+}
+
+// The groups of that name, of the region's part or of all; a problem where there is none.
+std::vector<const Group*> RegionFinder::groups_of(const Region& region) {
+  std::vector<const Group*> found;
+  std::set<std::string> known;
+  for (Index part = 0; part < mesh_.groups.size(); ++part) {
+    if (region.part && part != part_index(*region.part)) continue;
+    for (const auto& [name, group] : mesh_.groups[part]) {
+      known.insert(name);
+      if (name == *region.group) found.push_back(&group);
+    }
+  }
+  if (found.empty()) {
+    std::string rule = "there is no group \"" + *region.group + "\" in the mesh; there are:";
+    for (const std::string& name : known) rule.append(" ").append(name);
+    problem(region.origin, known.empty() ? rule + " none" : rule);
+  }
+  return found;
+}
+
+std::vector<Index> RegionFinder::nodes_in(const Region& region) {
+  std::vector<bool> chosen(mesh_.nodes_m.size(), !region.group);
+  if (region.group) {
+    const auto groups = groups_of(region);
+    if (groups.empty()) return {};
+    for (const Group* group : groups) {
+      for (const Index node : group->nodes) chosen[node] = true;
+    }
+  }
+  std::vector<Index> nodes;
+  for (Index node = 0; node < chosen.size(); ++node) {
+    if (chosen[node] && inside(region, node)) nodes.push_back(node);
+  }
+  if (nodes.empty()) problem(region.origin, "no node of the mesh is there");
+  return nodes;
+}
+
+std::vector<Face> RegionFinder::faces_in(const Region& region) {
+  std::vector<Face> candidates;
+  std::vector<bool> chosen(mesh_.nodes_m.size(), true);
+  if (region.group) {
+    const auto groups = groups_of(region);
+    if (groups.empty()) return {};
+    chosen.assign(chosen.size(), false);
+    for (const Group* group : groups) {
+      candidates.insert(candidates.end(), group->faces.begin(), group->faces.end());
+      for (const Index node : group->nodes) chosen[node] = true;
+    }
+  }
+  if (candidates.empty()) candidates = surface_;
+  std::erase_if(candidates, [&](const Face& face) {
+    const auto nodes = nodes_of(face);
+    return !std::all_of(nodes.begin(), nodes.end(),
+                        [&](Index node) { return chosen[node] && inside(region, node); });
+  });
+  if (candidates.empty()) problem(region.origin, "no face of the mesh's surface is there");
+  return candidates;
+}
+
+}  // namespace thermocomp::structure

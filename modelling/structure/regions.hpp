@@ -1,0 +1,69 @@
+/// Regions of the structure file on a mesh: nodes, faces, and couplings over faces.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "modelling/structure/matrices.hpp"
+#include "modelling/structure/structure_file.hpp"
+
+namespace thermocomp::structure {
+
+/// Finds what regions mean; what cannot be found is collected as problems.
+class RegionFinder {
+ public:
+  /// @pre the mesh outlives this
+  RegionFinder(const Mesh& mesh, std::string file);
+
+  [[nodiscard]] std::vector<Index> nodes_in(const Region& region);
+  /// Whole faces of the group, or of the surface.
+  [[nodiscard]] std::vector<Face> faces_in(const Region& region);
+  [[nodiscard]] const std::vector<Face>& surface() const noexcept { return surface_; }
+  [[nodiscard]] double tolerance_m() const noexcept { return tolerance_m_; }
+
+  void problem(const Origin& origin, std::string rule);
+  [[nodiscard]] bool has_problems() const noexcept { return !problems_.empty(); }
+  /// @throws ConfigurationError where there are problems
+  void throw_problems();
+
+ private:
+  [[nodiscard]] bool inside(const Region& region, Index node) const;
+  [[nodiscard]] Index part_index(const std::string& name) const;
+  [[nodiscard]] std::vector<const Group*> groups_of(const Region& region);
+
+  const Mesh& mesh_;
+  std::string file_;
+  double tolerance_m_;
+  std::vector<Face> surface_;
+  std::vector<std::vector<bool>> part_has_;
+  std::vector<Problem> problems_;
+};
+
+/// One coupling a quadrature point of the faces, as strong as its share of the area [m^2].
+/// `complete(place_m, coupling)` adds what the point is coupled to; false: the point is left out.
+template <class Complete>
+[[nodiscard]] std::vector<Coupling> couplings_on(const Mesh& mesh, const std::vector<Face>& faces,
+                                                 const Complete& complete) {
+  std::vector<Coupling> couplings;
+  for (const Face& face : faces) {
+    const auto nodes = nodes_of(face);
+    const NodeCoordinates at = coordinates_of(mesh, nodes);
+    for (const RulePoint& point : shape_info(face.shape).product_rule) {
+      Coupling coupling;
+      coupling.add(nodes, point.at.n, 1.0);
+      Vec3 place{};
+      for (std::size_t i = 0; i < nodes.size(); ++i) place = place + point.at.n[i] * at[i];
+      if (!complete(place, coupling)) continue;
+      coupling.strength.fill(length(area_vector_at({at.data(), nodes.size()}, point)));
+      couplings.push_back(coupling);
+    }
+  }
+  return couplings;
+}
+
+[[nodiscard]] inline std::vector<Coupling> couplings_on(const Mesh& mesh,
+                                                        const std::vector<Face>& faces) {
+  return couplings_on(mesh, faces, [](const Vec3&, Coupling&) { return true; });
+}
+
+}  // namespace thermocomp::structure
