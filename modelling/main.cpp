@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <stdexcept>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
@@ -31,12 +33,24 @@ void add_structure(CLI::App& app, std::function<int()>& action) {
 #endif
 }
 
+/// A subcommand that `thermocomp` may know and this build does not.
+void refuse_unknown(const CLI::App& app, const std::string& name) {
+  if (name.front() == '-') return;  // an option
+  std::string known;
+  for (const CLI::App* sub : app.get_subcommands({})) {
+    if (sub->get_name() == name) return;
+    known.append(known.empty() ? "" : ", ").append(sub->get_name());
+  }
+  throw std::runtime_error("thermocomp-modelling has no command '" + name + "'; it has " + known);
+}
+
 int run(int argc, char** argv) {
   CLI::App app("thermocomp-modelling: what leads to a model, and what a model gets wrong");
   app.require_subcommand(1);
   std::function<int()> action;
   thermocomp::diagnosis::add_diagnose_command(app, action);
   add_structure(app, action);
+  if (argc > 1 && *argv[1] != '\0') refuse_unknown(app, argv[1]);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -13,9 +13,9 @@ SOURCE = pathlib.Path(os.environ["THERMOCOMP_SOURCE"])
 PROGRAM = os.environ["THERMOCOMP"]
 
 
-def run(*arguments, env=None, **options):
+def run(*arguments, program=PROGRAM, env=None, **options):
     """Runs thermocomp; the answer has returncode, stdout and stderr."""
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True,
+    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True,
                           timeout=120, env={**os.environ, **(env or {})}, **options)
 
 

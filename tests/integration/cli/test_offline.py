@@ -2,10 +2,11 @@
 import csv
 import os
 import pathlib
+import shutil
 import stat
 
 import pytest
-from conftest import SOURCE, run
+from conftest import PROGRAM, SOURCE, run
 
 DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
 EXAMPLES = SOURCE / "config" / "examples"
@@ -139,17 +140,24 @@ def test_what_is_no_history_is_refused(tmp_path, command):
     assert not (tmp_path / "out.csv").exists()
 
 
-def test_modelling_commands_say_which_package_is_missing(tmp_path):
-    answer = run("fit", "run.csv", "--outputs", "z_um", env={"PATH": str(tmp_path)})
+@pytest.fixture
+def alone(tmp_path):
+    """The program where thermocomp-modelling does not lie beside it."""
+    (tmp_path / "bin").mkdir()
+    return shutil.copy(PROGRAM, tmp_path / "bin")
+
+
+def test_modelling_commands_say_which_package_is_missing(alone, tmp_path):
+    answer = run("fit", "run.csv", "--outputs", "z_um", program=alone, env={"PATH": str(tmp_path)})
     assert answer.returncode == 2
     assert answer.stderr.count("\n") == 1 and "thermocomp-modelling" in answer.stderr
 
 
-def test_modelling_commands_hand_everything_to_the_other_program(tmp_path):
+def test_modelling_commands_hand_everything_to_the_other_program(alone, tmp_path):
     other = tmp_path / "thermocomp-modelling"
     other.write_text('#!/bin/sh\necho "$@"\nexit 1\n')
     other.chmod(other.stat().st_mode | stat.S_IXUSR)
-    answer = run("diagnose", "--model", "m.toml", "--help", "-o", "x",
+    answer = run("diagnose", "--model", "m.toml", "--help", "-o", "x", program=alone,
                  env={"PATH": f"{tmp_path}:/bin"})
     assert answer.stdout.strip() == "diagnose --model m.toml --help -o x"
     assert answer.returncode == 1

@@ -16,7 +16,8 @@ namespace thermocomp::test {
 template <class Link>
 class Cycle {
  public:
-  explicit Cycle(Link& link) : link_(link), thread_([this] { run(); }) {}
+  explicit Cycle(Link& link, std::uint32_t epoch = 0)
+      : fixed_epoch(epoch), link_(link), thread_([this] { run(); }) {}
   Cycle(const Cycle&) = delete;
   Cycle& operator=(const Cycle&) = delete;
   ~Cycle() {
@@ -36,7 +37,7 @@ class Cycle {
   /// Stops offering (a hung cycle), while the state is still taken.
   std::atomic<bool> hung{false};
   /// Commands keep this epoch instead of the newest; 0: the newest.
-  std::atomic<std::uint32_t> fixed_epoch{0};
+  std::atomic<std::uint32_t> fixed_epoch;
 
  private:
   void run() {

@@ -186,8 +186,7 @@ TEST_CASE("nothing is written without a command of this epoch, not even a heartb
   ModbusMachine machine;
   ModbusController link(three_axes(machine.port()));
   link.start();
-  Cycle cycle(link);
-  cycle.fixed_epoch = 4711;
+  Cycle cycle(link, 4711);
   cycle.want(0, 5.0);
   const int reads = machine.reads;
   REQUIRE(eventually([&] { return machine.reads > reads + 20; }));
