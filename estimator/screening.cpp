@@ -22,10 +22,10 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
     if (verdict_ != Fault::never_read) ++rejected_;
     return false;
   }
-  confirmed_ = has_good_;
-  good_degC_ = reading.temp_degC;
-  good_at_ = reading.taken_at;
-  has_good_ = true;
+  confirmed_ = is_recent(good_, reading) || is_recent(doubted_, reading);
+  before_ = good_;
+  good_ = {true, reading.temp_degC, reading.taken_at};
+  doubted_ = {};
   return true;
 }
 
@@ -37,36 +37,55 @@ Fault Screening::judge(nanoseconds now, const Reading& reading) noexcept {
   // A time far ahead is as useless as an old one: it would make every later reading look old.
   if (!(reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_))
     return Fault::stale;
-  if (!has_good_) {
+  if (!good_.known && !doubted_.known) {
     same_since_ = reading.taken_at;
     return Fault::none;
   }
   // A reading from before the last good one came late or doubled; it says nothing new.
-  if (reading.taken_at <= good_at_) return Fault::stale;
-  const double change_K = std::abs(reading.temp_degC - good_degC_);
-  // The longer ago the last good reading, the more may have changed: a true step is believed
-  // as soon as the structure could have made it.
-  const auto elapsed_ns = static_cast<double>((reading.taken_at - good_at_).count());
-  if (!(change_K <= rate_K_per_ns_ * elapsed_ns + allowance_K_)) {
-    // Of two values that contradict each other the first may be the false one: while no second one
-    // has agreed with it, neither is believed.
-    if (!confirmed_) has_good_ = false;
+  if (good_.known && reading.taken_at <= good_.at) return Fault::stale;
+  if (doubted_.known && reading.taken_at <= doubted_.at) return Fault::stale;
+  if (!(follows(good_, reading) && follows(doubted_, reading))) {
+    if (!confirmed_ || doubted_.known) doubt(reading);
     return Fault::too_fast;
   }
-  if (change_K > 0) same_since_ = reading.taken_at;
+  if (!good_.known || reading.temp_degC != good_.temp_degC) same_since_ = reading.taken_at;
   if (stuck_after_ > nanoseconds{0} && reading.taken_at - same_since_ > stuck_after_)
     return Fault::stuck;
   return Fault::none;
+}
+
+/// Whether the structure can have come from the value to the reading; from nothing it can. The
+/// longer ago the value, the more may have changed: a true step is believed as soon as the
+/// structure could have made it.
+bool Screening::follows(const Value& value, const Reading& reading) const noexcept {
+  if (!value.known) return true;
+  const double change_K = std::abs(reading.temp_degC - value.temp_degC);
+  const auto elapsed_ns = static_cast<double>((reading.taken_at - value.at).count());
+  return change_K <= rate_K_per_ns_ * elapsed_ns + allowance_K_;
+}
+
+bool Screening::is_recent(const Value& value, const Reading& reading) const noexcept {
+  return value.known && reading.taken_at - value.at <= stale_after_;
+}
+
+/// Of two values that contradict each other the first may be the false one.
+void Screening::doubt(const Reading& reading) noexcept {
+  if (!confirmed_) {
+    good_ = before_;
+    before_ = {};
+    confirmed_ = true;
+  }
+  doubted_ = {true, reading.temp_degC, reading.taken_at};
 }
 
 void Screening::adopt(const Screening& previous) noexcept {
   seen_at_ = previous.seen_at_;
   seen_fault_ = previous.seen_fault_;
   verdict_ = previous.verdict_;
-  has_good_ = previous.has_good_;
+  good_ = previous.good_;
+  before_ = previous.before_;
+  doubted_ = previous.doubted_;
   confirmed_ = previous.confirmed_;
-  good_degC_ = previous.good_degC_;
-  good_at_ = previous.good_at_;
   same_since_ = previous.same_since_;
   rejected_ = previous.rejected_;
 }

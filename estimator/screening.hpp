@@ -9,6 +9,10 @@ namespace thermocomp {
 
 /// Judges one sensor's readings, each once, when it is new. A refused reading is as good as none:
 /// the last good one serves until it is stale.
+///
+/// The first value after the start or an outage has little to be compared with, so it may be the
+/// false one when the next contradicts it. Then neither is believed, and it takes two in a row that
+/// agree with each other (and with the last good one before the outage).
 class Screening {
  public:
   explicit Screening(const ScreeningConfig& config);
@@ -22,28 +26,38 @@ class Screening {
 
   /// Whether the last good reading may still be used at `now`.
   [[nodiscard]] bool usable(nanoseconds now) const noexcept {
-    return has_good_ && now - good_at_ <= stale_after_;
+    return good_.known && now - good_.at <= stale_after_;
   }
   /// Why the newest reading is not good: none while it is good and fresh.
   [[nodiscard]] Fault fault(nanoseconds now) const noexcept {
     if (verdict_ != Fault::none) return verdict_;
-    return now - good_at_ > stale_after_ ? Fault::stale : Fault::none;
+    return now - good_.at > stale_after_ ? Fault::stale : Fault::none;
   }
-  [[nodiscard]] double good_degC() const noexcept { return good_degC_; }
-  [[nodiscard]] nanoseconds good_at() const noexcept { return good_at_; }
+  [[nodiscard]] double good_degC() const noexcept { return good_.temp_degC; }
+  [[nodiscard]] nanoseconds good_at() const noexcept { return good_.at; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }
 
   /// After a reload: the past of the other, the rules of this one.
   void adopt(const Screening& previous) noexcept;
 
   void visit_state(StateArchive& archive) {
-    archive(seen_at_, seen_fault_, verdict_, has_good_, confirmed_, good_degC_, good_at_,
-            same_since_, rejected_);
+    archive(seen_at_, seen_fault_, verdict_, good_, before_, doubted_, confirmed_, same_since_,
+            rejected_);
   }
 
  private:
+  struct Value {
+    bool known{false};
+    double temp_degC{0.0};
+    nanoseconds at{};
+    void visit_state(StateArchive& archive) { archive(known, temp_degC, at); }
+  };
+
   [[nodiscard]] bool take(nanoseconds now, const Reading& reading) noexcept;
   [[nodiscard]] Fault judge(nanoseconds now, const Reading& reading) noexcept;
+  [[nodiscard]] bool follows(const Value& value, const Reading& reading) const noexcept;
+  [[nodiscard]] bool is_recent(const Value& value, const Reading& reading) const noexcept;
+  void doubt(const Reading& reading) noexcept;
 
   double min_degC_;
   double max_degC_;
@@ -55,11 +69,11 @@ class Screening {
   nanoseconds seen_at_{};
   Fault seen_fault_{Fault::never_read};
   Fault verdict_{Fault::never_read};
-  bool has_good_{false};
-  bool confirmed_{false};  ///< more than one reading has been good since the start
-  double good_degC_{0.0};
-  nanoseconds good_at_{};
-  nanoseconds same_since_{};  ///< since when good_degC_ has not changed by one bit
+  Value good_;                ///< the last good one
+  Value before_;              ///< the last good one before good_, while good_ is not confirmed
+  Value doubted_;             ///< known: the next good one must agree with it
+  bool confirmed_{false};     ///< a recent one agreed with good_
+  nanoseconds same_since_{};  ///< since when good_ has not changed by one bit
   std::uint64_t rejected_{0};
 };
 

@@ -126,6 +126,7 @@ TEST_CASE("a reading that comes out of order says nothing new", "[screening]") {
 TEST_CASE("a change faster than the structure can is refused; the allowance is on top",
           "[screening]") {
   Screening screening(plain());
+  look(screening, 0s, 20.0);
   look(screening, 1s, 20.0);
   CHECK_FALSE(look(screening, 2s, 21.51));
   CHECK(screening.fault(2s) == Fault::too_fast);
@@ -160,6 +161,33 @@ TEST_CASE("a first value that the second one contradicts does not outvote all la
   CHECK_FALSE(look(screening, 4s, 95.0));
   CHECK(screening.usable(4s));  // now the old one stands
   CHECK(screening.good_degC() == 20.0);
+}
+
+TEST_CASE("a false value after an outage does not outvote the ones that follow", "[screening]") {
+  Screening screening(plain());
+  look(screening, 0s, 20.0);
+  look(screening, 1s, 20.0);
+  CHECK(look(screening, 200s, 80.0));  // so long after the last one it could be
+  CHECK_FALSE(look(screening, 201s, 20.5));
+  CHECK_FALSE(screening.usable(201s));
+  CHECK_FALSE(look(screening, 202s, 85.0));  // nor is one believed that nothing agrees with
+  CHECK_FALSE(look(screening, 203s, 20.5));
+  CHECK(look(screening, 204s, 20.5));
+  CHECK(screening.usable(204s));
+  CHECK_FALSE(look(screening, 205s, 80.0));
+  CHECK(screening.good_degC() == 20.5);
+  CHECK(screening.rejected() == 4);
+}
+
+TEST_CASE("a true step during an outage is believed with its second reading", "[screening]") {
+  Screening screening(plain());
+  look(screening, 0s, 20.0);
+  look(screening, 1s, 20.0);
+  CHECK(look(screening, 200s, 80.0));
+  CHECK(look(screening, 201s, 80.0));
+  CHECK_FALSE(look(screening, 202s, 20.0));
+  CHECK(screening.usable(202s));
+  CHECK(screening.good_degC() == 80.0);
 }
 
 TEST_CASE("the very same value for too long is a fault until it moves", "[screening]") {
