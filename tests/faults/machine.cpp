@@ -53,9 +53,10 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
     sample.temp_degC += (drift->strength - 0.5) * 0.05 * seconds_of(at - drift->begin);
   const FaultEvent* spikes = schedule_.find(FaultKind::sensor_spiking, at, sensor, sensors_count);
   if (spikes != nullptr && at >= spikes_from_ && noise % 3 == 0) {
-    // Each of another height: two that agree would be a step, not spikes.
-    sample.temp_degC +=
-        (spikes->strength < 0.5 ? 55.0 : 300.0) + 0.4 * static_cast<double>(noise % 100);
+    // Each of another height than the ones near it: two that agree would be a step, not spikes.
+    sample.temp_degC += (spikes->strength < 0.5 ? 55.0 : 300.0) +
+                        3.0 * static_cast<double>(conversion % 13) +
+                        0.01 * static_cast<double>(noise % 100);
     sample.impossible = true;
   }
   sample.good = schedule_.find(FaultKind::sensor_open, time, sensor, sensors_count) == nullptr &&

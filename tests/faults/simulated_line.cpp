@@ -10,6 +10,10 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t head_bytes = 7;  // of a TCP frame
 
+/// Faults together make no answer later than the drivers say they can tell from a new one on a
+/// serial line (LateAnswers::lateness_max).
+constexpr nanoseconds lateness_max = milliseconds(2900);
+
 std::uint16_t word_of(std::span<const std::uint8_t> bytes, std::size_t at) {
   return static_cast<std::uint16_t>((bytes[at] << 8) | bytes[at + 1]);
 }
@@ -159,6 +163,7 @@ void SimulatedLine::spoil(Frame& frame) {
 }
 
 void SimulatedLine::deliver(Frame frame) {
+  frame.arrives_at = std::min(frame.arrives_at, clock_ + lateness_max);
   const auto later = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& other) {
     return other.arrives_at > frame.arrives_at;
   });
