@@ -139,7 +139,7 @@ void take_seal(std::vector<std::byte>& bytes) {
   add_seal(state);
   if (state != bytes)
     throw HistoryError("damaged: the estimator's state does not fit its checksum");
-  bytes.resize(bytes.size() - seal_bytes);
+  bytes.erase(bytes.end() - seal_bytes, bytes.end());
 }
 
 std::vector<std::byte> encode_inputs(std::span<const Reading> readings,
