@@ -211,8 +211,8 @@ void CanController::receive() {
   {
     const std::scoped_lock lock(health_mutex_);
     health_.reads += frames.size();
-    health_.last_error = socket_.error();
   }
+  tell_error();
   if (!gate_.in_sync()) return;
   if (gate_.explains(state_.applied_um))
     publish(true, monotonic_now());
@@ -239,14 +239,16 @@ void CanController::take(const CanFrame& frame) {
   ++health_.read_errors;
 }
 
-/// In sync or not, from what has arrived and how long ago.
+/// In sync or not, from what has arrived and how long ago. A bus-off counts even where it was over
+/// before we looked: what waited to be sent then is lost.
 void CanController::supervise(nanoseconds now) {
-  if (!socket_.is_open() || socket_.bus_off()) {
+  const bool was_off = socket_.errors().bus_off != bus_offs_;
+  bus_offs_ = socket_.errors().bus_off;
+  if (!socket_.is_open() || socket_.bus_off() || was_off) {
     if (gate_.in_sync()) lose();
     for (Incoming& frame : incoming_) frame.seen = false;
-    const std::scoped_lock lock(health_mutex_);
-    health_.last_error = socket_.error();
-    return;
+    silent_ = false;
+    return tell_error();
   }
   const nanoseconds limit = from_seconds(config_.silent_after_s);
   for (Incoming& frame : incoming_) {
@@ -256,11 +258,18 @@ void CanController::supervise(nanoseconds now) {
                                     [](const Incoming& frame) { return frame.seen; });
   if (gate_.in_sync() && !all_seen) {
     lose();
-    const std::scoped_lock lock(health_mutex_);
-    health_.last_error = "the controller is silent";
+    silent_ = true;
+    tell_error();
   } else if (!gate_.in_sync() && all_seen) {
     synchronise();
   }
+}
+
+/// What the interface suffers from says more than that nothing came over it.
+void CanController::tell_error() {
+  const std::scoped_lock lock(health_mutex_);
+  health_.last_error = socket_.error();
+  if (silent_ && health_.last_error.empty()) health_.last_error = "the controller is silent";
 }
 
 void CanController::note_bus_state() {
@@ -277,9 +286,10 @@ void CanController::synchronise() {
   const nanoseconds now = monotonic_now();
   next_send_ = now + gate_.next_pause();
   publish(true, now);
+  silent_ = false;
+  tell_error();
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
-  health_.last_error.clear();
 }
 
 void CanController::send_command(nanoseconds now) {

@@ -62,6 +62,7 @@ class CanController final : public ControllerLink {
   void take(const CanFrame& frame);
   void supervise(nanoseconds now);
   void note_bus_state();
+  void tell_error();
   void synchronise();
   void send_command(nanoseconds now);
   bool compose_and_send(Outgoing& outgoing);
@@ -75,6 +76,8 @@ class CanController final : public ControllerLink {
   CanSocket socket_;
   WriteGate gate_;
   std::uint64_t heartbeat_{0};
+  std::uint64_t bus_offs_{0};  ///< as the socket counts, up to the newest look
+  bool silent_{false};         ///< lost because frames were missing, and not back
   nanoseconds next_send_{};
   std::array<double, axes_max> held_um_{};  ///< what an axis that is not valid goes on sending
   WaitFreeSlot<ControllerState> states_;

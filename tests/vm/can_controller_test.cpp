@@ -8,6 +8,7 @@
 #include <thread>
 
 #include <catch2/catch.hpp>
+#include <linux/can/error.h>
 
 #include "../unit/controllers/cycle_stub.hpp"
 #include "can_bus.hpp"
@@ -144,12 +145,17 @@ TEST_CASE("a silent CAN controller is offline, and its return is a new epoch", "
   cycle.fixed_epoch = epoch;
   machine.tells_applied = false;  // the speed goes on
   REQUIRE(eventually([&] { return !cycle.state().online; }));
-  CHECK(link.health().last_error == "the controller is silent");
+  const std::string silent = "the controller is silent";
+  REQUIRE(eventually([&] { return link.health().last_error == silent; }));
+  const std::uint64_t frames = link.health().reads;
+  REQUIRE(eventually([&] { return link.health().reads > frames + 5; }));
+  CHECK(link.health().last_error == silent);  // other frames of it are no reason to forget that
   machine.applied_counts = 33;
   machine.tells_applied = true;
   REQUIRE(eventually([&] { return cycle.state().online; }));
   CHECK(cycle.state().link_epoch == epoch + 1);
   CHECK(cycle.state().applied_um[0] == Approx(0.33));
+  CHECK(eventually([&] { return link.health().last_error.empty(); }));
   const std::uint64_t writes = link.health().writes;
   const std::uint64_t reads = link.health().reads;
   REQUIRE(eventually([&] { return link.health().reads > reads + 20; }));
@@ -180,6 +186,23 @@ TEST_CASE("a CAN link that goes down, is bus-off or cut takes a new epoch", "[vm
     REQUIRE(eventually([&] { return cycle.state().online; }));
   }
   REQUIRE(shell("ip link del vcan9"));
+}
+
+TEST_CASE("a bus-off that is over before the link looks takes a new epoch", "[vm][controller]") {
+  Machine machine("vcan0");
+  CanController link(two_axes("vcan0"));
+  link.start();
+  Cycle cycle(link);
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  RawSender bus("vcan0");
+  for (std::uint64_t round = 1; round <= 20; ++round) {
+    const std::uint32_t epoch = cycle.state().link_epoch;
+    REQUIRE(bus.send(CAN_ERR_FLAG | CAN_ERR_BUSOFF, {0, 0, 0, 0, 0, 0, 0, 0}));
+    REQUIRE(bus.send(0x201, {0xE0, 0x2E}));  // the next frame ends it
+    REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
+    REQUIRE(eventually([&] { return cycle.state().online; }));
+    CHECK(link.health().bus_offs == round);
+  }
 }
 
 TEST_CASE("the CAN heartbeat stops when the cycle stands still", "[vm][controller]") {
