@@ -11,6 +11,7 @@
 #include "config/problems.hpp"
 #include "modelling/diagnosis/diagnose_command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
+#include "modelling/placement/place_command.hpp"
 #include "modelling/structure/structure_command.hpp"
 #endif
 
@@ -18,18 +19,23 @@ namespace {
 
 constexpr int exit_bad_use = 2;
 
+/// `structure` and `place`, which need CHOLMOD and Gmsh.
 void add_structure(CLI::App& app, std::function<int()>& action) {
 #ifdef THERMOCOMP_WITH_STRUCTURE
   thermocomp::structure::add_structure_command(app, action);
+  thermocomp::placement::add_place_command(app, action);
 #else
-  CLI::App* sub = app.add_subcommand("structure", "not in this build");
-  sub->prefix_command();
-  sub->callback([&action] {
-    action = [] {
-      std::fprintf(stderr, "thermocomp: built without 'structure', which needs CHOLMOD and Gmsh\n");
-      return exit_bad_use;
-    };
-  });
+  for (const char* name : {"structure", "place"}) {
+    CLI::App* sub = app.add_subcommand(name, "not in this build");
+    sub->prefix_command();
+    sub->callback([name, &action] {
+      action = [name] {
+        std::fprintf(stderr, "thermocomp: built without '%s', which needs CHOLMOD and Gmsh\n",
+                     name);
+        return exit_bad_use;
+      };
+    });
+  }
 #endif
 }
 

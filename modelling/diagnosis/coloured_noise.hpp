@@ -30,6 +30,8 @@ class Whitener {
            const Eigen::Array<bool, Eigen::Dynamic, 1>& present);
 
   [[nodiscard]] Eigen::VectorXd apply(const Eigen::Ref<const Eigen::VectorXd>& column) const;
+  /// The same for every column at once: the recursions of several columns run side by side.
+  [[nodiscard]] Eigen::MatrixXd apply_all(const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
   /// Logarithm of the determinant of the covariance, sigma = 1.
   [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
 

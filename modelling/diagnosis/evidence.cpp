@@ -49,8 +49,7 @@ Setting::Setting(const NoiseShape& shape, const StackedRows& rows,
       residual_(whitener_.apply(residual)),
       precision_(precision),
       present_rows_(static_cast<double>(present.count())) {
-  for (Eigen::Index column = 0; column < common.cols(); ++column)
-    common_.col(column) = whitener_.apply(common.col(column));
+  common_ = whitener_.apply_all(common);
   Eigen::MatrixXd square = common_.transpose() * common_;
   square.diagonal() += precision;
   factor_.compute(square);
@@ -61,12 +60,23 @@ Setting::Setting(const NoiseShape& shape, const StackedRows& rows,
 }
 
 Setting::Equations Setting::equations(const Eigen::MatrixXd& columns) const {
-  Eigen::MatrixXd white(columns.rows(), columns.cols());
-  for (Eigen::Index column = 0; column < columns.cols(); ++column)
-    white.col(column) = whitener_.apply(columns.col(column));
+  return equations_of_groups(columns, columns.cols()).front();
+}
+
+std::vector<Setting::Equations> Setting::equations_of_groups(const Eigen::MatrixXd& columns,
+                                                             Eigen::Index width) const {
+  const Eigen::MatrixXd white = whitener_.apply_all(columns);
   const Eigen::MatrixXd shared = factor_.matrixL().solve(common_.transpose() * white);
-  return {white.transpose() * white - shared.transpose() * shared,
-          white.transpose() * residual_ - shared.transpose() * common_residual_};
+  const Eigen::VectorXd right =
+      white.transpose() * residual_ - shared.transpose() * common_residual_;
+  std::vector<Equations> groups;
+  for (Eigen::Index first = 0; first < columns.cols(); first += width) {
+    const auto own = white.middleCols(first, width);
+    const auto common = shared.middleCols(first, width);
+    groups.push_back({own.transpose() * own - common.transpose() * common,
+                      right.segment(first, width)});
+  }
+  return groups;
 }
 
 double Setting::twice_log_likelihood(double squares) const {
@@ -165,6 +175,7 @@ void OutputEvidence::accept(const std::vector<Explanation>& found) {
 Eigen::MatrixXd columns_of(const Hypothesis& hypothesis, const std::vector<double>& shape,
                            const OutputEvidence& evidence) {
   Eigen::MatrixXd columns = hypothesis.columns(shape, evidence.output());
+  if (evidence.complete()) return columns;
   for (Eigen::Index row = 0; row < columns.rows(); ++row)
     if (!evidence.present()[row]) columns.row(row).setZero();
   return columns;

@@ -43,6 +43,9 @@ class Setting {
     Eigen::VectorXd right;
   };
   [[nodiscard]] Equations equations(const Eigen::MatrixXd& columns) const;
+  /// The same for several groups of `width` columns each, side by side in `columns`.
+  [[nodiscard]] std::vector<Equations> equations_of_groups(const Eigen::MatrixXd& columns,
+                                                           Eigen::Index width) const;
   [[nodiscard]] double squares() const noexcept { return squares_; }
   [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
   [[nodiscard]] double present_rows() const noexcept { return present_rows_; }
@@ -78,6 +81,8 @@ class OutputEvidence {
   [[nodiscard]] const std::vector<std::unique_ptr<Setting>>& settings() const { return settings_; }
   [[nodiscard]] const Column& residual() const noexcept { return residual_; }
   [[nodiscard]] const Eigen::Array<bool, Eigen::Dynamic, 1>& present() const { return present_; }
+  /// Whether no row's value is missing.
+  [[nodiscard]] bool complete() const { return present_.all(); }
   /// RMS of the residual, each run's mean taken off.
   [[nodiscard]] double centred_rms() const;
   [[nodiscard]] const Column& measured_residual() const noexcept { return measured_residual_; }

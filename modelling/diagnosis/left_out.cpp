@@ -24,8 +24,7 @@ BlockProducts products(const Setting& setting, const Eigen::MatrixXd& columns,
   result.free = columns.cols();
   Eigen::MatrixXd all(columns.rows(), result.common + result.free + 1);
   all.leftCols(result.common) = setting.common();
-  for (Eigen::Index i = 0; i < result.free; ++i)
-    all.col(result.common + i) = setting.whitener().apply(columns.col(i));
+  all.middleCols(result.common, result.free) = setting.whitener().apply_all(columns);
   all.rightCols(1) = setting.residual();
   result.total = Eigen::MatrixXd::Zero(all.cols(), all.cols());
   for (Eigen::Index i = 0; i < result.common; ++i) result.total(i, i) = setting.precision()[i];

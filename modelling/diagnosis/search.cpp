@@ -21,6 +21,7 @@ constexpr double structure_share_min = 0.05;
 /// ... and this many times the noise.
 constexpr double structure_noises_min = 2.0;
 constexpr int refit_rounds = 2;
+constexpr std::size_t shapes_at_once = 8;
 /// Explanations are as good as each other when what they leave differs by less than this share.
 constexpr double tie_share = 0.1;
 constexpr std::size_t weighed_shown = 6;
@@ -86,17 +87,47 @@ double Search::price(const Hypothesis& hypothesis) const {
   return sum;
 }
 
+std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
+                                             const Settings& settings) const {
+  std::vector<Trial> trials;
+  for (std::size_t first = 0; first < shapes.size(); first += shapes_at_once) {
+    const std::size_t count = std::min(shapes_at_once, shapes.size() - first);
+    std::vector<std::vector<Setting::Equations>> equations(
+        count, std::vector<Setting::Equations>(outputs_.size()));
+    for (const std::size_t output : measured_) {
+      if (!concerns(hypothesis, output)) continue;
+      Eigen::MatrixXd side_by_side;
+      Eigen::Index width = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        const Eigen::MatrixXd columns = columns_of(hypothesis, shapes[first + i], outputs_[output]);
+        width = columns.cols();
+        if (i == 0) side_by_side.resize(columns.rows(), width * static_cast<Eigen::Index>(count));
+        side_by_side.middleCols(width * static_cast<Eigen::Index>(i), width) = columns;
+      }
+      std::vector<Setting::Equations> groups =
+          settings[output]->equations_of_groups(side_by_side, width);
+      for (std::size_t i = 0; i < count; ++i) equations[i][output] = std::move(groups[i]);
+    }
+    for (const auto& of_shape : equations)
+      trials.push_back(trial_of(hypothesis, of_shape, settings));
+  }
+  return trials;
+}
+
 Search::Trial Search::weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
                             const Settings& settings) const {
+  return weigh_all(hypothesis, {shape}, settings).front();
+}
+
+Search::Trial Search::trial_of(const Hypothesis& hypothesis,
+                               const std::vector<Setting::Equations>& equations,
+                               const Settings& settings) const {
   Trial trial;
   trial.gains.resize(outputs_.size());
-  std::vector<Setting::Equations> equations(outputs_.size());
   double square = 0.0;
   double right = 0.0;
   for (const std::size_t output : measured_) {
-    if (!concerns(hypothesis, output)) continue;
-    equations[output] =
-        settings[output]->equations(columns_of(hypothesis, shape, outputs_[output]));
+    if (equations[output].right.size() == 0) continue;
     const double variance = settings[output]->squares();
     square += equations[output].square(0, 0) / variance;
     right += equations[output].right[0] / variance;
@@ -139,12 +170,12 @@ Explanation Search::profile(const Hypothesis& hypothesis, const Settings& settin
   const std::vector<std::vector<double>> grid = grid_of(hypothesis);
   Explanation best{&hypothesis, grid.front(), std::vector<Eigen::VectorXd>(outputs_.size()),
                    0.0,         settings,     0.0};
-  for (const std::vector<double>& shape : grid) {
-    Trial trial = weigh(hypothesis, shape, settings);
-    if (!(trial.score > best.score)) continue;
-    best.score = trial.score;
-    best.shape = shape;
-    best.gains = std::move(trial.gains);
+  std::vector<Trial> trials = weigh_all(hypothesis, grid, settings);
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    if (!(trials[i].score > best.score)) continue;
+    best.score = trials[i].score;
+    best.shape = grid[i];
+    best.gains = std::move(trials[i].gains);
   }
   best.score -= price(hypothesis);
   return best;
@@ -195,13 +226,16 @@ void Search::refine(Explanation& explanation) const {
     constexpr int points = 6;
     for (int round = 0; round < 4; ++round) {
       const double step = (high - low) / (points + 1);
+      Shapes shapes(points, explanation.shape);
+      for (int k = 1; k <= points; ++k)
+        shapes[static_cast<std::size_t>(k - 1)][i] = value_of(low + step * k);
+      std::vector<Trial> trials = weigh_all(hypothesis, shapes, explanation.settings);
+      const double origin = low;
       for (int k = 1; k <= points; ++k) {
-        std::vector<double> shape = explanation.shape;
-        shape[i] = value_of(low + step * k);
-        Trial trial = weigh(hypothesis, shape, explanation.settings);
+        Trial& trial = trials[static_cast<std::size_t>(k - 1)];
         if (!(trial.score > best.score)) continue;
         best = std::move(trial);
-        best_x = low + step * k;
+        best_x = origin + step * k;
       }
       low = std::max(low, best_x - step);
       high = std::min(high, best_x + step);

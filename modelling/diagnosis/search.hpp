@@ -13,7 +13,7 @@ struct Thresholds {
   double left_out_gain_min{0.12};
   /// Least RMS of what a cause explains, as a share of the measured motion's; never below the noise
   /// of a single value.
-  double motion_share_min{0.025};
+  double motion_share_min{0.005};
   /// All findings together must take this share of the variance of left-out rows.
   double carried_share_min{0.45};
   std::size_t findings_max{4};
@@ -60,8 +60,16 @@ class Search {
   };
   using Settings = std::vector<const Setting*>;
 
+  using Shapes = std::vector<std::vector<double>>;
+
+  /// One trial a shape.
+  [[nodiscard]] std::vector<Trial> weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
+                                             const Settings& settings) const;
   [[nodiscard]] Trial weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
                             const Settings& settings) const;
+  [[nodiscard]] Trial trial_of(const Hypothesis& hypothesis,
+                               const std::vector<Setting::Equations>& equations,
+                               const Settings& settings) const;
   [[nodiscard]] Explanation profile(const Hypothesis& hypothesis, const Settings& settings) const;
   [[nodiscard]] Settings likeliest_settings(const Explanation& explanation) const;
   void refine(Explanation& explanation) const;

@@ -1,0 +1,43 @@
+/// All methods of placing sensors beside each other.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "modelling/placement/sensor_choice.hpp"
+#include "modelling/placement/tendency_method.hpp"
+
+namespace thermocomp::placement {
+
+struct MethodResult {
+  std::string name;            ///< "greedy"
+  std::vector<Index> sensors;  ///< a node a block; empty where it is no placement of one a block
+  ErrorFigures used;
+  ErrorFigures left_out;
+  std::vector<ErrorFigures> by_case;  ///< shape (load cases)
+};
+
+struct Comparison {
+  MethodResult uncompensated;
+  std::vector<MethodResult> methods;
+  std::vector<TendencyPlacement> ways;  ///< one a way, in the order of all_ways
+  std::size_t best_way{0};              ///< least RMS over the used load cases
+  GreedyPlacement greedy;
+
+  [[nodiscard]] const MethodResult& method(std::string_view name) const;
+};
+
+inline constexpr int random_draws = 100;
+
+/// @param options  for the method of tendency patterns
+[[nodiscard]] Comparison compare_placements(const PlacementProblem& problem,
+                                            const TendencyOptions& options);
+
+/// For a person.
+[[nodiscard]] std::string comparison_text(const PlacementProblem& problem,
+                                          const Comparison& comparison);
+/// For a program; docs/placement.md describes it.
+[[nodiscard]] std::string comparison_json(const PlacementProblem& problem,
+                                          const Comparison& comparison);
+
+}  // namespace thermocomp::placement

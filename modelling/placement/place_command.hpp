@@ -1,0 +1,14 @@
+/// `thermocomp place`: where the sensors go.
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace thermocomp::placement {
+
+void add_place_command(CLI::App& app, std::function<int()>& action);
+
+}  // namespace thermocomp::placement

@@ -1,0 +1,53 @@
+/// Other ways to choose a node a block, to compare with and to choose from.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "modelling/placement/placement_problem.hpp"
+
+namespace thermocomp::placement {
+
+/// The candidate nearest to the middle of the block's nodes.
+[[nodiscard]] Index centroid_node(const PlacementProblem& problem, const BlockOfSensors& block);
+[[nodiscard]] std::vector<Index> place_at_centroids(const PlacementProblem& problem);
+
+struct GreedyStep {
+  std::string block;
+  Index node{0};
+  double error_um{0.0};  ///< RMS over the used fields after it
+};
+struct GreedyPlacement {
+  std::vector<GreedyStep> steps;
+  std::vector<Index> sensors;
+};
+
+/// Minimises the trace of the outputs' error covariance (about zero) over the used fields,
+/// sum_f |P1 theta_sensors,f - delta1,f|^2 by weights. At first every block has its mean; then one
+/// sensor after the other is put where the trace falls most; then each is moved again until none
+/// gains.
+[[nodiscard]] GreedyPlacement place_greedily(const PlacementProblem& problem);
+
+/// QR with column pivoting of the fields' modes: each pivot is the node with the greatest part not
+/// yet explained by the nodes chosen. One a block; blocks beyond the number of modes get their
+/// centroid.
+/// Source: K. Manohar et al., Data-driven sparse sensor placement for reconstruction, 2018.
+[[nodiscard]] std::vector<Index> place_by_qr(const PlacementProblem& problem);
+
+/// The same without regard to blocks, and with that publication's own estimate: the field is
+/// rebuilt from the modes by the readings. @return estimates for fields, shape (fields)(rows) [um]
+struct Reconstruction {
+  std::vector<Index> sensors;
+  std::vector<Numbers> modes_at_sensors;  ///< shape (sensors)(modes)
+  std::vector<Numbers> modes_um;          ///< displacement of each mode, shape (modes)(rows)
+};
+[[nodiscard]] Reconstruction reconstruct_by_qr(const PlacementProblem& problem);
+[[nodiscard]] std::vector<Numbers> estimates_um(const PlacementProblem& problem,
+                                                const std::vector<Field>& fields,
+                                                const Reconstruction& reconstruction);
+
+/// A candidate a block at random; reproducible.
+[[nodiscard]] std::vector<Index> place_at_random(const PlacementProblem& problem,
+                                                 std::uint64_t seed);
+
+}  // namespace thermocomp::placement

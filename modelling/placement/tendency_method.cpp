@@ -1,0 +1,282 @@
+#include "modelling/placement/tendency_method.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "estimator/checks.hpp"
+#include "modelling/placement/quadratic_fit.hpp"
+#include "modelling/placement/sensor_choice.hpp"
+
+namespace thermocomp::placement {
+namespace {
+
+constexpr std::array<double, 4> degrees_percent{10.0, -10.0, 5.0, -5.0};
+constexpr double nothing_um = 1e-9;
+constexpr double improves_by = 1e-3;  ///< a round that gains less is none
+constexpr double same_share = 0.05;   ///< coefficients that differ by less count as equal
+constexpr double far = std::numeric_limits<double>::infinity();
+
+struct Bounds {
+  Numbers low_K, high_K;
+};
+
+/// What a sensor in each block can read (step 3).
+Bounds bounds_of(const PlacementProblem& problem, const Field& field) {
+  Bounds bounds;
+  for (const BlockOfSensors& block : problem.blocks) {
+    double low = far;
+    double high = -far;
+    for (const Index node : block.candidates) {
+      low = std::min(low, field.rise_K[node]);
+      high = std::max(high, field.rise_K[node]);
+    }
+    bounds.low_K.push_back(low);
+    bounds.high_K.push_back(high);
+  }
+  return bounds;
+}
+
+void keep_inside(const Bounds& bounds, Numbers& blocks_K) {
+  for (std::size_t b = 0; b < blocks_K.size(); ++b) {
+    blocks_K[b] = std::clamp(blocks_K[b], bounds.low_K[b], bounds.high_K[b]);
+  }
+}
+
+Numbers start_of(const PlacementProblem& problem, const Field& field, Start start) {
+  if (start == Start::mean) return block_means_K(problem, field.rise_K);
+  Numbers blocks_K;
+  for (const BlockOfSensors& block : problem.blocks) {
+    if (start == Start::centroid) {
+      blocks_K.push_back(field.rise_K[centroid_node(problem, block)]);
+      continue;
+    }
+    Numbers sorted;
+    for (const Index node : block.nodes) sorted.push_back(field.rise_K[node]);
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    blocks_K.push_back(*middle);
+  }
+  return blocks_K;
+}
+
+/// Which blocks a pattern changes.
+struct Choice {
+  std::string name;
+  std::vector<bool> blocks;
+};
+
+void add_halves(const Numbers& values, const std::string& low, const std::string& high,
+                std::vector<Choice>& choices) {
+  Numbers sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  const double middle = 0.5 * (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]);
+  Choice below{low, {}};
+  Choice above{high, {}};
+  for (const double value : values) {
+    below.blocks.push_back(value < middle);
+    above.blocks.push_back(value > middle);
+  }
+  choices.push_back(std::move(below));
+  choices.push_back(std::move(above));
+}
+
+/// All blocks; those near to and far from what holds the machine; the warmer and the cooler half
+/// (near to and far from the heat); each alone.
+std::vector<Choice> choices_of(const PlacementProblem& problem, const Field& field) {
+  const std::size_t count = problem.blocks.size();
+  std::vector<Choice> choices{{"all", std::vector<bool>(count, true)}};
+  Numbers distances;
+  Numbers rises;
+  for (const BlockOfSensors& block : problem.blocks) distances.push_back(block.from_support_m);
+  for (const double mean : block_means_K(problem, field.rise_K)) rises.push_back(std::fabs(mean));
+  add_halves(distances, "near the support", "far from the support", choices);
+  add_halves(rises, "far from the heat", "near the heat", choices);
+  for (std::size_t b = 0; b < count; ++b) {
+    Choice alone{problem.blocks[b].name, std::vector<bool>(count, false)};
+    alone.blocks[b] = true;
+    choices.push_back(std::move(alone));
+  }
+  return choices;
+}
+
+Numbers difference(const Numbers& a, const Numbers& b) {
+  Numbers result = a;
+  for (std::size_t i = 0; i < result.size(); ++i) result[i] -= b[i];
+  return result;
+}
+
+double product(const PlacementProblem& problem, const Numbers& a, const Numbers& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += problem.row_weight[i] * a[i] * b[i];
+  return sum;
+}
+
+double size_of(const Numbers& values) {
+  return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0));
+}
+
+/// Places of coefficients, the largest of `needed` first.
+std::vector<std::size_t> largest_first(const Numbers& needed) {
+  std::vector<std::size_t> order(needed.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::fabs(needed[a]) > std::fabs(needed[b]);
+  });
+  return order;
+}
+
+/// How far a tendency is from what is needed; less is nearer. Compared from the first number on.
+Numbers distance(Way way, const PlacementProblem& problem, const Numbers& needed_um,
+                 const Numbers& tendency_um) {
+  if (way == Way::difference) {
+    const double cosine = product(problem, needed_um, tendency_um) /
+                          std::sqrt(product(problem, needed_um, needed_um) *
+                                    product(problem, tendency_um, tendency_um));
+    return {1.0 - std::fabs(cosine)};
+  }
+  const Numbers needed = curve_coefficients(problem.curves, needed_um);
+  const Numbers tendency = curve_coefficients(problem.curves, tendency_um);
+  const auto order = largest_first(needed);
+  const double lead = tendency[order[0]];
+  if (way == Way::ratios) {
+    if (!(std::fabs(lead) > nothing_um)) return {far};
+    double squares = 0.0;
+    for (const std::size_t i : order) {
+      squares += std::pow(needed[i] / needed[order[0]] - tendency[i] / lead, 2);
+    }
+    return {squares};
+  }
+  // Either sign: scaled so that the largest coefficients have the same one.
+  const double scale = std::copysign(size_of(needed) / size_of(tendency), needed[order[0]] * lead);
+  Numbers differences;
+  for (const std::size_t i : order) {
+    const double share = std::fabs(needed[i] - scale * tendency[i]) / std::fabs(needed[order[0]]);
+    differences.push_back(std::floor(share / same_share));
+  }
+  return differences;
+}
+
+struct Candidate {
+  std::string name;
+  Numbers blocks_K;     ///< theta3
+  Numbers tendency_um;  ///< delta3 - delta2
+  Numbers distance;
+};
+
+/// Steps 5 to 7, the nearest in shape first.
+std::vector<Candidate> candidates_of(const PlacementProblem& problem,
+                                     const std::vector<Choice>& choices, const Bounds& bounds,
+                                     const Numbers& blocks_K, const Numbers& needed_um, Way way) {
+  std::vector<Candidate> candidates;
+  const Numbers present_um = block_displacement_um(problem, blocks_K);
+  for (const Choice& choice : choices) {
+    for (const double degree : degrees_percent) {
+      Candidate candidate{choice.name + (degree > 0 ? " +" : " -") +
+                              std::to_string(static_cast<int>(std::fabs(degree))) + " %",
+                          blocks_K,
+                          {},
+                          {}};
+      for (std::size_t b = 0; b < blocks_K.size(); ++b) {
+        if (choice.blocks[b]) candidate.blocks_K[b] *= 1.0 + degree / 100.0;
+      }
+      keep_inside(bounds, candidate.blocks_K);
+      candidate.tendency_um =
+          difference(block_displacement_um(problem, candidate.blocks_K), present_um);
+      if (!(size_of(candidate.tendency_um) > nothing_um)) continue;
+      candidate.distance = distance(way, problem, needed_um, candidate.tendency_um);
+      candidates.push_back(std::move(candidate));
+    }
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.distance < b.distance; });
+  return candidates;
+}
+
+}  // namespace
+
+std::string_view name_of(Way way) {
+  switch (way) {
+    case Way::coefficients:
+      return "coefficients";
+    case Way::ratios:
+      return "ratios";
+    case Way::difference:
+      return "difference";
+  }
+  THERMOCOMP_ENSURE(false);
+  return "";
+}
+
+TendencyRun run_tendencies(const PlacementProblem& problem, const Field& field, Way way,
+                           const TendencyOptions& options) {
+  TendencyRun run;
+  const Bounds bounds = bounds_of(problem, field);
+  const std::vector<Choice> choices = choices_of(problem, field);
+  run.blocks_K = start_of(problem, field, options.start);
+  keep_inside(bounds, run.blocks_K);
+  Numbers needed_um =
+      difference(field.displacement_um, block_displacement_um(problem, run.blocks_K));
+  double error_um = run.error_um_at_start = rms_um(problem, needed_um);
+  while (run.ended.empty()) {
+    if (error_um <= options.threshold_um) {
+      run.ended = "the error is below the threshold";
+      break;
+    }
+    if (static_cast<int>(run.rounds.size()) >= options.rounds_max) {
+      run.ended = "the greatest number of rounds";
+      break;
+    }
+    run.ended = "no pattern makes it better inside what the blocks' sensors can read";
+    int rank = 0;
+    for (const Candidate& candidate :
+         candidates_of(problem, choices, bounds, run.blocks_K, needed_um, way)) {
+      ++rank;
+      const double rho = product(problem, needed_um, candidate.tendency_um) /
+                         product(problem, candidate.tendency_um, candidate.tendency_um);
+      Numbers next_K = run.blocks_K;
+      for (std::size_t b = 0; b < next_K.size(); ++b) {
+        next_K[b] = rho * candidate.blocks_K[b] + (1.0 - rho) * run.blocks_K[b];
+      }
+      keep_inside(bounds, next_K);
+      const Numbers left_um =
+          difference(field.displacement_um, block_displacement_um(problem, next_K));
+      const double next_um = rms_um(problem, left_um);
+      if (!(next_um < error_um * (1.0 - improves_by))) continue;
+      run.rounds.push_back({candidate.name, rank, rho, next_um});
+      run.blocks_K = next_K;
+      needed_um = left_um;
+      error_um = next_um;
+      run.ended.clear();
+      break;
+    }
+  }
+  return run;
+}
+
+TendencyPlacement place_by_tendencies(const PlacementProblem& problem, Way way,
+                                      const TendencyOptions& options) {
+  TendencyPlacement placement{way, {}, {}};
+  for (const Field& field : problem.used) {
+    placement.runs.push_back(run_tendencies(problem, field, way, options));
+  }
+  for (std::size_t b = 0; b < problem.blocks.size(); ++b) {
+    Index best = problem.blocks[b].candidates.front();
+    double least = far;
+    for (const Index node : problem.blocks[b].candidates) {
+      double squares = 0.0;
+      for (std::size_t f = 0; f < problem.used.size(); ++f) {
+        squares += std::pow(problem.used[f].rise_K[node] - placement.runs[f].blocks_K[b], 2);
+      }
+      if (squares < least) {
+        least = squares;
+        best = node;
+      }
+    }
+    placement.sensors.push_back(best);
+  }
+  return placement;
+}
+
+}  // namespace thermocomp::placement
