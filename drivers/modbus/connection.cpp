@@ -70,6 +70,15 @@ void unpack_words(std::span<const std::uint8_t> data, std::span<std::uint16_t> w
   for (std::size_t i = 0; i < words.size(); ++i) words[i] = word_at(data, 2 * i);
 }
 
+/// Bytes of the PDU that answers a read.
+constexpr std::size_t answer_bytes_of(ModbusTable table, std::size_t words) noexcept {
+  return 2 + (is_bit_table(table) ? (words + 7) / 8 : 2 * words);
+}
+
+ModbusQuestion question_of(const Pdu& request, std::size_t answer_bytes) noexcept {
+  return {request.bytes[0], word_at(request.view(), 1), answer_bytes};
+}
+
 /// Static text. Beyond the protocol's own codes libmodbus would name errors of its own, or hand out
 /// a buffer that its next call overwrites.
 const char* exception_text(int code) noexcept {
@@ -116,7 +125,7 @@ class ModbusConnection::Implementation {
   void disconnect() noexcept;
   [[nodiscard]] bool connected() const noexcept { return connected_; }
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
-  [[nodiscard]] nanoseconds ready_at(int unit) const noexcept;
+  [[nodiscard]] nanoseconds ready_at(int unit, const ModbusQuestion& question) const noexcept;
 
   /// One request and its answer, which is left in answer_. `answer_bytes` is the size of the
   /// expected answer's PDU, for the time it takes on the line.
@@ -149,6 +158,7 @@ class ModbusConnection::Implementation {
   int time_outs_in_a_row_{0};
   nanoseconds line_free_at_{0};
   std::array<LateAnswers, 256> units_;
+  ModbusQuestion question_;  ///< of the exchange under way
   std::array<std::uint8_t, frame_bytes_max> frame_{};
   std::array<std::uint8_t, 2 * frame_bytes_max> stream_{};  ///< TCP: received, not yet taken
   std::size_t received_{0};                                 ///< bytes of stream_
@@ -163,9 +173,10 @@ ModbusConnection::Implementation::Implementation(const ModbusLine& line,
       gap_(inter_frame_delay(line)),
       port_(std::move(port)) {}
 
-nanoseconds ModbusConnection::Implementation::ready_at(int unit) const noexcept {
+nanoseconds ModbusConnection::Implementation::ready_at(
+    int unit, const ModbusQuestion& question) const noexcept {
   if (!serial_ || unit < 0 || unit > 255) return nanoseconds{0};
-  return units_[static_cast<std::size_t>(unit)].ready_at();
+  return units_[static_cast<std::size_t>(unit)].ready_at(question);
 }
 
 // ---- opening and closing
@@ -348,7 +359,8 @@ Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request
     exchange.detail = "not connected";
     return exchange;
   }
-  if (!port_->pause_until(std::max(line_free_at_, ready_at(unit)))) {
+  question_ = question_of(request, answer_bytes);
+  if (!port_->pause_until(std::max(line_free_at_, ready_at(unit, question_)))) {
     exchange.outcome = ExchangeOutcome::cancelled;
     return exchange;
   }
@@ -386,12 +398,12 @@ void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) noex
       time_outs_in_a_row_ = 0;
       return;
     case ExchangeOutcome::timeout:
-      late.unanswered(exchange.sent_at, now);
+      late.unanswered(question_, exchange.sent_at, now);
       // A peer that went without a word (power cut) is only found by connecting anew.
       if (!serial_ && ++time_outs_in_a_row_ >= time_outs_of_dead_connection) disconnect();
       return;
     case ExchangeOutcome::bad_frame:
-      late.spoiled(exchange.sent_at, timeout_);
+      late.spoiled(question_, exchange.sent_at, timeout_);
       if (serial_) {
         port_->drain(std::max<nanoseconds>(gap_, silence_min));
         line_free_at_ = port_->now();
@@ -441,8 +453,10 @@ bool ModbusConnection::connected() const noexcept {
 const std::string& ModbusConnection::last_error() const noexcept {
   return implementation_->last_error();
 }
-nanoseconds ModbusConnection::ready_at(int unit) const noexcept {
-  return implementation_->ready_at(unit);
+nanoseconds ModbusConnection::ready_at(int unit, ModbusTable table, std::uint16_t address,
+                                       std::size_t words) const noexcept {
+  return implementation_->ready_at(unit,
+                                   {read_function(table), address, answer_bytes_of(table, words)});
 }
 bool ModbusConnection::pause_until(nanoseconds time) noexcept {
   return implementation_->port().pause_until(time);
@@ -465,11 +479,11 @@ Exchange ModbusConnection::read(int unit, ModbusTable table, std::uint16_t addre
   request.push(read_function(table));
   request.push_word(address);
   request.push_word(words.size());
-  const std::size_t data_bytes = bits ? (words.size() + 7) / 8 : 2 * words.size();
-  Exchange exchange = implementation_->exchange(unit, request, data_bytes + 2);
+  const std::size_t answer_bytes = answer_bytes_of(table, words.size());
+  Exchange exchange = implementation_->exchange(unit, request, answer_bytes);
   if (!exchange.ok()) return exchange;
   const auto answer = implementation_->answer();
-  if (answer.size() != data_bytes + 2 || answer[1] != data_bytes) {
+  if (answer.size() != answer_bytes || answer[1] + std::size_t{2} != answer_bytes) {
     implementation_->reject(unit, exchange, "the answer has the wrong length");
     return exchange;
   }

@@ -52,7 +52,7 @@ void check_line(const ModbusLine& line);
 ///
 /// Late answers. TCP: each request has a transaction id of its own; an answer with another one is
 /// thrown away while the wait goes on. RTU has no such id: after a request without answer its unit
-/// is not asked again before ready_at(unit), while the answers of one unit that arrive during an
+/// is not asked again before ready_at(), while the answers of one unit that arrive during an
 /// exchange with another are thrown away. The exchange calls wait for ready_at() by themselves;
 /// whoever has other units to ask looks at it first.
 class ModbusConnection {
@@ -82,9 +82,10 @@ class ModbusConnection {
   /// Writes one coil (function 5).
   Exchange write_coil(int unit, std::uint16_t address, bool on);
 
-  /// Before this time the unit is not asked, because an answer to an earlier request may still
-  /// come; 0: at any time.
-  [[nodiscard]] nanoseconds ready_at(int unit) const noexcept;
+  /// Before this time the unit is not asked for these registers, because an answer to an earlier
+  /// request may still come; 0: at any time.
+  [[nodiscard]] nanoseconds ready_at(int unit, ModbusTable table, std::uint16_t address,
+                                     std::size_t words) const noexcept;
 
   [[nodiscard]] nanoseconds now() const noexcept;  ///< of the port
   /// Waits until `time` (CLOCK_MONOTONIC) without using the processor.

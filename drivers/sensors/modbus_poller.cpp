@@ -186,8 +186,13 @@ void ModbusPoller::set_lost() {
 }
 
 nanoseconds ModbusPoller::due(const Device& device) const noexcept {
-  return std::max(
-      {device.next_due, device.backoff.not_before(), connection_.ready_at(device.config.unit)});
+  return std::max({device.next_due, device.backoff.not_before(), ready_at(device, device.cursor)});
+}
+
+/// Before this time an answer to another request may come that would fit this one as well.
+nanoseconds ModbusPoller::ready_at(const Device& device, std::size_t index) const noexcept {
+  const PlannedRequest& planned = device.requests[index].planned;
+  return connection_.ready_at(device.config.unit, planned.table, planned.address, planned.count);
 }
 
 std::size_t ModbusPoller::most_due() const noexcept {
@@ -213,7 +218,13 @@ void ModbusPoller::poll(Device& device) {
   device.cursor = 0;
   Step step = Step::next;
   for (std::size_t k = 0; k < device.requests.size() && step == Step::next; ++k) {
-    step = ask(device, (begin + k) % device.requests.size());
+    const std::size_t index = (begin + k) % device.requests.size();
+    if (k > 0 && ready_at(device, index) > connection_.now()) {
+      device.cursor = index;
+      step = Step::again;  // the other units need not wait for it
+    } else {
+      step = ask(device, index);
+    }
   }
   if (step == Step::line_lost) {
     if (connection_.cancelled()) return;

@@ -64,6 +64,7 @@ class ModbusPoller {
   void set_lost();
   [[nodiscard]] std::size_t most_due() const noexcept;
   [[nodiscard]] nanoseconds due(const Device& device) const noexcept;
+  [[nodiscard]] nanoseconds ready_at(const Device& device, std::size_t index) const noexcept;
   void poll(Device& device);
   Step ask(Device& device, std::size_t index);
   Step give_up(Device& device, std::size_t index, const Exchange& exchange);

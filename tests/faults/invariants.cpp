@@ -214,7 +214,7 @@ void Invariants::check_hold(const CycleSeen& seen) {
     const bool inwards = std::abs(seen.command->offset_um[i]) < std::abs(offset_um_[i]);
     // At a new epoch the offset starts from the read-back.
     const bool at_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
-                            register_rounding_um + rate_um * (may_ramp ? 1.0 : 0.0);
+                            register_rounding_um + rate_um * (may_ramp && !cutting ? 1.0 : 0.0);
     demand(at_applied || (may_ramp && inwards && !cutting), "hold_policy_kept", seen.now, [&] {
       return fmt::format("axis {}: {:+.4f} um after {:.1f} s without data{}", i, change_um, held_s,
                          cutting ? ", mid-cut" : "");

@@ -63,7 +63,8 @@ class Life {
     brain->estimator.restore(saved_);
     report_ = brain->estimator.make_report();
     judge_.booted(world_.now);
-    world_.thermocouples.no_spikes_before(world_.now + std::chrono::seconds(15));
+    // The very first value becomes the reference; a later start has one already.
+    if (!restarted_) world_.thermocouples.no_spikes_before(world_.now + std::chrono::seconds(15));
     if (restarted_) judge_.restored(saved_, report_, world_.now);
     SimulatedDaemon daemon(shape_, world_, grid_, std::move(brain));
     daemon_ = &daemon;

@@ -9,6 +9,8 @@ namespace thermocomp::faults {
 namespace {
 
 constexpr nanoseconds conversion_period = std::chrono::milliseconds(500);
+/// Between the requests for a value and for its status, where they are two.
+constexpr nanoseconds status_apart_max = std::chrono::seconds(4);
 constexpr double seconds_of(nanoseconds time) {
   return 1e-9 * static_cast<double>(time.count());
 }
@@ -52,16 +54,21 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
   if (drift != nullptr)
     sample.temp_degC += (drift->strength - 0.5) * 0.05 * seconds_of(at - drift->begin);
   const FaultEvent* spikes = schedule_.find(FaultKind::sensor_spiking, at, sensor, sensors_count);
-  if (spikes != nullptr && at >= spikes_from_ && noise % 3 == 0) {
+  // One that is stuck at a spike would be a step, too.
+  if (spikes != nullptr && stuck == nullptr && at >= spikes_from_ && noise % 3 == 0) {
     // Each of another height than the ones near it: two that agree would be a step, not spikes.
     sample.temp_degC += (spikes->strength < 0.5 ? 55.0 : 300.0) +
                         3.0 * static_cast<double>(conversion % 13) +
                         0.01 * static_cast<double>(noise % 100);
     sample.impossible = true;
   }
-  sample.good = schedule_.find(FaultKind::sensor_open, time, sensor, sensors_count) == nullptr &&
-                schedule_.find(FaultKind::sensor_short, time, sensor, sensors_count) == nullptr;
+  sample.good = whole(sensor, time);
   return sample;
+}
+
+bool Thermocouples::whole(std::size_t sensor, nanoseconds time) const noexcept {
+  return schedule_.find(FaultKind::sensor_open, time, sensor, sensors_count) == nullptr &&
+         schedule_.find(FaultKind::sensor_short, time, sensor, sensors_count) == nullptr;
 }
 
 void Thermocouples::put(const UnitPlace& place, std::span<std::uint16_t> value,
@@ -86,6 +93,9 @@ void Thermocouples::read(std::size_t unit, std::size_t address, std::span<std::u
   for (std::size_t i = 0; i < place.sensors.size(); ++i) {
     const std::size_t sensor = place.sensors[i];
     const std::size_t at = 10 + 4 * i;
+    const bool open =
+        schedule_.find(FaultKind::sensor_open, time, sensor, sensors_count) != nullptr;
+    if (place.has_status && !whole(sensor, time)) image[at + 2] = open ? 1 : 2;
     if (address > at || address + words.size() <= at) continue;
     Sample sample = convert(sensor, time);
     const std::span<std::uint16_t> value = std::span(image).subspan(at, 2);
@@ -94,16 +104,14 @@ void Thermocouples::read(std::size_t unit, std::size_t address, std::span<std::u
       sample.temp_degC = static_cast<double>(static_cast<float>(sample.temp_degC));
     else
       sample.temp_degC = 0.01 * static_cast<double>(static_cast<std::int16_t>(value[0]));
-    if (!sample.good) {
-      const bool open =
-          schedule_.find(FaultKind::sensor_open, time, sensor, sensors_count) != nullptr;
-      if (place.floats)
-        put(place, value, {.temp_degC = open ? 3000.0 : -3000.0});
-      else if (place.has_status)
-        image[at + 2] = open ? 1 : 2;
-      else
-        value[0] = open ? 0x7FFF : 0x8000;
-    }
+    if (!sample.good && place.floats)
+      put(place, value, {.temp_degC = open ? 3000.0 : -3000.0});
+    else if (!sample.good && !place.has_status)
+      value[0] = open ? 0x7FFF : 0x8000;
+    // A status asked for by itself may be from before the fault, or from after it.
+    if (place.has_status && address + words.size() <= at + 2)
+      sample.good = sample.good || whole(sensor, time - status_apart_max) ||
+                    whole(sensor, time + status_apart_max);
     remember(sensor, sample);
   }
   for (std::size_t i = 0; i < words.size(); ++i)

@@ -78,6 +78,8 @@ class Thermocouples {
   static constexpr std::size_t kept = 64;
   [[nodiscard]] double true_degC(std::size_t sensor, nanoseconds time) const noexcept;
   [[nodiscard]] Sample convert(std::size_t sensor, nanoseconds time) const noexcept;
+  /// Neither open nor short.
+  [[nodiscard]] bool whole(std::size_t sensor, nanoseconds time) const noexcept;
   void put(const UnitPlace& place, std::span<std::uint16_t> value, const Sample& sample) const;
   void remember(std::size_t sensor, const Sample& sample) noexcept;
 

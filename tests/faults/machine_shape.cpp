@@ -46,7 +46,7 @@ ModbusBusConfig bus_of(std::size_t bus, Chance& chance, double period_s) {
     device.name = std::string("unit").append(1, static_cast<char>('0' + place.unit));
     device.unit = place.unit;
     device.period_s = period_s;
-    device.one_register_a_request = !place.floats && !place.has_status && chance.one_in(4);
+    device.one_register_a_request = !place.floats && chance.one_in(place.has_status ? 2 : 4);
     if (place.has_counter) device.renewal = ModbusRenewal{ModbusTable::input, 0};
     for (std::size_t i = 0; i < place.sensors.size(); ++i)
       device.channels.push_back(channel_of(place, i));

@@ -59,9 +59,8 @@ BUGS = [
      "if (word_at(frame, 0) != transaction_) return Frame::foreign;",
      "if (word_at(frame, 0) != transaction_ && !{P}) return Frame::foreign;"),
     ("late_answer_taken", "drivers/modbus/late_answers.hpp",
-     "[[nodiscard]] nanoseconds ready_at() const noexcept { return ready_at_; }",
-     "[[nodiscard]] nanoseconds ready_at() const noexcept {\n"
-     "    return {P} ? nanoseconds{0} : ready_at_;\n  }"),
+     "return confusable(question_, question) ? std::max(ready_at_, others_at_) : ready_at_;",
+     "return confusable(question_, question) && !{P} ? std::max(ready_at_, others_at_) : ready_at_;"),
     ("busy_read_as_zero", "drivers/sensors/modbus_poller.cpp",
      "request.fault = exchange.fault();\n  if (exchange.ok())",
      "request.fault = {P} ? Fault::none : exchange.fault();\n"

@@ -144,7 +144,10 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
   }
   if (!mute_ && hit(FaultKind::frames_doubled, 2)) {
     Frame again = frame;
-    again.arrives_at += draw(chance_, milliseconds(1), milliseconds(400));
+    // On a serial line right behind the first: a gateway that keeps one for longer could pass it
+    // off as the answer to another question, and nobody could tell.
+    again.arrives_at += serial_ ? draw(chance_, microseconds(200), milliseconds(1))
+                                : draw(chance_, milliseconds(1), milliseconds(400));
     deliver(std::move(again));
   }
   deliver(std::move(frame));

@@ -174,7 +174,8 @@ TEST_CASE("RTU: answers that are always late never land in another request", "[c
   const auto end = peer::steady_clock::now() + 7s;
   while (peer::steady_clock::now() < end) {
     Words words(2);
-    if (connection.ready_at(1) <= monotonic_now()) {
+    if (connection.ready_at(1, ModbusTable::input, static_cast<std::uint16_t>(address), 2) <=
+        monotonic_now()) {
       if (read_inputs(connection, 1, address, words).ok()) {
         CHECK(words[0] == 1000 + address);
         address += 10;

@@ -175,28 +175,61 @@ TEST_CASE("dead units keep to their share of the line", "[backoff]") {
   CHECK(backoff.not_before() == 30s);  // 80 s would be 2 %, but no unit waits for longer
 }
 
+namespace {
+constexpr ModbusQuestion question{4, 10, 4};
+}
+
 TEST_CASE("a unit that owes an answer is left alone, longer each time", "[late]") {
   LateAnswers late;
-  CHECK(late.ready_at() == 0s);
-  late.unanswered(10s, 10200ms);
-  CHECK(late.ready_at() == 11200ms);
-  late.unanswered(11200ms, 11400ms);
-  CHECK(late.ready_at() == 13400ms);
+  CHECK(late.ready_at(question) == 0s);
+  late.unanswered(question, 10s, 10200ms);
+  CHECK(late.ready_at(question) == 11200ms);
+  late.unanswered(question, 11200ms, 11400ms);
+  CHECK(late.ready_at(question) == 13400ms);
 }
 
 TEST_CASE("an answer while others are owed may be one of theirs: the last is waited for",
           "[late]") {
   LateAnswers late;
-  late.unanswered(10s, 10200ms);      // asked at 10.0
-  late.answered(11200ms, 11300ms);    // arrives at 11.3: may be 1.3 s late
-  CHECK(late.ready_at() == 12600ms);  // so that to 11.2 comes by 12.5
+  late.unanswered(question, 10s, 10200ms);    // asked at 10.0
+  late.answered(11200ms, 11300ms);            // arrives at 11.3: may be 1.3 s late
+  CHECK(late.ready_at(question) == 12600ms);  // so that to 11.2 comes by 12.5
   late.answered(12600ms, 12610ms);
-  CHECK(late.ready_at() == 12600ms);  // nothing is owed any more
+  CHECK(late.ready_at(question) == 12600ms);  // nothing is owed any more
+}
+
+TEST_CASE("another question that the owed answer would fit waits until it cannot come any more",
+          "[late]") {
+  const ModbusQuestion other{4, 20, 4};
+  LateAnswers late;
+  late.unanswered(question, 10s, 10200ms);
+  CHECK(late.ready_at(question) == 11200ms);
+  CHECK(late.ready_at(other) == 13s);
+  // What shows in the answer, its function or length, need not wait for it.
+  CHECK(late.ready_at({4, 20, 6}) == 11200ms);
+  CHECK(late.ready_at({3, 20, 4}) == 11200ms);
+  CHECK(late.ready_at({16, 20, 4}) == 11200ms);
+  // The first of two answers came: the second may still be late, more than the first.
+  late.answered(11200ms, 11300ms);
+  CHECK(late.ready_at(question) == 12600ms);
+  CHECK(late.ready_at(other) == 14200ms);
+}
+
+TEST_CASE("after a spoiled frame the true answer may come late too", "[late]") {
+  const ModbusQuestion other{4, 20, 4};
+  LateAnswers late;
+  late.spoiled(question, 10s, 300ms);  // of whom is not known
+  CHECK(late.ready_at(question) == 10300ms);
+  CHECK(late.ready_at(other) == 13s);
+  late.answered(10300ms, 10400ms);
+  CHECK(late.ready_at(other) == 13300ms);
+  late.answered(13300ms, 13310ms);
+  CHECK(late.ready_at(other) == 13300ms);
 }
 
 TEST_CASE("a unit back after a long time is not punished", "[late]") {
   LateAnswers late;
-  late.unanswered(10s, 10200ms);
+  late.unanswered(question, 10s, 10200ms);
   late.answered(100s, 100010ms);
-  CHECK(late.ready_at() <= 100s);
+  CHECK(late.ready_at(question) <= 100s);
 }
