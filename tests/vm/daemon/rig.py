@@ -24,6 +24,7 @@ SILENT_AFTER_S = 0.5
 # What the daemon must stay below, as its documentation says (docs/operating.md). Not asserted: a
 # shared machine may stand still for longer.
 RECOVERED_WITHIN_S = 2.0
+ENOUGH_FRAMES = 50
 BUS_OFF, CONTROLLER_PROBLEM, RESTARTED = 0x40, 0x04, 0x100
 PASSIVE_BITS, WARNING_BITS, ACTIVE_BITS = 0x20, 0x08, 0x40
 
@@ -210,6 +211,7 @@ class Rig:
 
     def finish(self):
         """Ends the daemon; every outage with what the history says of it."""
+        eventually(lambda: len(self.monitor.offsets) > ENOUGH_FRAMES, "offsets to look at")
         self.daemon.committed()
         self.daemon.end()
         columns = assert_replays_exactly(self.daemon.history, self.lab.folder / "out.csv")
@@ -305,7 +307,7 @@ def assert_no_jump_on_the_bus(offsets):
     """An offset is where the last one was, or as far from it as the slew rate allows in the time
     between; after an outage in no more than 1 s. Half a second is for a machine that stands still
     meanwhile."""
-    assert len(offsets) > 50
+    assert len(offsets) > ENOUGH_FRAMES
     for (before, a, _), (after, b, _) in zip(offsets, offsets[1:]):
         bound = RATE_UM_PER_S_MAX * min(after - before + 0.5, 1.0) + 0.002
         assert abs(b - a) <= bound, f"{a} -> {b} um in {after - before:.3f} s"
