@@ -54,7 +54,8 @@ Eigen::MatrixXd Whitener::apply_all(const Eigen::Ref<const Eigen::MatrixXd>& col
     std::array<const double*, lanes> from{};
     std::array<double*, lanes> to{};
     for (Eigen::Index lane = 0; lane < count; ++lane) {
-      from[static_cast<std::size_t>(lane)] = columns.data() + (first + lane) * columns.outerStride();
+      from[static_cast<std::size_t>(lane)] =
+          columns.data() + (first + lane) * columns.outerStride();
       to[static_cast<std::size_t>(lane)] = white.data() + (first + lane) * white.outerStride();
     }
     Lanes state = Lanes::Zero();

@@ -64,8 +64,9 @@ void print(const Diagnosis& diagnosis) {
 
 void print_weighed(const Diagnosis& diagnosis) {
   for (const Weighed& each : diagnosis.weighed)
-    std::printf("weighed %zu: %s of %s: 2 ln L %.0f, left-out rows %.0f %%\n", each.round,
-                each.cause.c_str(), each.subject.c_str(), each.score, 100 * each.left_out_gain);
+    std::printf("weighed %zu: %s of %s: 2 ln L %.0f, left-out rows %.0f %%, ln %.3f\n", each.round,
+                each.cause.c_str(), each.subject.c_str(), each.score, 100 * each.left_out_gain,
+                each.log_left);
 }
 
 int run(const Options& options) {

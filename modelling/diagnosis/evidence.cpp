@@ -15,7 +15,7 @@ constexpr double noise_um_min = 1e-3;
 /// is what a diagnosis has to explain, not noise.
 std::vector<NoiseShape> noise_shapes(double residual_um, double noise_um) {
   std::vector<NoiseShape> shapes = {{0.0, 1.0}};
-  for (const double share : {0.1, 0.3}) {
+  for (const double share : {0.1, 0.3, 1.0}) {
     const double wander_um = share * residual_um;
     for (const double tau_s : {1200.0, 3600.0, 10800.0})
       shapes.push_back({wander_um * wander_um / (noise_um * noise_um), tau_s});
@@ -73,8 +73,8 @@ std::vector<Setting::Equations> Setting::equations_of_groups(const Eigen::Matrix
   for (Eigen::Index first = 0; first < columns.cols(); first += width) {
     const auto own = white.middleCols(first, width);
     const auto common = shared.middleCols(first, width);
-    groups.push_back({own.transpose() * own - common.transpose() * common,
-                      right.segment(first, width)});
+    groups.push_back(
+        {own.transpose() * own - common.transpose() * common, right.segment(first, width)});
   }
   return groups;
 }

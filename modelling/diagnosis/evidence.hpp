@@ -23,6 +23,7 @@ struct Explanation {
   double score{0.0};                     ///< gain of 2 ln L, the price of its parameters taken off
   std::vector<const Setting*> settings;  ///< one an output: under which it is likeliest
   double left_out_gain{0.0};  ///< share of the RMS that it takes from rows it was not fitted to
+  double log_left{0.0};       ///< ln of what it leaves of their RMS, summed over all outputs
 };
 
 /// One output's residual over the stacked rows under one noise shape, whitened, with everything

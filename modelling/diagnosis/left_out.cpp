@@ -160,17 +160,29 @@ std::vector<std::size_t> acting_outputs(const Explanation& explanation) {
   return acting;
 }
 
-double gain_of(const Squares& squares) {
-  return squares.before > 0 ? 1.0 - std::sqrt(squares.after / squares.before) : 0.0;
+/// @param by_output  of the outputs that it acts on
+LeftOutGain gain_of(const std::vector<Squares>& by_output) {
+  LeftOutGain gain;
+  double left = 0.0;
+  double outputs = 0.0;
+  for (const Squares& squares : by_output) {
+    if (!(squares.before > 0)) continue;
+    const double ratio = squares.after / squares.before;
+    left += ratio;
+    outputs += 1.0;
+    gain.log_left += 0.5 * std::log(std::max(ratio, 1e-12));
+  }
+  if (outputs > 0) gain.share = 1.0 - std::sqrt(left / outputs);
+  return gain;
 }
 
 }  // namespace
 
-double gain_on_left_out_blocks(const Explanation& explanation, const StackedRows& rows,
-                               const std::vector<OutputEvidence>& outputs) {
+LeftOutGain gain_on_left_out_blocks(const Explanation& explanation, const StackedRows& rows,
+                                    const std::vector<OutputEvidence>& outputs) {
   const std::vector<std::size_t> acting = acting_outputs(explanation);
   const std::size_t blocks = rows.blocks.size();
-  if (blocks < 2) return 0.0;
+  if (blocks < 2) return {};
   std::vector<BlockFit> best(blocks);
   std::vector<std::vector<double>> best_shape(blocks);
   for (const std::vector<double>& shape : shapes_of(explanation)) {
@@ -185,24 +197,25 @@ double gain_on_left_out_blocks(const Explanation& explanation, const StackedRows
       best_shape[block] = shape;
     }
   }
-  Squares sum;
+  std::vector<Squares> sums(acting.size());
   for (std::size_t block = 0; block < blocks; ++block) {
     for (std::size_t i = 0; i < best[block].gains.size(); ++i) {
       const OutputEvidence& evidence = outputs[acting[i]];
       const Column explained =
           columns_of(*explanation.hypothesis, best_shape[block], evidence) * best[block].gains[i];
       const Squares part = squares_in_block(evidence, explained, rows, rows.blocks[block]);
-      sum.before += part.before;
-      sum.after += part.after;
+      sums[i].before += part.before;
+      sums[i].after += part.after;
     }
   }
-  return gain_of(sum);
+  return gain_of(sums);
 }
 
-double gain_on_fitted_rows(const Explanation& explanation, const StackedRows& rows,
-                           const std::vector<OutputEvidence>& outputs) {
-  Squares sum;
+LeftOutGain gain_on_fitted_rows(const Explanation& explanation, const StackedRows& rows,
+                                const std::vector<OutputEvidence>& outputs) {
+  std::vector<Squares> sums;
   for (const std::size_t output : acting_outputs(explanation)) {
+    Squares& sum = sums.emplace_back();
     const Column explained =
         columns_of(*explanation.hypothesis, explanation.shape, outputs[output]) *
         explanation.gains[output];
@@ -212,7 +225,7 @@ double gain_on_fitted_rows(const Explanation& explanation, const StackedRows& ro
       sum.after += part.after;
     }
   }
-  return gain_of(sum);
+  return gain_of(sums);
 }
 
 }  // namespace thermocomp::diagnosis

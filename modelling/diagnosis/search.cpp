@@ -24,7 +24,7 @@ constexpr int refit_rounds = 2;
 constexpr std::size_t shapes_at_once = 8;
 /// Explanations are as good as each other when what they leave differs by less than this share.
 constexpr double tie_share = 0.1;
-constexpr std::size_t weighed_shown = 6;
+constexpr std::size_t weighed_shown = 12;
 
 std::vector<std::vector<double>> grid_of(const Hypothesis& hypothesis) {
   std::vector<std::vector<double>> points = {{}};
@@ -169,7 +169,8 @@ bool Search::acts(const Explanation& explanation) {
 Explanation Search::profile(const Hypothesis& hypothesis, const Settings& settings) const {
   const std::vector<std::vector<double>> grid = grid_of(hypothesis);
   Explanation best{&hypothesis, grid.front(), std::vector<Eigen::VectorXd>(outputs_.size()),
-                   0.0,         settings,     0.0};
+                   0.0,         settings,     0.0,
+                   0.0};
   std::vector<Trial> trials = weigh_all(hypothesis, grid, settings);
   for (std::size_t i = 0; i < grid.size(); ++i) {
     if (!(trials[i].score > best.score)) continue;
@@ -305,26 +306,27 @@ std::vector<Explanation> Search::ranked() {
   return once;
 }
 
-/// By what each takes from rows it was not fitted to; among those that leave nearly the same, by
+/// By what each leaves of rows it was not fitted to; among those that leave nearly the same, by
 /// likelihood.
 void Search::choose(std::vector<Explanation>& candidates) const {
-  for (Explanation& each : candidates) each.left_out_gain = left_out_gain(each);
-  const auto gains_more = [](const auto& a, const auto& b) {
-    return a.left_out_gain > b.left_out_gain;
-  };
-  std::sort(candidates.begin(), candidates.end(), gains_more);
+  for (Explanation& each : candidates) measure_left_out(each);
+  std::sort(candidates.begin(), candidates.end(),
+            [](const auto& a, const auto& b) { return a.log_left < b.log_left; });
   if (candidates.empty()) return;
-  const double left = 1.0 - candidates.front().left_out_gain;
+  const double least = candidates.front().log_left;
   const auto tie = std::find_if(candidates.begin(), candidates.end(), [&](const auto& each) {
-    return 1.0 - each.left_out_gain > (1.0 + tie_share) * left;
+    return each.log_left > least + tie_share;
   });
   std::sort(candidates.begin(), tie,
             [](const auto& a, const auto& b) { return a.score > b.score; });
 }
 
-double Search::left_out_gain(const Explanation& explanation) const {
-  return explanation.hypothesis->run ? gain_on_fitted_rows(explanation, rows_, outputs_)
-                                     : gain_on_left_out_blocks(explanation, rows_, outputs_);
+void Search::measure_left_out(Explanation& explanation) const {
+  const LeftOutGain gain = explanation.hypothesis->run
+                               ? gain_on_fitted_rows(explanation, rows_, outputs_)
+                               : gain_on_left_out_blocks(explanation, rows_, outputs_);
+  explanation.left_out_gain = gain.share;
+  explanation.log_left = gain.log_left;
 }
 
 void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
@@ -422,7 +424,7 @@ double Search::centred_rms_um(const Column& values, std::size_t output) const {
 }
 
 /// Whether what it explains can be seen beside noise and motion in one of the outputs.
-bool Search::matters(const Explanation& explanation) const {
+bool Search::matters(const Explanation& explanation, bool first) const {
   return std::any_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
     const Eigen::VectorXd& gains = explanation.gains[output];
     if (gains.size() == 0) return false;
@@ -430,8 +432,10 @@ bool Search::matters(const Explanation& explanation) const {
     const Column explained =
         columns_of(*explanation.hypothesis, explanation.shape, evidence) * gains;
     const double motion_um = centred_rms_um(evidence.measured(data_), output);
+    const double residual_um = centred_rms_um(evidence.measured_residual(), output);
     return centred_rms_um(explained, output) >
-           std::max(evidence.noise_um(), thresholds_.motion_share_min * motion_um);
+           std::max({evidence.noise_um(), thresholds_.motion_share_min * motion_um,
+                     first ? 0.0 : thresholds_.later_share_min * residual_um});
   });
 }
 
@@ -456,8 +460,8 @@ SearchResult Search::run() {
     for (std::size_t i = 0; i < std::min(weighed_shown, candidates.size()); ++i)
       result.weighed.push_back({result.findings.size() + 1, candidates[i].hypothesis->cause,
                                 candidates[i].hypothesis->subject, candidates[i].score,
-                                candidates[i].left_out_gain});
-    if (candidates.empty() || !matters(candidates.front())) break;
+                                candidates[i].left_out_gain, candidates[i].log_left});
+    if (candidates.empty() || !matters(candidates.front(), result.findings.empty())) break;
     if (candidates.front().left_out_gain < thresholds_.left_out_gain_min) break;
     Finding finding{candidates.front(), {}, {}, {}};
     for (std::size_t i = 1; i < candidates.size(); ++i) {

@@ -14,6 +14,8 @@ struct Thresholds {
   /// Least RMS of what a cause explains, as a share of the measured motion's; never below the noise
   /// of a single value.
   double motion_share_min{0.005};
+  /// Later findings explain at least this share of the residual's RMS before the first.
+  double later_share_min{0.2};
   /// All findings together must take this share of the variance of left-out rows.
   double carried_share_min{0.45};
   std::size_t findings_max{4};
@@ -34,6 +36,7 @@ struct Weighed {
   std::string subject{};
   double score{0.0};
   double left_out_gain{0.0};
+  double log_left{0.0};
 };
 
 struct SearchResult {
@@ -77,7 +80,7 @@ class Search {
   [[nodiscard]] double price(const Hypothesis& hypothesis) const;
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
   void choose(std::vector<Explanation>& candidates) const;
-  [[nodiscard]] double left_out_gain(const Explanation& explanation) const;
+  void measure_left_out(Explanation& explanation) const;
   void accept(const std::vector<Finding>& findings, std::size_t but);
   void refit(std::vector<Finding>& findings);
   void measure_spread(std::vector<Finding>& findings);
@@ -86,7 +89,7 @@ class Search {
                                      std::size_t output) const;
   /// Whether any output has a share.
   [[nodiscard]] static bool acts(const Explanation& explanation);
-  [[nodiscard]] bool matters(const Explanation& explanation) const;
+  [[nodiscard]] bool matters(const Explanation& explanation, bool first) const;
   [[nodiscard]] double centred_rms_um(const Column& values, std::size_t output) const;
   [[nodiscard]] bool structure_left() const;
 

@@ -1,12 +1,22 @@
 #!/usr/bin/python3
-"""Hides effects by seed, lets the tool look at the files, and counts what it says.
+"""Hides effects by seed, lets the tool look at the files alone, and counts what it says.
 
-campaign.py PROGRAM [--cases N] [--null N] [--outside N] [--double N] [--levels 1,2,3] [--seed S]
+campaign.py PROGRAM [--cases N] [--null N] [--outside N] [--double N] [--levels 1,2,3]
+            [--seed S] [--jobs 2] [--keep FOLDER] [--show]
+
+PROGRAM is thermocomp-modelling. Counts are for each level. --keep leaves the files in FOLDER and
+uses those that are there already; --show prints every answer that was not right.
 """
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the jobs are the threads
+
+# ruff: noqa: E402
 import argparse
 import collections
 import json
+import multiprocessing
 import pathlib
 import subprocess
 import sys
@@ -16,11 +26,17 @@ import numpy as np
 
 import hidden_effects as hidden
 
+DOUBLE_SEED = 90000
+OUTSIDE_SEED = 70000
+NULL_SEED = 50000
 
-def diagnose(program, folder):
+
+def diagnose(program, folder, out=None):
     answer = folder / "answer.json"
     command = [program, "diagnose", "--model", "model.toml", "--train", "train_a.csv",
                "train_b.csv", "--test", "test.csv", "--json", str(answer)]
+    if out:
+        command += ["--out", str(out)]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError("%s: %s" % (folder, done.stderr))
@@ -44,101 +60,154 @@ def errors(finding, truth):
     return out
 
 
-def one(program, seed, level, causes, keep, outputs):
+def examine(task):
+    """@return (task, what was hidden, the answer)"""
+    program, keep, kind, level, seed, causes = task
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(keep or temporary) / ("%d_%d_%s" % (level, seed, "+".join(causes)))
-        case = hidden.make(folder, seed, level, causes, outputs)
-        return case.truth, diagnose(program, folder)
+        facts = folder / "truth.json"
+        if not facts.exists():
+            hidden.make(folder, seed, level, causes)
+        return task, json.loads(facts.read_text()), diagnose(program, folder)
 
 
-def label(finding):
-    return finding["cause"]
+def tasks_of(options, level):
+    tasks = []
 
+    def add(kind, seed, causes):
+        tasks.append((options.program, options.keep, kind, level, seed, causes))
 
-def run_single(options, level):
-    right = extra = 0
-    confusion = collections.Counter()
-    wrong = collections.defaultdict(list)
-    ratios = []
     for i in range(options.cases):
-        cause = hidden.CAUSES[i % len(hidden.CAUSES)]
-        truth, answer = one(options.program, options.seed + i, level, [cause], options.keep,
-                            options.outputs)
-        found = answer["findings"]
-        hit = bool(found) and same(found[0], truth[0])
-        right += hit
-        extra += max(0, len(found) - 1)
-        if hit:
-            for name, error in errors(found[0], truth[0]).items():
-                wrong[truth[0]["cause"] + "." + name].append(error)
-        else:
-            said = "%s(%s)" % (found[0]["cause"], found[0]["subject"]) if found else \
-                answer["verdict"]
-            confusion["%s(%s) -> %s" % (truth[0]["cause"], truth[0]["subject"], said)] += 1
-            print("  level %d seed %d: %s(%s) -> %s" % (
-                level, options.seed + i, truth[0]["cause"], truth[0]["subject"], said), flush=True)
-    print("level %d: %d of %d right as the first finding (%.1f %%), %d further findings" % (
-        level, right, options.cases, 100 * right / max(1, options.cases), extra))
-    for name, values in sorted(wrong.items()):
-        print("  error of %s: median %.3f, 90 %% below %.3f (%d)" % (
-            name, np.median(values), np.quantile(values, 0.9), len(values)))
-    return right
-
-
-def run_silent(options, level, causes, count, what, allowed):
-    bad = 0
-    for i in range(count):
-        names = [causes[i % len(causes)]] if causes else []
-        truth, answer = one(options.program, 50000 + options.seed + i, level, names, options.keep,
-                            options.outputs)
-        if answer["verdict"] not in allowed:
-            bad += 1
-            first = answer["findings"][0] if answer["findings"] else None
-            print("  level %d seed %d: %s -> %s %s" % (
-                level, 50000 + options.seed + i, names, answer["verdict"],
-                first and (first["cause"], first["subject"], first["evidence"])), flush=True)
-    print("level %d: %s: %d of %d cases not %s" % (level, what, bad, count, "/".join(allowed)))
-
-
-def run_double(options, level):
-    both = 0
+        add("single", options.seed + i, [hidden.CAUSES[i % len(hidden.CAUSES)]])
+    for i in range(options.null):
+        add("null", NULL_SEED + options.seed + i, [])
+    for i in range(options.outside):
+        add("outside", OUTSIDE_SEED + options.seed + i, [hidden.OUTSIDE[i % len(hidden.OUTSIDE)]])
     for i in range(options.double):
         random = np.random.default_rng(i + 7)
         pair = [str(c) for c in random.choice(hidden.ALWAYS, 2, replace=False)]
-        truth, answer = one(options.program, 90000 + options.seed + i, level, pair, options.keep,
-                            options.outputs)
-        hits = [any(same(f, t) for f in answer["findings"]) for t in truth]
-        both += all(hits)
-        if not all(hits):
-            print("  level %d seed %d: %s -> %s" % (
-                level, 90000 + options.seed + i, [(t["cause"], t["subject"]) for t in truth],
-                [(f["cause"], f["subject"]) for f in answer["findings"]]), flush=True)
-    print("level %d: both of two found in %d of %d" % (level, both, options.double))
+        add("double", DOUBLE_SEED + options.seed + i, pair)
+    return tasks
+
+
+def said(answer):
+    found = answer["findings"]
+    return ", ".join("%s(%s)" % (f["cause"], f["subject"]) for f in found) or answer["verdict"]
+
+
+def progress(done, total):
+    if sys.stderr.isatty() or done == total or done % 100 == 0:
+        print("\r%d of %d" % (done, total), end="\n" if done == total else "", file=sys.stderr)
+
+
+class Count:
+    """What was right and what was not, at one level."""
+
+    def __init__(self, level, show):
+        self.level, self.show = level, show
+        self.total = collections.Counter()
+        self.right = collections.Counter()
+        self.by_cause = collections.defaultdict(lambda: [0, 0])
+        self.confusion = collections.Counter()
+        self.errors = collections.defaultdict(list)
+        self.ratios, self.extra, self.named_second = [], 0, 0
+
+    def add(self, task, truth, answer):
+        kind, level, seed, causes = task[2:]
+        right = getattr(self, "_" + kind)(truth, answer)
+        self.total[kind] += 1
+        self.right[kind] += right
+        if not right and self.show:
+            print("  level %d %s seed %d: %s -> %s" % (
+                level, kind, seed, ", ".join("%s(%s)" % (t["cause"], t["subject"]) for t in
+                                             truth["hidden"]) or "nothing", said(answer)))
+
+    def _single(self, truth, answer):
+        hidden_one, found = truth["hidden"][0], answer["findings"]
+        hit = bool(found) and same(found[0], hidden_one)
+        self.extra += max(0, len(found) - 1)
+        self.by_cause[hidden_one["cause"]][0] += hit
+        self.by_cause[hidden_one["cause"]][1] += 1
+        first = found[0]["cause"] if found else answer["verdict"]
+        if first == hidden_one["cause"] and not hit:
+            first += " (subject)"
+        self.confusion[(hidden_one["cause"], first)] += 1
+        if hit:
+            for name, error in errors(found[0], hidden_one).items():
+                self.errors[hidden_one["cause"] + "." + name].append(error)
+        else:
+            self.named_second += any(same(f, hidden_one) for f in found[1:]) or any(
+                same(a, hidden_one) for f in found[:1] for a in f["alternatives"])
+        if "run" not in hidden_one["parameters"]:
+            for output, oracle in truth["oracle_test_rms_um"].items():
+                after = answer["extended"][output]["test_rms_um"]
+                self.ratios.append(after / oracle)
+        return hit
+
+    def _null(self, truth, answer):
+        return answer["verdict"] != "effect"
+
+    def _outside(self, truth, answer):
+        self.confusion[("(outside)", answer["findings"][0]["cause"] if answer["findings"] else
+                        answer["verdict"])] += 1
+        return answer["verdict"] == "unexplained"
+
+    def _double(self, truth, answer):
+        return all(any(same(f, t) for f in answer["findings"]) for t in truth["hidden"])
+
+    def report(self):
+        def line(kind, text):
+            if self.total[kind]:
+                print("level %d: %s: %d of %d (%.1f %%)" % (
+                    self.level, text, self.right[kind], self.total[kind],
+                    100.0 * self.right[kind] / self.total[kind]))
+        line("single", "cause and subject right as the first finding")
+        line("null", "nothing hidden, silent")
+        line("outside", "outside the catalogue, called unexplained")
+        line("double", "two hidden, both found")
+        if self.total["single"]:
+            print("level %d: %d further findings; %d of the missed are second finding or "
+                  "alternative" % (self.level, self.extra, self.named_second))
+        if self.ratios:
+            print("level %d: test RMS after over that without the effect: median %.3f, 90 %% below "
+                  "%.2f" % (self.level, np.median(self.ratios), np.quantile(self.ratios, 0.9)))
+        print_confusion(self.confusion)
+        for name, values in sorted(self.errors.items()):
+            print("  error of %s: median %.3f, 90 %% below %.3f (%d)" % (
+                name, np.median(values), np.quantile(values, 0.9), len(values)))
+
+
+def print_confusion(confusion):
+    for cause in sorted({truth for truth, _ in confusion}):
+        row = sorted(((n, first) for (truth, first), n in confusion.items() if truth == cause),
+                     reverse=True)
+        print("  %-22s -> %s" % (cause, ", ".join("%s %d" % (first, n) for n, first in row)))
 
 
 def main():
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("program")
-    parser.add_argument("--cases", type=int, default=36)
-    parser.add_argument("--null", type=int, default=20)
-    parser.add_argument("--outside", type=int, default=12)
-    parser.add_argument("--double", type=int, default=12)
+    parser.add_argument("--cases", type=int, default=144)
+    parser.add_argument("--null", type=int, default=100)
+    parser.add_argument("--outside", type=int, default=40)
+    parser.add_argument("--double", type=int, default=40)
     parser.add_argument("--levels", default="1,2,3")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--outputs", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", help="folder that keeps the files")
+    parser.add_argument("--show", action="store_true")
     options = parser.parse_args()
     options.program = str(pathlib.Path(options.program).resolve())
-    for level in [int(l) for l in options.levels.split(",")]:
-        if options.cases:
-            run_single(options, level)
-        if options.null:
-            run_silent(options, level, [], options.null, "nothing hidden", ["none", "unexplained"])
-        if options.outside:
-            run_silent(options, level, hidden.OUTSIDE, options.outside, "outside the catalogue",
-                       ["unexplained"])
-        if options.double:
-            run_double(options, level)
+    if options.keep:
+        options.keep = str(pathlib.Path(options.keep).resolve())
+    counts = {int(l): Count(int(l), options.show) for l in options.levels.split(",")}
+    tasks = [task for level in counts for task in tasks_of(options, level)]
+    with multiprocessing.Pool(options.jobs) as pool:
+        for done, (task, truth, answer) in enumerate(pool.imap(examine, tasks), 1):
+            counts[task[3]].add(task, truth, answer)
+            progress(done, len(tasks))
+    for count in counts.values():
+        count.report()
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ import numpy as np
 
 import plant
 
-SAMPLE = 6  # plant steps a row: 60 s
 RUNS = (("train_a.csv", 13.0), ("train_b.csv", 9.0), ("test.csv", 9.0))
 LEVELS = {1: dict(sensor_K=0.01, step_K=0.0, noise_um=0.05, wander=False, coefficient=0.0),
           2: dict(sensor_K=0.03, step_K=0.1, noise_um=0.4, wander=True, coefficient=0.0),
@@ -15,8 +14,9 @@ LEVELS = {1: dict(sensor_K=0.01, step_K=0.0, noise_um=0.05, wander=False, coeffi
 ALWAYS = ("thermal_lag", "slow_sensor", "time_shift", "missing_heat_source", "speed_growth",
           "missing_temperature", "wrong_coefficient", "nonlinear_expansion", "position_dependence",
           "hysteresis_output", "hysteresis_temperature", "periodic_disturbance", "sensor_swap")
+EXCEEDS = 1.5  # an effect over what was left without it, RMS
 FAULTS = ("displacement_step", "displacement_drift", "sensor_drift", "sensor_step", "sensor_loose")
-OUTSIDE = ("outside_walk", "outside_product", "outside_bursts")
+OUTSIDE = ("outside_walk", "outside_chirp", "outside_bursts")
 CAUSES = ALWAYS + FAULTS
 
 
@@ -44,17 +44,26 @@ def rms(values):
 
 
 class Case:
-    """One machine with its runs and its base model; `hide` puts effects in, `write` the files."""
+    """One machine with its runs and its base model; `hide` puts effects in, `write` the files.
 
-    def __init__(self, seed, level, outputs=1):
+    Machines differ in outputs (one or two), rows (every 30, 60 or 120 s) and in what moves them:
+    the integral over their fields, which a few sensors follow closely at best, or the temperatures
+    of the measured places alone, which a linear model follows exactly.
+    """
+
+    def __init__(self, seed, level):
         self.random = np.random.default_rng([seed, level])
         self.level = LEVELS[level]
-        self.outputs = list(plant.OUTPUTS[:outputs])
+        self.outputs = list(plant.OUTPUTS[:self.random.choice([1, 1, 2])])
+        self.sample = int(self.random.choice([3, 6, 6, 12]))
+        self.by_places = self.random.uniform() < 0.4
         self.machine = plant.Machine(self.random)
         self.inputs = list(self.random.permutation(list(plant.PLACES))[:self.random.integers(7, 10)])
         if "spindle_degC" not in self.inputs:
             self.inputs[0] = "spindle_degC"
         self.inputs.sort()
+        self.place_um_per_K = {o: {n: self.random.uniform(2.0, 12.0) * self.random.choice([-1, 1])
+                                   for n in self.inputs} for o in self.outputs}
         self.runs = {name: self._run(hours) for name, hours in RUNS}
         self._fit([self._run(16.0) for _ in range(3)])
         self.truth = []
@@ -67,19 +76,24 @@ class Case:
         temps = {name: fields[:, self.machine.cells(body)[cell]]
                  for name, (body, cell) in plant.PLACES.items()}
         temps["room_degC"] = room.copy()
-        moved = {o: self.machine.displacement(fields, o) for o in self.outputs}
+        moved = {o: self._moved(fields, temps, o) for o in self.outputs}
         return dict(time_s=np.arange(steps) * plant.STEP_S, signals=signals, temps=temps,
                     moved={o: d - d[0] for o, d in moved.items()},
                     readings={n: t.copy() for n, t in temps.items()})
+
+    def _moved(self, fields, temps, output):
+        if self.by_places:
+            return sum(k * temps[n] for n, k in self.place_um_per_K[output].items())
+        return self.machine.displacement(fields, output)
 
     def rise(self, run, name):
         return run["temps"][name] - run["temps"][name][0]
 
     def _fit(self, runs):
         """The best linear model of the bare machine: least squares on runs of its own."""
-        left = np.vstack([np.stack([self.rise(r, n)[::SAMPLE] for n in self.inputs], axis=1)
+        left = np.vstack([np.stack([self.rise(r, n)[::self.sample] for n in self.inputs], axis=1)
                           for r in runs])
-        right = np.vstack([np.stack([r["moved"][o][::SAMPLE] for o in self.outputs], axis=1)
+        right = np.vstack([np.stack([r["moved"][o][::self.sample] for o in self.outputs], axis=1)
                            for r in runs])
         scale = left.std(axis=0)
         square = (left / scale).T @ (left / scale)
@@ -87,6 +101,53 @@ class Case:
         self.matrix = (np.linalg.solve(square, (left / scale).T @ right) / scale[:, None]).T
         wrong = 1.0 + self.level["coefficient"] * self.random.normal(size=self.matrix.shape)
         self.model = self.matrix * wrong
+        self.oracle_um = {o: self.left_um([self.runs["test.csv"]], o) for o in self.outputs}
+        self.left_before_um = {o: self.left_um(self.train(), o, centred=True) for o in self.outputs}
+
+    def left_um(self, runs, output, centred=False):
+        """RMS of what the base model leaves of the untouched machine, noise included."""
+        parts = []
+        for run in runs:
+            row = self.model[self.outputs.index(output)]
+            left = run["moved"][output] - sum(k * self.rise(run, n) for k, n in zip(row, self.inputs))
+            parts.append((left - left.mean() * centred)[::self.sample])
+        return float(np.hypot(np.sqrt(np.mean(np.concatenate(parts) ** 2)), self._noise_um(output)))
+
+    def _noise_um(self, output):
+        """Of a measured displacement and of what noise and steps of the readings make of it."""
+        reading_K = np.hypot(self.level["sensor_K"], self.level["step_K"] / np.sqrt(12.0))
+        row = self.model[self.outputs.index(output)]
+        return float(np.hypot(self.level["noise_um"], reading_K * np.linalg.norm(row)))
+
+    def nothing_to_find(self):
+        """Whether no crude extension takes a tenth of the RMS that is left in the training rows."""
+        return all(self._crude_gain(output) < 0.1 for output in self.outputs)
+
+    def _crude_gain(self, output):
+        runs = self.train()
+        row = self.model[self.outputs.index(output)]
+
+        def stacked(column):
+            values = [column(run)[::self.sample] for run in runs]
+            return np.concatenate([v - v.mean() for v in values])
+        left = stacked(lambda r: r["moved"][output] - sum(
+            k * self.rise(r, n) for k, n in zip(row, self.inputs)))
+        noise = len(left) * self._noise_um(output) ** 2
+        columns = [lambda r, u=u, t=t, p=p: low_pass(r["signals"][u] ** p, t)
+                   for u in ("spindle_rpm", "feed_mm_per_min", "coolant_on") for p in (1, 2)
+                   for t in (1.0, 600.0, 1800.0, 5400.0)]
+        columns += [lambda r, n=n, t=t: low_pass(self.rise(r, n), t)
+                    for n in list(plant.PLACES) + ["room_degC"] for t in (1.0, 900.0, 3600.0)]
+        columns += [lambda r, n=n, t=t: low_pass(self.rise(r, n), t) - self.rise(r, n)
+                    for n in self.inputs for t in (300.0, 1200.0, 4800.0)]
+        columns += [lambda r, n=n: self.rise(r, n) ** 2 for n in self.inputs]
+        columns += [lambda r, n=n: self.rise(r, n) * r["signals"]["x_mm"] for n in self.inputs]
+        best = 0.0
+        for column in columns:
+            values = stacked(column)
+            if values @ values > 0:
+                best = max(best, (values @ left) ** 2 / (values @ values))
+        return 1.0 - np.sqrt((left @ left - best + noise) / (left @ left + noise))
 
     def train(self):
         return [self.runs[name] for name, _ in RUNS if name != "test.csv"]
@@ -137,9 +198,25 @@ class Case:
         return self.matrix[self.outputs.index(output), self.inputs.index(name)]
 
     def hide(self, cause):
+        before = {id(r): (dict(r["moved"]), dict(r["readings"])) for r in self.train()}
         subject, parameters = getattr(self, "_" + cause)()
+        self._exceeds_noise(before)
         named = "hysteresis" if cause.startswith("hysteresis") else cause
         self.truth.append(dict(cause=named, subject=subject, parameters=parameters))
+
+    def _exceeds_noise(self, before):
+        """@throws ValueError when what was hidden is smaller than what was left without it"""
+        for output in self.outputs:
+            parts = []
+            for run in self.train():
+                moved, readings = before[id(run)]
+                change = run["moved"][output] - moved[output]
+                for k, n in zip(self.matrix[self.outputs.index(output)], self.inputs):
+                    change = change - k * (run["readings"][n] - readings[n])
+                parts.append(change - change.mean())
+            if rms(np.concatenate(parts)) > EXCEEDS * self.left_before_um[output]:
+                return
+        raise ValueError("less than the noise")
 
     def _thermal_lag(self):
         name, tau_s = self.strong_input(), float(self.random.uniform(600, 5400))
@@ -329,9 +406,12 @@ class Case:
         self._add(lambda r, o: gain * unit(r, o))
         return "", {}
 
-    def _outside_product(self):
-        unit = lambda r, o: (low_pass(r["signals"]["spindle_rpm"], 900.0)
-                             * np.sin(2 * np.pi * r["time_s"] / 9000.0))
+    def _outside_chirp(self):
+        """A sine whose period grows from 25 minutes to three hours in the course of a run."""
+        def unit(r, o):
+            share = r["time_s"] / r["time_s"][-1]
+            period_s = 1500.0 * 7.0 ** share
+            return np.sin(2 * np.pi * np.cumsum(plant.STEP_S / period_s))
         gain = self._scaled(unit)
         self._add(lambda r, o: gain * unit(r, o))
         return "", {}
@@ -355,7 +435,7 @@ class Case:
         temperatures = list(plant.PLACES) + ["room_degC"]
         names = ["time_s", "spindle_rpm", "feed_mm_per_min", "coolant_on", "x_mm"] + temperatures
         for file_name, run in self.runs.items():
-            rows = slice(None, None, SAMPLE)
+            rows = slice(None, None, self.sample)
             columns = [run["time_s"][rows]]
             columns += [run["signals"][n][rows] for n in names[1:5]]
             for name in temperatures:
@@ -375,13 +455,18 @@ class Case:
         (folder / "model.toml").write_text(
             'format = 1\ninputs = %s\noutputs = %s\nreference = "first_sample"\n'
             "matrix_um_per_K = [\n  %s\n]\n" % (quoted(self.inputs), quoted(self.outputs), matrix))
-        (folder / "truth.json").write_text(json.dumps(self.truth, indent=1))
+        facts = dict(hidden=self.truth, oracle_test_rms_um=self.oracle_um,
+                     left_before_um=self.left_before_um)
+        (folder / "truth.json").write_text(json.dumps(facts, indent=1))
 
 
-def make(folder, seed, level, causes, outputs=1):
-    """Tries machines by seed until every cause finds a place that carries it."""
-    for attempt in range(40):
-        case = Case(seed * 1000 + attempt, level, outputs)
+def make(folder, seed, level, causes):
+    """Tries machines by seed until every cause finds a place that carries it; without a cause,
+    until a machine has nothing to find."""
+    for attempt in range(200):
+        case = Case(seed * 1000 + attempt, level)
+        if not causes and not case.nothing_to_find():
+            continue
         try:
             for cause in causes:
                 case.hide(cause)
