@@ -4,8 +4,10 @@
 #include <cstdio>
 #include <fmt/format.h>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -30,6 +32,7 @@ struct Options {
   bool list{false};
   bool verbose{false};
   bool expect_found{false};
+  bool complete{false};
 };
 
 std::pair<std::uint64_t, std::uint64_t> parse_seeds(const std::string& text) {
@@ -77,7 +80,11 @@ class Campaign {
     fmt::print("invariants broken          {:>9}\n", broken_);
     fmt::print("machine hours a second     {:>9.1f}   ({:.1f} s)\n", total_.machine_hours / took_s,
                took_s);
-    if (options_.expect_found) return broken_ != 0 ? 0 : 1;
+    if (options_.expect_found) return report_found();
+    if (options_.complete && !total_.pairs.all()) {
+      fmt::print("not every pair of kinds of faults came up\n");
+      return 1;
+    }
     return broken_ == 0 ? 0 : 1;
   }
 
@@ -113,7 +120,7 @@ class Campaign {
     total_.compensating += result.compensating;
     total_.pairs |= result.pairs;
     for (std::size_t i = 0; i < fault_kinds; ++i) total_.faults[i] += result.faults[i];
-    if (result.broken) say(seed, *result.broken);
+    if (result.broken) note(seed, *result.broken);
     const auto now = Clock::now();
     if (now - told_ < std::chrono::seconds(2) || options_.verbose) return;
     told_ = now;
@@ -122,8 +129,13 @@ class Campaign {
                total_.machine_hours, broken_);
   }
 
-  void say(std::uint64_t seed, const Broken& broken) {
-    if (++broken_ > 12) return;
+  void note(std::uint64_t seed, const Broken& broken) {
+    ++broken_;
+    if (!found_ || seed < found_->first) found_ = {seed, broken};
+    if (!options_.expect_found && broken_ <= 12) say(seed, broken);
+  }
+
+  void say(std::uint64_t seed, const Broken& broken) const {
     const double at_s = 1e-9 * static_cast<double>(broken.at.count()) - 3600.0;
     fmt::print("BROKEN {} in seed {} at {:.2f} s: {}\n", broken.invariant, seed, at_s,
                broken.detail);
@@ -134,6 +146,18 @@ class Campaign {
     std::fflush(stdout);
   }
 
+  /// Every life with a smaller seed has been lived to its end: the same answer with any number of
+  /// threads.
+  int report_found() const {
+    if (!found_) return 1;
+    const auto& [seed, broken] = *found_;
+    say(seed, broken);
+    const double in_life_h = 1e-9 * static_cast<double>(broken.at.count()) / 3600.0 - 1.0;
+    fmt::print("FOUND {} {} {:.1f}\n", broken.invariant, seed,
+               static_cast<double>(seed - first_) * options_.hours + in_life_h);
+    return 0;
+  }
+
   const Options& options_;
   std::uint64_t first_{0};
   std::uint64_t next_{0};
@@ -142,6 +166,7 @@ class Campaign {
   LifeResult total_;
   std::uint64_t lives_{0};
   std::uint64_t broken_{0};
+  std::optional<std::pair<std::uint64_t, Broken>> found_;  ///< the smallest seed of them
   Clock::time_point began_{};
   Clock::time_point told_{};
 };
@@ -170,6 +195,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 256));
   app.add_flag("--expect-found", options.expect_found,
                "stop at the first broken invariant; exit status 0 if there was one");
+  app.add_flag("--complete", options.complete,
+               "exit status 1 too unless every pair of kinds of faults came up");
   app.add_flag("--list", options.list, "kinds of faults, invariants and planted bugs");
   app.add_flag("--verbose", options.verbose,
                "the faults and what becomes of them; one life at once");
