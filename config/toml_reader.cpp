@@ -229,6 +229,14 @@ bool TomlTable::is_text(std::string_view key) const {
   return node != nullptr && as_node(node)->is_string();
 }
 
+bool TomlTable::is_list_of_numbers(std::string_view key) const {
+  const void* node = find(key);
+  const auto* list = node == nullptr ? nullptr : as_node(node)->as_array();
+  return list != nullptr && std::all_of(list->begin(), list->end(), [](const toml::node& each) {
+           return each.is_number();
+         });
+}
+
 bool TomlTable::is_table(std::string_view key) const {
   const void* node = find(key);
   return node != nullptr && as_node(node)->is_table();
