@@ -230,11 +230,8 @@ bool TomlTable::is_text(std::string_view key) const {
 }
 
 bool TomlTable::is_list_of_numbers(std::string_view key) const {
-  const void* node = find(key);
-  const auto* list = node == nullptr ? nullptr : as_node(node)->as_array();
-  return list != nullptr && std::all_of(list->begin(), list->end(), [](const toml::node& each) {
-           return each.is_number();
-         });
+  const auto* list = has(key) ? as_node(find(key))->as_array() : nullptr;
+  return list != nullptr && !list->empty() && list->front().is_number();
 }
 
 bool TomlTable::is_table(std::string_view key) const {

@@ -122,6 +122,7 @@ class TomlTable {
   [[nodiscard]] bool has(std::string_view key) const;
   /// Whether the value is of this sort; false if absent. Marks the key as known.
   [[nodiscard]] bool is_text(std::string_view key) const;
+  /// ... or a list that begins with one.
   [[nodiscard]] bool is_list_of_numbers(std::string_view key) const;
   [[nodiscard]] bool is_table(std::string_view key) const;
   /// The keys that stand there, in the order of the file; marks none. For tables of free names.

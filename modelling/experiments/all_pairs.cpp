@@ -1,0 +1,278 @@
+#include "modelling/experiments/all_pairs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <stdexcept>
+
+namespace thermocomp::experiments {
+namespace {
+
+using Row = std::vector<int>;
+constexpr std::size_t completion_steps_max = 1'000'000;
+constexpr int restarts = 8;
+constexpr int candidates = 25;
+constexpr std::size_t annealing_moves = 400'000;
+constexpr double start_temperature = 0.6;  // in uncovered pairs; cools to a hundredth
+
+class Chance {
+ public:
+  explicit Chance(std::uint64_t seed) : engine_(seed) {}
+  /// Uniform in [0, count): the standard's distributions differ between libraries.
+  std::size_t below(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
+  double share() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// How often each pair of levels stands in a plan; impossible pairs are out of account.
+class PairTable {
+ public:
+  explicit PairTable(const Constraints& constraints) : counts_(constraints.level_counts()) {
+    first_.push_back(0);
+    for (const int count : counts_)
+      first_.push_back(first_.back() + static_cast<std::size_t>(count));
+    width_ = first_.back();
+    seen_.assign(width_ * width_, 0);
+    for (std::size_t a = 0; a < counts_.size(); ++a)
+      for (std::size_t b = a + 1; b < counts_.size(); ++b) rule_out(constraints, a, b);
+    open_ = possible_;
+  }
+
+  [[nodiscard]] std::size_t open() const noexcept { return open_; }
+  [[nodiscard]] std::size_t possible() const noexcept { return possible_; }
+  [[nodiscard]] std::size_t impossible() const noexcept { return impossible_; }
+  [[nodiscard]] bool is_open(std::size_t a, int x, std::size_t b, int y) const noexcept {
+    return seen_[place(a, x, b, y)] == 0;
+  }
+  void add(std::size_t a, int x, std::size_t b, int y) noexcept {
+    int& seen = seen_[place(a, x, b, y)];
+    if (seen++ == 0) --open_;
+  }
+  void remove(std::size_t a, int x, std::size_t b, int y) noexcept {
+    int& seen = seen_[place(a, x, b, y)];
+    if (--seen == 0) ++open_;
+  }
+  void add(const Row& row) noexcept {
+    for (std::size_t a = 0; a < row.size(); ++a)
+      for (std::size_t b = a + 1; b < row.size(); ++b) add(a, row[a], b, row[b]);
+  }
+  /// Changes one level of a row.
+  void change(Row& row, std::size_t factor, int level) noexcept {
+    for (std::size_t other = 0; other < row.size(); ++other)
+      if (other != factor) remove(factor, row[factor], other, row[other]);
+    row[factor] = level;
+    for (std::size_t other = 0; other < row.size(); ++other)
+      if (other != factor) add(factor, level, other, row[other]);
+  }
+  /// An open pair, the one after a random place. @pre open() > 0
+  [[nodiscard]] std::pair<Pick, Pick> some_open(Chance& chance) const {
+    for (std::size_t from = chance.below(seen_.size());; from = (from + 1) % seen_.size()) {
+      const std::size_t i = from / width_;
+      const std::size_t j = from % width_;
+      const std::size_t a = factor_at(i);
+      const std::size_t b = factor_at(j);
+      if (a < b && seen_[from] == 0)
+        return {{a, static_cast<int>(i - first_[a])}, {b, static_cast<int>(j - first_[b])}};
+    }
+  }
+
+ private:
+  void rule_out(const Constraints& constraints, std::size_t a, std::size_t b) {
+    for (int x = 0; x < counts_[a]; ++x) {
+      for (int y = 0; y < counts_[b]; ++y) {
+        bool can_be = true;
+        if (!constraints.empty()) {
+          Row row(counts_.size(), Constraints::no_level);
+          row[a] = x;
+          row[b] = y;
+          can_be = !constraints.completed(row).empty();
+        }
+        if (can_be) {
+          ++possible_;
+        } else {
+          ++impossible_;
+          seen_[place(a, x, b, y)] = 1;  // never open
+        }
+      }
+    }
+  }
+  [[nodiscard]] std::size_t place(std::size_t a, int x, std::size_t b, int y) const noexcept {
+    const std::size_t i = first_[a] + static_cast<std::size_t>(x);
+    const std::size_t j = first_[b] + static_cast<std::size_t>(y);
+    return a < b ? i * width_ + j : j * width_ + i;
+  }
+  [[nodiscard]] std::size_t factor_at(std::size_t place) const {
+    return static_cast<std::size_t>(std::upper_bound(first_.begin(), first_.end(), place) -
+                                    first_.begin()) -
+           1;
+  }
+
+  std::vector<int> counts_;
+  std::vector<std::size_t> first_;
+  std::size_t width_{0};
+  std::vector<int> seen_;
+  std::size_t open_{0};
+  std::size_t possible_{0};
+  std::size_t impossible_{0};
+};
+
+/// A level whose choice leaves the row completable, with the most open pairs to the levels set.
+int best_level(const PairTable& table, const Constraints& constraints, Row& row, std::size_t factor,
+               Chance& chance) {
+  int best = Constraints::no_level;
+  std::size_t most = 0;
+  const int count = constraints.level_counts()[factor];
+  const int from = static_cast<int>(chance.below(static_cast<std::size_t>(count)));
+  for (int step = 0; step < count; ++step) {
+    const int level = (from + step) % count;
+    std::size_t open = 0;
+    for (std::size_t other = 0; other < row.size(); ++other)
+      if (other != factor && row[other] != Constraints::no_level &&
+          table.is_open(factor, level, other, row[other]))
+        ++open;
+    if (best != Constraints::no_level && open <= most) continue;
+    row[factor] = level;
+    if (!constraints.empty() && constraints.completed(row).empty()) continue;
+    best = level;
+    most = open;
+  }
+  row[factor] = best;
+  return static_cast<int>(most);
+}
+
+Row greedy_row(const PairTable& table, const Constraints& constraints, Chance& chance) {
+  const std::size_t factors = constraints.level_counts().size();
+  Row best;
+  int most = -1;
+  for (int candidate = 0; candidate < candidates; ++candidate) {
+    Row row(factors, Constraints::no_level);
+    const auto [a, b] = table.some_open(chance);
+    row[a.factor] = a.level;
+    row[b.factor] = b.level;
+    std::vector<std::size_t> order(factors);
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    for (std::size_t i = factors; i > 1; --i) std::swap(order[i - 1], order[chance.below(i)]);
+    int open = 1;
+    for (const std::size_t factor : order)
+      if (row[factor] == Constraints::no_level)
+        open += best_level(table, constraints, row, factor, chance);
+    if (open <= most) continue;
+    most = open;
+    best = row;
+  }
+  return best;
+}
+
+std::vector<Row> greedy_rows(PairTable table, const Constraints& constraints, Chance& chance,
+                             std::size_t most) {
+  std::vector<Row> rows;
+  while (table.open() > 0 && rows.size() < most) {
+    rows.push_back(greedy_row(table, constraints, chance));
+    table.add(rows.back());
+  }
+  return table.open() > 0 ? std::vector<Row>{} : rows;
+}
+
+/// Tries to cover everything with the rows given; true when it did.
+bool anneal(PairTable table, const Constraints& constraints, std::vector<Row>& rows,
+            Chance& chance) {
+  for (const Row& row : rows) table.add(row);
+  const std::vector<int>& counts = constraints.level_counts();
+  const double cooling = std::pow(0.01, 1.0 / static_cast<double>(annealing_moves));
+  double temperature = start_temperature;
+  for (std::size_t move = 0; move < annealing_moves && table.open() > 0; ++move) {
+    temperature *= cooling;
+    Row& row = rows[chance.below(rows.size())];
+    const std::size_t factor = chance.below(counts.size());
+    const int level = static_cast<int>(chance.below(static_cast<std::size_t>(counts[factor])));
+    const int previous = row[factor];
+    if (level == previous) continue;
+    const std::size_t before = table.open();
+    table.change(row, factor, level);
+    const double worse = static_cast<double>(table.open()) - static_cast<double>(before);
+    if ((worse > 0 && chance.share() >= std::exp(-worse / temperature)) ||
+        !constraints.kept_by(row))
+      table.change(row, factor, previous);
+  }
+  return table.open() == 0;
+}
+
+/// The smallest orthogonal array that holds every pair; empty rows: none.
+Design smallest_array(const std::vector<int>& level_counts) {
+  for (const std::string& name : array_names())
+    for (const Design& variant : array_variants(name)) {
+      FittedArray fitted = fit_to(variant, level_counts);
+      if (!fitted.design.rows.empty()) return fitted.design;
+    }
+  return {};
+}
+
+}  // namespace
+
+Constraints::Constraints(std::vector<int> level_counts, std::vector<Forbidden> forbidden)
+    : level_counts_(std::move(level_counts)), forbidden_(std::move(forbidden)) {}
+
+bool Constraints::kept_by(const std::vector<int>& row) const noexcept {
+  return std::none_of(forbidden_.begin(), forbidden_.end(), [&](const Forbidden& picks) {
+    return std::all_of(picks.begin(), picks.end(),
+                       [&](const Pick& pick) { return row[pick.factor] == pick.level; });
+  });
+}
+
+std::vector<int> Constraints::completed(std::vector<int> row) const {
+  std::size_t steps = 0;
+  if (!kept_by(row) || !complete(row, 0, steps)) return {};
+  return row;
+}
+
+bool Constraints::complete(std::vector<int>& row, std::size_t factor, std::size_t& steps) const {
+  while (factor < row.size() && row[factor] != no_level) ++factor;
+  if (factor == row.size()) return true;
+  for (int level = 0; level < level_counts_[factor]; ++level) {
+    if (++steps > completion_steps_max)
+      throw std::runtime_error("what is forbidden is too entangled to plan around");
+    row[factor] = level;
+    if (kept_by(row) && complete(row, factor + 1, steps)) return true;
+  }
+  row[factor] = no_level;
+  return false;
+}
+
+PairCount count_pairs(const Design& design, const Constraints& constraints) {
+  PairTable table(constraints);
+  for (const Row& row : design.rows) table.add(row);
+  return {table.possible(), table.impossible(), table.possible() - table.open()};
+}
+
+Design all_pairs(const Constraints& constraints, std::uint64_t seed) {
+  const std::vector<int>& counts = constraints.level_counts();
+  if (constraints.completed(Row(counts.size(), Constraints::no_level)).empty())
+    throw std::runtime_error("no test is allowed: what is forbidden leaves nothing");
+  const PairTable table(constraints);
+  Chance chance(seed);
+  std::vector<Row> best;
+  for (int restart = 0; restart < restarts; ++restart) {
+    const std::size_t most = best.empty() ? table.possible() + 1 : best.size() - 1;
+    std::vector<Row> rows = greedy_rows(table, constraints, chance, most);
+    if (!rows.empty()) best = std::move(rows);
+  }
+  Design array = constraints.empty() ? smallest_array(counts) : Design{};
+  std::size_t fewest = 1;  // two factors with the most levels need a test a pair
+  std::vector<int> sorted = counts;
+  std::sort(sorted.rbegin(), sorted.rend());
+  if (constraints.empty() && sorted.size() > 1)
+    fewest = static_cast<std::size_t>(sorted[0]) * static_cast<std::size_t>(sorted[1]);
+  while (best.size() > fewest && (array.rows.empty() || array.rows.size() > fewest)) {
+    std::vector<Row> rows = best;
+    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(chance.below(rows.size())));
+    if (!anneal(table, constraints, rows, chance)) break;
+    best = std::move(rows);
+  }
+  if (!array.rows.empty() && (array.rows.size() <= best.size() || best.empty())) return array;
+  return {"all pairs", counts, best};
+}
+
+}  // namespace thermocomp::experiments
