@@ -314,8 +314,11 @@ Reading ModbusPoller::evaluate(const Device& device, std::size_t channel, const 
   const ChannelPlace& place = device.plan.channels[channel];
   const Request& request = device.requests[place.value.request];
   Fault fault = request.fault;
+  nanoseconds arrived_at = request.arrived_at;
   if (fault == Fault::none && place.status) {
     const Request& status = device.requests[place.status->request];
+    // A value is vouched for only as long as its status is fresh.
+    arrived_at = std::min(arrived_at, status.arrived_at);
     fault = status.fault != Fault::none
                 ? status.fault
                 : decode_status(*config.status, status.words[place.status->offset]);
@@ -327,7 +330,7 @@ Reading ModbusPoller::evaluate(const Device& device, std::size_t channel, const 
   const Decoded decoded = decode(words, format, config.sentinels);
   if (decoded.fault != Fault::none) return {not_a_number, before.taken_at, decoded.fault};
   const bool stamp = renewed_now || before.taken_at == nanoseconds{0};
-  return {decoded.value, stamp ? request.arrived_at : before.taken_at, Fault::none};
+  return {decoded.value, stamp ? arrived_at : before.taken_at, Fault::none};
 }
 
 void ModbusPoller::publish() noexcept {

@@ -30,7 +30,7 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
       // A serial answer carries no number: one to the same question may be up to 3 s old.
       slack_[sensor] = from_s(timeout_s + (place.bus == 0 ? 0.05 : 3.1));
       stale_after_[sensor] = from_s(shape.estimator.sensors[sensor].screening.stale_after_s);
-      has_counter_[sensor] = place.has_counter;
+      stamped_earlier_[sensor] = place.has_counter || place.has_status;
     }
   }
   link_period_s_ = shape.controller.period_s;
@@ -107,7 +107,7 @@ void Invariants::check_readings(const CycleSeen& seen) {
       return fmt::format("sensor {}: taken {:.3f} s ahead of the cycle", i + 1,
                          to_s(reading.taken_at - seen.now));
     });
-    const nanoseconds to = has_counter_[i] ? seen.now : reading.taken_at;
+    const nanoseconds to = stamped_earlier_[i] ? seen.now : reading.taken_at;
     const Sample* sample =
         thermocouples_.given(i, reading.temp_degC, reading.taken_at - slack_of(i), to);
     if (sample != nullptr) continue;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr nanoseconds conversion_period = std::chrono::milliseconds(500);
 /// Between the requests for a value and for its status, where they are two.
-constexpr nanoseconds status_apart_max = std::chrono::seconds(4);
+constexpr nanoseconds status_apart_max = std::chrono::seconds(12);
 constexpr double seconds_of(nanoseconds time) {
   return 1e-9 * static_cast<double>(time.count());
 }

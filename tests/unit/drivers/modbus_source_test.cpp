@@ -2,7 +2,10 @@
 
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -123,6 +126,33 @@ TEST_CASE("sentinels and status registers are faults of their channel only", "[s
   CHECK(running.becomes(1, Fault::open_circuit));
   CHECK(running.becomes(2, Fault::out_of_range));
   CHECK(std::isnan(running.all[1].temp_degC));
+}
+
+TEST_CASE("a value whose status was read before it is as old as the status", "[source]") {
+  std::mutex mutex;
+  std::vector<std::pair<int, nanoseconds>> asked;  // function, when it was served
+  peer::TcpDevice device([&](const peer::Request& request) {
+    const std::lock_guard lock(mutex);
+    asked.emplace_back(request.function, monotonic_now());
+    if (asked.size() == 2) return peer::Reply{};  // lost: this one is asked first in the next try
+    const std::uint16_t word = request.function == 3 ? 250 : 0;
+    return peer::Reply{peer::registers_pdu(request.function, {word})};
+  });
+  ModbusBusConfig bus = tcp_bus(device.port());
+  bus.line.timeout_ms = 100.0;
+  bus.line.retries = 1;
+  bus.devices = {device_of(1, 0, {0}, 3600.0)};
+  bus.devices[0].channels[0].table = ModbusTable::holding;
+  bus.devices[0].channels[0].status =
+      ModbusStatus{ModbusTable::input, 0, 0xFFFF, {{1, Fault::open_circuit}}};
+  Running running(bus);
+  REQUIRE(running.becomes(0, 250.0));
+  const std::lock_guard lock(mutex);
+  REQUIRE(asked.size() == 4);
+  CHECK(asked[1].first == 4);
+  CHECK(asked[3].first == 3);
+  CHECK(running.all[0].taken_at > asked[2].second);
+  CHECK(running.all[0].taken_at < asked[3].second);
 }
 
 TEST_CASE("a busy or failing device is a fault, and a value again afterwards", "[source]") {
