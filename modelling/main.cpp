@@ -9,35 +9,11 @@
 #include <CLI/CLI.hpp>
 
 #include "config/problems.hpp"
-#include "modelling/diagnosis/diagnose_command.hpp"
-#ifdef THERMOCOMP_WITH_STRUCTURE
-#include "modelling/placement/place_command.hpp"
-#include "modelling/structure/structure_command.hpp"
-#endif
+#include "modelling/command_line.hpp"
 
 namespace {
 
 constexpr int exit_bad_use = 2;
-
-/// `structure` and `place`, which need CHOLMOD and Gmsh.
-void add_structure(CLI::App& app, std::function<int()>& action) {
-#ifdef THERMOCOMP_WITH_STRUCTURE
-  thermocomp::structure::add_structure_command(app, action);
-  thermocomp::placement::add_place_command(app, action);
-#else
-  for (const char* name : {"structure", "place"}) {
-    CLI::App* sub = app.add_subcommand(name, "not in this build");
-    sub->prefix_command();
-    sub->callback([name, &action] {
-      action = [name] {
-        std::fprintf(stderr, "thermocomp: built without '%s', which needs CHOLMOD and Gmsh\n",
-                     name);
-        return exit_bad_use;
-      };
-    });
-  }
-#endif
-}
 
 /// A subcommand that `thermocomp` may know and this build does not.
 void refuse_unknown(const CLI::App& app, const std::string& name) {
@@ -51,11 +27,9 @@ void refuse_unknown(const CLI::App& app, const std::string& name) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("thermocomp-modelling: what leads to a model, and what a model gets wrong");
-  app.require_subcommand(1);
+  CLI::App app;
   std::function<int()> action;
-  thermocomp::diagnosis::add_diagnose_command(app, action);
-  add_structure(app, action);
+  thermocomp::declare_modelling_command_line(app, action);
   if (argc > 1 && *argv[1] != '\0') refuse_unknown(app, argv[1]);
   try {
     app.parse(argc, argv);

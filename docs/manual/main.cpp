@@ -4,6 +4,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <stdexcept>
 
@@ -16,6 +17,9 @@
 #include "docs/manual/completion.hpp"
 #include "docs/manual/format_page.hpp"
 #include "simulator/command_line.hpp"
+#ifdef THERMOCOMP_WITH_MODELLING
+#include "modelling/command_line.hpp"
+#endif
 
 namespace {
 
@@ -57,7 +61,8 @@ void write_command(const fs::path& folder) {
       {"THERMOCOMP_SOCKET", "the daemon's status socket, instead of the default"}};
   extras.files = {{global.socket, "the daemon's status socket"},
                   {HistoryConfig{}.file.string(), "the daemon's history"}};
-  extras.see_also = {"thermocompd(8)", "thermocompd.toml(5)", "thermocomp-sim(1)"};
+  extras.see_also = {"thermocompd(8)", "thermocompd.toml(5)", "thermocomp-sim(1)",
+                     "thermocomp-modelling(1)"};
   write_program(folder, app, extras);
 }
 
@@ -88,6 +93,17 @@ void write_simulator(const fs::path& folder) {
   extras.see_also = {"thermocomp(1)", "thermocompd(8)"};
   write_program(folder, app, extras);
 }
+
+#ifdef THERMOCOMP_WITH_MODELLING
+void write_modelling(const fs::path& folder) {
+  CLI::App app;
+  std::function<int()> action;
+  declare_modelling_command_line(app, action);
+  PageExtras extras;
+  extras.see_also = {"thermocomp(1)"};
+  write_program(folder, app, extras);
+}
+#endif
 
 void write_formats(const fs::path& examples, const fs::path& folder) {
   FormatPage page;
@@ -133,6 +149,9 @@ int main(int argc, char** argv) {
     write_command(folder);
     write_daemon(folder);
     write_simulator(folder);
+#ifdef THERMOCOMP_WITH_MODELLING
+    write_modelling(folder);
+#endif
     write_formats(argv[1], folder);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "thermocomp-manual: %s\n", error.what());

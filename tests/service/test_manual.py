@@ -12,9 +12,11 @@ import pytest
 
 BIN = pathlib.Path(os.environ["THERMOCOMP_BIN"])
 MANUAL = pathlib.Path(os.environ["THERMOCOMP_MANUAL"])
-PAGES = ["thermocomp.1", "thermocompd.8", "thermocomp-sim.1", "thermocompd.toml.5"]
+PAGES = ["thermocomp.1", "thermocompd.8", "thermocomp-sim.1", "thermocomp-modelling.1",
+         "thermocompd.toml.5"]
 PROGRAMS = {"thermocomp": "thermocomp.1", "thermocompd": "thermocompd.8",
-            "thermocomp-sim": "thermocomp-sim.1"}
+            "thermocomp-sim": "thermocomp-sim.1",
+            "thermocomp-modelling": "thermocomp-modelling.1"}
 # Carried out by a program of its own, which has the help.
 MODELLING = {"structure", "place", "tiebar", "plan", "group", "fit", "diagnose"}
 
@@ -62,6 +64,16 @@ def test_every_command_of_the_help_is_in_the_page_with_its_options():
         if command not in MODELLING:
             for option in words(help_of("thermocomp", command)):
                 assert option in text
+
+
+def test_every_modelling_command_is_in_its_page_with_its_options():
+    text = shown("thermocomp-modelling.1")
+    commands = re.findall(r"^  ([a-z]+) ", help_of("thermocomp-modelling"), re.MULTILINE)
+    assert {"structure", "place", "diagnose"} <= set(commands) <= MODELLING
+    for command in commands:
+        assert re.search(rf"^   {command}\b", text, re.MULTILINE), command
+        for option in words(help_of("thermocomp-modelling", command)):
+            assert option in text
 
 
 def test_the_configurations_page_is_the_commented_example():
@@ -135,6 +147,10 @@ def shell(tmp_path):
     ("thermocomp fit mach", "thermocomp fit machine.toml"),
     ("thermocompd --ver", "thermocompd --version"),
     ("thermocompd mach", "thermocompd machine.toml"),
+    ("thermocomp-modelling pl", "thermocomp-modelling place"),
+    ("thermocomp-modelling diagnose --mod", "thermocomp-modelling diagnose --model"),
+    ("thermocomp-modelling diagnose --model mach",
+     "thermocomp-modelling diagnose --model machine.toml"),
     ("thermocomp-sim --start", "thermocomp-sim --start-on-heartbeat"),
     ("thermocomp-sim --truth mach", "thermocomp-sim --truth machine.toml"),
 ])

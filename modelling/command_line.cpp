@@ -1,0 +1,58 @@
+#include "modelling/command_line.hpp"
+
+#include <cstdio>
+
+#include <CLI/CLI.hpp>
+
+#include "modelling/diagnosis/diagnose_command.hpp"
+#ifdef THERMOCOMP_WITH_STRUCTURE
+#include "modelling/placement/place_command.hpp"
+#include "modelling/structure/structure_command.hpp"
+#endif
+
+namespace thermocomp {
+namespace {
+
+/// `structure` and `place`, which need CHOLMOD and Gmsh.
+void add_structure(CLI::App& app, std::function<int()>& action) {
+#ifdef THERMOCOMP_WITH_STRUCTURE
+  structure::add_structure_command(app, action);
+  placement::add_place_command(app, action);
+#else
+  constexpr int exit_bad_use = 2;
+  for (const char* name : {"structure", "place"}) {
+    CLI::App* sub = app.add_subcommand(name, "not in this build");
+    sub->prefix_command();
+    sub->callback([name, &action] {
+      action = [name] {
+        std::fprintf(stderr, "thermocomp: built without '%s', which needs CHOLMOD and Gmsh\n",
+                     name);
+        return exit_bad_use;
+      };
+    });
+  }
+#endif
+}
+
+/// All text that these commands take is the name of a file or folder, which completion should know.
+void name_files(CLI::App& app) {
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
+    for (CLI::Option* option : command->get_options()) {
+      if (option->get_type_name() == "TEXT") option->type_name("FILE");
+    }
+  }
+}
+
+}  // namespace
+
+void declare_modelling_command_line(CLI::App& app, std::function<int()>& action) {
+  app.name("thermocomp-modelling");
+  app.description("What leads to a model, and what a model gets wrong");
+  app.footer("Exit status: 0 success, 2 bad use or bad input.");
+  app.require_subcommand(1);
+  diagnosis::add_diagnose_command(app, action);
+  add_structure(app, action);
+  name_files(app);
+}
+
+}  // namespace thermocomp
