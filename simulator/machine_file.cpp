@@ -15,7 +15,8 @@ MachineConfig read_machine(const TomlDocument& document) {
       static_cast<std::uint64_t>(root.integer<std::int64_t>("seed", 0, 1'000'000'000'000, 1));
   machine.duration_s = 3600.0 * root.number("duration_h", Range::between(0.0, 1e5), 0.0);
   machine.pitch_s = root.number("pitch_s", Range::between(0.01, 86400.0), 10.0);
-  if (root.has("plant")) machine.plant = read_plant(root);
+  if (root.has("plant"))
+    machine.plant = read_plant(root, std::filesystem::path(document.name()).parent_path());
   read_devices(root, machine);
   document.finish();
   return machine;

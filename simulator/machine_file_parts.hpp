@@ -1,6 +1,7 @@
 /// The two halves of the machine file's reader; only machine_file.cpp uses them.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ class NameList {
  public:
   /// Reads `name`; a problem when it is there already.
   std::string read(const TomlTable& table);
+  void add(std::string name) { names_.push_back(std::move(name)); }
   /// Index of the name that `key` of `table` gives; a problem and 0 when there is none such.
   [[nodiscard]] std::size_t index(const TomlTable& table, std::string_view key,
                                   std::string_view what) const;
@@ -25,8 +27,8 @@ class NameList {
   std::vector<std::string> names_;
 };
 
-/// [plant] and what belongs to it.
-[[nodiscard]] PlantConfig read_plant(const TomlTable& root);
+/// [plant] and what belongs to it. @param folder  where a body's file is sought
+[[nodiscard]] PlantConfig read_plant(const TomlTable& root, const std::filesystem::path& folder);
 /// Columns that the plant provides, in its order.
 [[nodiscard]] std::vector<std::string> plant_columns(const PlantConfig& plant);
 /// [[bus]], [[device]], [[channel]], [controller], [[axis]], [[event]].

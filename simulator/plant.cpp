@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "estimator/checks.hpp"
 #include "simulator/operating_signal.hpp"
@@ -15,7 +16,16 @@ namespace {
 constexpr std::uint64_t thermocouple_stream = 0x10000;
 constexpr std::uint64_t signal_stream = 0x20000;
 
+ThermalNetwork make_network(const ReducedBody& body, bool coolant_flows) {
+  std::vector<double> conductance = body.conductance;
+  for (std::size_t i = 0; coolant_flows && i < conductance.size(); ++i) {
+    conductance[i] += body.coolant_conductance[i];
+  }
+  return ThermalNetwork(std::vector<double>(body.states(), 1.0), conductance);
+}
+
 ThermalNetwork make_network(const PlantConfig& config, bool coolant_flows) {
+  if (config.body) return make_network(*config.body, coolant_flows);
   const std::size_t n = config.nodes.size();
   std::vector<double> capacity(n);
   std::vector<double> conductance(n * n, 0.0);
@@ -34,6 +44,21 @@ ThermalNetwork make_network(const PlantConfig& config, bool coolant_flows) {
   return ThermalNetwork(capacity, conductance);
 }
 
+std::vector<double> start_state(const PlantConfig& config, double room_degC) {
+  if (!config.body) return std::vector<double>(config.nodes.size(), room_degC);
+  std::vector<double> state = config.body->one_degC;
+  for (double& value : state) value *= room_degC;
+  return state;
+}
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+void add_scaled(double factor, const std::vector<double>& values, std::vector<double>& sum) {
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += factor * values[i];
+}
+
 }  // namespace
 
 /// The plant lives on a grid of steps; what is seen between two grid points is computed from the
@@ -45,7 +70,7 @@ struct Plant::Parts {
   std::vector<OperatingSignal> generators;
   ThermalNetwork dry;
   ThermalNetwork flooded;
-  std::vector<double> start_degC;  ///< a lump
+  std::vector<double> start_degC;  ///< a lump, or the body's states
   std::uint64_t grid_index{0};
   std::vector<double> grid_degC;         ///< lumps at the grid point
   std::vector<double> grid_lagged_degC;  ///< thermocouples before noise at the grid point
@@ -65,9 +90,9 @@ struct Plant::Parts {
         room(plant.room, with_seed),
         dry(make_network(plant, false)),
         flooded(make_network(plant, true)),
-        start_degC(plant.nodes.size(), room.temp_degC(0.0)),
+        start_degC(start_state(plant, room.temp_degC(0.0))),
         grid_degC(start_degC),
-        inflow_W(plant.nodes.size(), 0.0),
+        inflow_W(start_degC.size(), 0.0),
         sources_W(plant.nodes.size(), 0.0),
         signals(plant.signals.size(), 0.0),
         now_degC(start_degC) {
@@ -100,6 +125,10 @@ struct Plant::Parts {
     coolant_degC =
         config.coolant.temp_degC + config.coolant.room_share * (room_degC - config.room.mean_degC);
     coolant_flows = config.coolant.signal && signals[*config.coolant.signal] != 0.0;
+    if (config.body) {
+      take_body_inputs(*config.body);
+      return;
+    }
     std::fill(sources_W.begin(), sources_W.end(), 0.0);
     for (const HeatSourceConfig& source : config.sources) {
       THERMOCOMP_ENSURE(source.node < sources_W.size() && source.signal < signals.size());
@@ -113,6 +142,21 @@ struct Plant::Parts {
     }
   }
 
+  void take_body_inputs(const ReducedBody& body) {
+    std::fill(inflow_W.begin(), inflow_W.end(), 0.0);
+    add_scaled(room_degC, body.room_inflow, inflow_W);
+    if (coolant_flows) add_scaled(coolant_degC, body.coolant_inflow, inflow_W);
+    for (std::size_t i = 0; i < body.sources.size(); ++i) {
+      const BodySource& source = body.sources[i];
+      double share = 1.0;
+      if (source.signal) {
+        THERMOCOMP_ENSURE(config.body_signals.at(i) < signals.size());
+        share = std::pow(std::abs(signals[config.body_signals[i]]) / source.at, source.exponent);
+      }
+      add_scaled(share * source.heat_W, source.inflow, inflow_W);
+    }
+  }
+
   [[nodiscard]] double place_degC(std::size_t index, const std::vector<double>& nodes) const {
     const ThermocoupleConfig& thermocouple = config.thermocouples[index];
     switch (thermocouple.place) {
@@ -123,6 +167,7 @@ struct Plant::Parts {
       case ThermocoupleConfig::Place::node:
         break;
     }
+    if (config.body) return dot(config.body->sensors.at(thermocouple.node).row, nodes);
     THERMOCOMP_ENSURE(thermocouple.node < nodes.size());
     return nodes[thermocouple.node];
   }
@@ -177,6 +222,7 @@ double Plant::time_s() const noexcept {
   return parts_->time_s;
 }
 double Plant::node_degC(std::size_t node) const {
+  THERMOCOMP_ENSURE(!parts_->config.body);
   return parts_->now_degC.at(node);
 }
 double Plant::room_degC() const noexcept {
@@ -204,6 +250,10 @@ double Plant::thermocouple_degC(std::size_t thermocouple) const {
 
 double Plant::displacement_um(std::size_t output) const {
   const PlantConfig& config = parts_->config;
+  if (config.body) {
+    const std::vector<double>& row = config.body->outputs.at(config.body_outputs.at(output)).row;
+    return dot(row, parts_->now_degC) - dot(row, parts_->start_degC);
+  }
   double sum = 0.0;
   for (std::size_t i = 0; i < config.nodes.size(); ++i) {
     const auto& coefficients = config.nodes[i].displacement_um_per_K;

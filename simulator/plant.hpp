@@ -26,6 +26,7 @@ class Plant {
   void advance_to(double time_s);
 
   [[nodiscard]] double time_s() const noexcept;
+  /// @pre the plant has lumps (checked)
   [[nodiscard]] double node_degC(std::size_t node) const;
   [[nodiscard]] double room_degC() const noexcept;
   [[nodiscard]] double coolant_degC() const noexcept;

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "simulator/reduced_body.hpp"
+
 namespace thermocomp {
 
 /// A lump of the structure that has one temperature.
@@ -87,7 +89,7 @@ struct ThermocoupleConfig {
   enum class Place { node, room, coolant };
   std::string name;  ///< its column is NAME_degC
   Place place{Place::node};
-  std::size_t node{0};       ///< where place is node
+  std::size_t node{0};       ///< where place is node; a sensor of the body where there is one
   double noise_K{0.0};       ///< standard deviation of one conversion
   double lag_s{0.0};         ///< first-order lag behind the node
   double offset_K{0.0};      ///< constant error
@@ -114,6 +116,10 @@ struct PlantConfig {
   std::vector<SignalConfig> signals;
   RoomConfig room;
   CoolantConfig coolant;
+  /// In place of nodes, links and sources: a reduced finite-element model.
+  std::optional<ReducedBody> body;
+  std::vector<std::size_t> body_signals;  ///< the signal of each of the body's sources
+  std::vector<std::size_t> body_outputs;  ///< the body's row of each output
   std::vector<NodeConfig> nodes;
   std::vector<LinkConfig> links;
   std::vector<HeatSourceConfig> sources;

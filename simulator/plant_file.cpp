@@ -163,15 +163,52 @@ ThermocoupleConfig read_thermocouple(const TomlTable& table, NameList& thermocou
   return thermocouple;
 }
 
+/// Binds the body's sources to signals and its rows to the outputs.
+void read_body_of(const TomlTable& table, const std::filesystem::path& folder,
+                  const NameList& signals, PlantConfig& plant) {
+  const std::string file = table.text("body");
+  if (file.empty()) return;
+  plant.body = load_body(folder / file);
+  for (const BodySource& source : plant.body->sources) {
+    plant.body_signals.push_back(
+        source.signal ? signals.index_of(table, "body", *source.signal, "signal") : 0);
+  }
+  for (const OutputConfig& output : plant.outputs) {
+    const auto& rows = plant.body->outputs;
+    const auto found = std::find_if(rows.begin(), rows.end(),
+                                    [&](const BodyRow& row) { return row.name == output.name; });
+    if (found == rows.end()) table.problem("body", output.name, "the body has no such output");
+    plant.body_outputs.push_back(static_cast<std::size_t>(found - rows.begin()));
+  }
+}
+
+/// Lumps, what joins them and what warms them.
+void read_lumps(const TomlTable& root, const NameList& signals, const NameList& outputs,
+                NameList& nodes, PlantConfig& plant) {
+  for (const TomlTable& table : root.tables_required("node")) {
+    plant.nodes.push_back(read_node(table, nodes, outputs));
+  }
+  for (const TomlTable& table : root.tables("link")) {
+    plant.links.push_back(read_link(table, nodes));
+  }
+  for (const TomlTable& table : root.tables("source")) {
+    plant.sources.push_back(read_source(table, nodes, signals));
+  }
+  for (const TomlTable& table : root.tables("position_effect")) {
+    plant.position_effects.push_back(read_position_effect(table, nodes, signals, outputs));
+  }
+}
+
 }  // namespace
 
-PlantConfig read_plant(const TomlTable& root) {
+PlantConfig read_plant(const TomlTable& root, const std::filesystem::path& folder) {
   PlantConfig plant;
   NameList signals;
   NameList outputs;
   NameList nodes;
   NameList thermocouples;
-  plant.step_s = root.table("plant").number("step_s", Range::between(0.001, 3600.0), 1.0);
+  const TomlTable own = root.table("plant");
+  plant.step_s = own.number("step_s", Range::between(0.001, 3600.0), 1.0);
   for (const TomlTable& table : root.tables("signal")) {
     plant.signals.push_back(read_signal(table, signals));
   }
@@ -188,17 +225,16 @@ PlantConfig read_plant(const TomlTable& root) {
     output.noise_um = table.number("noise_um", Range::between(0.0, 1e6), 0.0);
     plant.outputs.push_back(output);
   }
-  for (const TomlTable& table : root.tables_required("node")) {
-    plant.nodes.push_back(read_node(table, nodes, outputs));
-  }
-  for (const TomlTable& table : root.tables("link")) {
-    plant.links.push_back(read_link(table, nodes));
-  }
-  for (const TomlTable& table : root.tables("source")) {
-    plant.sources.push_back(read_source(table, nodes, signals));
-  }
-  for (const TomlTable& table : root.tables("position_effect")) {
-    plant.position_effects.push_back(read_position_effect(table, nodes, signals, outputs));
+  if (own.has("body")) {
+    for (const char* key : {"node", "link", "source", "position_effect"}) {
+      root.refuse(key, "a machine with a body of its own (plant.body) has no lumps");
+    }
+    read_body_of(own, folder, signals, plant);
+    if (plant.body) {
+      for (const BodyRow& sensor : plant.body->sensors) nodes.add(sensor.name);
+    }
+  } else {
+    read_lumps(root, signals, outputs, nodes, plant);
   }
   for (const TomlTable& table : root.tables("thermocouple")) {
     plant.thermocouples.push_back(read_thermocouple(table, thermocouples, nodes));

@@ -73,12 +73,25 @@ Vec3 support_middle_m(const Structure& structure) {
   return mean_of(held_m);
 }
 
+/// No sensor goes where faces touch, on a foot or in a joint.
+void leave_out_joints(const Structure& structure, std::vector<bool>& possible) {
+  for (const structure::Coupling& spring : structure.springs) {
+    for (std::size_t i = 0; i < spring.count; ++i) possible[spring.nodes[i]] = false;
+  }
+  for (Index node = 0; node < possible.size(); ++node) {
+    for (const structure::Weighted& master : structure.reduction.masters_of(node)) {
+      possible[node] = possible[master.node] = false;
+    }
+  }
+}
+
 void add_blocks(const StructureSpec& spec, const Structure& structure, PlacementProblem& problem) {
   std::vector<bool> possible(problem.nodes_m.size(), !spec.sensors_on_surface);
   if (spec.sensors_on_surface) {
     for (const structure::Face& face : surface_of(structure.mesh)) {
       for (const Index node : nodes_of(face)) possible[node] = true;
     }
+    leave_out_joints(structure, possible);
   }
   for (const std::string& name : structure.block_names) problem.blocks.push_back({name, {}, {}, 0});
   for (Index node = 0; node < problem.nodes_m.size(); ++node) {
@@ -94,7 +107,7 @@ void add_blocks(const StructureSpec& spec, const Structure& structure, Placement
     block.from_support_m = length(mean_of(points_m) - support_m);
     if (!block.candidates.empty()) continue;
     problems.push_back({spec.file.string(), 0, "block", block.name,
-                        "has no node on the surface where a sensor could stand; "
+                        "has no node on the free surface where a sensor could stand; "
                         "placement.on_surface = false takes any node"});
   }
   if (!problems.empty()) throw ConfigurationError(std::move(problems));

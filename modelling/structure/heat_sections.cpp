@@ -21,6 +21,7 @@ class HeatReader {
     for (const TomlTable& table : root_.tables("convection")) read_convection(table);
     for (const TomlTable& table : root_.tables("heat")) read_heat(table);
     for (const TomlTable& table : root_.tables("load_case")) read_load_case(table);
+    for (const TomlTable& table : root_.tables("sensor")) read_sensor(table);
     if (!spec_.load_cases.empty() || !spec_.heats.empty()) check_materials();
     if (!spec_.load_cases.empty() && spec_.convections.empty()) {
       root_.problem("load_case", "a load case needs a [[convection]] that carries heat away");
@@ -81,6 +82,19 @@ class HeatReader {
     spec_.load_cases.push_back(std::move(load));
   }
 
+  void read_sensor(const TomlTable& table) {
+    SensorSpec sensor;
+    sensor.name = read_unique_name(table, sensor_names_);
+    if (!sensor.name.empty() && !is_column_name(sensor.name)) {
+      table.problem("name", column_name_rule);
+    }
+    sensor.place.part = read_index(table, "part", names_of(spec_.parts), "part");
+    sensor.place.at_m = {read_point_m(table, "at_mm")};
+    sensor.place.tolerance_m = mm * table.number("tolerance_mm", Range::between(0, 100), 0.1);
+    sensor.place.origin = origin_of(table, "at_mm");
+    spec_.sensors.push_back(std::move(sensor));
+  }
+
   static void read_times(const TomlTable& table, LoadCaseSpec& load) {
     load.duration_s = table.number("duration_s", Range::above(0, 1e7));
     load.step_s = table.number("step_s", Range::above(0, 1e6));
@@ -115,7 +129,7 @@ class HeatReader {
 
   const TomlTable& root_;
   StructureSpec& spec_;
-  std::set<std::string> heat_names_, case_names_, signals_;
+  std::set<std::string> heat_names_, case_names_, sensor_names_, signals_;
 };
 
 }  // namespace

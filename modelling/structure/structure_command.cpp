@@ -12,6 +12,7 @@
 
 #include "cli/output_file.hpp"
 #include "config/model_file.hpp"
+#include "modelling/structure/body_reduction.hpp"
 #include "modelling/structure/picture.hpp"
 #include "modelling/structure/structure_model.hpp"
 #include "modelling/structure/vtu_file.hpp"
@@ -24,6 +25,7 @@ struct Options {
   std::string model;
   std::string vtu;
   std::string picture;
+  std::string plant;
 };
 
 /// What begins, with the time since the start, on stderr.
@@ -66,6 +68,15 @@ std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& 
   return shapes;
 }
 
+std::string body_text(const Options& options, const Structure& structure, const ReducedBody& body) {
+  std::string comment = "# Made by: thermocomp structure ";
+  comment.append(std::filesystem::path(options.structure).filename().string());
+  comment.append(" --plant. A machine's body for thermocomp-sim: heat\n# conduction and thermal ");
+  comment.append("displacement of ").append(std::to_string(structure.mesh.nodes_m.size()));
+  comment.append(" nodes, reduced to ").append(std::to_string(body.states()));
+  return write_body(body, comment.append(" states (docs/structure.md).\n"));
+}
+
 int run(const Options& options) {
   const ProgressLines progress;
   const StructureSpec spec = load_structure(options.structure);
@@ -81,6 +92,12 @@ int run(const Options& options) {
     const auto shapes = block_shapes(structure, statics, progress);
     if (!options.vtu.empty()) write(options.vtu, vtu_file(structure, shapes));
     if (!options.picture.empty()) write(options.picture, svg_picture(structure, shapes));
+  }
+  if (!options.plant.empty()) {
+    progress.say("a small state space for the simulator");
+    const HeatModel heat = build_heat_model(spec, structure);
+    write(options.plant,
+          body_text(options, structure, reduce_body(spec, structure, heat, statics)));
   }
   write(options.model, write_model(model));
   progress.say("done");
@@ -102,6 +119,9 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
       ->required();
   sub->add_option("--vtu", options->vtu, "mesh, blocks and deformed shapes, for ParaView");
   sub->add_option("--picture", options->picture, "the same as a picture (SVG)");
+  sub->add_option(
+      "--plant", options->plant,
+      "the machine's body for thermocomp-sim: a reduced model of heat and displacement");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

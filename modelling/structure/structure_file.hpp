@@ -87,6 +87,12 @@ struct OutputSpec {
   std::vector<PlaceSpec> places;
 };
 
+/// A thermocouple, for a simulated machine.
+struct SensorSpec {
+  std::string name;
+  PlaceSpec place;
+};
+
 struct GuidewayRows {
   std::string name;
   std::string axis;
@@ -141,6 +147,7 @@ struct StructureSpec {
   std::vector<ConvectionSpec> convections;
   std::vector<HeatSpec> heats;
   std::vector<LoadCaseSpec> load_cases;
+  std::vector<SensorSpec> sensors;
   bool sensors_on_surface{true};  ///< a sensor is screwed on, not cast in
 };
 

@@ -2,6 +2,9 @@
 #include "simulator/machine_file.hpp"
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include <catch2/catch.hpp>
@@ -155,34 +158,18 @@ TEST_CASE("the commented example is right and every event kind is in it") {
   }
 }
 
-TEST_CASE("the demonstration's model is the block matrix of its machine") {
-  const MachineConfig machine = load_machine(folder + "/demo/machine.toml");
-  const ThermalModel model = load_model(folder + "/demo/model.toml");
-  std::vector<std::string> blocks;
-  for (const std::string& input : model.inputs) {
-    blocks.push_back(input.substr(0, input.size() - std::string("_degC").size()));
-  }
-  const auto matrix = block_matrix(*machine.plant, blocks);
-  REQUIRE(matrix.size() == model.matrix_um_per_K.size());
-  for (std::size_t row = 0; row < matrix.size(); ++row) {
-    CHECK(machine.plant->outputs[row].name == model.outputs[row]);
-    for (std::size_t block = 0; block < blocks.size(); ++block) {
-      CHECK(matrix[row][block] == Approx(model.matrix_um_per_K[row][block]).margin(1e-9));
-    }
-  }
-}
-
-TEST_CASE("block temperatures of the demonstration explain all but 12 % of its displacement") {
+TEST_CASE("block temperatures of the demonstration explain all but 16 % of its displacement") {
   const MachineConfig machine = load_machine(folder + "/demo/machine.toml");
   const ThermalModel model = load_model(folder + "/demo/model.toml");
   const auto seed = GENERATE(20u, 1u, 2u);
   const RunFile run = simulate(machine, machine.duration_s, seed);
   const std::vector<std::vector<std::string>> sensors{{"bed_front_degC", "bed_rear_degC"},
                                                       {"table_degC"},
-                                                      {"room_degC"},
+                                                      {"saddle_degC"},
+                                                      {"head_degC"},
+                                                      {"spindle_front_degC", "spindle_rear_degC"},
                                                       {"column_left_degC"},
-                                                      {"column_right_degC"},
-                                                      {"spindle_front_degC", "spindle_rear_degC"}};
+                                                      {"column_right_degC"}};
   const auto block_degC = [&](std::size_t block, std::size_t row) {
     double sum = 0.0;
     for (const std::string& column : sensors[block]) sum += run.column(column)[row];
@@ -206,5 +193,121 @@ TEST_CASE("block temperatures of the demonstration explain all but 12 % of its d
   const auto rows = static_cast<double>(run.rows());
   CHECK(std::sqrt(before / rows) > 20.0);
   CHECK(std::sqrt(before / rows) < 60.0);
-  CHECK(std::sqrt(after / before) < 0.12);
+  CHECK(std::sqrt(after / before) < 0.16);
+}
+
+namespace {
+
+/// Two states, of which the first is the whole body's temperature.
+const std::string body_text = R"(format = 1
+states = 2
+conductance = [[10.0, 0.0], [0.0, 40.0]]
+coolant_conductance = [[5.0, 1.0], [1.0, 3.0]]
+room_inflow = [10.0, 0.0]
+coolant_inflow = [5.0, 1.0]
+one_degC = [1.0, 0.0]
+[[source]]
+name = "bearing"
+heat_W = 20.0
+signal = "spindle_rpm"
+at = 1000.0
+exponent = 2.0
+inflow = [1.0, 2.0]
+[[sensor]]
+name = "nose"
+row = [1.0, 0.5]
+[[output]]
+name = "z_um"
+row = [3.0, -2.0]
+)";
+
+struct TemporaryFolder {
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "thermocomp_XXXXXX").string();
+    REQUIRE(::mkdtemp(pattern.data()) != nullptr);
+    path = pattern;
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path); }
+  std::filesystem::path path;
+};
+
+/// A machine whose body is in a file beside its own.
+std::string machine_text(const std::string& more) {
+  return R"(format = 1
+[plant]
+body = "body.toml"
+[[signal]]
+name = "spindle_rpm"
+kind = "steps"
+times_s = [0]
+values = [2000]
+[[output]]
+name = "z_um"
+[[thermocouple]]
+name = "nose"
+node = "nose"
+[room]
+mean_degC = 20.0
+)" + more;
+}
+
+std::string problems_of_machine(const std::string& text, const std::string& body) {
+  const TemporaryFolder folder_of_body;
+  std::ofstream(folder_of_body.path / "body.toml") << body;
+  try {
+    static_cast<void>(parse_machine(text, (folder_of_body.path / "machine.toml").string()));
+  } catch (const ConfigurationError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("a machine with a body of its own warms as its states say") {
+  const TemporaryFolder folder_of_body;
+  std::ofstream(folder_of_body.path / "body.toml") << body_text;
+  const MachineConfig machine =
+      parse_machine(machine_text(""), (folder_of_body.path / "machine.toml").string());
+  Plant plant(*machine.plant, 1);
+  CHECK(plant.thermocouple_degC(0) == Approx(20.0));
+  CHECK(plant.displacement_um(0) == Approx(0.0).margin(1e-12));
+  plant.advance_to(1e4);
+  // 20 W (2000/1000)^2 = 80 W: the states end at 20 + 80/10 and 160/40.
+  CHECK(plant.thermocouple_degC(0) == Approx(28.0 + 0.5 * 4.0));
+  CHECK(plant.displacement_um(0) == Approx(3.0 * 8.0 - 2.0 * 4.0));
+}
+
+TEST_CASE("a body is the same after writing and reading") {
+  const ReducedBody body = parse_body(body_text, "body.toml");
+  const ReducedBody again = parse_body(write_body(body, "# a body\n"), "again.toml");
+  CHECK(again.conductance == body.conductance);
+  CHECK(again.coolant_conductance == body.coolant_conductance);
+  CHECK(again.sources.at(0).inflow == body.sources.at(0).inflow);
+  CHECK(again.sources.at(0).signal == body.sources.at(0).signal);
+  CHECK(again.sensors.at(0).row == body.sensors.at(0).row);
+  CHECK(again.outputs.at(0).row == body.outputs.at(0).row);
+}
+
+TEST_CASE("what is wrong with a body or a machine that has one is named") {
+  const auto without = [](std::string text, const std::string& what, const std::string& with) {
+    return text.replace(text.find(what), what.size(), with);
+  };
+  CHECK(problems_of_machine(machine_text(""), body_text).empty());
+  struct Case {
+    std::string machine, body, told;
+  };
+  const std::string lump = "[[node]]\nname = \"bed\"\ncapacity_J_per_K = 1.0\n";
+  for (const auto& [machine, body, told] : std::vector<Case>{
+           {machine_text(lump), body_text, "has no lumps"},
+           {without(machine_text(""), "node = \"nose\"", "node = \"nase\""), body_text, "nase"},
+           {without(machine_text(""), "z_um", "y_um"), body_text, "the body has no such output"},
+           {without(machine_text(""), "spindle_rpm", "drive_rpm"), body_text, "spindle_rpm"},
+           {machine_text(""), without(body_text, "[[10.0, 0.0]", "[[10.0, 1.0]"), "symmetric"},
+           {machine_text(""), without(body_text, "[1.0, 2.0]", "[1.0]"), "as many numbers"},
+           {machine_text(""), without(body_text, "20.0", "nan"), "finite"},
+           {machine_text(""), without(body_text, "\"z_um\"", "\"z_mm\""), "must end in _um"}}) {
+    CAPTURE(told);
+    CHECK(problems_of_machine(machine, body).find(told) != std::string::npos);
+  }
 }
