@@ -96,6 +96,10 @@ class Candump {
   [[nodiscard]] bool shows(const std::string& part) const {
     return text().find(part) != std::string::npos;
   }
+  /// A frame that it would show is sent; a program takes its time to begin.
+  [[nodiscard]] bool listens(RawSender& bus, std::uint32_t id) const {
+    return bus.send(id, {0x5A, 0xA5}) && shows("5A A5");
+  }
 
  private:
   std::filesystem::path file_;

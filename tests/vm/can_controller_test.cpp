@@ -265,7 +265,8 @@ TEST_CASE("the end of the CAN link sends the newest command once more", "[vm][co
     return state.online;
   }));
   Candump dump("vcan0,100:7FF");
-  std::this_thread::sleep_for(500ms);  // candump is listening by then
+  RawSender bus("vcan0");
+  REQUIRE(eventually([&] { return dump.listens(bus, 0x100); }));
   OffsetCommand command;
   command.link_epoch = state.link_epoch;
   command.offset_um[0] = 1.5;
