@@ -60,7 +60,7 @@ plot truth using (column("time_s")/3600):"x_error_um" with lines lw 1.5 lc rgb x
 set title "Temperatures"
 set ylabel "degC"
 set xlabel "hours of the shift"
-plot for [place in "bed_front bed_rear table room column_left column_right spindle_front spindle_rear"] \
+plot for [place in "bed_front bed_rear table saddle column_left column_right head spindle_front spindle_rear"] \
   truth using (column("time_s")/3600):place."_degC" with lines lw 1.5 \
   title system("echo ".place." | tr _ ' '")
 unset multiplot
