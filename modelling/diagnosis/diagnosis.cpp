@@ -3,107 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <random>
 
 #include "modelling/diagnosis/extended_model.hpp"
+#include "modelling/diagnosis/gain_on_test.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
 
-constexpr int resamples = 400;
-constexpr int test_blocks = 16;
 /// Rows are correlated: 2 ln L overstates what a difference is worth. Support is told as if one row
 /// in ten were a new one.
 constexpr double independent_share = 0.1;
 constexpr double support_shown_min = 0.001;
 constexpr std::size_t alternatives_max = 4;
-
-struct Residuals {
-  std::vector<Column> by_run;  ///< over the selected rows; NaN where nothing was measured
-};
-
-/// measured - model over the selected rows of every run, both from the run's first row on.
-Residuals residuals(const ThermalModel& model, const MeasuredData& data, std::size_t output) {
-  Residuals all;
-  for (const MeasuredRun& run : data.runs) {
-    Column predicted = model_over(model, run, data)[output];
-    const Column& measured = run.measured_um[output];
-    Eigen::Index start = 0;
-    while (start < run.rows() && !std::isfinite(measured[start])) ++start;
-    if (start < run.rows()) predicted.array() -= double(predicted[start]);
-    all.by_run.emplace_back((measured - predicted).tail(run.rows() - run.begin));
-  }
-  return all;
-}
-
-double root_mean_square(const Residuals& residuals) {
-  double sum = 0.0;
-  double count = 0.0;
-  for (const Column& run : residuals.by_run) {
-    for (const double value : run) {
-      if (!std::isfinite(value)) continue;
-      sum += value * value;
-      count += 1.0;
-    }
-  }
-  return count > 0 ? std::sqrt(sum / count) : not_a_number;
-}
-
-double peak(const Residuals& residuals) {
-  double largest = not_a_number;
-  for (const Column& run : residuals.by_run)
-    for (const double value : run)
-      if (std::isfinite(value) && !(std::abs(value) <= largest)) largest = std::abs(value);
-  return largest;
-}
-
-struct BlockSquares {
-  double before{0.0};
-  double after{0.0};
-};
-
-std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residuals& after) {
-  std::vector<BlockSquares> blocks;
-  Eigen::Index rows = 0;
-  for (const Column& run : before.by_run) rows += run.size();
-  const Eigen::Index length = std::max<Eigen::Index>(1, rows / test_blocks);
-  for (std::size_t i = 0; i < before.by_run.size(); ++i) {
-    for (Eigen::Index row = 0; row < before.by_run[i].size(); ++row) {
-      if (row % length == 0) blocks.emplace_back();
-      const double a = before.by_run[i][row];
-      const double b = after.by_run[i][row];
-      if (!std::isfinite(a) || !std::isfinite(b)) continue;
-      blocks.back().before += a * a;
-      blocks.back().after += b * b;
-    }
-  }
-  return blocks;
-}
-
-TestGain test_gain(const Residuals& before, const Residuals& after) {
-  TestGain gain{root_mean_square(before), root_mean_square(after), 0.0, {}};
-  gain.reduction = 1.0 - gain.after_um / gain.before_um;
-  const std::vector<BlockSquares> blocks = squares_by_block(before, after);
-  std::mt19937_64 random(1);  // the same answer for the same data
-  std::uniform_int_distribution<std::size_t> draw(0, blocks.size() - 1);
-  std::vector<double> reductions;
-  for (int i = 0; i < resamples; ++i) {
-    BlockSquares sum;
-    for (std::size_t j = 0; j < blocks.size(); ++j) {
-      const BlockSquares& block = blocks[draw(random)];
-      sum.before += block.before;
-      sum.after += block.after;
-    }
-    if (sum.before > 0) reductions.push_back(1.0 - std::sqrt(sum.after / sum.before));
-  }
-  if (reductions.empty()) return gain;
-  std::sort(reductions.begin(), reductions.end());
-  const auto at = [&](double share) {
-    return reductions[static_cast<std::size_t>(share * static_cast<double>(reductions.size() - 1))];
-  };
-  gain.ci95 = {at(0.025), at(0.975)};
-  return gain;
-}
 
 std::vector<Alternative> alternatives_of(const Finding& finding) {
   std::vector<Alternative> all;
@@ -143,27 +54,46 @@ NamedFinding named(const Finding& finding, const MeasuredData& train) {
   return name;
 }
 
+/// What a finding that no term can carry corrects, if it acts in every run.
+std::optional<Correction> correction_of(const NamedFinding& name, std::size_t output) {
+  const auto value = [&name](const std::string& parameter) {
+    for (const Parameter& each : name.parameters)
+      if (each.name == parameter) return each.values.at("");
+    return 0.0;
+  };
+  if (name.cause == "time_shift") return Correction{output, value("shift_s"), 0.0, 0.0};
+  if (name.cause == "periodic_disturbance")
+    return Correction{output, 0.0, value("period_s"), value("amplitude_um")};
+  return std::nullopt;
+}
+
 /// The model with each finding added after those before it, and what each gains.
-void extend(Diagnosis& diagnosis, const std::vector<Finding>& findings, const MeasuredData& train,
-            const MeasuredData& test) {
+/// @return what terms cannot carry, over the test runs
+Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
+                   const MeasuredData& train, const MeasuredData& test) {
+  Corrections corrections;
   for (const Finding& finding : findings) {
     NamedFinding name = named(finding, train);
     const std::optional<TermSpec> term = term_of(finding, train);
-    if (term) {
-      ThermalModel longer = diagnosis.extended;
-      longer.terms.push_back(*term);
-      for (const std::string& output : name.outputs) {
-        const auto index = static_cast<std::size_t>(
-            std::find(train.model.outputs.begin(), train.model.outputs.end(), output) -
-            train.model.outputs.begin());
-        const Residuals before = residuals(diagnosis.extended, test, index);
-        if (std::isfinite(root_mean_square(before)))
-          name.test[output] = test_gain(before, residuals(longer, test, index));
-      }
-      diagnosis.extended = std::move(longer);
+    ThermalModel longer = diagnosis.extended;
+    Corrections more = corrections;
+    if (term) longer.terms.push_back(*term);
+    for (const std::string& output : name.outputs) {
+      const auto index = static_cast<std::size_t>(
+          std::find(train.model.outputs.begin(), train.model.outputs.end(), output) -
+          train.model.outputs.begin());
+      const std::optional<Correction> correction = correction_of(name, index);
+      if (correction) more.push_back(*correction);
+      if (!term && !correction) continue;
+      const Residuals before = residuals(diagnosis.extended, corrections, test, index);
+      if (std::isfinite(root_mean_square(before)))
+        name.test[output] = test_gain(before, residuals(longer, more, test, index));
     }
+    diagnosis.extended = std::move(longer);
+    corrections = std::move(more);
     diagnosis.findings.push_back(std::move(name));
   }
+  return corrections;
 }
 
 }  // namespace
@@ -182,15 +112,15 @@ Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
   Diagnosis diagnosis;
   diagnosis.extended = model;
   diagnosis.weighed = result.weighed;
-  extend(diagnosis, result.findings, train_data, test_data);
+  const Corrections corrections = extend(diagnosis, result.findings, train_data, test_data);
   diagnosis.verdict = !diagnosis.findings.empty() ? "effect"
                       : result.unexplained        ? "unexplained"
                                                   : "none";
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
-    const Residuals base = residuals(model, test_data, output);
-    const Residuals extended = residuals(diagnosis.extended, test_data, output);
+    const Residuals base = residuals(model, {}, test_data, output);
+    const Residuals extended = residuals(diagnosis.extended, corrections, test_data, output);
     diagnosis.outputs[model.outputs[output]] = {
-        root_mean_square(residuals(model, train_data, output)),
+        root_mean_square(residuals(model, {}, train_data, output)),
         root_mean_square(base),
         peak(base),
         root_mean_square(extended),

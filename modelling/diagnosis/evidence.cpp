@@ -155,6 +155,7 @@ void OutputEvidence::accept(const std::vector<Explanation>& found) {
   }
   for (Eigen::Index row = 0; row < common.rows(); ++row)
     if (!present_[row]) common.row(row).setZero();
+  free_columns_ = common.rightCols(free_columns);
   settings_.clear();
   const double variance = noise_um_ * noise_um_;
   Eigen::VectorXd precision =

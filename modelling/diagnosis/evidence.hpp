@@ -86,6 +86,9 @@ class OutputEvidence {
   [[nodiscard]] bool complete() const { return present_.all(); }
   /// RMS of the residual, each run's mean taken off.
   [[nodiscard]] double centred_rms() const;
+  /// Columns of the accepted explanations that are fitted anew each time, shape (rows, m); they are
+  /// the last ones of every setting's common columns.
+  [[nodiscard]] const Eigen::MatrixXd& free_columns() const noexcept { return free_columns_; }
   [[nodiscard]] const Column& measured_residual() const noexcept { return measured_residual_; }
   /// The measured displacement over the stacked rows; 0 where missing.
   [[nodiscard]] Column measured(const MeasuredData& data) const;
@@ -100,6 +103,7 @@ class OutputEvidence {
   Column measured_residual_;  ///< measured - model; 0 where missing
   Column residual_;           ///< explanations without a gain subtracted
   Eigen::MatrixXd offsets_;
+  Eigen::MatrixXd free_columns_;
   double noise_um_{0.0};  ///< of a single value, from the residual's second differences
   std::vector<std::unique_ptr<Setting>> settings_;
   const Setting* setting_{nullptr};

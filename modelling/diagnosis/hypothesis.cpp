@@ -8,6 +8,7 @@
 #include "config/units.hpp"
 #include "estimator/low_pass.hpp"
 #include "estimator/play.hpp"
+#include "modelling/diagnosis/series.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -16,6 +17,9 @@ using Shape = std::vector<double>;
 
 constexpr std::size_t blocks_wanted = 8;
 constexpr double block_rows_min = 12;
+constexpr double special_case_handicap = 20.0;
+/// A derivative is taken of readings smoothed with this share of the time constant that it is for.
+constexpr double slope_smoothing = 0.25;
 
 std::vector<double> logarithmic_grid(double low, double high, std::size_t count) {
   std::vector<double> grid;
@@ -30,57 +34,6 @@ std::vector<double> linear_grid(double low, double high, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i)
     grid.push_back(low + (high - low) * static_cast<double>(i) / static_cast<double>(count - 1));
   return grid;
-}
-
-nanoseconds at_time(double time_s) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
-}
-
-/// The column through one of the estimator's filters.
-template <class Filter>
-Column through(Filter filter, const Column& time_s, const Column& input) {
-  Column out(input.size());
-  for (Eigen::Index row = 0; row < input.size(); ++row) {
-    if constexpr (requires { filter.step(nanoseconds{}, 0.0); })
-      out[row] = filter.step(at_time(time_s[row]), input[row]);
-    else
-      out[row] = filter.step(input[row]);
-  }
-  return out;
-}
-
-/// The series shifted by `shift_s` (positive: late), interpolated, held at the ends.
-Column shifted(const Column& time_s, const Column& values, double shift_s) {
-  Column out(values.size());
-  Eigen::Index row = 0;
-  const Eigen::Index last = values.size() - 1;
-  for (Eigen::Index i = 0; i <= last; ++i) {
-    const double t = time_s[i] - shift_s;
-    while (row > 0 && time_s[row] > t) --row;
-    while (row < last && time_s[row + 1] <= t) ++row;
-    if (row == last || t <= time_s[row]) {
-      out[i] = values[row];
-      continue;
-    }
-    const double share = (t - time_s[row]) / (time_s[row + 1] - time_s[row]);
-    out[i] = values[row] + share * (values[row + 1] - values[row]);
-  }
-  return out;
-}
-
-/// The derivative of the values smoothed forwards and backwards with tau_s, which shifts nothing.
-Column slope_per_s(const Column& time_s, const Column& values, double tau_s) {
-  const Column backwards_s = -time_s.reverse();
-  const Column there = through(LowPass(tau_s), time_s, values).reverse();
-  const Column smooth = through(LowPass(tau_s), backwards_s, there).reverse();
-  const Eigen::Index last = values.size() - 1;
-  Column slope = Column::Zero(values.size());
-  for (Eigen::Index row = 0; row <= last && last > 0; ++row) {
-    const Eigen::Index low = std::max<Eigen::Index>(0, row - 1);
-    const Eigen::Index high = std::min(last, row + 1);
-    slope[row] = (smooth[high] - smooth[low]) / (time_s[high] - time_s[low]);
-  }
-  return slope;
 }
 
 double median_step_s(const MeasuredData& data) {
@@ -223,7 +176,7 @@ void Catalogue::add_reading_errors(std::size_t input) {
   slow.in_every_output = true;
   slow.columns = [this, input](const Shape& shape, std::size_t output) -> Eigen::MatrixXd {
     return coefficient_times(input, output, [&](const MeasuredRun& run) -> Column {
-      return shape[0] * slope_per_s(run.time_s, run.inputs_K[input], 0.25 * shape[0]);
+      return shape[0] * slope_per_s(run.time_s, run.inputs_K[input], slope_smoothing * shape[0]);
     });
   };
   double range_K = 0.0;
@@ -277,8 +230,10 @@ void Catalogue::add_positions(const std::string& name,
             [signal](const MeasuredRun& run) -> const Column& { return run.signals[signal]; }))
       continue;
     const std::string subject = std::min(name, position) + "|" + std::max(name, position);
-    add({"position_dependence", subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}})
-        .columns = [this, rise_K, signal](const Shape&, std::size_t) -> Eigen::MatrixXd {
+    Hypothesis& along =
+        add({"position_dependence", subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}});
+    along.handicap = special_case_handicap;  // without the position: a coefficient
+    along.columns = [this, rise_K, signal](const Shape&, std::size_t) -> Eigen::MatrixXd {
       Eigen::MatrixXd both(rows_.time_s.size(), 2);
       both.col(0) = stacked([&](const MeasuredRun& run) -> Column {
         return run.signals[signal].cwiseProduct(rise_K(run));
@@ -360,7 +315,9 @@ void Catalogue::add_output(std::size_t output) {
     shift.output = output;
     shift.columns = [this, model_um](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
       return stacked([&](const MeasuredRun& run) -> Column {
-        return shifted(run.time_s, model_um(run), shape[0]) - model_um(run);
+        // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
+        const Column smooth_um = smoothed(run.time_s, model_um(run), 2.0 * step_s_);
+        return shifted(run.time_s, smooth_um, shape[0]) - smooth_um;
       });
     };
   }
@@ -452,6 +409,7 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
         add({cause, name, Form::shared_gain, {onsets(run, onset, first, 0.95, count)}, {gain}});
     added.run = run;
     added.sensor = input;
+    added.handicap = special_case_handicap;  // from the run's start on: a fault of the datum
     added.in_every_output = true;
     return added;
   };

@@ -45,7 +45,9 @@ struct Hypothesis {
   std::optional<std::size_t> output{};  ///< acts on this output alone
   std::optional<std::size_t> run{};     ///< a fault of this run alone
   std::optional<std::size_t> sensor{};  ///< a fault of the reading of this input
-  bool in_every_output{false};          ///< an output without its share speaks against it
+  /// 2 ln L that it must gain beyond others: for what contains a simpler cause as a special case.
+  double handicap{0.0};
+  bool in_every_output{false};  ///< an output without its share speaks against it
   /// Columns for an output over the stacked rows, shape (rows, gains or 1).
   std::function<Eigen::MatrixXd(const std::vector<double>& shape, std::size_t output)> columns{};
   /// Whether a gain is physically possible; empty: all are.

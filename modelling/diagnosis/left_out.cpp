@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <Eigen/Cholesky>
 
@@ -41,17 +42,20 @@ struct Reduced {
   Eigen::MatrixXd square;
   Eigen::VectorXd right;
   double squares{0.0};
+  Eigen::MatrixXd carried;  ///< what the common columns carry of each other one
 };
 
-Reduced without_block(const BlockProducts& products, std::size_t block) {
-  const Eigen::MatrixXd rest = products.total - products.blocks[block];
+/// @param block  none of them: all rows stay
+Reduced without_block(const BlockProducts& products, std::optional<std::size_t> block) {
+  Eigen::MatrixXd rest = products.total;
+  if (block) rest -= products.blocks[*block];
   const Eigen::Index n = products.common;
   const Eigen::Index m = products.free + 1;
   const Eigen::MatrixXd carried = rest.topLeftCorner(n, n).ldlt().solve(rest.topRightCorner(n, m));
   const Eigen::MatrixXd reduced =
       rest.bottomRightCorner(m, m) - rest.bottomLeftCorner(m, n) * carried;
   return {reduced.topLeftCorner(products.free, products.free),
-          reduced.topRightCorner(products.free, 1), reduced(m - 1, m - 1)};
+          reduced.topRightCorner(products.free, 1), reduced(m - 1, m - 1), carried};
 }
 
 /// Finer grids than this are only searched anew around the peak.
@@ -86,14 +90,20 @@ std::vector<std::vector<double>> shapes_of(const Explanation& explanation) {
   return shapes;
 }
 
-/// What is left of `before` and `after` in a block when each run's mean outside of it is taken off.
 struct Squares {
   double before{0.0};
   double after{0.0};
 };
 
-Squares squares_in_block(const OutputEvidence& evidence, const Column& explained,
-                         const StackedRows& rows, const Block& block) {
+/// What is left of an output without (`before`) and with the hypothesis.
+struct Left {
+  Column before;
+  Column after;
+};
+
+/// Squares of both in a block when each run's mean outside of it is taken off.
+Squares squares_in_block(const OutputEvidence& evidence, const Left& left, const StackedRows& rows,
+                         const Block& block) {
   Squares sum;
   for (const Block& run : rows.runs) {
     if (block.begin < run.begin || block.begin >= run.end) continue;
@@ -104,15 +114,15 @@ Squares squares_in_block(const OutputEvidence& evidence, const Column& explained
     for (Eigen::Index row = run.begin; row < run.end; ++row) {
       const bool inside = row >= block.begin && row < block.end;
       if (!evidence.present()[row] || (inside && !alone)) continue;
-      before_um += evidence.residual()[row];
-      after_um += evidence.residual()[row] - explained[row];
+      before_um += left.before[row];
+      after_um += left.after[row];
       count += 1.0;
     }
     if (!(count > 0)) continue;
     for (Eigen::Index row = block.begin; row < block.end; ++row) {
       if (!evidence.present()[row]) continue;
-      const double before = evidence.residual()[row] - before_um / count;
-      const double after = evidence.residual()[row] - explained[row] - after_um / count;
+      const double before = left.before[row] - before_um / count;
+      const double after = left.after[row] - after_um / count;
       sum.before += before * before;
       sum.after += after * after;
     }
@@ -124,13 +134,16 @@ Squares squares_in_block(const OutputEvidence& evidence, const Column& explained
 struct BlockFit {
   double misfit{std::numeric_limits<double>::infinity()};
   std::vector<Eigen::VectorXd> gains;
+  /// Gains of the accepted columns, without and with the hypothesis.
+  std::vector<Eigen::VectorXd> accepted_before;
+  std::vector<Eigen::VectorXd> accepted_after;
 };
 
 BlockFit fit_without(const Explanation& explanation, const std::vector<std::size_t>& acting,
-                     const std::vector<BlockProducts>& products, std::size_t block) {
+                     const std::vector<BlockProducts>& products, std::optional<std::size_t> block) {
   std::vector<Reduced> reduced;
   for (const BlockProducts& each : products) reduced.push_back(without_block(each, block));
-  BlockFit fit{0.0, {}};
+  BlockFit fit{0.0, {}, {}, {}};
   double square = 0.0;
   double right = 0.0;
   for (std::size_t i = 0; i < acting.size(); ++i) {
@@ -149,8 +162,22 @@ BlockFit fit_without(const Explanation& explanation, const std::vector<std::size
     fit.misfit +=
         explanation.settings[acting[i]]->present_rows() * std::log(std::max(squares, 1e-12));
     fit.gains.push_back(gains);
+    const Eigen::VectorXd before = reduced[i].carried.rightCols(1);
+    fit.accepted_before.push_back(before);
+    fit.accepted_after.emplace_back(before - reduced[i].carried.leftCols(gains.size()) * gains);
   }
   return fit;
+}
+
+/// What a fit leaves of the output number `i` of those acted on.
+Left left_of(const BlockFit& fit, std::size_t i, const OutputEvidence& evidence,
+             const Explanation& explanation, const std::vector<double>& shape) {
+  const Eigen::MatrixXd& accepted = evidence.free_columns();
+  Left left{evidence.residual(), evidence.residual()};
+  left.before -= accepted * fit.accepted_before[i].tail(accepted.cols());
+  left.after -= accepted * fit.accepted_after[i].tail(accepted.cols());
+  left.after -= columns_of(*explanation.hypothesis, shape, evidence) * fit.gains[i];
+  return left;
 }
 
 std::vector<std::size_t> acting_outputs(const Explanation& explanation) {
@@ -201,9 +228,8 @@ LeftOutGain gain_on_left_out_blocks(const Explanation& explanation, const Stacke
   for (std::size_t block = 0; block < blocks; ++block) {
     for (std::size_t i = 0; i < best[block].gains.size(); ++i) {
       const OutputEvidence& evidence = outputs[acting[i]];
-      const Column explained =
-          columns_of(*explanation.hypothesis, best_shape[block], evidence) * best[block].gains[i];
-      const Squares part = squares_in_block(evidence, explained, rows, rows.blocks[block]);
+      const Left left = left_of(best[block], i, evidence, explanation, best_shape[block]);
+      const Squares part = squares_in_block(evidence, left, rows, rows.blocks[block]);
       sums[i].before += part.before;
       sums[i].after += part.after;
     }
@@ -213,16 +239,21 @@ LeftOutGain gain_on_left_out_blocks(const Explanation& explanation, const Stacke
 
 LeftOutGain gain_on_fitted_rows(const Explanation& explanation, const StackedRows& rows,
                                 const std::vector<OutputEvidence>& outputs) {
-  std::vector<Squares> sums;
-  for (const std::size_t output : acting_outputs(explanation)) {
-    Squares& sum = sums.emplace_back();
-    const Column explained =
-        columns_of(*explanation.hypothesis, explanation.shape, outputs[output]) *
-        explanation.gains[output];
+  const std::vector<std::size_t> acting = acting_outputs(explanation);
+  std::vector<BlockProducts> all;
+  for (const std::size_t output : acting)
+    all.push_back(products(*explanation.settings[output],
+                           columns_of(*explanation.hypothesis, explanation.shape, outputs[output]),
+                           rows));
+  const BlockFit fit = fit_without(explanation, acting, all, std::nullopt);
+  std::vector<Squares> sums(acting.size());
+  for (std::size_t i = 0; i < acting.size(); ++i) {
+    const OutputEvidence& evidence = outputs[acting[i]];
+    const Left left = left_of(fit, i, evidence, explanation, explanation.shape);
     for (const Block& run : rows.runs) {
-      const Squares part = squares_in_block(outputs[output], explained, rows, run);
-      sum.before += part.before;
-      sum.after += part.after;
+      const Squares part = squares_in_block(evidence, left, rows, run);
+      sums[i].before += part.before;
+      sums[i].after += part.after;
     }
   }
   return gain_of(sums);

@@ -17,9 +17,9 @@ constexpr std::size_t shortlist_of_each = 20;
 /// An output counts as acted on when its 2 ln L gains this much beyond the price of its gains.
 constexpr double output_gain_min = 6.0;
 /// Structure is called unexplained when its RMS is above this share of the measured motion's ...
-constexpr double structure_share_min = 0.05;
+constexpr double structure_share_min = 0.03;
 /// ... and this many times the noise.
-constexpr double structure_noises_min = 2.0;
+constexpr double structure_noises_min = 1.5;
 constexpr int refit_rounds = 2;
 constexpr std::size_t shapes_at_once = 8;
 /// Explanations are as good as each other when what they leave differs by less than this share.
@@ -84,7 +84,7 @@ double Search::price(const Hypothesis& hypothesis) const {
   for (const ShapeParameter& parameter : hypothesis.shape)
     if (!parameter.discrete) sum += std::log(rows);
   if (hypothesis.form == Form::shared_gain) sum += std::log(rows);
-  return sum;
+  return sum + hypothesis.handicap;
 }
 
 std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
@@ -439,6 +439,14 @@ bool Search::matters(const Explanation& explanation, bool first) const {
   });
 }
 
+bool Search::earned(const Explanation& explanation, bool first) const {
+  if (!(explanation.left_out_gain >= thresholds_.left_out_gain_min)) return false;
+  const bool clear = !first || explanation.left_out_gain >= thresholds_.clear_share;
+  if (!(explanation.score >= (clear ? thresholds_.clear_score_min : thresholds_.score_min)))
+    return false;
+  return matters(explanation, first);
+}
+
 bool Search::structure_left() const {
   return std::any_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
     const OutputEvidence& evidence = outputs_[output];
@@ -461,8 +469,7 @@ SearchResult Search::run() {
       result.weighed.push_back({result.findings.size() + 1, candidates[i].hypothesis->cause,
                                 candidates[i].hypothesis->subject, candidates[i].score,
                                 candidates[i].left_out_gain, candidates[i].log_left});
-    if (candidates.empty() || !matters(candidates.front(), result.findings.empty())) break;
-    if (candidates.front().left_out_gain < thresholds_.left_out_gain_min) break;
+    if (candidates.empty() || !earned(candidates.front(), result.findings.empty())) break;
     Finding finding{candidates.front(), {}, {}, {}};
     for (std::size_t i = 1; i < candidates.size(); ++i) {
       const Hypothesis& other = *candidates[i].hypothesis;

@@ -11,13 +11,19 @@ namespace thermocomp::diagnosis {
 struct Thresholds {
   /// Least share of the RMS that a cause must take from rows it was not fitted to.
   double left_out_gain_min{0.12};
+  /// Least gain of 2 ln L over noise that may be as large as the residual, for a cause that takes
+  /// less of left-out rows than `clear_share` ...
+  double score_min{90.0};
+  double clear_share{0.55};
+  /// ... and for one that takes more, and for every one after the first.
+  double clear_score_min{30.0};
   /// Least RMS of what a cause explains, as a share of the measured motion's; never below the noise
   /// of a single value.
   double motion_share_min{0.005};
   /// Later findings explain at least this share of the residual's RMS before the first.
   double later_share_min{0.2};
   /// All findings together must take this share of the variance of left-out rows.
-  double carried_share_min{0.45};
+  double carried_share_min{0.3};
   std::size_t findings_max{4};
 };
 
@@ -89,6 +95,8 @@ class Search {
                                      std::size_t output) const;
   /// Whether any output has a share.
   [[nodiscard]] static bool acts(const Explanation& explanation);
+  /// Whether it may be named.
+  [[nodiscard]] bool earned(const Explanation& explanation, bool first) const;
   [[nodiscard]] bool matters(const Explanation& explanation, bool first) const;
   [[nodiscard]] double centred_rms_um(const Column& values, std::size_t output) const;
   [[nodiscard]] bool structure_left() const;

@@ -1,0 +1,142 @@
+#include "modelling/diagnosis/report_texts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string_view>
+
+namespace thermocomp::diagnosis {
+namespace {
+
+struct CauseTexts {
+  std::string_view cause;
+  std::string_view says;  ///< continues "SUBJECT: "
+  std::string_view to_do;
+};
+
+constexpr std::array<CauseTexts, 17> texts = {{
+    {"thermal_lag", "a part of the structure follows this temperature late",
+     "Use the extended model; a sensor deeper in the slow part would make it unnecessary."},
+    {"slow_sensor", "the displacement leads the reading: the sensor follows its place late",
+     "Look at how the sensor is mounted (paste, clamp, tape); until then use the extended model."},
+    {"time_shift", "the displacement is logged at other times than the temperatures",
+     "Set the clocks of both recorders, or correct the time column before anything is fitted."},
+    {"missing_heat_source",
+     "the machine goes on moving after this signal changes: heat that no sensor sees",
+     "Use the extended model, or put a sensor where that heat enters."},
+    {"speed_growth", "the displacement jumps with the square of this signal",
+     "Use the extended model; this part is not thermal and no sensor will show it."},
+    {"missing_temperature", "a measured place that the model ignores moves the machine",
+     "Use the extended model, or take this place into the model when it is fitted again."},
+    {"wrong_coefficient", "the model moves by the wrong amount for each kelvin of this place",
+     "Use the extended model; look at the support or material that the coefficient came from."},
+    {"nonlinear_expansion", "the effect of this temperature is curved",
+     "Use the extended model; beyond the temperatures seen here the curve is not known."},
+    {"position_dependence", "the effect of this temperature grows along the axis",
+     "Use the extended model, or give the model a guideway along this axis."},
+    {"hysteresis", "what moves sticks before it follows: a loop that does not depend on speed",
+     "Look for a joint or a clamp that slips; the extended model carries it until then."},
+    {"periodic_disturbance", "a cycle of its own, which no temperature here explains",
+     "Look for what switches with this period: a cooler, a pump, the room's ventilation."},
+    {"displacement_step", "the datum of the displacement jumped once",
+     "Do not fit to this run across the jump; look whether the probe was touched or set again."},
+    {"displacement_drift", "the datum of the displacement creeps through the whole run",
+     "Do not fit to this run; look at the probe, its holder and its amplifier's warm-up."},
+    {"sensor_drift", "this reading creeps away from what its neighbours and the displacement say",
+     "Replace or calibrate the sensor; leave the run out of any fit."},
+    {"sensor_step", "this reading jumped and stayed",
+     "Look at the connector and the amplifier's channel; leave the run out of any fit."},
+    {"sensor_loose", "from a time on this sensor shows more of the room than of its place",
+     "Fasten the sensor; leave the rest of the run out of any fit."},
+    {"sensor_swap", "these two channels are exchanged",
+     "Exchange the two plugs or the two names in the configuration."},
+}};
+
+const CauseTexts* texts_of(std::string_view cause) {
+  const auto at = std::find_if(texts.begin(), texts.end(),
+                               [cause](const CauseTexts& each) { return each.cause == cause; });
+  return at == texts.end() ? nullptr : &*at;
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+std::string parameter_text(const Parameter& parameter) {
+  std::string text;
+  for (const auto& [output, value] : parameter.values) {
+    if (!text.empty()) text += "; ";
+    text += parameter.name;
+    if (!output.empty()) text += " of " + output;
+    text += " " + number(value);
+    const auto ci = parameter.ci95.find(output);
+    if (ci != parameter.ci95.end())
+      text += " (" + number(ci->second.low) + " to " + number(ci->second.high) + ")";
+  }
+  return text;
+}
+
+bool acts_at_once(std::string_view cause) {
+  return cause == "speed_growth" || cause == "wrong_coefficient" ||
+         cause == "nonlinear_expansion" || cause == "sensor_swap";
+}
+
+bool fault_of_one_run(std::string_view cause) {
+  return cause.starts_with("displacement_") || cause == "sensor_drift" || cause == "sensor_step" ||
+         cause == "sensor_loose";
+}
+
+bool has_memory(std::string_view cause) {
+  return cause == "thermal_lag" || cause == "slow_sensor" || cause == "time_shift" ||
+         cause == "hysteresis";
+}
+
+}  // namespace
+
+std::string sentence_of(const NamedFinding& finding) {
+  const CauseTexts* of = texts_of(finding.cause);
+  std::string text = finding.subject;
+  text += ": ";
+  text += of == nullptr ? std::string_view(finding.cause) : of->says;
+  if (finding.run) text += " (in " + *finding.run + ")";
+  std::string figures;
+  for (const Parameter& parameter : finding.parameters)
+    figures += (figures.empty() ? "" : "; ") + parameter_text(parameter);
+  if (!figures.empty()) text += "; " + figures;
+  for (const auto& [output, gain] : finding.test)
+    text += "; knowing it takes the error of " + output + " from " + number(gain.before_um) +
+            " to " + number(gain.after_um);
+  return text + ".";
+}
+
+std::string what_to_do(const NamedFinding& finding) {
+  const CauseTexts* of = texts_of(finding.cause);
+  return of == nullptr ? std::string() : std::string(of->to_do);
+}
+
+std::string experiment_for(const NamedFinding& finding, const Alternative& other) {
+  const auto either = [&](const auto& test) { return test(finding.cause) || test(other.cause); };
+  const auto named = [&](std::string_view cause) {
+    return finding.cause == cause || other.cause == cause;
+  };
+  if (finding.cause == other.cause)
+    return "Warm one of the two places alone (a heating pad for half an hour) and read both.";
+  if (either(fault_of_one_run))
+    return "Repeat the run with the same duty: a fault of one run does not come back.";
+  if (named("missing_heat_source") || named("speed_growth"))
+    return "Hold one constant speed for two hours, then stop and record two hours of standstill.";
+  if (named("position_dependence"))
+    return "Warm up, then measure at both ends and in the middle of the axis within ten minutes.";
+  if (named("hysteresis"))
+    return "Repeat the same warm-up twice as slowly: a lag's loop closes, that of play does not.";
+  if (either(has_memory))
+    return "Step the speed up and record until nothing moves, then step it down: only what has "
+           "memory parts the two branches.";
+  if (either(acts_at_once))
+    return "Hold three different temperatures of the place until nothing moves any more.";
+  return "Repeat the run with another sequence of speeds and another room temperature.";
+}
+
+}  // namespace thermocomp::diagnosis
