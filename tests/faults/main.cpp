@@ -2,11 +2,13 @@
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <fmt/format.h>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <unistd.h>
 #include <utility>
 #include <vector>
 
@@ -50,6 +52,13 @@ class Campaign {
     std::tie(next_, end_) = parse_seeds(options.seeds);
     first_ = next_;
     total_.pairs.reset();
+    history_folder_ = std::filesystem::path(options.history) / std::to_string(getpid());
+  }
+  Campaign(const Campaign&) = delete;
+  Campaign& operator=(const Campaign&) = delete;
+  ~Campaign() {
+    std::error_code ignored;
+    std::filesystem::remove_all(history_folder_, ignored);
   }
 
   void run() {
@@ -103,7 +112,7 @@ class Campaign {
       life.cycle_hz = options_.cycle_hz;
       life.verbose = options_.verbose;
       if (options_.history_every != 0 && seed % options_.history_every == 0)
-        life.history_folder = options_.history;
+        life.history_folder = history_folder_;
       add(seed, live(life));
     }
   }
@@ -159,6 +168,7 @@ class Campaign {
   }
 
   const Options& options_;
+  std::filesystem::path history_folder_;
   std::uint64_t first_{0};
   std::uint64_t next_{0};
   std::uint64_t end_{0};
@@ -185,7 +195,8 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0.5, 1000.0));
   app.add_option("--planted", options.planted, "a bug to plant; --list names them");
-  app.add_option("--history", options.history, "folder for the histories that are really written")
+  app.add_option("--history", options.history,
+                 "folder for the histories that are really written, one in it a process")
       ->capture_default_str();
   app.add_option("--history-every", options.history_every,
                  "seeds that are a multiple of this write a real history; 0: none")
