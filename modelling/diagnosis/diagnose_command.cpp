@@ -12,6 +12,7 @@
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/report_data.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -71,12 +72,16 @@ void print_weighed(const Diagnosis& diagnosis) {
 
 int run(const Options& options) {
   const ThermalModel model = load_model(options.model);
-  const Diagnosis diagnosis = diagnose(model, load_runs(options.train), options.train,
-                                       load_runs(options.test), options.test);
+  ReportData report;
+  const Diagnosis diagnosis =
+      diagnose(model, load_runs(options.train), options.train, load_runs(options.test),
+               options.test, options.folder.empty() ? nullptr : &report);
   if (!options.folder.empty()) {
     std::filesystem::create_directories(options.folder);
     write((std::filesystem::path(options.folder) / "model.toml").string(),
           write_model(diagnosis.extended));
+    write((std::filesystem::path(options.folder) / "report.html").string(),
+          report_html(diagnosis, report));
   }
   if (!options.json.empty()) write(options.json, diagnosis_json(diagnosis));
   if (options.json != "-") print(diagnosis);
@@ -95,7 +100,7 @@ void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
       ->add_option("--train", options->train, "runs from which causes are found: RUN.csv[@T0:T1]")
       ->required();
   command->add_option("--test", options->test, "runs on which the gain is measured")->required();
-  command->add_option("--out", options->folder, "folder for the extended model");
+  command->add_option("--out", options->folder, "folder for the report and the extended model");
   command->add_option("--json", options->json, "file for the answer as JSON; - is the output");
   command->add_flag("--weighed", options->weighed, "also print what came into question");
   command->callback([options, &action] { action = [options] { return run(*options); }; });

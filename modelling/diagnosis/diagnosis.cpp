@@ -6,6 +6,7 @@
 
 #include "modelling/diagnosis/extended_model.hpp"
 #include "modelling/diagnosis/gain_on_test.hpp"
+#include "modelling/diagnosis/report_data.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -96,11 +97,22 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
   return corrections;
 }
 
+/// What no term carries, over the training runs.
+Corrections train_corrections(const Diagnosis& diagnosis, const MeasuredData& train) {
+  Corrections corrections;
+  for (const NamedFinding& finding : diagnosis.findings)
+    for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
+      if (finding.outputs.front() == train.model.outputs[output])
+        if (const auto correction = correction_of(finding, output))
+          corrections.push_back(*correction);
+  return corrections;
+}
+
 }  // namespace
 
 Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
                    const std::vector<std::string>& train_names, const std::vector<RunFile>& test,
-                   const std::vector<std::string>& test_names) {
+                   const std::vector<std::string>& test_names, ReportData* report) {
   std::vector<RunFile> all = train;
   all.insert(all.end(), test.begin(), test.end());
   const SharedColumns columns = shared_columns(model, all);
@@ -126,6 +138,11 @@ Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
         root_mean_square(extended),
         peak(extended),
         result.unexplained_share[output]};
+  }
+  if (report != nullptr) {
+    add_runs(*report, diagnosis, model, train_corrections(diagnosis, train_data), train_data,
+             false);
+    add_runs(*report, diagnosis, model, corrections, test_data, true);
   }
   return diagnosis;
 }

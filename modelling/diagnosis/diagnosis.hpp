@@ -57,6 +57,8 @@ struct OutputFigures {
   double unexplained_fraction{0.0};
 };
 
+struct ReportData;
+
 struct Diagnosis {
   std::string verdict;  ///< "effect", "none" or "unexplained"
   std::vector<NamedFinding> findings;
@@ -66,11 +68,13 @@ struct Diagnosis {
 };
 
 /// @param train_names, test_names  the runs' arguments as given
+/// @param report  if given, receives what the report shows
 /// @throws ConfigurationError when a run lacks a column of the model or any measured value
 [[nodiscard]] Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
                                  const std::vector<std::string>& train_names,
                                  const std::vector<RunFile>& test,
-                                 const std::vector<std::string>& test_names);
+                                 const std::vector<std::string>& test_names,
+                                 ReportData* report = nullptr);
 
 /// The answer as JSON (indented, a newline at the end). Numbers that are not known are null.
 [[nodiscard]] std::string diagnosis_json(const Diagnosis& diagnosis);

@@ -18,11 +18,16 @@ constexpr double slope_share_min = 0.08;
 
 const char* phase_name(Phase phase) {
   switch (phase) {
-    case Phase::change: return "speed change";
-    case Phase::heating: return "heating";
-    case Phase::cooling: return "cooling";
-    case Phase::standstill: return "standstill";
-    case Phase::steady: break;
+    case Phase::change:
+      return "speed change";
+    case Phase::heating:
+      return "heating";
+    case Phase::cooling:
+      return "cooling";
+    case Phase::standstill:
+      return "standstill";
+    case Phase::steady:
+      break;
   }
   return "steady";
 }
@@ -100,8 +105,9 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel
   report.inputs = model.inputs;
   const std::size_t first = report.runs.size();
   for (const MeasuredRun& run : data.runs) {
-    ReportRun added{run.name, test, run.time_s.tail(run.rows() - run.begin),
-                    phases_of(run, data), {}, {}, {}, {}};
+    ReportRun added{
+        run.name, test, run.time_s.tail(run.rows() - run.begin), phases_of(run, data), {}, {},
+        {},       {}};
     const Eigen::Index rows = added.time_s.size();
     for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
     for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));

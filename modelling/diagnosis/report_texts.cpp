@@ -60,7 +60,7 @@ const CauseTexts* texts_of(std::string_view cause) {
 
 std::string number(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
+  std::snprintf(text, sizeof text, value >= 100.0 ? "%.0f" : "%.3g", value);
   return text;
 }
 
@@ -69,11 +69,15 @@ std::string parameter_text(const Parameter& parameter) {
   for (const auto& [output, value] : parameter.values) {
     if (!text.empty()) text += "; ";
     text += parameter.name;
-    if (!output.empty()) text += " of " + output;
-    text += " " + number(value);
+    if (!output.empty()) text.append(" of ").append(output);
+    text.append(" ").append(number(value));
     const auto ci = parameter.ci95.find(output);
     if (ci != parameter.ci95.end())
-      text += " (" + number(ci->second.low) + " to " + number(ci->second.high) + ")";
+      text.append(" (")
+          .append(number(ci->second.low))
+          .append(" to ")
+          .append(number(ci->second.high))
+          .append(")");
   }
   return text;
 }
@@ -100,14 +104,18 @@ std::string sentence_of(const NamedFinding& finding) {
   std::string text = finding.subject;
   text += ": ";
   text += of == nullptr ? std::string_view(finding.cause) : of->says;
-  if (finding.run) text += " (in " + *finding.run + ")";
+  if (finding.run) text.append(" (in ").append(*finding.run).append(")");
   std::string figures;
   for (const Parameter& parameter : finding.parameters)
-    figures += (figures.empty() ? "" : "; ") + parameter_text(parameter);
-  if (!figures.empty()) text += "; " + figures;
+    figures.append(figures.empty() ? "" : "; ").append(parameter_text(parameter));
+  if (!figures.empty()) text.append("; ").append(figures);
   for (const auto& [output, gain] : finding.test)
-    text += "; knowing it takes the error of " + output + " from " + number(gain.before_um) +
-            " to " + number(gain.after_um);
+    text.append("; knowing it takes the error of ")
+        .append(output)
+        .append(" from ")
+        .append(number(gain.before_um))
+        .append(" to ")
+        .append(number(gain.after_um));
   return text + ".";
 }
 

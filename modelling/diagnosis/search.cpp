@@ -440,11 +440,22 @@ bool Search::matters(const Explanation& explanation, bool first) const {
 }
 
 bool Search::earned(const Explanation& explanation, bool first) const {
-  if (!(explanation.left_out_gain >= thresholds_.left_out_gain_min)) return false;
-  const bool clear = !first || explanation.left_out_gain >= thresholds_.clear_share;
-  if (!(explanation.score >= (clear ? thresholds_.clear_score_min : thresholds_.score_min)))
-    return false;
-  return matters(explanation, first);
+  return explanation.left_out_gain >= thresholds_.left_out_gain_min &&
+         explanation.score >= thresholds_.score_min && matters(explanation, first);
+}
+
+/// Whether the findings may be named: one of them is clear by itself, or all together are.
+bool Search::convincing(const std::vector<Finding>& findings) const {
+  double left = 1.0;
+  double score = 0.0;
+  for (const Finding& finding : findings) {
+    const Explanation& each = finding.explanation;
+    if (each.left_out_gain >= thresholds_.clear_share || each.score >= thresholds_.clear_score)
+      return true;
+    left *= 1.0 - each.left_out_gain;
+    score += each.score;
+  }
+  return 1.0 - left >= thresholds_.together_share && score >= thresholds_.clear_score;
 }
 
 bool Search::structure_left() const {
@@ -480,6 +491,7 @@ SearchResult Search::run() {
     result.findings.push_back(std::move(finding));
     refit(result.findings);
   }
+  const bool named = convincing(result.findings);
   measure_spread(result.findings);
   accept(result.findings, result.findings.size());
   double left_variance = 1.0;
@@ -489,7 +501,7 @@ SearchResult Search::run() {
   for (const std::size_t output : measured_)
     result.unexplained_share[output] =
         std::clamp(1.0 - carried_share(result.findings, output), 0.0, 1.0);
-  if (1.0 - left_variance < thresholds_.carried_share_min) {
+  if (!named || 1.0 - left_variance < thresholds_.carried_share_min) {
     result.findings.clear();
     for (const std::size_t output : measured_) result.unexplained_share[output] = 1.0;
     result.unexplained = structure_left();

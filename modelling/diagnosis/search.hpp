@@ -11,12 +11,14 @@ namespace thermocomp::diagnosis {
 struct Thresholds {
   /// Least share of the RMS that a cause must take from rows it was not fitted to.
   double left_out_gain_min{0.12};
-  /// Least gain of 2 ln L over noise that may be as large as the residual, for a cause that takes
-  /// less of left-out rows than `clear_share` ...
-  double score_min{90.0};
+  /// Least gain of 2 ln L over noise that may be as large as the residual.
+  double score_min{25.0};
+  /// A finding is clear when it takes this share of the RMS of left-out rows, or gains this much
+  /// ...
   double clear_share{0.55};
-  /// ... and for one that takes more, and for every one after the first.
-  double clear_score_min{30.0};
+  double clear_score{90.0};
+  /// ... and several are when they take this share together and gain that much.
+  double together_share{0.65};
   /// Least RMS of what a cause explains, as a share of the measured motion's; never below the noise
   /// of a single value.
   double motion_share_min{0.005};
@@ -97,6 +99,7 @@ class Search {
   [[nodiscard]] static bool acts(const Explanation& explanation);
   /// Whether it may be named.
   [[nodiscard]] bool earned(const Explanation& explanation, bool first) const;
+  [[nodiscard]] bool convincing(const std::vector<Finding>& findings) const;
   [[nodiscard]] bool matters(const Explanation& explanation, bool first) const;
   [[nodiscard]] double centred_rms_um(const Column& values, std::size_t output) const;
   [[nodiscard]] bool structure_left() const;

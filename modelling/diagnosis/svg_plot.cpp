@@ -34,26 +34,38 @@ Range range_of(const std::vector<const Column*>& columns) {
   return range;
 }
 
-std::string formatted(const char* format, double a, double b = 0.0) {
-  char text[160];
-  std::snprintf(text, sizeof text, format, a, b);
+/// "1.5 2.5": a place in the drawing.
+std::string place(double x, double y) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.1f %.1f", x, y);
   return text;
 }
 
-std::string frame(const std::string& title, double whole_width, const Range& y) {
-  std::string svg = formatted("<svg viewBox=\"0 0 %g %g\" role=\"img\">", whole_width, height);
-  svg += "<text x=\"4\" y=\"14\" class=\"title\">" + escaped(title) + "</text>";
-  svg += formatted("<text x=\"4\" y=\"%g\">", top + 10) + formatted("%.3g</text>", y.high);
-  svg += formatted("<text x=\"4\" y=\"%g\">", height - bottom) + formatted("%.3g</text>", y.low);
-  if (y.low < 0 && y.high > 0) {
-    const double zero = height - bottom - (0 - y.low) / (y.high - y.low) * (height - top - bottom);
-    svg += formatted("<path class=\"zero\" d=\"M64 %g", zero) + formatted("H%g\"/>", whole_width);
-  }
-  return svg;
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+std::string label(double x, double y, const std::string& text, const char* attributes = "") {
+  std::string svg = "<text x=\"" + number(x);
+  svg.append("\" y=\"").append(number(y)).append("\" ").append(attributes).append(">");
+  return svg.append(escaped(text)).append("</text>");
 }
 
 double vertical(double value, const Range& y) {
   return height - bottom - (value - y.low) / (y.high - y.low) * (height - top - bottom);
+}
+
+std::string frame(const std::string& title, double whole_width, const Range& y) {
+  std::string svg = "<svg viewBox=\"0 0 " + place(whole_width, height);
+  svg.append("\" role=\"img\">").append(label(4, 14, title, "class=\"title\""));
+  svg += label(4, top + 10, number(y.high)) + label(4, height - bottom, number(y.low));
+  if (y.low < 0 && y.high > 0) {
+    svg.append("<path class=\"zero\" d=\"M").append(place(left, vertical(0.0, y)));
+    svg.append("L").append(place(whole_width, vertical(0.0, y))).append("\"/>");
+  }
+  return svg;
 }
 
 }  // namespace
@@ -95,18 +107,16 @@ std::string line_plot(const std::string& title, const Column& time_s,
         continue;
       }
       const double along = left + (time_s[row] - x.low) / (x.high - x.low) * (width - left - 8);
-      svg += formatted(pen_down ? "L%.1f %.1f" : "M%.1f %.1f", along, vertical(value, y));
+      svg.append(pen_down ? "L" : "M").append(place(along, vertical(value, y)));
       pen_down = true;
     }
-    svg += "\"/>" + formatted("<text x=\"%g\" y=\"14\" fill=\"", legend) + line.colour + "\">" +
-           escaped(line.label) + "</text>";
+    const std::string fill = "fill=\"" + line.colour + "\"";
+    svg.append("\"/>").append(label(legend, 14, line.label, fill.c_str()));
     legend += 130.0;
   }
-  svg += formatted("<text x=\"64\" y=\"%g\">", height - 8) +
-         formatted("%.2f h</text>", x.low / 3600.0);
-  svg += formatted("<text x=\"%g\" y=\"%g\">", width - 60, height - 8) +
-         formatted("%.2f h</text></svg>\n", x.high / 3600.0);
-  return svg;
+  svg += label(left, height - 8, number(x.low / 3600.0) + " h");
+  svg += label(width - 60, height - 8, number(x.high / 3600.0) + " h");
+  return svg + "</svg>\n";
 }
 
 std::string scatter_plot(const std::string& title, const Column& x, const Column& y) {
@@ -118,11 +128,11 @@ std::string scatter_plot(const std::string& title, const Column& x, const Column
     if (!std::isfinite(x[row]) || !std::isfinite(y[row])) continue;
     const double along =
         left + (x[row] - across.low) / (across.high - across.low) * (small_width - left - 8);
-    svg += formatted("M%.1f %.1fh1", along, vertical(y[row], up));
+    svg.append("M").append(place(along, vertical(y[row], up))).append("h1");
   }
-  svg += formatted("\"/><text x=\"64\" y=\"%g\">", height - 8) +
-         formatted("%.3g to %.3g K</text></svg>\n", across.low, across.high);
-  return svg;
+  svg += "\"/>";
+  svg += label(left, height - 8, number(across.low) + " to " + number(across.high) + " K");
+  return svg + "</svg>\n";
 }
 
 }  // namespace thermocomp::diagnosis
