@@ -1,0 +1,115 @@
+"""A model that `thermocomp diagnose` has extended, in the running daemon: the offsets are the tool's
+prediction from the same readings."""
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+
+import spindle
+from lab import BIN, read_columns, run_tool
+
+pytestmark = [
+    pytest.mark.skipif(not spindle.is_here(), reason=spindle.MISSING),
+    pytest.mark.skipif(not (BIN / "thermocomp-modelling").exists(),
+                       reason="built without thermocomp-modelling"),
+]
+
+ROWS = 400
+ROW_PERIOD_S = 0.025
+PERIOD_S = 0.01  # of the daemon's cycle
+# Rows of 15 s go by in 25 ms, and so must the terms' lags.
+TIME_FACTOR = 15.0 / ROW_PERIOD_S
+HEAT_TAU_S = 1200.0
+HEAT_UM_PER_RPM = 0.004
+
+
+def low_pass(values, tau_s, step_s):
+    share = -np.expm1(-step_s / tau_s)
+    out = np.empty_like(values)
+    state = values[0]
+    for i, value in enumerate(values):
+        state += share * (value - state)
+        out[i] = state
+    return out
+
+
+def write_machine_with_heat(path):
+    """The measured temperatures, and displacements of a machine that the model is right of but for
+    heat that no sensor sees."""
+    columns = read_columns(spindle.RUN)
+    temps = spindle.temps_degC(columns)
+    matrix = np.array(tomllib.loads(spindle.MODEL.read_text())["matrix_um_per_K"])
+    heat = HEAT_UM_PER_RPM * low_pass(np.array(columns["spindle_rpm"]), HEAT_TAU_S, 15.0)
+    moved = (temps - temps[0]) @ matrix.T + heat[:, None]
+    moved += np.random.default_rng(4).normal(0.0, 0.2, moved.shape)
+    names = ["time_s", "spindle_rpm"] + [f"t{i + 1}_degC" for i in range(spindle.SENSORS)]
+    names += [f"ch{i + 1}_um" for i in range(spindle.AXES)]
+    rows = np.column_stack([columns["time_s"], columns["spindle_rpm"], temps, moved])[::4]
+    np.savetxt(path, rows, fmt="%.7g", delimiter=",", header=",".join(names), comments="")
+
+
+def extended_model(folder):
+    """What diagnose makes of the model, its lags as fast as the rows go by."""
+    run = folder / "heat.csv"
+    write_machine_with_heat(run)
+    status, said, errors = run_tool("diagnose", "--model", spindle.MODEL, "--train", f"{run}@:60000",
+                                    "--test", f"{run}@60000:", "--out", folder / "answer")
+    assert status == 0, errors
+    assert "missing_heat_source of spindle_rpm" in said, said
+    text = (folder / "answer" / "model.toml").read_text()
+    assert (folder / "answer" / "report.html").stat().st_size > 10000
+    tau_s = float(re.search(r"tau_s = ([0-9.e+-]+)", text)[1])
+    assert abs(tau_s / HEAT_TAU_S - 1.0) < 0.05, text
+    path = folder / "extended.toml"
+    path.write_text(re.sub(r"tau_s = [0-9.e+-]+", f"tau_s = {tau_s / TIME_FACTOR!r}", text))
+    return path
+
+
+def late_um(times_s, rpm_max):
+    """What cycles may make of it that a busy machine left out: the daemon's lag begins to follow a
+    new speed in the cycle after it, the prediction's at the row before."""
+    steps_s = np.diff(times_s)
+    left_out_s = np.sum(np.maximum(0.0, steps_s - 1.01 * PERIOD_S))
+    return 1e-6 + HEAT_UM_PER_RPM * rpm_max * left_out_s * TIME_FACTOR / HEAT_TAU_S
+
+
+def test_the_offsets_of_an_extended_model_are_its_prediction(lab):
+    model = extended_model(lab.folder)
+    bus = spindle.modbus_bus("modbus_tcp", "ABCD",
+                             ('host = "127.0.0.1"\nport = 0',
+                              'host = "127.0.0.1"\nport = @sensors@'),
+                             ('host = "127.0.0.1"\nport = 0\nunit = 1',
+                              'host = "127.0.0.1"\nport = @cnc@\nunit = 1'))
+    run = lab.folder / "spindle.csv"
+    spindle.write_replay_file(run, ROWS, ROW_PERIOD_S)
+    simulator = lab.simulator(spindle.machine_text(bus), "--replay", run, "--row-period-ms",
+                              1000 * ROW_PERIOD_S, "--start-on-heartbeat", "--settle-s", 1,
+                              "--tick-ms", 2)
+    # Every cycle is noted, so that the exported rows are all that the terms have seen.
+    daemon = lab.daemon(spindle.daemon_text(bus, rate_hz=round(1 / PERIOD_S), model=model))
+    daemon.config.write_text(spindle.with_ports(daemon.config.read_text(), simulator.ready))
+    daemon.start()
+    simulator.wait(60 + 3 * (spindle.FIRST_ROW_S + ROWS * ROW_PERIOD_S))
+    daemon.end()
+
+    exported, out = lab.folder / "exported.csv", lab.folder / "predicted.csv"
+    status, _, said = run_tool("export", daemon.history, "-o", exported)
+    assert status == 0, said
+    status, _, said = run_tool("predict", "--model", model, exported, "-o", out)
+    assert status == 0, said
+    rows, predicted = read_columns(exported), read_columns(out)
+    offsets = spindle.offsets_um(rows, "offset")
+    wanted = -np.column_stack([predicted[f"ch{i + 1}_predicted_um"] for i in range(spindle.AXES)])
+    together = np.isin(rows["time_s"], predicted["time_s"])
+    offsets = offsets[together]
+    known = np.all(np.isfinite(offsets), axis=1) & np.any(offsets != 0.0, axis=1)
+    difference = np.abs(offsets - wanted)[known]
+    moved = np.ptp(wanted[known], axis=0)
+    bound = late_um(np.array(rows["time_s"]), np.max(rows["spindle_rpm"]))
+    print(f"{np.sum(known)} cycles, predictions move by {moved} um, largest difference "
+          f"{np.max(difference):.3g} um, bound {bound:.3g} um")
+    assert np.sum(known) > ROWS
+    assert np.all(moved > 5.0)
+    assert np.max(difference) <= bound
