@@ -5,6 +5,9 @@
 #include <CLI/CLI.hpp>
 
 #include "modelling/diagnosis/diagnose_command.hpp"
+#include "modelling/experiments/plan_command.hpp"
+#include "modelling/identification/fit_command.hpp"
+#include "modelling/identification/group_command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/placement/place_command.hpp"
 #include "modelling/structure/structure_command.hpp"
@@ -52,6 +55,9 @@ void declare_modelling_command_line(CLI::App& app, std::function<int()>& action)
   app.require_subcommand(1);
   diagnosis::add_diagnose_command(app, action);
   add_structure(app, action);
+  experiments::add_plan_command(app, action);
+  identification::add_group_command(app, action);
+  identification::add_fit_command(app, action);
   name_files(app);
 }
 

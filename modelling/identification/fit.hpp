@@ -1,0 +1,77 @@
+/// Sensor choice and equation from measured runs (JP7689460B2), and how far it can be believed.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "estimator/thermal_model.hpp"
+#include "modelling/identification/lag_search.hpp"
+#include "modelling/identification/similarity.hpp"
+#include "modelling/identification/subset_search.hpp"
+
+namespace thermocomp::identification {
+
+enum class Choice {
+  published,  ///< at most two places of a group, the largest group among them
+  free        ///< any places
+};
+
+struct FitOptions {
+  std::size_t terms_min{3};
+  std::size_t terms_max{5};
+  Choice choice{Choice::published};
+  double threshold{-1.0};  ///< of similarity; negative: chosen
+  bool lags{false};
+  double lag_gain_min{0.05};  ///< share of the left-out sum of squares that a lag must take away
+};
+
+/// What the equation says and does for one output.
+struct OutputFit {
+  Eigen::VectorXd coefficients;  ///< one a column [um/K]
+  Eigen::VectorXd ci95;          ///< half width of the 95 % interval
+  double train_rms_um{0.0};
+  double left_out_rms_um{0.0};
+  double left_out_peak_um{0.0};
+  double no_model_rms_um{0.0};
+  std::vector<double> fold_rms_um;           ///< left out
+  std::vector<double> fold_no_model_rms_um;  ///< of the same rows
+};
+
+/// What is left of the equation when a chosen place is lost.
+struct LostPlace {
+  std::size_t place{0};
+  std::vector<double> without_rms_um;  ///< left out, refitted without it, one an output
+  std::size_t replacement{0};  ///< the place that does best in its stead; own: there is none
+  std::vector<double> replaced_rms_um;
+};
+
+struct Fit {
+  Grouping grouping;
+  std::vector<std::size_t> places;  ///< chosen, ascending
+  std::vector<FitColumn> columns;   ///< their rises, then lags
+  std::vector<OutputFit> outputs;
+  double condition{0.0};  ///< of the columns, each scaled to length 1
+  std::vector<LostPlace> lost;
+  /// Left-out prediction over all selected rows of all runs, in order; shape (rows, outputs).
+  Eigen::MatrixXd left_out_um;
+  std::vector<std::vector<Subset>> ranking;  ///< [terms], best first
+  std::uint64_t judged{0};
+  std::vector<std::string> warnings;  ///< worse than no model on a test, nearly singular, ...
+};
+
+/// Every allowed combination; the best by left-out tests, of two that are as good (2 %) the one
+/// with fewer terms.
+/// @throws std::runtime_error when no combination is allowed or there are too many
+[[nodiscard]] Fit fit_equation(const MeasuredTests& tests, const FitOptions& options);
+
+/// The model file that the daemon runs; reference: first sample.
+[[nodiscard]] ThermalModel model_of(const MeasuredTests& tests, const Fit& fit);
+
+[[nodiscard]] std::string fit_text(const MeasuredTests& tests, const Fit& fit);
+[[nodiscard]] std::string fit_json(const MeasuredTests& tests, const Fit& fit);
+/// One page with curves of measured and left-out prediction, residuals, and the chosen places.
+[[nodiscard]] std::string fit_html(const MeasuredTests& tests, const Fit& fit);
+
+}  // namespace thermocomp::identification

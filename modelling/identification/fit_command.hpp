@@ -1,0 +1,14 @@
+/// `thermocomp fit`: sensors and equation from measured runs.
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace thermocomp::identification {
+
+void add_fit_command(CLI::App& app, std::function<int()>& action);
+
+}  // namespace thermocomp::identification

@@ -1,0 +1,175 @@
+#include <cmath>
+#include <limits>
+
+#include <nlohmann/json.hpp>
+
+#include "config/number_text.hpp"
+#include "modelling/identification/fit.hpp"
+#include "modelling/identification/printed.hpp"
+#include "modelling/identification/svg.hpp"
+
+namespace thermocomp::identification {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string column_name(const MeasuredTests& tests, const FitColumn& column) {
+  const std::string& place = tests.places[column.place];
+  if (!(column.tau_s > 0)) return place;
+  return std::string("lag of ")
+      .append(place)
+      .append(", ")
+      .append(number_text(column.tau_s))
+      .append(" s");
+}
+
+std::string losses_text(const MeasuredTests& tests, const Fit& fit) {
+  std::string text("if a sensor is lost, left-out RMS (um):\n");
+  for (const LostPlace& lost : fit.lost) {
+    text += printed("  %-16s", tests.places[lost.place].c_str());
+    for (std::size_t o = 0; o < tests.outputs.size(); ++o)
+      text += printed(" %s %.3f without it", tests.outputs[o].c_str(), lost.without_rms_um[o]);
+    if (lost.replacement != lost.place) {
+      text += printed("; with %s instead", tests.places[lost.replacement].c_str());
+      for (const double rms_um : lost.replaced_rms_um) text += printed(" %.3f", rms_um);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+/// Measured, predicted and residual of an output over the folds, one behind the other.
+std::string curves(const MeasuredTests& tests, const Fit& fit, Eigen::Index output) {
+  Curve measured{"measured", {}, {}, "#606060", false};
+  Curve predicted{"predicted, left out", {}, {}, "#c8502c", false};
+  Curve residual{"residual", {}, {}, "#1b6ca8", false};
+  double start_h = 0.0;
+  Eigen::Index stacked = 0;
+  for (const Fold& fold : tests.folds) {
+    const TestRun& run = tests.runs[fold.run];
+    const double first_s = run.time_s[fold.begin];
+    for (Eigen::Index row = fold.begin; row < fold.end; ++row, ++stacked) {
+      const double hour = start_h + (run.time_s[row] - first_s) / 3600.0;
+      const double value_um = run.outputs_um(row, output);
+      for (Curve* curve : {&measured, &predicted, &residual}) curve->x.push_back(hour);
+      measured.y.push_back(value_um);
+      predicted.y.push_back(fit.left_out_um(stacked, output));
+      residual.y.push_back(value_um - fit.left_out_um(stacked, output));
+    }
+    for (Curve* curve : {&measured, &predicted, &residual}) {
+      curve->x.push_back(curve->x.back());
+      curve->y.push_back(std::numeric_limits<double>::quiet_NaN());
+    }
+    start_h = measured.x.back();
+  }
+  const std::string& name = tests.outputs[static_cast<std::size_t>(output)];
+  return svg_of({name + ", each test predicted without itself",
+                 "h, tests one behind the other",
+                 name,
+                 {measured, predicted, residual},
+                 960.0,
+                 320.0});
+}
+
+std::string groups_map(const MeasuredTests& tests, const Fit& fit) {
+  HeatMap map;
+  map.title = "similarity of the places; chosen ones are marked with *";
+  map.names = tests.places;
+  for (const std::size_t place : fit.places) map.names[place].insert(0, "* ");
+  map.values = similarity(tests, true);
+  for (const auto& group : fit.grouping.groups) {
+    map.order.insert(map.order.end(), group.begin(), group.end());
+    map.group_sizes.push_back(group.size());
+  }
+  return svg_of(map);
+}
+
+}  // namespace
+
+std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
+  std::string text = printed("%llu combinations of %zu places in %zu groups, %zu tests left out\n",
+                             static_cast<unsigned long long>(fit.judged), tests.places.size(),
+                             fit.grouping.groups.size(), tests.folds.size());
+  for (std::size_t terms = 0; terms < fit.ranking.size(); ++terms) {
+    if (fit.ranking[terms].empty()) continue;
+    const Subset& best = fit.ranking[terms].front();
+    text += printed("  %zu terms, linear: left-out sum of squares %.3g %% of no model's:", terms,
+                    100.0 * best.score);
+    for (const std::size_t place : best.places) text.append(" ").append(tests.places[place]);
+    text += "\n";
+  }
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+    const OutputFit& output = fit.outputs[o];
+    text += printed("%s: RMS left out %.3f um (peak %.3f), fitted %.3f, without a model %.3f\n",
+                    tests.outputs[o].c_str(), output.left_out_rms_um, output.left_out_peak_um,
+                    output.train_rms_um, output.no_model_rms_um);
+    for (std::size_t i = 0; i < fit.columns.size(); ++i)
+      text += printed(
+          "  %+10.4f +- %.4f um/K  %s\n", output.coefficients[static_cast<Eigen::Index>(i)],
+          output.ci95[static_cast<Eigen::Index>(i)], column_name(tests, fit.columns[i]).c_str());
+    for (std::size_t f = 0; f < tests.folds.size(); ++f)
+      text += printed("  without %s: %.3f there (no model: %.3f)\n", tests.fold_name(f).c_str(),
+                      output.fold_rms_um[f], output.fold_no_model_rms_um[f]);
+  }
+  text += printed("condition of the chosen columns: %.1f\n", fit.condition);
+  text += losses_text(tests, fit);
+  for (const std::string& warning : fit.warnings)
+    text.append("warning: ").append(warning).append("\n");
+  return text;
+}
+
+std::string fit_json(const MeasuredTests& tests, const Fit& fit) {
+  Json json;
+  json["inputs"] = Json::array();
+  for (const std::size_t place : fit.places) json["inputs"].push_back(tests.places[place]);
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+    const OutputFit& output = fit.outputs[o];
+    json["left_out_rms_um"][tests.outputs[o]] = output.left_out_rms_um;
+    json["left_out_peak_um"][tests.outputs[o]] = output.left_out_peak_um;
+    json["train_rms_um"][tests.outputs[o]] = output.train_rms_um;
+    json["no_model_rms_um"][tests.outputs[o]] = output.no_model_rms_um;
+    Json terms = Json::array();
+    for (std::size_t i = 0; i < fit.columns.size(); ++i)
+      terms.push_back({{"place", tests.places[fit.columns[i].place]},
+                       {"lag_tau_s", fit.columns[i].tau_s},
+                       {"um_per_K", output.coefficients[static_cast<Eigen::Index>(i)]},
+                       {"ci95", output.ci95[static_cast<Eigen::Index>(i)]}});
+    json["terms"][tests.outputs[o]] = terms;
+    for (std::size_t f = 0; f < tests.folds.size(); ++f)
+      json["tests"][tests.outputs[o]].push_back(
+          {{"left_out", tests.fold_name(f)},
+           {"rms_um", output.fold_rms_um[f]},
+           {"no_model_rms_um", output.fold_no_model_rms_um[f]}});
+  }
+  json["combinations"] = fit.judged;
+  json["condition"] = fit.condition;
+  for (const auto& group : fit.grouping.groups) {
+    Json names = Json::array();
+    for (const std::size_t place : group) names.push_back(tests.places[place]);
+    json["groups"].push_back(names);
+  }
+  for (const LostPlace& lost : fit.lost)
+    json["lost"].push_back(
+        {{"place", tests.places[lost.place]},
+         {"without_rms_um", lost.without_rms_um},
+         {"replacement",
+          lost.replacement == lost.place ? Json(nullptr) : Json(tests.places[lost.replacement])},
+         {"replaced_rms_um", lost.replaced_rms_um}});
+  json["warnings"] = fit.warnings;
+  json["notes"] = tests.notes;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string fit_html(const MeasuredTests& tests, const Fit& fit) {
+  std::string text(
+      "<!DOCTYPE html>\n<html><head><meta charset=\"utf-8\"><title>thermocomp fit</title></head>\n"
+      "<body style=\"font-family:sans-serif;max-width:1000px\">\n<h1>Sensors and equation</h1>\n"
+      "<pre>");
+  text.append(xml_text(fit_text(tests, fit))).append("</pre>\n");
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o)
+    text += curves(tests, fit, static_cast<Eigen::Index>(o));
+  text += groups_map(tests, fit);
+  return text.append("</body></html>\n");
+}
+
+}  // namespace thermocomp::identification

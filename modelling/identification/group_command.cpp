@@ -1,0 +1,156 @@
+#include "modelling/identification/group_command.hpp"
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/output_file.hpp"
+#include "modelling/identification/similarity.hpp"
+#include "modelling/identification/svg.hpp"
+
+namespace thermocomp::identification {
+namespace {
+
+struct Options {
+  std::vector<std::string> runs;
+  std::vector<std::string> places;
+  double threshold{-1.0};  ///< negative: chosen
+  bool as_published{false};
+  bool json{false};
+  std::string picture;
+};
+
+using Json = nlohmann::ordered_json;
+
+std::vector<std::string> names_of(const MeasuredTests& tests,
+                                  const std::vector<std::size_t>& group) {
+  std::vector<std::string> names;
+  for (const std::size_t place : group) names.push_back(tests.places[place]);
+  return names;
+}
+
+std::string json_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
+                    const Grouping& grouping) {
+  Json json;
+  json["groups"] = Json::array();
+  for (const auto& group : grouping.groups) json["groups"].push_back(names_of(tests, group));
+  json["threshold"] = grouping.threshold;
+  json["threshold_given"] = grouping.threshold_given;
+  json["places"] = tests.places;
+  json["similarity"] = Json::array();
+  for (Eigen::Index row = 0; row < s.rows(); ++row) {
+    Json line = Json::array();
+    for (Eigen::Index column = 0; column < s.cols(); ++column) line.push_back(s(row, column));
+    json["similarity"].push_back(line);
+  }
+  json["thresholds"] = Json::array();
+  for (const Merge& merge : grouping.merges)
+    json["thresholds"].push_back({{"from", merge.threshold}, {"groups", merge.groups}});
+  json["notes"] = tests.notes;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string text_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
+                    const Grouping& grouping) {
+  std::string text;
+  char line[160];
+  std::snprintf(line, sizeof line, "%zu places, %zu tests: %zu groups at S <= %.3g (%s)\n",
+                tests.places.size(), tests.runs.size(), grouping.groups.size(), grouping.threshold,
+                grouping.threshold_given ? "given" : "chosen: the widest gap between mergings");
+  text += line;
+  for (std::size_t i = 0; i < grouping.groups.size(); ++i) {
+    std::snprintf(line, sizeof line, "group %zu (%zu):", i + 1, grouping.groups[i].size());
+    text += line;
+    for (const auto& name : names_of(tests, grouping.groups[i])) text.append(" ").append(name);
+    text += "\n";
+  }
+  text += "\nother thresholds:\n";
+  for (const Merge& merge : grouping.merges) {
+    std::snprintf(line, sizeof line, "  from S = %-10.3g %zu groups\n", merge.threshold,
+                  merge.groups);
+    text += line;
+  }
+  text += "\nS, a row against a column:\n          ";
+  for (const auto& group : grouping.groups)
+    for (const std::size_t b : group) {
+      std::snprintf(line, sizeof line, "%9.9s", tests.places[b].c_str());
+      text += line;
+    }
+  text += "\n";
+  for (const auto& group : grouping.groups)
+    for (const std::size_t a : group) {
+      std::snprintf(line, sizeof line, "%-10.10s", tests.places[a].c_str());
+      text += line;
+      for (const auto& other : grouping.groups)
+        for (const std::size_t b : other) {
+          std::snprintf(line, sizeof line, "%9.2g",
+                        s(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)));
+          text += line;
+        }
+      text += "\n";
+    }
+  return text;
+}
+
+std::string picture_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
+                       const Grouping& grouping) {
+  HeatMap map;
+  map.title = "similarity S of places, light: alike; frames: groups";
+  map.names = tests.places;
+  map.values = s;
+  for (const auto& group : grouping.groups) {
+    map.order.insert(map.order.end(), group.begin(), group.end());
+    map.group_sizes.push_back(group.size());
+  }
+  return svg_of(map);
+}
+
+int run(const Options& options) {
+  std::vector<RunFile> runs;
+  for (const std::string& argument : options.runs)
+    runs.push_back(load_run(parse_selection(argument)));
+  const MeasuredTests tests = measured_tests(runs, {options.places, {}, 1});
+  const Eigen::MatrixXd s = similarity(tests, !options.as_published);
+  Grouping grouping;
+  if (options.threshold >= 0) {
+    grouping = group_places(s, options.threshold);
+  } else if (options.as_published) {
+    throw std::runtime_error("--as-published needs a --threshold: sums have no scale of their own");
+  } else {
+    grouping = group_places(s, noise_floor(tests));
+  }
+  if (!options.picture.empty()) {
+    cli::OutputFile picture(options.picture);
+    picture.stream() << picture_of(tests, s, grouping);
+    picture.commit();
+  }
+  for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
+  cli::OutputFile out("-");
+  out.stream() << (options.json ? json_of(tests, s, grouping) : text_of(tests, s, grouping));
+  out.commit();
+  return 0;
+}
+
+}  // namespace
+
+void add_group_command(CLI::App& app, std::function<int()>& action) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* sub = app.add_subcommand("group", "similarity groups of measured temperatures");
+  sub->add_option("RUN.csv", options->runs, "runs, each one test: RUN.csv[@T0:T1]")->required();
+  sub->add_option("--places", options->places, "temperatures to look at; else all of them")
+      ->delimiter(',')
+      ->type_name("NAME");
+  sub->add_option("--threshold", options->threshold,
+                  "S up to which places are of one group; else the widest gap is looked for")
+      ->check(CLI::Range(0.0, 1e9));
+  sub->add_flag("--as-published", options->as_published,
+                "S as sums, not divided by the place's own sum of squares");
+  sub->add_option("--picture", options->picture, "heat map of S in the order of the groups (SVG)");
+  sub->add_flag("--json", options->json, "groups, S and all thresholds, for a program");
+  sub->callback([options, &action] { action = [options] { return run(*options); }; });
+}
+
+}  // namespace thermocomp::identification

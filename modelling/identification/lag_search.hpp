@@ -1,0 +1,60 @@
+/// A lag on a term, d = K T + g (LP(T) - T), where a left-out test pays for it.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "modelling/identification/measured_tests.hpp"
+
+namespace thermocomp::identification {
+
+/// A column of the equation: a place's rise, or (tau_s > 0) what its low pass lags behind.
+struct FitColumn {
+  std::size_t place{0};
+  double tau_s{0.0};
+};
+
+/// The column over all rows of a run, in the estimator's own arithmetic.
+[[nodiscard]] Eigen::VectorXd column_of(const TestRun& run, const FitColumn& column);
+
+/// Equations of each fold for every place and every place's lags at fixed time constants.
+class ColumnPool {
+ public:
+  /// @param lags  how many time constants, spaced by equal ratios; 0: none
+  ColumnPool(const MeasuredTests& tests, std::size_t lags);
+
+  [[nodiscard]] const std::vector<FitColumn>& columns() const noexcept { return columns_; }
+  [[nodiscard]] const std::vector<double>& taus_s() const noexcept { return taus_s_; }
+  /// Shape (columns + outputs) squared, one a fold.
+  [[nodiscard]] const std::vector<Eigen::MatrixXd>& folds() const noexcept { return folds_; }
+  [[nodiscard]] std::size_t index_of(std::size_t place, std::size_t lag) const noexcept {
+    return places_ + place * taus_s_.size() + lag;
+  }
+  [[nodiscard]] std::size_t places() const noexcept { return places_; }
+  [[nodiscard]] std::size_t outputs() const noexcept { return outputs_; }
+
+  /// Left-out sum of squares, shape (folds, outputs), of least squares with these columns on all
+  /// other folds; NaN where the equations are singular.
+  [[nodiscard]] Eigen::MatrixXd left_out(const std::vector<std::size_t>& columns) const;
+
+ private:
+  std::size_t places_;
+  std::size_t outputs_;
+  std::vector<double> taus_s_;
+  std::vector<FitColumn> columns_;
+  std::vector<Eigen::MatrixXd> folds_;
+  Eigen::MatrixXd total_;
+};
+
+struct LaggedSubset {
+  std::vector<std::size_t> columns;  ///< of the pool: places first, then lags
+  double score{0.0};                 ///< as Subset::score
+};
+
+/// Forward choice: the lag with the best left-out score joins while it lowers the score by
+/// `gain_min` of itself and helps on more than half of the folds; one lag a place.
+[[nodiscard]] LaggedSubset add_lags(const ColumnPool& pool, const std::vector<std::size_t>& places,
+                                    double gain_min);
+
+}  // namespace thermocomp::identification

@@ -1,0 +1,53 @@
+/// Measured runs as the material of similarity and fit: rises over the reference, in tests that can
+/// be left out one at a time.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "config/run_file.hpp"
+
+namespace thermocomp::identification {
+
+/// One run from the row of its reference (the file's first row in which nothing is missing) to the
+/// end of its selection; rows in which something is missing are left out.
+struct TestRun {
+  std::string name;
+  Eigen::VectorXd time_s;
+  Eigen::MatrixXd places_K;    ///< shape (rows, places): rise over the reference
+  Eigen::MatrixXd outputs_um;  ///< shape (rows, outputs): change since the reference
+  Eigen::Index begin{0};       ///< first selected row
+};
+
+/// What is left out as one: a whole run, or a stretch of the only run.
+struct Fold {
+  std::size_t run{0};
+  Eigen::Index begin{0};
+  Eigen::Index end{0};
+};
+
+struct MeasuredTests {
+  std::vector<std::string> places;
+  std::vector<std::string> outputs;
+  std::vector<TestRun> runs;
+  std::vector<Fold> folds;
+  std::vector<std::string> notes;  ///< for a person: what was left out and why
+
+  [[nodiscard]] Eigen::Index rows() const;  ///< selected ones of all runs
+  [[nodiscard]] std::string fold_name(std::size_t fold) const;
+};
+
+struct TestOptions {
+  std::vector<std::string> places;   ///< empty: every temperature that all runs have
+  std::vector<std::string> outputs;  ///< may be empty
+  std::size_t folds_of_one_run{6};
+};
+
+/// A place that no run has a value of, or that moves in none, is left out with a note.
+/// @throws ConfigurationError when a run lacks a column that was asked for, or has too few rows
+[[nodiscard]] MeasuredTests measured_tests(const std::vector<RunFile>& runs,
+                                           const TestOptions& options);
+
+}  // namespace thermocomp::identification

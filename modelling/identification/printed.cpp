@@ -1,0 +1,18 @@
+#include "modelling/identification/printed.hpp"
+
+#include <array>
+#include <cstdarg>
+#include <cstdio>
+
+namespace thermocomp::identification {
+
+std::string printed(const char* format, ...) {
+  std::array<char, 501> text{};
+  std::va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text.data(), text.size(), format, arguments);
+  va_end(arguments);
+  return text.data();
+}
+
+}  // namespace thermocomp::identification

@@ -1,0 +1,141 @@
+#include "modelling/identification/similarity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace thermocomp::identification {
+namespace {
+
+/// Places that differ by more than this are not alike in any sense: a third of the movement.
+constexpr double threshold_max = 0.3;
+
+struct Pair {
+  double s;
+  std::size_t a;
+  std::size_t b;
+};
+
+std::vector<Pair> sorted_pairs(const Eigen::MatrixXd& s) {
+  std::vector<Pair> pairs;
+  const Eigen::Index places = s.rows();
+  for (Eigen::Index a = 0; a < places; ++a)
+    for (Eigen::Index b = 0; b < places; ++b)
+      if (a != b && std::isfinite(s(a, b)))
+        pairs.push_back({s(a, b), static_cast<std::size_t>(a), static_cast<std::size_t>(b)});
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Pair& x, const Pair& y) { return x.s < y.s; });
+  return pairs;
+}
+
+std::size_t root_of(std::vector<std::size_t>& parent, std::size_t place) {
+  while (parent[place] != place) place = parent[place] = parent[parent[place]];
+  return place;
+}
+
+std::vector<std::vector<std::size_t>> groups_of(std::vector<std::size_t>& parent) {
+  std::vector<std::vector<std::size_t>> by_root(parent.size());
+  for (std::size_t place = 0; place < parent.size(); ++place)
+    by_root[root_of(parent, place)].push_back(place);
+  std::erase_if(by_root, [](const auto& group) { return group.empty(); });
+  std::stable_sort(by_root.begin(), by_root.end(), [](const auto& a, const auto& b) {
+    return a.size() != b.size() ? a.size() > b.size() : a.front() < b.front();
+  });
+  return by_root;
+}
+
+/// Mean square of a place over the selected rows of all tests.
+Eigen::VectorXd mean_squares(const MeasuredTests& tests) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tests.places.size()));
+  for (const TestRun& run : tests.runs)
+    sum += run.places_K.bottomRows(run.places_K.rows() - run.begin).colwise().squaredNorm();
+  return sum / static_cast<double>(tests.rows());
+}
+
+}  // namespace
+
+Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative) {
+  const auto places = static_cast<Eigen::Index>(tests.places.size());
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(places, places);
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(places);
+  for (const TestRun& run : tests.runs) {
+    const auto rows = run.places_K.bottomRows(run.places_K.rows() - run.begin);
+    products.noalias() += rows.transpose() * rows;
+    largest = largest.cwiseMax(rows.cwiseAbs().colwise().maxCoeff().transpose());
+  }
+  Eigen::MatrixXd s(places, places);
+  for (Eigen::Index a = 0; a < places; ++a) {
+    for (Eigen::Index b = 0; b < places; ++b) {
+      const double cross = std::max(0.0, products(a, b));  // alpha >= 0
+      const double cosine2 = cross * cross / (products(a, a) * products(b, b));
+      const double shape = a == b ? 0.0 : std::max(0.0, 1.0 - cosine2);
+      s(a, b) = relative ? shape : shape * products(a, a) / (largest[a] * largest[a]);
+    }
+  }
+  return s;
+}
+
+Eigen::MatrixXd noise_floor(const MeasuredTests& tests) {
+  const auto places = static_cast<Eigen::Index>(tests.places.size());
+  Eigen::VectorXd noise = Eigen::VectorXd::Zero(places);
+  double count = 0.0;
+  for (const TestRun& run : tests.runs) {
+    const Eigen::Index rows = run.places_K.rows();
+    if (rows < 3) continue;
+    const Eigen::MatrixXd second = run.places_K.topRows(rows - 2) -
+                                   2.0 * run.places_K.middleRows(1, rows - 2) +
+                                   run.places_K.bottomRows(rows - 2);
+    noise += second.colwise().squaredNorm();
+    count += static_cast<double>(rows - 2);
+  }
+  // A second difference of white noise has six times its variance. The rise has the noise of its
+  // own row and that of the reference row.
+  const Eigen::VectorXd share =
+      (2.0 * noise / (6.0 * std::max(count, 1.0))).cwiseQuotient(mean_squares(tests));
+  Eigen::MatrixXd floor(places, places);
+  for (Eigen::Index a = 0; a < places; ++a)
+    for (Eigen::Index b = 0; b < places; ++b) floor(a, b) = share[a] + share[b];
+  return floor;
+}
+
+Grouping group_places(const Eigen::MatrixXd& s, double threshold) {
+  Grouping grouping;
+  grouping.threshold = threshold;
+  grouping.threshold_given = true;
+  std::vector<std::size_t> parent(static_cast<std::size_t>(s.rows()));
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  std::vector<std::size_t> all = parent;
+  std::size_t left = parent.size();
+  for (const Pair& pair : sorted_pairs(s)) {
+    if (pair.s <= threshold) parent[root_of(parent, pair.a)] = root_of(parent, pair.b);
+    const std::size_t a = root_of(all, pair.a);
+    const std::size_t b = root_of(all, pair.b);
+    if (a == b) continue;
+    all[a] = b;
+    grouping.merges.push_back({pair.s, --left});
+  }
+  grouping.groups = groups_of(parent);
+  return grouping;
+}
+
+Grouping group_places(const Eigen::MatrixXd& s, const Eigen::MatrixXd& floor) {
+  // A pair that differs by less than its noise is alike as far as anybody can tell.
+  const Eigen::MatrixXd raised = s.cwiseMax(floor);
+  const std::vector<Merge> merges = group_places(raised, 0.0).merges;
+  double threshold = 0.0;
+  double widest = 1.0;
+  for (std::size_t i = 0; i <= merges.size(); ++i) {
+    const double below = i == 0 ? floor.minCoeff() : merges[i - 1].threshold;
+    const double above = i == merges.size() ? 1.0 : merges[i].threshold;
+    if (!(below > 0) || below > threshold_max) continue;
+    const double ratio = above / below;
+    if (ratio <= widest) continue;
+    widest = ratio;
+    threshold = std::min(std::sqrt(below * above), threshold_max);
+  }
+  Grouping grouping = group_places(raised, threshold);
+  grouping.threshold_given = false;
+  return grouping;
+}
+
+}  // namespace thermocomp::identification

@@ -1,0 +1,58 @@
+/// Every combination of places, judged on tests left out, from normal equations alone.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "modelling/identification/measured_tests.hpp"
+
+namespace thermocomp::identification {
+
+/// X'X, X'Y and Y'Y of each fold: candidates first, then outputs.
+struct NormalEquations {
+  Eigen::Index candidates{0};
+  Eigen::Index outputs{0};
+  std::vector<Eigen::MatrixXd> folds;  ///< shape (candidates + outputs) squared, symmetric
+  std::vector<double> rows;            ///< of each fold
+};
+[[nodiscard]] NormalEquations normal_equations(const MeasuredTests& tests);
+
+struct SubsetOptions {
+  std::size_t terms_min{3};
+  std::size_t terms_max{5};
+  std::vector<std::size_t> group_of;  ///< candidate -> group; empty: free choice
+  std::size_t of_a_group_max{2};
+  std::size_t group_required{0};  ///< one of its places must be in; only with group_of
+  std::size_t kept{20};           ///< best subsets kept for each number of terms
+};
+
+struct Subset {
+  std::vector<std::size_t> places;  ///< ascending
+  /// Sum over outputs of (left-out sum of squares / sum of squares without a model), divided by
+  /// their number: 0 is perfect, 1 as good as nothing.
+  double score{0.0};
+};
+
+struct SubsetSearch {
+  std::vector<std::vector<Subset>> best;  ///< [terms], best first
+  std::uint64_t judged{0};
+};
+
+/// The number of combinations that a free choice would judge.
+[[nodiscard]] double combinations(std::size_t candidates, std::size_t terms_min,
+                                  std::size_t terms_max);
+
+/// Exact least squares of every allowed combination on all folds but one, for every fold, and the
+/// sum of squares on the fold left out.
+///
+/// Depth first over ascending places. Taking up place k eliminates it from the training equations
+/// of all folds at once (Gauss), and the fold left out goes through the same congruence: with
+/// c_i = A_ki / A_kk, A_ij -= c_i A_kj and T_ij += c_i c_j T_kk - c_i T_kj - c_j T_ki. Then a
+/// further place j costs, for each fold, b = A_jy / A_jj and T_yy - 2 b T_jy + b^2 T_jj.
+/// A place that the others explain to one part in 10^10 is not taken up beside them.
+[[nodiscard]] SubsetSearch search_subsets(const NormalEquations& equations,
+                                          const SubsetOptions& options);
+
+}  // namespace thermocomp::identification

@@ -1,0 +1,81 @@
+#include "modelling/identification/similarity.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include <catch2/catch.hpp>
+
+#include "synthetic_places.hpp"
+
+namespace thermocomp::identification {
+namespace {
+
+/// Two tests of three places, three rows each, that can be checked by hand.
+MeasuredTests by_hand() {
+  MeasuredTests tests;
+  tests.places = {"a_degC", "b_degC", "c_degC"};
+  TestRun run;
+  run.name = "first";
+  run.time_s = Eigen::Vector3d(0, 60, 120);
+  run.places_K.resize(3, 3);
+  run.places_K << 0, 0, 0,  //
+      1, 2, 0,              //
+      2, 4, 1;
+  tests.runs.push_back(run);
+  run.name = "second";
+  run.places_K << 0, 0, 0,  //
+      0, 0, 2,              //
+      4, 7, -1;
+  tests.runs.push_back(run);
+  tests.folds = {{0, 0, 3}, {1, 0, 3}};
+  return tests;
+}
+
+TEST_CASE("similarity is what it is by hand, with one factor over both tests", "[group]") {
+  const MeasuredTests tests = by_hand();
+  // a.a = 1+4+16 = 21, b.b = 4+16+49 = 69, a.b = 2+8+28 = 38, max a = 4
+  const Eigen::MatrixXd sums = similarity(tests, false);
+  CHECK(sums(0, 1) == Approx(21.0 / 16 - (38.0 / 4) * (38.0 / 4) / 69));
+  CHECK(sums(1, 0) == Approx(69.0 / 49 - (38.0 / 7) * (38.0 / 7) / 21));
+  CHECK(sums(0, 1) != Approx(sums(1, 0)));
+  const Eigen::MatrixXd relative = similarity(tests, true);
+  CHECK(relative(0, 1) == Approx(1.0 - 38.0 * 38.0 / (21.0 * 69.0)));
+  CHECK(relative(1, 0) == Approx(relative(0, 1)));
+}
+
+TEST_CASE("places that move against each other have nothing in common", "[group]") {
+  // a.c = 2 - 4 < 0: alpha is 0, and the whole of a is left over
+  CHECK(similarity(by_hand(), true)(0, 2) == 1.0);
+  CHECK(similarity(by_hand(), false)(0, 2) == Approx(21.0 / 16));
+}
+
+TEST_CASE("a threshold merges pairs in ascending order, and says what others would do", "[group]") {
+  Eigen::MatrixXd s(4, 4);
+  s << 0, .01, .5, .9, .01, 0, .02, .8, .5, .02, 0, .7, .9, .8, .7, 0;
+  CHECK(group_places(s, 0.015).groups == std::vector<std::vector<std::size_t>>{{0, 1}, {2}, {3}});
+  const Grouping three = group_places(s, 0.02);
+  CHECK(three.groups == std::vector<std::vector<std::size_t>>{{0, 1, 2}, {3}});
+  REQUIRE(three.merges.size() == 3);
+  CHECK(three.merges[2].threshold == 0.7);
+  CHECK(three.merges[2].groups == 1);
+  CHECK(group_places(s, 1.0).groups.size() == 1);
+}
+
+TEST_CASE("22 places in 9 groups are found again at three levels of noise", "[group]") {
+  const std::vector<std::size_t> sizes{10, 5, 1, 1, 1, 1, 1, 1, 1};
+  std::vector<std::vector<std::size_t>> truth;
+  std::size_t next = 0;
+  for (const std::size_t size : sizes) {
+    std::vector<std::size_t>& group = truth.emplace_back();
+    for (std::size_t i = 0; i < size; ++i) group.push_back(next++);
+  }
+  const double noise_K = GENERATE(0.01, 0.05, 0.1);
+  const auto seed = GENERATE(1u, 2u, 3u);
+  const MeasuredTests tests = grouped_places(sizes, noise_K, seed);
+  const Grouping grouping = group_places(similarity(tests, true), noise_floor(tests));
+  CAPTURE(noise_K, grouping.threshold);
+  CHECK(grouping.groups == truth);
+}
+
+}  // namespace
+}  // namespace thermocomp::identification
