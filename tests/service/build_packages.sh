@@ -20,6 +20,8 @@ rm -f "$folder"/*.deb "$folder"/*.changes "$folder"/*.buildinfo
 
 # debhelper gives the build a home of its own, where ccache would find nothing.
 export CCACHE_DIR=${CCACHE_DIR:-$HOME/.cache/ccache}
-export DEB_BUILD_OPTIONS="nocheck parallel=$jobs"
+# Symbols for a debugger cost time and are in packages of their own, which no test installs; the
+# programs are the same without.
+export DEB_BUILD_OPTIONS="nocheck noautodbgsym parallel=$jobs"
 cd -- "$copy"
 dpkg-buildpackage -b -uc -us -nc

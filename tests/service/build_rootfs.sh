@@ -1,10 +1,11 @@
 #!/bin/bash
-# build_rootfs.sh FOLDER DEPENDENCY...
+# build_rootfs.sh FOLDER DEPENDENCY... [-- ASKED...]
 #
 # Makes FOLDER/rootfs, a small Debian 12 with systemd as its init, by mmdebstrap, unless it is there
 # and as this script and the dependencies want it. DEPENDENCY: the packages that the ones under test
 # depend on. What they add to a minimal Debian with systemd is noted in FOLDER/dependencies: lines
-# "PACKAGE KIB". Needs root and a Debian mirror.
+# "PACKAGE KIB". ASKED: packages that are not installed; FOLDER/asked has apt's lines about how much
+# they and what they need would add to those. Needs root and a Debian mirror.
 set -euo pipefail
 mkdir -p "${1:?a folder}"
 folder=$(cd -- "$1" && pwd)
@@ -15,7 +16,13 @@ if [[ -e $folder/rootfs.stamp && $(cat "$folder/rootfs.stamp") == "$wanted" ]]; 
   echo "rootfs: there"
   exit 0
 fi
-rm -rf "$folder/rootfs" "$folder/rootfs.stamp"
+dependencies=()
+while (($#)) && [[ $1 != -- ]]; do
+  dependencies+=("$1")
+  shift
+done
+asked=("${@:2}")
+rm -rf "$folder/rootfs" "$folder/rootfs.stamp" "$folder/asked"
 began=$SECONDS
 
 # What boots; then what is under test needs; then what the tests themselves need.
@@ -23,6 +30,8 @@ base=systemd,systemd-sysv,dbus
 tools=(kmod iproute2 procps python3 python3-pytest)
 list_packages() { printf "chroot \"\$1\" dpkg-query -W -f '\${Package} \${Installed-Size}\\\\n' | sort > %q" "$1"; }
 apt_install="chroot \"\$1\" env DEBIAN_FRONTEND=noninteractive apt-get -q -y --no-install-recommends install"
+# --assume-no: says what it would do, and ends with status 1.
+ask="chroot \"\$1\" env LC_ALL=C apt-get -q --assume-no --no-install-recommends install"
 
 # The hooks are for mmdebstrap's shell.
 # shellcheck disable=SC2016
@@ -30,8 +39,10 @@ apt_install="chroot \"\$1\" env DEBIAN_FRONTEND=noninteractive apt-get -q -y --n
 if ! mmdebstrap --mode=root --variant=minbase --include="$base" \
   --aptopt='Acquire::Languages "none"' --skip=cleanup/apt/lists \
   --customize-hook="$(list_packages "$folder/packages.base")" \
-  --customize-hook="$apt_install $*" \
+  --customize-hook="$apt_install ${dependencies[*]}" \
   --customize-hook="$(list_packages "$folder/packages.dependencies")" \
+  --customize-hook="$ask ${asked[*]} | grep -E 'newly installed|archives|disk space' \
+                    > $(printf %q "$folder/asked") || true" \
   --customize-hook="$apt_install ${tools[*]}" \
   --customize-hook='rm -rf "$1"/var/lib/apt/lists/* "$1"/var/cache/apt/*' \
   --customize-hook='echo guest > "$1/etc/hostname"; : > "$1/etc/resolv.conf"' \

@@ -24,11 +24,44 @@ echo "packages built in $((SECONDS - began)) s"
 lintian --allow-root --fail-on error,warning --tag-display-limit 0 "$packages"/*.changes
 echo "lintian: no error, no warning"
 
-needed=$(for file in "$packages"/*.deb; do dpkg-deb -f "$file" Depends; done |
-  tr ',' '\n' | sed 's/|.*//; s/(.*//; s/ //g' | sort -u | grep -v '^thermocomp')
+# depends_of PACKAGE...: names of the packages of others that they depend on.
+depends_of() {
+  local name
+  for name in "$@"; do dpkg-deb -f "$packages/$name"_*.deb Depends; done |
+    tr ',' '\n' | sed 's/|.*//; s/(.*//; s/ //g' | sort -u | grep -v '^thermocomp'
+}
+fail() {
+  echo "check_packages.sh: $*" >&2
+  exit 1
+}
+
+# What stands beside the machine stays small, and no file is in two packages.
+beside_machine=$(depends_of thermocomp thermocomp-simulator)
+for library in gmsh cholmod blas occt; do
+  [[ $beside_machine != *"$library"* ]] || fail "the daemon's packages depend on lib$library"
+done
+twice=$(for file in "$packages"/*.deb; do
+  dpkg-deb --fsys-tarfile "$file" | tar -t | grep -v '/$'
+done | sort | uniq -d)
+[[ -z $twice ]] || fail "in more than one package: $twice"
+
+# Unpacked, because what it needs is large: it runs, and the command finds it.
+unpacked=$folder/unpacked
+rm -rf "$unpacked"
+for name in thermocomp thermocomp-modelling; do
+  dpkg-deb -x "$packages/$name"_*.deb "$unpacked"
+done
+for command in structure place diagnose; do
+  "$unpacked/usr/bin/thermocomp" "$command" --help > "$folder/help" ||
+    fail "thermocomp $command cannot be carried out"
+  grep -q 'Usage: thermocomp-modelling ' "$folder/help" || fail "no help of $command"
+  if grep -q 'not in this build' "$folder/help"; then fail "$command was left out"; fi
+done
+echo "thermocomp-modelling: structure, place, diagnose"
+
 if [[ $(id -u) -eq 0 ]]; then
-  # shellcheck disable=SC2086
-  "$here/build_rootfs.sh" "$folder" $needed
+  # shellcheck disable=SC2046,SC2086
+  "$here/build_rootfs.sh" "$folder" $beside_machine -- $(depends_of thermocomp-modelling)
 fi
 
 for file in "$packages"/*.deb; do
@@ -40,4 +73,8 @@ if [[ -s $folder/dependencies ]]; then
   awk -v own="$own" '{ text = text " " $1; sum += $2 } END {
     printf "on a minimal Debian with systemd thermocomp needs besides:%s, %d KiB; together %.1f MB\n",
       text, sum, (sum + own) * 1.024 / 1000 }' "$folder/dependencies"
+fi
+if [[ -s $folder/asked ]]; then
+  echo "beside thermocomp's, thermocomp-modelling needs:"
+  cat "$folder/asked"
 fi
