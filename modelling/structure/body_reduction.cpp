@@ -92,7 +92,12 @@ class Reducer {
       : spec_(spec), structure_(structure), heat_(heat), free_(free_model()) {}
 
   ReducedBody reduce(const Statics& statics) {
-    find_basis();
+    const auto sensitivities = statics.sensitivities(structure_.rows);
+    std::vector<Vector> outputs;
+    for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
+      outputs.push_back(um * restricted(sensitivities[i]));
+    }
+    find_basis(outputs);
     ReducedBody body;
     const Matrix coolant_part = times(free_.flooded, basis_) - times(free_.dry, basis_);
     const Matrix coolant = basis_.transpose() * coolant_part;
@@ -107,11 +112,8 @@ class Reducer {
                               states_of(free_.inputs[i])});
     }
     add_sensors(body);
-    const auto sensitivities = statics.sensitivities(structure_.rows);
     for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
-      Vector row = restricted(sensitivities[i]);
-      row *= um;
-      body.outputs.push_back({spec_.outputs[i].name, states_of(row)});
+      body.outputs.push_back({spec_.outputs[i].name, states_of(outputs[i])});
     }
     return body;
   }
@@ -148,7 +150,7 @@ class Reducer {
     }
   }
 
-  void find_basis() {
+  void find_basis(const std::vector<Vector>& outputs) {
     Basis basis(free_.capacity);
     basis.add(Vector::Ones(heat_.reduction.free_size()));
     const bool wet = free_.coolant.squaredNorm() > 0.0;
@@ -156,8 +158,10 @@ class Reducer {
     with_coolant.push_back(free_.coolant);
     for (const double shift : shifts_per_s) {
       add_responses(free_.dry, free_.capacity, shift, free_.inputs, basis);
+      add_responses(free_.dry, free_.capacity, shift, outputs, basis);
       if (!wet) continue;
       add_responses(free_.flooded, free_.capacity_flooded, shift, with_coolant, basis);
+      add_responses(free_.flooded, free_.capacity_flooded, shift, outputs, basis);
     }
     basis_ = basis.matrix();
     const Matrix conduction = basis_.transpose() * times(free_.dry, basis_);

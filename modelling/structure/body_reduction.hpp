@@ -9,9 +9,10 @@
 namespace thermocomp::structure {
 
 /// Galerkin projection on rational Krylov vectors: V holds the uniform field and
-/// (L + s C)^-1 b for every input b (heats, room, coolant), at some shifts s, without and with
-/// coolant; orthonormal in C, then turned so that V^T L V is diagonal. The response to every input
-/// is matched at each shift (s = 0: the steady state, exactly); symmetric, so stable.
+/// (L + s C)^-1 b for every input b (heats, room, coolant) and every output's sensitivity, at some
+/// shifts s, without and with coolant; orthonormal in C, then turned so that V^T L V is diagonal.
+/// The response to every input is matched at each shift (s = 0: the steady state, exactly), that of
+/// the displacements with its slope; symmetric, so stable.
 /// Source: E. J. Grimme, Krylov projection methods for model reduction, 1997.
 /// @throws ConfigurationError: sensors outside their part, no sensors, outputs on a guideway
 [[nodiscard]] ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
