@@ -11,7 +11,7 @@ show() { sed "s/^/$1_/"; }
 
 small=$("$program" tet4 15 15 21 calculix direct)
 quadratic=$("$program" tet10 20 20 65 calculix direct)
-large=$("$program" tet10 20 20 17)
+large=$("$program" tet10 20 20 19.9)
 echo "$small" | show tet4_50k
 echo "$large" | show tet10_200k
 echo "$quadratic"

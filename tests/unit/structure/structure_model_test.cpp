@@ -1,5 +1,8 @@
 #include "modelling/structure/structure_model.hpp"
 
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <numeric>
 
 #include "config/model_file.hpp"
@@ -275,4 +278,39 @@ TEST_CASE("the commented example is a structure that can be computed", "[structu
   CHECK(report.find("a_urad: ") != std::string::npos);
   CHECK(report.find(" urad/K") != std::string::npos);
   CHECK(report.find("condition number: ") != std::string::npos);
+}
+
+TEST_CASE("an inverted element and a number that is none are named by the mesh's own numbers",
+          "[structure][bad_input]") {
+  std::string pattern = (std::filesystem::temp_directory_path() / "thermocomp_XXXXXX").string();
+  REQUIRE(::mkdtemp(pattern.data()) != nullptr);
+  const std::filesystem::path folder = pattern;
+  const auto problems_with = [&](const std::string& fourth_z, const std::string& order) {
+    std::ofstream(folder / "lid.inp")
+        << "*NODE\n1, 0, 0, 0\n2, 10, 0, 0\n3, 0, 10, 0\n4, 0, 0, " << fourth_z
+        << "\n*ELEMENT, TYPE=C3D4, ELSET=LID\n17, " << order << "\n";
+    const std::string text = material +
+                             "[[part]]\nname = \"lid\"\nmaterial = \"iron\"\nmesh = \"lid.inp\"\n"
+                             "[[support]]\non = { part = \"lid\" }\n" +
+                             all_warm +
+                             "[[output]]\nname = \"z_um\"\ndirection = \"z\"\n"
+                             "tool = { part = \"lid\", at_mm = [0, 0, 0] }\n";
+    std::string all;
+    try {
+      static_cast<void>(build_structure(parse_structure(text, (folder / "machine.toml").string()),
+                                        [](std::string_view) {}));
+    } catch (const ConfigurationError& error) {
+      all = error.what();
+    }
+    return all;
+  };
+  CHECK(problems_with("10", "1, 2, 3, 4").empty());
+  const std::string inverted = problems_with("10", "1, 3, 2, 4");
+  CAPTURE(inverted);
+  CHECK(inverted.find("17") != std::string::npos);
+  CHECK(inverted.find("lid") != std::string::npos);
+  CHECK(inverted.find("inverted") != std::string::npos);
+  CHECK(problems_with("0", "1, 2, 3, 4").find("17") != std::string::npos);  // flat
+  CHECK(problems_with("inf", "1, 2, 3, 4").find("must be a finite number") != std::string::npos);
+  std::filesystem::remove_all(folder);
 }
