@@ -65,9 +65,9 @@ void Invariants::reloaded(const MachineShape& shape) {
 void Invariants::restored(const PersistentState& saved, const Report& report, nanoseconds now) {
   demand(report.enabled == saved.enabled, "state_survives_restart", now, "the operator's switch");
   std::size_t i = 0;
-  for (const auto& [column, reference_degC] : saved.reference_degC) {
-    demand(i < report.inputs.size() && report.inputs[i].reference_degC == reference_degC,
-           "state_survives_restart", now, [&] { return "reference of " + column; });
+  for (const auto& reference : saved.reference_degC) {
+    demand(i < report.inputs.size() && report.inputs[i].reference_degC == reference.second,
+           "state_survives_restart", now, "reference of " + reference.first);
     ++i;
   }
   for (std::size_t axis = 0; axis < axes_count; ++axis) {

@@ -30,7 +30,7 @@ class RecordedTwin {
 
  private:
   struct Expected {
-    std::uint64_t cycle;
+    std::uint64_t cycle{0};
     OffsetCommand command;
   };
   struct Session {
