@@ -301,13 +301,12 @@ void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
     ever_good = true;
     lost_since = at;
   }
+  const bool given_up = !working && config.compensation.on_loss == LossPolicy::ramp_to_zero &&
+                        at - lost_since > hold;
   Mode next = Mode::compensating;
   if (disabled)
     next = Mode::disabled;
-  else if (stopping)
-    next = Mode::ramping_to_zero;
-  else if (!working && config.compensation.on_loss == LossPolicy::ramp_to_zero &&
-           at - lost_since > hold)
+  else if (stopping || given_up)
     next = Mode::ramping_to_zero;
   else if (!working)
     next = ever_good ? Mode::holding : Mode::starting;
