@@ -301,8 +301,8 @@ void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
     ever_good = true;
     lost_since = at;
   }
-  const bool given_up = !working && config.compensation.on_loss == LossPolicy::ramp_to_zero &&
-                        at - lost_since > hold;
+  const bool given_up =
+      !working && config.compensation.on_loss == LossPolicy::ramp_to_zero && at - lost_since > hold;
   Mode next = Mode::compensating;
   if (disabled)
     next = Mode::disabled;
