@@ -209,7 +209,7 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
   const std::size_t valid_at = words_an_offset() * axes_count;
   if (address + words.size() <= 200 + valid_at) return true;  // the mark of validity comes later
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
-    if ((written_[valid_at] >> axis & 1u) == 0) continue;
+    if (((unsigned{written_[valid_at]} >> axis) & 1u) == 0) continue;
     const std::size_t at = words_an_offset() * axis;
     double told_um = 0.1 * static_cast<double>(static_cast<std::int16_t>(written_[at]));
     if (floats_)
