@@ -269,6 +269,15 @@ void Search::settle(Explanation& explanation) const {
   }
 }
 
+/// Settles an explanation beside others than before, from the shape that it had. A new search over
+/// the grid could lose it: under wandering noise a jump that is a few rows off explains nothing.
+void Search::settle_anew(Explanation& explanation) const {
+  for (const std::size_t output : measured_)
+    explanation.settings[output] = outputs_[output].settings().front().get();
+  explanation.gains = weigh(*explanation.hypothesis, explanation.shape, explanation.settings).gains;
+  settle(explanation);
+}
+
 std::vector<Explanation> Search::ranked() {
   Settings likeliest(outputs_.size(), nullptr);
   Settings plain(outputs_.size(), nullptr);
@@ -341,12 +350,7 @@ void Search::refit(std::vector<Finding>& findings) {
     for (std::size_t i = 0; i < findings.size(); ++i) {
       accept(findings, i);
       Explanation& each = findings[i].explanation;
-      for (const std::size_t output : measured_)
-        each.settings[output] = &outputs_[output].setting();
-      const double left_out = each.left_out_gain;
-      each = profile(*each.hypothesis, each.settings);
-      settle(each);
-      each.left_out_gain = left_out;
+      settle_anew(each);
       if (!acts(each)) findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i--));
     }
   }
@@ -378,8 +382,7 @@ void Search::measure_spread(std::vector<Finding>& findings) {
     accept(findings, i);
     Finding& finding = findings[i];
     Explanation& each = finding.explanation;
-    for (const std::size_t output : measured_) each.settings[output] = &outputs_[output].setting();
-    settle(each);
+    settle_anew(each);
     if (!acts(each)) {
       findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i--));
       continue;
@@ -473,11 +476,12 @@ bool Search::structure_left() const {
 
 SearchResult Search::run() {
   SearchResult result;
-  while (result.findings.size() < thresholds_.findings_max) {
+  // A refit can drop what a later finding explains better: rounds are counted, not findings.
+  for (std::size_t round = 1; round <= thresholds_.findings_max; ++round) {
     accept(result.findings, result.findings.size());
     const std::vector<Explanation> candidates = ranked();
     for (std::size_t i = 0; i < std::min(weighed_shown, candidates.size()); ++i)
-      result.weighed.push_back({result.findings.size() + 1, candidates[i].hypothesis->cause,
+      result.weighed.push_back({round, candidates[i].hypothesis->cause,
                                 candidates[i].hypothesis->subject, candidates[i].score,
                                 candidates[i].left_out_gain, candidates[i].log_left});
     if (candidates.empty() || !earned(candidates.front(), result.findings.empty())) break;

@@ -85,6 +85,7 @@ class Search {
   [[nodiscard]] Settings likeliest_settings(const Explanation& explanation) const;
   void refine(Explanation& explanation) const;
   void settle(Explanation& explanation) const;
+  void settle_anew(Explanation& explanation) const;
   [[nodiscard]] double price(const Hypothesis& hypothesis) const;
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
   void choose(std::vector<Explanation>& candidates) const;
