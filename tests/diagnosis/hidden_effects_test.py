@@ -1,41 +1,37 @@
-"""The short campaign: every cause once, silence on untouched data. Exit status 1 when it is worse
-than what docs/diagnosis.md promises of these seeds."""
+#!/usr/bin/python3
+"""The short campaign: every cause once, silence on untouched machines. Exit status 1 when it is
+worse than docs/diagnosis.md promises of these seeds.
 
+hidden_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
+"""
+
+import multiprocessing
 import pathlib
 import sys
-import tempfile
 
 import campaign
 import hidden_effects as hidden
 
 LEVEL = 2
-RIGHT_MIN = 14  # of 18
+WRONG_MAX = 3  # of 18
 NULLS = 6
+FEW = ("missing_heat_source", "sensor_swap", "displacement_step")
 
 
-def main(program):
-    right = 0
-    false_alarms = []
-    with tempfile.TemporaryDirectory() as folder:
-        for seed, cause in enumerate(hidden.CAUSES):
-            place = pathlib.Path(folder) / cause
-            truth = hidden.make(place, seed, LEVEL, [cause]).truth[0]
-            answer = campaign.diagnose(program, place)
-            first = answer["findings"][0] if answer["findings"] else None
-            hit = first is not None and campaign.same(first, truth)
-            right += hit
-            print("%s of %s: %s" % (truth["cause"], truth["subject"], "found" if hit else
-                                    first and (first["cause"], first["subject"])), flush=True)
-        for seed in range(NULLS):
-            place = pathlib.Path(folder) / ("null%d" % seed)
-            hidden.make(place, 50000 + seed, LEVEL, [])
-            answer = campaign.diagnose(program, place)
-            if answer["verdict"] == "effect":
-                false_alarms.append(answer["findings"][0])
-    print("%d of %d right, %d false alarms of %d" % (right, len(hidden.CAUSES), len(false_alarms),
-                                                    NULLS))
-    return 0 if right >= RIGHT_MIN and not false_alarms else 1
+def main(program, few):
+    causes = FEW if few else hidden.CAUSES
+    tasks = [(program, None, "single", LEVEL, seed, [cause]) for seed, cause in enumerate(causes)]
+    tasks += [(program, None, "null", LEVEL, campaign.NULL_SEED + seed, [])
+              for seed in range(1 if few else NULLS)]
+    count = campaign.Count(LEVEL, show=True)
+    with multiprocessing.Pool(2) as pool:
+        for task, truth, answer in pool.imap(campaign.examine, tasks):
+            count.add(task, truth, answer)
+    count.report()
+    wrong = count.total["single"] - count.right["single"]
+    silent = count.right["null"] == count.total["null"]
+    return 0 if wrong <= (0 if few else WRONG_MAX) and silent else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main(str(pathlib.Path(sys.argv[1]).resolve())))
+    sys.exit(main(str(pathlib.Path(sys.argv[1]).resolve()), "--few" in sys.argv[2:]))
