@@ -8,6 +8,7 @@
 #include "modelling/experiments/plan_command.hpp"
 #include "modelling/identification/fit_command.hpp"
 #include "modelling/identification/group_command.hpp"
+#include "modelling/identification/tiebar_command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/placement/place_command.hpp"
 #include "modelling/structure/structure_command.hpp"
@@ -58,6 +59,7 @@ void declare_modelling_command_line(CLI::App& app, std::function<int()>& action)
   experiments::add_plan_command(app, action);
   identification::add_group_command(app, action);
   identification::add_fit_command(app, action);
+  identification::add_tiebar_command(app, action);
   name_files(app);
 }
 

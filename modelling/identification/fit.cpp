@@ -16,6 +16,7 @@ namespace {
 constexpr double combinations_max = 2e9;
 constexpr double as_good_as = 1.02;       // fewer terms win within this
 constexpr double condition_max = 1000.0;  // beyond, coefficients balance each other
+constexpr double sensor_error_K_of_one_run = 0.1;
 constexpr std::size_t kept_for_lags = 3000;
 
 /// Two-sided 95 % points of Student's t; beyond thirty degrees the normal's.
@@ -91,7 +92,24 @@ Eigen::VectorXd confidence(const Stacked& data, const Eigen::VectorXd& residual)
   return student_95(folds - 1) * covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
 }
 
-void judge_outputs(const Stacked& data, Fit& fit) {
+void judge_hot_half(const MeasuredTests& tests, const Stacked& data, Fit& fit) {
+  for (OutputFit& output : fit.outputs)
+    output.hot_rms_um = std::numeric_limits<double>::quiet_NaN();
+  if (tests.hot.rows.empty()) return;
+  std::vector<bool> is_hot(static_cast<std::size_t>(data.x.rows()), false);
+  for (const Eigen::Index row : tests.hot.rows)
+    is_hot[static_cast<std::size_t>(row - tests.runs[0].begin)] = true;
+  std::vector<Eigen::Index> hot;
+  std::vector<Eigen::Index> cool;
+  for (Eigen::Index row = 0; row < data.x.rows(); ++row)
+    (is_hot[static_cast<std::size_t>(row)] ? hot : cool).push_back(row);
+  const Eigen::MatrixXd b = solve(data.x(cool, Eigen::all), data.y(cool, Eigen::all));
+  const Eigen::MatrixXd left = data.y(hot, Eigen::all) - data.x(hot, Eigen::all) * b;
+  for (std::size_t o = 0; o < fit.outputs.size(); ++o)
+    fit.outputs[o].hot_rms_um = rms(left.col(static_cast<Eigen::Index>(o)));
+}
+
+void judge_outputs(const MeasuredTests& tests, const Stacked& data, Fit& fit) {
   const std::size_t folds = data.begin.size() - 1;
   const Eigen::MatrixXd coefficients = solve(data.x, data.y);
   fit.left_out_um.resize(data.y.rows(), data.y.cols());
@@ -119,6 +137,7 @@ void judge_outputs(const Stacked& data, Fit& fit) {
       output.fold_no_model_rms_um.push_back(rms(data.y.col(o).segment(data.begin[f], rows)));
     }
   }
+  judge_hot_half(tests, data, fit);
   Eigen::MatrixXd scaled = data.x;
   scaled.colwise().normalize();
   const auto values = scaled.bdcSvd().singularValues();
@@ -238,25 +257,19 @@ Fit fit_equation(const MeasuredTests& tests, const FitOptions& options) {
   const SubsetOptions subset = subset_options(tests, options, fit.grouping);
   if (!(combinations(tests.places.size(), subset.terms_min, subset.terms_max) <= combinations_max))
     throw std::runtime_error("too many combinations: fewer terms, or fewer places by --places");
-  const NormalEquations equations = normal_equations(tests);
-  if (equations.folds.size() < 2) {
-    NormalEquations both = equations;  // nothing to leave out: the test is judged by itself
-    both.folds.emplace_back(both.folds[0]);
-    SubsetSearch search = search_subsets(both, subset);
-    fit.ranking = std::move(search.best);
-    fit.judged = search.judged;
-  } else {
-    SubsetSearch search = search_subsets(equations, subset);
-    fit.ranking = std::move(search.best);
-    fit.judged = search.judged;
-  }
-  const ColumnPool pool(tests, options.lags ? 12 : 0);
+  const double sensor_error_K = options.sensor_error_K >= 0 ? options.sensor_error_K
+                                : tests.runs.size() > 1     ? 0.0
+                                                            : sensor_error_K_of_one_run;
+  SubsetSearch search = search_subsets(normal_equations(tests, sensor_error_K), subset);
+  fit.ranking = std::move(search.best);
+  fit.judged = search.judged;
+  const ColumnPool pool(tests, options.lags ? 12 : 0, sensor_error_K);
   const std::vector<std::size_t> columns = choose_columns(pool, options, fit);
   for (const std::size_t column : columns) {
     fit.columns.push_back(pool.columns()[column]);
     if (column < pool.places()) fit.places.push_back(column);
   }
-  judge_outputs(stack(tests, fit.columns), fit);
+  judge_outputs(tests, stack(tests, fit.columns), fit);
   judge_losses(tests, pool, columns, fit);
   warn(tests, fit);
   return fit;

@@ -24,6 +24,10 @@ struct FitOptions {
   Choice choice{Choice::published};
   double threshold{-1.0};  ///< of similarity; negative: chosen
   bool lags{false};
+  /// What a reading may be wrong by, each place for itself. Negative: 0 with several tests, whose
+  /// left-out errors hold it already (each has a reference of its own); 0.1 K with one run, all
+  /// of whose stretches share one.
+  double sensor_error_K{-1.0};
   double lag_gain_min{0.05};  ///< share of the left-out sum of squares that a lag must take away
 };
 
@@ -37,6 +41,7 @@ struct OutputFit {
   double no_model_rms_um{0.0};
   std::vector<double> fold_rms_um;           ///< left out
   std::vector<double> fold_no_model_rms_um;  ///< of the same rows
+  double hot_rms_um{0.0};                    ///< of the hot half, from the other; NaN: none
 };
 
 /// What is left of the equation when a chosen place is lost.
@@ -61,7 +66,8 @@ struct Fit {
   std::vector<std::string> warnings;  ///< worse than no model on a test, nearly singular, ...
 };
 
-/// Every allowed combination; the best by left-out tests, of two that are as good (2 %) the one
+/// Every allowed combination; the best by left-out tests (and the hot half of an only run), with
+/// what wrong readings would add; of two that are as good (2 %) the one
 /// with fewer terms.
 /// @throws std::runtime_error when no combination is allowed or there are too many
 [[nodiscard]] Fit fit_equation(const MeasuredTests& tests, const FitOptions& options);

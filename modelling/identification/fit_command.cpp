@@ -23,6 +23,7 @@ struct Options {
   bool free_choice{false};
   bool lags{false};
   double threshold{-1.0};
+  double sensor_error_K{-1.0};  ///< negative: left out
   std::string model;
   std::string report;
   bool json{false};
@@ -58,6 +59,7 @@ int run(const Options& options) {
   fit_options.choice = options.free_choice ? Choice::free : Choice::published;
   fit_options.threshold = options.threshold;
   fit_options.lags = options.lags;
+  fit_options.sensor_error_K = options.sensor_error_K;
   std::vector<RunFile> runs;
   for (const std::string& argument : options.runs)
     runs.push_back(load_run(parse_selection(argument)));
@@ -94,6 +96,10 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
                   "similarity up to which places are of one group; else chosen")
       ->check(CLI::Range(0.0, 1.0));
   sub->add_flag("--lags", options->lags, "a lag on a term where a left-out test pays for it");
+  sub->add_option("--sensor-error-K", options->sensor_error_K,
+                  "what each reading may be wrong by: large coefficients that balance each other "
+                  "then pay; 0 judges by the tests alone. Left out: 0, with one run 0.1")
+      ->check(CLI::Range(0.0, 10.0));
   sub->add_option("--stretches", options->tests.folds_of_one_run,
                   "into how many tests to cut the run when there is only one")
       ->check(CLI::Range(2, 100));

@@ -111,6 +111,9 @@ std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
       text += printed("  without %s: %.3f there (no model: %.3f)\n", tests.fold_name(f).c_str(),
                       output.fold_rms_um[f], output.fold_no_model_rms_um[f]);
   }
+  for (std::size_t o = 0; o < tests.outputs.size() && !tests.hot.rows.empty(); ++o)
+    text += printed("%s: the hotter half from the cooler one: %.3f um\n", tests.outputs[o].c_str(),
+                    fit.outputs[o].hot_rms_um);
   text += printed("condition of the chosen columns: %.1f\n", fit.condition);
   text += losses_text(tests, fit);
   for (const std::string& warning : fit.warnings)
@@ -128,6 +131,7 @@ std::string fit_json(const MeasuredTests& tests, const Fit& fit) {
     json["left_out_peak_um"][tests.outputs[o]] = output.left_out_peak_um;
     json["train_rms_um"][tests.outputs[o]] = output.train_rms_um;
     json["no_model_rms_um"][tests.outputs[o]] = output.no_model_rms_um;
+    if (!tests.hot.rows.empty()) json["hot_half_rms_um"][tests.outputs[o]] = output.hot_rms_um;
     Json terms = Json::array();
     for (std::size_t i = 0; i < fit.columns.size(); ++i)
       terms.push_back({{"place", tests.places[fit.columns[i].place]},

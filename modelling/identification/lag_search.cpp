@@ -47,12 +47,15 @@ class Forward {
     for (std::size_t o = 0; o < pool.outputs(); ++o)
       rows.push_back(all + static_cast<Eigen::Index>(o));
     count_ = static_cast<Eigen::Index>(columns.size());
-    Eigen::MatrixXd total = Eigen::MatrixXd::Zero(count_ + outputs(), count_ + outputs());
-    for (const Eigen::MatrixXd& fold : pool.folds()) {
-      left_out_.emplace_back(fold(rows, rows));
-      total += left_out_.back();
+    const NormalEquations& equations = pool.equations();
+    const Eigen::MatrixXd total = equations.total(rows, rows);
+    for (std::size_t f = 0; f < equations.folds.size(); ++f) {
+      left_out_.emplace_back(equations.folds[f](rows, rows));
+      train_.emplace_back(total - left_out_.back());
+      for (Eigen::Index i = 0; i < count_; ++i)
+        left_out_.back()(i, i) += equations.reading_errors(rows[static_cast<std::size_t>(i)],
+                                                           static_cast<Eigen::Index>(f));
     }
-    for (const Eigen::MatrixXd& fold : left_out_) train_.emplace_back(total - fold);
     norm_ = total.diagonal();
   }
 
@@ -114,6 +117,26 @@ bool helps_on_most(const std::vector<double>& before, const std::vector<double>&
   return 2 * better > before.size();
 }
 
+/// Whether the newest of the lags is a share of its place's coefficient, fitted to all rows.
+bool is_share(const ColumnPool& pool, const std::vector<std::size_t>& columns) {
+  std::vector<Eigen::Index> x;
+  std::vector<Eigen::Index> y;
+  for (const std::size_t column : columns) x.push_back(static_cast<Eigen::Index>(column));
+  for (std::size_t o = 0; o < pool.outputs(); ++o)
+    y.push_back(static_cast<Eigen::Index>(pool.columns().size() + o));
+  const Eigen::MatrixXd& total = pool.equations().total;
+  const Eigen::MatrixXd b = total(x, x).ldlt().solve(total(x, y));
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (!(pool.columns()[columns[i]].tau_s > 0)) continue;
+    const std::size_t place = pool.columns()[columns[i]].place;
+    const auto at = std::find(columns.begin(), columns.end(), place) - columns.begin();
+    const auto lag = b.row(static_cast<Eigen::Index>(i));
+    const auto own = b.row(at);
+    if (!(lag.dot(own) > 0 && lag.squaredNorm() <= own.squaredNorm())) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Eigen::VectorXd column_of(const TestRun& run, const FitColumn& column) {
@@ -129,27 +152,22 @@ Eigen::VectorXd column_of(const TestRun& run, const FitColumn& column) {
   return lag_K;
 }
 
-ColumnPool::ColumnPool(const MeasuredTests& tests, std::size_t lags)
+ColumnPool::ColumnPool(const MeasuredTests& tests, std::size_t lags, double sensor_error_K)
     : places_(tests.places.size()),
       outputs_(tests.outputs.size()),
-      taus_s_(time_constants(tests, lags)) {
+      taus_s_(time_constants(tests, lags)),
+      tests_(tests.folds.size()) {
   for (std::size_t place = 0; place < places_; ++place) columns_.push_back({place, 0.0});
   for (std::size_t place = 0; place < places_; ++place)
     for (const double tau_s : taus_s_) columns_.push_back({place, tau_s});
   const auto count = static_cast<Eigen::Index>(columns_.size());
   std::vector<Eigen::MatrixXd> all_of_run;
   for (const TestRun& run : tests.runs) {
-    Eigen::MatrixXd all(run.time_s.size(), count + run.outputs_um.cols());
+    Eigen::MatrixXd& all = all_of_run.emplace_back(run.time_s.size(), count);
     for (Eigen::Index i = 0; i < count; ++i)
       all.col(i) = column_of(run, columns_[static_cast<std::size_t>(i)]);
-    all.rightCols(run.outputs_um.cols()) = run.outputs_um;
-    all_of_run.push_back(std::move(all));
   }
-  for (const Fold& fold : tests.folds) {
-    const auto rows = all_of_run[fold.run].middleRows(fold.begin, fold.end - fold.begin);
-    folds_.emplace_back(rows.transpose() * rows);
-    total_ = total_.size() == 0 ? folds_.back() : Eigen::MatrixXd(total_ + folds_.back());
-  }
+  equations_ = normal_equations(tests, all_of_run, sensor_error_K);
 }
 
 Eigen::MatrixXd ColumnPool::left_out(const std::vector<std::size_t>& columns) const {
@@ -158,10 +176,9 @@ Eigen::MatrixXd ColumnPool::left_out(const std::vector<std::size_t>& columns) co
   std::vector<Eigen::Index> y;
   for (std::size_t o = 0; o < outputs_; ++o)
     y.push_back(static_cast<Eigen::Index>(columns_.size() + o));
-  Eigen::MatrixXd sums(static_cast<Eigen::Index>(folds_.size()),
-                       static_cast<Eigen::Index>(y.size()));
-  for (std::size_t f = 0; f < folds_.size(); ++f) {
-    const Eigen::MatrixXd train = total_ - folds_[f];
+  Eigen::MatrixXd sums(static_cast<Eigen::Index>(tests_), static_cast<Eigen::Index>(y.size()));
+  for (std::size_t f = 0; f < tests_; ++f) {
+    const Eigen::MatrixXd train = equations_.total - equations_.folds[f];
     Eigen::MatrixXd b = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(x.size()), sums.cols());
     if (!x.empty()) {
       const Eigen::MatrixXd a = train(x, x);
@@ -173,7 +190,7 @@ Eigen::MatrixXd ColumnPool::left_out(const std::vector<std::size_t>& columns) co
                                          std::numeric_limits<double>::quiet_NaN());
       b = scale.asDiagonal() * solver.solve(scale.asDiagonal() * train(x, y));
     }
-    const Eigen::MatrixXd& own = folds_[f];
+    const Eigen::MatrixXd& own = equations_.folds[f];
     for (Eigen::Index o = 0; o < sums.cols(); ++o) {
       const auto column = y[static_cast<std::size_t>(o)];
       double sum = own(column, column);
@@ -208,6 +225,9 @@ LaggedSubset add_lags(const ColumnPool& pool, const std::vector<std::size_t>& pl
       const std::vector<double> with = forward.scores_with(static_cast<Eigen::Index>(i));
       if (with.empty() || !(sum_of(with) < sum_of(best_scores)) || !helps_on_most(scores, with))
         continue;
+      std::vector<std::size_t> tried = subset.columns;
+      tried.push_back(columns[i]);
+      if (!is_share(pool, tried)) continue;
       best = i;
       best_scores = with;
     }

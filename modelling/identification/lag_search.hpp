@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "modelling/identification/measured_tests.hpp"
+#include "modelling/identification/subset_search.hpp"
 
 namespace thermocomp::identification {
 
@@ -22,12 +23,11 @@ struct FitColumn {
 class ColumnPool {
  public:
   /// @param lags  how many time constants, spaced by equal ratios; 0: none
-  ColumnPool(const MeasuredTests& tests, std::size_t lags);
+  ColumnPool(const MeasuredTests& tests, std::size_t lags, double sensor_error_K);
 
   [[nodiscard]] const std::vector<FitColumn>& columns() const noexcept { return columns_; }
   [[nodiscard]] const std::vector<double>& taus_s() const noexcept { return taus_s_; }
-  /// Shape (columns + outputs) squared, one a fold.
-  [[nodiscard]] const std::vector<Eigen::MatrixXd>& folds() const noexcept { return folds_; }
+  [[nodiscard]] const NormalEquations& equations() const noexcept { return equations_; }
   [[nodiscard]] std::size_t index_of(std::size_t place, std::size_t lag) const noexcept {
     return places_ + place * taus_s_.size() + lag;
   }
@@ -35,7 +35,7 @@ class ColumnPool {
   [[nodiscard]] std::size_t outputs() const noexcept { return outputs_; }
 
   /// Left-out sum of squares, shape (folds, outputs), of least squares with these columns on all
-  /// other folds; NaN where the equations are singular.
+  /// other folds, without the hot half and reading errors; NaN where the equations are singular.
   [[nodiscard]] Eigen::MatrixXd left_out(const std::vector<std::size_t>& columns) const;
 
  private:
@@ -43,8 +43,8 @@ class ColumnPool {
   std::size_t outputs_;
   std::vector<double> taus_s_;
   std::vector<FitColumn> columns_;
-  std::vector<Eigen::MatrixXd> folds_;
-  Eigen::MatrixXd total_;
+  std::size_t tests_;  ///< folds without the hot half
+  NormalEquations equations_;
 };
 
 struct LaggedSubset {
@@ -53,7 +53,8 @@ struct LaggedSubset {
 };
 
 /// Forward choice: the lag with the best left-out score joins while it lowers the score by
-/// `gain_min` of itself and helps on more than half of the folds; one lag a place.
+/// `gain_min` of itself and helps on more than half of the folds; one lag a place, and only as a
+/// share of the structure that follows late, 0 < g / K <= 1 (for several outputs: taken together).
 [[nodiscard]] LaggedSubset add_lags(const ColumnPool& pool, const std::vector<std::size_t>& places,
                                     double gain_min);
 

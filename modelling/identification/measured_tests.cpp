@@ -124,6 +124,20 @@ std::vector<Fold> make_folds(const std::vector<TestRun>& runs, std::size_t stret
   return folds;
 }
 
+HotHalf hot_half(const std::vector<TestRun>& runs) {
+  HotHalf hot;
+  if (runs.size() > 1) return hot;
+  const TestRun& run = runs[0];
+  const Eigen::Index count = run.time_s.size() - run.begin;
+  const Eigen::VectorXd heat = run.places_K.bottomRows(count).cwiseAbs().rowwise().sum();
+  std::vector<double> sorted(heat.data(), heat.data() + count);
+  std::nth_element(sorted.begin(), sorted.begin() + count / 2, sorted.end());
+  const double median = sorted[static_cast<std::size_t>(count / 2)];
+  for (Eigen::Index i = 0; i < count; ++i)
+    if (heat[i] > median) hot.rows.push_back(run.begin + i);
+  return hot;
+}
+
 }  // namespace
 
 Eigen::Index MeasuredTests::rows() const {
@@ -154,6 +168,7 @@ MeasuredTests measured_tests(const std::vector<RunFile>& runs, const TestOptions
   leave_out_still_places(tests);
   if (tests.places.empty()) refuse(runs.front().name, "", "has no temperature that can be used");
   tests.folds = make_folds(tests.runs, options.folds_of_one_run);
+  tests.hot = hot_half(tests.runs);
   return tests;
 }
 

@@ -28,11 +28,19 @@ struct Fold {
   Eigen::Index end{0};
 };
 
+/// Rows of the only run whose places, taken together, are further from the reference than in the
+/// other half. Predicting them from the cooler half shows what an equation does beyond what it was
+/// fitted to - as it must when the machine is loaded more than it was in the test.
+struct HotHalf {
+  std::vector<Eigen::Index> rows;  ///< empty: there are several tests, which serve for that
+};
+
 struct MeasuredTests {
   std::vector<std::string> places;
   std::vector<std::string> outputs;
   std::vector<TestRun> runs;
   std::vector<Fold> folds;
+  HotHalf hot;
   std::vector<std::string> notes;  ///< for a person: what was left out and why
 
   [[nodiscard]] Eigen::Index rows() const;  ///< selected ones of all runs

@@ -102,8 +102,7 @@ class Search {
       std::stable_partition(place_.begin(), place_.end(), [&](std::size_t place) {
         return options_.group_of[place] == options_.group_required;
       });
-    Eigen::MatrixXd total = equations.folds[0];
-    for (std::size_t f = 1; f < equations.folds.size(); ++f) total += equations.folds[f];
+    const Eigen::MatrixXd& total = equations.total;
     // Columns of one length: what is singular can then be told from one number.
     Eigen::VectorXd scale = total.diagonal().cwiseSqrt().cwiseInverse();
     for (Eigen::Index i = 0; i < scale.size(); ++i)
@@ -119,7 +118,10 @@ class Search {
           const bool real = f < equations.folds.size();
           const double own = real ? equations.folds[f](a, b) * scale[a] * scale[b] : 0.0;
           const double all = total(a, b) * scale[a] * scale[b];
-          levels_[0].left_out[at(i, j) + f] = own;
+          const bool reading = real && i == j && i < candidates_;
+          const double error =
+              reading ? equations.reading_errors(a, static_cast<Eigen::Index>(f)) : 0.0;
+          levels_[0].left_out[at(i, j) + f] = own + error * scale[a] * scale[b];
           // A lane without a fold: equations that cannot fail, and weigh nothing.
           levels_[0].train[at(i, j) + f] = real ? all - own : (i == j ? 1.0 : 0.0);
         }
@@ -237,18 +239,42 @@ SubsetSearch search_with(const NormalEquations& equations, const SubsetOptions& 
 
 }  // namespace
 
-NormalEquations normal_equations(const MeasuredTests& tests) {
+NormalEquations normal_equations(const MeasuredTests& tests, double sensor_error_K) {
+  std::vector<Eigen::MatrixXd> columns;
+  for (const TestRun& run : tests.runs) columns.push_back(run.places_K);
+  return normal_equations(tests, columns, sensor_error_K);
+}
+
+NormalEquations normal_equations(const MeasuredTests& tests,
+                                 const std::vector<Eigen::MatrixXd>& columns,
+                                 double sensor_error_K) {
   NormalEquations equations;
-  equations.candidates = static_cast<Eigen::Index>(tests.places.size());
+  equations.candidates = columns[0].cols();
   equations.outputs = static_cast<Eigen::Index>(tests.outputs.size());
-  for (const Fold& fold : tests.folds) {
-    const TestRun& run = tests.runs[fold.run];
-    Eigen::MatrixXd all(fold.end - fold.begin, equations.candidates + equations.outputs);
-    all << run.places_K.middleRows(fold.begin, fold.end - fold.begin),
-        run.outputs_um.middleRows(fold.begin, fold.end - fold.begin);
+  std::vector<double> rows;
+  const auto add = [&](const auto& x, const auto& y) {
+    Eigen::MatrixXd all(x.rows(), x.cols() + y.cols());
+    all << x, y;
     equations.folds.emplace_back(all.transpose() * all);
-    equations.rows.push_back(static_cast<double>(all.rows()));
+    rows.push_back(static_cast<double>(all.rows()));
+  };
+  for (const Fold& fold : tests.folds) {
+    const Eigen::Index count = fold.end - fold.begin;
+    add(columns[fold.run].middleRows(fold.begin, count),
+        tests.runs[fold.run].outputs_um.middleRows(fold.begin, count));
   }
+  equations.total = equations.folds[0];
+  for (std::size_t f = 1; f < equations.folds.size(); ++f) equations.total += equations.folds[f];
+  if (!tests.hot.rows.empty())
+    add(columns[0](tests.hot.rows, Eigen::all),
+        tests.runs[0].outputs_um(tests.hot.rows, Eigen::all));
+  const auto places = static_cast<Eigen::Index>(tests.places.size());
+  equations.reading_errors =
+      Eigen::MatrixXd::Zero(equations.candidates, static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t f = 0; f < rows.size(); ++f)
+    equations.reading_errors.col(static_cast<Eigen::Index>(f))
+        .head(places)
+        .setConstant(rows[f] * sensor_error_K * sensor_error_K);
   return equations;
 }
 

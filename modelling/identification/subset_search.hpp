@@ -10,14 +10,22 @@
 
 namespace thermocomp::identification {
 
-/// X'X, X'Y and Y'Y of each fold: candidates first, then outputs.
+/// X'X, X'Y and Y'Y: candidates first, then outputs; shape (candidates + outputs) squared.
 struct NormalEquations {
   Eigen::Index candidates{0};
   Eigen::Index outputs{0};
-  std::vector<Eigen::MatrixXd> folds;  ///< shape (candidates + outputs) squared, symmetric
-  std::vector<double> rows;            ///< of each fold
+  Eigen::MatrixXd total;               ///< over all rows
+  std::vector<Eigen::MatrixXd> folds;  ///< what is left out; the hot half last, where there is one
+  /// Added to a fold's own diagonal, shape (candidates, folds): rows times the square of what a
+  /// place's reading may be wrong by. It adds rows * sum (coefficient * error)^2 to what is left.
+  Eigen::MatrixXd reading_errors;
 };
-[[nodiscard]] NormalEquations normal_equations(const MeasuredTests& tests);
+/// @param sensor_error_K  what each place's reading may be wrong by, independently of the others
+[[nodiscard]] NormalEquations normal_equations(const MeasuredTests& tests, double sensor_error_K);
+/// The same from columns computed for every run; the first `places` of them have reading errors.
+[[nodiscard]] NormalEquations normal_equations(const MeasuredTests& tests,
+                                               const std::vector<Eigen::MatrixXd>& columns,
+                                               double sensor_error_K);
 
 struct SubsetOptions {
   std::size_t terms_min{3};

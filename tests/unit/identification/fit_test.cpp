@@ -57,7 +57,7 @@ TEST_CASE("the search judges every combination as least squares on the rows does
   options.terms_min = 1;
   options.terms_max = 4;
   options.kept = 1000;
-  const SubsetSearch search = search_subsets(normal_equations(tests), options);
+  const SubsetSearch search = search_subsets(normal_equations(tests, 0.0), options);
   CHECK(search.judged == 8 + 28 + 56 + 70);
   CHECK(static_cast<double>(search.judged) == combinations(8, 1, 4));
   for (std::size_t terms = 1; terms <= 4; ++terms)
@@ -74,7 +74,7 @@ TEST_CASE("odd and large numbers of tests give the same scores", "[fit]") {
   SubsetOptions options;
   options.terms_min = options.terms_max = 2;
   options.kept = 100;
-  const SubsetSearch search = search_subsets(normal_equations(tests), options);
+  const SubsetSearch search = search_subsets(normal_equations(tests, 0.0), options);
   REQUIRE(search.best[2].size() == 28);
   for (const Subset& subset : search.best[2])
     CHECK(subset.score == Approx(score_by_rows(tests, subset.places)).epsilon(1e-6));
@@ -92,7 +92,7 @@ TEST_CASE("by the publication's rules at most two of a group, and one of the lar
     const int first = __builtin_popcount(mask & 7u);
     if (__builtin_popcount(mask) <= 4 && first >= 1 && first <= 2) ++expected;
   }
-  const SubsetSearch search = search_subsets(normal_equations(tests), options);
+  const SubsetSearch search = search_subsets(normal_equations(tests, 0.0), options);
   CHECK(search.judged == expected);
   for (const auto& subsets : search.best)
     for (const Subset& subset : subsets) {
@@ -109,7 +109,7 @@ TEST_CASE("a place that is the sum of two others is not taken up beside both", "
   SubsetOptions options;
   options.terms_min = options.terms_max = 3;
   options.kept = 1000;
-  for (const Subset& subset : search_subsets(normal_equations(tests), options).best[3])
+  for (const Subset& subset : search_subsets(normal_equations(tests, 0.0), options).best[3])
     CHECK(subset.places != std::vector<std::size_t>{5, 6, 7});
 }
 

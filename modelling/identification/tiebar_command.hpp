@@ -1,0 +1,14 @@
+/// `thermocomp tiebar`: the two coefficients of a gate-shaped machine.
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace thermocomp::identification {
+
+void add_tiebar_command(CLI::App& app, std::function<int()>& action);
+
+}  // namespace thermocomp::identification
