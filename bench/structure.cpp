@@ -1,10 +1,12 @@
 // The block matrix of a hollow column (eight blocks, nine rows): the way `thermocomp structure`
 // computes it, checked against solving block by block and against CalculiX on the same mesh.
 //
-//   bench_structure ELEMENT X_MM Y_MM Z_MM [calculix] [direct]
+//   bench_structure ELEMENT X_MM Y_MM Z_MM [calculix] [direct] [petsc1] [petsc2] [petsc_alone]
 //
-// ELEMENT tet4 or tet10, the lengths an element's greatest edges. On stdout lines NAME VALUE UNIT.
-// Exit status 0: agreed (or nothing was compared), 1: did not, 77: CalculiX is not there.
+// ELEMENT tet4 or tet10, the lengths an element's greatest edges. petsc1, petsc2: by PETSc too, on
+// one and two ranks; petsc_alone: without the factorisation to compare with. On stdout lines NAME
+// VALUE UNIT. Exit status 0: agreed (or nothing was compared), 1: did not, 77: a program to compare
+// with is not there.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -13,6 +15,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,7 +33,8 @@ using namespace thermocomp::structure;
 constexpr double agreement_max = 5e-7;  ///< of the largest entry; CalculiX prints 7 digits
 constexpr double adjoint_max = 1e-9;
 constexpr int exit_disagrees = 1;
-constexpr int exit_no_calculix = 77;
+constexpr int exit_nothing_to_compare = 77;
+constexpr double petsc_max = 1e-6;
 constexpr std::array<Vec3, 3> points_mm{{{300, 0, 300}, {300, 0, 900}, {300, 0, 1500}}};
 
 using Rows = std::vector<std::vector<double>>;
@@ -247,40 +251,83 @@ bool has(const std::vector<std::string>& words, const char* word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-int run(const std::vector<std::string>& words) {
-  const bool calculix = has(words, "calculix");
-  if (calculix && std::system("command -v ccx > /dev/null") != 0) {
-    std::printf("SKIPPED CalculiX (ccx) is not installed\n");
-    return exit_no_calculix;
-  }
+/// The sensitivities, with the time from the structure file's text to the model.
+struct Solved {
+  Structure structure;
+  std::unique_ptr<Statics> statics;
+  Rows sensitivities;
+  double took_s{0.0};
+};
+
+std::unique_ptr<Solved> solve(const StructureSpec& spec, const SolverChoice& choice) {
   const double began_s = seconds();
-  const StructureSpec spec =
-      parse_structure(column_text(words[0], {words[1], words[2], words[3]}), "column.toml");
-  const Structure structure = build_structure(spec, [](std::string_view) {});
-  const Statics statics(structure.mesh, structure.material_of_part, structure.reduction,
-                        structure.springs);
-  const Rows sensitivities = statics.sensitivities(structure.rows);
-  static_cast<void>(block_model(spec, structure, sensitivities));
-  const double own_s = seconds() - began_s;
-  const double own_MB = peak_MB();
-  std::printf("%s_nodes %zu nodes\n", words[0].c_str(), structure.mesh.nodes_m.size());
-  std::printf("time_own %.2f s\nmemory_own %.0f MB\n", own_s, own_MB);
+  // The solver keeps references to the structure, so it must not move any more.
+  auto solved = std::unique_ptr<Solved>(
+      new Solved{build_structure(spec, [](std::string_view) {}), nullptr, {}});
+  const Structure& structure = solved->structure;
+  solved->statics = std::make_unique<Statics>(structure.mesh, structure.material_of_part,
+                                              structure.reduction, structure.springs, choice);
+  solved->sensitivities = solved->statics->sensitivities(structure.rows);
+  static_cast<void>(block_model(spec, structure, solved->sensitivities));
+  solved->took_s = seconds() - began_s;
+  return solved;
+}
+
+bool by_petsc(const StructureSpec& spec, int ranks, const Rows* reference) {
+  const auto solved = solve(spec, {Backend::petsc, ranks});
+  std::fprintf(stderr, "%s", solved->statics->solver().report().c_str());
+  std::printf("petsc_%d_ranks_nodes %zu nodes\npetsc_%d_ranks_time %.1f s\n", ranks,
+              solved->structure.mesh.nodes_m.size(), ranks, solved->took_s);
+  std::printf("petsc_%d_ranks_memory_of_this_process %.0f MB\n", ranks, peak_MB());
+  if (reference == nullptr) return true;
+  const double apart =
+      disagreement(*reference, by_adjoint(solved->sensitivities, block_fields(solved->structure)));
+  std::printf("petsc_%d_ranks_against_cholmod %.2g ratio\n", ranks, apart);
+  return apart <= petsc_max;
+}
+
+bool compare(const Solved& own, const Rows& matrix, const Rows& fields, bool calculix,
+             bool direct) {
   bool agreed = true;
-  const Rows fields = block_fields(structure);
-  const Rows adjoint = by_adjoint(sensitivities, fields);
-  if (has(words, "direct")) {
-    const double apart = disagreement(adjoint, by_direct(structure, statics, fields));
+  if (direct) {
+    const double apart = disagreement(matrix, by_direct(own.structure, *own.statics, fields));
     std::printf("adjoint_against_direct %.2g ratio\n", apart);
     agreed = agreed && apart <= adjoint_max;
   }
   if (calculix) {
     double calculix_s = 0.0;
-    const Rows theirs = by_calculix(structure, fields, calculix_s);
-    const double apart = disagreement(adjoint, theirs);
+    const Rows theirs = by_calculix(own.structure, fields, calculix_s);
+    const double apart = disagreement(matrix, theirs);
     std::printf("time_calculix %.2f s\n", calculix_s);
     std::printf("disagreement_with_calculix %.2g ratio\n", apart);
-    std::printf("time_over_calculix %.3f ratio\n", own_s / calculix_s);
+    std::printf("time_over_calculix %.3f ratio\n", own.took_s / calculix_s);
     agreed = agreed && apart <= agreement_max;
+  }
+  return agreed;
+}
+
+int run(const std::vector<std::string>& words) {
+  const bool calculix = has(words, "calculix");
+  if (calculix && std::system("command -v ccx > /dev/null") != 0) {
+    std::printf("SKIPPED CalculiX (ccx) is not installed\n");
+    return exit_nothing_to_compare;
+  }
+  const StructureSpec spec =
+      parse_structure(column_text(words[0], {words[1], words[2], words[3]}), "column.toml");
+  bool agreed = true;
+  Rows matrix;
+  const bool alone = has(words, "petsc_alone");
+  if (!alone) {
+    const auto own = solve(spec, {});
+    std::printf("%s_nodes %zu nodes\n", words[0].c_str(), own->structure.mesh.nodes_m.size());
+    std::printf("time_own %.2f s\nmemory_own %.0f MB\n", own->took_s, peak_MB());
+    const Rows fields = block_fields(own->structure);
+    matrix = by_adjoint(own->sensitivities, fields);
+    agreed = compare(*own, matrix, fields, calculix, has(words, "direct"));
+  }
+  for (const int ranks : {1, 2}) {
+    if (!has(words, ranks == 1 ? "petsc1" : "petsc2")) continue;
+    agreed = by_petsc(spec, ranks, alone ? nullptr : &matrix) && agreed;
   }
   return agreed ? 0 : exit_disagrees;
 }
@@ -290,7 +337,9 @@ int run(const std::vector<std::string>& words) {
 int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   if (words.size() < 4 || (words[0] != "tet4" && words[0] != "tet10")) {
-    std::fprintf(stderr, "usage: bench_structure tet4|tet10 X_MM Y_MM Z_MM [calculix] [direct]\n");
+    std::fprintf(stderr,
+                 "usage: bench_structure tet4|tet10 X_MM Y_MM Z_MM [calculix] [direct] "
+                 "[petsc1] [petsc2] [petsc_alone]\n");
     return 2;
   }
   try {

@@ -17,6 +17,8 @@ part() {
   stage "$name" "$@" || failed+=("$name")
 }
 
+# Before anything is configured: thermocomp-petsc is built where PETSc is there.
+part "packages of PETSc" scripts/setup.sh petsc
 for preset in release asan-ubsan tsan debug coverage; do
   part "$preset" ./test.sh --preset "$preset"
 done

@@ -14,6 +14,10 @@ packages_build=(
 # several times as long.
 packages_modelling=("${packages_build[@]}" libsuitesparse-dev libopenblas-dev libgmsh-dev)
 
+# Besides, for meshes past the memory of a factorisation: thermocomp-petsc. Not part of the tests,
+# being large; they include it where it is there.
+packages_petsc=("${packages_modelling[@]}" libpetsc-real-dev)
+
 # The demo draws a picture of itself.
 packages_demo=("${packages_build[@]}" gnuplot-nox)
 

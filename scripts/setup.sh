@@ -1,6 +1,6 @@
 #!/bin/bash
 # Installs the Debian packages that are missing, after saying which.
-#   scripts/setup.sh build|modelling|demo|test
+#   scripts/setup.sh build|modelling|petsc|demo|test
 # Needs root or sudo only where something is missing. Exit status 0: everything is there.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -53,10 +53,11 @@ main() {
   case ${1:-} in
     build) wanted=("${packages_build[@]}") ;;
     modelling) wanted=("${packages_modelling[@]}") ;;
+    petsc) wanted=("${packages_petsc[@]}") ;;
     demo) wanted=("${packages_demo[@]}") ;;
     test) wanted=("${packages_test[@]}") ;;
     *)
-      echo "usage: setup.sh build|modelling|demo|test" >&2
+      echo "usage: setup.sh build|modelling|petsc|demo|test" >&2
       exit 2
       ;;
   esac

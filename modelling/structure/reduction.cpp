@@ -83,6 +83,14 @@ void Reduction::finish() {
   }
 }
 
+std::vector<Index> Reduction::places_of_free() const {
+  std::vector<Index> places;
+  for (Index full = 0; full < held_.size(); ++full) {
+    if (!held_[full] && ties_[full / components_].empty()) places.push_back(full);
+  }
+  return places;
+}
+
 std::vector<double> Reduction::given(std::span<const double> values) const {
   std::vector<double> result(held_.size(), 0.0);
   for (Index full = 0; full < held_.size(); ++full) {

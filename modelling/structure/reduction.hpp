@@ -34,6 +34,8 @@ class Reduction {
     return held_[node * components_ + component];
   }
   [[nodiscard]] const std::vector<Weighted>& masters_of(Index node) const { return ties_[node]; }
+  /// For each free unknown its place in the full model, increasing.
+  [[nodiscard]] std::vector<Index> places_of_free() const;
   /// g with the values of the held unknowns and of what follows them, from values for all
   /// unknowns (only those of held ones count). Shapes (full_size).
   [[nodiscard]] std::vector<double> given(std::span<const double> values) const;

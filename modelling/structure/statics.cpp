@@ -1,11 +1,36 @@
 #include "modelling/structure/statics.hpp"
 
 #include <algorithm>
+#include <cstdio>
+
+#include "modelling/structure/petsc_solver.hpp"
 
 namespace thermocomp::structure {
 namespace {
 
 constexpr std::size_t right_sides_at_once = 16;
+
+class CholmodSolver : public LinearSolver {
+ public:
+  explicit CholmodSolver(const SparseSymmetric& matrix) : factor_(matrix) {}
+  void solve(std::span<double> right_sides) const override { factor_.solve(right_sides); }
+  [[nodiscard]] std::string report() const override {
+    char text[128];
+    std::snprintf(text, sizeof text,
+                  "factor %.0f MB\nreciprocal condition of the stiffness (estimate): %.2g\n",
+                  factor_.factor_MB(), factor_.reciprocal_condition());
+    return text;
+  }
+
+ private:
+  Cholesky factor_;
+};
+
+std::unique_ptr<LinearSolver> make_solver(const SparseSymmetric& matrix, const Mesh& mesh,
+                                          const Reduction& reduction, const SolverChoice& choice) {
+  if (choice.backend == Backend::cholmod) return std::make_unique<CholmodSolver>(matrix);
+  return std::make_unique<PetscSolver>(matrix, mesh, reduction, choice.ranks);
+}
 
 }  // namespace
 
@@ -23,11 +48,13 @@ double Functional::of(std::span<const double> displacement_m) const {
 }
 
 Statics::Statics(const Mesh& mesh, std::span<const Material> material_of_part,
-                 const Reduction& reduction, std::span<const Coupling> couplings)
+                 const Reduction& reduction, std::span<const Coupling> couplings,
+                 const SolverChoice& choice)
     : mesh_(mesh),
       material_of_part_(material_of_part),
       reduction_(reduction),
-      factor_(reduction.reduced(stiffness_matrix(mesh, material_of_part, couplings))) {}
+      solver_(make_solver(reduction.reduced(stiffness_matrix(mesh, material_of_part, couplings)),
+                          mesh, reduction, choice)) {}
 
 std::vector<double> Statics::displacement_m(std::span<const double> rise_K) const {
   return displacement_under_m(thermal_load(mesh_, material_of_part_, rise_K));
@@ -36,7 +63,7 @@ std::vector<double> Statics::displacement_m(std::span<const double> rise_K) cons
 std::vector<double> Statics::displacement_under_m(std::span<const double> force_N) const {
   std::vector<double> free(reduction_.free_size());
   reduction_.restrict_to_free(force_N, free);
-  factor_.solve(free);
+  solver_->solve(free);
   return reduction_.expanded(free);
 }
 
@@ -56,7 +83,7 @@ std::vector<std::vector<double>> Statics::sensitivities(std::span<const Function
       }
       reduction_.restrict_to_free(full, {&sides[i * size], size});
     }
-    factor_.solve(sides);
+    solver_->solve(sides);
     for (std::size_t i = 0; i < count; ++i) {
       const auto adjoint = reduction_.expanded({&sides[i * size], size});
       rows.push_back(thermal_load_transposed(mesh_, material_of_part_, adjoint));

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "modelling/structure/linear_solver.hpp"
 #include "modelling/structure/matrices.hpp"
 #include "modelling/structure/reduction.hpp"
 
@@ -24,14 +25,14 @@ struct Functional {
   [[nodiscard]] double of(std::span<const double> displacement_m) const;
 };
 
-/// One factorisation serves any number of temperature fields and outputs.
+/// One factorisation (or set-up) serves any number of temperature fields and outputs.
 /// Source: JP6507619B2, delta = K^-1 F T; the adjoint form S = (K^-1 E)^T F is ours.
 class Statics {
  public:
   /// @pre mesh, materials and reduction outlive this
   /// @throws FactorisationError
   Statics(const Mesh& mesh, std::span<const Material> material_of_part, const Reduction& reduction,
-          std::span<const Coupling> couplings);
+          std::span<const Coupling> couplings, const SolverChoice& choice = {});
 
   /// Displacements [m], shape (3 nodes), from the rise of every node [K], shape (nodes).
   [[nodiscard]] std::vector<double> displacement_m(std::span<const double> rise_K) const;
@@ -42,13 +43,13 @@ class Statics {
   [[nodiscard]] std::vector<std::vector<double>> sensitivities(
       std::span<const Functional> outputs) const;
 
-  [[nodiscard]] const Cholesky& factor() const noexcept { return factor_; }
+  [[nodiscard]] const LinearSolver& solver() const noexcept { return *solver_; }
 
  private:
   const Mesh& mesh_;
   std::span<const Material> material_of_part_;
   const Reduction& reduction_;
-  Cholesky factor_;
+  std::unique_ptr<LinearSolver> solver_;
 };
 
 /// Stress at nodes [Pa] as xx, yy, zz, xy, yz, zx: each element's own at its node, the mean over

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -26,6 +27,7 @@ struct Options {
   std::string vtu;
   std::string picture;
   std::string plant;
+  SolverChoice solver;
 };
 
 /// What begins, with the time since the start, on stderr.
@@ -83,9 +85,9 @@ int run(const Options& options) {
   const Structure structure =
       build_structure(spec, [&](std::string_view what) { progress.say(what); });
   progress.say("stiffness of " + std::to_string(structure.mesh.nodes_m.size()) +
-               " nodes, assembled and factorised");
+               " nodes, assembled and made ready to solve");
   const Statics statics(structure.mesh, structure.material_of_part, structure.reduction,
-                        structure.springs);
+                        structure.springs, options.solver);
   progress.say(std::to_string(structure.rows.size()) + " rows, one solve each");
   const ThermalModel model = block_model(spec, structure, statics.sensitivities(structure.rows));
   if (!options.vtu.empty() || !options.picture.empty()) {
@@ -122,6 +124,14 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option(
       "--plant", options->plant,
       "the machine's body for thermocomp-sim: a reduced model of heat and displacement");
+  const std::map<std::string, Backend> backends{{"cholmod", Backend::cholmod},
+                                                {"petsc", Backend::petsc}};
+  sub->add_option("--solver", options->solver.backend,
+                  "cholmod (default): one factorisation; petsc: for meshes past this memory")
+      ->transform(CLI::CheckedTransformer(backends));
+  sub->add_option("--ranks", options->solver.ranks, "MPI ranks of petsc")
+      ->check(CLI::Range(1, 256))
+      ->default_str("2");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

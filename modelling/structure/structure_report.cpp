@@ -61,11 +61,9 @@ std::string conditioning(const Rows& rows) {
 
 std::string structure_report(const Structure& structure, const Statics& statics,
                              const ThermalModel& model) {
-  std::string text = line("%zu nodes, %zu elements, %u unknowns; factor %.0f MB\n",
-                          structure.mesh.nodes_m.size(), structure.mesh.elements.size(),
-                          structure.reduction.free_size(), statics.factor().factor_MB());
-  text.append(line("reciprocal condition of the stiffness (estimate): %.2g\n",
-                   statics.factor().reciprocal_condition()));
+  std::string text = line("%zu nodes, %zu elements, %u unknowns; ", structure.mesh.nodes_m.size(),
+                          structure.mesh.elements.size(), structure.reduction.free_size());
+  text += statics.solver().report();
   std::vector<std::size_t> nodes(structure.block_names.size(), 0);
   for (const Index block : structure.block_of_node) ++nodes[block];
   for (std::size_t i = 0; i < nodes.size(); ++i) {
