@@ -82,6 +82,17 @@ std::string axis_marks(const json& axis) {
   return marks.empty() ? "" : "  [" + joined(marks) + "]";
 }
 
+/// "gains 1.08, 0.94; spread of the estimate 1.2 um; a probing is worth it"
+std::string correction_text(const json& correction) {
+  std::string text("gains");
+  for (const json& gain : list_of(correction, "gains"))
+    text.append(text == "gains" ? " " : ", ").append(fixed(number_of(gain, "gain"), 3));
+  text.append("; spread of the estimate ").append(fixed(number_of(correction, "sd_um"), 1));
+  text.append(" um");
+  if (flag_of(correction, "probing_wanted")) text.append("; a probing is worth it");
+  return text;
+}
+
 std::string axes_lines(const json& status) {
   std::string result;
   for (const json& axis : list_of(status, "axes")) {
@@ -93,6 +104,7 @@ std::string axes_lines(const json& status) {
       values += ", measured " + with_unit(number_of(axis, "measured"), 2, unit);
     }
     result += line("Axis " + text_of(axis, "name"), values + axis_marks(axis));
+    if (axis.contains("correction")) result += line("", correction_text(axis["correction"]));
   }
   return result;
 }

@@ -6,6 +6,7 @@
 #include "config/model_file.hpp"
 #include "config/sections/buses.hpp"
 #include "config/sections/controller_section.hpp"
+#include "config/sections/correction_section.hpp"
 #include "config/sections/estimator_sections.hpp"
 #include "config/sections/model_binding.hpp"
 #include "config/toml_reader.hpp"
@@ -123,6 +124,7 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.compensation =
       sections::read_compensation(compensation, config.estimator.signals);
   check_controller_period(compensation, config, controller.period_s);
+  config.estimator.correction = sections::read_correction(root.table_or_empty("correction"));
   return tables;
 }
 
@@ -150,7 +152,11 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, FindMod
     config.model = std::move(reading.model);
     config.model_text = *source.text;
     config.model_checksum = sha256_hex(*source.text);
-    if (reading.names_known) sections::check_binding(tables, config.estimator, config.model);
+    if (reading.names_known) {
+      sections::check_binding(tables, config.estimator, config.model);
+      sections::check_correction(root.table_or_empty("correction"), config.estimator.correction,
+                                 config.model);
+    }
   }
   std::vector<Problem> problems = document.all_problems();
   problems.insert(problems.end(), model_problems.begin(), model_problems.end());

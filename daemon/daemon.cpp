@@ -289,6 +289,14 @@ void Daemon::Parts::look_at_health() {
   service.status(status_line(view()));
 }
 
+static void add_axis_state(const std::string& name, const AxisReport& axis,
+                           PersistentState& state) {
+  state.offset_um[name] = axis.offset_um;
+  if (std::isfinite(axis.held_um)) state.held_um[name] = axis.held_um;
+  for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
+    state.correction[std::string(name).append(".").append(key)] = value;
+}
+
 PersistentState Daemon::Parts::persistent_state() {
   const Report& report = cycle->report();
   PersistentState state;
@@ -306,7 +314,7 @@ PersistentState Daemon::Parts::persistent_state() {
     if (std::isfinite(report.signals[i].reference))
       state.reference_signals[signal_columns[i]] = report.signals[i].reference;
   for (std::size_t i = 0; i < report.axes.size(); ++i)
-    state.offset_um[config.estimator.axes[i].name] = report.axes[i].offset_um;
+    add_axis_state(config.estimator.axes[i].name, report.axes[i], state);
   return state;
 }
 
@@ -314,7 +322,8 @@ void Daemon::Parts::save_state(bool now) {
   PersistentState state = persistent_state();
   const bool switched = state.enabled != saved.enabled ||
                         state.reference_degC != saved.reference_degC ||
-                        state.reference_signals != saved.reference_signals;
+                        state.reference_signals != saved.reference_signals ||
+                        state.held_um != saved.held_um || state.correction != saved.correction;
   if (!switched && !(now && state.offset_um != saved.offset_um)) return;
   next_offsets_saved = Clock::now() + offsets_saved_every;
   const std::string error = save_state_file(config.state_file, state);

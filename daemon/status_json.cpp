@@ -34,6 +34,23 @@ json reasons(const Report& report) {
   return names;
 }
 
+json correction(const StatusView& view, const CorrectionReport& report) {
+  const CorrectionConfig& config = view.config.estimator.correction;
+  json gains = json::array();
+  for (std::size_t g = 0; g < config.groups.size(); ++g)
+    gains.push_back({{"inputs", config.groups[g]},
+                     {"gain", number(report.gain[g])},
+                     {"sd", number(report.gain_sd[g])}});
+  return {{"form", config.form == CorrectionForm::two_phase ? "two_phase" : "recursive"},
+          {"gains", gains},
+          {"bias_um", number(report.bias_um)},
+          {"sd_um", number(report.sd_um)},
+          {"probing_wanted", report.probing_wanted},
+          {"phase", report.phase},
+          {"taken", report.taken},
+          {"refused", report.refused}};
+}
+
 json axes(const StatusView& view) {
   json list = json::array();
   for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
@@ -53,6 +70,9 @@ json axes(const StatusView& view) {
                     {"proving", axis.proving},
                     {"offset_sd", number(axis.offset_sd_um)},
                     {"offset_sd_max", view.config.estimator.compensation.offset_sd_um_max}});
+    if (std::isfinite(axis.held_um)) list.back()["held"] = axis.held_um;
+    if (view.config.estimator.correction.form != CorrectionForm::off)
+      list.back()["correction"] = correction(view, axis.correction);
   }
   return list;
 }

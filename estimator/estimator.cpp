@@ -6,6 +6,7 @@
 #include "estimator/axis_channel.hpp"
 #include "estimator/block_bank.hpp"
 #include "estimator/checks.hpp"
+#include "estimator/cycle_hold.hpp"
 #include "estimator/displacement_model.hpp"
 #include "estimator/input_gains.hpp"
 #include "estimator/lost_blocks.hpp"
@@ -13,22 +14,6 @@
 
 namespace thermocomp {
 namespace {
-
-std::vector<int> plan_names(const std::vector<std::string>& ours,
-                            const std::vector<std::string>& theirs) {
-  std::vector<int> plan;
-  for (const std::string& name : ours) {
-    const auto found = std::find(theirs.begin(), theirs.end(), name);
-    plan.push_back(found == theirs.end() ? -1 : static_cast<int>(found - theirs.begin()));
-  }
-  return plan;
-}
-
-void take_by_plan(const std::vector<int>& plan, const std::vector<double>& from,
-                  std::vector<double>& to) noexcept {
-  for (std::size_t i = 0; i < plan.size(); ++i)
-    if (plan[i] >= 0) to[i] = from[static_cast<std::size_t>(plan[i])];
-}
 
 constexpr int no_signal = -1;
 
@@ -69,6 +54,14 @@ struct Estimator::Parts {
   void decide_mode(nanoseconds now, bool data_good) noexcept;
   void step_axes(nanoseconds now, const ControllerState& controller) noexcept;
   [[nodiscard]] double target_um(std::size_t axis) const noexcept;
+  void note_measured(std::size_t axis, double value_um) noexcept;
+  void correct(nanoseconds now) noexcept;
+  [[nodiscard]] double model_change_um(std::size_t axis) const noexcept {
+    return model_um[axis_output[axis]] - zero_um[axis_output[axis]];
+  }
+  [[nodiscard]] double predicted_um(std::size_t axis) const noexcept {
+    return model_change_um(axis) + corrections[axis].correction_um();
+  }
   [[nodiscard]] double signal(int index) const noexcept {
     return index == no_signal ? not_a_number : all_signals[static_cast<std::size_t>(index)];
   }
@@ -85,10 +78,14 @@ struct Estimator::Parts {
   DisplacementModel displacement;
   DisplacementModel at_reference;  ///< the same model, only ever asked for the zero
   std::vector<AxisChannel> axes;
+  std::vector<RunningCorrection> corrections;  ///< one an axis
+  std::vector<CycleHold> holds;                ///< one an axis
+  CycleEnds cycle_ends;
   std::vector<std::size_t> axis_output;    ///< axis -> output
   std::vector<std::size_t> model_signals;  ///< model's signal -> configured signal
   int cutting_signal{no_signal};
   int disable_signal{no_signal};
+  int cycle_end_signal{no_signal};
   nanoseconds controller_stale_after;
   nanoseconds hold;
 
@@ -116,7 +113,6 @@ struct Estimator::Parts {
   Mode mode{Mode::starting};
   nanoseconds mode_since{};
   std::uint32_t reasons{0};
-  std::uint64_t cycle_ends{0};
 
   std::vector<double> rise_K;         ///< scratch, one a column
   std::vector<double> gain_um_per_K;  ///< scratch, one a column
@@ -138,6 +134,8 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
       gains(model),
       displacement(model),
       at_reference(model),
+      cycle_ends(config.compensation.cycles_per_update,
+                 config.compensation.cycle_end_signal.ends_with("_on")),
       controller_stale_after(std::chrono::duration_cast<nanoseconds>(
           seconds_d(config.compensation.controller_stale_after_s))),
       hold(std::chrono::duration_cast<nanoseconds>(seconds_d(config.compensation.hold_s))),
@@ -152,6 +150,8 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
     axes.emplace_back(axis, config.compensation, config.controller_reads_back);
     axis_output.push_back(
         index_of(model.outputs, axis.output, "axis.output", "is not an output of the model"));
+    corrections.emplace_back(config.correction, model, axis_output.back());
+    holds.emplace_back(config.compensation.cycle_ahead);
   }
   for (const std::string& name : model.signal_columns())
     model_signals.push_back(
@@ -163,6 +163,7 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
   };
   cutting_signal = optional_signal(config.compensation.cutting_signal, "cutting_signal");
   disable_signal = optional_signal(config.compensation.disable_signal, "disable_signal");
+  cycle_end_signal = optional_signal(config.compensation.cycle_end_signal, "cycle_end_signal");
   reference_degC.assign(columns.size(), not_a_number);
   std::copy(model.reference_degC.begin(), model.reference_degC.end(), reference_degC.begin());
   signal_values.assign(model_signals.size(), not_a_number);
@@ -286,6 +287,16 @@ void Estimator::Parts::predict(nanoseconds at) noexcept {
     zero_known = true;
   }
   displacement.step(at, lost.temps_degC(), reference_degC, signal_values, model_um);
+  correct(at);
+}
+
+void Estimator::Parts::correct(nanoseconds at) noexcept {
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    rise_K[i] = lost.temps_degC()[i] - reference_degC[i];
+  // What a probing taught waits for the end of the cut; unknown is taken for cutting.
+  const bool may_change =
+      cutting_signal == no_signal || (controller_online && signal(cutting_signal) < 0.5);
+  for (RunningCorrection& correction : corrections) correction.step(at, rise_K, may_change);
 }
 
 void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
@@ -319,11 +330,14 @@ void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
 double Estimator::Parts::target_um(std::size_t axis) const noexcept {
   if (mode == Mode::disabled || mode == Mode::ramping_to_zero) return 0.0;
   if (mode != Mode::compensating) return not_a_number;
-  const std::size_t output = axis_output[axis];
-  return -config.axes[axis].sign * (model_um[output] - zero_um[output]);
+  const bool by_cycles = config.compensation.update == UpdateRule::each_cycle;
+  return -config.axes[axis].sign * (by_cycles ? holds[axis].held_um() : predicted_um(axis));
 }
 
 void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controller) noexcept {
+  if (controller_online) cycle_ends.signal(signal(cycle_end_signal));
+  if (cycle_ends.take(predicted && mode == Mode::compensating))
+    for (std::size_t i = 0; i < axes.size(); ++i) holds[i].cycle_end(predicted_um(i));
   AxisInput input;
   input.now = at;
   input.dt_s = dt_s;
@@ -368,10 +382,10 @@ void Estimator::apply(const Command& command) noexcept {
       parts.take_new_reference();
       break;
     case CommandKind::measured:
-      if (command.axis < parts.axes.size()) parts.measured_um[command.axis] = command.value_um;
+      if (command.axis < parts.axes.size()) parts.note_measured(command.axis, command.value_um);
       break;
     case CommandKind::cycle_end:
-      ++parts.cycle_ends;
+      parts.cycle_ends.command();
       break;
     case CommandKind::prove:
       if (command.axis < parts.axes.size()) parts.axes[command.axis].prove(command.value_um);
@@ -383,6 +397,18 @@ void Estimator::apply(const Command& command) noexcept {
   }
 }
 
+void Estimator::Parts::note_measured(std::size_t axis, double value_um) noexcept {
+  measured_um[axis] = value_um;
+  if (!predicted) return;  // nothing to compare it with
+  double total_um = value_um;
+  if (config.correction.measured == MeasuredMeaning::remaining) {
+    const double applied_um = axes[axis].applied_um();
+    total_um -=
+        config.axes[axis].sign * (std::isfinite(applied_um) ? applied_um : axes[axis].offset_um());
+  }
+  corrections[axis].measured(total_um, model_change_um(axis));
+}
+
 void Estimator::Parts::take_new_reference() noexcept {
   // All or nothing: a reference of two moments would be no state the machine was ever in.
   for (std::size_t i = 0; i < columns.size(); ++i)
@@ -390,6 +416,8 @@ void Estimator::Parts::take_new_reference() noexcept {
   for (std::size_t i = 0; i < columns.size(); ++i) reference_degC[i] = blocks.temps_degC()[i];
   std::fill(reference_signals.begin(), reference_signals.end(), not_a_number);
   displacement.restart();
+  for (RunningCorrection& correction : corrections) correction.restart();
+  for (CycleHold& hold_of_axis : holds) hold_of_axis.restart();
 }
 
 Report Estimator::make_report() const {
@@ -411,7 +439,7 @@ void Estimator::report(Report& out) const noexcept {
   out.mode_since = parts.mode_since;
   out.reasons = parts.reasons;
   out.enabled = parts.enabled;
-  out.cycle_ends = parts.cycle_ends;
+  out.cycle_ends = parts.cycle_ends.count();
   parts.blocks.report(out.sensors);
   for (std::size_t i = 0; i < parts.columns.size(); ++i)
     out.inputs[i] = {parts.lost.temps_degC()[i], parts.reference_degC[i], parts.blocks.good(i),
@@ -423,7 +451,9 @@ void Estimator::report(Report& out) const noexcept {
   for (std::size_t i = 0; i < parts.axes.size(); ++i) {
     const AxisChannel& axis = parts.axes[i];
     AxisReport& line = out.axes[i];
-    line.displacement_um = out.displacement_um[parts.axis_output[i]];
+    line.displacement_um = parts.predicted_um(i);
+    line.held_um = parts.holds[i].held_um();
+    line.correction = parts.corrections[i].report();
     line.target_um = axis.target_um();
     line.offset_um = axis.offset_um();
     line.applied_um = axis.applied_um();
@@ -440,6 +470,8 @@ void Estimator::report(Report& out) const noexcept {
 void Estimator::Parts::visit_state(StateArchive& archive) {
   archive(blocks, lost, displacement);
   for (AxisChannel& axis : axes) archive(axis);
+  for (RunningCorrection& correction : corrections) archive(correction);
+  for (CycleHold& hold_of_axis : holds) archive(hold_of_axis);
   archive(cycle, stepped, now, dt_s, all_signals, controller_online, reference_degC, signal_values,
           reference_signals, zero_known, model_um, zero_um, measured_um, offset_sd_um, uncertain,
           predicted, ever_good, lost_since, enabled, stopping, mode, mode_since, reasons,
@@ -497,6 +529,10 @@ void Estimator::restore(const PersistentState& state) {
     double offset_um = 0.0;
     take(state.offset_um, parts.config.axes[i].name, offset_um);
     parts.axes[i].restore(offset_um);
+    double held_um = not_a_number;
+    take(state.held_um, parts.config.axes[i].name, held_um);
+    parts.holds[i].restore(held_um);
+    parts.corrections[i].restore(state.correction, parts.config.axes[i].name);
   }
 }
 
@@ -536,6 +572,8 @@ void Estimator::adopt(const Estimator& previous) noexcept {
     const auto from = static_cast<std::size_t>(parts.axis_plan[i]);
     parts.axes[i].adopt(other.axes[from]);
     parts.measured_um[i] = other.measured_um[from];
+    parts.corrections[i].adopt(other.corrections[from]);
+    parts.holds[i].adopt(other.holds[from]);
   }
   parts.cycle = other.cycle;
   parts.stepped = other.stepped;
@@ -548,7 +586,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.mode = other.mode;
   parts.mode_since = other.mode_since;
   parts.uncertain = other.uncertain;
-  parts.cycle_ends = other.cycle_ends;
+  parts.cycle_ends.adopt(other.cycle_ends);
 }
 
 const EstimatorConfig& Estimator::config() const noexcept {

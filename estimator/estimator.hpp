@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "estimator/estimator_config.hpp"
+#include "estimator/running_correction.hpp"
 #include "estimator/thermal_model.hpp"
 #include "estimator/types.hpp"
 
@@ -74,11 +75,12 @@ struct SignalReport {  ///< an operating signal or position of the model
 };
 
 struct AxisReport {
-  double displacement_um{not_a_number};  ///< of the model's output, positive as ARCHITECTURE says
-  double target_um{0.0};                 ///< where the offset is heading
-  double offset_um{0.0};                 ///< sent
-  double applied_um{not_a_number};       ///< read back
-  double measured_um{not_a_number};      ///< last `measured` of the operator
+  /// Of the model's output with the running correction, positive as ARCHITECTURE says.
+  double displacement_um{not_a_number};
+  double target_um{0.0};             ///< where the offset is heading
+  double offset_um{0.0};             ///< sent
+  double applied_um{not_a_number};   ///< read back
+  double measured_um{not_a_number};  ///< last `measured` of the operator
   bool synced{false};
   bool driven{false};  ///< offset marked valid
   bool mismatch{false};
@@ -86,6 +88,8 @@ struct AxisReport {
   bool proving{false};
   /// Standard deviation that estimated blocks give the offset; 0 where all are measured.
   double offset_sd_um{0.0};
+  double held_um{not_a_number};  ///< update = each_cycle: displacement of the last cycle end
+  CorrectionReport correction;
 };
 
 /// All that an operator or the history may want to know after a step. Made once by
@@ -115,6 +119,9 @@ struct PersistentState {
   std::map<std::string, double> reference_signals;  ///< operating signals then, by column
   std::map<std::string, double> offset_um;          ///< by axis, last sent
   std::map<std::string, double> temp_degC;          ///< in use then, by temperature column
+  std::map<std::string, double> held_um;            ///< AxisReport::held_um, by axis
+  /// RunningCorrection::persistent(), "z.gain1" and so on.
+  std::map<std::string, double> correction;
 };
 
 /// Pure: no clock, no I/O, no thread; no allocation after construction except where said.

@@ -36,6 +36,9 @@ void LimiterConfig::validate() const {
 }
 
 void CompensationConfig::validate() const {
+  require(cycles_per_update >= 1 && cycles_per_update <= 1'000'000, "cycles_per_update",
+          static_cast<double>(cycles_per_update), "must be in [1, 1000000]");
+  require(cycle_ahead >= 0 && cycle_ahead <= 1, "cycle_ahead", cycle_ahead, "must be in [0, 1]");
   require(hold_s >= 0 && hold_s <= 1e6, "hold_s", hold_s, "must be in [0, 1e6]");
   require(stop_ramp_s_max > 0 && stop_ramp_s_max <= 3600, "stop_ramp_s_max", stop_ramp_s_max,
           "must be in (0, 3600]");

@@ -3,10 +3,12 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "estimator/correction_config.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
@@ -72,7 +74,16 @@ struct AxisConfig {
 enum class LossPolicy { hold, ramp_to_zero };
 enum class StopPolicy { hold, ramp_to_zero };
 
+enum class UpdateRule {
+  continuous,  ///< the offset follows the model
+  each_cycle   ///< the offset changes at the end of a machining cycle
+};
+
 struct CompensationConfig {
+  UpdateRule update{UpdateRule::continuous};
+  std::string cycle_end_signal;        ///< "cycle_end_on", "cycles"; empty: by command only
+  std::uint64_t cycles_per_update{1};  ///< each_cycle: at each so-many-th cycle end
+  double cycle_ahead{0.0};             ///< each_cycle: share of the last change added beyond
   LossPolicy on_loss{LossPolicy::hold};
   double hold_s{600.0};                  ///< ramp_to_zero: hold this long first
   StopPolicy on_stop{StopPolicy::hold};  ///< where the daemon leaves the offsets when it is stopped
@@ -99,6 +110,7 @@ struct EstimatorConfig {
   std::vector<AxisConfig> axes;
   bool controller_reads_back{true};  ///< applied_um is reported
   CompensationConfig compensation;
+  CorrectionConfig correction;
 };
 
 }  // namespace thermocomp

@@ -20,4 +20,22 @@ namespace thermocomp {
   return static_cast<std::size_t>(found - names.begin());
 }
 
+/// Where each of our names stands among theirs; -1: nowhere.
+[[nodiscard]] inline std::vector<int> plan_names(const std::vector<std::string>& ours,
+                                                 const std::vector<std::string>& theirs) {
+  std::vector<int> plan;
+  for (const std::string& name : ours) {
+    const auto found = std::find(theirs.begin(), theirs.end(), name);
+    plan.push_back(found == theirs.end() ? -1 : static_cast<int>(found - theirs.begin()));
+  }
+  return plan;
+}
+
+/// What stands at the same name takes the place of ours.
+inline void take_by_plan(const std::vector<int>& plan, const std::vector<double>& from,
+                         std::vector<double>& to) noexcept {
+  for (std::size_t i = 0; i < plan.size(); ++i)
+    if (plan[i] >= 0) to[i] = from[static_cast<std::size_t>(plan[i])];
+}
+
 }  // namespace thermocomp

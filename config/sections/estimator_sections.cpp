@@ -169,7 +169,8 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
 
 CompensationConfig read_compensation(const TomlTable& table,
                                      const std::vector<std::string>& signals) {
-  constexpr std::array<NumberField<CompensationConfig>, 8> fields{{
+  constexpr std::array<NumberField<CompensationConfig>, 9> fields{{
+      {"cycle_ahead", &CompensationConfig::cycle_ahead},
       {"hold_s", &CompensationConfig::hold_s},
       {"stop_ramp_s_max", &CompensationConfig::stop_ramp_s_max},
       {"controller_stale_after_s", &CompensationConfig::controller_stale_after_s},
@@ -189,6 +190,11 @@ CompensationConfig read_compensation(const TomlTable& table,
   config.enabled_at_first_start =
       table.flag("enabled_at_first_start", config.enabled_at_first_start);
   config.estimate_lost_blocks = table.flag("estimate_lost_blocks", config.estimate_lost_blocks);
+  config.update = table.choice<UpdateRule>(
+      "update", {{"continuous", UpdateRule::continuous}, {"each_cycle", UpdateRule::each_cycle}},
+      config.update);
+  config.cycles_per_update =
+      table.integer<std::uint64_t>("cycles_per_update", 1, 1'000'000, config.cycles_per_update);
   config.hold_while_cutting = table.flag("hold_while_cutting", config.hold_while_cutting);
   read_fields(table, fields, CompensationConfig{}, config);
   const auto read_signal = [&](std::string_view key) {
@@ -200,6 +206,10 @@ CompensationConfig read_compensation(const TomlTable& table,
   };
   config.cutting_signal = read_signal("cutting_signal");
   config.disable_signal = read_signal("disable_signal");
+  config.cycle_end_signal = read_signal("cycle_end_signal");
+  if (config.update == UpdateRule::continuous)
+    refuse_all(table, {"cycles_per_update", "cycle_ahead"},
+               "makes no sense with update = \"continuous\"");
   if (config.hold_while_cutting && !table.has("cutting_signal")) {
     table.problem("hold_while_cutting", "needs a cutting_signal");
   }

@@ -172,6 +172,48 @@ TEST_CASE("everything behind \"default\" may be left out and is then the same", 
   CHECK(a.estimator.compensation.hold_s == b.estimator.compensation.hold_s);
   CHECK(a.estimator.sensors[0].screening.stale_after_s ==
         b.estimator.sensors[0].screening.stale_after_s);
+  CHECK(a.estimator.correction == b.estimator.correction);
+  CHECK(a.estimator.correction.form == CorrectionForm::off);
+}
+
+TEST_CASE("a correction's groups are inputs of the model, each named once", "[config]") {
+  const auto with = [](const std::string& correction) {
+    std::string text = example("small_machine.toml");
+    text.erase(text.find("[correction]"),
+               text.find("# ----", text.find("[correction]")) - text.find("[correction]"));
+    return text.append("\n[correction]\n").append(correction);
+  };
+  const std::string input = load_daemon_config(examples / "small_machine.toml").model.inputs[0];
+  const std::string group = "[[correction.group]]\ninputs = [\"" + input + "\"]\n";
+  const DaemonConfig config = parse(with("form = \"recursive\"\n" + group));
+  CHECK(config.estimator.correction.form == CorrectionForm::recursive);
+  CHECK(config.estimator.correction.groups == std::vector<std::vector<std::string>>{{input}});
+  const std::vector<std::pair<std::string, const char*>> bad = {
+      {"form = \"recursive\"\n", "must be 1 to 4"},
+      {"form = \"two_phase\"\n" + group, "must be two"},
+      {"form = \"recursive\"\n" + group + group, "is named already"},
+      {"form = \"recursive\"\n[[correction.group]]\ninputs = [\"t99_degC\"]\n",
+       "must be an input of the model"},
+      {"gain_min = 2.0\n", "must be in [0, 1]"},
+      {"gain = 2.0\n", "gain"},
+  };
+  for (const auto& [text, rule] : bad) {
+    INFO(text);
+    CHECK_THROWS_WITH(parse(with(text)), Catch::Contains(rule));
+  }
+}
+
+TEST_CASE("keys of cycles make no sense where the offset follows the model", "[config]") {
+  CHECK_THROWS_WITH(
+      edited_machine("update = \"continuous\"", "update = \"continuous\"\ncycles_per_update = 2"),
+      Catch::Contains("makes no sense"));
+  const DaemonConfig config =
+      edited_machine("update = \"continuous\"",
+                     "update = \"each_cycle\"\ncycles_per_update = 2\ncycle_ahead = 1.0");
+  CHECK(config.estimator.compensation.update == UpdateRule::each_cycle);
+  CHECK(config.estimator.compensation.cycles_per_update == 2);
+  CHECK_THROWS_WITH(edited_machine("update = \"continuous\"", "cycle_end_signal = \"nothing_on\""),
+                    Catch::Contains("must be a signal of the controller"));
 }
 
 TEST_CASE("the texts of a history give the same configuration as the files", "[config]") {

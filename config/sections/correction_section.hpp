@@ -1,0 +1,16 @@
+/// [correction]: how measured displacements correct the model while it runs.
+#pragma once
+
+#include "config/toml_reader.hpp"
+#include "estimator/correction_config.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp::sections {
+
+[[nodiscard]] CorrectionConfig read_correction(const TomlTable& table);
+
+/// Every input of a group is one of the model, and of no other group.
+void check_correction(const TomlTable& table, const CorrectionConfig& config,
+                      const ThermalModel& model);
+
+}  // namespace thermocomp::sections

@@ -1,0 +1,39 @@
+/// How measured displacements correct the model while it runs.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace thermocomp {
+
+inline constexpr std::size_t correction_groups_max = 4;
+
+enum class CorrectionForm { off, two_phase, recursive };
+/// What an operator's or a probe's `measured` is: what remains at the tool with the offset in
+/// effect, or the displacement as it would be without any.
+enum class MeasuredMeaning { remaining, total };
+
+struct CorrectionConfig {
+  CorrectionForm form{CorrectionForm::off};
+  /// Inputs that share a gain. two_phase: two groups, the heat source's and the tie's.
+  std::vector<std::vector<std::string>> groups;
+  MeasuredMeaning measured{MeasuredMeaning::remaining};
+  bool as_printed{
+      false};  ///< two_phase: R_1 = measured / predicted, right only while the tie is cold
+  double noise_um{1.0};  ///< standard deviation of a probing
+  double turn_um{3.0};   ///< two_phase: phase 2 begins when the displacement came back so far
+  double contribution_um_min{3.0};  ///< a smaller one cannot tell its gain
+  double gain_min{0.3};
+  double gain_max{3.0};
+  double step_um_max{10.0};  ///< one probing moves the estimate by no more
+  double gain_sd{0.3};       ///< recursive: what a gain may be off by before any probing
+  double gain_drift_per_sqrt_h{0.1};
+  double bias_drift_um_per_sqrt_h{0.0};  ///< 0: no bias is learned
+  double outlier_sigma{4.0};
+  double probe_sd_um{3.0};  ///< beyond, a new probing is worth it
+  void validate() const;    ///< @throws InvalidValue
+  bool operator==(const CorrectionConfig&) const = default;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,117 @@
+"""Displacements measured at the tool correct the running daemon's model; machining cycles set when
+the offset may change."""
+
+import json
+import time
+
+import pytest
+
+from lab import assert_replays_exactly, eventually, run_tool
+from plain_devices import Machine, assert_slewed
+
+STEP_UM = 2.5
+CORRECTION = f"""
+[correction]
+form = "recursive"
+gain_sd = 1.0
+step_um_max = {STEP_UM}
+[[correction.group]]
+inputs = ["column_degC"]
+[[correction.group]]
+inputs = ["spindle_degC"]
+"""
+CYCLE_SIGNAL = """[[controller.signal]]
+name = "cycle_end_on"
+table = "discrete_input"
+address = 1
+"""
+
+
+def with_config(machine, edit):
+    machine.daemon.write_config(edit(machine.config))
+    return machine
+
+
+@pytest.fixture
+def machine(lab):
+    return Machine(lab)
+
+
+def gain(daemon):
+    return daemon.axis()["correction"]["gains"][0]["gain"]
+
+
+def test_a_probing_moves_the_estimate_by_a_bounded_step_and_is_replayed(machine, lab):
+    with_config(machine, lambda text: text.replace("[history]", CORRECTION + "[history]"))
+    daemon = machine.start()
+    machine.warm_by(12.0)  # the model says -12 um
+    daemon.wait_for_offset(12.0, 0.05)
+    before = daemon.axis()["displacement"]
+    assert gain(daemon) == 1.0 and daemon.axis()["correction"]["probing_wanted"]
+    # 12.3 um are left: far more than one probing may say.
+    status, out, said = daemon.cli("measured", "z", "12.3")
+    assert status == 0, said
+    after = eventually(lambda: daemon.axis()["displacement"] != before and
+                       daemon.axis()["displacement"], "the estimate changes")
+    assert 0.1 < abs(after - before) <= STEP_UM + 0.02, (before, after)
+    daemon.wait_for_offset(-after, 0.05)
+    taught = gain(daemon)
+    assert taught != 1.0
+    assert json.loads(daemon.state.read_text())["correction"]["z.gain1"] == pytest.approx(taught)
+    assert_slewed(machine.controller.orders())
+
+    daemon.end()
+    daemon.start().wait_for_mode("compensating")
+    assert gain(daemon) == pytest.approx(taught)
+    daemon.wait_for_offset(-after, 0.05)
+    daemon.end()
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+    exported = lab.folder / "run.csv"
+    status, _, said = run_tool("export", daemon.history, "-o", exported)
+    assert status == 0, said
+    header, *rows = [line for line in exported.read_text().splitlines()
+                     if not line.startswith("#")]
+    column = header.split(",").index("z_measured_um")
+    assert any(row.split(",")[column] not in ("", "nan") for row in rows)
+
+
+def test_without_a_correction_a_probing_is_only_noted(machine):
+    daemon = machine.start()
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    assert daemon.cli("measured", "z", "3.0")[0] == 0
+    time.sleep(0.5)
+    assert abs(daemon.axis()["offset"] - 6.0) < 0.05 and daemon.axis()["measured"] == 3.0
+    assert "correction" not in daemon.axis()
+
+
+def test_by_cycles_the_offset_changes_at_their_ends_only(machine, lab):
+    def by_cycles(text):
+        text = text.replace("[[axis]]", CYCLE_SIGNAL + "[[axis]]")
+        return text.replace("[compensation]", '[compensation]\nupdate = "each_cycle"\n'
+                            'cycle_end_signal = "cycle_end_on"')
+
+    daemon = with_config(machine, by_cycles).start()
+    machine.warm_by(9.0)
+    eventually(lambda: abs(daemon.axis()["displacement"] + 9.0) < 0.05, "the model sees it")
+    time.sleep(0.5)
+    assert daemon.axis()["offset"] == 0.0
+    assert daemon.cli("cycle-end")[0] == 0
+    daemon.wait_for_offset(9.0, 0.05)
+    machine.warm_by(15.0)
+    eventually(lambda: abs(daemon.axis()["displacement"] + 15.0) < 0.05, "the model sees it")
+    time.sleep(0.5)
+    assert abs(daemon.axis()["offset"] - 9.0) < 0.05
+    with machine.controller.lock:
+        machine.controller.tables[2][1] = 1  # the coil rises
+    daemon.wait_for_offset(15.0, 0.05)
+    assert daemon.status()["cycle_ends"] == 2
+
+    # The held value outlives a restart: nothing moves before the next cycle end.
+    machine.warm_by(3.0)
+    daemon.end()
+    daemon.start().wait_for_mode("compensating")
+    time.sleep(0.5)
+    assert abs(daemon.axis()["offset"] - 15.0) < 0.05
+    daemon.end()
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")

@@ -1,0 +1,313 @@
+#include "estimator/running_correction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <catch2/catch.hpp>
+
+#include "estimator/checks.hpp"
+#include "estimator/cycle_hold.hpp"
+#include "small_machine.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+CorrectionConfig config_of(CorrectionForm form) {
+  CorrectionConfig config;
+  config.form = form;
+  config.groups = {{"t1_degC"}, {"t2_degC"}};
+  config.step_um_max = 50.0;
+  return config;
+}
+
+ThermalModel tie_model() {
+  ThermalModel model = small_model();
+  model.matrix_um_per_K = {{4.0, -2.0}};  // Ki, -Kc
+  return model;
+}
+
+double model_um(double t1_K, double t2_K) {
+  return 4.0 * t1_K - 2.0 * t2_K;
+}
+
+/// One probing of a machine whose true gains are `g`.
+void probe(RunningCorrection& correction, nanoseconds now, double t1_K, double t2_K,
+           const std::array<double, 2>& g, double noise_um = 0.0) {
+  const std::vector<double> rise{t1_K, t2_K};
+  correction.step(now, rise, true);
+  correction.measured(g[0] * 4.0 * t1_K - g[1] * 2.0 * t2_K + noise_um, model_um(t1_K, t2_K));
+  correction.step(now, rise, true);
+}
+
+}  // namespace
+
+TEST_CASE("in phase 1 the consistent gain makes the estimate what was measured", "[correction]") {
+  RunningCorrection correction(config_of(CorrectionForm::two_phase), tie_model(), 0);
+  probe(correction, 60s, 5.0, 1.0, {1.2, 1.0});
+  CHECK(correction.report().gain[0] == Approx(1.2));
+  CHECK(correction.report().gain[1] == 1.0);
+  CHECK(model_um(5.0, 1.0) + correction.correction_um() == Approx(1.2 * 20.0 - 2.0));
+}
+
+TEST_CASE("the printed form agrees with it only while the tie is cold", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::two_phase);
+  config.as_printed = true;
+  RunningCorrection cold(config, tie_model(), 0);
+  probe(cold, 60s, 5.0, 0.0, {1.2, 1.0});
+  CHECK(cold.report().gain[0] == Approx(1.2));
+  RunningCorrection warm(config, tie_model(), 0);
+  probe(warm, 60s, 5.0, 1.0, {1.2, 1.0});
+  CHECK(warm.report().gain[0] == Approx((1.2 * 20.0 - 2.0) / 18.0));
+  CHECK(model_um(5.0, 1.0) + warm.correction_um() != Approx(1.2 * 20.0 - 2.0));
+}
+
+TEST_CASE("phase 2 begins when the displacement has turned, and then only the tie's gain moves",
+          "[correction]") {
+  RunningCorrection correction(config_of(CorrectionForm::two_phase), tie_model(), 0);
+  probe(correction, 60s, 10.0, 0.0, {1.1, 0.8});
+  CHECK(correction.report().phase == 1);
+  probe(correction, 120s, 10.0, 1.0, {1.1, 0.8});  // came back by 1.6 um: not yet beyond noise
+  CHECK(correction.report().phase == 1);
+  const double first = correction.report().gain[0];
+  probe(correction, 180s, 10.0, 6.0, {1.1, 0.8});
+  CHECK(correction.report().phase == 2);
+  CHECK(correction.report().gain[0] == first);
+  CHECK(model_um(10.0, 6.0) + correction.correction_um() == Approx(44.0 - 9.6));
+}
+
+TEST_CASE("a gain is not told from next to nothing", "[correction]") {
+  RunningCorrection correction(config_of(CorrectionForm::two_phase), tie_model(), 0);
+  probe(correction, 60s, 0.1, 0.0, {1.0, 1.0}, 2.0);
+  CHECK(correction.report().gain[0] == 1.0);
+  CHECK(correction.report().refused == 1);
+  CHECK(correction.correction_um() == 0.0);
+}
+
+TEST_CASE("the recursive form finds gains in noise and says how sure it is", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::recursive);
+  config.gain_drift_per_sqrt_h = 0.02;
+  RunningCorrection correction(config, tie_model(), 0);
+  std::mt19937_64 engine(3);
+  std::normal_distribution<double> noise(0.0, 0.5);
+  nanoseconds now{};
+  for (int i = 0; i < 60; ++i) {
+    now += 300s;
+    probe(correction, now, 8.0 + 3.0 * std::sin(0.3 * i), 6.0 + 3.0 * std::cos(0.11 * i),
+          {1.25, 0.7}, noise(engine));
+  }
+  const CorrectionReport report = correction.report();
+  CHECK(std::abs(report.gain[0] - 1.25) < 0.05);
+  CHECK(std::abs(report.gain[1] - 0.7) < 0.1);
+  CHECK(report.sd_um < 1.0);
+  CHECK(report.gain_sd[0] < 0.05);
+}
+
+TEST_CASE("a probing is wanted when the estimate has become too unsure", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::recursive);
+  RunningCorrection correction(config, tie_model(), 0);
+  const std::vector<double> cold{0.0, 0.0};
+  correction.step(60s, cold, true);
+  CHECK_FALSE(correction.report().probing_wanted);  // nothing is warm: no gain matters
+  const std::vector<double> warm{10.0, 5.0};
+  correction.step(120s, warm, true);
+  CHECK(correction.report().probing_wanted);
+  probe(correction, 120s, 10.0, 5.0, {1.0, 1.0});
+  CHECK_FALSE(correction.report().probing_wanted);
+  correction.step(120s + 3h, warm, true);
+  CHECK(correction.report().probing_wanted);
+}
+
+TEST_CASE("one wild probing is refused; a second that agrees is believed", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::recursive);
+  RunningCorrection correction(config, tie_model(), 0);
+  nanoseconds now{};
+  for (int i = 0; i < 5; ++i) probe(correction, now += 60s, 5.0, 2.0, {1.0, 1.0});
+  const double before = correction.correction_um();
+  probe(correction, now += 60s, 5.0, 2.0, {1.0, 1.0}, 30.0);
+  CHECK(correction.correction_um() == before);
+  CHECK(correction.report().refused == 1);
+  probe(correction, now += 60s, 5.0, 2.0, {1.0, 1.0}, 30.0);
+  CHECK(correction.correction_um() > before + 1.0);
+}
+
+TEST_CASE("no probing moves the estimate beyond its step nor a gain out of its range",
+          "[correction][property]") {
+  const auto form = GENERATE(CorrectionForm::two_phase, CorrectionForm::recursive);
+  const auto seed = GENERATE(range(0u, 50u));
+  CorrectionConfig config = config_of(form);
+  config.step_um_max = 2.5;
+  config.bias_drift_um_per_sqrt_h = seed % 2 == 0 ? 0.0 : 3.0;
+  RunningCorrection correction(config, tie_model(), 0);
+  std::mt19937_64 engine(seed);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  nanoseconds now{};
+  for (int i = 0; i < 200; ++i) {
+    now += std::chrono::seconds(1 + i % 900);
+    const std::vector<double> rise{20.0 * any(engine), 20.0 * any(engine)};
+    correction.step(now, rise, true);
+    const double before = correction.correction_um();
+    const double values[]{200.0 * any(engine), not_a_number, 1e300, INFINITY};
+    correction.measured(values[i % 7 == 0 ? 1 + i % 3 : 0], model_um(rise[0], rise[1]));
+    correction.step(now, rise, true);
+    CHECK(std::abs(correction.correction_um() - before) <= 2.5 + 1e-9);
+    for (std::size_t g = 0; g < 2; ++g) {
+      CHECK(correction.report().gain[g] >= config.gain_min);
+      CHECK(correction.report().gain[g] <= config.gain_max);
+    }
+  }
+}
+
+TEST_CASE("what was learned while cutting is used after the cut", "[correction]") {
+  RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
+  const std::vector<double> rise{5.0, 1.0};
+  correction.step(1s, rise, false);
+  correction.measured(30.0, 18.0);
+  correction.step(2s, rise, false);
+  CHECK(correction.correction_um() == 0.0);
+  correction.step(3s, rise, true);
+  CHECK(correction.correction_um() > 1.0);
+}
+
+TEST_CASE("gains survive a restart by name, foreign values do not come in", "[correction]") {
+  RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
+  probe(correction, 60s, 5.0, 1.0, {1.3, 1.0});
+  std::map<std::string, double> kept;
+  for (const auto& [key, value] : RunningCorrection::persistent(correction.report()))
+    kept[std::string("z.").append(key)] = value;
+  RunningCorrection next(config_of(CorrectionForm::recursive), tie_model(), 0);
+  next.restore(kept, "z");
+  CHECK(next.report().gain[0] == correction.report().gain[0]);
+  CHECK(next.report().gain_sd[0] == correction.report().gain_sd[0]);
+  RunningCorrection other(config_of(CorrectionForm::recursive), tie_model(), 0);
+  other.restore({{"z.gain1", 1e9}, {"z.gain2", not_a_number}, {"x.gain1", 2.0}}, "z");
+  CHECK(other.report().gain[0] == 1.0);
+  CHECK(other.report().gain[1] == 1.0);
+}
+
+TEST_CASE("a group that names no input of the model is refused", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::recursive);
+  config.groups[1] = {"t9_degC"};
+  CHECK_THROWS_AS(RunningCorrection(config, tie_model(), 0), InvalidValue);
+  config.groups[1] = {"t1_degC"};
+  CHECK_THROWS_AS(RunningCorrection(config, tie_model(), 0), InvalidValue);
+}
+
+TEST_CASE("a probing of what remains corrects the estimate, at the slew of the axis",
+          "[correction][estimator]") {
+  EstimatorConfig config = small_config();
+  config.correction = config_of(CorrectionForm::recursive);
+  config.correction.gain_sd = 3.0;  // so unsure that the probing is believed at once
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {22.0, 31.0});  // 11 um
+  CHECK(machine.offset_um() == Approx(-11.0));
+  machine.estimator.apply({CommandKind::measured, 0, 4.0});  // 4 um are left: it is 15 um
+  machine.step({22.0, 31.0});
+  CHECK(machine.offset_um() > -21.0 - 1e-9);
+  machine.steps(20, {22.0, 31.0});
+  CHECK(machine.offset_um() == Approx(-15.0).margin(0.3));
+  CHECK(machine.report().axes[0].correction.taken == 1);
+}
+
+TEST_CASE("the same history of probings and readings gives the same bits", "[correction][replay]") {
+  EstimatorConfig config = small_config();
+  config.correction = config_of(CorrectionForm::recursive);
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {24.0, 32.0});
+  machine.estimator.apply({CommandKind::measured, 0, 3.0});
+  machine.steps(3, {24.5, 32.0});
+  std::vector<std::byte> state(machine.estimator.state_size_bytes());
+  machine.estimator.save_state(state);
+  Machine twin(config);
+  twin.estimator.load_state(state);
+  twin.now = machine.now;
+  twin.controller = machine.controller;
+  for (int i = 0; i < 50; ++i) {
+    if (i % 10 == 3) {
+      machine.estimator.apply({CommandKind::measured, 0, 0.1 * i});
+      twin.estimator.apply({CommandKind::measured, 0, 0.1 * i});
+    }
+    machine.step({24.0 + 0.1 * i, 32.0});
+    twin.step({24.0 + 0.1 * i, 32.0});
+    CHECK(machine.offset_um() == twin.offset_um());
+  }
+}
+
+TEST_CASE("a reload keeps what probings taught", "[correction][estimator]") {
+  EstimatorConfig config = small_config();
+  config.correction = config_of(CorrectionForm::recursive);
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(20, {24.0, 32.0});
+  machine.estimator.apply({CommandKind::measured, 0, 3.0});
+  machine.steps(20, {24.0, 32.0});
+  const double before = machine.offset_um();
+  const double gain = machine.report().axes[0].correction.gain[0];
+  CHECK(gain > 1.0);
+  reload(machine, config, small_model());
+  machine.steps(20, {24.0, 32.0});
+  CHECK(machine.report().axes[0].correction.gain[0] == gain);
+  CHECK(machine.offset_um() == Approx(before));
+}
+
+TEST_CASE("each_cycle: the offset changes at cycle ends only", "[cycle_hold][estimator]") {
+  EstimatorConfig config = small_config();
+  config.compensation.update = UpdateRule::each_cycle;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(10, {21.0, 31.0});
+  CHECK(machine.offset_um() == 0.0);
+  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
+  machine.steps(10, {21.0, 31.0});
+  CHECK(machine.offset_um() == -6.0);
+  machine.steps(10, {23.0, 31.0});
+  CHECK(machine.offset_um() == -6.0);
+  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
+  machine.steps(10, {23.0, 31.0});
+  CHECK(machine.offset_um() == -16.0);
+}
+
+TEST_CASE("a cycle end in a moment without data counts when the data are back",
+          "[cycle_hold][estimator]") {
+  EstimatorConfig config = small_config();
+  config.compensation.update = UpdateRule::each_cycle;
+  Machine machine(config);
+  machine.step({20.0, 30.0});
+  machine.steps(5, {21.0, lost});
+  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
+  machine.steps(5, {21.0, lost});
+  CHECK(machine.offset_um() == 0.0);
+  machine.steps(5, {21.0, 31.0});
+  CHECK(machine.offset_um() == -6.0);
+}
+
+TEST_CASE("a coil that rises, a counter that changes, and every n-th of them end a cycle",
+          "[cycle_hold]") {
+  CycleEnds coil(1, true);
+  for (const double value : {1.0, 1.0, 0.0, not_a_number, 0.0}) coil.signal(value);
+  CHECK(coil.count() == 0);  // standing at 1 when the daemon starts ends nothing
+  coil.signal(1.0);
+  CHECK(coil.count() == 1);
+  CHECK(coil.take(false) == false);
+  CHECK(coil.take(true));
+  CHECK_FALSE(coil.take(true));
+  CycleEnds counter(3, false);
+  for (const double value : {7.0, 8.0, 8.0, 9.0}) counter.signal(value);
+  CHECK_FALSE(counter.take(true));
+  counter.command();
+  CHECK(counter.take(true));
+}
+
+TEST_CASE("one cycle ahead, the change since the last cycle end is added again", "[cycle_hold]") {
+  CycleHold hold(1.0);
+  hold.cycle_end(5.0);
+  CHECK(hold.held_um() == 5.0);
+  hold.cycle_end(8.0);
+  CHECK(hold.held_um() == 11.0);
+  hold.restart();
+  hold.cycle_end(0.0);
+  CHECK(hold.held_um() == 0.0);
+}
