@@ -10,7 +10,7 @@ command -v ccx >/dev/null || { echo "bench/structure.sh: CalculiX (ccx) is not i
 show() { sed "s/^/$1_/"; }
 
 small=$("$program" tet4 15 15 21 calculix direct)
-quadratic=$("$program" tet10 20 20 65 calculix direct)
+quadratic=$("$program" tet10 20 20 90 calculix direct)
 large=$("$program" tet10 20 20 19.9)
 echo "$small" | show tet4_50k
 echo "$large" | show tet10_200k

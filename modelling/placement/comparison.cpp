@@ -68,6 +68,7 @@ std::vector<Numbers> nothing(const PlacementProblem& problem, const std::vector<
 
 std::vector<Numbers> from_means(const PlacementProblem& problem, const std::vector<Field>& fields) {
   std::vector<Numbers> estimates;
+  estimates.reserve(fields.size());
   for (const Field& field : fields) {
     estimates.push_back(block_displacement_um(problem, block_means_K(problem, field.rise_K)));
   }

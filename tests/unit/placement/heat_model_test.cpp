@@ -145,24 +145,25 @@ TEST_CASE("what is wrong with heat and load cases is named", "[placement][bad_in
     std::string text = good;
     return text.replace(text.find(what), what.size(), with);
   };
-  for (const auto& [text, told] : std::vector<Case>{
-           {column + heater + cases, "needs a [[convection]] that carries heat away"},
-           {column + cooled + heater, "needs a [[load_case]] that is not left out"},
-           {column + cooled + heater + left_out, "needs a [[load_case]] that is not left out"},
-           {replaced("conductivity_W_per_m_K = 50\n", ""), "needs conductivity_W_per_m_K"},
-           {replaced("density_kg_per_m3 = 7200", "density_kg_per_m3 = nan"), "finite"},
-           {replaced("heater_on = 1", "heating_on = 1"), "no [[heat]] has this signal"},
-           {replaced("at_s = [600, 1800, 3600]", "at_s = [600, 600]"), "must increase"},
-           {replaced("at_s = [600, 1800, 3600]", "at_s = [3601]"), "not be later than duration_s"},
-           {replaced("step_s = 120", "step_s = 7200"), "1 to 100000 steps"},
-           {replaced("heat_W = 40", "heat_W = inf"), "finite"},
-           {replaced("x_mm = [0, 0], z_mm = [200, 400]", "x_mm = [1, 2]"),
-            "no face of the mesh's surface is there"},
-           {replaced("signal = \"heater_on\"", "signal = \"heater_degC\""), "operating signal"},
-           {good + "[[convection]]\non = { group = \"skin\" }\ncoefficient_W_per_m2_K = 1\n",
-            "there is no group \"skin\""},
-           {good + "[placement]\non_the_surface = true\n", "unknown key"},
-       }) {
+  const std::vector<Case> listed{
+      {column + heater + cases, "needs a [[convection]] that carries heat away"},
+      {column + cooled + heater, "needs a [[load_case]] that is not left out"},
+      {column + cooled + heater + left_out, "needs a [[load_case]] that is not left out"},
+      {replaced("conductivity_W_per_m_K = 50\n", ""), "needs conductivity_W_per_m_K"},
+      {replaced("density_kg_per_m3 = 7200", "density_kg_per_m3 = nan"), "finite"},
+      {replaced("heater_on = 1", "heating_on = 1"), "no [[heat]] has this signal"},
+      {replaced("at_s = [600, 1800, 3600]", "at_s = [600, 600]"), "must increase"},
+      {replaced("at_s = [600, 1800, 3600]", "at_s = [3601]"), "not be later than duration_s"},
+      {replaced("step_s = 120", "step_s = 7200"), "1 to 100000 steps"},
+      {replaced("heat_W = 40", "heat_W = inf"), "finite"},
+      {replaced("x_mm = [0, 0], z_mm = [200, 400]", "x_mm = [1, 2]"),
+       "no face of the mesh's surface is there"},
+      {replaced("signal = \"heater_on\"", "signal = \"heater_degC\""), "operating signal"},
+      {good + "[[convection]]\non = { group = \"skin\" }\ncoefficient_W_per_m2_K = 1\n",
+       "there is no group \"skin\""},
+      {good + "[placement]\non_the_surface = true\n", "unknown key"},
+  };
+  for (const auto& [text, told] : listed) {
     const std::string problems = problems_of(text);
     CAPTURE(told, problems);
     CHECK(problems.find(told) != std::string::npos);

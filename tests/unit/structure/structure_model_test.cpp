@@ -81,9 +81,9 @@ TEST_CASE("a free column grows by alpha L a kelvin, and its blocks share that",
       "names = [\"b1_degC\", \"b2_degC\", \"b3_degC\", \"b4_degC\"]\n";
   for (const char* element : {"tet4", "tet10", "hex8", "hex20"}) {
     INFO(element);
-    const Result result =
-        matrix_of(material + box_part("column", "[0, 0, 0]", "[100, 100, 400]", element) + slides +
-                  blocks + top);
+    std::string text = material;
+    text.append(box_part("column", "[0, 0, 0]", "[100, 100, 400]", element));
+    const Result result = matrix_of(text.append(slides).append(blocks).append(top));
     CHECK(result.model.inputs ==
           std::vector<std::string>{"b1_degC", "b2_degC", "b3_degC", "b4_degC"});
     const auto& row = result.model.matrix_um_per_K.at(0);
@@ -189,45 +189,43 @@ TEST_CASE("what is wrong with a structure is named, with its place", "[structure
     std::string told;
   };
   const std::string support = "[[support]]\non = ";
-  for (const auto& [text, told] : std::vector<Case>{
-           {with(support + "{ group = \"base\" }\n"), "there is no group \"base\" in the mesh"},
-           {with(support + "{ z_mm = [500, 600] }\n"), "no node of the mesh is there"},
-           {with(support + "{ part = \"colum\" }\n"), "did you mean \"column\"?"},
-           {with(support + "{ z_mm = [2, 1] }\n"), "must be a range"},
-           {with(support + "{ z_mm = [nan, 1] }\n"), "must be a finite number"},
-           {with("[[spring]]\non = { z_mm = [10, 20] }\nstiffness_N_per_um = [1, 1, 1]\n"),
-            "no face of the mesh's surface is there"},
-           {with("[[block]]\nname = \"t2_degC\"\non = { x_mm = [900, 901] }\n"),
-            "no node of the mesh is there"},
-           {with("[[block]]\nname = \"t1_degC\"\non = { x_mm = [0, 1] }\n"), "is used twice"},
-           {with("[[block]]\nname = \"t2\"\non = { x_mm = [0, 1] }\n"), "must be a temperature"},
-           {with("[[block]]\nname = \"t2_degC\"\nrest = true\n"), "has no nodes"},
-           {with("unknown = 1\n"), "unknown key"},
-           {with("[[output]]\nname = \"y_um\"\ndirection = \"y\"\n"
-                 "tool = { part = \"column\", at_mm = [50, 50, 500] }\n"),
-            "[50, 50, 500] mm is outside part column"},
-           {with("[[output]]\nname = \"y_um\"\ndirection = \"y\"\n"), "must have tool or work"},
-           {with("[[output]]\nname = \"y_um\"\ndirection = [0, 0, 0]\n"
-                 "tool = { part = \"column\", at_mm = [50, 50, 400] }\n"),
-            "or a vector"},
-           {with("[[joint]]\nname = \"j\"\nfrom = { part = \"column\", z_mm = [0, 0] }\n"
-                 "to = { part = \"column\", z_mm = [400, 400] }\n"),
-            "nowhere nearer"},
-           {material + column + all_warm + top, "part column is not held against moving along x"},
-           {material + column + foot + top, "there must be a [[block]] or a [[division]]"},
-           {material + column + foot + top +
-                "[[block]]\nname = \"a_degC\"\non = { z_mm = [0, 99] }\n",
-            "nodes are in no block"},
-           {material + foot + all_warm + top, "part = (missing)"},
-           {material + column +
-                "[[part]]\nname = \"lid\"\nmaterial = \"brass\"\nmesh = \"no.msh\"\n" + foot +
-                all_warm + top,
-            "there is no material of this name"},
-           {material + column +
-                "[[part]]\nname = \"lid\"\nmaterial = \"iron\"\nmesh = \"no.msh\"\n" + foot +
-                all_warm + top,
-            "no.msh: no such file"},
-       }) {
+  const std::vector<Case> listed{
+      {with(support + "{ group = \"base\" }\n"), "there is no group \"base\" in the mesh"},
+      {with(support + "{ z_mm = [500, 600] }\n"), "no node of the mesh is there"},
+      {with(support + "{ part = \"colum\" }\n"), "did you mean \"column\"?"},
+      {with(support + "{ z_mm = [2, 1] }\n"), "must be a range"},
+      {with(support + "{ z_mm = [nan, 1] }\n"), "must be a finite number"},
+      {with("[[spring]]\non = { z_mm = [10, 20] }\nstiffness_N_per_um = [1, 1, 1]\n"),
+       "no face of the mesh's surface is there"},
+      {with("[[block]]\nname = \"t2_degC\"\non = { x_mm = [900, 901] }\n"),
+       "no node of the mesh is there"},
+      {with("[[block]]\nname = \"t1_degC\"\non = { x_mm = [0, 1] }\n"), "is used twice"},
+      {with("[[block]]\nname = \"t2\"\non = { x_mm = [0, 1] }\n"), "must be a temperature"},
+      {with("[[block]]\nname = \"t2_degC\"\nrest = true\n"), "has no nodes"},
+      {with("unknown = 1\n"), "unknown key"},
+      {with("[[output]]\nname = \"y_um\"\ndirection = \"y\"\n"
+            "tool = { part = \"column\", at_mm = [50, 50, 500] }\n"),
+       "[50, 50, 500] mm is outside part column"},
+      {with("[[output]]\nname = \"y_um\"\ndirection = \"y\"\n"), "must have tool or work"},
+      {with("[[output]]\nname = \"y_um\"\ndirection = [0, 0, 0]\n"
+            "tool = { part = \"column\", at_mm = [50, 50, 400] }\n"),
+       "or a vector"},
+      {with("[[joint]]\nname = \"j\"\nfrom = { part = \"column\", z_mm = [0, 0] }\n"
+            "to = { part = \"column\", z_mm = [400, 400] }\n"),
+       "nowhere nearer"},
+      {material + column + all_warm + top, "part column is not held against moving along x"},
+      {material + column + foot + top, "there must be a [[block]] or a [[division]]"},
+      {material + column + foot + top + "[[block]]\nname = \"a_degC\"\non = { z_mm = [0, 99] }\n",
+       "nodes are in no block"},
+      {material + foot + all_warm + top, "part = (missing)"},
+      {material + column + "[[part]]\nname = \"lid\"\nmaterial = \"brass\"\nmesh = \"no.msh\"\n" +
+           foot + all_warm + top,
+       "there is no material of this name"},
+      {material + column + "[[part]]\nname = \"lid\"\nmaterial = \"iron\"\nmesh = \"no.msh\"\n" +
+           foot + all_warm + top,
+       "no.msh: no such file"},
+  };
+  for (const auto& [text, told] : listed) {
     const auto lines = problems_in(text);
     std::string all;
     for (const std::string& line : lines) all += line + "\n";
