@@ -52,6 +52,7 @@ std::string text_of(const fs::path& path) {
 /// Runs a program and waits. @return its exit status; -1 where it was ended by a signal
 int run(const std::vector<std::string>& words, const fs::path& log) {
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   const pid_t child = ::fork();
