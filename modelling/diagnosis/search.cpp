@@ -444,7 +444,9 @@ bool Search::matters(const Explanation& explanation, bool first) const {
 
 bool Search::earned(const Explanation& explanation, bool first) const {
   return explanation.left_out_gain >= thresholds_.left_out_gain_min &&
-         explanation.score >= thresholds_.score_min && matters(explanation, first);
+         (explanation.score >= thresholds_.score_min ||
+          explanation.left_out_gain >= thresholds_.obvious_share) &&
+         matters(explanation, first);
 }
 
 /// Whether the findings may be named: one of them is clear by itself, or all together are.
@@ -453,8 +455,10 @@ bool Search::convincing(const std::vector<Finding>& findings) const {
   double score = 0.0;
   for (const Finding& finding : findings) {
     const Explanation& each = finding.explanation;
-    if (each.left_out_gain >= thresholds_.clear_share || each.score >= thresholds_.clear_score)
-      return true;
+    const double share = each.left_out_gain / thresholds_.clear_share;
+    const double likelihood = std::min(1.0, each.score / thresholds_.clear_score);
+    if (share >= 1.0 || share + likelihood >= thresholds_.clear_sum) return true;
+    if (likelihood >= 1.0 && each.left_out_gain >= thresholds_.seen_share) return true;
     left *= 1.0 - each.left_out_gain;
     score += each.score;
   }
@@ -479,7 +483,12 @@ SearchResult Search::run() {
   // A refit can drop what a later finding explains better: rounds are counted, not findings.
   for (std::size_t round = 1; round <= thresholds_.findings_max; ++round) {
     accept(result.findings, result.findings.size());
-    const std::vector<Explanation> candidates = ranked();
+    std::vector<Explanation> candidates = ranked();
+    std::erase_if(candidates, [&](const Explanation& each) {
+      return std::any_of(result.findings.begin(), result.findings.end(), [&](const Finding& found) {
+        return found.explanation.hypothesis == each.hypothesis;
+      });
+    });
     for (std::size_t i = 0; i < std::min(weighed_shown, candidates.size()); ++i)
       result.weighed.push_back({round, candidates[i].hypothesis->cause,
                                 candidates[i].hypothesis->subject, candidates[i].score,

@@ -11,13 +11,18 @@ namespace thermocomp::diagnosis {
 struct Thresholds {
   /// Least share of the RMS that a cause must take from rows it was not fitted to.
   double left_out_gain_min{0.12};
-  /// Least gain of 2 ln L over noise that may be as large as the residual.
+  /// Least gain of 2 ln L over noise that may be as large as the residual, unless it takes
+  /// `obvious_share` of the RMS of left-out rows.
   double score_min{25.0};
-  /// A finding is clear when it takes this share of the RMS of left-out rows, or gains this much
-  /// ...
+  double obvious_share{0.7};
+  /// A finding is clear when it takes this share of the RMS of left-out rows, when it gains
+  /// clear_score and takes seen_share, or when the sum of share / clear_share and
+  /// 2 ln L / clear_score (at most 1) is large enough.
   double clear_share{0.55};
   double clear_score{90.0};
-  /// ... and several are when they take this share together and gain that much.
+  double seen_share{0.2};
+  double clear_sum{1.55};
+  /// Several are clear when they take this share together and gain clear_score.
   double together_share{0.65};
   /// Least RMS of what a cause explains, as a share of the measured motion's; never below the noise
   /// of a single value.
