@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <dlfcn.h>
 #include <limits>
 #include <suitesparse/cholmod.h>
+#include <unistd.h>
 
 #include "estimator/checks.hpp"
 
@@ -62,12 +65,33 @@ SparseSymmetric combination(double a, const SparseSymmetric& A, double b,
   return sum;
 }
 
+namespace {
+
+/// CHOLMOD asks for four threads and OpenBLAS for one a processor, whatever else runs. Where others
+/// want the processors too, these threads' waiting for each other takes several times as long as
+/// the work. Both are asked to take what is free; found at run time, since the libraries behind
+/// CHOLMOD are the system's choice.
+void leave_processors_to_others() {
+  using SetNumber = void (*)(int);
+  const auto set = [](const char* name, int number) {
+    if (void* found = ::dlsym(RTLD_DEFAULT, name)) reinterpret_cast<SetNumber>(found)(number);
+  };
+  set("omp_set_dynamic", 1);
+  double load = 0.0;
+  const auto processors = static_cast<double>(::sysconf(_SC_NPROCESSORS_ONLN));
+  if (::getloadavg(&load, 1) == 1 && load > processors) set("openblas_set_num_threads", 1);
+}
+
+}  // namespace
+
 struct Cholesky::Parts {
   cholmod_common common{};
   cholmod_factor* factor{nullptr};
   Index size{0};
 
   Parts() {
+    static const bool left = (leave_processors_to_others(), true);
+    static_cast<void>(left);
     cholmod_start(&common);
     common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_METIS;
