@@ -74,7 +74,7 @@ class Catalogue {
   Column stacked(Make make) const {
     Column out(rows_.time_s.size());
     for (std::size_t i = 0; i < data_.runs.size(); ++i) {
-      const Column whole = make(data_.runs[i]);
+      const Column& whole = make(data_.runs[i]);
       const Block& block = rows_.runs[i];
       out.segment(block.begin, block.end - block.begin) =
           whole.segment(data_.runs[i].begin, block.end - block.begin);

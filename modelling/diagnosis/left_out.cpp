@@ -142,6 +142,7 @@ struct BlockFit {
 BlockFit fit_without(const Explanation& explanation, const std::vector<std::size_t>& acting,
                      const std::vector<BlockProducts>& products, std::optional<std::size_t> block) {
   std::vector<Reduced> reduced;
+  reduced.reserve(products.size());
   for (const BlockProducts& each : products) reduced.push_back(without_block(each, block));
   BlockFit fit{0.0, {}, {}, {}};
   double square = 0.0;
@@ -214,6 +215,7 @@ LeftOutGain gain_on_left_out_blocks(const Explanation& explanation, const Stacke
   std::vector<std::vector<double>> best_shape(blocks);
   for (const std::vector<double>& shape : shapes_of(explanation)) {
     std::vector<BlockProducts> all;
+    all.reserve(acting.size());
     for (const std::size_t output : acting)
       all.push_back(products(*explanation.settings[output],
                              columns_of(*explanation.hypothesis, shape, outputs[output]), rows));
@@ -241,6 +243,7 @@ LeftOutGain gain_on_fitted_rows(const Explanation& explanation, const StackedRow
                                 const std::vector<OutputEvidence>& outputs) {
   const std::vector<std::size_t> acting = acting_outputs(explanation);
   std::vector<BlockProducts> all;
+  all.reserve(acting.size());
   for (const std::size_t output : acting)
     all.push_back(products(*explanation.settings[output],
                            columns_of(*explanation.hypothesis, explanation.shape, outputs[output]),

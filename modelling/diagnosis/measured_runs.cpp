@@ -24,6 +24,7 @@ double missing_share(const std::vector<double>& values) {
 /// The rows that are used: every needed column has a value there.
 std::vector<std::size_t> usable_rows(const RunFile& run, const std::vector<std::string>& needed) {
   std::vector<const std::vector<double>*> columns;
+  columns.reserve(needed.size());
   for (const std::string& name : needed) columns.push_back(&run.column(name));
   std::vector<std::size_t> rows;
   for (std::size_t row = 0; row < run.selected_end; ++row) {

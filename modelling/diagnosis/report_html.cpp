@@ -43,16 +43,14 @@ struct Figures {
   double peak{not_a_number};
 };
 
-/// RMS without the run's mean, over the rows that `takes` accepts; and the largest value.
+/// RMS over the rows that `takes` accepts; and the largest value.
 template <class Takes>
 Figures figures_of(const Column& values, Takes takes) {
-  double sum = 0.0;
   double squares = 0.0;
   double count = 0.0;
   Figures figures;
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i]) || !takes(i)) continue;
-    sum += values[i];
     squares += values[i] * values[i];
     count += 1.0;
     if (!(std::abs(values[i]) <= figures.peak)) figures.peak = std::abs(values[i]);

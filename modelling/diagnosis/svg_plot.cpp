@@ -91,6 +91,7 @@ std::string escaped(const std::string& text) {
 std::string line_plot(const std::string& title, const Column& time_s,
                       const std::vector<PlotLine>& lines) {
   std::vector<const Column*> columns;
+  columns.reserve(lines.size());
   for (const PlotLine& line : lines) columns.push_back(line.values);
   const Range y = range_of(columns);
   const Range x = range_of({&time_s});
