@@ -14,7 +14,7 @@
 namespace thermocomp::sections {
 namespace {
 
-enum class Kind { dry_run, modbus_tcp, modbus_rtu, can, unknown };
+enum class Kind { dry_run, modbus_tcp, modbus_rtu, piezo_tcp, piezo_rtu, can, unknown };
 
 /// The bound of the axis must be something that the value can carry, or offsets would be cut off.
 void check_reach(const TomlTable& table, std::string_view key, const Range& reach,
@@ -76,6 +76,8 @@ class ControllerReader {
                                           {{"dry_run", Kind::dry_run},
                                            {"modbus_tcp", Kind::modbus_tcp},
                                            {"modbus_rtu", Kind::modbus_rtu},
+                                           {"piezo_tcp", Kind::piezo_tcp},
+                                           {"piezo_rtu", Kind::piezo_rtu},
                                            {"can", Kind::can}},
                                           Kind::unknown);
     switch (kind) {
@@ -84,7 +86,11 @@ class ControllerReader {
         break;
       case Kind::modbus_tcp:
       case Kind::modbus_rtu:
-        read_modbus(kind == Kind::modbus_tcp, serial_devices);
+        read_modbus(kind == Kind::modbus_tcp, false, serial_devices);
+        break;
+      case Kind::piezo_tcp:
+      case Kind::piezo_rtu:
+        read_modbus(kind == Kind::piezo_tcp, true, serial_devices);
         break;
       case Kind::can:
         read_can();
@@ -112,7 +118,8 @@ class ControllerReader {
     for (const std::string& key : table_.keys()) {
       if (key != "name" && key != "kind") table_.refuse(key, rule);
     }
-    for (const TomlTable& axis : axis_tables_) refuse_all(axis, {"offset", "applied"}, rule);
+    for (const TomlTable& axis : axis_tables_)
+      refuse_all(axis, {"offset", "applied", "piezo"}, rule);
     result_.config = DryRunControllerConfig{name_, axes_.size()};
   }
 
@@ -146,7 +153,8 @@ class ControllerReader {
     }
   }
 
-  void read_modbus(bool is_tcp, const std::set<std::string>& serial_devices) {
+  /// @param volts  the offsets go to piezos, by the voltage of their amplifiers
+  void read_modbus(bool is_tcp, bool volts, const std::set<std::string>& serial_devices) {
     ModbusControllerConfig config;
     config.name = name_;
     config.line = read_modbus_line(table_, is_tcp);
@@ -158,7 +166,8 @@ class ControllerReader {
     refuse_all(table_, {"interface", "silent_after_s"}, "makes no sense for a Modbus controller");
     WrittenRegisters written;
     for (std::size_t i = 0; i < axes_.size(); ++i) {
-      config.axes.push_back(read_modbus_axis(axis_tables_[i], axes_[i], written));
+      config.axes.push_back(volts ? read_piezo_axis(axis_tables_[i], axes_[i], written)
+                                  : read_modbus_axis(axis_tables_[i], axes_[i], written));
     }
     check_read_back();
     config.valid_bits = read_written_bits("valid_bits", written);
@@ -178,6 +187,38 @@ class ControllerReader {
     const ModbusValue value = read_modbus_value(place, RegisterUse::written_bits);
     written.add(table_, key, value);
     return value;
+  }
+
+  static ModbusAxis read_piezo_axis(const TomlTable& table, const AxisConfig& axis,
+                                    WrittenRegisters& written) {
+    refuse_all(table, {"applied"}, "makes no sense for a piezo: its displacement is not read back");
+    ModbusAxis place;
+    const TomlTable offset = table.table("offset");
+    place.offset = read_modbus_value(offset, RegisterUse::written);
+    if (offset) written.add(table, "offset", place.offset);
+    const TomlTable own = table.table("piezo");
+    PiezoConfig piezo;
+    piezo.curve_V = own.numbers("curve_V");
+    piezo.curve_um = own.numbers("curve_um");
+    piezo.return_to_zero = own.flag("return_to_zero", piezo.return_to_zero);
+    piezo.settle_s = own.number("settle_s", Range::any(), piezo.settle_s);
+    piezo.steady_s = own.number("steady_s", Range::any(), piezo.steady_s);
+    piezo.step_um = own.number("step_um", Range::any(), piezo.step_um);
+    place.piezo = piezo;
+    if (!own) return place;
+    try {
+      piezo.validate();
+    } catch (const InvalidValue& error) {
+      own.problem(error.key(), error.value(), error.rule());
+      return place;
+    }
+    check_reach(table, "piezo", Range::between(piezo.curve_um.front(), piezo.curve_um.back()),
+                axis);
+    const Range volts = reach(place.offset);
+    if (offset && !volts.contains(piezo.curve_V.back()))
+      table.problem("offset", "must be able to hold the curve's voltages, but reaches from " +
+                                  number_text(volts.min) + " to " + number_text(volts.max));
+    return place;
   }
 
   static ModbusAxis read_modbus_axis(const TomlTable& table, const AxisConfig& axis,
@@ -203,8 +244,7 @@ class ControllerReader {
     config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
     config.silent_after_s =
         table_.number("silent_after_s", Range::between(0.01, 3600), config.silent_after_s);
-    config.reconnect_s =
-        table_.number("reconnect_s", Range::between(0.01, 1), config.reconnect_s);
+    config.reconnect_s = table_.number("reconnect_s", Range::between(0.01, 1), config.reconnect_s);
     refuse_all(table_,
                {"host", "port", "unit", "device", "baud", "parity", "data_bits", "stop_bits",
                 "rs485", "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "drivers/controllers/piezo_config.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
 
 namespace thermocomp {
@@ -30,6 +31,8 @@ struct ModbusSignal {
 struct ModbusAxis {
   ModbusValue offset;
   std::optional<ModbusValue> applied;  ///< none: the controller does not read back
+  /// `offset` takes volts of an amplifier, not um; there is no read-back then.
+  std::optional<PiezoConfig> piezo{};
   bool operator==(const ModbusAxis&) const = default;
 };
 

@@ -62,6 +62,7 @@ void check_config(const ModbusControllerConfig& config) {
   for (const ModbusAxis& axis : config.axes) {
     note(axis.offset, "offset");
     if (axis.applied) check_place(*axis.applied, "applied");
+    if (axis.piezo) axis.piezo->validate();
   }
   for (const ModbusSignal& signal : config.signals) {
     require(signal.signal < signals_max, "signal", static_cast<double>(signal.signal),
@@ -112,6 +113,8 @@ ModbusDialogue::ModbusDialogue(ModbusControllerConfig config, ModbusConnection& 
     read_targets_.push_back(&state_.signals[signal.signal]);
   }
   read_plan_ = plan_reads(read_values_);
+  for (const ModbusAxis& axis : config_.axes)
+    piezos_.push_back(axis.piezo ? std::optional<PiezoDrive>(*axis.piezo) : std::nullopt);
   health_.name = config_.name;
   health_.kind = std::holds_alternative<ModbusTcp>(config_.line.link) ? "modbus_tcp" : "modbus_rtu";
 }
@@ -173,6 +176,8 @@ bool ModbusDialogue::synchronise() {
     return false;
   }
   gate_.synchronised(state_.applied_um);
+  for (auto& piezo : piezos_)
+    if (piezo) piezo->restart();
   publish(true);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
@@ -203,14 +208,20 @@ void ModbusDialogue::look_for_command() {
   if (commands_.fresh()) gate_.offered(commands_.front(), connection_.now());
 }
 
-std::vector<WriteField> ModbusDialogue::fields_of(const OffsetCommand& command) const {
+double ModbusDialogue::written_value(std::size_t axis, double offset_um) {
+  return piezos_[axis] ? piezos_[axis]->step(connection_.now(), offset_um) : offset_um;
+}
+
+std::vector<WriteField> ModbusDialogue::fields_of(const OffsetCommand& command) {
   std::vector<WriteField> fields;
   double valid_bits = 0.0;
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     if (!drivable(command, axis)) continue;
+    const double value = written_value(axis, command.offset_um[axis]);
+    if (std::isnan(value)) continue;  // a piezo that waits for the offset to stand still
     valid_bits += std::ldexp(1.0, static_cast<int>(axis));
     const ModbusValue& place = config_.axes[axis].offset;
-    fields.push_back(field_of(place, WriteStage::offset, command.offset_um[axis],
+    fields.push_back(field_of(place, WriteStage::offset, value,
                               {place.encoding, place.word_order, place.scale, 0.0}));
   }
   if (config_.valid_bits) {

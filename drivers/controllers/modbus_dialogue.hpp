@@ -4,12 +4,14 @@
 
 #include <atomic>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/controllers/piezo_drive.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/wait_free_slot.hpp"
@@ -50,7 +52,8 @@ class ModbusDialogue {
   void look_for_command();
   bool write_command();
   bool write(const WriteField& request);
-  std::vector<WriteField> fields_of(const OffsetCommand& command) const;
+  std::vector<WriteField> fields_of(const OffsetCommand& command);
+  [[nodiscard]] double written_value(std::size_t axis, double offset_um);
   bool read_all();
   void take(std::span<const std::vector<std::uint16_t>> answers);
   void publish(bool online);
@@ -66,6 +69,7 @@ class ModbusDialogue {
   ReadPlan read_plan_;
   ModbusConnection& connection_;
   WriteGate gate_;
+  std::vector<std::optional<PiezoDrive>> piezos_;  ///< one an axis
   std::uint64_t heartbeat_{0};
   ControllerState state_;  ///< the thread's own
   WaitFreeSlot<ControllerState> states_;

@@ -203,6 +203,27 @@ TEST_CASE("a correction's groups are inputs of the model, each named once", "[co
   }
 }
 
+TEST_CASE("a piezo's curve is read, must rise, and must reach the axis' bound", "[config]") {
+  const DaemonConfig config = load_daemon_config(examples / "piezo.toml");
+  const auto& controller = std::get<ModbusControllerConfig>(config.controller);
+  REQUIRE(controller.axes.at(0).piezo);
+  CHECK(controller.axes[0].piezo->curve_V.size() == 7);
+  CHECK_FALSE(config.estimator.controller_reads_back);
+  const std::string text = example("piezo.toml");
+  const std::vector<std::pair<std::pair<std::string, std::string>, const char*>> bad = {
+      {{"offset_um_max = 20.0", "offset_um_max = 30.0"}, "reaches from -22 to 22.8"},
+      {{"-9.4", "-19.4"}, "can be inverted"},
+      {{"curve_V = [0,", "curve_V = [1,"}, "must begin at 0 V"},
+      {{"settle_s = 0.2", "settle_s = -1"}, "settle_s"},
+      {{"scale = 0.01 }  # volts", "scale = 0.001 }"}, "hold the curve's voltages"},
+  };
+  for (const auto& [edit, rule] : bad) {
+    INFO(edit.second);
+    CHECK_THROWS_WITH(parse(edited(text, edit.first, edit.second), "column_model.toml"),
+                      Catch::Contains(rule));
+  }
+}
+
 TEST_CASE("keys of cycles make no sense where the offset follows the model", "[config]") {
   CHECK_THROWS_WITH(
       edited_machine("update = \"continuous\"", "update = \"continuous\"\ncycles_per_update = 2"),
