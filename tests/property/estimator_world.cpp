@@ -77,6 +77,15 @@ EstimatorConfig random_config(Chance& chance) {
   config.compensation.prove_hold_s = chance.between(0.0, 2.0);
   config.compensation.estimate_lost_blocks = !chance.one_in(5);
   config.compensation.offset_sd_um_max = chance.between(0.5, 50.0);
+  if (chance.one_in(2)) {
+    config.correction.form =
+        chance.one_in(2) ? CorrectionForm::recursive : CorrectionForm::two_phase;
+    config.correction.groups = {{"t1_degC"}, {"t2_degC"}};
+    config.correction.gain_sd = chance.between(0.05, 3.0);
+    config.correction.step_um_max = chance.between(0.5, 100.0);
+    config.correction.bias_drift_um_per_sqrt_h = chance.between(0.0, 20.0);
+  }
+  if (chance.one_in(8)) config.compensation.update = UpdateRule::each_cycle;
   return config;
 }
 

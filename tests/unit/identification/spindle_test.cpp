@@ -1,0 +1,56 @@
+// On measured data of a spindle, which are not part of the project: THERMOCOMP_DATA names their
+// folder.
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include <catch2/catch.hpp>
+
+#include "modelling/identification/fit.hpp"
+
+namespace thermocomp::identification {
+namespace {
+
+/// RMS of what the equation leaves of the selected rows, its reference the file's first row.
+double rms_on(const MeasuredTests& rows, const Fit& fit) {
+  const TestRun& run = rows.runs[0];
+  Eigen::VectorXd left = run.outputs_um.col(0);
+  for (std::size_t i = 0; i < fit.columns.size(); ++i)
+    left -=
+        fit.outputs[0].coefficients[static_cast<Eigen::Index>(i)] * column_of(run, fit.columns[i]);
+  const auto selected = left.tail(left.size() - run.begin);
+  return std::sqrt(selected.squaredNorm() / static_cast<double>(selected.size()));
+}
+
+TEST_CASE("four sensors and lags do better on hours not fitted than sixteen without",
+          "[fit][data]") {
+  const char* named = std::getenv("THERMOCOMP_DATA");
+  const std::filesystem::path run =
+      std::filesystem::path(named != nullptr ? named : THERMOCOMP_DATA_DEFAULT) / "spindle_46h" /
+      "hours_00_32.csv";
+  if (!std::filesystem::exists(run)) {
+    WARN("skipped: " << run << " is not here");
+    return;
+  }
+  // The static model of all sixteen, as its makers state it.
+  const std::vector<std::pair<std::string, double>> sixteen{{"ch1_um", 5.653},
+                                                            {"ch2_um", 5.087},
+                                                            {"ch3_um", 9.193},
+                                                            {"ch4_um", 9.005},
+                                                            {"ch5_um", 5.002}};
+  const RunFile train = load_run(parse_selection(run.string().append("@:86760")));
+  const RunFile later = load_run(parse_selection(run.string().append("@86760:")));
+  FitOptions options;
+  options.terms_min = options.terms_max = 4;
+  options.lags = true;
+  for (const auto& [channel, static_rms_um] : sixteen) {
+    const MeasuredTests tests = measured_tests({train}, {{}, {channel}, 6});
+    const Fit fit = fit_equation(tests, options);
+    CAPTURE(channel);
+    CHECK(fit.places.size() == 4);
+    CHECK(rms_on(measured_tests({later}, {{}, {channel}, 6}), fit) < static_rms_um);
+  }
+}
+
+}  // namespace
+}  // namespace thermocomp::identification
