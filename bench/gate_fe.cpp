@@ -59,6 +59,25 @@ Shape shape_at(double r, double s) {
 constexpr std::array<double, 3> gauss{-0.774596669241483377, 0.0, 0.774596669241483377};
 constexpr std::array<double, 3> weight{5.0 / 9, 8.0 / 9, 5.0 / 9};
 
+/// Stiffness, forces of temperatures, conductance and capacity of one element.
+struct ElementMatrices {
+  Eigen::Matrix<double, 16, 16> ke = Eigen::Matrix<double, 16, 16>::Zero();
+  Eigen::Matrix<double, 16, 8> fe = Eigen::Matrix<double, 16, 8>::Zero();
+  Eigen::Matrix<double, 8, 8> he = Eigen::Matrix<double, 8, 8>::Zero();
+  Eigen::Matrix<double, 8, 8> ce = Eigen::Matrix<double, 8, 8>::Zero();
+};
+
+using Triplet = Eigen::Triplet<double>;
+
+void build(Sparse& matrix, int rows, int columns, const std::vector<Triplet>& from) {
+  matrix.resize(rows, columns);
+  matrix.setFromTriplets(from.begin(), from.end());
+}
+
+int dof(int node, int direction) {
+  return 2 * node + direction;
+}
+
 }  // namespace
 
 /// Lengths in m here. Node (i, j) of a grid of half elements; centres of elements are not used.
@@ -69,7 +88,8 @@ struct GateFe::Parts {
         width_m(gate.column_width_mm * 1e-3),
         height_m(1.02e-3 * std::max(gate.working_height_mm, gate.tie_height_mm)),
         up(2 * static_cast<int>(std::lround(height_m / width_m * 3.0)) + 8) {
-    number.assign(static_cast<std::size_t>((2 * across + 1) * (2 * up + 1)), -1);
+    number.assign(static_cast<std::size_t>(2 * across + 1) * static_cast<std::size_t>(2 * up + 1),
+                  -1);
     for (int j = 0; j <= 2 * up; ++j)
       for (int i = 0; i <= 2 * across; ++i)
         if (i % 2 == 0 || j % 2 == 0) number[index(i, j)] = nodes++;
@@ -81,7 +101,8 @@ struct GateFe::Parts {
   }
 
   [[nodiscard]] std::size_t index(int i, int j) const {
-    return static_cast<std::size_t>(j * (2 * across + 1) + i);
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(2 * across + 1) +
+           static_cast<std::size_t>(i);
   }
   [[nodiscard]] int node(int i, int j) const { return number[index(i, j)]; }
   [[nodiscard]] double x_m(int i) const { return width_m * i / (2.0 * across); }
@@ -99,6 +120,9 @@ struct GateFe::Parts {
   }
 
   void assemble();
+  [[nodiscard]] ElementMatrices matrices_of(const Eigen::Matrix3d& elastic, double half_x,
+                                            double half_y) const;
+  void add_sides();
   [[nodiscard]] Vector influence(double at_m) const;
   [[nodiscard]] double at_middle(const Vector& field, double height) const;
   [[nodiscard]] double thermal(const Vector& w, const Vector& theta) const {
@@ -127,8 +151,29 @@ struct GateFe::Parts {
   Vector tie_rise;
 };
 
+ElementMatrices GateFe::Parts::matrices_of(const Eigen::Matrix3d& elastic, double half_x,
+                                           double half_y) const {
+  ElementMatrices m;
+  for (std::size_t g = 0; g < 9; ++g) {
+    const Shape shape = shape_at(gauss[g % 3], gauss[g / 3]);
+    const double volume = weight[g % 3] * weight[g / 3] * half_x * half_y * depth_m;
+    const Eigen::Matrix<double, 8, 1> dx = shape.slope.col(0) / half_x;
+    const Eigen::Matrix<double, 8, 1> dy = shape.slope.col(1) / half_y;
+    Eigen::Matrix<double, 3, 16> strain = Eigen::Matrix<double, 3, 16>::Zero();
+    for (int i = 0; i < 8; ++i) {
+      strain(0, 2 * i) = strain(2, 2 * i + 1) = dx[i];
+      strain(1, 2 * i + 1) = strain(2, 2 * i) = dy[i];
+    }
+    m.ke += volume * strain.transpose() * elastic * strain;
+    const Eigen::Vector3d free(machine.column_expansion_per_K, machine.column_expansion_per_K, 0);
+    m.fe += volume * strain.transpose() * elastic * free * shape.value.transpose();
+    m.he += volume * conductivity_W_per_mK * (dx * dx.transpose() + dy * dy.transpose());
+    m.ce += volume * heat_J_per_m3K * shape.value * shape.value.transpose();
+  }
+  return m;
+}
+
 void GateFe::Parts::assemble() {
-  using Triplet = Eigen::Triplet<double>;
   std::vector<Triplet> k;
   std::vector<Triplet> f;
   std::vector<Triplet> conduct;
@@ -142,53 +187,42 @@ void GateFe::Parts::assemble() {
   for (int b = 0; b < up; ++b) {
     for (int a = 0; a < across; ++a) {
       const Element e = element(a, b);
-      Eigen::Matrix<double, 16, 16> ke = Eigen::Matrix<double, 16, 16>::Zero();
-      Eigen::Matrix<double, 16, 8> fe = Eigen::Matrix<double, 16, 8>::Zero();
-      Eigen::Matrix<double, 8, 8> he = Eigen::Matrix<double, 8, 8>::Zero();
-      Eigen::Matrix<double, 8, 8> ce = Eigen::Matrix<double, 8, 8>::Zero();
-      for (std::size_t g = 0; g < 9; ++g) {
-        const Shape shape = shape_at(gauss[g % 3], gauss[g / 3]);
-        const double volume = weight[g % 3] * weight[g / 3] * half_x * half_y * depth_m;
-        const Eigen::Matrix<double, 8, 1> dx = shape.slope.col(0) / half_x;
-        const Eigen::Matrix<double, 8, 1> dy = shape.slope.col(1) / half_y;
-        Eigen::Matrix<double, 3, 16> strain = Eigen::Matrix<double, 3, 16>::Zero();
-        for (int i = 0; i < 8; ++i) {
-          strain(0, 2 * i) = strain(2, 2 * i + 1) = dx[i];
-          strain(1, 2 * i + 1) = strain(2, 2 * i) = dy[i];
-        }
-        ke += volume * strain.transpose() * elastic * strain;
-        const Eigen::Vector3d free(machine.column_expansion_per_K, machine.column_expansion_per_K,
-                                   0);
-        fe += volume * strain.transpose() * elastic * free * shape.value.transpose();
-        he += volume * conductivity_W_per_mK * (dx * dx.transpose() + dy * dy.transpose());
-        ce += volume * heat_J_per_m3K * shape.value * shape.value.transpose();
-      }
+      const ElementMatrices m = matrices_of(elastic, half_x, half_y);
       for (int i = 0; i < 16; ++i)
         for (int j = 0; j < 16; ++j)
           k.emplace_back(2 * e.nodes[static_cast<std::size_t>(i / 2)] + i % 2,
-                         2 * e.nodes[static_cast<std::size_t>(j / 2)] + j % 2, ke(i, j));
+                         2 * e.nodes[static_cast<std::size_t>(j / 2)] + j % 2, m.ke(i, j));
       for (int i = 0; i < 16; ++i)
         for (int j = 0; j < 8; ++j)
           f.emplace_back(2 * e.nodes[static_cast<std::size_t>(i / 2)] + i % 2,
-                         e.nodes[static_cast<std::size_t>(j)], fe(i, j));
+                         e.nodes[static_cast<std::size_t>(j)], m.fe(i, j));
       for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 8; ++j) {
           const int row = e.nodes[static_cast<std::size_t>(i)];
           const int column = e.nodes[static_cast<std::size_t>(j)];
-          conduct.emplace_back(row, column, he(i, j));
-          store.emplace_back(row, column, ce(i, j));
+          conduct.emplace_back(row, column, m.he(i, j));
+          store.emplace_back(row, column, m.ce(i, j));
         }
     }
   }
   for (int i = 0; i <= 2 * across; ++i)  // clamped: stiff beyond measure
     for (int d = 0; d < 2; ++d)
-      k.emplace_back(2 * node(i, 0) + d, 2 * node(i, 0) + d, 1e6 * modulus_Pa);
+      k.emplace_back(dof(node(i, 0), d), dof(node(i, 0), d), 1e6 * modulus_Pa);
+  build(stiffness, 2 * nodes, 2 * nodes, k);
+  build(expansion, 2 * nodes, nodes, f);
+  build(conductance, nodes, nodes, conduct);
+  build(capacity, nodes, nodes, store);
+  add_sides();
+  solver.compute(stiffness);
+}
+
+void GateFe::Parts::add_sides() {
   // Sides: quadratic lines, Simpson-like consistent matrix of a line of three nodes.
   std::vector<Triplet> oil;
   std::vector<Triplet> air;
   Eigen::Matrix3d line;
   line << 4, 2, -1, 2, 16, 2, -1, 2, 4;
-  line *= 2 * half_y * depth_m / 30;
+  line *= 2 * (height_m / up / 2) * depth_m / 30;
   for (int b = 0; b < up; ++b)
     for (const int i : {0, 2 * across}) {
       const bool heated = i == 0 && y_m(2 * b + 1) < machine.heated_height_mm * 1e-3;
@@ -196,17 +230,8 @@ void GateFe::Parts::assemble() {
         for (int n = 0; n < 3; ++n)
           (heated ? oil : air).emplace_back(node(i, 2 * b + m), node(i, 2 * b + n), line(m, n));
     }
-  const auto build = [](Sparse& matrix, int rows, int columns, const std::vector<Triplet>& from) {
-    matrix.resize(rows, columns);
-    matrix.setFromTriplets(from.begin(), from.end());
-  };
-  build(stiffness, 2 * nodes, 2 * nodes, k);
-  build(expansion, 2 * nodes, nodes, f);
-  build(conductance, nodes, nodes, conduct);
-  build(capacity, nodes, nodes, store);
   build(oil_surface, nodes, nodes, oil);
   build(air_surface, nodes, nodes, air);
-  solver.compute(stiffness);
 }
 
 /// Across at the middle of the width, between the two nearest nodes by height.
@@ -214,16 +239,16 @@ double GateFe::Parts::at_middle(const Vector& field, double height) const {
   const double place = std::min(height / height_m * up, static_cast<double>(up));
   const int below = std::min(static_cast<int>(place), up - 1);
   const double share = place - below;
-  return (1 - share) * field[2 * node(across, 2 * below)] +
-         share * field[2 * node(across, 2 * below + 2)];
+  return (1 - share) * field[Eigen::Index{2} * node(across, 2 * below)] +
+         share * field[Eigen::Index{2} * node(across, 2 * below + 2)];
 }
 
 Vector GateFe::Parts::influence(double at) const {
   const double place = std::min(at / height_m * up, static_cast<double>(up));
   const int below = std::min(static_cast<int>(place), up - 1);
   Vector force = Vector::Zero(2 * nodes);
-  force[2 * node(across, 2 * below)] = 1 - (place - below);
-  force[2 * node(across, 2 * below + 2)] = place - below;
+  force[Eigen::Index{2} * node(across, 2 * below)] = 1 - (place - below);
+  force[Eigen::Index{2} * node(across, 2 * below + 2)] = place - below;
   return solver.solve(force);
 }
 

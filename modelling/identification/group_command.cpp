@@ -28,6 +28,7 @@ using Json = nlohmann::ordered_json;
 std::vector<std::string> names_of(const MeasuredTests& tests,
                                   const std::vector<std::size_t>& group) {
   std::vector<std::string> names;
+  names.reserve(group.size());
   for (const std::size_t place : group) names.push_back(tests.places[place]);
   return names;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include <Eigen/Cholesky>
 
@@ -36,16 +37,21 @@ std::vector<double> time_constants(const MeasuredTests& tests, std::size_t count
   return taus_s;
 }
 
+/// Where the outputs stand in the pool's equations.
+std::vector<Eigen::Index> outputs_of(const ColumnPool& pool) {
+  std::vector<Eigen::Index> places(pool.outputs());
+  std::iota(places.begin(), places.end(), static_cast<Eigen::Index>(pool.columns().size()));
+  return places;
+}
+
 /// The equations of one subset and its lags in all folds, while columns are taken up one by one;
 /// the arithmetic is that of search_subsets().
 class Forward {
  public:
   Forward(const ColumnPool& pool, const std::vector<std::size_t>& columns) : pool_(pool) {
-    std::vector<Eigen::Index> rows;
-    for (const std::size_t column : columns) rows.push_back(static_cast<Eigen::Index>(column));
-    const auto all = static_cast<Eigen::Index>(pool.columns().size());
-    for (std::size_t o = 0; o < pool.outputs(); ++o)
-      rows.push_back(all + static_cast<Eigen::Index>(o));
+    std::vector<Eigen::Index> rows(columns.begin(), columns.end());
+    const std::vector<Eigen::Index> y = outputs_of(pool);
+    rows.insert(rows.end(), y.begin(), y.end());
     count_ = static_cast<Eigen::Index>(columns.size());
     const NormalEquations& equations = pool.equations();
     const Eigen::MatrixXd total = equations.total(rows, rows);
@@ -60,8 +66,8 @@ class Forward {
   }
 
   [[nodiscard]] bool take(Eigen::Index k) {
-    for (std::size_t f = 0; f < train_.size(); ++f)
-      if (!(train_[f](k, k) > singular_share * norm_[k])) return false;
+    for (const Eigen::MatrixXd& train : train_)
+      if (!(train(k, k) > singular_share * norm_[k])) return false;
     for (std::size_t f = 0; f < train_.size(); ++f) {
       Eigen::MatrixXd& a = train_[f];
       Eigen::MatrixXd& t = left_out_[f];
@@ -119,11 +125,8 @@ bool helps_on_most(const std::vector<double>& before, const std::vector<double>&
 
 /// Whether the newest of the lags is a share of its place's coefficient, fitted to all rows.
 bool is_share(const ColumnPool& pool, const std::vector<std::size_t>& columns) {
-  std::vector<Eigen::Index> x;
-  std::vector<Eigen::Index> y;
-  for (const std::size_t column : columns) x.push_back(static_cast<Eigen::Index>(column));
-  for (std::size_t o = 0; o < pool.outputs(); ++o)
-    y.push_back(static_cast<Eigen::Index>(pool.columns().size() + o));
+  const std::vector<Eigen::Index> x(columns.begin(), columns.end());
+  const std::vector<Eigen::Index> y = outputs_of(pool);
   const Eigen::MatrixXd& total = pool.equations().total;
   const Eigen::MatrixXd b = total(x, x).ldlt().solve(total(x, y));
   for (std::size_t i = 0; i < columns.size(); ++i) {
@@ -140,7 +143,7 @@ bool is_share(const ColumnPool& pool, const std::vector<std::size_t>& columns) {
 }  // namespace
 
 Eigen::VectorXd column_of(const TestRun& run, const FitColumn& column) {
-  const Eigen::VectorXd rise_K = run.places_K.col(static_cast<Eigen::Index>(column.place));
+  Eigen::VectorXd rise_K = run.places_K.col(static_cast<Eigen::Index>(column.place));
   if (!(column.tau_s > 0)) return rise_K;
   LowPass late(column.tau_s);
   Eigen::VectorXd lag_K(rise_K.size());
@@ -171,11 +174,8 @@ ColumnPool::ColumnPool(const MeasuredTests& tests, std::size_t lags, double sens
 }
 
 Eigen::MatrixXd ColumnPool::left_out(const std::vector<std::size_t>& columns) const {
-  std::vector<Eigen::Index> x;
-  for (const std::size_t column : columns) x.push_back(static_cast<Eigen::Index>(column));
-  std::vector<Eigen::Index> y;
-  for (std::size_t o = 0; o < outputs_; ++o)
-    y.push_back(static_cast<Eigen::Index>(columns_.size() + o));
+  const std::vector<Eigen::Index> x(columns.begin(), columns.end());
+  const std::vector<Eigen::Index> y = outputs_of(*this);
   Eigen::MatrixXd sums(static_cast<Eigen::Index>(tests_), static_cast<Eigen::Index>(y.size()));
   for (std::size_t f = 0; f < tests_; ++f) {
     const Eigen::MatrixXd train = equations_.total - equations_.folds[f];

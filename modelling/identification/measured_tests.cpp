@@ -53,6 +53,7 @@ std::vector<std::string> usable_places(const std::vector<RunFile>& runs,
 TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
                  const std::vector<std::string>& outputs) {
   std::vector<const std::vector<double>*> columns;
+  columns.reserve(places.size() + outputs.size());
   for (const auto& name : places) columns.push_back(&run.column(name));
   for (const auto& name : outputs) columns.push_back(&run.column(name));
   std::vector<std::size_t> rows;

@@ -39,7 +39,7 @@ inline MeasuredTests grouped_places(const std::vector<std::size_t>& sizes, doubl
     run.places_K.resize(rows, static_cast<Eigen::Index>(group_of.size()));
     std::vector<double> state(sizes.size(), 0.0);
     const double spindle = 4.0 + static_cast<double>(t % 3) * 4.0;
-    const double coolant = -2.0 + static_cast<double>(t / 3) * 3.0;
+    const double coolant = -2.0 + std::floor(static_cast<double>(t) / 3.0) * 3.0;
     const double room = 1.0 + static_cast<double>((t * 2) % 3);
     for (Eigen::Index row = 0; row < rows; ++row) {
       const bool running = row % 200 < 150;

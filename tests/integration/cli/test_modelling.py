@@ -1,0 +1,100 @@
+"""plan, group, fit and tiebar as their users meet them: answers, files, exit statuses."""
+import csv
+import json
+import math
+import pathlib
+import random
+
+import pytest
+
+from conftest import PROGRAM, SOURCE, run
+
+EXAMPLES = SOURCE / "config" / "examples"
+
+pytestmark = pytest.mark.skipif(
+    not (pathlib.Path(PROGRAM).parent / "thermocomp-modelling").exists(),
+    reason="thermocomp-modelling is not in this build")
+
+
+def write_tests(folder, count=4):
+    """Runs of three places: t1 and t2 alike, t3 slow; z = 5 t1 - 2 t3."""
+    files = []
+    chance = random.Random(3)
+    for test in range(count):
+        quick = slow = 0.0
+        rows = []
+        for minute in range(240):
+            heat = (6.0 + 2 * test) * (minute % 80 < 60) + math.sin(0.02 * minute + test)
+            quick += (heat - quick) / 10
+            slow += (quick - slow) / 60
+            noise = [chance.gauss(0, sd_K) for sd_K in (0.01, 0.05, 0.01)]
+            rows.append([60 * minute, 20 + quick + noise[0], 21 + 0.7 * quick + noise[1],
+                         19 + slow + noise[2],
+                         5 * quick - 2 * slow + chance.gauss(0, 0.2)])
+        files.append(folder / f"test_{test}.csv")
+        with files[-1].open("w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["time_s", "t1_degC", "t2_degC", "t3_degC", "z_um"])
+            writer.writerows(rows)
+    return files
+
+
+def test_plan_writes_a_sheet_and_a_run_file_for_each_test(tmp_path):
+    answer = run("plan", EXAMPLES / "factors.toml", "--json", "--out", tmp_path / "tests")
+    assert answer.returncode == 0, answer.stderr
+    plan = json.loads(answer.stdout)
+    assert plan["strength"] == 2 and plan["pairs"]["covered"] == plan["pairs"]["possible"]
+    assert len(plan["tests"]) == 9
+    files = sorted(path.name for path in (tmp_path / "tests").iterdir())
+    assert files == ["plan.csv", "sheet.md"] + [f"test_{i:02}.csv" for i in range(1, 10)]
+    again = run("plan", EXAMPLES / "factors.toml", "--out", tmp_path / "tests")
+    assert again.returncode == 2 and "nothing is written" in again.stderr
+
+
+def test_group_names_places_that_move_alike(tmp_path):
+    answer = run("group", *write_tests(tmp_path), "--json", "--picture", tmp_path / "groups.svg")
+    assert answer.returncode == 0, answer.stderr
+    assert json.loads(answer.stdout)["groups"] == [["t1_degC", "t2_degC"], ["t3_degC"]]
+    assert (tmp_path / "groups.svg").read_text().count("<rect") == 1 + 9 + 2
+
+
+def test_fit_finds_the_equation_and_its_model_predicts(tmp_path):
+    files = write_tests(tmp_path)
+    model = tmp_path / "model.toml"
+    answer = run("fit", *files, "--outputs", "z_um", "--terms", "2", "-o", model, "--json",
+                 "--report", tmp_path / "fit.html")
+    assert answer.returncode == 0, answer.stderr
+    said = json.loads(answer.stdout)
+    assert said["inputs"] == ["t1_degC", "t3_degC"]
+    assert said["left_out_rms_um"]["z_um"] < 0.5
+    coefficients = {term["place"]: term["um_per_K"] for term in said["terms"]["z_um"]}
+    assert coefficients["t1_degC"] == pytest.approx(5, abs=0.1)
+    assert coefficients["t3_degC"] == pytest.approx(-2, abs=0.1)
+    assert "<svg" in (tmp_path / "fit.html").read_text()
+    predicted = run("predict", "--model", model, files[0], "-o", tmp_path / "out.csv")
+    assert predicted.returncode == 0 and float(predicted.stderr.split()[1]) < 0.6
+
+
+def test_tiebar_gives_both_coefficients(tmp_path):
+    answer = run("tiebar", EXAMPLES / "gate_machine.toml", "--json", "--ratio", "0.2",
+                 "--curves", tmp_path / "curves.svg")
+    assert answer.returncode == 0, answer.stderr
+    said = json.loads(answer.stdout)
+    assert set(said) >= {"Ki_um_per_K", "Kc_um_per_K", "best_tie_height_mm"}
+    assert (tmp_path / "curves.svg").read_text().startswith("<svg")
+
+
+@pytest.mark.parametrize("arguments, names", [
+    (("fit", "@run", "--outputs", "y_um", "-o", "@out"), "y_um"),
+    (("fit", "@run", "--outputs", "z_um", "--terms", "0..9", "-o", "@out"), "--terms"),
+    (("fit", "@run", "--outputs", "t1_degC", "-o", "@out"), "displacement"),
+    (("group", "@none"), "none.csv"),
+    (("plan", "@run"), "test_0.csv"),
+    (("tiebar", "@run"), "test_0.csv"),
+])
+def test_bad_use_and_bad_input_are_refused(tmp_path, arguments, names):
+    places = {"@run": write_tests(tmp_path, 1)[0], "@out": tmp_path / "model.toml",
+              "@none": tmp_path / "none.csv"}
+    answer = run(*(places.get(word, word) for word in arguments))
+    assert answer.returncode == 2 and names in answer.stderr, answer.stderr
+    assert not (tmp_path / "model.toml").exists()
