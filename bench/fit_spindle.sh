@@ -9,7 +9,10 @@ run=$data/hours_00_32.csv
 tool=$THERMOCOMP_BENCH_BUILD/bin/thermocomp
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-rms() { "$tool" predict --model "$1" "$run@86760:" -o "$out/p.csv" 2>&1 | awk -v c="$2" '$1 == c { print $2 }'; }
+rms() {
+  "$tool" predict --model "$1" "$run@86760:" -o "$out/p.csv" 2>&1 |
+    awk -v c="$2" '$1 == c { print $2 }'
+}
 for channel in ch1_um ch2_um ch3_um ch4_um ch5_um; do
   echo "static_model_$channel $(rms "$data/static_model.toml" $channel) um"
   "$tool" fit "$run@:86760" --outputs $channel --terms 4 -o "$out/m.toml" > "$out/said"

@@ -160,7 +160,7 @@ ElementMatrices GateFe::Parts::matrices_of(const Eigen::Matrix3d& elastic, doubl
     const Eigen::Matrix<double, 8, 1> dx = shape.slope.col(0) / half_x;
     const Eigen::Matrix<double, 8, 1> dy = shape.slope.col(1) / half_y;
     Eigen::Matrix<double, 3, 16> strain = Eigen::Matrix<double, 3, 16>::Zero();
-    for (int i = 0; i < 8; ++i) {
+    for (Eigen::Index i = 0; i < 8; ++i) {
       strain(0, 2 * i) = strain(2, 2 * i + 1) = dx[i];
       strain(1, 2 * i + 1) = strain(2, 2 * i) = dy[i];
     }
@@ -246,7 +246,7 @@ double GateFe::Parts::at_middle(const Vector& field, double height) const {
 Vector GateFe::Parts::influence(double at) const {
   const double place = std::min(at / height_m * up, static_cast<double>(up));
   const int below = std::min(static_cast<int>(place), up - 1);
-  Vector force = Vector::Zero(2 * nodes);
+  Vector force = Vector::Zero(Eigen::Index{2} * nodes);
   force[Eigen::Index{2} * node(across, 2 * below)] = 1 - (place - below);
   force[Eigen::Index{2} * node(across, 2 * below + 2)] = place - below;
   return solver.solve(force);
