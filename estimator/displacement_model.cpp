@@ -1,8 +1,8 @@
 #include "estimator/displacement_model.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <array>
+#include <cmath>
 
 #include <Eigen/Core>
 

@@ -31,8 +31,8 @@ void CovarianceGrowth::validate(std::size_t inputs) const {
   require(noise_K > 0 && noise_K <= 10, "covariance.noise_K", noise_K, "must be in (0, 10]");
   require(drift_time_s >= 0 && drift_time_s <= 1e9, "covariance.drift_time_s", drift_time_s,
           "must be in [0, 1e9]");
-  require(scatter_time_s >= 0 && scatter_time_s <= 1e9, "covariance.scatter_time_s",
-          scatter_time_s, "must be in [0, 1e9]");
+  require(scatter_time_s >= 0 && scatter_time_s <= 1e9, "covariance.scatter_time_s", scatter_time_s,
+          "must be in [0, 1e9]");
   const auto check = [inputs](const std::vector<double>& factors, const char* key) {
     require(factors.empty() || factors.size() == inputs, key, static_cast<double>(factors.size()),
             "must have one value an input");

@@ -38,11 +38,11 @@ inline constexpr double drift_factor_default = 2.0;
 
 /// `[covariance]` beside its matrix: how the error of an estimated input grows (LostBlocks).
 struct CovarianceGrowth {
-  double noise_K{0.02};              ///< of a block's temperature; keeps the matrix regular
-  double drift_time_s{0.0};          ///< 0: at once
-  double scatter_time_s{0.0};        ///< 0: at once
-  std::vector<double> drift_factor;  ///< one an input; empty: drift_factor_default
-  std::vector<double> scatter_factor;  ///< one an input; empty: 0
+  double noise_K{0.02};                     ///< of a block's temperature; keeps the matrix regular
+  double drift_time_s{0.0};                 ///< 0: at once
+  double scatter_time_s{0.0};               ///< 0: at once
+  std::vector<double> drift_factor;         ///< one an input; empty: drift_factor_default
+  std::vector<double> scatter_factor;       ///< one an input; empty: 0
   void validate(std::size_t inputs) const;  ///< @throws InvalidValue
 };
 

@@ -123,6 +123,7 @@ class RawClient {
   std::string input_;
 };
 
-inline constexpr const char* status_request = "{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"status\"}\n";
+inline constexpr const char* status_request =
+    "{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"status\"}\n";
 
 }  // namespace thermocomp::testing
