@@ -147,7 +147,7 @@ def shell(tmp_path):
     ("thermocomp fit mach", "thermocomp fit machine.toml"),
     ("thermocompd --ver", "thermocompd --version"),
     ("thermocompd mach", "thermocompd machine.toml"),
-    ("thermocomp-modelling pl", "thermocomp-modelling place"),
+    ("thermocomp-modelling plac", "thermocomp-modelling place"),
     ("thermocomp-modelling diagnose --mod", "thermocomp-modelling diagnose --model"),
     ("thermocomp-modelling diagnose --model mach",
      "thermocomp-modelling diagnose --model machine.toml"),
