@@ -109,7 +109,9 @@ TEST_CASE("a place that is the sum of two others is not taken up beside both", "
   SubsetOptions options;
   options.terms_min = options.terms_max = 3;
   options.kept = 1000;
-  for (const Subset& subset : search_subsets(normal_equations(tests, 0.0), options).best[3])
+  const SubsetSearch search = search_subsets(normal_equations(tests, 0.0), options);
+  REQUIRE_FALSE(search.best[3].empty());
+  for (const Subset& subset : search.best[3])
     CHECK(subset.places != std::vector<std::size_t>{5, 6, 7});
 }
 
