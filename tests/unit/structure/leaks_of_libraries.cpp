@@ -1,0 +1,12 @@
+// What the leak sanitizer is to leave alone: OpenCASCADE, which reads STEP files behind Gmsh, keeps
+// some tables until the process ends.
+
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): the sanitizer's names
+extern "C" const char* __lsan_default_suppressions() {
+  return "leak:libTK";
+}
+
+extern "C" const char* __lsan_default_options() {
+  return "print_suppressions=0";
+}
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
