@@ -159,7 +159,8 @@ PetscErrorCode make_matrix(const System& system, const LocalRows& rows, Mat& mat
   PetscScalar* values = nullptr;
   PetscCall(VecGetArray(coordinates, &values));
   for (PetscInt i = 0; i < local; ++i) {
-    values[i] = system.coordinates_m[static_cast<std::size_t>(rows.first + i)];
+    const auto row = static_cast<std::size_t>(rows.first) + static_cast<std::size_t>(i);
+    values[i] = system.coordinates_m[row];
   }
   PetscCall(VecRestoreArray(coordinates, &values));
   MatNullSpace motions = nullptr;

@@ -86,7 +86,11 @@ TEST_CASE("a model file keeps all but its old covariance, comments too", "[cli][
   const std::string tail =
       "\n[[term]] # t\nkind = \"thermal_lag\"\nsubject = \"a_degC\"\ntau_s = 9.0\n"
       "gain_um_per_K = { z_um = 1.0 }\n";
-  for (const std::string& text : {head, head + old, head + old + tail}) {
+  std::string with_old = head;
+  with_old.append(old);
+  std::string with_tail = with_old;
+  with_tail.append(tail);
+  for (const std::string& text : {head, with_old, with_tail}) {
     ThermalModel model = parse_model(text, "m");
     model.covariance_K2 = {{5.0, 1.0}, {1.0, 6.0}};
     model.covariance_growth.drift_factor = {2.5, 3.5};
