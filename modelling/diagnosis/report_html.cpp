@@ -6,6 +6,7 @@
 #include "modelling/diagnosis/report_data.hpp"
 #include "modelling/diagnosis/report_texts.hpp"
 #include "modelling/diagnosis/svg_plot.hpp"
+#include "modelling/markup/xml_text.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -32,7 +33,7 @@ std::string fixed(double value, int digits = 2) {
 std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
   std::string html = "<tr>";
   for (const std::string& cell : cells) {
-    html.append("<").append(tag).append(">").append(escaped(cell));
+    html.append("<").append(tag).append(">").append(xml_text(cell));
     html.append("</").append(tag).append(">");
   }
   return html + "</tr>\n";
@@ -80,10 +81,10 @@ std::string gains_table(const Diagnosis& diagnosis) {
 }
 
 std::string finding_html(const NamedFinding& finding, std::size_t number) {
-  std::string html = "<h3>" + std::to_string(number) + ". " + escaped(finding.cause) + " of " +
-                     escaped(finding.subject) + "</h3><p>" + escaped(sentence_of(finding)) +
-                     "</p><p>Evidence: " + escaped(finding.evidence) +
-                     ".</p><p><b>What to do.</b> " + escaped(what_to_do(finding)) + "</p>\n";
+  std::string html = "<h3>" + std::to_string(number) + ". " + xml_text(finding.cause) + " of " +
+                     xml_text(finding.subject) + "</h3><p>" + xml_text(sentence_of(finding)) +
+                     "</p><p>Evidence: " + xml_text(finding.evidence) +
+                     ".</p><p><b>What to do.</b> " + xml_text(what_to_do(finding)) + "</p>\n";
   if (!finding.test.empty()) {
     html += "<table>" + row({"output", "test RMS before", "after", "taken", "95 %"}, "th");
     for (const auto& [output, gain] : finding.test)
@@ -95,9 +96,9 @@ std::string finding_html(const NamedFinding& finding, std::size_t number) {
   for (const Alternative& other : finding.alternatives) {
     if (other.relative_support < support_told_min) continue;
     html +=
-        "<p>These data do not rule out " + escaped(other.cause) + " of " + escaped(other.subject) +
-        " (support " + fixed(other.relative_support) +
-        " of that of the finding). What would tell: " + escaped(experiment_for(finding, other)) +
+        "<p>These data do not rule out " + xml_text(other.cause) + " of " +
+        xml_text(other.subject) + " (support " + fixed(other.relative_support) +
+        " of that of the finding). What would tell: " + xml_text(experiment_for(finding, other)) +
         "</p>\n";
   }
   return html;
@@ -172,7 +173,7 @@ std::string scatters(const ReportRun& run, const ReportData& report, std::size_t
 }
 
 std::string run_html(const ReportRun& run, const ReportData& report) {
-  std::string html = "<h2>" + escaped(run.name) + (run.test ? " (test)" : " (training)") + "</h2>";
+  std::string html = "<h2>" + xml_text(run.name) + (run.test ? " (test)" : " (training)") + "</h2>";
   for (std::size_t output = 0; output < report.outputs.size(); ++output) {
     html += line_plot(report.outputs[output] + ": measured - model", run.time_s,
                       {{"model", "#c53030", &run.before_um[output]},

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "modelling/markup/xml_text.hpp"
+
 namespace thermocomp::diagnosis {
 namespace {
 
@@ -50,7 +52,7 @@ std::string number(double value) {
 std::string label(double x, double y, const std::string& text, const char* attributes = "") {
   std::string svg = "<text x=\"" + number(x);
   svg.append("\" y=\"").append(number(y)).append("\" ").append(attributes).append(">");
-  return svg.append(escaped(text)).append("</text>");
+  return svg.append(xml_text(text)).append("</text>");
 }
 
 double vertical(double value, const Range& y) {
@@ -69,24 +71,6 @@ std::string frame(const std::string& title, double whole_width, const Range& y) 
 }
 
 }  // namespace
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else if (c == '&') {
-      out += "&amp;";
-    } else if (c == '"') {
-      out += "&quot;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
 
 std::string line_plot(const std::string& title, const Column& time_s,
                       const std::vector<PlotLine>& lines) {

@@ -19,7 +19,5 @@ struct PlotLine {
                                     const std::vector<PlotLine>& lines);
 /// Dots of y over x.
 [[nodiscard]] std::string scatter_plot(const std::string& title, const Column& x, const Column& y);
-/// The text with the characters that HTML keeps for itself replaced.
-[[nodiscard]] std::string escaped(const std::string& text);
 
 }  // namespace thermocomp::diagnosis

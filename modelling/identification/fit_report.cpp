@@ -7,6 +7,7 @@
 #include "modelling/identification/fit.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/identification/svg.hpp"
+#include "modelling/markup/xml_text.hpp"
 
 namespace thermocomp::identification {
 namespace {

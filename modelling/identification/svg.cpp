@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "modelling/identification/printed.hpp"
+#include "modelling/markup/xml_text.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -121,24 +122,6 @@ std::string shade(double value) {
 }
 
 }  // namespace
-
-std::string xml_text(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&') {
-      result += "&amp;";
-    } else if (c == '<') {
-      result += "&lt;";
-    } else if (c == '>') {
-      result += "&gt;";
-    } else if (c == '"') {
-      result += "&quot;";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
 
 std::string svg_of(const Diagram& diagram) {
   const Axes axes(diagram);

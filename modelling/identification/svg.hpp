@@ -39,7 +39,4 @@ struct HeatMap {
 };
 [[nodiscard]] std::string svg_of(const HeatMap& map);
 
-/// Text with &, <, > and " as XML wants them.
-[[nodiscard]] std::string xml_text(const std::string& text);
-
 }  // namespace thermocomp::identification

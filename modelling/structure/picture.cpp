@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <numeric>
 
+#include "modelling/markup/xml_text.hpp"
+
 namespace thermocomp::structure {
 namespace {
 
@@ -25,20 +27,6 @@ std::string colour(Index block, double light) {
   char text[40];
   std::snprintf(text, sizeof text, "hsl(%.0f,55%%,%.0f%%)", hue, 38.0 + 34.0 * light);
   return text;
-}
-
-std::string xml(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&') {
-      result += "&amp;";
-    } else if (c == '<') {
-      result += "&lt;";
-    } else {
-      result += c;
-    }
-  }
-  return result;
 }
 
 class Picture {
@@ -64,7 +52,7 @@ class Picture {
     body_ += text;
     draw_faces(points);
     std::snprintf(text, sizeof text, "<text x=\"%.0f\" y=\"%.0f\">", margin_px, panel_px - 8.0);
-    body_.append(text).append(xml(title));
+    body_.append(text).append(xml_text(title));
     if (factor > 0.0) {
       std::snprintf(text, sizeof text, " +1 K, displacement x %.2g", factor);
       body_ += text;

@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include "modelling/markup/xml_text.hpp"
+
 namespace thermocomp::structure {
 namespace {
 
@@ -18,23 +20,6 @@ int cell_type(Shape shape) {
   }
 }
 
-/// Text in XML attributes.
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&') {
-      result += "&amp;";
-    } else if (c == '<') {
-      result += "&lt;";
-    } else if (c == '"') {
-      result += "&quot;";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
-
 /// Arrays stand behind the XML as raw bytes, each after its size; the XML holds their offsets.
 class Appended {
  public:
@@ -42,7 +27,7 @@ class Appended {
   std::string array(const char* type, const std::string& name, int components,
                     const std::vector<T>& values) {
     std::string tag = "<DataArray type=\"";
-    tag.append(type).append("\" Name=\"").append(escaped(name));
+    tag.append(type).append("\" Name=\"").append(xml_text(name));
     tag.append("\" NumberOfComponents=\"").append(std::to_string(components));
     tag.append("\" format=\"appended\" offset=\"").append(std::to_string(bytes_.size()));
     tag.append("\"/>\n");

@@ -116,7 +116,7 @@ def test_faults_commands_reloads_and_power_cuts_are_replayed_bit_for_bit(lab):
             committed = count_rows(daemon.history)
             daemon.kill()
             after = count_rows(daemon.history)
-            assert all(now >= before for now, before in zip(after, committed))
+            assert all(kept >= had for had, kept in zip(committed, after))
             assert_replays_exactly(daemon.history, lab.folder / "cut.csv")
             daemon.start()
         turn += 1

@@ -179,7 +179,7 @@ def test_history_survives_a_power_cut_and_replays_exactly(machine, lab):
         committed = count_rows(daemon.history)
         daemon.kill()
         after = count_rows(daemon.history)
-        assert all(now >= before for now, before in zip(after, committed))
+        assert all(kept >= had for had, kept in zip(committed, after))
         assert_replays_exactly(daemon.history, lab.folder / "out.csv")
         machine.start()
     daemon.end()

@@ -1,0 +1,23 @@
+#include "modelling/markup/xml_text.hpp"
+
+namespace thermocomp {
+
+std::string xml_text(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '&') {
+      result += "&amp;";
+    } else if (c == '<') {
+      result += "&lt;";
+    } else if (c == '>') {
+      result += "&gt;";
+    } else if (c == '"') {
+      result += "&quot;";
+    } else {
+      result += c;
+    }
+  }
+  return result;
+}
+
+}  // namespace thermocomp
