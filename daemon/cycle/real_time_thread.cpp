@@ -5,7 +5,6 @@
 #include <cstring>
 #include <malloc.h>
 #include <sched.h>
-#include <time.h>
 
 #include <sys/mman.h>
 

@@ -99,7 +99,8 @@ class Shell:
                  "bind 'set enable-bracketed-paste off'; bind 'set completion-query-items 0'\n")
         for program in PROGRAMS:
             self.say(f"source {MANUAL / program}.bash\n")
-        self.until("echo rea''dy\n", "ready\r\n")
+        # The prompt behind it: from then on the terminal no longer echoes what is typed.
+        self.until("echo rea''dy\n", "ready\r\n$ ")
 
     def say(self, text):
         os.write(self.master, text.encode())
