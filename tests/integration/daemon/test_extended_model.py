@@ -75,6 +75,15 @@ def late_um(times_s, rpm_max):
     return 1e-9 + HEAT_UM_PER_RPM * rpm_max * left_out_s * TIME_FACTOR / HEAT_TAU_S
 
 
+def last_row_came(temps, times_s):
+    """The cycle that read the run's last row. The machine stands still for a second then, and what
+    changes afterwards is its end: readings go, one by one, and the offsets are held."""
+    changes = np.flatnonzero(np.any(np.diff(temps, axis=0) != 0.0, axis=1)) + 1
+    still = np.flatnonzero(np.diff(times_s[changes]) > 20 * ROW_PERIOD_S)
+    after_rows = [int(i) for i in still if i > ROWS / 2]
+    return changes[after_rows[0] if after_rows else -1]
+
+
 def test_the_offsets_of_an_extended_model_are_its_prediction(lab):
     model = extended_model(lab.folder)
     bus = spindle.modbus_bus("modbus_tcp", "ABCD",
@@ -103,13 +112,8 @@ def test_the_offsets_of_an_extended_model_are_its_prediction(lab):
     offsets = spindle.offsets_um(rows, "offset")
     wanted = -np.column_stack([predicted[f"ch{i + 1}_predicted_um"] for i in range(spindle.AXES)])
     together = np.isin(rows["time_s"], predicted["time_s"])
-    # Until the last row came; a second later the machine is gone and the offsets are held, and a
-    # reading that changes that late, alone, is none of a row.
-    temps = spindle.temps_degC(rows)
     times_s = np.array(rows["time_s"])
-    changes = np.flatnonzero(np.any(np.diff(temps, axis=0) != 0.0, axis=1)) + 1
-    in_rows = changes[1:][np.diff(times_s[changes]) < 10 * ROW_PERIOD_S]
-    before_end = np.arange(len(offsets)) <= in_rows[-1]
+    before_end = np.arange(len(offsets)) <= last_row_came(spindle.temps_degC(rows), times_s)
     known = (np.all(np.isfinite(offsets), axis=1) & before_end)[together]
     offsets = offsets[together]
     difference = np.abs(offsets - wanted)[known]
