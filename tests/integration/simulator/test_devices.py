@@ -129,6 +129,17 @@ MACHINE = BODY + BUSES + CONTROLLER
 LATER_S = 1e8  # of plant time: an event that never ends in a test
 
 
+STANDING = "--start-on-heartbeat"  # the script's time stands still until begin()
+
+
+def begin(simulator):
+    """The script's time begins, which a STANDING simulator holds until then."""
+    link = simulator.connect("cnc")
+    for beat in (1, 2):
+        ask(link, 1, struct.pack(">BHH", 6, 11, beat))
+    link.close()
+
+
 def event(kind, target, more="", at_s=0.0, duration_s=LATER_S):
     duration = "" if kind == "rehome" else f"duration_s = {duration_s}\n"
     return f'[[event]]\nkind = "{kind}"\ntarget = "{target}"\nat_s = {at_s}\n{duration}{more}\n'
@@ -200,17 +211,22 @@ def test_a_renewal_register_counts_until_the_device_freezes(simulate):
     eventually(lambda: ask(link, 3, read_request(4, 9, 1)) != first, "a conversion")
     frozen = simulate(MACHINE + event("freeze", "module", at_s=0.2))
     link = frozen.connect("cabinet")
-    time.sleep(0.5)
-    first = ask(link, 3, read_request(4, 9, 1))
-    time.sleep(0.2)
-    assert ask(link, 3, read_request(4, 9, 1)) == first
+
+    def stands():
+        seen = ask(link, 3, read_request(4, 9, 1))
+        time.sleep(0.5)
+        return ask(link, 3, read_request(4, 9, 1)) == seen
+
+    eventually(stands, "no more conversions")
+    assert stands()
 
 
 def test_an_open_circuit_shows_its_code_and_status_and_ends(simulate):
-    simulator = simulate(MACHINE + event("open_circuit", "a", at_s=0.0, duration_s=1.0))
+    simulator = simulate(MACHINE + event("open_circuit", "a", at_s=0.0, duration_s=0.5), STANDING)
     link = simulator.connect("cabinet")
     assert room_of(link) == 32767
     assert ask(link, 3, read_request(2, 0, 1)) == bytes([2, 1, 1])
+    begin(simulator)
     eventually(lambda: room_of(link) == 2125, "the circuit closed again")
     assert ask(link, 3, read_request(2, 0, 1)) == bytes([2, 1, 0])
 
@@ -279,9 +295,10 @@ def closed(link):
 
 
 def test_a_rebooting_device_closes_connections_is_silent_and_comes_back(simulate):
-    simulator = simulate(MACHINE + event("reboot", "module", at_s=1.0, duration_s=1.0))
+    simulator = simulate(MACHINE + event("reboot", "module", at_s=0.2, duration_s=2.0), STANDING)
     link = simulator.connect("cabinet")
     assert room_of(link) == 2125
+    begin(simulator)
     assert closed(link)
     link = simulator.connect("cabinet")  # the coupler listens, the module does not answer
     link.sendall(request(3, read_request(4, 0, 1), 41))
@@ -306,8 +323,9 @@ def refused(simulator, name):
 
 
 def test_a_bus_without_power_refuses_connections_and_keeps_its_port(simulate):
-    simulator = simulate(MACHINE + event("reboot", "cabinet", at_s=1.0, duration_s=1.0))
+    simulator = simulate(MACHINE + event("reboot", "cabinet", at_s=0.2, duration_s=2.0), STANDING)
     assert not refused(simulator, "cabinet")
+    begin(simulator)
     eventually(lambda: refused(simulator, "cabinet"), "the bus went down")
     eventually(lambda: not refused(simulator, "cabinet"), "the bus came back")
     assert room_of(simulator.connect("cabinet")) == 2125
@@ -323,10 +341,11 @@ def applied(link):
 
 
 def test_a_controller_that_was_off_has_forgotten_its_offset(simulate):
-    simulator = simulate(MACHINE + event("reboot", "cnc", at_s=1.0, duration_s=0.5))
+    simulator = simulate(MACHINE + event("reboot", "cnc", at_s=0.2, duration_s=0.5), STANDING)
     link = simulator.connect("cnc")
     write_offset(link, 500)
     assert applied(link) == 500
+    begin(simulator)
     assert closed(link)
     eventually(lambda: not refused(simulator, "cnc"), "the controller came back")
     link = simulator.connect("cnc")
@@ -343,9 +362,11 @@ def test_a_controller_rejects_misapplies_and_loses_its_offset_by_the_script(simu
     link = simulate(MACHINE + event("misapply", "cnc", "change_um = 2.5")).connect("cnc")
     write_offset(link, 500)
     assert applied(link) == 750
-    link = simulate(MACHINE + event("rehome", "cnc", at_s=1.0)).connect("cnc")
+    simulator = simulate(MACHINE + event("rehome", "cnc", at_s=0.2), STANDING)
+    link = simulator.connect("cnc")
     write_offset(link, 500)
     assert applied(link) == 500
+    begin(simulator)
     eventually(lambda: applied(link) == 0, "the axes were homed")
     time.sleep(0.1)
     assert applied(link) == 0
