@@ -88,7 +88,7 @@ void check_controller_period(const TomlTable& compensation, const DaemonConfig& 
 /// Everything but the model's content.
 /// @return the tables that are looked at once more beside the model
 sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folder,
-                                    DaemonConfig& config) {
+                                    sections::Presets& presets, DaemonConfig& config) {
   static_cast<void>(root.integer("format", 1, 1));
   config.log_level = root.choice<std::string>("log_level",
                                               {{"trace", "trace"},
@@ -110,7 +110,7 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.sensors = sections::read_sensors(root, sensors);
   config.estimator.blocks = sections::read_blocks(tables.blocks, config.estimator.sensors);
   config.estimator.axes = sections::read_axes(tables.axes);
-  sections::SensorBuses buses = sections::read_buses(root, sensors);
+  sections::SensorBuses buses = sections::read_buses(root, sensors, presets);
   config.modbus_buses = std::move(buses.modbus);
   config.can_buses = std::move(buses.can);
   check_periods(sensors, config);
@@ -134,7 +134,8 @@ struct ModelSource {
 };
 
 template <class FindModel>
-DaemonConfig build(const TomlDocument& document, const fs::path& folder, FindModel find_model) {
+DaemonConfig build(const TomlDocument& document, const fs::path& folder, sections::Presets presets,
+                   FindModel find_model) {
   DaemonConfig config;
   config.file = document.name();
   config.text = document.text();
@@ -142,7 +143,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, FindMod
   const TomlTable model_table = root.table("model");
   config.model_file = read_path(model_table, "file", "model.toml", folder);
   if (!model_table.has("file")) model_table.problem("file", "must be given");
-  const sections::BindingTables tables = read_daemon(root, folder, config);
+  const sections::BindingTables tables = read_daemon(root, folder, presets, config);
 
   const ModelSource source = find_model(model_table, config.model_file);
   std::vector<Problem> model_problems;
@@ -159,6 +160,8 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, FindMod
     }
   }
   std::vector<Problem> problems = document.all_problems();
+  const std::vector<Problem> preset_problems = presets.problems();
+  problems.insert(problems.end(), preset_problems.begin(), preset_problems.end());
   problems.insert(problems.end(), model_problems.begin(), model_problems.end());
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
   return config;
@@ -179,14 +182,16 @@ ModelSource read_model_file(const TomlTable& model_table, const fs::path& path) 
 
 DaemonConfig load_daemon_config(const fs::path& path) {
   const TomlDocument document = TomlDocument::from_file(path);
-  return build(document, fs::absolute(path).parent_path(), read_model_file);
+  const fs::path folder = fs::absolute(path).parent_path();
+  return build(document, folder, sections::Presets(sections::preset_folders(folder)),
+               read_model_file);
 }
 
 DaemonConfig parse_daemon_config(const std::string& config_text, const std::string& config_name,
                                  const std::string& model_text, const std::string& model_name) {
   const TomlDocument document = TomlDocument::from_text(config_text, config_name);
   const fs::path folder = fs::path(config_name).parent_path();
-  return build(document, folder, [&](const TomlTable&, const fs::path&) {
+  return build(document, folder, sections::Presets({}), [&](const TomlTable&, const fs::path&) {
     return ModelSource{model_name, model_text};
   });
 }

@@ -67,7 +67,7 @@ struct DaemonConfig {
 [[nodiscard]] DaemonConfig load_daemon_config(const std::filesystem::path& path);
 
 /// The same from texts, as the history keeps them. The names stand for the files in problems; no
-/// file is opened.
+/// file is opened, so that devices with a preset are left out of the buses.
 /// @throws ConfigurationError
 [[nodiscard]] DaemonConfig parse_daemon_config(const std::string& config_text,
                                                const std::string& config_name,

@@ -1,10 +1,7 @@
 #include "config/toml_reader.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
@@ -17,7 +14,6 @@ namespace thermocomp {
 namespace {
 
 constexpr std::size_t shown_value_max = 60;
-constexpr std::uintmax_t file_bytes_max = std::uintmax_t{64} * 1024 * 1024;
 
 const toml::table* as_table(const void* node) {
   return static_cast<const toml::table*>(node);
@@ -74,21 +70,6 @@ std::string shown(const toml::node& node) {
   std::string text;
   append_shown(node, text);
   return shortened(text);
-}
-
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row[b.size()];
 }
 
 const toml::key* find_key(const toml::table& table, std::string_view name) {
@@ -178,10 +159,27 @@ TomlTable::TomlTable(std::shared_ptr<detail::TomlState> state, const void* node,
   if (node_ != nullptr) state_->opened[as_table(node_)].path = path_;
 }
 
-const void* TomlTable::find(std::string_view key) const {
+TomlTable TomlTable::over(const TomlTable& base) const {
+  TomlTable layered = *this;
+  layered.base_ = std::make_shared<const TomlTable>(base_ ? base_->over(base) : base);
+  return layered;
+}
+
+const void* TomlTable::find_own(std::string_view key) const {
   if (node_ == nullptr) return nullptr;
   state_->opened[as_table(node_)].asked.emplace(key);
   return as_table(node_)->get(key);
+}
+
+const void* TomlTable::find(std::string_view key) const {
+  const void* own = find_own(key);
+  const void* below = base_ ? base_->find(key) : nullptr;  // known there, even where hidden
+  return own != nullptr ? own : below;
+}
+
+const TomlTable& TomlTable::owner(std::string_view key) const {
+  if (!base_ || find_own(key) != nullptr) return *this;
+  return base_->find(key) != nullptr ? base_->owner(key) : *this;
 }
 
 std::string TomlTable::full(std::string_view key) const {
@@ -189,6 +187,7 @@ std::string TomlTable::full(std::string_view key) const {
 }
 
 int TomlTable::line(std::string_view key) const {
+  if (const TomlTable& table = owner(key); &table != this) return table.line(key);
   if (node_ == nullptr) return line_;
   const toml::key* found = find_key(*as_table(node_), key);
   if (found == nullptr) return line_;
@@ -197,12 +196,14 @@ int TomlTable::line(std::string_view key) const {
 }
 
 void TomlTable::problem(std::string_view key, std::string_view rule) const {
+  if (const TomlTable& table = owner(key); &table != this) return table.problem(key, rule);
   if (silent_) return;
   const void* node = find(key);
   state_->add(line(key), full(key), node == nullptr ? "(missing)" : shown(*as_node(node)), rule);
 }
 
 void TomlTable::problem(std::string_view key, std::string_view value, std::string_view rule) const {
+  if (const TomlTable& table = owner(key); &table != this) return table.problem(key, value, rule);
   if (silent_) return;
   static_cast<void>(find(key));
   state_->add(line(key), full(key), value.empty() ? "\"\"" : shortened(std::string(value)), rule);
@@ -217,6 +218,7 @@ void TomlTable::refuse(std::string_view key, std::string_view rule) const {
 }
 
 void TomlTable::ignore_rest() const {
+  if (base_) base_->ignore_rest();
   if (node_ != nullptr) state_->opened[as_table(node_)].ignore_rest = true;
 }
 
@@ -474,6 +476,7 @@ TomlTable TomlTable::table(std::string_view key) const {
 }
 
 TomlTable TomlTable::table_or_empty(std::string_view key) const {
+  if (const TomlTable& table = owner(key); &table != this) return table.table_or_empty(key);
   const void* node = find(key);
   if (node == nullptr) return {state_, nullptr, full(key), line_, silent_};
   if (!as_node(node)->is_table()) {
@@ -484,6 +487,7 @@ TomlTable TomlTable::table_or_empty(std::string_view key) const {
 }
 
 std::vector<TomlTable> TomlTable::tables(std::string_view key) const {
+  if (const TomlTable& table = owner(key); &table != this) return table.tables(key);
   std::vector<TomlTable> result;
   for_each_element(key, false, "tables", [&](const void* element, std::size_t position) {
     const toml::table* table = as_node(element)->as_table();
@@ -562,39 +566,6 @@ std::vector<Problem> TomlDocument::all_problems() const {
 void TomlDocument::finish() const {
   std::vector<Problem> problems = all_problems();
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
-}
-
-// ---------------------------------------------------------------- helpers
-
-std::string read_text_file(const std::filesystem::path& path) {
-  const auto refuse = [&](const std::string& rule) {
-    throw ConfigurationError({{path.string(), 0, "", "", rule}});
-  };
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) refuse("no such file");
-  if (!std::filesystem::is_regular_file(status)) refuse("must be a regular file");
-  const auto size = std::filesystem::file_size(path, error);
-  if (error) refuse("cannot be read: " + error.message());
-  if (size > file_bytes_max) refuse("must have at most 64 MB");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) refuse(std::string("cannot be opened: ") + std::strerror(errno));
-  std::string text(static_cast<std::size_t>(size), '\0');
-  file.read(text.data(), static_cast<std::streamsize>(size));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  return text;
-}
-
-std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
-  std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
-  std::string nearest;
-  for (const std::string& candidate : known) {
-    const std::size_t distance = edit_distance(name, candidate);
-    if (distance >= best || distance >= name.size()) continue;
-    best = distance;
-    nearest = candidate;
-  }
-  return nearest;
 }
 
 }  // namespace thermocomp

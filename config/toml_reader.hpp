@@ -118,6 +118,11 @@ class TomlTable {
   /// `[[key]]`, at least one.
   [[nodiscard]] std::vector<TomlTable> tables_required(std::string_view key) const;
 
+  /// This table over `base`: a key that is not here is looked for there, and what is said about it
+  /// names the file and the line where it stands. Nested tables are not merged; keys() is as
+  /// before.
+  [[nodiscard]] TomlTable over(const TomlTable& base) const;
+
   /// Whether the key stands there. Marks it as known.
   [[nodiscard]] bool has(std::string_view key) const;
   /// Whether the value is of this sort; false if absent. Marks the key as known.
@@ -163,6 +168,8 @@ class TomlTable {
                                          const std::vector<std::string_view>& names,
                                          std::optional<std::size_t> otherwise) const;
   [[nodiscard]] const void* find(std::string_view key) const;  ///< marks; nullptr: absent
+  [[nodiscard]] const void* find_own(std::string_view key) const;
+  [[nodiscard]] const TomlTable& owner(std::string_view key) const;  ///< where it stands, or this
   [[nodiscard]] std::string full(std::string_view key) const;
   [[nodiscard]] TomlTable child(std::string_view key, const void* node, std::string path) const;
   [[nodiscard]] TomlTable silent_child(std::string_view key) const;
@@ -176,6 +183,7 @@ class TomlTable {
   std::string path_;
   int line_;
   bool silent_;
+  std::shared_ptr<const TomlTable> base_;  ///< of over()
 };
 
 class TomlDocument {

@@ -25,7 +25,13 @@ struct Device {
   std::size_t index{0};  ///< in its bus
   TomlTable table;
   bool used{false};
+  const Preset* preset{nullptr};
 };
+
+/// What a preset must have been written for.
+std::string protocol_of(BusKind kind) {
+  return kind == BusKind::can ? "can" : "modbus";
+}
 
 std::string known(const auto& entries) {
   std::string text;
@@ -35,7 +41,7 @@ std::string known(const auto& entries) {
 
 class BusReader {
  public:
-  explicit BusReader(const TomlTable& root) : root_(root) {}
+  BusReader(const TomlTable& root, Presets& presets) : root_(root), presets_(presets) {}
 
   SensorBuses read(const std::vector<TomlTable>& sensors) {
     std::set<std::string> bus_names;
@@ -104,19 +110,26 @@ class BusReader {
     return bus;
   }
 
-  void read_device(const TomlTable& table, std::set<std::string>& names) {
-    const std::string name = unique_name(table, names);
-    const std::string bus_name = table.text("bus");
+  void read_device(const TomlTable& own, std::set<std::string>& names) {
+    const std::string name = unique_name(own, names);
+    const std::string bus_name = own.text("bus");
     const auto bus = buses_.find(bus_name);
-    Device device{BusKind::unknown, 0, 0, table, false};
+    Device device{BusKind::unknown, 0, 0, own, false};
+    device.preset = presets_.of_device(own);
     if (bus == buses_.end()) {
       misnamed_bus_ = true;
-      if (!bus_name.empty()) table.problem("bus", "must name a bus: " + known(buses_));
+      if (!bus_name.empty()) own.problem("bus", "must name a bus: " + known(buses_));
+    } else if (own.has("preset") && device.preset == nullptr) {
+      bus->second.used = true;  // what the device is like is not known
     } else {
       bus->second.used = true;
       device.kind = bus->second.kind;
       device.bus = bus->second.index;
+      if (device.preset != nullptr) {
+        device.table = Presets::over_preset(own, *device.preset, protocol_of(device.kind));
+      }
     }
+    const TomlTable& table = device.table;
     if (device.kind == BusKind::unknown) {
       table.ignore_rest();
     } else if (device.kind == BusKind::can) {
@@ -148,17 +161,20 @@ class BusReader {
     return device;
   }
 
-  void read_channel(const TomlTable& sensor, std::size_t index) {
-    const std::string device_name = sensor.text("device");
+  void read_channel(const TomlTable& own, std::size_t index) {
+    const std::string device_name = own.text("device");
     const auto found = devices_.find(device_name);
     if (found == devices_.end()) {
       misnamed_device_ = true;
-      if (!device_name.empty()) sensor.problem("device", "must name a device: " + known(devices_));
-      sensor.ignore_rest();
+      if (!device_name.empty()) own.problem("device", "must name a device: " + known(devices_));
+      own.ignore_rest();
       return;
     }
     Device& device = found->second;
     device.used = true;
+    const bool preset = device.preset != nullptr && device.kind != BusKind::unknown;
+    const TomlTable sensor =
+        preset ? Presets::over_channel(own, device.table, *device.preset) : own;
     if (device.kind == BusKind::unknown) {
       sensor.ignore_rest();
     } else if (device.kind == BusKind::can) {
@@ -187,6 +203,7 @@ class BusReader {
   }
 
   TomlTable root_;
+  Presets& presets_;
   SensorBuses result_;
   std::map<std::string, Bus> buses_;
   std::map<std::string, Device> devices_;
@@ -197,8 +214,9 @@ class BusReader {
 
 }  // namespace
 
-SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors) {
-  return BusReader(root).read(sensors);
+SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors,
+                       Presets& presets) {
+  return BusReader(root, presets).read(sensors);
 }
 
 }  // namespace thermocomp::sections

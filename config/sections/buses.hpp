@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "config/sections/presets.hpp"
 #include "config/toml_reader.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
 
@@ -17,6 +18,8 @@ struct SensorBuses {
 };
 
 /// @param sensors  the [[sensor]] tables in order; their channels get these indices
-[[nodiscard]] SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors);
+/// @param presets  whose problems are the caller's to tell
+[[nodiscard]] SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors,
+                                     Presets& presets);
 
 }  // namespace thermocomp::sections

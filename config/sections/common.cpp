@@ -7,10 +7,11 @@ namespace thermocomp::sections {
 
 std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base, std::int64_t low,
                                  std::int64_t high) {
-  constexpr std::array<std::pair<std::string_view, Fault>, 4> lists{{
+  constexpr std::array<std::pair<std::string_view, Fault>, 5> lists{{
       {"open_circuit_codes", Fault::open_circuit},
       {"short_circuit_codes", Fault::short_circuit},
       {"over_range_codes", Fault::out_of_range},
+      {"under_range_codes", Fault::out_of_range},
       {"error_codes", Fault::device_error},
   }};
   std::vector<Sentinel> sentinels;

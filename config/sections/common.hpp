@@ -37,7 +37,8 @@ inline std::string unique_name(const TomlTable& table, std::set<std::string>& se
 }
 
 /// The codes of `[low, high]` that are messages and no values, by the lists open_circuit_codes,
-/// short_circuit_codes, over_range_codes and error_codes; a list in `own` replaces that of `base`.
+/// short_circuit_codes, over_range_codes, under_range_codes and error_codes; a list in `own`
+/// replaces that of `base`.
 [[nodiscard]] std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base,
                                                std::int64_t low, std::int64_t high);
 

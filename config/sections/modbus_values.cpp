@@ -150,18 +150,37 @@ std::uint16_t read_address(const TomlTable& table) {
   return static_cast<std::uint16_t>(table.integer("address", 0, address_max));
 }
 
-ModbusStatus read_status(const TomlTable& table) {
+/// Values of the status that say that all is well although they are not 0.
+void read_good_codes(const TomlTable& table, std::int64_t high, ModbusStatus& status) {
+  for (const std::int64_t code : table.integers("good_codes", 0, high, {})) {
+    for (const Sentinel& listed : status.codes) {
+      if (listed.code != code) continue;
+      table.problem("good_codes", std::to_string(code), "must not be the code of a fault too");
+    }
+    status.codes.push_back({code, Fault::none});
+  }
+}
+
+/// @param base_address  where the device's registers begin; bits do not move with them
+ModbusStatus read_status(const TomlTable& table, int base_address) {
   ModbusStatus status;
   status.table = table.choice("table", all_tables());
   status.address = read_address(table);
   if (is_bit(status.table)) {
     table.refuse("mask", "makes no sense for a bit");
     status.codes = read_codes(table, table, 0, 1);
+    read_good_codes(table, 1, status);
     return status;
+  }
+  if (status.address + base_address > address_max) {
+    table.problem("address", "would pass register 65535 with the device's base_address");
+  } else {
+    status.address = static_cast<std::uint16_t>(status.address + base_address);
   }
   const int mask = table.integer("mask", 1, 0xFFFF, 0xFFFF);
   status.mask = static_cast<std::uint16_t>(mask);
   status.codes = read_codes(table, table, 0, 0xFFFF);
+  read_good_codes(table, 0xFFFF, status);
   for (const Sentinel& code : status.codes) {
     if ((code.code & ~static_cast<std::int64_t>(mask)) != 0) {
       table.problem("mask", "hides bits of the code " + std::to_string(code.code));
@@ -246,12 +265,14 @@ ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& devi
   channel.scale = read_scale(sensor, read_scale(device, channel.scale));
   channel.offset_degC = sensor.number("offset_degC", Range::between(-1e4, 1e4),
                                       device.number("offset_degC", Range::between(-1e4, 1e4), 0));
-  channel.address = read_address(sensor);
-  check_address(sensor, channel.address, registers(channel.encoding));
+  const int base_address = device.integer("base_address", 0, address_max, 0);
+  const int address = base_address + read_address(sensor);
+  check_address(sensor, address, registers(channel.encoding));
+  channel.address = static_cast<std::uint16_t>(std::min(address, address_max));
   const Codes codes = codes_of(channel.encoding);
   channel.sentinels = read_codes(sensor, device, codes.low, codes.high);
-  if (device.has("status")) channel.status = read_status(device.table("status"));
-  if (sensor.has("status")) channel.status = read_status(sensor.table("status"));
+  if (device.has("status")) channel.status = read_status(device.table("status"), base_address);
+  if (sensor.has("status")) channel.status = read_status(sensor.table("status"), base_address);
   refuse_all(sensor, {"id", "start_bit", "length_bits", "byte_order", "extended_id"},
              "makes no sense on a Modbus bus");
   return channel;
