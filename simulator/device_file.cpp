@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <map>
-#include <set>
 
+#include "config/sections/presets.hpp"
 #include "drivers/can/signal_codec.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"
+#include "simulator/fault_codes.hpp"
 #include "simulator/machine_file_parts.hpp"
+#include "simulator/scripted_events.hpp"
 
 namespace thermocomp {
 namespace {
@@ -28,12 +30,9 @@ const Names<WordOrder> order_names{{"ABCD", WordOrder::abcd},
 class Occupied {
  public:
   /// @return whether all of them were free; takes them
-  bool take(int unit, ModbusTable table, std::size_t address, std::size_t count) {
-    bool free = true;
-    for (std::size_t i = 0; i < count; ++i) {
-      free = words_.insert({unit, static_cast<int>(table), address + i}).second && free;
-    }
-    return free;
+  bool take(int unit, ModbusTable table, std::size_t address, std::size_t count,
+            std::uint16_t mask = 0xFFFF) {
+    return words_.take(unit, table, address, count, mask);
   }
   bool take(const CanSignal& signal) {
     std::uint64_t& bits = frames_[{signal.id, signal.extended_id}];
@@ -43,7 +42,7 @@ class Occupied {
   }
 
  private:
-  std::set<std::tuple<int, int, std::size_t>> words_;
+  RegistersTaken words_;
   std::map<std::pair<std::uint32_t, bool>, std::uint64_t> frames_;
 };
 
@@ -116,26 +115,9 @@ CanSignal read_can(const TomlTable& table, CanUse use) {
   return signal;
 }
 
-std::optional<std::int64_t> read_open_circuit_code(const TomlTable& table) {
-  const auto codes = table.integers("open_circuit_codes", -4294967296LL, 4294967295LL,
-                                    std::vector<std::int64_t>{});
-  if (codes.size() > 1) table.problem("open_circuit_codes", "must be the one code that is shown");
-  return codes.empty() ? std::nullopt : std::optional(codes.front());
-}
-
-ModbusStatus read_status(const TomlTable& table, ModbusTable otherwise) {
-  ModbusStatus status;
-  status.table = table.choice("table", table_names, otherwise);
-  status.address = table.integer<std::uint16_t>("address", 0, 65535);
-  const bool bit = is_bit_table(status.table);
-  if (bit) {
-    table.refuse("open_circuit_codes", "must not stand with a bit, which is 1 at a fault");
-  }
-  const auto codes =
-      bit ? std::vector<std::int64_t>{1} : table.integers("open_circuit_codes", 1, 65535, {1});
-  if (codes.size() != 1) table.problem("open_circuit_codes", "must be the one code that is shown");
-  if (!codes.empty()) status.codes.push_back({codes.front(), Fault::open_circuit});
-  return status;
+/// Codes of any encoding; whether a channel's own can express them is looked at there.
+FaultCodes read_codes(const TomlTable& table) {
+  return read_fault_codes(table, -4294967296LL, 4294967295LL);
 }
 
 /// What is gathered while the file is read.
@@ -153,7 +135,10 @@ struct Draft {
 struct DeviceDefaults {
   ModbusValue place;
   double offset_degC{0.0};
-  std::optional<std::int64_t> code;
+  FaultCodes codes;
+  int base_address{0};  ///< added to the addresses of all registers
+  TomlTable table;      ///< over its preset, if it has one
+  const sections::Preset* preset{nullptr};
 };
 
 void check_column(const Draft& state, const TomlTable& table, std::string_view key,
@@ -167,11 +152,12 @@ void check_column(const Draft& state, const TomlTable& table, std::string_view k
   table.problem(key, rule);
 }
 
-void take(Draft& state, std::size_t bus, int unit, const ModbusValue& value,
-          const TomlTable& table) {
+void take(Draft& state, std::size_t bus, int unit, const ModbusValue& value, const TomlTable& table,
+          std::uint16_t mask = 0xFFFF) {
   if (!state.occupied[bus].take(unit, value.table, value.address,
-                                words_of(value.table, value.encoding))) {
-    table.problem("address", "shares a register with another value of this unit");
+                                words_of(value.table, value.encoding), mask)) {
+    table.problem(table.has("channel") ? "channel" : "address",
+                  "shares a register with another value of this unit");
   }
 }
 
@@ -181,15 +167,24 @@ void take(Draft& state, std::size_t bus, const CanSignal& signal, const TomlTabl
   }
 }
 
-DeviceDefaults read_device(Draft& state, const TomlTable& table) {
-  DeviceDefaults defaults;
-  defaults.place.table = ModbusTable::input;
+/// The device over its preset, if it names one that can be read.
+DeviceDefaults find_preset(sections::Presets& presets, const TomlTable& own, bool can) {
+  DeviceDefaults defaults{{}, 0.0, {}, 0, own, presets.of_device(own)};
+  if (defaults.preset == nullptr) return defaults;
+  defaults.table = sections::Presets::over_preset(own, *defaults.preset, can ? "can" : "modbus");
+  return defaults;
+}
+
+DeviceDefaults read_device(Draft& state, const TomlTable& own, sections::Presets& presets) {
   SimulatedDevice device;
-  device.name = state.devices.read(table);
-  device.bus = state.buses.index(table, "bus", "bus");
-  device.period_s = table.number("period_s", Range::between(0.001, 3600.0), device.period_s);
+  device.name = state.devices.read(own);
+  device.bus = state.buses.index(own, "bus", "bus");
+  device.period_s = own.number("period_s", Range::between(0.001, 3600.0), device.period_s);
   const bool can =
       !state.machine.buses.empty() && state.machine.buses[device.bus].kind == SimulatedBusKind::can;
+  DeviceDefaults defaults = find_preset(presets, own, can);
+  const TomlTable& table = defaults.table;
+  defaults.place.table = ModbusTable::input;
   if (!can) {
     device.unit = table.integer("unit", 0, 255);
     const bool used = std::any_of(
@@ -202,7 +197,8 @@ DeviceDefaults read_device(Draft& state, const TomlTable& table) {
     defaults.place.scale = table.number("scale", Range::between(-1e6, 1e6), 1.0);
     if (defaults.place.scale == 0.0) table.problem("scale", "must not be 0");
     defaults.offset_degC = table.number("offset_degC", Range::between(-1e6, 1e6), 0.0);
-    defaults.code = read_open_circuit_code(table);
+    defaults.codes = read_codes(table);
+    defaults.base_address = table.integer("base_address", 0, 65535, 0);
     if (table.has("renewal")) {
       const TomlTable renewal = table.table("renewal");
       ModbusValue value;
@@ -216,40 +212,64 @@ DeviceDefaults read_device(Draft& state, const TomlTable& table) {
   return defaults;
 }
 
-void read_channel(Draft& state, const TomlTable& table,
-                  const std::vector<DeviceDefaults>& defaults) {
+/// Adds the device's first register; what would pass the last one is a problem.
+std::uint16_t moved(const TomlTable& table, std::uint16_t address, int base_address) {
+  if (address + base_address <= 65535) return static_cast<std::uint16_t>(address + base_address);
+  table.problem("address", "would pass register 65535 with the device's base_address");
+  return address;
+}
+
+void check_codes(const TomlTable& table, const SimulatedChannel& channel) {
+  for (const auto& [fault, codes] : channel.codes) {
+    for (const std::int64_t code : codes) {
+      if (is_representable(code, channel.place.encoding)) continue;
+      table.problem("open_circuit_codes", std::to_string(code),
+                    "cannot be expressed in the channel's encoding");
+    }
+  }
+}
+
+void read_registers(Draft& state, const TomlTable& table, const DeviceDefaults& defaults,
+                    const SimulatedDevice& device, SimulatedChannel& channel) {
+  channel.place = read_place(table, defaults.place);
+  channel.place.address = moved(table, channel.place.address, defaults.base_address);
+  channel.offset_degC =
+      table.number("offset_degC", Range::between(-1e6, 1e6), defaults.offset_degC);
+  channel.codes = defaults.codes;
+  for (const auto& [fault, codes] : read_codes(table)) channel.codes[fault] = codes;
+  check_codes(table, channel);
+  take(state, device.bus, device.unit, channel.place, table);
+  if (!table.has("status")) return;
+  const TomlTable status = table.table("status");
+  channel.status = read_simulated_status(status);
+  ModbusValue word;
+  word.table = channel.status->table;
+  if (!is_bit_table(word.table)) {
+    channel.status->address = moved(status, channel.status->address, defaults.base_address);
+  }
+  word.address = channel.status->address;
+  take(state, device.bus, device.unit, word, status, channel.status->mask);
+}
+
+void read_channel(Draft& state, const TomlTable& own, const std::vector<DeviceDefaults>& defaults) {
   SimulatedChannel channel;
-  channel.name = state.channels.read(table);
-  const std::size_t index = state.devices.index(table, "device", "device");
-  channel.column = table.text("column", channel.name + "_degC");
-  check_column(state, table, table.has("column") ? "column" : "name", channel.column);
-  if (state.machine.devices.empty()) return table.ignore_rest();
+  channel.name = state.channels.read(own);
+  const std::size_t index = state.devices.index(own, "device", "device");
+  channel.column = own.text("column", channel.name + "_degC");
+  check_column(state, own, own.has("column") ? "column" : "name", channel.column);
+  if (state.machine.devices.empty()) return own.ignore_rest();
+  const sections::Preset* preset = defaults[index].preset;
+  const TomlTable table =
+      preset == nullptr ? own
+                        : sections::Presets::over_channel(own, defaults[index].table, *preset);
   SimulatedDevice& device = state.machine.devices[index];
   state.channel_places.emplace_back(index, device.channels.size());
   if (state.machine.buses[device.bus].kind == SimulatedBusKind::can) {
     channel.can = read_can(table, CanUse::temperature);
-    channel.open_circuit_code = read_open_circuit_code(table);
+    channel.codes = read_codes(table);
     take(state, device.bus, channel.can, table);
   } else {
-    channel.place = read_place(table, defaults[index].place);
-    channel.offset_degC =
-        table.number("offset_degC", Range::between(-1e6, 1e6), defaults[index].offset_degC);
-    channel.open_circuit_code =
-        table.has("open_circuit_codes") ? read_open_circuit_code(table) : defaults[index].code;
-    if (channel.open_circuit_code &&
-        !is_representable(*channel.open_circuit_code, channel.place.encoding)) {
-      table.problem("open_circuit_codes", std::to_string(*channel.open_circuit_code),
-                    "cannot be expressed in the channel's encoding");
-    }
-    take(state, device.bus, device.unit, channel.place, table);
-    if (table.has("status")) {
-      const TomlTable status = table.table("status");
-      channel.status = read_status(status, ModbusTable::discrete_input);
-      ModbusValue word;
-      word.table = channel.status->table;
-      word.address = channel.status->address;
-      take(state, device.bus, device.unit, word, status);
-    }
+    read_registers(state, table, defaults[index], device, channel);
   }
   device.channels.push_back(channel);
 }
@@ -373,6 +393,10 @@ void read_target(const Draft& state, const TomlTable& table, EventConfig& event)
 bool fits(EventKind kind, TargetKind target, bool can) {
   switch (kind) {
     case EventKind::open_circuit:
+    case EventKind::short_circuit:
+    case EventKind::over_range:
+    case EventKind::under_range:
+    case EventKind::channel_error:
     case EventKind::spike:
     case EventKind::drift:
       return target == TargetKind::channel;
@@ -404,9 +428,38 @@ bool on_can(const Draft& state, const EventConfig& event) {
   return bus < machine.buses.size() && machine.buses[bus].kind == SimulatedBusKind::can;
 }
 
+/// A channel can only be made to show what its device has a code for; any can have an open circuit.
+void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& event) {
+  const auto fault = channel_fault(event.kind);
+  if (!fault || event.target != TargetKind::channel || state.machine.devices.empty()) return;
+  const auto& channels = state.machine.devices[event.device].channels;
+  if (event.channel >= channels.size()) return;  // refused already
+  const SimulatedChannel& channel = channels[event.channel];
+  const auto has = [&](const FaultCodes& codes) { return codes.contains(*fault); };
+  if (!has(channel.codes) && !(channel.status && has(channel.status->codes)) &&
+      *fault != ChannelFault::open_circuit) {
+    table.problem("kind", "the channel's device has no code for it");
+  }
+  if (!table.has("code")) return;
+  event.channel_code =
+      table.integer<std::int64_t>("code", -4294967296LL, std::int64_t{4294967295LL});
+  const auto lists = [&](const FaultCodes& codes) {
+    const auto found = codes.find(*fault);
+    return found != codes.end() && std::find(found->second.begin(), found->second.end(),
+                                             *event.channel_code) != found->second.end();
+  };
+  if (!lists(channel.codes) && !(channel.status && lists(channel.status->codes))) {
+    table.problem("code", "must be one that the channel's device has for it");
+  }
+}
+
 EventConfig read_event(const Draft& state, const TomlTable& table) {
   EventConfig event;
   event.kind = table.choice<EventKind>("kind", {{"open_circuit", EventKind::open_circuit},
+                                                {"short_circuit", EventKind::short_circuit},
+                                                {"over_range", EventKind::over_range},
+                                                {"under_range", EventKind::under_range},
+                                                {"channel_error", EventKind::channel_error},
                                                 {"freeze", EventKind::freeze},
                                                 {"spike", EventKind::spike},
                                                 {"drift", EventKind::drift},
@@ -435,6 +488,7 @@ EventConfig read_event(const Draft& state, const TomlTable& table) {
   if (event.kind == EventKind::delay) {
     event.delay_ms = table.number("delay_ms", Range::above(0.0, 1e6));
   }
+  read_channel_code(state, table, event);
   if (event.kind == EventKind::exception) event.code = table.integer("code", 1, 255, 6);
   if (!fits(event.kind, event.target, on_can(state, event))) {
     table.problem("kind", "cannot happen to such a target");
@@ -444,7 +498,7 @@ EventConfig read_event(const Draft& state, const TomlTable& table) {
 
 }  // namespace
 
-void read_devices(const TomlTable& root, MachineConfig& machine) {
+void read_devices(const TomlTable& root, sections::Presets& presets, MachineConfig& machine) {
   Draft state{machine, {}, {}, {}, {}, {}, {}};
   if (machine.plant) state.columns = plant_columns(*machine.plant);
   for (const TomlTable& table : root.tables("bus")) {
@@ -454,7 +508,7 @@ void read_devices(const TomlTable& root, MachineConfig& machine) {
   }
   std::vector<DeviceDefaults> defaults;
   for (const TomlTable& table : root.tables("device")) {
-    defaults.push_back(read_device(state, table));
+    defaults.push_back(read_device(state, table, presets));
   }
   if (machine.buses.empty()) {
     machine.devices.clear();  // each was refused already: it names no bus

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,15 +28,29 @@ struct SimulatedBus {
   std::string interface;      ///< CAN
 };
 
+/// What a device can say of a channel instead of its temperature.
+enum class ChannelFault { open_circuit, short_circuit, over_range, under_range, error };
+/// Raw codes for it; the first of a list is shown unless an event names another.
+using FaultCodes = std::map<ChannelFault, std::vector<std::int64_t>>;
+
+/// A register or bit beside a value; it has `good` in the bits of its mask while all is well.
+struct SimulatedStatus {
+  ModbusTable table{ModbusTable::discrete_input};
+  std::uint16_t address{0};
+  std::uint16_t mask{0xFFFF};
+  std::uint16_t good{0};
+  FaultCodes codes;
+};
+
 /// One measured value in a device's registers or frames.
 struct SimulatedChannel {
   std::string name;    ///< what events call it
   std::string column;  ///< of the plant or of the replayed run file
   ModbusValue place;   ///< value = raw * scale + offset_degC
   double offset_degC{0.0};
-  CanSignal can;  ///< on a CAN bus instead of `place`
-  std::optional<std::int64_t> open_circuit_code;
-  std::optional<ModbusStatus> status;  ///< its first code is shown while the circuit is open
+  CanSignal can;     ///< on a CAN bus instead of `place`
+  FaultCodes codes;  ///< in place of the value
+  std::optional<SimulatedStatus> status;
 };
 
 struct SimulatedDevice {
@@ -82,17 +97,21 @@ struct SimulatedController {
 
 enum class EventKind {
   open_circuit,  ///< a channel's thermocouple is broken
-  freeze,        ///< a channel, or all of a device, shows its last value for ever
-  spike,         ///< a channel shows change_K too much
-  drift,         ///< a channel departs at rate_K_per_h
-  drop,          ///< no answer, no frame
-  delay,         ///< the answer comes delay_ms late
-  garbage,       ///< the answer is random bytes
-  exception,     ///< the answer is Modbus exception `code`
-  reboot,        ///< connections closed; nothing for the duration; a controller forgets its offset
-  reject,        ///< the controller answers, but leaves the offset as it is
-  misapply,      ///< the controller applies change_um more than it was told
-  rehome         ///< the controller's applied offset falls to zero until it is written anew
+  short_circuit,
+  over_range,
+  under_range,
+  channel_error,  ///< the device says that it cannot measure the channel
+  freeze,         ///< a channel, or all of a device, shows its last value for ever
+  spike,          ///< a channel shows change_K too much
+  drift,          ///< a channel departs at rate_K_per_h
+  drop,           ///< no answer, no frame
+  delay,          ///< the answer comes delay_ms late
+  garbage,        ///< the answer is random bytes
+  exception,      ///< the answer is Modbus exception `code`
+  reboot,         ///< connections closed; nothing for the duration; a controller forgets its offset
+  reject,         ///< the controller answers, but leaves the offset as it is
+  misapply,       ///< the controller applies change_um more than it was told
+  rehome          ///< the controller's applied offset falls to zero until it is written anew
 };
 
 enum class TargetKind { channel, device, bus, controller };
@@ -110,6 +129,7 @@ struct EventConfig {
   double rate_K_per_h{0.0};
   double delay_ms{0.0};  ///< real time
   int code{6};
+  std::optional<std::int64_t> channel_code;  ///< of a channel's fault; none: the first listed
 };
 
 struct MachineConfig {

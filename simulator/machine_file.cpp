@@ -7,7 +7,7 @@
 namespace thermocomp {
 namespace {
 
-MachineConfig read_machine(const TomlDocument& document) {
+MachineConfig read_machine(const TomlDocument& document, sections::Presets presets) {
   const TomlTable root = document.root();
   MachineConfig machine;
   (void)root.integer("format", 1, 1);
@@ -17,8 +17,12 @@ MachineConfig read_machine(const TomlDocument& document) {
   machine.pitch_s = root.number("pitch_s", Range::between(0.01, 86400.0), 10.0);
   if (root.has("plant"))
     machine.plant = read_plant(root, std::filesystem::path(document.name()).parent_path());
-  read_devices(root, machine);
-  document.finish();
+  read_devices(root, presets, machine);
+  presets.ignore_rest();  // not every key of a device is a simulated one's
+  std::vector<Problem> problems = document.all_problems();
+  const std::vector<Problem> preset_problems = presets.problems();
+  problems.insert(problems.end(), preset_problems.begin(), preset_problems.end());
+  if (!problems.empty()) throw ConfigurationError(std::move(problems));
   return machine;
 }
 
@@ -50,11 +54,14 @@ std::size_t NameList::index_of(const TomlTable& table, std::string_view key,
 }
 
 MachineConfig load_machine(const std::filesystem::path& path) {
-  return read_machine(TomlDocument::from_file(path));
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  return read_machine(TomlDocument::from_file(path),
+                      sections::Presets(sections::preset_folders(folder)));
 }
 
 MachineConfig parse_machine(std::string text, std::string name) {
-  return read_machine(TomlDocument::from_text(std::move(text), std::move(name)));
+  return read_machine(TomlDocument::from_text(std::move(text), std::move(name)),
+                      sections::Presets({}));
 }
 
 }  // namespace thermocomp

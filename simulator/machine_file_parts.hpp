@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "config/sections/presets.hpp"
 #include "config/toml_reader.hpp"
 #include "simulator/machine_config.hpp"
 
@@ -32,6 +33,6 @@ class NameList {
 /// Columns that the plant provides, in its order.
 [[nodiscard]] std::vector<std::string> plant_columns(const PlantConfig& plant);
 /// [[bus]], [[device]], [[channel]], [controller], [[axis]], [[event]].
-void read_devices(const TomlTable& root, MachineConfig& machine);
+void read_devices(const TomlTable& root, sections::Presets& presets, MachineConfig& machine);
 
 }  // namespace thermocomp

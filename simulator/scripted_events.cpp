@@ -29,10 +29,12 @@ void befall(UnitEffect& unit, const EventConfig& event) {
 }
 
 void befall(ChannelEffect& channel, const EventConfig& event, double since_s) {
+  if (const auto fault = channel_fault(event.kind)) {
+    channel.fault = fault;
+    channel.code = event.channel_code;
+    return;
+  }
   switch (event.kind) {
-    case EventKind::open_circuit:
-      channel.open_circuit = true;
-      break;
     case EventKind::freeze:
       channel.frozen = true;
       break;
@@ -62,6 +64,23 @@ void befall_controller(Effects& effects, const EventConfig& event) {
 }
 
 }  // namespace
+
+std::optional<ChannelFault> channel_fault(EventKind kind) {
+  switch (kind) {
+    case EventKind::open_circuit:
+      return ChannelFault::open_circuit;
+    case EventKind::short_circuit:
+      return ChannelFault::short_circuit;
+    case EventKind::over_range:
+      return ChannelFault::over_range;
+    case EventKind::under_range:
+      return ChannelFault::under_range;
+    case EventKind::channel_error:
+      return ChannelFault::error;
+    default:
+      return std::nullopt;
+  }
+}
 
 Effects effects_at(const MachineConfig& machine, double plant_time_s) {
   Effects effects;

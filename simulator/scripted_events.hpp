@@ -9,7 +9,8 @@
 namespace thermocomp {
 
 struct ChannelEffect {
-  bool open_circuit{false};
+  std::optional<ChannelFault> fault;
+  std::optional<std::int64_t> code;  ///< none: the first that the device has for the fault
   bool frozen{false};
   double added_K{0.0};
 };
@@ -37,6 +38,9 @@ struct Effects {
   UnitEffect controller_unit;
   ControllerEffect controller;
 };
+
+/// The fault of a channel that an event of this kind is; none for all other kinds.
+[[nodiscard]] std::optional<ChannelFault> channel_fault(EventKind kind);
 
 /// An event is in force from at_s until before at_s + duration_s.
 [[nodiscard]] Effects effects_at(const MachineConfig& machine, double plant_time_s);

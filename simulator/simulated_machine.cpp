@@ -322,26 +322,47 @@ struct SimulatedMachine::Parts {
 
   // -------------------------------------------------------------- devices
 
+  /// The code that is shown for the fault: the event's if it is listed, else the first listed.
+  static std::optional<std::int64_t> code_for(const FaultCodes& codes,
+                                              const ChannelEffect& effect) {
+    if (!effect.fault) return std::nullopt;
+    const auto found = codes.find(*effect.fault);
+    if (found == codes.end()) return std::nullopt;
+    const auto& listed = found->second;
+    const bool named =
+        effect.code && std::find(listed.begin(), listed.end(), *effect.code) != listed.end();
+    return named ? *effect.code : listed.front();
+  }
+
+  /// A device that tells a fault beside the value leaves a temperature in the value's place; one
+  /// that has no code at all for an open circuit shows its highest value, or NaN.
+  static double shown(const SimulatedChannel& channel, const ChannelEffect& effect, double value) {
+    const bool told_beside = channel.status && code_for(channel.status->codes, effect);
+    return effect.fault == ChannelFault::open_circuit && !told_beside ? not_a_number : value;
+  }
+
   static void show_channel(Device& device, const SimulatedChannel& channel, bool can,
-                           double value) {
-    const bool open = std::isnan(value);
+                           const ChannelEffect& effect, double value) {
+    ChannelEffect seen = effect;
+    if (std::isnan(value) && !seen.fault) seen.fault = ChannelFault::open_circuit;
+    const auto code = code_for(channel.codes, seen);
     if (can) {
-      if (open && channel.open_circuit_code) {
-        device.frames.set_code(channel.can, *channel.open_circuit_code);
-      } else {
-        device.frames.set_value(channel.can, value);
-      }
+      code ? device.frames.set_code(channel.can, *code)
+           : device.frames.set_value(channel.can, shown(channel, seen, value));
       return;
     }
-    if (open && channel.open_circuit_code) {
-      device.unit.set_code(channel.place, *channel.open_circuit_code);
+    if (code) {
+      device.unit.set_code(channel.place, *code);
     } else {
-      device.unit.set_value(channel.place, channel.offset_degC, value);
+      device.unit.set_value(channel.place, channel.offset_degC, shown(channel, seen, value));
     }
     if (!channel.status) return;
-    const std::int64_t code = open ? channel.status->codes.front().code : 0;
-    device.unit.set(channel.status->table, channel.status->address,
-                    static_cast<std::uint16_t>(code));
+    const SimulatedStatus& status = *channel.status;
+    const auto told = code_for(status.codes, seen);
+    const auto bits = static_cast<unsigned>(told ? *told : status.good) & status.mask;
+    const unsigned others =
+        device.unit.word(status.table, status.address) & ~static_cast<unsigned>(status.mask);
+    device.unit.set(status.table, status.address, static_cast<std::uint16_t>(bits | others));
   }
 
   void convert(std::size_t index, std::span<const double> row) {
@@ -352,8 +373,7 @@ struct SimulatedMachine::Parts {
       const ChannelEffect& effect = effects.channels[index][i];
       if (effect.frozen) continue;
       const double value = row[device.columns[i]] + effect.added_K;
-      show_channel(device, device.config.channels[i], can,
-                   effect.open_circuit ? not_a_number : value);
+      show_channel(device, device.config.channels[i], can, effect, value);
     }
     ++device.conversions;
     if (device.config.renewal) {

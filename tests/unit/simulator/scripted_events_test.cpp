@@ -44,11 +44,11 @@ SimulatedController two_axes() {
 TEST_CASE("an event is in force from its time until its duration is over, and only on its target") {
   MachineConfig machine = one_device();
   machine.events = {event(EventKind::open_circuit, TargetKind::channel, 100.0, 50.0)};
-  CHECK_FALSE(effects_at(machine, 99.9).channels[0][1].open_circuit);
-  CHECK(effects_at(machine, 100.0).channels[0][1].open_circuit);
-  CHECK_FALSE(effects_at(machine, 100.0).channels[0][0].open_circuit);
-  CHECK(effects_at(machine, 149.9).channels[0][1].open_circuit);
-  CHECK_FALSE(effects_at(machine, 150.0).channels[0][1].open_circuit);
+  CHECK_FALSE(effects_at(machine, 99.9).channels[0][1].fault.has_value());
+  CHECK(effects_at(machine, 100.0).channels[0][1].fault.has_value());
+  CHECK_FALSE(effects_at(machine, 100.0).channels[0][0].fault.has_value());
+  CHECK(effects_at(machine, 149.9).channels[0][1].fault.has_value());
+  CHECK_FALSE(effects_at(machine, 150.0).channels[0][1].fault.has_value());
 }
 
 TEST_CASE("each kind of event does what its name says") {
