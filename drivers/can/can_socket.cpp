@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <iterator>
 #include <unistd.h>
 
 #include <linux/can.h>
@@ -33,17 +34,17 @@ std::string said(int code) {
   return std::strerror(code);
 }
 
-can_filter filter_for(const CanId& wanted) noexcept {
+can_filter masked_filter(const CanFilter& wanted) noexcept {
   can_filter filter{};
   // With CAN_RTR_FLAG in the mask remote requests, which carry no data, stay out too.
-  if (wanted.extended) {
-    filter.can_id = wanted.id | CAN_EFF_FLAG;
-    filter.can_mask = CAN_EFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
-  } else {
-    filter.can_id = wanted.id;
-    filter.can_mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
-  }
+  const std::uint32_t bits = wanted.id.extended ? CAN_EFF_MASK : CAN_SFF_MASK;
+  filter.can_id = wanted.id.id | (wanted.id.extended ? CAN_EFF_FLAG : 0u);
+  filter.can_mask = (wanted.mask & bits) | CAN_EFF_FLAG | CAN_RTR_FLAG;
   return filter;
+}
+
+can_filter filter_for(const CanId& wanted) noexcept {
+  return masked_filter({wanted, CAN_EFF_MASK});
 }
 
 CanFrame to_frame(const can_frame& raw, nanoseconds received_at) noexcept {
@@ -124,6 +125,13 @@ CanSocket::CanSocket(std::string interface, std::vector<CanId> wanted)
   require(wanted_.size() <= filters_max, "id", static_cast<double>(wanted_.size()),
           "at most 512 different identifiers can be received on one interface");
   received_.reserve(batch_max);
+}
+
+void CanSocket::also_want(const CanFilter& filter) {
+  also_wanted_.push_back(filter);
+  require(wanted_.size() + also_wanted_.size() <= filters_max, "id",
+          static_cast<double>(wanted_.size() + also_wanted_.size()),
+          "at most 512 different identifiers can be received on one interface");
 }
 
 CanSocket::~CanSocket() {
@@ -207,6 +215,8 @@ bool CanSocket::configure() {
 
   std::vector<can_filter> filters(wanted_.size());
   std::transform(wanted_.begin(), wanted_.end(), filters.begin(), filter_for);
+  std::transform(also_wanted_.begin(), also_wanted_.end(), std::back_inserter(filters),
+                 masked_filter);
   const auto bytes = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
   const can_err_mask_t every_error = CAN_ERR_MASK;
   const int on = 1;

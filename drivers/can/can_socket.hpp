@@ -27,6 +27,12 @@ struct CanId {
   auto operator<=>(const CanId&) const = default;
 };
 
+/// Identifiers that agree with `id` in the bits of `mask` (and are as long).
+struct CanFilter {
+  CanId id;
+  std::uint32_t mask{0x1FFFFFFF};
+};
+
 struct CanFrame {
   CanId id;
   std::size_t size{0};  ///< bytes of data, 0..8
@@ -76,6 +82,9 @@ class CanSocket {
   /// @param wanted  identifiers to receive; the kernel drops all others. Duplicates are joined.
   /// @throws InvalidValue for more than filters_max identifiers or an impossible interface name
   CanSocket(std::string interface, std::vector<CanId> wanted);
+  /// Identifiers to receive as well, from the next open() on.
+  /// @throws InvalidValue when there are more than filters_max of both sorts
+  void also_want(const CanFilter& filter);
   CanSocket(const CanSocket&) = delete;
   CanSocket& operator=(const CanSocket&) = delete;
   ~CanSocket();
@@ -117,6 +126,7 @@ class CanSocket {
 
   std::string interface_;
   std::vector<CanId> wanted_;
+  std::vector<CanFilter> also_wanted_;
   int socket_{-1};
   CanState state_{CanState::down};
   nanoseconds state_since_;

@@ -1,0 +1,42 @@
+/// What speaks a protocol above CAN frames: fed with frames and times, asked for frames and
+/// readings. No socket, no clock, no thread, so that it runs in tests, in tools and in a driver.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/can/can_socket.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+class CanProtocol {
+ public:
+  CanProtocol() = default;
+  CanProtocol(const CanProtocol&) = delete;
+  CanProtocol& operator=(const CanProtocol&) = delete;
+  virtual ~CanProtocol() = default;
+
+  /// Frames to receive; all others need not be given to take().
+  [[nodiscard]] virtual std::vector<CanFilter> wanted() const = 0;
+  /// For each reading its sensor's index in the whole configuration.
+  [[nodiscard]] virtual std::vector<std::size_t> sensors() const = 0;
+
+  virtual void opened(nanoseconds now) = 0;  ///< the bus can be used from now on
+  virtual void closed(nanoseconds now) = 0;  ///< ... no longer; every reading becomes no_answer
+  virtual void take(const CanFrame& frame) = 0;
+  /// What is due by now. To be called after take() and at least every 50 ms.
+  virtual void advance(nanoseconds now) = 0;
+  /// Frames to send, oldest first; each is given once.
+  [[nodiscard]] virtual std::optional<CanFrame> next_frame() = 0;
+
+  [[nodiscard]] virtual std::span<const Reading> readings() const = 0;
+  [[nodiscard]] virtual std::vector<UnitHealth> health(nanoseconds now) const = 0;
+};
+
+}  // namespace thermocomp

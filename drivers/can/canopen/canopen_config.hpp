@@ -1,0 +1,96 @@
+/// What a CANopen bus is built from: plain structures, filled by config/ or by a test.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/sensors/sensor_bus_config.hpp"
+
+namespace thermocomp {
+
+inline constexpr std::size_t canopen_bytes_max = 8;  ///< of a frame; CANopen FD is another protocol
+
+/// A place in a node's object dictionary.
+struct ObjectAddress {
+  std::uint16_t index{0};
+  std::uint8_t sub{0};
+  bool operator==(const ObjectAddress&) const = default;
+};
+
+/// A value written to the node before it is started, and read back.
+struct CanopenWrite {
+  ObjectAddress object;
+  std::vector<std::uint8_t> bytes;  ///< 1..4, least significant first
+  bool operator==(const CanopenWrite&) const = default;
+};
+
+/// One object in a TPDO.
+struct CanopenMapped {
+  ObjectAddress object;  ///< indices below 0x20 are fillers
+  int length_bits{0};
+  bool operator==(const CanopenMapped&) const = default;
+};
+
+/// A TPDO whose mapping is known: its objects follow each other from bit 0.
+struct CanopenMapping {
+  std::uint32_t cob_id{0};
+  std::vector<CanopenMapped> objects;
+  bool operator==(const CanopenMapping&) const = default;
+};
+
+enum class CanopenWay {
+  pdo_bits,    ///< bits of a TPDO, given by cob_id and signal.start_bit
+  pdo_object,  ///< an object, found in a mapping
+  sdo          ///< an object, asked for every poll_s
+};
+
+struct CanopenChannel {
+  std::size_t sensor{0};  ///< index of the sensor in the configuration
+  CanopenWay way{CanopenWay::pdo_bits};
+  ObjectAddress object;  ///< not for pdo_bits
+  /// Form and scale; for pdo_bits also `id` and `start_bit`. length_bits is that of the object.
+  CanSignal signal;
+  double poll_s{1.0};
+  int emergency_channel{0};  ///< by which emergency messages name it; 0: they do not
+  /// Emergency error codes that make it a device_error until the errors are reset.
+  std::vector<std::uint16_t> emergency_codes;
+  bool operator==(const CanopenChannel&) const = default;
+};
+
+enum class EmergencyForm {
+  generic,  ///< error code and register only
+  jumo      ///< JUMO CANtrans: code 0x5030, byte 4 the channel, byte 5 break or short circuit
+};
+
+struct CanopenNodeConfig {
+  std::string name;
+  int node{1};  ///< 1..127
+  /// Period of the node's heartbeat, written to its object 1017; 0: as the node has it.
+  double heartbeat_s{0.0};
+  double heartbeat_timeout_s{0.0};  ///< no heartbeat for so long: the node is lost; 0: not watched
+  double pdo_period_s{0.0};         ///< how often the node sends each TPDO; 0: not known
+  EmergencyForm emergency{EmergencyForm::generic};
+  std::vector<CanopenWrite> writes;
+  std::vector<CanopenMapping> mappings;
+  std::vector<int> mappings_read;  ///< numbers of TPDOs whose COB-ID and mapping the node is asked
+  std::vector<CanopenChannel> channels;
+  bool operator==(const CanopenNodeConfig&) const = default;
+};
+
+struct CanopenBusConfig {
+  std::string name;
+  std::string interface;    ///< "can0"
+  double reconnect_s{0.5};  ///< pause before the interface is tried again
+  bool start_nodes{true};   ///< NMT start, also after a node's reboot
+  int own_node{0};          ///< of our heartbeat; 0: none is sent
+  double heartbeat_s{1.0};  ///< period of our heartbeat
+  double sync_s{0.0};       ///< period of SYNC; 0: none is sent
+  double sdo_timeout_s{0.5};
+  std::vector<CanopenNodeConfig> nodes;
+  bool operator==(const CanopenBusConfig&) const = default;
+};
+
+}  // namespace thermocomp

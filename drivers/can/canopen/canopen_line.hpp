@@ -1,0 +1,43 @@
+/// All that is on one CANopen bus: the nodes, SYNC, our own heartbeat. Pure.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "drivers/can/can_protocol.hpp"
+#include "drivers/can/canopen/canopen_node.hpp"
+
+namespace thermocomp {
+
+class CanopenLine final : public CanProtocol {
+ public:
+  /// @throws InvalidValue for a node number that cannot be or is used twice, and for signals that
+  /// cannot be
+  explicit CanopenLine(CanopenBusConfig config);
+
+  [[nodiscard]] std::vector<CanFilter> wanted() const override;
+  [[nodiscard]] std::vector<std::size_t> sensors() const override;
+  void opened(nanoseconds now) override;
+  void closed(nanoseconds now) override;
+  void take(const CanFrame& frame) override;
+  void advance(nanoseconds now) override;
+  [[nodiscard]] std::optional<CanFrame> next_frame() override;
+  [[nodiscard]] std::span<const Reading> readings() const override { return readings_; }
+  [[nodiscard]] std::vector<UnitHealth> health(nanoseconds now) const override;
+
+ private:
+  void send_cyclic(nanoseconds now);
+  void look_for_conflicts(nanoseconds now);
+  void collect();
+
+  const CanopenBusConfig config_;
+  std::vector<CanopenNode> nodes_;
+  std::map<int, std::size_t> node_of_number_;
+  std::vector<Reading> readings_;  ///< the nodes' after each other
+  bool open_{false};
+  nanoseconds sync_at_{};
+  nanoseconds heartbeat_at_{};
+  std::deque<CanFrame> frames_;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,130 @@
+/// One node of a CANopen bus as its master sees it: set up, started, watched, read. Pure: frames
+/// and times in, frames and readings out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/can/can_socket.hpp"
+#include "drivers/can/canopen/canopen_config.hpp"
+#include "drivers/can/canopen/emergency.hpp"
+#include "drivers/can/canopen/rate_watch.hpp"
+#include "drivers/can/canopen/sdo_client.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+
+namespace thermocomp {
+
+/// Where each channel of a node stands in its TPDOs: fills signal.id, start_bit and length_bits of
+/// the pdo_object channels that `mapping` holds. @return their positions
+std::vector<std::size_t> place_channels(const CanopenMapping& mapping,
+                                        std::vector<CanopenChannel>& channels);
+
+/// The life of a node: pre-operational while it is set up (writes, each read back; COB-IDs and
+/// mappings asked for), then started, then read. A reboot, a lost heartbeat or a lost bus begins it
+/// anew. A channel shows a value only while all of that is well; its readings are no_answer
+/// before and between, device_error where the set-up was refused or two nodes say the same thing.
+class CanopenNode {
+ public:
+  CanopenNode(const CanopenNodeConfig& config, const CanopenBusConfig& bus);
+
+  void opened(nanoseconds now);
+  void closed(nanoseconds now);
+
+  // What the node sent; the identifier says which of them a frame is for.
+  void take_heartbeat(std::span<const std::uint8_t> data, nanoseconds at);
+  void take_emergency(std::span<const std::uint8_t> data, nanoseconds at);
+  void take_sdo(std::span<const std::uint8_t> data, nanoseconds at);
+  /// A TPDO of this or another node. @return whether a channel is in it
+  bool take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> data, nanoseconds at);
+
+  void advance(nanoseconds now);
+  [[nodiscard]] std::optional<CanFrame> next_frame();
+
+  /// Order of the node's channels.
+  [[nodiscard]] std::span<const Reading> readings() const noexcept { return readings_; }
+  [[nodiscard]] const std::vector<CanopenChannel>& channels() const noexcept { return channels_; }
+  /// Of TPDOs that the node said are its own, in this life.
+  [[nodiscard]] std::span<const std::uint32_t> cob_ids_told() const noexcept { return told_; }
+  /// Another node says that this TPDO is its own; empty: none does.
+  void claim_conflict(const std::string& reason, nanoseconds now);
+
+  [[nodiscard]] bool running() const noexcept { return phase_ == Phase::running && !lost_; }
+  /// Counters and what is wrong, for an operator.
+  [[nodiscard]] UnitHealth health(nanoseconds now) const;
+
+ private:
+  enum class Phase { closed, setting_up, waiting, running };
+  enum class Work { write, verify, ask_cob_id, ask_count, ask_entry, ask_errors };
+  struct Job {
+    Work work{Work::write};
+    std::size_t which{0};  ///< of the writes, or number of the TPDO
+    int entry{0};
+  };
+  struct Watched {
+    std::uint32_t cob_id{0};
+    RateWatch rate;
+  };
+
+  void begin_setup(nanoseconds now);
+  void next_job(nanoseconds now);
+  void start_job(const Job& job, nanoseconds now);
+  void take_job(const SdoResult& result, nanoseconds now);
+  void take_answer(const Job& job, std::span<const std::uint8_t> bytes, nanoseconds now);
+  void take_mapping_answer(const Job& job, std::span<const std::uint8_t> bytes, nanoseconds now);
+  void finish_mapping();
+  void setup_failed(const std::string& reason, Fault fault, nanoseconds now);
+  void setup_done(nanoseconds now);
+  void poll(nanoseconds now);
+  void take_poll(const SdoResult& result, nanoseconds now);
+  void take_result(nanoseconds now);
+  void watch_heartbeat(nanoseconds now);
+  void watch_duplicates(nanoseconds now);
+  void command(std::uint8_t what);
+  [[nodiscard]] bool knows_emergencies() const;
+  void forget_emergencies();
+  void show(std::size_t channel, const CanValue& decoded, nanoseconds at);
+  void lose(std::size_t channel, Fault fault, nanoseconds at);
+  void lose_all(Fault fault, nanoseconds at);
+  [[nodiscard]] bool is_doubtful(std::size_t channel) const noexcept;
+  [[nodiscard]] std::string trouble() const;
+
+  const CanopenNodeConfig config_;
+  const bool starts_;  ///< we send NMT commands
+  std::vector<CanopenWrite> writes_;
+  std::vector<CanopenChannel> channels_;
+  std::vector<Reading> readings_;
+  std::vector<std::optional<Fault>> emergencies_;  ///< of the channels
+  std::vector<nanoseconds> poll_at_;
+  std::vector<Watched> watched_;  ///< a TPDO each
+  SdoClient client_;
+
+  Phase phase_{Phase::closed};
+  std::deque<Job> jobs_;
+  std::optional<std::size_t> polled_;  ///< channel whose answer is awaited
+  CanopenMapping mapping_;             ///< being asked for
+  int entries_{0};
+  std::vector<std::uint32_t> told_;
+  nanoseconds retry_at_{};
+  nanoseconds retry_pause_;
+  nanoseconds heard_at_{};  ///< last heartbeat, or when it began to be awaited
+  nanoseconds start_again_at_{};
+  bool lost_{false};
+  RateWatch heartbeats_;
+  std::uint64_t second_answers_seen_{0};
+  nanoseconds second_answer_until_{};  ///< a second node is taken to be there until then
+  bool was_doubtful_{false};
+  std::string conflict_;
+  std::string setup_error_;
+  std::string poll_error_;
+  std::string emergency_text_;  ///< of the last one, until the errors are reset
+  std::deque<CanFrame> frames_;
+  UnitHealth counters_;
+  nanoseconds good_at_{};  ///< last good answer or TPDO
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,67 @@
+/// All that is on one J1939 bus: parameter groups, multi-packet messages, address claims. Pure.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/can/can_protocol.hpp"
+#include "drivers/can/j1939/j1939_message.hpp"
+#include "drivers/can/j1939/transport.hpp"
+
+namespace thermocomp {
+
+/// A device is known by its source address or, where its NAME is configured, by what address that
+/// NAME claims (J1939-81). When somebody else claims the address of such a device its readings are
+/// no_answer until its NAME is heard again.
+class J1939Line final : public CanProtocol {
+ public:
+  /// @throws InvalidValue for parameters and addresses that cannot be
+  explicit J1939Line(J1939BusConfig config);
+
+  [[nodiscard]] std::vector<CanFilter> wanted() const override;
+  [[nodiscard]] std::vector<std::size_t> sensors() const override;
+  void opened(nanoseconds now) override;
+  void closed(nanoseconds now) override;
+  void take(const CanFrame& frame) override;
+  void advance(nanoseconds now) override;
+  [[nodiscard]] std::optional<CanFrame> next_frame() override;
+  [[nodiscard]] std::span<const Reading> readings() const override { return readings_; }
+  [[nodiscard]] std::vector<UnitHealth> health(nanoseconds now) const override;
+
+  /// Our address while it is ours.
+  [[nodiscard]] std::optional<std::uint8_t> own_address() const noexcept { return own_address_; }
+  /// The address at which the device is read now.
+  [[nodiscard]] std::optional<std::uint8_t> address_of(std::size_t node) const;
+
+ private:
+  struct Node {
+    std::optional<std::uint8_t> address;
+    std::size_t first{0};  ///< of its channels among the readings
+    UnitHealth counters;
+    std::string note;  ///< about its address
+    nanoseconds good_at{};
+  };
+
+  void take_group(std::uint32_t pgn, std::uint8_t source, std::span<const std::uint8_t> bytes,
+                  nanoseconds at);
+  void take_claim(std::uint8_t source, std::span<const std::uint8_t> data, nanoseconds at);
+  void take_claim_of_ours(std::uint64_t name);
+  void move_node(std::size_t node, std::uint8_t source, std::uint64_t name, nanoseconds at);
+  void claim(std::uint8_t from);
+  void ask_for_names();
+  void lose(std::size_t node, nanoseconds at);
+
+  const J1939BusConfig config_;
+  std::vector<Node> nodes_;
+  std::vector<Reading> readings_;  ///< the nodes' after each other
+  TransportReceiver transport_;
+  std::optional<std::uint8_t> own_address_;
+  std::string own_error_;
+  std::array<std::optional<std::uint64_t>, 256> names_{};  ///< by address
+  bool open_{false};
+  std::deque<CanFrame> frames_;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,652 @@
+// CANopen's state machines, with the bytes of CiA 301 written out by hand.
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "drivers/can/canopen/canopen_line.hpp"
+#include "estimator/checks.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes bytes_of(const CanFrame& frame) {
+  return {frame.payload().begin(), frame.payload().end()};
+}
+
+/// What a client has to send: identifier and bytes.
+struct Sent {
+  std::uint32_t id{0};
+  Bytes bytes;
+  bool operator==(const Sent&) const = default;
+};
+std::ostream& operator<<(std::ostream& out, const Sent& sent) {
+  out << std::hex << sent.id << '#';
+  for (const int byte : sent.bytes) out << ' ' << byte;
+  return out << std::dec;
+}
+
+template <class Machine>
+std::vector<Sent> sent_by(Machine& machine) {
+  std::vector<Sent> sent;
+  while (const auto frame = machine.next_frame()) {
+    CHECK_FALSE(frame->id.extended);
+    sent.push_back({frame->id.id, bytes_of(*frame)});
+  }
+  return sent;
+}
+
+CanSignal int16_tenths(std::uint32_t id, int start) {
+  CanSignal signal;
+  signal.id = id;
+  signal.start_bit = start;
+  signal.length_bits = 16;
+  signal.scale = 0.1;
+  return signal;
+}
+
+CanopenChannel in_pdo(std::size_t sensor, std::uint32_t cob_id, int start) {
+  CanopenChannel channel;
+  channel.sensor = sensor;
+  channel.signal = int16_tenths(cob_id, start);
+  return channel;
+}
+
+CanopenChannel object_channel(CanopenWay way, ObjectAddress object) {
+  CanopenChannel channel;
+  channel.way = way;
+  channel.object = object;
+  channel.signal = int16_tenths(0, 0);
+  return channel;
+}
+
+CanopenBusConfig bus_of(std::vector<CanopenNodeConfig> nodes) {
+  CanopenBusConfig bus;
+  bus.name = "bus";
+  bus.interface = "vcan0";
+  bus.nodes = std::move(nodes);
+  return bus;
+}
+
+CanopenNodeConfig node_5(std::vector<CanopenChannel> channels) {
+  CanopenNodeConfig node;
+  node.name = "module";
+  node.node = 5;
+  node.channels = std::move(channels);
+  return node;
+}
+
+/// A line and the time beside it.
+struct Bus {
+  explicit Bus(CanopenBusConfig config) : line(std::move(config)) {
+    line.opened(now);
+    line.advance(now);
+  }
+  void put(std::uint32_t id, const Bytes& data) {
+    CanFrame frame;
+    frame.id = {id, false};
+    frame.size = data.size();
+    std::copy(data.begin(), data.end(), frame.data.begin());
+    frame.received_at = now;
+    line.take(frame);
+    line.advance(now);
+  }
+  void wait(nanoseconds time) {
+    for (const nanoseconds end = now + time; now < end;) {
+      now += 10ms;
+      line.advance(now);
+    }
+  }
+  std::vector<Sent> sent() { return sent_by(line); }
+  [[nodiscard]] Fault fault(std::size_t channel = 0) const {
+    return line.readings()[channel].fault;
+  }
+  [[nodiscard]] double temp_degC(std::size_t channel = 0) const {
+    return line.readings()[channel].temp_degC;
+  }
+  [[nodiscard]] std::string error(std::size_t node = 0) const {
+    return line.health(now)[node].last_error;
+  }
+
+  nanoseconds now{1000s};
+  CanopenLine line;
+};
+
+const Sent start_5{0x000, {0x01, 0x05}};
+const Sent pre_operational_5{0x000, {0x80, 0x05}};
+
+}  // namespace
+
+// ------------------------------------------------------------------ SDO
+
+TEST_CASE("SDO: an expedited read is one question and one answer", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x40, 0x40, 0x20, 0x01, 0, 0, 0, 0}}});
+  SECTION("with its length") {
+    client.take(Bytes{0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0x55, 0x55}, 1s);
+    const auto result = client.result();
+    REQUIRE(result);
+    CHECK(result->outcome == SdoOutcome::done);
+    CHECK(result->bytes == Bytes{0xE1, 0x00});
+  }
+  SECTION("without its length: four bytes") {
+    client.take(Bytes{0x42, 0x40, 0x20, 0x01, 1, 2, 3, 4}, 1s);
+    CHECK(client.result()->bytes == Bytes{1, 2, 3, 4});
+  }
+  CHECK_FALSE(client.busy());
+  CHECK_FALSE(client.result());
+}
+
+TEST_CASE("SDO: a segmented read alternates its toggle bit", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x1008, 0}, 1s);
+  sent_by(client);
+  client.take(Bytes{0x41, 0x08, 0x10, 0x00, 9, 0, 0, 0}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x60, 0, 0, 0, 0, 0, 0, 0}}});
+  client.take(Bytes{0x00, 'C', 'A', 'N', 't', 'r', 'a', 'n'}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x70, 0, 0, 0, 0, 0, 0, 0}}});
+  SECTION("the last segment says how much of it is unused") {
+    client.take(Bytes{0x1B, 's', 'T', 0, 0, 0, 0, 0}, 1s);
+    const auto result = client.result();
+    REQUIRE(result);
+    CHECK(std::string(result->bytes.begin(), result->bytes.end()) == "CANtransT");
+  }
+  SECTION("a toggle that stands still is an abort") {
+    client.take(Bytes{0x0B, 's', 'T', 0, 0, 0, 0, 0}, 1s);
+    CHECK(client.result()->outcome == SdoOutcome::broken);
+    CHECK(sent_by(client) ==
+          std::vector<Sent>{{0x605, {0x80, 0x08, 0x10, 0x00, 0x00, 0x00, 0x03, 0x05}}});
+  }
+  SECTION("fewer bytes than announced are an abort") {
+    client.take(Bytes{0x1D, 's', 0, 0, 0, 0, 0, 0}, 1s);
+    CHECK(client.result()->outcome == SdoOutcome::broken);
+  }
+}
+
+TEST_CASE("SDO: an announcement beyond the limit is refused", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x1008, 0}, 1s);
+  sent_by(client);
+  client.take(Bytes{0x41, 0x08, 0x10, 0x00, 0x01, 0x04, 0, 0}, 1s);
+  CHECK(client.result()->abort_code == 0x05040005);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x80, 0x08, 0x10, 0x00, 0x05, 0x00, 0x04, 0x05});
+}
+
+TEST_CASE("SDO: expedited writes say how many bytes count", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.write({0x1017, 0}, Bytes{0xE8, 0x03}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x2B, 0x17, 0x10, 0x00, 0xE8, 0x03, 0, 0}}});
+  client.take(Bytes{0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0}, 1s);
+  CHECK(client.result()->outcome == SdoOutcome::done);
+  client.write({0x1800, 2}, Bytes{0x01}, 1s);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x2F, 0x00, 0x18, 0x02, 0x01, 0, 0, 0});
+  client.cancel();
+  client.write({0x1800, 1}, Bytes{0x85, 0x01, 0, 0}, 1s);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x23, 0x00, 0x18, 0x01, 0x85, 0x01, 0, 0});
+}
+
+TEST_CASE("SDO: an abort is told by name", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  client.take(Bytes{0x80, 0x40, 0x20, 0x01, 0x00, 0x00, 0x02, 0x06}, 1s);
+  const auto result = client.result();
+  REQUIRE(result);
+  CHECK(result->outcome == SdoOutcome::aborted);
+  CHECK(to_string(*result) == "2040:01: aborted by the node: 0x06020000 object does not exist");
+  CHECK(sdo_abort_name(0x06090030) == "invalid value");
+  CHECK(sdo_abort_name(0x12345678) == "unknown abort code");
+}
+
+TEST_CASE("SDO: silence ends a transfer, and the node is told", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  sent_by(client);
+  client.advance(1s + 99ms);
+  CHECK(client.busy());
+  client.advance(1s + 100ms);
+  CHECK(client.result()->outcome == SdoOutcome::timed_out);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x80, 0x40, 0x20, 0x01, 0x00, 0x00, 0x04, 0x05});
+  SECTION("a late answer is not taken for one to the next question") {
+    client.read({0x2040, 2}, 2s);
+    client.take(Bytes{0x4B, 0x40, 0x20, 0x01, 0xFF, 0x0F, 0, 0}, 2s);
+    CHECK(client.busy());
+    CHECK(client.second_answers() == 0);
+  }
+}
+
+TEST_CASE("SDO: a second answer betrays a second node", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  const Bytes answer{0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0, 0};
+  client.take(answer, 1s);
+  CHECK(client.second_answers() == 0);
+  client.take(answer, 1s);
+  CHECK(client.second_answers() == 1);
+}
+
+// ------------------------------------------------------------------ EMCY
+
+TEST_CASE("EMCY: code, register and what the manufacturer adds", "[canopen][emergency]") {
+  const auto emergency = read_emergency(Bytes{0x30, 0x50, 0x01, 0x02, 0x01, 0, 0, 0});
+  REQUIRE(emergency);
+  CHECK(to_string(*emergency) == "0x5030 device hardware (register 0x01)");
+  CHECK_FALSE(read_emergency(Bytes{0x30, 0x50, 0x01}));
+
+  CanopenChannel channel;
+  channel.emergency_channel = 2;
+  const auto jumo = [&](Bytes data) {
+    return emergency_fault(*read_emergency(data), EmergencyForm::jumo, channel);
+  };
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x01, 0, 0, 0}) == Fault::open_circuit);
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x02, 0, 0, 0}) == Fault::short_circuit);
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x10, 0, 0, 0}) == Fault::short_circuit);
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x44, 0, 0, 0}) == Fault::device_error);
+  CHECK_FALSE(jumo({0x30, 0x50, 0x01, 1, 0x01, 0, 0, 0}));
+  CHECK_FALSE(jumo({0x10, 0x81, 0x11, 2, 0x01, 0, 0, 0}));
+  CHECK(jumo({0, 0, 0, 2, 0, 0, 0, 0}) == Fault::none);
+  CHECK_FALSE(jumo({0, 0, 0, 1, 0, 0, 0, 0}));
+  CHECK(jumo({0, 0, 0, 0, 0, 0, 0, 0}) == Fault::none);
+}
+
+TEST_CASE("EMCY: listed codes fault a channel until no error is left", "[canopen][emergency]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x185, 16)});
+  node.channels[0].emergency_codes = {0x4210};
+  Bus bus(bus_of({node}));
+  bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0, 0, 0, 0});  // error register: none
+  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+  CHECK(bus.temp_degC(0) == Approx(22.5));
+  bus.put(0x085, {0x10, 0x42, 0x09, 0, 0, 0, 0, 0});
+  CHECK(bus.fault(0) == Fault::device_error);
+  CHECK(bus.fault(1) == Fault::none);
+  CHECK(bus.error() == "emergency 0x4210 temperature (register 0x09)");
+  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+  CHECK(bus.fault(0) == Fault::device_error);
+  bus.put(0x085, {0, 0, 0x01, 0, 0, 0, 0, 0});  // reset, but another error is left
+  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+  CHECK(bus.fault(0) == Fault::device_error);
+  bus.put(0x085, {0, 0, 0, 0, 0, 0, 0, 0});
+  CHECK(bus.fault(0) == Fault::device_error);  // the old value stays gone
+  bus.put(0x185, {0xE3, 0x00, 0xE2, 0x00});
+  CHECK(bus.temp_degC(0) == Approx(22.7));
+  CHECK(bus.error().empty());
+}
+
+// ------------------------------------------------------------------ the node's life
+
+TEST_CASE("a node is started at once and again after its reboot", "[canopen][node]") {
+  Bus bus(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
+  CHECK(bus.sent() == std::vector<Sent>{start_5});
+  CHECK(bus.fault() == Fault::no_answer);
+  bus.put(0x185, {0xE1, 0x00});
+  CHECK(bus.temp_degC() == Approx(22.5));
+  CHECK(bus.line.readings()[0].taken_at == bus.now);
+  bus.put(0x705, {0x00});  // boot-up
+  CHECK(bus.fault() == Fault::no_answer);
+  CHECK(bus.sent() == std::vector<Sent>{start_5});
+  bus.put(0x185, {0xE2, 0x00});
+  CHECK(bus.temp_degC() == Approx(22.6));
+}
+
+TEST_CASE("a node that somebody stopped is started again, once a second", "[canopen][node]") {
+  Bus bus(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
+  bus.sent();
+  bus.wait(1s);
+  bus.put(0x705, {0x7F});
+  bus.put(0x705, {0x7F});
+  CHECK(bus.sent() == std::vector<Sent>{start_5});
+  bus.put(0x705, {0x05});
+  bus.wait(1s);
+  CHECK(bus.sent().empty());
+}
+
+TEST_CASE("who does not manage the network sends no command", "[canopen][node]") {
+  CanopenBusConfig config = bus_of({node_5({in_pdo(0, 0x185, 0)})});
+  config.start_nodes = false;
+  Bus bus(config);
+  bus.put(0x705, {0x00});
+  bus.put(0x705, {0x7F});
+  bus.wait(3s);
+  CHECK(bus.sent().empty());
+  bus.put(0x185, {0xE1, 0x00});
+  CHECK(bus.temp_degC() == Approx(22.5));
+}
+
+TEST_CASE("a lost heartbeat takes the readings away until it is back", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
+  node.heartbeat_timeout_s = 0.5;
+  Bus bus(bus_of({node}));
+  bus.put(0x705, {0x05});
+  bus.put(0x185, {0xE1, 0x00});
+  bus.wait(400ms);
+  CHECK(bus.fault() == Fault::none);
+  bus.wait(200ms);
+  CHECK(bus.fault() == Fault::no_answer);
+  CHECK(bus.error() == "no heartbeat");
+  bus.put(0x185, {0xE1, 0x00});  // its values alone are not enough
+  CHECK(bus.fault() == Fault::no_answer);
+  bus.sent();
+  bus.put(0x705, {0x05});
+  CHECK(bus.sent() == std::vector<Sent>{start_5});
+  CHECK(bus.fault() == Fault::no_answer);
+  bus.put(0x185, {0xE2, 0x00});
+  CHECK(bus.temp_degC() == Approx(22.6));
+  CHECK(bus.error().empty());
+}
+
+TEST_CASE("settings are written before the start, and read back", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
+  node.writes = {{{0x6110, 1}, {0x14, 0x00}}};
+  Bus bus(bus_of({node}));
+  CHECK(bus.sent() ==
+        std::vector<Sent>{pre_operational_5, {0x605, {0x2B, 0x10, 0x61, 0x01, 0x14, 0, 0, 0}}});
+  bus.put(0x185, {0xE1, 0x00});  // of a node that still runs with its old settings
+  CHECK(bus.fault() == Fault::no_answer);
+  bus.put(0x585, {0x60, 0x10, 0x61, 0x01, 0, 0, 0, 0});
+  CHECK(bus.sent() == std::vector<Sent>{{0x605, {0x40, 0x10, 0x61, 0x01, 0, 0, 0, 0}}});
+  SECTION("the same value") {
+    bus.put(0x585, {0x4B, 0x10, 0x61, 0x01, 0x14, 0, 0, 0});
+    CHECK(bus.sent() == std::vector<Sent>{start_5});
+    bus.put(0x185, {0xE1, 0x00});
+    CHECK(bus.temp_degC() == Approx(22.5));
+  }
+  SECTION("another value: no temperature, and a new try after a pause") {
+    bus.put(0x585, {0x4B, 0x10, 0x61, 0x01, 0x15, 0, 0, 0});
+    CHECK(bus.fault() == Fault::device_error);
+    CHECK(bus.error() == "setting 6110:01: reads back 21 instead of 20");
+    bus.put(0x185, {0xE1, 0x00});
+    CHECK(bus.fault() == Fault::device_error);
+    bus.wait(1100ms);
+    CHECK(bus.sent().at(0) == pre_operational_5);
+  }
+}
+
+TEST_CASE("a refused setting is told by the name of its abort code", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
+  node.heartbeat_s = 1.0;
+  Bus bus(bus_of({node}));
+  CHECK(bus.sent().at(1).bytes == Bytes{0x2B, 0x17, 0x10, 0x00, 0xE8, 0x03, 0, 0});
+  bus.put(0x585, {0x80, 0x17, 0x10, 0x00, 0x02, 0x00, 0x01, 0x06});
+  CHECK(bus.fault() == Fault::device_error);
+  CHECK(bus.error() == "setting 1017:00: aborted by the node: 0x06010002 object is read only");
+  bus.wait(600ms);
+  CHECK(bus.sent().empty());
+  SECTION("a reboot is a reason to try at once") {
+    bus.put(0x705, {0x00});
+    CHECK(bus.sent().size() == 2);
+    CHECK(bus.fault() == Fault::no_answer);
+  }
+}
+
+TEST_CASE("a node that is not there is asked again with growing pauses", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
+  node.heartbeat_s = 1.0;
+  Bus bus(bus_of({node}));
+  int tries = 0;
+  for (int s = 0; s < 120; ++s) {
+    bus.wait(1s);
+    for (const Sent& sent : bus.sent()) tries += sent.id == 0x605 && sent.bytes[0] == 0x2B ? 1 : 0;
+    CHECK(bus.fault() == Fault::no_answer);
+  }
+  CHECK(tries > 8);
+  CHECK(tries < 20);
+  CHECK(bus.error() == "1017:00: no answer");
+}
+
+TEST_CASE("mappings are asked for and objects found in them", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 2})});
+  node.mappings_read = {1};
+  Bus bus(bus_of({node}));
+  CHECK(bus.line.wanted().size() == 1);  // everything: the identifier is not known yet
+  CHECK(bus.sent() == std::vector<Sent>{{0x605, {0x40, 0x00, 0x18, 0x01, 0, 0, 0, 0}}});
+  const auto answer = [&](Bytes data) { bus.put(0x585, data); };
+  SECTION("where they are") {
+    answer({0x43, 0x00, 0x18, 0x01, 0x95, 0x01, 0x00, 0x40});  // 0x195, no RTR
+    CHECK(bus.sent().at(0).bytes == Bytes{0x40, 0x00, 0x1A, 0x00, 0, 0, 0, 0});
+    answer({0x4F, 0x00, 0x1A, 0x00, 2, 0, 0, 0});
+    answer({0x43, 0x00, 0x1A, 0x01, 0x10, 0x01, 0x30, 0x71});  // 7130:01, 16 bits
+    CHECK(bus.sent().at(1).bytes == Bytes{0x40, 0x00, 0x1A, 0x02, 0, 0, 0, 0});
+    answer({0x43, 0x00, 0x1A, 0x02, 0x10, 0x02, 0x30, 0x71});
+    CHECK(bus.sent() == std::vector<Sent>{start_5});
+    bus.put(0x195, {0x11, 0x11, 0xE1, 0x00});
+    CHECK(bus.temp_degC() == Approx(22.5));
+  }
+  SECTION("an object that is in none of them") {
+    answer({0x43, 0x00, 0x18, 0x01, 0x95, 0x01, 0x00, 0x40});
+    answer({0x4F, 0x00, 0x1A, 0x00, 1, 0, 0, 0});
+    answer({0x43, 0x00, 0x1A, 0x01, 0x10, 0x01, 0x30, 0x71});
+    CHECK(bus.fault() == Fault::device_error);
+    CHECK(bus.error() == "7130:02 is in none of the node's TPDOs with 16 bits");
+    bus.put(0x195, {0xE1, 0x00});
+    CHECK(bus.fault() == Fault::device_error);
+  }
+  SECTION("a TPDO that is switched off") {
+    answer({0x43, 0x00, 0x18, 0x01, 0x95, 0x01, 0x00, 0x80});
+    CHECK(bus.fault() == Fault::device_error);
+    CHECK(bus.error() == "TPDO 1 is switched off in the node");
+  }
+}
+
+TEST_CASE("a configured mapping needs no question", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 2})});
+  node.mappings = {{0x285, {{{0x0005, 0}, 8}, {{0x7130, 1}, 16}, {{0x7130, 2}, 16}}}};
+  Bus bus(bus_of({node}));
+  CHECK(bus.sent() == std::vector<Sent>{start_5});
+  bus.put(0x285, {0xFF, 0x11, 0x11, 0xE1, 0x00});
+  CHECK(bus.temp_degC() == Approx(22.5));
+  bus.put(0x285, {0xFF, 0x11, 0x11, 0xE1});
+  CHECK(bus.fault() == Fault::bad_frame);
+}
+
+TEST_CASE("objects are polled, and each way of failing is its own fault", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({object_channel(CanopenWay::sdo, {0x2040, 1})});
+  Bus bus(bus_of({node}));
+  const Bytes question{0x40, 0x40, 0x20, 0x01, 0, 0, 0, 0};
+  CHECK(bus.sent() == std::vector<Sent>{start_5, {0x605, question}});
+  bus.put(0x585, {0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0, 0});
+  CHECK(bus.temp_degC() == Approx(22.5));
+  bus.wait(1s);
+  CHECK(bus.sent().at(0).bytes == question);
+  SECTION("abort") {
+    bus.put(0x585, {0x80, 0x40, 0x20, 0x01, 0x24, 0x00, 0x00, 0x08});
+    CHECK(bus.fault() == Fault::device_error);
+    CHECK(bus.error() == "2040:01: aborted by the node: 0x08000024 no data available");
+  }
+  SECTION("silence") {
+    bus.wait(500ms);
+    CHECK(bus.fault() == Fault::no_answer);
+  }
+  SECTION("too few bytes") {
+    bus.put(0x585, {0x4F, 0x40, 0x20, 0x01, 0xE1, 0, 0, 0});
+    CHECK(bus.fault() == Fault::bad_frame);
+  }
+  bus.sent();
+  while (bus.sent().empty()) bus.wait(10ms);  // until it is asked again
+  bus.put(0x585, {0x4B, 0x40, 0x20, 0x01, 0xE2, 0x00, 0, 0});
+  CHECK(bus.temp_degC() == Approx(22.6));
+  CHECK(bus.error().empty());
+}
+
+TEST_CASE("a JUMO CANtrans with a broken and a shorted thermocouple", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x185, 16)});
+  node.emergency = EmergencyForm::jumo;
+  node.channels[0].emergency_channel = 1;
+  node.channels[1].emergency_channel = 2;
+  Bus bus(bus_of({node}));
+  CHECK(bus.sent().at(0).bytes == Bytes{0x40, 0x01, 0x10, 0x00, 0, 0, 0, 0});
+  bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0, 0, 0, 0});
+  bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+  bus.put(0x085, {0x30, 0x50, 0x01, 1, 0x01, 0, 0, 0});
+  CHECK(bus.fault(0) == Fault::open_circuit);
+  CHECK(bus.temp_degC(1) == Approx(22.6));
+  bus.put(0x085, {0x30, 0x50, 0x01, 2, 0x02, 0, 0, 0});
+  bus.put(0x185, {0xFF, 0x7F, 0xE2, 0x00});
+  CHECK(bus.fault(0) == Fault::open_circuit);
+  CHECK(bus.fault(1) == Fault::short_circuit);
+  SECTION("the resets name their channel") {
+    bus.put(0x085, {0, 0, 0, 2, 0, 0, 0, 0});
+    bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+    CHECK(bus.fault(0) == Fault::open_circuit);
+    CHECK(bus.temp_degC(1) == Approx(22.6));
+  }
+  SECTION("a reset that nobody heard is seen in the error register when the bus is back") {
+    bus.line.closed(bus.now);
+    CHECK(bus.fault(1) == Fault::no_answer);
+    bus.line.opened(bus.now);
+    bus.put(0x585, {0x4F, 0x01, 0x10, 0x00, 0, 0, 0, 0});
+    bus.put(0x185, {0xE1, 0x00, 0xE2, 0x00});
+    CHECK(bus.fault(0) == Fault::none);
+    CHECK(bus.fault(1) == Fault::none);
+  }
+  CHECK(bus.line.health(bus.now)[0].exceptions == 2);
+}
+
+// ------------------------------------------------------------------ two that say the same
+
+TEST_CASE("two nodes of one number are noticed by their heartbeats", "[canopen][duplicate]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
+  node.heartbeat_s = 0.1;
+  Bus bus(bus_of({node}));
+  bus.put(0x585, {0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0});
+  bus.put(0x585, {0x4B, 0x17, 0x10, 0x00, 100, 0, 0, 0});
+  const auto beat = [&](int a_period) {
+    for (int i = 0; i < 20 * a_period; ++i) {
+      bus.put(0x705, {0x05});
+      bus.put(0x185, {0xE1, 0x00});
+      bus.wait(100ms / a_period);
+    }
+  };
+  beat(1);
+  CHECK(bus.fault() == Fault::none);
+  beat(2);
+  CHECK(bus.fault() == Fault::device_error);
+  CHECK(bus.error() == "two nodes answer as node 5");
+  beat(1);
+  CHECK(bus.temp_degC() == Approx(22.5));
+  CHECK(bus.error().empty());
+}
+
+TEST_CASE("a TPDO that comes twice as often as it should is no value", "[canopen][duplicate]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x285, 0)});
+  node.pdo_period_s = 0.1;
+  Bus bus(bus_of({node}));
+  const auto run = [&](int a_period) {
+    for (int i = 0; i < 20 * a_period; ++i) {
+      bus.put(0x185, {0xE1, 0x00});
+      if (i % a_period == 0) bus.put(0x285, {0xE2, 0x00});
+      bus.wait(100ms / a_period);
+    }
+  };
+  run(1);
+  CHECK(bus.fault(0) == Fault::none);
+  run(2);
+  CHECK(bus.fault(0) == Fault::device_error);
+  CHECK(bus.fault(1) == Fault::none);
+  CHECK(bus.error() == "COB-ID 389 comes too often: two nodes send it, or pdo_period_s is wrong");
+  run(1);
+  CHECK(bus.fault(0) == Fault::none);
+}
+
+TEST_CASE("two answers to one question: neither is believed", "[canopen][duplicate]") {
+  CanopenNodeConfig node = node_5({object_channel(CanopenWay::sdo, {0x2040, 1})});
+  Bus bus(bus_of({node}));
+  const Bytes one{0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0, 0};
+  bus.put(0x585, one);
+  CHECK(bus.fault() == Fault::none);
+  bus.put(0x585, {0x4B, 0x40, 0x20, 0x01, 0x10, 0x00, 0, 0});
+  CHECK(bus.fault() == Fault::device_error);
+  CHECK(bus.error() == "two nodes answer as node 5");
+  for (int i = 0; i < 11; ++i) {
+    bus.wait(1s);
+    bus.put(0x585, one);
+  }
+  CHECK(bus.fault() == Fault::none);
+}
+
+TEST_CASE("two nodes that tell the same COB-ID are both refused", "[canopen][duplicate]") {
+  CanopenNodeConfig a = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 1})});
+  a.mappings_read = {1};
+  CanopenNodeConfig b = a;
+  b.name = "other";
+  b.node = 6;
+  Bus bus(bus_of({a, b}));
+  const auto map = [&](std::uint32_t id, std::uint8_t cob_id) {
+    bus.put(id, {0x43, 0x00, 0x18, 0x01, cob_id, 0x01, 0, 0});
+    bus.put(id, {0x4F, 0x00, 0x1A, 0x00, 1, 0, 0, 0});
+    bus.put(id, {0x43, 0x00, 0x1A, 0x01, 0x10, 0x01, 0x30, 0x71});
+  };
+  map(0x585, 0x85);
+  bus.put(0x185, {0xE1, 0x00});
+  CHECK(bus.fault(0) == Fault::none);
+  map(0x586, 0x85);
+  bus.put(0x185, {0xE1, 0x00});
+  CHECK(bus.fault(0) == Fault::device_error);
+  CHECK(bus.fault(1) == Fault::device_error);
+  CHECK(bus.error(0) == "COB-ID 389 is sent by node 6 (other) too");
+  bus.put(0x706, {0x00});  // somebody mended it
+  map(0x586, 0x86);
+  bus.put(0x185, {0xE1, 0x00});
+  bus.put(0x186, {0xE2, 0x00});
+  CHECK(bus.fault(0) == Fault::none);
+  CHECK(bus.temp_degC(1) == Approx(22.6));
+}
+
+// ------------------------------------------------------------------ the line
+
+TEST_CASE("SYNC and our heartbeat keep their periods and make up for nothing", "[canopen][line]") {
+  CanopenBusConfig config = bus_of({node_5({in_pdo(0, 0x185, 0)})});
+  config.sync_s = 0.1;
+  config.own_node = 127;
+  config.heartbeat_s = 0.5;
+  Bus bus(config);
+  bus.sent();
+  bus.wait(1s);
+  int syncs = 0;
+  int heartbeats = 0;
+  for (const Sent& sent : bus.sent()) {
+    syncs += sent == Sent{0x080, {}} ? 1 : 0;
+    heartbeats += sent == Sent{0x77F, {0x05}} ? 1 : 0;
+  }
+  CHECK(syncs == 10);
+  CHECK(heartbeats == 2);
+  bus.now += 10s;  // the machine stood still
+  bus.line.advance(bus.now);
+  CHECK(bus.sent().size() == 2);
+}
+
+TEST_CASE("a lost bus takes every reading away; it begins anew", "[canopen][line]") {
+  Bus bus(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
+  bus.put(0x185, {0xE1, 0x00});
+  bus.line.closed(bus.now);
+  CHECK(bus.fault() == Fault::no_answer);
+  bus.put(0x185, {0xE1, 0x00});
+  CHECK(bus.fault() == Fault::no_answer);
+  bus.sent();
+  bus.line.opened(bus.now);
+  CHECK(bus.sent() == std::vector<Sent>{start_5});
+  bus.put(0x185, {0xE1, 0x00});
+  CHECK(bus.fault() == Fault::none);
+}
+
+TEST_CASE("node numbers that cannot be are refused by name", "[canopen][line]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
+  CHECK_THROWS_AS(CanopenLine(bus_of({node, node})), InvalidValue);
+  node.node = 128;
+  CHECK_THROWS_AS(CanopenLine(bus_of({node})), InvalidValue);
+  CanopenBusConfig config = bus_of({node_5({in_pdo(0, 0x185, 0)})});
+  config.own_node = 5;
+  CHECK_THROWS_AS(CanopenLine(config), InvalidValue);
+}
+
+TEST_CASE("only frames that somebody needs are asked for", "[canopen][line]") {
+  const CanopenLine line(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
+  std::vector<std::uint32_t> ids;
+  for (const CanFilter& filter : line.wanted()) ids.push_back(filter.id.id);
+  CHECK(ids == std::vector<std::uint32_t>{0x085, 0x585, 0x705, 0x185});
+}
