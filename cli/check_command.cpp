@@ -29,6 +29,9 @@ std::string controller_kind(const ControllerConfig& controller) {
   if (const auto* can = std::get_if<CanControllerConfig>(&controller)) {
     return can->name + " (can)";
   }
+  if (const auto* bridge = std::get_if<BridgeControllerConfig>(&controller)) {
+    return bridge->name + " (linuxcnc: its bridge calls the daemon)";
+  }
   return std::get<DryRunControllerConfig>(controller).name + " (dry_run: nothing is sent)";
 }
 

@@ -11,11 +11,13 @@
 #include <thread>
 #include <unistd.h>
 
+#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 #include <sys/signalfd.h>
 
 #include "config/daemon_config.hpp"
 #include "config/problems.hpp"
+#include "daemon/bridge_desk.hpp"
 #include "daemon/cycle/cycle.hpp"
 #include "daemon/cycle/real_time_thread.hpp"
 #include "daemon/event_log.hpp"
@@ -149,9 +151,16 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
   saved = loaded.state;
   cycle = std::make_unique<Cycle>(grid, pointers(sources), *link, config.estimator.sensors.size(),
                                   std::move(brain));
-  add_operator_methods(*server,
-                       {[this] { return view(); }, [this](const Command& asked) { command(asked); },
-                        [this] { reload(); }});
+  DeskActions actions{[this] { return view(); },
+                      [this](const Command& asked) { command(asked); },
+                      [this] { reload(); },
+                      {}};
+  if (auto* bridge = dynamic_cast<BridgeController*>(link.get()))
+    actions.controller_state = [this, bridge](const nlohmann::json& params) {
+      return answer_bridge(*bridge, std::get<BridgeControllerConfig>(config.controller),
+                           cycle->report().mode, params);
+    };
+  add_operator_methods(*server, actions);
 }
 
 std::unique_ptr<CycleBrain> Daemon::Parts::make_brain(const DaemonConfig& next) {

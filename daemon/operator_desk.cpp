@@ -113,8 +113,9 @@ void add_operator_methods(StatusServer& server, const DeskActions& actions) {
   add("measured", [actions](const json& params) { return note_measured(actions, params); });
   add("prove", [actions](const json& params) { return prove(actions, params); });
   add("reload", [actions](const json&) { return reload(actions); });
-  server.add_method("controller_state", AccessClass::bridge, [](const json&) -> json {
-    throw RpcError(rpc::refused, "this configuration's controller is no bridge");
+  server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
+    refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");
+    return actions.controller_state(params);
   });
 }
 

@@ -3,6 +3,8 @@
 
 #include <functional>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "config/daemon_config.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status_json.hpp"
@@ -17,6 +19,8 @@ struct DeskActions {
   std::function<void(const Command&)> command;
   /// @throws ConfigurationError or RpcError with what is wrong; the running one then stays
   std::function<void()> reload;
+  /// A bridge's report and its answer; empty where the controller is no bridge. @throws RpcError
+  std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
 };
 
 /// Adds every method of CONTRACTS to `server`. @param actions  copied; must stay callable

@@ -14,7 +14,7 @@
 namespace thermocomp::sections {
 namespace {
 
-enum class Kind { dry_run, modbus_tcp, modbus_rtu, piezo_tcp, piezo_rtu, can, unknown };
+enum class Kind { dry_run, modbus_tcp, modbus_rtu, piezo_tcp, piezo_rtu, can, linuxcnc, unknown };
 
 /// The bound of the axis must be something that the value can carry, or offsets would be cut off.
 void check_reach(const TomlTable& table, std::string_view key, const Range& reach,
@@ -78,7 +78,8 @@ class ControllerReader {
                                            {"modbus_rtu", Kind::modbus_rtu},
                                            {"piezo_tcp", Kind::piezo_tcp},
                                            {"piezo_rtu", Kind::piezo_rtu},
-                                           {"can", Kind::can}},
+                                           {"can", Kind::can},
+                                           {"linuxcnc", Kind::linuxcnc}},
                                           Kind::unknown);
     switch (kind) {
       case Kind::dry_run:
@@ -94,6 +95,9 @@ class ControllerReader {
         break;
       case Kind::can:
         read_can();
+        break;
+      case Kind::linuxcnc:
+        read_linuxcnc();
         break;
       case Kind::unknown:
         if (!table_.has("kind")) table_.problem("kind", "must be given");
@@ -121,6 +125,26 @@ class ControllerReader {
     for (const TomlTable& axis : axis_tables_)
       refuse_all(axis, {"offset", "applied", "piezo"}, rule);
     result_.config = DryRunControllerConfig{name_, axes_.size()};
+  }
+
+  void read_linuxcnc() {
+    constexpr std::string_view rule = "makes no sense for kind = \"linuxcnc\": the bridge knows it";
+    BridgeControllerConfig config;
+    config.name = name_;
+    config.silent_after_s =
+        table_.number("silent_after_s", Range::between(0.2, 60), config.silent_after_s);
+    for (const std::string& key : table_.keys())
+      if (key != "name" && key != "kind" && key != "silent_after_s" && key != "signal")
+        table_.refuse(key, rule);
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      refuse_all(axis_tables_[i], {"offset", "applied", "piezo"}, rule);
+      if (axes_[i].output.ends_with("_urad"))
+        axis_tables_[i].problem("output", "must be in um: LinuxCNC takes offsets of linear axes");
+      config.axes.push_back(axes_[i].name);
+    }
+    read_signals([](const TomlTable&, std::size_t) {});
+    config.signals = result_.signals;
+    result_.config = std::move(config);  // the bridge sets the pace: no period
   }
 
   /// Calls read_value(table, index) for every signal whose name can be used.

@@ -78,7 +78,16 @@ struct DryRunControllerConfig {
   bool operator==(const DryRunControllerConfig&) const = default;
 };
 
-using ControllerConfig =
-    std::variant<DryRunControllerConfig, ModbusControllerConfig, CanControllerConfig>;
+/// LinuxCNC: a bridge of its own calls the daemon (docs/linuxcnc.md).
+struct BridgeControllerConfig {
+  std::string name;
+  double silent_after_s{1.0};        ///< without a report: offline
+  std::vector<std::string> axes;     ///< as the bridge calls them, order of the configuration's
+  std::vector<std::string> signals;  ///< as the bridge calls them, order of the configuration's
+  bool operator==(const BridgeControllerConfig&) const = default;
+};
+
+using ControllerConfig = std::variant<DryRunControllerConfig, ModbusControllerConfig,
+                                      CanControllerConfig, BridgeControllerConfig>;
 
 }  // namespace thermocomp

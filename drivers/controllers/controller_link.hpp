@@ -10,7 +10,7 @@ namespace thermocomp {
 
 struct ControllerHealth {
   std::string name;
-  std::string kind;  ///< "modbus_tcp", "modbus_rtu", "can", "dry_run"
+  std::string kind;  ///< "modbus_tcp", "modbus_rtu", "can", "linuxcnc", "dry_run"
   bool connected{false};
   std::uint64_t connects{0};
   std::uint64_t writes{0};  ///< offsets sent

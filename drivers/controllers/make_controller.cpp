@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "drivers/can/signal_codec.hpp"
+#include "drivers/controllers/bridge_controller.hpp"
 #include "drivers/controllers/can_controller.hpp"
 #include "drivers/controllers/dry_run_controller.hpp"
 #include "drivers/controllers/modbus_controller.hpp"
@@ -20,6 +21,9 @@ struct Maker {
   std::unique_ptr<ControllerLink> operator()(const CanControllerConfig& config) const {
     return std::make_unique<CanController>(config);
   }
+  std::unique_ptr<ControllerLink> operator()(const BridgeControllerConfig& config) const {
+    return std::make_unique<BridgeController>(config);
+  }
 };
 
 double resolution(const ModbusValue& value) {
@@ -30,6 +34,9 @@ double resolution(const ModbusValue& value) {
 struct Resolutions {
   std::vector<double> operator()(const DryRunControllerConfig& config) const {
     return std::vector<double>(config.axes, 0.0);
+  }
+  std::vector<double> operator()(const BridgeControllerConfig& config) const {
+    return std::vector<double>(config.axes.size(), 0.0);
   }
   template <class WithAxes>
   std::vector<double> operator()(const WithAxes& config) const {

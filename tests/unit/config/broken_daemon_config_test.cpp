@@ -180,7 +180,8 @@ const std::vector<Broken>& broken_small_machine() {
       // ---- controller
       {"controller kind", "kind = \"modbus_tcp\"                      # dry_run",
        "kind = \"profinet\"                      # dry_run", "", "controller.kind",
-       "\"dry_run\" \"modbus_tcp\" \"modbus_rtu\" \"piezo_tcp\" \"piezo_rtu\" \"can\""},
+       "\"dry_run\" \"modbus_tcp\" \"modbus_rtu\" \"piezo_tcp\" \"piezo_rtu\" \"can\" "
+       "\"linuxcnc\""},
       {"controller host", "host = \"192.168.10.30\"", "host = \"1.2.3\"", "", "controller.host",
        "IP address"},
       {"controller period", "period_s = 0.1", "period_s = 0.0", "", "controller.period_s",

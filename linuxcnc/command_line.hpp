@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/// The options of thermocomp-linuxcnc.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "linuxcnc/bridge_state.hpp"
+#include "linuxcnc/hal_file.hpp"
+
+namespace thermocomp_linuxcnc {
+
+struct BridgeOptions {
+  std::string name{"thermocomp"};
+  std::string axes{"xyz"};
+  std::string socket{"/run/thermocomp/status.sock"};
+  double period_s{0.05};
+  Limits limits;
+};
+
+/// What is to be done: run as a bridge, or print a HAL file.
+struct Task {
+  bool print_hal{false};
+  BridgeOptions bridge;
+  HalFileOptions hal;
+  std::string rejoin_as;  ///< not empty: the file for another component to take over
+};
+
+/// Prints help, version or what is wrong where that is due.
+/// @return nothing: `status` is the exit status
+[[nodiscard]] std::optional<Task> read_command_line(int argc, const char* const* argv, int& status);
+
+/// "x=0,z=2" @throws BadOption
+[[nodiscard]] std::vector<HalAxis> read_axes(const std::string& text);
+
+}  // namespace thermocomp_linuxcnc

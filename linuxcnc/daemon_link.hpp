@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/// The connection to the daemon's status socket: lines out, lines in, never waits.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+namespace thermocomp_linuxcnc {
+
+class DaemonLink {
+ public:
+  /// No answer of the daemon is longer.
+  static constexpr std::size_t line_bytes_max = std::size_t{256} * 1024;
+
+  explicit DaemonLink(std::string path) : path_(std::move(path)) {}
+  ~DaemonLink() { close(); }
+  DaemonLink(const DaemonLink&) = delete;
+  DaemonLink& operator=(const DaemonLink&) = delete;
+
+  /// @return whether there is a connection now; error() says why not
+  bool connect();
+  void close();
+  [[nodiscard]] bool connected() const noexcept { return fd_ >= 0; }
+  [[nodiscard]] int fd() const noexcept { return fd_; }  ///< -1: none
+  [[nodiscard]] const std::string& error() const noexcept { return error_; }
+
+  /// A request is far smaller than a socket's buffer: what does not fit at once ends the
+  /// connection.
+  bool send(const std::string& line);
+  /// The next whole line, if one is there. The connection may end here.
+  std::optional<std::string> receive();
+
+ private:
+  void fail(const std::string& what, int code);
+
+  std::string path_;
+  int fd_{-1};
+  std::string input_;
+  std::string error_;
+};
+
+}  // namespace thermocomp_linuxcnc

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/// The bridge as a HAL component: its pins, read and written.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+#include "linuxcnc/bridge_state.hpp"
+#include "linuxcnc/machine_view.hpp"
+
+namespace thermocomp_linuxcnc {
+
+class HalError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class HalPins {
+ public:
+  /// Makes the component and its pins, and says that it is ready. @throws HalError
+  HalPins(const std::string& name, const std::string& axes);
+  ~HalPins();  ///< leaves HAL: the component can be loaded again
+  HalPins(const HalPins&) = delete;
+  HalPins& operator=(const HalPins&) = delete;
+
+  [[nodiscard]] MachineView read() const;
+  void write(const Outputs& outputs, bool connected);
+
+ private:
+  struct Pins;  ///< in HAL's memory
+  void add_pins(const std::string& name, const std::string& axes);
+
+  int component_{-1};
+  std::size_t axes_;
+  Pins* pins_{nullptr};
+};
+
+}  // namespace thermocomp_linuxcnc
