@@ -88,7 +88,8 @@ void check_controller_period(const TomlTable& compensation, const DaemonConfig& 
 /// Everything but the model's content.
 /// @return the tables that are looked at once more beside the model
 sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folder,
-                                    sections::Presets& presets, DaemonConfig& config) {
+                                    sections::Presets& presets, sections::DbcFiles& dbc_files,
+                                    DaemonConfig& config) {
   static_cast<void>(root.integer("format", 1, 1));
   config.log_level = root.choice<std::string>("log_level",
                                               {{"trace", "trace"},
@@ -110,7 +111,7 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.sensors = sections::read_sensors(root, sensors);
   config.estimator.blocks = sections::read_blocks(tables.blocks, config.estimator.sensors);
   config.estimator.axes = sections::read_axes(tables.axes);
-  sections::SensorBuses buses = sections::read_buses(root, sensors, presets);
+  sections::SensorBuses buses = sections::read_buses(root, sensors, presets, dbc_files);
   config.modbus_buses = std::move(buses.modbus);
   config.can_buses = std::move(buses.can);
   check_periods(sensors, config);
@@ -135,7 +136,7 @@ struct ModelSource {
 
 template <class FindModel>
 DaemonConfig build(const TomlDocument& document, const fs::path& folder, sections::Presets presets,
-                   FindModel find_model) {
+                   sections::DbcFiles dbc_files, FindModel find_model) {
   DaemonConfig config;
   config.file = document.name();
   config.text = document.text();
@@ -143,7 +144,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, section
   const TomlTable model_table = root.table("model");
   config.model_file = read_path(model_table, "file", "model.toml", folder);
   if (!model_table.has("file")) model_table.problem("file", "must be given");
-  const sections::BindingTables tables = read_daemon(root, folder, presets, config);
+  const sections::BindingTables tables = read_daemon(root, folder, presets, dbc_files, config);
 
   const ModelSource source = find_model(model_table, config.model_file);
   std::vector<Problem> model_problems;
@@ -162,6 +163,8 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, section
   std::vector<Problem> problems = document.all_problems();
   const std::vector<Problem> preset_problems = presets.problems();
   problems.insert(problems.end(), preset_problems.begin(), preset_problems.end());
+  const std::vector<Problem>& dbc_problems = dbc_files.problems();
+  problems.insert(problems.end(), dbc_problems.begin(), dbc_problems.end());
   problems.insert(problems.end(), model_problems.begin(), model_problems.end());
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
   return config;
@@ -184,16 +187,17 @@ DaemonConfig load_daemon_config(const fs::path& path) {
   const TomlDocument document = TomlDocument::from_file(path);
   const fs::path folder = fs::absolute(path).parent_path();
   return build(document, folder, sections::Presets(sections::preset_folders(folder)),
-               read_model_file);
+               sections::DbcFiles(folder), read_model_file);
 }
 
 DaemonConfig parse_daemon_config(const std::string& config_text, const std::string& config_name,
                                  const std::string& model_text, const std::string& model_name) {
   const TomlDocument document = TomlDocument::from_text(config_text, config_name);
   const fs::path folder = fs::path(config_name).parent_path();
-  return build(document, folder, sections::Presets({}), [&](const TomlTable&, const fs::path&) {
-    return ModelSource{model_name, model_text};
-  });
+  return build(document, folder, sections::Presets({}), sections::DbcFiles(std::nullopt),
+               [&](const TomlTable&, const fs::path&) {
+                 return ModelSource{model_name, model_text};
+               });
 }
 
 }  // namespace thermocomp

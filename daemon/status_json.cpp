@@ -129,6 +129,7 @@ json buses(const StatusView& view) {
                         {"state_s", age_s(view, bus.state_since)},
                         {"error_frames", bus.error_frames},
                         {"bus_offs", bus.bus_offs},
+                        {"restarts", bus.restarts},
                         {"dropped", bus.dropped}});
   }
   return list;

@@ -35,15 +35,15 @@ class Occupied {
     return words_.take(unit, table, address, count, mask);
   }
   bool take(const CanSignal& signal) {
-    std::uint64_t& bits = frames_[{signal.id, signal.extended_id}];
-    const bool free = (bits & bits_of(signal)) == 0;
+    CanBits& bits = frames_[{signal.id, signal.extended_id}];
+    const bool free = (bits & bits_of(signal)).none();
     bits |= bits_of(signal);
     return free;
   }
 
  private:
   RegistersTaken words_;
-  std::map<std::pair<std::uint32_t, bool>, std::uint64_t> frames_;
+  std::map<std::pair<std::uint32_t, bool>, CanBits> frames_;
 };
 
 SimulatedBus read_link(const TomlTable& table, SimulatedBusKind kind) {

@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 
+#include "config/sections/can_database.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 #include "config/sections/modbus_values.hpp"
@@ -41,7 +42,8 @@ std::string known(const auto& entries) {
 
 class BusReader {
  public:
-  BusReader(const TomlTable& root, Presets& presets) : root_(root), presets_(presets) {}
+  BusReader(const TomlTable& root, Presets& presets, DbcFiles& dbc_files)
+      : root_(root), presets_(presets), dbc_files_(dbc_files) {}
 
   SensorBuses read(const std::vector<TomlTable>& sensors) {
     std::set<std::string> bus_names;
@@ -74,6 +76,7 @@ class BusReader {
     if (kind == BusKind::can) {
       bus.index = result_.can.size();
       result_.can.push_back(read_can_bus(table, name));
+      databases_.push_back(dbc_files_.read(table));
     } else if (kind == BusKind::unknown) {
       if (!table.has("kind")) table.problem("kind", "must be given");
       table.ignore_rest();
@@ -101,7 +104,7 @@ class BusReader {
     ModbusBusConfig bus;
     bus.name = name;
     bus.line = read_modbus_line(table, kind == BusKind::modbus_tcp);
-    table.refuse("interface", "makes no sense on a Modbus bus");
+    refuse_all(table, {"interface", "dbc"}, "makes no sense on a Modbus bus");
     if (const auto* rtu = std::get_if<ModbusRtu>(&bus.line.link)) {
       if (!rtu->device.empty() && !result_.serial_devices.insert(rtu->device).second) {
         table.problem("device", "is used by two buses");
@@ -180,8 +183,9 @@ class BusReader {
     } else if (device.kind == BusKind::can) {
       refuse_all(sensor, {"table", "address", "encoding", "word_order", "status"},
                  "makes no sense on a CAN bus");
-      result_.can[device.bus].devices[device.index].channels.push_back(
-          {index, read_can_signal(sensor, device.table, CanUse::temperature)});
+      CanChannel channel = read_can_channel(sensor, device.table, databases_[device.bus]);
+      channel.sensor = index;
+      result_.can[device.bus].devices[device.index].channels.push_back(std::move(channel));
     } else {
       ModbusDeviceConfig& modbus = result_.modbus[device.bus].devices[device.index];
       ModbusChannel channel = read_modbus_channel(sensor, device.table);
@@ -204,7 +208,9 @@ class BusReader {
 
   TomlTable root_;
   Presets& presets_;
+  DbcFiles& dbc_files_;
   SensorBuses result_;
+  std::vector<CanDatabase> databases_;  ///< one a CAN bus
   std::map<std::string, Bus> buses_;
   std::map<std::string, Device> devices_;
   /// A reference to a name that does not exist: whom nobody names may be the one that was meant.
@@ -215,8 +221,8 @@ class BusReader {
 }  // namespace
 
 SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors,
-                       Presets& presets) {
-  return BusReader(root, presets).read(sensors);
+                       Presets& presets, DbcFiles& dbc_files) {
+  return BusReader(root, presets, dbc_files).read(sensors);
 }
 
 }  // namespace thermocomp::sections

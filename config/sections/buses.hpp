@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "config/sections/can_database.hpp"
 #include "config/sections/presets.hpp"
 #include "config/toml_reader.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
@@ -18,8 +19,8 @@ struct SensorBuses {
 };
 
 /// @param sensors  the [[sensor]] tables in order; their channels get these indices
-/// @param presets  whose problems are the caller's to tell
+/// @param presets, dbc_files  whose problems are the caller's to tell
 [[nodiscard]] SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors,
-                                     Presets& presets);
+                                     Presets& presets, DbcFiles& dbc_files);
 
 }  // namespace thermocomp::sections

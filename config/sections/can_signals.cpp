@@ -8,7 +8,8 @@
 namespace thermocomp::sections {
 namespace {
 
-constexpr int frame_bits_max = 64;
+constexpr int classic_bits_max = 64;
+constexpr int fd_bits_max = 512;
 constexpr std::int64_t standard_id_max = 0x7FF;
 constexpr std::int64_t extended_id_max = 0x1FFFFFFF;
 
@@ -38,6 +39,12 @@ int required_integer(const TomlTable& own, const TomlTable& base, std::string_vi
   return own.integer(key, low, high, base.integer(key, low, high, otherwise));
 }
 
+std::string too_long(const CanSignal& signal) {
+  return "a signal of " + std::to_string(signal.length_bits) +
+         " bits from here does not fit into " + (signal.fd ? "64" : "8") +
+         " bytes in its byte order";
+}
+
 void read_place(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
   signal.extended_id = own.flag("extended_id", base.flag("extended_id", false));
   const bool in_base = base.has("id");
@@ -45,16 +52,14 @@ void read_place(const TomlTable& own, const TomlTable& base, CanSignal& signal) 
   const TomlTable& source = !own.has("id") && in_base ? base : own;
   const std::int64_t id_max = signal.extended_id ? extended_id_max : standard_id_max;
   signal.id = static_cast<std::uint32_t>(source.integer<std::int64_t>("id", 0, id_max, 0));
-  signal.start_bit =
-      required_integer(own, base, "start_bit", 0, frame_bits_max - 1, signal.start_bit);
-  signal.length_bits =
-      required_integer(own, base, "length_bits", 1, frame_bits_max, signal.length_bits);
+  signal.fd = own.flag("fd", base.flag("fd", false));
+  const int bits = signal.fd ? fd_bits_max : classic_bits_max;
+  signal.start_bit = required_integer(own, base, "start_bit", 0, bits - 1, signal.start_bit);
+  signal.length_bits = required_integer(own, base, "length_bits", 1, 64, signal.length_bits);
   signal.byte_order = own.choice("byte_order", byte_orders(),
                                  base.choice("byte_order", byte_orders(), signal.byte_order));
-  if (frame_bits(signal) == 0) {
-    own.problem("start_bit", std::to_string(signal.start_bit),
-                "a signal of " + std::to_string(signal.length_bits) +
-                    " bits from here does not fit into 8 bytes in its byte order");
+  if (frame_bits(signal).none()) {
+    own.problem("start_bit", std::to_string(signal.start_bit), too_long(signal));
     signal.start_bit = signal.byte_order == ByteOrder::little_endian ? 0 : 7;
   }
 }
@@ -67,7 +72,45 @@ void read_form(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
   }
 }
 
+/// The multiplexor that a device or sensor names, and the number at which the sensor is there.
+void read_selector(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
+  const auto field = read_can_field(own, base, "multiplexor", signal.fd);
+  if (!field) {
+    own.refuse("multiplexor_value", "makes no sense without a multiplexor");
+    return;
+  }
+  const std::int64_t greatest =
+      field->length_bits >= 63 ? INT64_MAX : (std::int64_t{1} << field->length_bits) - 1;
+  if (!own.has("multiplexor_value")) own.problem("multiplexor_value", "must be given");
+  const auto page =
+      static_cast<std::uint64_t>(own.integer<std::int64_t>("multiplexor_value", 0, greatest, 0));
+  signal.selectors = {{*field, {{page, page}}}};
+}
+
 }  // namespace
+
+std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& base,
+                                       std::string_view key, bool fd) {
+  const TomlTable& source = own.has(key) ? own : base;
+  if (!source.has(key)) return std::nullopt;
+  const TomlTable table = source.table(key);
+  CanSignal number;
+  number.fd = fd;
+  number.start_bit = table.integer("start_bit", 0, (fd ? fd_bits_max : classic_bits_max) - 1);
+  number.length_bits = table.integer("length_bits", 1, 64);
+  number.byte_order = table.choice("byte_order", byte_orders(), number.byte_order);
+  if (table && frame_bits(number).none()) {
+    table.problem("start_bit", std::to_string(number.start_bit), too_long(number));
+    return std::nullopt;
+  }
+  return CanField{number.start_bit, number.length_bits, number.byte_order};
+}
+
+std::vector<Sentinel> read_can_codes(const TomlTable& own, const TomlTable& base,
+                                     const CanSignal& signal) {
+  const auto [low, high] = codes_of(signal);
+  return read_codes(own, base, low, high);
+}
 
 std::string read_interface(const TomlTable& table) {
   constexpr std::size_t name_max = 15;  // IFNAMSIZ less the end
@@ -94,25 +137,25 @@ CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse us
     const Range range = Range::between(-1e4, 1e4);
     signal.offset =
         own.number("offset_degC", range, base.number("offset_degC", range, signal.offset));
-    const auto [low, high] = codes_of(signal);
-    signal.sentinels = read_codes(own, base, low, high);
+    signal.sentinels = read_can_codes(own, base, signal);
+    read_selector(own, base, signal);
   }
   return signal;
 }
 
-std::uint64_t frame_bits(const CanSignal& signal) {
-  std::uint64_t mask = 0;
+FrameBits frame_bits(const CanSignal& signal) {
+  FrameBits bits;
   int bit = signal.start_bit;
   for (int i = 0; i < signal.length_bits; ++i) {
-    if (bit < 0 || bit >= frame_bits_max) return 0;
-    mask |= 1ULL << static_cast<unsigned>(bit);
+    if (bit < 0 || bit >= (signal.fd ? fd_bits_max : classic_bits_max)) return {};
+    bits.set(static_cast<std::size_t>(bit));
     if (signal.byte_order == ByteOrder::little_endian) {
       ++bit;
     } else {
       bit = bit % 8 == 0 ? bit + 15 : bit - 1;  // from bit 0 on to bit 7 of the next byte
     }
   }
-  return mask;
+  return bits;
 }
 
 Range reach(const CanSignal& signal) {

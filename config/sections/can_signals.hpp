@@ -1,7 +1,12 @@
 /// The parts of the daemon's file that describe CAN interfaces and signals.
 #pragma once
 
+#include <bitset>
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "config/toml_reader.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
@@ -17,12 +22,23 @@ enum class CanUse {
   offset,       ///< of an axis, sent or applied: scale
   bits          ///< heartbeat, valid bits: an unsigned number without scale
 };
-/// What `own` leaves out is as in `base` (which may be `own` again).
+/// What `own` leaves out is as in `base` (which may be `own` again). Multiplexors are for
+/// temperatures only.
 [[nodiscard]] CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse use);
 
-/// The bits of the frame that the signal takes, bit 8 n + k of the mask for bit k of byte n.
-/// 0 when it does not fit into 8 bytes.
-[[nodiscard]] std::uint64_t frame_bits(const CanSignal& signal);
+/// The number `key = { start_bit, length_bits, byte_order }` of the frame, in `own` or else in
+/// `base`; none where neither has it.
+[[nodiscard]] std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& base,
+                                                     std::string_view key, bool fd);
+
+/// The lists of codes that are messages and no values, for a signal whose place is known.
+[[nodiscard]] std::vector<Sentinel> read_can_codes(const TomlTable& own, const TomlTable& base,
+                                                   const CanSignal& signal);
+
+using FrameBits = std::bitset<512>;
+/// The bits of the frame that the signal takes, bit 8 n + k for bit k of byte n. None when it does
+/// not fit into 8 bytes (FD: 64).
+[[nodiscard]] FrameBits frame_bits(const CanSignal& signal);
 
 /// The numbers that raw * scale + offset can be, least and greatest.
 [[nodiscard]] Range reach(const CanSignal& signal);

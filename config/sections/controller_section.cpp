@@ -51,9 +51,9 @@ class WrittenRegisters {
 class SentBits {
  public:
   void add(const TomlTable& table, std::string_view key, const CanSignal& signal) {
-    std::uint64_t& used = used_[{signal.id, signal.extended_id}];
-    const std::uint64_t bits = frame_bits(signal);
-    if ((used & bits) != 0) table.problem(key, "shares bits with another value that is sent");
+    FrameBits& used = used_[{signal.id, signal.extended_id}];
+    const FrameBits bits = frame_bits(signal);
+    if ((used & bits).any()) table.problem(key, "shares bits with another value that is sent");
     used |= bits;
   }
   [[nodiscard]] bool sends(const CanSignal& signal) const {
@@ -61,7 +61,7 @@ class SentBits {
   }
 
  private:
-  std::map<std::pair<std::uint32_t, bool>, std::uint64_t> used_;
+  std::map<std::pair<std::uint32_t, bool>, FrameBits> used_;
 };
 
 class ControllerReader {

@@ -47,14 +47,14 @@ can_filter filter_for(const CanId& wanted) noexcept {
   return masked_filter({wanted, CAN_EFF_MASK});
 }
 
-CanFrame to_frame(const can_frame& raw, nanoseconds received_at) noexcept {
-  CanFrame frame;
+/// @param raw  classic frames have the same layout, but for the room behind byte 8
+void to_frame(const canfd_frame& raw, bool fd, nanoseconds received_at, CanFrame& frame) noexcept {
   frame.id.extended = (raw.can_id & CAN_EFF_FLAG) != 0;
   frame.id.id = raw.can_id & (frame.id.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
-  frame.size = std::min<std::size_t>(raw.len, can_bytes_max);
+  frame.fd = fd;
+  frame.size = std::min<std::size_t>(raw.len, fd ? can_bytes_max : can_classic_bytes_max);
   std::copy_n(std::begin(raw.data), frame.size, frame.data.begin());
   frame.received_at = received_at;
-  return frame;
 }
 
 }  // namespace
@@ -66,20 +66,22 @@ struct CanSocket::Buffers {
   struct alignas(cmsghdr) Control {
     std::array<char, control_bytes> bytes;
   };
-  std::array<can_frame, batch_max> frames{};
+  std::array<canfd_frame, batch_max> frames{};
   std::array<iovec, batch_max> parts{};
   std::array<Control, batch_max> controls{};
   std::array<mmsghdr, batch_max> messages{};
+  std::size_t used{batch_max};  ///< those that the kernel has written to, or nobody yet
 
   void prepare() noexcept {
-    for (std::size_t i = 0; i < batch_max; ++i) {
-      parts[i] = {&frames[i], sizeof(can_frame)};
+    for (std::size_t i = 0; i < used; ++i) {
+      parts[i] = {&frames[i], sizeof(canfd_frame)};
       messages[i] = {};
       messages[i].msg_hdr.msg_iov = &parts[i];
       messages[i].msg_hdr.msg_iovlen = 1;
       messages[i].msg_hdr.msg_control = controls[i].bytes.data();
       messages[i].msg_hdr.msg_controllen = control_bytes;
     }
+    used = 0;
   }
 };
 
@@ -110,6 +112,11 @@ nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now
                             nanoseconds monotonic_now) noexcept {
   constexpr nanoseconds oldest = std::chrono::seconds{1};
   return monotonic_now - std::clamp(realtime_now - realtime_stamp, nanoseconds{0}, oldest);
+}
+
+std::size_t whole_frame_bytes(std::size_t size) noexcept {
+  constexpr std::array<std::size_t, 7> sizes{12, 16, 20, 24, 32, 48, 64};
+  return size <= can_classic_bytes_max ? size : *std::lower_bound(sizes.begin(), sizes.end(), size);
 }
 
 CanSocket::CanSocket(std::string interface, std::vector<CanId> wanted)
@@ -226,6 +233,7 @@ bool CanSocket::configure() {
   // Filters before the bind: no frame of anybody else gets in between. An empty list is legal
   // and receives nothing.
   if (!set(SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) ||
+      !set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on) ||
       !set(SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &every_error, sizeof every_error) ||
       !set(SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on) ||
       !set(SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on)) {
@@ -237,7 +245,17 @@ bool CanSocket::configure() {
   if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) < 0) {
     return fail("bind", errno), false;
   }
+  ask_for_room();
   return true;
+}
+
+/// So that a full bus can wait for a busy machine; the default holds some 30 ms of 1 Mbit/s.
+/// Without the privilege the kernel gives what net.core.rmem_max allows, and it is no harm to have
+/// less.
+void CanSocket::ask_for_room() noexcept {
+  const int bytes = 2'000'000;
+  if (::setsockopt(socket_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) == 0) return;
+  ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
 }
 
 std::span<const CanFrame> CanSocket::receive() {
@@ -251,23 +269,25 @@ std::span<const CanFrame> CanSocket::receive() {
     if (errno != EAGAIN && errno != EINTR) fail("receiving", errno);
     return {};
   }
+  buffers_->used = static_cast<std::size_t>(count);
   const nanoseconds realtime = wall_clock_now();
   const nanoseconds monotonic = monotonic_now();
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-    const can_frame& raw = buffers_->frames[i];
-    if (buffers_->messages[i].msg_len != CAN_MTU) continue;
+    const canfd_frame& raw = buffers_->frames[i];
+    const bool fd = buffers_->messages[i].msg_len == CANFD_MTU;
+    if (!fd && buffers_->messages[i].msg_len != CAN_MTU) continue;
     const std::optional<nanoseconds> stamp = read_control(buffers_->messages[i].msg_hdr);
-    const CanFrame frame =
-        to_frame(raw, stamp ? monotonic_stamp(*stamp, realtime, monotonic) : monotonic);
+    CanFrame& frame = received_.emplace_back();
+    to_frame(raw, fd, stamp ? monotonic_stamp(*stamp, realtime, monotonic) : monotonic, frame);
     if ((raw.can_id & CAN_ERR_FLAG) != 0) {
       note_error_frame(raw.can_id & CAN_ERR_MASK, frame.payload());
+      received_.pop_back();
       continue;
     }
     if (bus_off()) {
       without_carrier_ = false;
       enter(CanState::active);
     }
-    received_.push_back(frame);
   }
   return received_;
 }
@@ -322,12 +342,14 @@ void CanSocket::note_error_state(unsigned bits) {
 
 bool CanSocket::send(const CanFrame& frame) {
   if (!is_open()) return false;
-  can_frame raw{};
+  canfd_frame raw{};
   raw.can_id = frame.id.id | (frame.id.extended ? CAN_EFF_FLAG : 0u);
-  raw.len = static_cast<std::uint8_t>(frame.size);
+  raw.len = static_cast<std::uint8_t>(whole_frame_bytes(frame.size));
   std::copy_n(frame.data.begin(), frame.size, std::begin(raw.data));
-  const ssize_t sent = ::send(socket_, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL);
-  if (sent == static_cast<ssize_t>(sizeof raw)) {
+  const bool fd = frame.fd || frame.size > can_classic_bytes_max;
+  const std::size_t bytes = fd ? CANFD_MTU : CAN_MTU;
+  const ssize_t sent = ::send(socket_, &raw, bytes, MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent == static_cast<ssize_t>(bytes)) {
     if (send_failed_) {
       send_failed_ = false;
       tell_state();

@@ -35,7 +35,8 @@ struct CanFilter {
 
 struct CanFrame {
   CanId id;
-  std::size_t size{0};  ///< bytes of data, 0..8
+  std::size_t size{0};  ///< bytes of data, 0..8 or, in an FD frame, 0..64
+  bool fd{false};       ///< CAN FD
   std::array<std::uint8_t, can_bytes_max> data{};
   nanoseconds received_at{};  ///< CLOCK_MONOTONIC
   [[nodiscard]] std::span<const std::uint8_t> payload() const noexcept {
@@ -72,12 +73,17 @@ struct CanErrors {
 [[nodiscard]] nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now,
                                           nanoseconds monotonic_now) noexcept;
 
-/// One bus seen through one socket; used by one thread. Trouble is data: no method throws after
-/// construction (but for memory), a lost link closes the socket and error() says why.
+/// The least number of bytes, `size` or more, that a frame can have: above 8 only some exist.
+/// @pre size <= can_bytes_max
+[[nodiscard]] std::size_t whole_frame_bytes(std::size_t size) noexcept;
+
+/// One bus seen through one socket, classic and FD frames alike; used by one thread. Trouble is
+/// data: no method throws after construction (but for memory), a lost link closes the socket and
+/// error() says why.
 class CanSocket {
  public:
   static constexpr std::size_t filters_max = 512;  ///< the kernel's CAN_RAW_FILTER_MAX
-  static constexpr std::size_t batch_max = 64;     ///< frames of one receive()
+  static constexpr std::size_t batch_max = 128;    ///< frames of one receive()
 
   /// @param wanted  identifiers to receive; the kernel drops all others. Duplicates are joined.
   /// @throws InvalidValue for more than filters_max identifiers or an impossible interface name
@@ -99,6 +105,7 @@ class CanSocket {
   /// What has arrived, without waiting, at most batch_max frames; valid until the next call.
   /// Error frames are counted and not handed out. Closes itself when the link is lost.
   [[nodiscard]] std::span<const CanFrame> receive();
+  /// A frame of more than 8 bytes goes out as CAN FD, filled up with zeros to a size that exists.
   /// @return false when the kernel did not take the frame; the link may be lost then
   bool send(const CanFrame& frame);
 
@@ -115,6 +122,7 @@ class CanSocket {
   struct Buffers;
 
   bool configure();
+  void ask_for_room() noexcept;
   void enter(CanState state);
   void tell_state();
   void look_for_carrier();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "estimator/checks.hpp"
@@ -10,39 +11,33 @@
 namespace thermocomp {
 namespace {
 
-constexpr int frame_bits = 64;
+constexpr int number_bits = 64;
 
 std::uint64_t low_bits(int count) noexcept {
-  return count >= frame_bits ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
+  return count >= number_bits ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
 }
 
-/// Place of the signal's most significant bit counted from the first bit sent (big_endian only).
-int first_sent(const CanSignal& signal) noexcept {
-  return signal.start_bit / 8 * 8 + (7 - signal.start_bit % 8);
+CanField field_of(const CanSignal& signal) noexcept {
+  return {signal.start_bit, signal.length_bits, signal.byte_order};
 }
 
-/// How far the signal is from the right end of the frame read as one 64-bit number of its order.
-int shift_of(const CanSignal& signal) noexcept {
-  if (signal.byte_order == ByteOrder::little_endian) return signal.start_bit;
-  return frame_bits - (first_sent(signal) + signal.length_bits);
+/// Place of the field's first bit counted in the order in which it runs through the bytes: for
+/// big_endian from the highest bit of byte 0 downwards.
+int first_bit(const CanField& field) noexcept {
+  if (field.byte_order == ByteOrder::little_endian) return field.start_bit;
+  return field.start_bit / 8 * 8 + (7 - field.start_bit % 8);
 }
 
-/// The number's byte that the frame's byte `index` is, counted from the least significant.
-int place_of(std::size_t index, ByteOrder order) noexcept {
-  const int place = static_cast<int>(index);
-  return order == ByteOrder::little_endian ? place : 7 - place;
-}
-
-std::uint64_t as_number(std::span<const std::uint8_t> payload, ByteOrder order) noexcept {
+/// Eight bytes of the frame as a number of the given order; those beyond its end are zero.
+std::uint64_t load(std::span<const std::uint8_t> bytes, ByteOrder order) noexcept {
   std::uint64_t number = 0;
-  for (std::size_t i = 0; i < std::min(payload.size(), can_bytes_max); ++i) {
-    number |= std::uint64_t{payload[i]} << (8 * place_of(i, order));
-  }
-  return number;
+  std::memcpy(&number, bytes.data(), std::min(bytes.size(), sizeof number));
+  static_assert(std::endian::native == std::endian::little);
+  return order == ByteOrder::little_endian ? number : __builtin_bswap64(number);
 }
 
 std::int64_t sign_extended(std::uint64_t raw, int length_bits) noexcept {
-  const int unused = frame_bits - length_bits;
+  const int unused = number_bits - length_bits;
   return static_cast<std::int64_t>(raw << unused) >> unused;
 }
 
@@ -79,52 +74,112 @@ std::uint64_t integer_bits(double counts, const CanSignal& signal, bool& fitted)
 
 }  // namespace
 
+void check(const CanField& field, bool fd) {
+  const int frame_bits = static_cast<int>(8 * (fd ? can_bytes_max : can_classic_bytes_max));
+  require(field.length_bits >= 1 && field.length_bits <= number_bits, "length_bits",
+          field.length_bits, "must be in [1, 64]");
+  require(field.start_bit >= 0 && field.start_bit < frame_bits, "start_bit", field.start_bit,
+          fd ? "must be in [0, 511]" : "must be in [0, 63]");
+  require(first_bit(field) + field.length_bits <= frame_bits, "start_bit", field.start_bit,
+          fd ? "the signal must end within 64 bytes" : "the signal must end within 8 bytes");
+}
+
 void check(const CanSignal& signal) {
   if (signal.extended_id) {
     require(signal.id <= 0x1FFFFFFFu, "id", signal.id, "must be at most 0x1FFFFFFF (29 bits)");
   } else {
     require(signal.id <= 0x7FFu, "id", signal.id, "must be at most 0x7FF (11 bits)");
   }
-  require(signal.length_bits >= 1 && signal.length_bits <= frame_bits, "length_bits",
-          signal.length_bits, "must be in [1, 64]");
+  check(field_of(signal), signal.fd);
   require(!signal.is_float || signal.length_bits == 32 || signal.length_bits == 64, "length_bits",
           signal.length_bits, "a float has 32 or 64 bits");
-  require(signal.start_bit >= 0 && signal.start_bit < frame_bits, "start_bit", signal.start_bit,
-          "must be in [0, 63]");
-  const int begin =
-      signal.byte_order == ByteOrder::little_endian ? signal.start_bit : first_sent(signal);
-  require(begin + signal.length_bits <= frame_bits, "start_bit", signal.start_bit,
-          "the signal must end within 8 bytes");
   require(std::isfinite(signal.scale) && signal.scale != 0.0, "scale", signal.scale,
           "must be finite and not 0");
   require(std::isfinite(signal.offset), "offset", signal.offset, "must be finite");
+  for (const CanSelector& selector : signal.selectors) {
+    check(selector.field, signal.fd);
+    require(!selector.pages.empty(), "multiplexor", 0.0, "must have a value");
+  }
+}
+
+std::size_t bytes_needed(const CanField& field) noexcept {
+  return static_cast<std::size_t>(first_bit(field) + field.length_bits + 7) / 8;
 }
 
 std::size_t bytes_needed(const CanSignal& signal) noexcept {
-  const int begin =
-      signal.byte_order == ByteOrder::little_endian ? signal.start_bit : first_sent(signal);
-  return static_cast<std::size_t>(begin + signal.length_bits + 7) / 8;
+  std::size_t bytes = bytes_needed(field_of(signal));
+  for (const CanSelector& selector : signal.selectors) {
+    bytes = std::max(bytes, bytes_needed(selector.field));
+  }
+  return bytes;
 }
 
-std::uint64_t bits_of(const CanSignal& signal) noexcept {
-  const std::uint64_t mask = low_bits(signal.length_bits) << shift_of(signal);
-  if (signal.byte_order == ByteOrder::little_endian) return mask;
-  return __builtin_bswap64(mask);
+CanBits bits_of(const CanField& field) noexcept {
+  CanBits bits;
+  int bit = first_bit(field);
+  for (int i = 0; i < field.length_bits; ++i, ++bit) {
+    const bool up = field.byte_order == ByteOrder::little_endian;
+    bits.set(static_cast<std::size_t>(up ? bit : bit / 8 * 8 + (7 - bit % 8)));
+  }
+  return bits;
+}
+
+CanBits bits_of(const CanSignal& signal) noexcept {
+  return bits_of(field_of(signal));
+}
+
+std::uint64_t extract_raw(std::span<const std::uint8_t> payload, const CanField& field) noexcept {
+  const int first = first_bit(field);
+  const auto byte = static_cast<std::size_t>(first / 8);
+  const int skipped = first % 8;
+  const std::uint64_t number = load(payload.subspan(byte), field.byte_order);
+  // Up to seven bits may stand in a ninth byte.
+  const bool more = skipped + field.length_bits > number_bits;
+  const std::uint64_t ninth = more ? payload[byte + 8] : 0;
+  if (field.byte_order == ByteOrder::little_endian) {
+    const std::uint64_t high = more ? ninth << (number_bits - skipped) : 0;
+    return ((number >> skipped) | high) & low_bits(field.length_bits);
+  }
+  const std::uint64_t low = more ? ninth >> (8 - skipped) : 0;
+  return ((number << skipped) | low) >> (number_bits - field.length_bits);
 }
 
 std::uint64_t extract_raw(std::span<const std::uint8_t> payload, const CanSignal& signal) noexcept {
-  const std::uint64_t number = as_number(payload, signal.byte_order);
-  return (number >> shift_of(signal)) & low_bits(signal.length_bits);
+  return extract_raw(payload, field_of(signal));
+}
+
+void insert_raw(std::span<std::uint8_t> payload, const CanField& field,
+                std::uint64_t raw) noexcept {
+  const bool up = field.byte_order == ByteOrder::little_endian;
+  int bit = first_bit(field);
+  for (int left = field.length_bits; left > 0;) {
+    const int place = bit % 8;
+    const int count = std::min(8 - place, left);
+    // Those of the byte that come first: at its low end, or (big_endian) at its high end.
+    const int shift = up ? place : 8 - place - count;
+    const std::uint64_t part = up ? raw >> (field.length_bits - left) : raw >> (left - count);
+    const std::uint64_t mask = low_bits(count) << shift;
+    std::uint8_t& byte = payload[static_cast<std::size_t>(bit / 8)];
+    byte = static_cast<std::uint8_t>((byte & ~mask) | ((part << shift) & mask));
+    bit += count;
+    left -= count;
+  }
 }
 
 void insert_raw(std::span<std::uint8_t> payload, const CanSignal& signal,
                 std::uint64_t raw) noexcept {
-  const std::uint64_t mask = low_bits(signal.length_bits) << shift_of(signal);
-  const std::uint64_t number =
-      (as_number(payload, signal.byte_order) & ~mask) | ((raw << shift_of(signal)) & mask);
-  for (std::size_t i = 0; i < std::min(payload.size(), can_bytes_max); ++i) {
-    payload[i] = static_cast<std::uint8_t>(number >> (8 * place_of(i, signal.byte_order)));
-  }
+  insert_raw(payload, field_of(signal), raw);
+}
+
+bool carries(std::span<const std::uint8_t> payload, const CanSignal& signal) noexcept {
+  return std::all_of(
+      signal.selectors.begin(), signal.selectors.end(), [&](const CanSelector& selector) {
+        if (payload.size() < bytes_needed(selector.field)) return true;
+        const std::uint64_t page = extract_raw(payload, selector.field);
+        return std::any_of(selector.pages.begin(), selector.pages.end(), [&](const auto& pages) {
+          return page >= pages.first && page <= pages.last;
+        });
+      });
 }
 
 CanValue decode(std::span<const std::uint8_t> payload, const CanSignal& signal) noexcept {

@@ -1,4 +1,4 @@
-/// Values in the bits of a CAN frame: pure, no I/O.
+/// Values in the bits of a CAN frame, classic or FD: pure, no I/O.
 ///
 /// Bits are numbered as DBC files do: bit 8 n + k is bit k (0 = lowest) of byte n. A little_endian
 /// signal starts at its least significant bit and grows upwards through the numbers. A big_endian
@@ -6,6 +6,7 @@
 /// 7 of the next byte (the sawtooth).
 #pragma once
 
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -14,27 +15,43 @@
 
 namespace thermocomp {
 
-inline constexpr std::size_t can_bytes_max = 8;  ///< of a classic CAN frame
+inline constexpr std::size_t can_classic_bytes_max = 8;
+inline constexpr std::size_t can_bytes_max = 64;  ///< of a CAN FD frame
 
-/// Refuses a signal that cannot be: identifier, length, place in 8 bytes, float length, scale.
-/// The keys named are those of CanSignal.
+/// A bit for each of a frame's, by its DBC number.
+using CanBits = std::bitset<8 * can_bytes_max>;
+
+/// Refuses a signal that cannot be: identifier, length, place in 8 bytes (FD: 64), float length,
+/// scale, multiplexors. The keys named are those of CanSignal and CanField.
 /// @throws InvalidValue
 void check(const CanSignal& signal);
+/// The same for a number in a frame of a signal with this `fd`.
+void check(const CanField& field, bool fd);
 
-/// Bytes a frame must have to hold the signal. @pre check(signal) passes
+/// Bytes a frame must have to hold the signal and its multiplexors. @pre check(signal) passes
 [[nodiscard]] std::size_t bytes_needed(const CanSignal& signal) noexcept;
+[[nodiscard]] std::size_t bytes_needed(const CanField& field) noexcept;
 
-/// Bits of `payload` that belong to the signal, as a mask over the 64 bits of the frame counted
-/// 8 byte + bit (DBC numbers). Two signals of one frame overlap when their masks do.
-[[nodiscard]] std::uint64_t bits_of(const CanSignal& signal) noexcept;
+/// The bits that belong to the signal. Two signals of one frame overlap when these do.
+/// @pre check() passes
+[[nodiscard]] CanBits bits_of(const CanSignal& signal) noexcept;
+[[nodiscard]] CanBits bits_of(const CanField& field) noexcept;
 
-/// The signal's bits, right-aligned, not sign-extended.
-/// @pre check(signal) passes and payload has bytes_needed(signal) or more
+/// The bits of a field, right-aligned. @pre check() passes and payload has bytes_needed() or more
+[[nodiscard]] std::uint64_t extract_raw(std::span<const std::uint8_t> payload,
+                                        const CanField& field) noexcept;
+/// The signal's bits, right-aligned, not sign-extended. @pre as above
 [[nodiscard]] std::uint64_t extract_raw(std::span<const std::uint8_t> payload,
                                         const CanSignal& signal) noexcept;
 /// Puts the lowest length_bits of `raw` into the frame; all other bits of it stay. @pre as above
+void insert_raw(std::span<std::uint8_t> payload, const CanField& field, std::uint64_t raw) noexcept;
 void insert_raw(std::span<std::uint8_t> payload, const CanSignal& signal,
                 std::uint64_t raw) noexcept;
+
+/// Whether the frame carries the signal: false when a multiplexor in it shows another page. A frame
+/// too short for a multiplexor counts as one that does, so that decode() can call it bad.
+/// @pre check(signal) passes
+[[nodiscard]] bool carries(std::span<const std::uint8_t> payload, const CanSignal& signal) noexcept;
 
 /// A decoded value; NaN exactly when there is a fault.
 struct CanValue {
@@ -44,11 +61,12 @@ struct CanValue {
 
 /// value = raw * scale + offset. A frame too short for the signal is bad_frame, a raw value listed
 /// as a sentinel is the sentinel's fault, a float that is not finite is out_of_range.
-/// @pre check(signal) passes
+/// @pre check(signal) and carries(payload, signal)
 [[nodiscard]] CanValue decode(std::span<const std::uint8_t> payload,
                               const CanSignal& signal) noexcept;
 
-/// raw = round((value - offset) / scale), saturated to what the signal can hold.
+/// raw = round((value - offset) / scale), saturated to what the signal can hold. Multiplexors are
+/// left as they are.
 /// @return false when the value had to be saturated, or is NaN (then nothing is written)
 /// @pre as insert_raw
 bool encode(double value, std::span<std::uint8_t> payload, const CanSignal& signal) noexcept;

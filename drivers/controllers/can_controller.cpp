@@ -39,11 +39,11 @@ std::vector<CanId> received_ids(const CanControllerConfig& config) {
 }
 
 void check_signals(const CanControllerConfig& config) {
-  std::map<CanId, std::uint64_t> used;
+  std::map<CanId, CanBits> used;
   for (const CanSignal* signal : sent_signals(config)) {
     check(*signal);
-    std::uint64_t& bits = used[id_of(*signal)];
-    require((bits & bits_of(*signal)) == 0, "start_bit", signal->start_bit,
+    CanBits& bits = used[id_of(*signal)];
+    require((bits & bits_of(*signal)).none(), "start_bit", signal->start_bit,
             "signals of a frame that is sent must not overlap");
     bits |= bits_of(*signal);
   }

@@ -103,11 +103,34 @@ struct ModbusBusConfig {
 
 enum class ByteOrder { little_endian, big_endian };  ///< Intel, Motorola
 
-/// Where a value stands in a CAN frame. `start_bit` counts as DBC files do: for little_endian the
-/// least significant bit, for big_endian the most significant bit, bit 0 = lowest of byte 0.
+/// Bits of a CAN frame read as an unsigned number. `start_bit` counts as DBC files do: for
+/// little_endian the least significant bit, for big_endian the most significant bit, bit 0 = lowest
+/// of byte 0.
+struct CanField {
+  int start_bit{0};
+  int length_bits{8};  ///< 1..64
+  ByteOrder byte_order{ByteOrder::little_endian};
+  bool operator==(const CanField&) const = default;
+};
+
+/// A multiplexor: a number in the frame that says which of several contents the rest of it has.
+struct CanSelector {
+  /// Numbers from first to last, both included.
+  struct Pages {
+    std::uint64_t first{0};
+    std::uint64_t last{0};
+    bool operator==(const Pages&) const = default;
+  };
+  CanField field;
+  std::vector<Pages> pages;  ///< the signal is in the frame while the number is in one of them
+  bool operator==(const CanSelector&) const = default;
+};
+
+/// Where a value stands in a CAN frame, with the numbering of CanField.
 struct CanSignal {
   std::uint32_t id{0};
   bool extended_id{false};
+  bool fd{false};  ///< the frame may have up to 64 bytes (CAN FD), else 8
   int start_bit{0};
   int length_bits{16};  ///< 1..64; a float has 32 or 64
   ByteOrder byte_order{ByteOrder::little_endian};
@@ -116,12 +139,15 @@ struct CanSignal {
   double scale{1.0};  ///< value = raw * scale + offset
   double offset{0.0};
   std::vector<Sentinel> sentinels;
+  std::vector<CanSelector> selectors{};  ///< all must agree; empty: it is in every frame
   bool operator==(const CanSignal&) const = default;
 };
 
 struct CanChannel {
   std::size_t sensor{0};  ///< index of the sensor in the configuration
   CanSignal signal;
+  /// A counter or toggle in the same frame; while it stands still, so does the reading's time.
+  std::optional<CanField> counter{};
   bool operator==(const CanChannel&) const = default;
 };
 

@@ -35,6 +35,7 @@ struct BusHealth {
   nanoseconds state_since{};      ///< CLOCK_MONOTONIC when it was entered
   std::uint64_t error_frames{0};  ///< CAN: error frames of every kind
   std::uint64_t bus_offs{0};      ///< CAN: times the interface left the bus
+  std::uint64_t restarts{0};      ///< CAN: times its driver restarted the interface
   std::uint64_t dropped{0};       ///< CAN: frames lost because they came faster than they were read
 };
 

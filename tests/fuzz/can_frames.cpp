@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <ctime>
+#include <span>
 #include <vector>
 
 #include <linux/can.h>
@@ -31,9 +32,11 @@ std::vector<CanSignal> signals_from(fuzz::ByteFeed& feed) {
     signal.is_float = (kind & 4) != 0;
     signal.extended_id = (kind & 8) != 0;
     signal.id = feed.u16() & (signal.extended_id ? 0xFFFFu : 0x7FFu);
-    signal.start_bit = feed.u8() % 64;
+    signal.fd = (kind & 16) != 0;
+    signal.start_bit = feed.u8() % 64 * (signal.fd ? 8 : 1);
     signal.length_bits = 1 + feed.u8() % 64;
     signal.scale = 0.1;
+    if ((kind & 32) != 0) signal.selectors = {{{feed.u8() % 64, 4, {}}, {{feed.u8(), feed.u8()}}}};
   }
   const auto is_bad = [](const CanSignal& signal) {
     try {
@@ -68,15 +71,18 @@ bool deliver(fuzz::ByteFeed& feed, std::size_t& frames, mmsghdr& message) {
   if (feed.empty()) return false;
   const std::uint8_t kind = feed.u8();
   if ((kind & 0x80) != 0) return false;  // the end of a batch
-  can_frame frame{};
+  const bool fd = (kind & 64) != 0;
+  canfd_frame frame{};
   frame.can_id = feed.u16();
   if ((kind & 1) != 0) frame.can_id |= CAN_EFF_FLAG;
   if ((kind & 2) != 0) frame.can_id |= CAN_ERR_FLAG;
   if ((kind & 4) != 0) frame.can_id |= CAN_RTR_FLAG;
   frame.len = feed.u8();
-  for (std::uint8_t& byte : frame.data) byte = feed.u8();
+  const std::span<std::uint8_t> data(frame.data, fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN);
+  for (std::uint8_t& byte : data) byte = feed.u8();
   std::memcpy(message.msg_hdr.msg_iov[0].iov_base, &frame, sizeof frame);
-  message.msg_len = (kind & 8) != 0 ? feed.u8() : static_cast<unsigned>(CAN_MTU);
+  const auto whole = static_cast<unsigned>(fd ? CANFD_MTU : CAN_MTU);
+  message.msg_len = (kind & 8) != 0 ? feed.u8() : whole;
   std::size_t used = 0;
   if ((kind & 16) != 0) {
     timespec stamp{};
@@ -94,12 +100,13 @@ bool deliver(fuzz::ByteFeed& feed, std::size_t& frames, mmsghdr& message) {
 }
 
 void check_frame(const CanFrame& frame, const std::vector<CanSignal>& signals) {
-  FUZZ_PROMISE(frame.size <= can_bytes_max);
+  FUZZ_PROMISE(frame.size <= (frame.fd ? can_bytes_max : can_classic_bytes_max));
   FUZZ_PROMISE(frame.id.id <= (frame.id.extended ? 0x1FFFFFFFu : 0x7FFu));
   const nanoseconds age = monotonic_now() - frame.received_at;
   FUZZ_PROMISE(age >= nanoseconds{0} && age <= std::chrono::seconds(10));
   for (const CanSignal& signal : signals) {
     if (signal.id != frame.id.id || signal.extended_id != frame.id.extended) continue;
+    if (!carries(frame.payload(), signal)) continue;
     const CanValue value = decode(frame.payload(), signal);
     FUZZ_PROMISE(std::isfinite(value.value) == (value.fault == Fault::none));
     FUZZ_PROMISE(frame.size >= bytes_needed(signal) || value.fault == Fault::bad_frame);

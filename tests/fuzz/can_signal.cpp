@@ -1,4 +1,5 @@
 /// CAN frames <-> values: any signal that check() lets pass, any payload.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <vector>
@@ -18,7 +19,8 @@ CanSignal signal_from(fuzz::ByteFeed& feed) {
   signal.is_signed = (kind & 2) != 0;
   signal.is_float = (kind & 4) != 0;
   signal.extended_id = (kind & 8) != 0;
-  signal.start_bit = static_cast<std::int8_t>(feed.u8());
+  signal.fd = (kind & 32) != 0;
+  signal.start_bit = static_cast<std::int8_t>(feed.u8()) * (signal.fd ? 4 : 1);
   signal.length_bits = static_cast<std::int8_t>(feed.u8());
   signal.id = static_cast<std::uint32_t>(feed.u16()) << ((kind & 16) != 0 ? 16 : 0);
   signal.scale = (kind & 0x80) != 0 ? feed.f64() : (feed.u8() + 1) * 0.25;
@@ -28,6 +30,13 @@ CanSignal signal_from(fuzz::ByteFeed& feed) {
     sentinel.code = std::bit_cast<std::int64_t>(feed.u64());
     sentinel.fault = static_cast<Fault>(1 + feed.u8() % (faults_count - 1));
   }
+  signal.selectors.resize(feed.u8() % 3);
+  for (CanSelector& selector : signal.selectors) {
+    selector.field = {static_cast<std::int8_t>(feed.u8()), static_cast<std::int8_t>(feed.u8()),
+                      feed.u8() % 2 == 0 ? ByteOrder::little_endian : ByteOrder::big_endian};
+    selector.pages.resize(feed.u8() % 3);
+    for (CanSelector::Pages& pages : selector.pages) pages = {feed.u8(), feed.u8()};
+  }
   return signal;
 }
 
@@ -36,15 +45,24 @@ void check_insertion(const CanSignal& signal, std::vector<std::uint8_t> payload,
                      std::uint64_t raw) {
   const std::vector<std::uint8_t> before = payload;
   insert_raw(payload, signal, raw);
-  const std::uint64_t mask = bits_of(signal);
+  const CanBits mask = bits_of(signal);
   for (std::size_t i = 0; i < payload.size(); ++i) {
-    const auto own = static_cast<std::uint8_t>(mask >> (8 * i));
+    const auto own = static_cast<std::uint8_t>(((mask >> (8 * i)) & CanBits(0xFF)).to_ulong());
     FUZZ_PROMISE(((payload[i] ^ before[i]) & static_cast<std::uint8_t>(~own)) == 0);
   }
   const std::uint64_t low =
       signal.length_bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << signal.length_bits) - 1;
   FUZZ_PROMISE(extract_raw(payload, signal) == (raw & low));
-  FUZZ_PROMISE(std::popcount(mask) == signal.length_bits);
+  FUZZ_PROMISE(mask.count() == static_cast<std::size_t>(signal.length_bits));
+}
+
+/// Only a multiplexor that is there can say that the signal is not.
+void check_pages(const CanSignal& signal, const std::vector<std::uint8_t>& payload) {
+  const auto readable = [&](const CanSelector& selector) {
+    return payload.size() >= bytes_needed(selector.field);
+  };
+  const bool any = std::any_of(signal.selectors.begin(), signal.selectors.end(), readable);
+  FUZZ_PROMISE(any || carries(payload, signal));
 }
 
 }  // namespace
@@ -58,12 +76,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     FUZZ_PROMISE(!error.key().empty() && !error.rule().empty());
     return 0;
   }
-  std::vector<std::uint8_t> payload = feed.take(feed.u8() % 9);
+  std::vector<std::uint8_t> payload = feed.take(feed.u8() % (signal.fd ? 65 : 9));
+  check_pages(signal, payload);
   const CanValue decoded = decode(payload, signal);
   FUZZ_PROMISE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
   const bool too_short = payload.size() < bytes_needed(signal);
   FUZZ_PROMISE(!too_short || decoded.fault == Fault::bad_frame);
-  FUZZ_PROMISE(bytes_needed(signal) >= 1 && bytes_needed(signal) <= can_bytes_max);
+  FUZZ_PROMISE(bytes_needed(signal) >= 1 &&
+               bytes_needed(signal) <= (signal.fd ? can_bytes_max : can_classic_bytes_max));
   if (too_short) return 0;
 
   check_insertion(signal, payload, feed.u64());

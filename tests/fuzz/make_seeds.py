@@ -228,8 +228,9 @@ def modbus_seeds():
 
 def can_seeds():
     def message(kind, number, data, length=None):
+        whole = 64 if kind & 64 else 8
         return (bytes([kind]) + struct.pack("<HB", number, len(data) if length is None else length) +
-                data.ljust(8, b"\0"))
+                data.ljust(whole, b"\0"))
 
     two = bytes([1, 2]) + struct.pack("<HBB", 0x100, 0, 15) + bytes([3]) + struct.pack(
         "<HBB", 0x101, 7, 31)
@@ -242,10 +243,22 @@ def can_seeds():
           message(48, 0x100, bytes(8)) + b"\xff" * 24)
     write("can_frames", "odd_sizes", two + message(8, 0x100, bytes(8), 255) + b"\x08" +
           message(4, 0x100, bytes(8)))
-    write("can_signal", "intel", bytes([2, 0, 16, 0, 1, 3, 100, 0, 8]) + bytes(range(8)) + bytes(16))
-    write("can_signal", "motorola", bytes([1, 7, 32, 0, 1, 3, 100, 0, 8]) + bytes(range(24)))
+    far = bytes([0, 16 + 2]) + struct.pack("<HBB", 0x100, 40, 15)
+    write("can_frames", "fd", far + message(64, 0x100, bytes(range(64))) +
+          message(64, 0x100, bytes(12)) + message(0, 0x100, bytes(8)))
+    paged = bytes([0, 32]) + struct.pack("<HBBBBB", 0x100, 8, 15, 0, 2, 3)
+    write("can_frames", "pages", paged + message(0, 0x100, bytes([2] * 8)) +
+          message(0, 0x100, bytes(8)))
+    # kind, start, length, identifier, scale, offset, sentinels, multiplexors, bytes and the frame
+    write("can_signal", "intel", bytes([2, 0, 16, 0, 1, 3, 100, 0, 0, 8]) + bytes(range(8)) +
+          bytes(16))
+    write("can_signal", "motorola", bytes([1, 7, 32, 0, 1, 3, 100, 0, 0, 8]) + bytes(range(24)))
     write("can_signal", "float", bytes([0x84, 0, 64, 0, 1]) + struct.pack("<dd", 0.5, -1.0) +
-          bytes([1]) + struct.pack("<qB", -1, 3) + bytes([8]) + struct.pack("<d", 12.5) + bytes(16))
+          bytes([1]) + struct.pack("<qB", -1, 3) + bytes([0, 8]) + struct.pack("<d", 12.5) +
+          bytes(16))
+    write("can_signal", "fd", bytes([34, 100, 63, 0, 1, 3, 100, 0, 0, 64]) + bytes(range(80)))
+    write("can_signal", "pages", bytes([2, 8, 16, 0, 1, 3, 100, 0, 2, 0, 4, 0, 1, 2, 5, 7, 1, 1, 1,
+                                        1, 1, 8]) + bytes(range(24)))
     write("modbus_registers", "int16", bytes([3, 0, 0, 120, 1]) + struct.pack("<qBH", 32767, 2, 210))
     for encoding in range(6):
         write("modbus_registers", f"encoding_{encoding}", bytes([2, encoding + 6, 9, 100, 0]) +

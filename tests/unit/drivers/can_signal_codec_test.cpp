@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <span>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -98,16 +99,17 @@ const std::vector<HandComputed>& hand_computed() {
   return frames;
 }
 
-/// A random signal that fits, any order, length and sign.
-CanSignal random_signal(std::mt19937_64& random) {
+/// A random signal that fits into `bytes`, any order, length and sign.
+CanSignal random_signal(std::mt19937_64& random, int bytes = 8) {
   const auto below = [&random](int n) {
     return std::uniform_int_distribution<int>(0, n - 1)(random);
   };
   const int length = 1 + below(64);
-  const int first = below(64 - length + 1);
+  const int first = below(8 * bytes - length + 1);
   CanSignal signal = below(2) == 0 ? intel(first, length) : motorola(0, length);
   if (signal.byte_order == ByteOrder::big_endian) signal.start_bit = first / 8 * 8 + 7 - first % 8;
   signal.is_signed = below(2) == 0;
+  signal.fd = bytes > 8;
   return signal;
 }
 
@@ -116,7 +118,7 @@ Frame random_frame(std::mt19937_64& random) {
 }
 
 /// The value of a signal read bit by bit along the numbering's definition.
-std::uint64_t read_bit_by_bit(const Frame& frame, const CanSignal& signal) {
+std::uint64_t read_bit_by_bit(std::span<const std::uint8_t> frame, const CanSignal& signal) {
   std::uint64_t raw = 0;
   int bit = signal.start_bit;
   for (int i = 0; i < signal.length_bits; ++i) {
@@ -148,7 +150,7 @@ TEST_CASE("a CAN signal is decoded as computed by hand", "[can]") {
 TEST_CASE("a CAN value is put into exactly its own bits", "[can]") {
   for (const HandComputed& example : hand_computed()) {
     CAPTURE(example.what);
-    const std::uint64_t own = bits_of(example.signal);
+    const std::uint64_t own = bits_of(example.signal).to_ullong();
     for (const std::uint8_t background : {std::uint8_t{0x00}, std::uint8_t{0xFF}}) {
       Frame frame;
       frame.fill(background);
@@ -177,9 +179,64 @@ TEST_CASE("what is put into random signals comes out and nothing else changes", 
     REQUIRE(read_bit_by_bit(after, signal) == wanted);
     const std::uint64_t changed =
         std::bit_cast<std::uint64_t>(before) ^ std::bit_cast<std::uint64_t>(after);
-    REQUIRE((changed & ~bits_of(signal)) == 0);
-    REQUIRE(std::popcount(bits_of(signal)) == signal.length_bits);
+    REQUIRE((changed & ~bits_of(signal).to_ullong()) == 0);
+    REQUIRE(bits_of(signal).count() == static_cast<std::size_t>(signal.length_bits));
   }
+}
+
+TEST_CASE("signals anywhere in 64 bytes are put in and come out bit by bit", "[can][property]") {
+  const auto seed = GENERATE(range(0u, 300u));
+  std::mt19937_64 random(seed);
+  for (int round = 0; round < 20; ++round) {
+    const CanSignal signal = random_signal(random, 64);
+    std::array<std::uint8_t, 64> before{};
+    for (std::uint8_t& byte : before) byte = static_cast<std::uint8_t>(random());
+    const std::uint64_t wanted = random() >> static_cast<unsigned>(64 - signal.length_bits);
+    CAPTURE(seed, round, signal.start_bit, signal.length_bits,
+            signal.byte_order == ByteOrder::big_endian);
+    REQUIRE_NOTHROW(check(signal));
+    auto after = before;
+    // No byte behind the signal is looked at: a frame that ends there will do.
+    const std::span<std::uint8_t> just_enough(after.data(), bytes_needed(signal));
+    insert_raw(just_enough, signal, wanted);
+    REQUIRE(extract_raw(just_enough, signal) == wanted);
+    REQUIRE(read_bit_by_bit(just_enough, signal) == wanted);
+    for (std::size_t bit = 0; bit < 512; ++bit) {
+      const bool same = ((after[bit / 8] ^ before[bit / 8]) >> (bit % 8) & 1) == 0;
+      if (!bits_of(signal)[bit] && !same) FAIL("bit " << bit << " has changed");
+    }
+  }
+}
+
+TEST_CASE("a multiplexed signal is in the frames that show its page", "[can]") {
+  CanSignal signal = intel(8, 16);
+  signal.selectors = {{{0, 4, ByteOrder::little_endian}, {{2, 2}, {5, 7}}}};
+  const auto carried = [&](std::uint8_t first) {
+    const Frame frame{first, 0x34, 0x12};
+    return carries(frame, signal);
+  };
+  CHECK(carried(0xF2));  // only the lowest four bits select
+  CHECK(carried(5));
+  CHECK(carried(7));
+  CHECK_FALSE(carried(0));
+  CHECK_FALSE(carried(3));
+  CHECK_FALSE(carried(8));
+  // The second multiplexor is itself on a page of the first: both must agree.
+  signal.selectors.push_back({{7, 1, ByteOrder::big_endian}, {{1, 1}}});
+  CHECK(carried(0x82));
+  CHECK_FALSE(carried(0x02));
+  CHECK_FALSE(carried(0x83));
+}
+
+TEST_CASE("a frame too short for its multiplexor is bad, not of another page", "[can]") {
+  CanSignal signal = intel(0, 8);
+  signal.selectors = {{{16, 8, ByteOrder::little_endian}, {{1, 1}}}};
+  const Frame frame{0x12, 0x34, 0x01};
+  const std::span<const std::uint8_t> whole = frame;
+  CHECK(bytes_needed(signal) == 3);
+  CHECK(decode(whole.first(3), signal).value == 0x12);
+  CHECK(carries(whole.first(2), signal));
+  CHECK(decode(whole.first(2), signal).fault == Fault::bad_frame);
 }
 
 TEST_CASE("a random value survives the frame within half a count", "[can][property]") {
@@ -295,6 +352,16 @@ TEST_CASE("a CAN signal that cannot be is refused by key", "[can]") {
   CHECK(refused_key(intel(0, 0)) == "length_bits");
   CHECK(refused_key(intel(0, 65)) == "length_bits");
   CHECK(refused_key(floating(intel(0, 16))) == "length_bits");
+  CanSignal wide = intel(64, 8);
+  wide.fd = true;
+  CHECK(refused_key(wide) == "accepted");
+  wide.start_bit = 505;
+  CHECK(refused_key(wide) == "start_bit");
+  CanSignal multiplexed = intel(0, 8);
+  multiplexed.selectors = {{{60, 8, ByteOrder::little_endian}, {{0, 0}}}};
+  CHECK(refused_key(multiplexed) == "start_bit");
+  multiplexed.selectors = {{{0, 8, ByteOrder::little_endian}, {}}};
+  CHECK(refused_key(multiplexed) == "multiplexor");
   CHECK(refused_key(scaled(intel(0, 16), 0.0, 0.0)) == "scale");
   CHECK(refused_key(scaled(intel(0, 16), not_a_number, 0.0)) == "scale");
   CHECK(refused_key(scaled(intel(0, 16), 1.0, not_a_number)) == "offset");

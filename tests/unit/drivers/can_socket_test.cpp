@@ -35,6 +35,15 @@ TEST_CASE("a CAN interface that is not there is told by name and does no harm", 
   CHECK_FALSE(socket.send(CanFrame{}));
 }
 
+TEST_CASE("a CAN FD frame has one of the sizes that exist", "[can]") {
+  for (std::size_t size = 0; size <= 8; ++size) CHECK(whole_frame_bytes(size) == size);
+  CHECK(whole_frame_bytes(9) == 12);
+  CHECK(whole_frame_bytes(12) == 12);
+  CHECK(whole_frame_bytes(33) == 48);
+  CHECK(whole_frame_bytes(49) == 64);
+  CHECK(whole_frame_bytes(64) == 64);
+}
+
 TEST_CASE("impossible CAN sockets are refused", "[can]") {
   CHECK_THROWS_AS(CanSocket("", {}), InvalidValue);
   CHECK_THROWS_AS(CanSocket("a_name_of_sixteen", {}), InvalidValue);

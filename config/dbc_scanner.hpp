@@ -1,0 +1,50 @@
+/// The words, numbers and strings of a DBC file, one after another.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace thermocomp {
+
+/// What ends the reading of a DBC file.
+struct DbcSyntaxError {
+  int line{0};
+  std::string found;
+  std::string rule;
+};
+
+/// White space before what is asked for is skipped; what is not found is a DbcSyntaxError.
+class DbcScanner {
+ public:
+  explicit DbcScanner(std::string_view text) : text_(text) {}
+
+  [[nodiscard]] bool at_end();
+  /// Of what comes next.
+  [[nodiscard]] int line();
+  [[nodiscard]] bool accept(char symbol);
+  void expect(char symbol);
+  /// A C identifier, or nothing.
+  [[nodiscard]] std::string_view next_word();
+  std::string_view word(std::string_view what);
+  [[nodiscard]] bool next_is(char symbol);
+  double real(std::string_view what);
+  std::uint64_t integer(std::string_view what, std::uint64_t max);
+  /// A string without its quotes; `\"` inside it is a quote.
+  std::string text(std::string_view what);
+  /// Everything up to and with the semicolon that ends the statement.
+  void skip_statement();
+  /// @throws DbcSyntaxError about what comes next
+  [[noreturn]] void fail(std::string_view rule);
+
+ private:
+  void skip_space() noexcept;
+  [[nodiscard]] std::string_view rest() const noexcept { return text_.substr(at_); }
+
+  std::string_view text_;
+  std::size_t at_{0};
+  int line_{1};
+};
+
+}  // namespace thermocomp
