@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -13,12 +14,14 @@
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
 
 struct Options {
   std::string model;
+  std::string thermal;
   std::vector<std::string> train;
   std::vector<std::string> test;
   std::string folder;
@@ -70,18 +73,26 @@ void print_weighed(const Diagnosis& diagnosis) {
                 each.log_left);
 }
 
+Diagnosis diagnosis_of(const Options& options, ReportData* report) {
+  const std::vector<RunFile> train = load_runs(options.train);
+  const std::vector<RunFile> test = load_runs(options.test);
+  if (!options.thermal.empty())
+    return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
+                            options.test, report);
+  return diagnose(load_model(options.model), train, options.train, test, options.test, report);
+}
+
 int run(const Options& options) {
-  const ThermalModel model = load_model(options.model);
+  if (options.model.empty() == options.thermal.empty())
+    throw std::runtime_error("diagnose needs either --model or --thermal");
   ReportData report;
-  const Diagnosis diagnosis =
-      diagnose(model, load_runs(options.train), options.train, load_runs(options.test),
-               options.test, options.folder.empty() ? nullptr : &report);
+  const Diagnosis diagnosis = diagnosis_of(options, options.folder.empty() ? nullptr : &report);
   if (!options.folder.empty()) {
-    std::filesystem::create_directories(options.folder);
-    write((std::filesystem::path(options.folder) / "model.toml").string(),
-          write_model(diagnosis.extended));
-    write((std::filesystem::path(options.folder) / "report.html").string(),
-          report_html(diagnosis, report));
+    const std::filesystem::path folder(options.folder);
+    std::filesystem::create_directories(folder);
+    if (options.thermal.empty())
+      write((folder / "model.toml").string(), write_model(diagnosis.extended));
+    write((folder / "report.html").string(), report_html(diagnosis, report));
   }
   if (!options.json.empty()) write(options.json, diagnosis_json(diagnosis));
   if (options.json != "-") print(diagnosis);
@@ -95,7 +106,10 @@ void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("diagnose", "what a model gets wrong in measured runs, and why");
-  command->add_option("--model", options->model, "model file")->required();
+  command->add_option("--model", options->model, "model file: displacements are compared");
+  command->add_option(
+      "--thermal", options->thermal,
+      "machine file with a [plant], in place of --model: temperatures are compared");
   command
       ->add_option("--train", options->train, "runs from which causes are found: RUN.csv[@T0:T1]")
       ->required();

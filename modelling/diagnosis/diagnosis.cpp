@@ -2,58 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "modelling/diagnosis/extended_model.hpp"
 #include "modelling/diagnosis/gain_on_test.hpp"
+#include "modelling/diagnosis/named_finding.hpp"
 #include "modelling/diagnosis/report_data.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
-
-/// Rows are correlated: 2 ln L overstates what a difference is worth. Support is told as if one row
-/// in ten were a new one.
-constexpr double independent_share = 0.1;
-constexpr double support_shown_min = 0.001;
-constexpr std::size_t alternatives_max = 4;
-
-std::vector<Alternative> alternatives_of(const Finding& finding) {
-  std::vector<Alternative> all;
-  for (const Explanation& other : finding.alternatives) {
-    const double support =
-        std::exp(-0.5 * independent_share * (finding.explanation.score - other.score));
-    if (support < support_shown_min || all.size() >= alternatives_max) break;
-    const Hypothesis& of = *other.hypothesis;
-    const bool known = std::any_of(all.begin(), all.end(), [&](const Alternative& each) {
-      return each.cause == of.cause && each.subject == of.subject;
-    });
-    if (!known) all.push_back({of.cause, of.subject, std::min(1.0, support)});
-  }
-  return all;
-}
-
-std::string evidence_text(const Finding& finding) {
-  char text[160];
-  std::snprintf(
-      text, sizeof text,
-      "takes %.0f %% of the RMS of %s training rows; 2 ln L gains %.0f beyond the price of "
-      "its parameters",
-      100.0 * finding.explanation.left_out_gain,
-      finding.explanation.hypothesis->run ? "the fitted" : "left-out", finding.explanation.score);
-  return text;
-}
-
-NamedFinding named(const Finding& finding, const MeasuredData& train) {
-  const Explanation& each = finding.explanation;
-  NamedFinding name{each.hypothesis->cause, each.hypothesis->subject, {}, {}, {}, {}, {}, {}};
-  for (std::size_t output = 0; output < each.gains.size(); ++output)
-    if (each.gains[output].size() > 0) name.outputs.push_back(train.model.outputs[output]);
-  name.parameters = parameters_of(finding, train);
-  if (each.hypothesis->run) name.run = train.runs[*each.hypothesis->run].name;
-  name.evidence = evidence_text(finding);
-  name.alternatives = alternatives_of(finding);
-  return name;
-}
 
 /// What a finding that no term can carry corrects, if it acts in every run.
 std::optional<Correction> correction_of(const NamedFinding& name, std::size_t output) {
@@ -74,7 +30,7 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
                    const MeasuredData& train, const MeasuredData& test) {
   Corrections corrections;
   for (const Finding& finding : findings) {
-    NamedFinding name = named(finding, train);
+    NamedFinding name = named_finding(finding, train, parameters_of(finding, train));
     const std::optional<TermSpec> term = term_of(finding, train);
     ThermalModel longer = diagnosis.extended;
     Corrections more = corrections;
@@ -125,9 +81,7 @@ Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
   diagnosis.extended = model;
   diagnosis.weighed = result.weighed;
   const Corrections corrections = extend(diagnosis, result.findings, train_data, test_data);
-  diagnosis.verdict = !diagnosis.findings.empty() ? "effect"
-                      : result.unexplained        ? "unexplained"
-                                                  : "none";
+  diagnosis.verdict = verdict_of(result);
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
     const Residuals base = residuals(model, {}, test_data, output);
     const Residuals extended = residuals(diagnosis.extended, corrections, test_data, output);

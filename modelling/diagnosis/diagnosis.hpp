@@ -59,8 +59,10 @@ struct OutputFigures {
 
 struct ReportData;
 
+/// Figures named `_um` are in `unit`.
 struct Diagnosis {
-  std::string verdict;  ///< "effect", "none" or "unexplained"
+  std::string unit{"um"};  ///< "K" where temperatures were compared
+  std::string verdict;     ///< "effect", "none" or "unexplained"
   std::vector<NamedFinding> findings;
   std::map<std::string, OutputFigures> outputs;
   ThermalModel extended;

@@ -35,7 +35,12 @@ Json ci_json(const Parameter& parameter) {
   return table;
 }
 
-Json finding_json(const NamedFinding& finding) {
+/// "test_rms" as a key: test_rms_um.
+std::string key_of(const char* what, const std::string& unit) {
+  return std::string(what) + "_" + unit;
+}
+
+Json finding_json(const NamedFinding& finding, const std::string& unit) {
   Json parameters = Json::object();
   Json ci95 = Json::object();
   if (finding.run) parameters["run"] = *finding.run;
@@ -54,29 +59,36 @@ Json finding_json(const NamedFinding& finding) {
                     {"after", number(gain.after_um)},
                     {"reduction", number(gain.reduction)},
                     {"ci95", interval(gain.ci95)}};
-  return {
-      {"cause", finding.cause},       {"subject", finding.subject},
-      {"outputs", finding.outputs},   {"parameters", parameters},
-      {"parameters_ci95", ci95},      {"evidence", finding.evidence},
-      {"alternatives", alternatives}, {"test_rms_um", finding.test.empty() ? Json(nullptr) : test}};
+  return {{"cause", finding.cause},
+          {"subject", finding.subject},
+          {"outputs", finding.outputs},
+          {"parameters", parameters},
+          {"parameters_ci95", ci95},
+          {"evidence", finding.evidence},
+          {"alternatives", alternatives},
+          {key_of("test_rms", unit), finding.test.empty() ? Json(nullptr) : test}};
 }
 
 }  // namespace
 
 std::string diagnosis_json(const Diagnosis& diagnosis) {
+  const std::string& unit = diagnosis.unit;
+  const std::string test_rms = key_of("test_rms", unit);
+  const std::string test_peak = key_of("test_peak", unit);
   Json baseline = Json::object();
   Json extended = Json::object();
   Json unexplained = Json::object();
   for (const auto& [output, figures] : diagnosis.outputs) {
-    baseline[output] = {{"train_rms_um", number(figures.train_rms_um)},
-                        {"test_rms_um", number(figures.test_rms_um)},
-                        {"test_peak_um", number(figures.test_peak_um)}};
-    extended[output] = {{"test_rms_um", number(figures.extended_test_rms_um)},
-                        {"test_peak_um", number(figures.extended_test_peak_um)}};
+    baseline[output] = {{key_of("train_rms", unit), number(figures.train_rms_um)},
+                        {test_rms, number(figures.test_rms_um)},
+                        {test_peak, number(figures.test_peak_um)}};
+    extended[output] = {{test_rms, number(figures.extended_test_rms_um)},
+                        {test_peak, number(figures.extended_test_peak_um)}};
     unexplained[output] = number(figures.unexplained_fraction);
   }
   Json findings = Json::array();
-  for (const NamedFinding& finding : diagnosis.findings) findings.push_back(finding_json(finding));
+  for (const NamedFinding& finding : diagnosis.findings)
+    findings.push_back(finding_json(finding, unit));
   const Json answer = {{"verdict", diagnosis.verdict},
                        {"baseline", baseline},
                        {"findings", findings},

@@ -104,6 +104,8 @@ OutputEvidence::OutputEvidence(const MeasuredData& data, const StackedRows& rows
   }
   residual_ = measured_residual_;
   noise_um_ = noise_of(residual_, present_, rows.runs);
+  if (output < data.least_noise_um.size())
+    noise_um_ = std::max(noise_um_, data.least_noise_um[output]);
   accept({});
 }
 

@@ -193,7 +193,10 @@ LeftOutGain gain_of(const std::vector<Squares>& by_output) {
   LeftOutGain gain;
   double left = 0.0;
   double outputs = 0.0;
+  Squares all;
   for (const Squares& squares : by_output) {
+    all.before += squares.before;
+    all.after += squares.after;
     if (!(squares.before > 0)) continue;
     const double ratio = squares.after / squares.before;
     left += ratio;
@@ -201,6 +204,7 @@ LeftOutGain gain_of(const std::vector<Squares>& by_output) {
     gain.log_left += 0.5 * std::log(std::max(ratio, 1e-12));
   }
   if (outputs > 0) gain.share = 1.0 - std::sqrt(left / outputs);
+  if (all.before > 0) gain.share_of_all = 1.0 - std::sqrt(all.after / all.before);
   return gain;
 }
 

@@ -9,6 +9,8 @@ struct LeftOutGain {
   /// 1 - RMS with the explanation / RMS without, over all outputs that it acts on, each in units of
   /// its own RMS.
   double share{0.0};
+  /// The same with all outputs in one unit: what is large counts.
+  double share_of_all{0.0};
   /// Sum over all outputs of ln(RMS with / RMS without): how explanations of different outputs
   /// compare. Negative: better than nothing.
   double log_left{0.0};

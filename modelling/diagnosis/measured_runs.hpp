@@ -34,6 +34,9 @@ struct MeasuredData {
   std::vector<std::string> others;   ///< temperatures that the model does not use
   std::vector<std::string> signals;  ///< operating signals and positions
   std::vector<MeasuredRun> runs;
+  /// Least noise of a single value of each output, as the steps of its converter make it; empty:
+  /// nothing is known.
+  std::vector<double> least_noise_um{};
 
   /// The model's coefficient of an input [um/K] in each row: matrix and guideways.
   [[nodiscard]] Column coefficient(const MeasuredRun& run, std::size_t output,

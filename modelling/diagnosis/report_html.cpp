@@ -195,7 +195,9 @@ std::string report_html(const Diagnosis& diagnosis, const ReportData& report) {
   for (const NamedFinding& finding : diagnosis.findings) html += finding_html(finding, ++number);
   html += gains_table(diagnosis);
   html +=
-      "<p>RMS and peak in um (urad for tilts). Phases: ten minutes after a change of a signal; "
+      "<p>RMS and peak in " +
+      std::string(diagnosis.unit == "um" ? "um (urad for tilts)" : diagnosis.unit) +
+      ". Phases: ten minutes after a change of a signal; "
       "heating and cooling by the mean of the inputs; else standstill or steady. White noise would "
       "be correlated over 0 min.</p>\n";
   for (const ReportRun& run : report.runs) html += run_html(run, report);

@@ -14,7 +14,7 @@ struct CauseTexts {
   std::string_view to_do;
 };
 
-constexpr std::array<CauseTexts, 17> texts = {{
+constexpr std::array<CauseTexts, 23> texts = {{
     {"thermal_lag", "a part of the structure follows this temperature late",
      "Use the extended model; a sensor deeper in the slow part would make it unnecessary."},
     {"slow_sensor", "the displacement leads the reading: the sensor follows its place late",
@@ -50,7 +50,27 @@ constexpr std::array<CauseTexts, 17> texts = {{
      "Fasten the sensor; leave the rest of the run out of any fit."},
     {"sensor_swap", "these two channels are exchanged",
      "Exchange the two plugs or the two names in the configuration."},
+    {"missing_heat", "this place warms with this signal: heat that the thermal model does not have",
+     "Add a [[source]] with these figures, then look which motor, bearing or pump it is."},
+    {"wrong_heat_source", "this source gives another heat than the thermal model says",
+     "Put the new heat_W into the thermal model; look at preload, load and speed of what warms."},
+    {"wrong_film_coefficient",
+     "this place gives another heat to the air or the coolant than the "
+     "thermal model says",
+     "Put the new value into the thermal model; look for a cover, a fan or a blocked jacket."},
+    {"wrong_conductance", "this joint conducts otherwise than the thermal model says",
+     "Put the new value into the thermal model; look at pressure and flatness of the joint."},
+    {"wrong_heat_capacity", "this place stores another heat than the thermal model says",
+     "Put the new value into the thermal model; look whether a mass was left out of it."},
+    {"wrong_ambient", "the air around this is warmer or colder than the reading of the room",
+     "Move the room's sensor to the air that the machine is in, or take the offset into account."},
 }};
+
+/// Of a thermal network: the subject is a signal and a place.
+std::string_view key_of(const NamedFinding& finding) {
+  const bool network = finding.subject.find('|') != std::string::npos;
+  return finding.cause == "missing_heat_source" && network ? "missing_heat" : finding.cause;
+}
 
 const CauseTexts* texts_of(std::string_view cause) {
   const auto at = std::find_if(texts.begin(), texts.end(),
@@ -92,6 +112,11 @@ bool fault_of_one_run(std::string_view cause) {
          cause == "sensor_loose";
 }
 
+bool of_a_network(std::string_view cause) {
+  return cause == "wrong_heat_source" || cause == "wrong_film_coefficient" ||
+         cause == "wrong_conductance" || cause == "wrong_heat_capacity" || cause == "wrong_ambient";
+}
+
 bool has_memory(std::string_view cause) {
   return cause == "thermal_lag" || cause == "slow_sensor" || cause == "time_shift" ||
          cause == "hysteresis";
@@ -100,7 +125,7 @@ bool has_memory(std::string_view cause) {
 }  // namespace
 
 std::string sentence_of(const NamedFinding& finding) {
-  const CauseTexts* of = texts_of(finding.cause);
+  const CauseTexts* of = texts_of(key_of(finding));
   std::string text = finding.subject;
   text += ": ";
   text += of == nullptr ? std::string_view(finding.cause) : of->says;
@@ -120,7 +145,7 @@ std::string sentence_of(const NamedFinding& finding) {
 }
 
 std::string what_to_do(const NamedFinding& finding) {
-  const CauseTexts* of = texts_of(finding.cause);
+  const CauseTexts* of = texts_of(key_of(finding));
   return of == nullptr ? std::string() : std::string(of->to_do);
 }
 
@@ -129,6 +154,10 @@ std::string experiment_for(const NamedFinding& finding, const Alternative& other
   const auto named = [&](std::string_view cause) {
     return finding.cause == cause || other.cause == cause;
   };
+  if (either(of_a_network))
+    return "Warm up at one speed until nothing changes, then stop and record until nothing "
+           "changes: "
+           "the steady state tells films and joints, the way there capacities, the level sources.";
   if (finding.cause == other.cause)
     return "Warm one of the two places alone (a heating pad for half an hour) and read both.";
   if (either(fault_of_one_run))

@@ -64,10 +64,15 @@ Column centred(const Column& values, const OutputEvidence& evidence, const Stack
 }  // namespace
 
 Search::Search(const MeasuredData& data, const Thresholds& thresholds)
+    : Search(data, thresholds, hypotheses(data, stacked_rows(data)), {}) {}
+
+Search::Search(const MeasuredData& data, const Thresholds& thresholds,
+               std::vector<Hypothesis> hypotheses, Accepted accepted)
     : data_(data),
       thresholds_(thresholds),
       rows_(stacked_rows(data)),
-      hypotheses_(hypotheses(data, rows_)) {
+      hypotheses_(std::move(hypotheses)),
+      accepted_(std::move(accepted)) {
   for (std::size_t output = 0; output < data.model.outputs.size(); ++output) {
     outputs_.emplace_back(data, rows_, output);
     if (outputs_.back().measured()) measured_.push_back(output);
@@ -334,7 +339,7 @@ void Search::measure_left_out(Explanation& explanation) const {
   const LeftOutGain gain = explanation.hypothesis->run
                                ? gain_on_fitted_rows(explanation, rows_, outputs_)
                                : gain_on_left_out_blocks(explanation, rows_, outputs_);
-  explanation.left_out_gain = gain.share;
+  explanation.left_out_gain = thresholds_.one_unit ? gain.share_of_all : gain.share;
   explanation.log_left = gain.log_left;
 }
 
@@ -342,6 +347,7 @@ void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
   std::vector<Explanation> found;
   for (std::size_t i = 0; i < findings.size(); ++i)
     if (i != but) found.push_back(findings[i].explanation);
+  if (accepted_) accepted_(found);
   for (OutputEvidence& output : outputs_) output.accept(found);
 }
 

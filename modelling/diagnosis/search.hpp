@@ -1,6 +1,7 @@
 /// The search for what a model gets wrong: profile of every hypothesis, choice, joint refit.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "modelling/diagnosis/evidence.hpp"
@@ -32,6 +33,9 @@ struct Thresholds {
   /// All findings together must take this share of the variance of left-out rows.
   double carried_share_min{0.3};
   std::size_t findings_max{4};
+  /// Outputs have one unit and much the same noise: shares are of all their squares together, since
+  /// a cause that is plain in one of them leaves most others as they are.
+  bool one_unit{false};
 };
 
 struct Finding {
@@ -64,7 +68,14 @@ struct SearchResult {
 /// Seeks causes in the training rows.
 class Search {
  public:
+  /// Told what is accepted before the columns of any hypothesis are asked for again.
+  using Accepted = std::function<void(const std::vector<Explanation>&)>;
+
   Search(const MeasuredData& data, const Thresholds& thresholds);
+  /// With hypotheses of another catalogue; where their columns depend on what else is wrong,
+  /// `accepted` says what that is.
+  Search(const MeasuredData& data, const Thresholds& thresholds, std::vector<Hypothesis> hypotheses,
+         Accepted accepted);
   [[nodiscard]] SearchResult run();
   /// The explanations under consideration for the next finding, best first.
   [[nodiscard]] std::vector<Explanation> ranked();
@@ -116,6 +127,7 @@ class Search {
   std::vector<Hypothesis> hypotheses_;
   std::vector<OutputEvidence> outputs_;
   std::vector<std::size_t> measured_;  ///< outputs with values
+  Accepted accepted_;
 };
 
 }  // namespace thermocomp::diagnosis

@@ -31,12 +31,10 @@ OUTSIDE_SEED = 70000
 NULL_SEED = 50000
 
 
-def diagnose(program, folder, out=None):
+def diagnose(program, folder, model=("--model", "model.toml")):
     answer = folder / "answer.json"
-    command = [program, "diagnose", "--model", "model.toml", "--train", "train_a.csv",
-               "train_b.csv", "--test", "test.csv", "--json", str(answer)]
-    if out:
-        command += ["--out", str(out)]
+    command = [program, "diagnose", *model, "--train", "train_a.csv", "train_b.csv", "--test",
+               "test.csv", "--json", str(answer)]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError("%s: %s" % (folder, done.stderr))
@@ -103,8 +101,9 @@ def progress(done, total):
 class Count:
     """What was right and what was not, at one level."""
 
-    def __init__(self, level, show):
+    def __init__(self, level, show, unit="um"):
         self.level, self.show = level, show
+        self.test_rms = "test_rms_" + unit
         self.total = collections.Counter()
         self.right = collections.Counter()
         self.by_cause = collections.defaultdict(lambda: [0, 0])
@@ -139,8 +138,8 @@ class Count:
             self.named_second += any(same(f, hidden_one) for f in found[1:]) or any(
                 same(a, hidden_one) for f in found[:1] for a in f["alternatives"])
         if "run" not in hidden_one["parameters"]:
-            for output, oracle in truth["oracle_test_rms_um"].items():
-                after = answer["extended"][output]["test_rms_um"]
+            for output, oracle in truth["oracle_" + self.test_rms].items():
+                after = answer["extended"][output][self.test_rms]
                 self.ratios.append(after / oracle)
         return hit
 

@@ -1,0 +1,79 @@
+/// How heat flows through a machine, as a state space whose parts can be changed one by one.
+///
+///   C dx/dt = -(K + K_coolant while it flows) x + q_room T_room + q_coolant T_coolant
+///             + sum over the sources of heat_W (|signal| / at)^exponent b
+///
+/// x are the temperatures of lumps, or the amplitudes of a reduced finite-element model.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace thermocomp::diagnosis {
+
+struct NetworkSource {
+  std::string signal;  ///< column of a run file; empty: constant
+  double heat_W{0.0};
+  double at{1.0};
+  double exponent{1.0};
+  Eigen::VectorXd inflow;  ///< b: what a W brings into each state
+};
+
+struct NetworkSensor {
+  std::string column;
+  Eigen::RowVectorXd row;  ///< reading = row . x, then a first-order lag
+  double lag_s{0.0};
+};
+
+struct HeatNetwork {
+  Eigen::MatrixXd capacity;             ///< C [J/K], symmetric, positive definite
+  Eigen::MatrixXd conductance;          ///< K [W/K], symmetric
+  Eigen::MatrixXd coolant_conductance;  ///< besides, while the coolant flows
+  Eigen::VectorXd room_inflow;          ///< W a degC of the room's air
+  Eigen::VectorXd coolant_inflow;
+  std::vector<NetworkSource> sources;
+  std::vector<NetworkSensor> sensors;
+};
+
+enum class PartKind { room_film, coolant_film, joint, capacity };
+
+/// A part of the network whose strength may be wrong: its share of the matrices.
+struct NetworkPart {
+  PartKind kind{PartKind::joint};
+  std::string subject;          ///< as it is named in an answer
+  Eigen::MatrixXd matrix;       ///< in K, K_coolant or C
+  Eigen::VectorXd inflow;       ///< of a film: in q_room or q_coolant; else empty
+  std::string key;              ///< of the machine file
+  std::optional<double> value;  ///< under that key, where it is one number
+};
+
+/// Where heat may enter that the model does not have.
+struct NetworkPlace {
+  std::string name;
+  Eigen::VectorXd inflow;
+};
+
+/// What a machine file says of heat.
+struct ThermalPlant {
+  HeatNetwork network;
+  std::vector<NetworkPart> parts;
+  std::vector<NetworkPlace> places;
+  std::vector<std::string> source_names;  ///< SIGNAL|NODE or the body's source, one a source
+  std::string room_column;
+  std::optional<std::string> coolant_column;  ///< none: from the room, by the next three
+  double coolant_degC{20.0};
+  double coolant_room_share{0.0};
+  double room_mean_degC{21.0};
+  std::optional<std::string> coolant_signal;
+};
+
+/// @param path  a machine file of the simulator: its [plant] with lumps or a body, thermocouples
+/// @throws ConfigurationError: what the simulator refuses; no thermocouple in the room or on the
+///         machine; a part that no heat can leave
+[[nodiscard]] ThermalPlant load_thermal_plant(const std::filesystem::path& path);
+
+}  // namespace thermocomp::diagnosis

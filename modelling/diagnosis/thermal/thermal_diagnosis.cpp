@@ -1,0 +1,162 @@
+#include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "modelling/diagnosis/gain_on_test.hpp"
+#include "modelling/diagnosis/named_finding.hpp"
+#include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/thermal/network_hypotheses.hpp"
+#include "modelling/diagnosis/thermal/network_simulation.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr double least_step_K = 1e-9;
+
+/// Readings held over missing ones, relative to the first.
+Column rise_of(const Column& measured_degC) {
+  Column rise = measured_degC;
+  double first = not_a_number;
+  double last = 0.0;
+  for (double& value : rise) {
+    if (std::isfinite(value)) {
+      if (!std::isfinite(first)) first = value;
+      last = value - first;
+    }
+    value = last;
+  }
+  return rise;
+}
+
+/// Noise that the smallest step between two readings stands for.
+double step_noise_K(const ThermalRuns& runs, std::size_t sensor) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const ThermalRun& run : runs.runs) {
+    const Column& values = run.measured_degC[sensor];
+    for (Eigen::Index row = 1; row < values.size(); ++row) {
+      const double step = std::abs(values[row] - values[row - 1]);
+      if (step > least_step_K) least = std::min(least, step);
+    }
+  }
+  return std::isfinite(least) ? least / std::sqrt(12.0) : 0.0;
+}
+
+/// The runs as the search sees them: sensors are the outputs.
+MeasuredData data_of(const ThermalPlant& plant, const ThermalRuns& runs) {
+  MeasuredData data;
+  data.signals = runs.signals;
+  for (const NetworkSensor& sensor : plant.network.sensors) {
+    data.model.outputs.push_back(sensor.column);
+    data.model.inputs.push_back(sensor.column);
+  }
+  for (std::size_t i = 0; i < runs.runs.size(); ++i) {
+    const ThermalRun& of = runs.runs[i];
+    MeasuredRun run;
+    run.name = of.name;
+    run.time_s = of.time_s;
+    run.begin = of.begin;
+    run.signals = of.signals;
+    run.model_um = simulated_degC(plant.network, runs, i);
+    run.measured_um = of.measured_degC;
+    for (const Column& measured : of.measured_degC) run.inputs_K.push_back(rise_of(measured));
+    data.runs.push_back(std::move(run));
+  }
+  for (std::size_t sensor = 0; sensor < plant.network.sensors.size(); ++sensor)
+    data.least_noise_um.push_back(step_noise_K(runs, sensor));
+  return data;
+}
+
+/// measured - simulated over the selected rows, of every sensor.
+std::vector<Residuals> residuals_of(const HeatNetwork& network, const ThermalRuns& runs) {
+  std::vector<Residuals> all(network.sensors.size());
+  for (std::size_t i = 0; i < runs.runs.size(); ++i) {
+    const ThermalRun& run = runs.runs[i];
+    const std::vector<Column> simulated = simulated_degC(network, runs, i);
+    for (std::size_t sensor = 0; sensor < all.size(); ++sensor)
+      all[sensor].by_run.emplace_back(
+          (run.measured_degC[sensor] - simulated[sensor]).tail(run.rows() - run.begin));
+  }
+  return all;
+}
+
+void add_to_report(ReportData& report, const HeatNetwork& before, const HeatNetwork& after,
+                   const ThermalRuns& runs, const MeasuredData& data, bool test) {
+  report.outputs = report.inputs = data.model.outputs;
+  report.signals = runs.signals;
+  const std::vector<Residuals> left_before = residuals_of(before, runs);
+  const std::vector<Residuals> left_after = residuals_of(after, runs);
+  for (std::size_t i = 0; i < runs.runs.size(); ++i) {
+    const MeasuredRun& run = data.runs[i];
+    const Eigen::Index rows = run.rows() - run.begin;
+    ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data), {}, {}, {}, {}};
+    for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
+    for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
+    for (const Residuals& each : left_before) added.before_um.push_back(each.by_run[i]);
+    for (const Residuals& each : left_after) added.after_um.push_back(each.by_run[i]);
+    report.runs.push_back(std::move(added));
+  }
+}
+
+}  // namespace
+
+Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>& train,
+                           const std::vector<std::string>& train_names,
+                           const std::vector<RunFile>& test,
+                           const std::vector<std::string>& test_names, ReportData* report) {
+  std::vector<RunFile> all = train;
+  all.insert(all.end(), test.begin(), test.end());
+  const std::vector<std::string> signals = shared_signals(all);
+  const ThermalRuns train_runs = thermal_runs(plant, train, train_names, signals);
+  const ThermalRuns test_runs = thermal_runs(plant, test, test_names, signals);
+  const MeasuredData train_data = data_of(plant, train_runs);
+  const StackedRows rows = stacked_rows(train_data);
+  const auto catalogue = std::make_shared<NetworkHypotheses>(plant, train_runs, rows);
+  Thresholds thresholds;
+  thresholds.one_unit = true;
+  Search search(train_data, thresholds, NetworkHypotheses::all(catalogue),
+                [&](const std::vector<Explanation>& found) { catalogue->accept(found); });
+  const SearchResult result = search.run();
+
+  Diagnosis diagnosis;
+  diagnosis.unit = "K";
+  diagnosis.weighed = result.weighed;
+  diagnosis.verdict = verdict_of(result);
+  const std::vector<Residuals> base = residuals_of(plant.network, test_runs);
+  std::vector<Residuals> before = base;
+  HeatNetwork network = plant.network;
+  for (const Finding& finding : result.findings) {
+    NamedFinding name = named_finding(finding, train_data, catalogue->parameters_of(finding));
+    catalogue->apply(finding, network);
+    const std::vector<Residuals> after = residuals_of(network, test_runs);
+    for (std::size_t sensor = 0; sensor < base.size() && !name.run; ++sensor) {
+      const std::string& column = plant.network.sensors[sensor].column;
+      const bool acts =
+          std::find(name.outputs.begin(), name.outputs.end(), column) != name.outputs.end();
+      if (acts && std::isfinite(root_mean_square(before[sensor])))
+        name.test[column] = test_gain(before[sensor], after[sensor]);
+    }
+    before = after;
+    diagnosis.findings.push_back(std::move(name));
+  }
+  const std::vector<Residuals> train_base = residuals_of(plant.network, train_runs);
+  for (std::size_t sensor = 0; sensor < base.size(); ++sensor) {
+    const double train_K = root_mean_square(train_base[sensor]);
+    if (!std::isfinite(train_K)) continue;
+    diagnosis.outputs[plant.network.sensors[sensor].column] = {train_K,
+                                                               root_mean_square(base[sensor]),
+                                                               peak(base[sensor]),
+                                                               root_mean_square(before[sensor]),
+                                                               peak(before[sensor]),
+                                                               result.unexplained_share[sensor]};
+  }
+  if (report != nullptr) {
+    add_to_report(*report, plant.network, network, train_runs, train_data, false);
+    add_to_report(*report, plant.network, network, test_runs, data_of(plant, test_runs), true);
+  }
+  return diagnosis;
+}
+
+}  // namespace thermocomp::diagnosis

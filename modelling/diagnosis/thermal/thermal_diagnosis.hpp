@@ -1,0 +1,26 @@
+/// What a thermal network, or a finite-element model reduced to one, gets wrong in measured
+/// temperatures, and why: the answer has the form of that for displacements, in kelvin.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/thermal/heat_network.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// @param train_names, test_names  the runs' arguments as given
+/// @param report  if given, receives what the report shows
+/// @return figures of every sensor that the training runs have; `extended` is empty, since the
+///         corrected values stand in the findings' parameters
+/// @throws ConfigurationError when a run lacks the room, a signal of the network or every sensor
+[[nodiscard]] Diagnosis diagnose_thermal(const ThermalPlant& plant,
+                                         const std::vector<RunFile>& train,
+                                         const std::vector<std::string>& train_names,
+                                         const std::vector<RunFile>& test,
+                                         const std::vector<std::string>& test_names,
+                                         ReportData* report = nullptr);
+
+}  // namespace thermocomp::diagnosis
