@@ -135,7 +135,7 @@ class Catalogue {
                                       std::size_t count) const;
 
   const MeasuredData& data_;
-  const StackedRows& rows_;
+  const StackedRows rows_;
   double step_s_{1.0};
   double length_s_{0.0};
   std::vector<Hypothesis> found_;
