@@ -1,0 +1,43 @@
+/// The gate machine of config/examples/gate_structure.toml, with the tie at any height: its
+/// coefficients, and its course in time under oil that comes and goes.
+#pragma once
+
+#include <memory>
+
+#include "modelling/identification/gate_machine.hpp"
+
+namespace thermocomp::bench {
+
+/// What the tank does.
+struct Oil {
+  bool in_tank{true};
+  double temp_degC{40.0};
+};
+
+class GateStructure {
+ public:
+  /// @param step_s  of advance()
+  /// @throws ConfigurationError
+  GateStructure(double tie_height_mm, double step_s);
+  ~GateStructure();
+  GateStructure(const GateStructure&) = delete;
+  GateStructure& operator=(const GateStructure&) = delete;
+
+  /// The same machine to the beam formulas.
+  [[nodiscard]] const identification::GateMachine& machine() const;
+  /// Ki and Kc as finite elements have them: a temperature that is linear across the heated zone,
+  /// and a tie 1 K warm.
+  [[nodiscard]] identification::TieCoefficients coefficients() const;
+
+  void advance(const Oil& oil);  ///< one step, from everything at the room's temperature on
+  [[nodiscard]] double theta_a_K() const;        ///< side A, middle of the heated zone
+  [[nodiscard]] double theta_b_K() const;        ///< side B
+  [[nodiscard]] double theta_c_K() const;        ///< mean of ten places on the tie
+  [[nodiscard]] double displacement_um() const;  ///< positive: tool and work come closer
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace thermocomp::bench

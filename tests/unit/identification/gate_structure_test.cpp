@@ -1,0 +1,46 @@
+#include "gate_structure.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+namespace thermocomp {
+namespace {
+
+constexpr double step_s = 20.0;
+
+TEST_CASE("beam formulas are what finite elements of the gate machine say", "[tiebar][fe]") {
+  const double tie_mm = GENERATE(250.0, 400.0, 600.0, 900.0);
+  const bench::GateStructure gate(tie_mm, step_s);
+  const auto& m = gate.machine();
+  CHECK(m.tie_height_mm == Approx(tie_mm));
+  const auto beam = identification::tie_coefficients(m);
+  const auto fe = gate.coefficients();
+  const double free_um_per_K = 1000 * 3 * m.column_expansion_per_K * m.working_height_mm *
+                               m.working_height_mm / (8 * m.column_width_mm);
+  CHECK(std::abs(fe.ki_um_per_K - beam.ki_um_per_K) < 0.03 * free_um_per_K);
+  CHECK(fe.kc_um_per_K == Approx(beam.kc_um_per_K).epsilon(0.02));
+}
+
+TEST_CASE("warm oil first brings tool and work closer, then the tie parts them", "[tiebar][fe]") {
+  bench::GateStructure gate(250.0, step_s);
+  double early_um = 0.0;
+  for (int step = 0; step < 180; ++step) {
+    gate.advance({true, 40.0});
+    early_um = std::max(early_um, gate.displacement_um());
+  }
+  CHECK(early_um > 10.0);
+  CHECK(gate.displacement_um() < early_um - 10.0);
+  CHECK(gate.theta_a_K() > gate.theta_b_K());
+  CHECK(gate.theta_c_K() > 0.0);
+  SECTION("and without oil everything cools") {
+    const double before_K = gate.theta_a_K();
+    for (int step = 0; step < 30; ++step) gate.advance({false, 40.0});
+    CHECK(gate.theta_a_K() < before_K);
+    CHECK(gate.theta_a_K() > 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace thermocomp
