@@ -52,6 +52,14 @@ void print_what_was_found(const DaemonConfig& config) {
     std::cout << "bus " << bus.name << " (can, "
               << bus.interface << "): " << counted(bus.devices.size(), "device") << '\n';
   }
+  for (const CanopenBusConfig& bus : config.canopen_buses) {
+    std::cout << "bus " << bus.name << " (canopen, "
+              << bus.interface << "): " << counted(bus.nodes.size(), "node") << '\n';
+  }
+  for (const J1939BusConfig& bus : config.j1939_buses) {
+    std::cout << "bus " << bus.name << " (j1939, "
+              << bus.interface << "): " << counted(bus.nodes.size(), "device") << '\n';
+  }
   std::cout << counted(estimator.sensors.size(), "sensor") << ": " << list_names(estimator.sensors)
             << '\n'
             << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)

@@ -63,14 +63,27 @@ SocketConfig read_socket(const TomlTable& table, const fs::path& folder) {
 
 /// A reading that is older than its sensor's period must not be stale yet.
 void check_periods(const std::vector<TomlTable>& sensor_tables, const DaemonConfig& config) {
+  const auto stale_after_s = [&](std::size_t sensor) {
+    return config.estimator.sensors[sensor].screening.stale_after_s;
+  };
+  for (const CanopenBusConfig& bus : config.canopen_buses) {
+    for (const CanopenNodeConfig& node : bus.nodes) {
+      for (const CanopenChannel& channel : node.channels) {
+        if (channel.way != CanopenWay::sdo || stale_after_s(channel.sensor) > channel.poll_s) {
+          continue;
+        }
+        sensor_tables[channel.sensor].problem("screening.stale_after_s",
+                                              std::to_string(stale_after_s(channel.sensor)),
+                                              "must be more than poll_s");
+      }
+    }
+  }
   for (const ModbusBusConfig& bus : config.modbus_buses) {
     for (const ModbusDeviceConfig& device : bus.devices) {
       for (const ModbusChannel& channel : device.channels) {
-        const double stale_after_s =
-            config.estimator.sensors[channel.sensor].screening.stale_after_s;
-        if (stale_after_s > device.period_s) continue;
+        if (stale_after_s(channel.sensor) > device.period_s) continue;
         sensor_tables[channel.sensor].problem(
-            "screening.stale_after_s", std::to_string(stale_after_s),
+            "screening.stale_after_s", std::to_string(stale_after_s(channel.sensor)),
             "must be more than period_s of the device " + device.name);
       }
     }
@@ -89,7 +102,7 @@ void check_controller_period(const TomlTable& compensation, const DaemonConfig& 
 /// @return the tables that are looked at once more beside the model
 sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folder,
                                     sections::Presets& presets, sections::DbcFiles& dbc_files,
-                                    DaemonConfig& config) {
+                                    sections::EdsFiles& eds_files, DaemonConfig& config) {
   static_cast<void>(root.integer("format", 1, 1));
   config.log_level = root.choice<std::string>("log_level",
                                               {{"trace", "trace"},
@@ -111,9 +124,11 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.sensors = sections::read_sensors(root, sensors);
   config.estimator.blocks = sections::read_blocks(tables.blocks, config.estimator.sensors);
   config.estimator.axes = sections::read_axes(tables.axes);
-  sections::SensorBuses buses = sections::read_buses(root, sensors, presets, dbc_files);
+  sections::SensorBuses buses = sections::read_buses(root, sensors, presets, dbc_files, eds_files);
   config.modbus_buses = std::move(buses.modbus);
   config.can_buses = std::move(buses.can);
+  config.canopen_buses = std::move(buses.canopen);
+  config.j1939_buses = std::move(buses.j1939);
   check_periods(sensors, config);
 
   sections::ControllerReading controller = sections::read_controller(
@@ -136,7 +151,8 @@ struct ModelSource {
 
 template <class FindModel>
 DaemonConfig build(const TomlDocument& document, const fs::path& folder, sections::Presets presets,
-                   sections::DbcFiles dbc_files, FindModel find_model) {
+                   sections::DbcFiles dbc_files, sections::EdsFiles eds_files,
+                   FindModel find_model) {
   DaemonConfig config;
   config.file = document.name();
   config.text = document.text();
@@ -144,7 +160,8 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, section
   const TomlTable model_table = root.table("model");
   config.model_file = read_path(model_table, "file", "model.toml", folder);
   if (!model_table.has("file")) model_table.problem("file", "must be given");
-  const sections::BindingTables tables = read_daemon(root, folder, presets, dbc_files, config);
+  const sections::BindingTables tables =
+      read_daemon(root, folder, presets, dbc_files, eds_files, config);
 
   const ModelSource source = find_model(model_table, config.model_file);
   std::vector<Problem> model_problems;
@@ -165,6 +182,8 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, section
   problems.insert(problems.end(), preset_problems.begin(), preset_problems.end());
   const std::vector<Problem>& dbc_problems = dbc_files.problems();
   problems.insert(problems.end(), dbc_problems.begin(), dbc_problems.end());
+  const std::vector<Problem>& eds_problems = eds_files.problems();
+  problems.insert(problems.end(), eds_problems.begin(), eds_problems.end());
   problems.insert(problems.end(), model_problems.begin(), model_problems.end());
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
   return config;
@@ -187,7 +206,7 @@ DaemonConfig load_daemon_config(const fs::path& path) {
   const TomlDocument document = TomlDocument::from_file(path);
   const fs::path folder = fs::absolute(path).parent_path();
   return build(document, folder, sections::Presets(sections::preset_folders(folder)),
-               sections::DbcFiles(folder), read_model_file);
+               sections::DbcFiles(folder), sections::EdsFiles(folder), read_model_file);
 }
 
 DaemonConfig parse_daemon_config(const std::string& config_text, const std::string& config_name,
@@ -195,7 +214,7 @@ DaemonConfig parse_daemon_config(const std::string& config_text, const std::stri
   const TomlDocument document = TomlDocument::from_text(config_text, config_name);
   const fs::path folder = fs::path(config_name).parent_path();
   return build(document, folder, sections::Presets({}), sections::DbcFiles(std::nullopt),
-               [&](const TomlTable&, const fs::path&) {
+               sections::EdsFiles(std::nullopt), [&](const TomlTable&, const fs::path&) {
                  return ModelSource{model_name, model_text};
                });
 }

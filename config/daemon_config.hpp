@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "config/problems.hpp"
+#include "drivers/can/canopen/canopen_config.hpp"
+#include "drivers/can/j1939/j1939_config.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
 #include "estimator/estimator_config.hpp"
@@ -51,6 +53,8 @@ struct DaemonConfig {
   EstimatorConfig estimator;
   std::vector<ModbusBusConfig> modbus_buses;
   std::vector<CanBusConfig> can_buses;
+  std::vector<CanopenBusConfig> canopen_buses;
+  std::vector<J1939BusConfig> j1939_buses;
   ControllerConfig controller;
   HistoryConfig history;
   SocketConfig socket;
@@ -67,7 +71,8 @@ struct DaemonConfig {
 [[nodiscard]] DaemonConfig load_daemon_config(const std::filesystem::path& path);
 
 /// The same from texts, as the history keeps them. The names stand for the files in problems; no
-/// file is opened, so that devices with a preset are left out of the buses.
+/// file is opened, so that devices with a preset and CANopen objects by name are left out of
+/// the buses.
 /// @throws ConfigurationError
 [[nodiscard]] DaemonConfig parse_daemon_config(const std::string& config_text,
                                                const std::string& config_name,

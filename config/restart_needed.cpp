@@ -51,6 +51,8 @@ std::vector<std::string> restart_needed(const DaemonConfig& running, const Daemo
           "names or order of the sensors");
   compare_buses(running.modbus_buses, next.modbus_buses, changed);
   compare_buses(running.can_buses, next.can_buses, changed);
+  compare_buses(running.canopen_buses, next.canopen_buses, changed);
+  compare_buses(running.j1939_buses, next.j1939_buses, changed);
   compare(names_of(running.estimator.axes) == names_of(next.estimator.axes),
           "names, count or order of the axes");
   // What the controller applies and shows would change its meaning at once.

@@ -27,6 +27,7 @@
 #include "daemon/state/state_file.hpp"
 #include "daemon/status_json.hpp"
 #include "drivers/controllers/make_controller.hpp"
+#include "drivers/sensors/can_protocol_source.hpp"
 #include "drivers/sensors/can_source.hpp"
 #include "drivers/sensors/modbus_source.hpp"
 
@@ -59,6 +60,8 @@ std::vector<std::unique_ptr<SensorSource>> make_sources(const DaemonConfig& conf
     sources.push_back(std::make_unique<ModbusSource>(bus));
   for (const CanBusConfig& bus : config.can_buses)
     sources.push_back(std::make_unique<CanSource>(bus));
+  for (const CanopenBusConfig& bus : config.canopen_buses) sources.push_back(make_source(bus));
+  for (const J1939BusConfig& bus : config.j1939_buses) sources.push_back(make_source(bus));
   return sources;
 }
 

@@ -6,12 +6,13 @@
 #include "config/sections/can_database.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
+#include "config/sections/j1939_bus.hpp"
 #include "config/sections/modbus_values.hpp"
 
 namespace thermocomp::sections {
 namespace {
 
-enum class BusKind { modbus_tcp, modbus_rtu, can, unknown };
+enum class BusKind { modbus_tcp, modbus_rtu, can, canopen, j1939, unknown };
 
 struct Bus {
   BusKind kind{BusKind::unknown};
@@ -31,7 +32,19 @@ struct Device {
 
 /// What a preset must have been written for.
 std::string protocol_of(BusKind kind) {
-  return kind == BusKind::can ? "can" : "modbus";
+  switch (kind) {
+    case BusKind::can:
+      return "can";
+    case BusKind::canopen:
+      return "canopen";
+    case BusKind::j1939:
+      return "j1939";
+    case BusKind::modbus_tcp:
+    case BusKind::modbus_rtu:
+    case BusKind::unknown:
+      break;
+  }
+  return "modbus";
 }
 
 std::string known(const auto& entries) {
@@ -42,8 +55,8 @@ std::string known(const auto& entries) {
 
 class BusReader {
  public:
-  BusReader(const TomlTable& root, Presets& presets, DbcFiles& dbc_files)
-      : root_(root), presets_(presets), dbc_files_(dbc_files) {}
+  BusReader(const TomlTable& root, Presets& presets, DbcFiles& dbc_files, EdsFiles& eds_files)
+      : root_(root), presets_(presets), dbc_files_(dbc_files), eds_files_(eds_files) {}
 
   SensorBuses read(const std::vector<TomlTable>& sensors) {
     std::set<std::string> bus_names;
@@ -70,13 +83,21 @@ class BusReader {
     const BusKind kind = table.choice<BusKind>("kind",
                                                {{"modbus_tcp", BusKind::modbus_tcp},
                                                 {"modbus_rtu", BusKind::modbus_rtu},
-                                                {"can", BusKind::can}},
+                                                {"can", BusKind::can},
+                                                {"canopen", BusKind::canopen},
+                                                {"j1939", BusKind::j1939}},
                                                BusKind::unknown);
     Bus bus{kind, 0, table, false};
     if (kind == BusKind::can) {
       bus.index = result_.can.size();
       result_.can.push_back(read_can_bus(table, name));
       databases_.push_back(dbc_files_.read(table));
+    } else if (kind == BusKind::canopen) {
+      bus.index = result_.canopen.size();
+      result_.canopen.push_back(read_canopen_bus(table, name));
+    } else if (kind == BusKind::j1939) {
+      bus.index = result_.j1939.size();
+      result_.j1939.push_back(read_j1939_bus(table, name));
     } else if (kind == BusKind::unknown) {
       if (!table.has("kind")) table.problem("kind", "must be given");
       table.ignore_rest();
@@ -132,21 +153,46 @@ class BusReader {
         device.table = Presets::over_preset(own, *device.preset, protocol_of(device.kind));
       }
     }
-    const TomlTable& table = device.table;
-    if (device.kind == BusKind::unknown) {
-      table.ignore_rest();
-    } else if (device.kind == BusKind::can) {
-      refuse_all(table,
-                 {"unit", "period_s", "registers_per_request_max", "gap_registers_max",
-                  "one_register_a_request", "renewal", "table", "encoding", "word_order", "status"},
-                 "makes no sense on a CAN bus");
-      device.index = result_.can[device.bus].devices.size();
-      result_.can[device.bus].devices.push_back({name, {}});
-    } else {
-      device.index = result_.modbus[device.bus].devices.size();
-      result_.modbus[device.bus].devices.push_back(read_modbus_device(table, name, device.kind));
-    }
+    read_kind_of_device(device, name);
     devices_.try_emplace(name, device);
+  }
+
+  void read_kind_of_device(Device& device, const std::string& name) {
+    const TomlTable& table = device.table;
+    switch (device.kind) {
+      case BusKind::unknown:
+        return table.ignore_rest();
+      case BusKind::can:
+        refuse_all(
+            table,
+            {"unit", "period_s", "registers_per_request_max", "gap_registers_max",
+             "one_register_a_request", "renewal", "table", "encoding", "word_order", "status"},
+            "makes no sense on a CAN bus");
+        device.index = result_.can[device.bus].devices.size();
+        result_.can[device.bus].devices.push_back({name, {}});
+        return;
+      case BusKind::canopen: {
+        CanopenBusConfig& bus = result_.canopen[device.bus];
+        const CanopenDevice& read =
+            canopen_devices_.insert_or_assign(name, read_canopen_device(table, name, eds_files_))
+                .first->second;
+        check_canopen_node(table, bus, read.node);
+        device.index = bus.nodes.size();
+        bus.nodes.push_back(read.node);
+        return;
+      }
+      case BusKind::j1939: {
+        J1939BusConfig& bus = result_.j1939[device.bus];
+        device.index = bus.nodes.size();
+        bus.nodes.push_back(read_j1939_device(table, name, bus));
+        return;
+      }
+      case BusKind::modbus_tcp:
+      case BusKind::modbus_rtu:
+        device.index = result_.modbus[device.bus].devices.size();
+        result_.modbus[device.bus].devices.push_back(read_modbus_device(table, name, device.kind));
+        return;
+    }
   }
 
   static ModbusDeviceConfig read_modbus_device(const TomlTable& table, const std::string& name,
@@ -178,20 +224,47 @@ class BusReader {
     const bool preset = device.preset != nullptr && device.kind != BusKind::unknown;
     const TomlTable sensor =
         preset ? Presets::over_channel(own, device.table, *device.preset) : own;
-    if (device.kind == BusKind::unknown) {
-      sensor.ignore_rest();
-    } else if (device.kind == BusKind::can) {
-      refuse_all(sensor, {"table", "address", "encoding", "word_order", "status"},
-                 "makes no sense on a CAN bus");
-      CanChannel channel = read_can_channel(sensor, device.table, databases_[device.bus]);
-      channel.sensor = index;
-      result_.can[device.bus].devices[device.index].channels.push_back(std::move(channel));
-    } else {
-      ModbusDeviceConfig& modbus = result_.modbus[device.bus].devices[device.index];
-      ModbusChannel channel = read_modbus_channel(sensor, device.table);
-      channel.sensor = index;
-      check_request(sensor, channel, modbus);
-      modbus.channels.push_back(std::move(channel));
+    read_channel_of(device, device_name, sensor, index);
+  }
+
+  void read_channel_of(const Device& device, const std::string& device_name,
+                       const TomlTable& sensor, std::size_t index) {
+    switch (device.kind) {
+      case BusKind::unknown:
+        return sensor.ignore_rest();
+      case BusKind::can: {
+        refuse_all(sensor, {"table", "address", "encoding", "word_order", "status"},
+                   "makes no sense on a CAN bus");
+        CanChannel channel = read_can_channel(sensor, device.table, databases_[device.bus]);
+        channel.sensor = index;
+        result_.can[device.bus].devices[device.index].channels.push_back(std::move(channel));
+        return;
+      }
+      case BusKind::canopen: {
+        CanopenBusConfig& bus = result_.canopen[device.bus];
+        auto channel = read_canopen_channel(sensor, device.table, canopen_devices_.at(device_name),
+                                            eds_files_);
+        if (!channel) return;
+        channel->sensor = index;
+        check_canopen_channel(sensor, bus, device.index, *channel);
+        bus.nodes[device.index].channels.push_back(std::move(*channel));
+        return;
+      }
+      case BusKind::j1939: {
+        J1939Channel channel = read_j1939_channel(sensor, device.table);
+        channel.sensor = index;
+        result_.j1939[device.bus].nodes[device.index].channels.push_back(std::move(channel));
+        return;
+      }
+      case BusKind::modbus_tcp:
+      case BusKind::modbus_rtu: {
+        ModbusDeviceConfig& modbus = result_.modbus[device.bus].devices[device.index];
+        ModbusChannel channel = read_modbus_channel(sensor, device.table);
+        channel.sensor = index;
+        check_request(sensor, channel, modbus);
+        modbus.channels.push_back(std::move(channel));
+        return;
+      }
     }
   }
 
@@ -209,8 +282,10 @@ class BusReader {
   TomlTable root_;
   Presets& presets_;
   DbcFiles& dbc_files_;
+  EdsFiles& eds_files_;
   SensorBuses result_;
   std::vector<CanDatabase> databases_;  ///< one a CAN bus
+  std::map<std::string, CanopenDevice> canopen_devices_;
   std::map<std::string, Bus> buses_;
   std::map<std::string, Device> devices_;
   /// A reference to a name that does not exist: whom nobody names may be the one that was meant.
@@ -221,8 +296,8 @@ class BusReader {
 }  // namespace
 
 SensorBuses read_buses(const TomlTable& root, const std::vector<TomlTable>& sensors,
-                       Presets& presets, DbcFiles& dbc_files) {
-  return BusReader(root, presets, dbc_files).read(sensors);
+                       Presets& presets, DbcFiles& dbc_files, EdsFiles& eds_files) {
+  return BusReader(root, presets, dbc_files, eds_files).read(sensors);
 }
 
 }  // namespace thermocomp::sections

@@ -1,0 +1,329 @@
+#include "config/sections/canopen_bus.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "config/sections/can_signals.hpp"
+#include "config/sections/common.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+constexpr int node_max = 127;
+constexpr std::uint32_t standard_id_max = 0x7FF;
+
+const Names<ObjectType>& type_names() {
+  static const Names<ObjectType> names{
+      {"bool", {1, false, false}},    {"int8", {8, true, false}},
+      {"int16", {16, true, false}},   {"int24", {24, true, false}},
+      {"int32", {32, true, false}},   {"int64", {64, true, false}},
+      {"uint8", {8, false, false}},   {"uint16", {16, false, false}},
+      {"uint24", {24, false, false}}, {"uint32", {32, false, false}},
+      {"uint64", {64, false, false}}, {"real32", {32, true, true}},
+      {"real64", {64, true, true}}};
+  return names;
+}
+
+/// What CiA 301 keeps for other services cannot be a TPDO.
+bool can_be_tpdo(std::uint32_t cob_id) {
+  return (cob_id > 0x100 && cob_id < 0x580) || (cob_id >= 0x680 && cob_id < 0x6E0);
+}
+
+struct Place {
+  std::optional<ObjectAddress> object;
+  std::optional<ObjectType> type;  ///< of the data sheet
+  bool unknown{false};             ///< a name, and no data sheets are opened
+};
+
+Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles& eds_files) {
+  Place place;
+  const std::string name = table.text("object");
+  refuse_all(table, {"index", "sub"}, "cannot stand beside object");
+  if (name.empty()) return place;
+  if (!known.eds) {
+    place.unknown = true;
+    if (!eds_files.opens_files()) return place;
+    table.problem("object", "needs the data sheet of its device: eds");
+    return place;
+  }
+  const auto found = known.eds->find(name);
+  if (found.size() == 1) {
+    place.object = found.front()->address;
+    place.type = found.front()->type;
+    if (!place.type) table.problem("object", "is no number in the data sheet");
+    return place;
+  }
+  if (!found.empty()) {
+    table.problem("object", "is not clear; may be " + found[0]->name + " or " + found[1]->name);
+    return place;
+  }
+  const std::string near = nearest_name(name, known.eds->names());
+  std::string rule = "is no object of the data sheet";
+  if (!near.empty()) rule.append("; did you mean ").append(near).append("?");
+  table.problem("object", rule);
+  return place;
+}
+
+ObjectAddress read_address(const TomlTable& table) {
+  return {table.integer<std::uint16_t>("index", 0, 0xFFFF, 0),
+          table.integer<std::uint8_t>("sub", 0, 0xFE, 0)};
+}
+
+/// `object`, or `index` and `sub`.
+Place read_object(const TomlTable& table, const CanopenDevice& known, const EdsFiles& eds_files) {
+  if (table.has("object")) return by_name(table, known, eds_files);
+  Place place;
+  if (!table.has("index")) return place;
+  place.object = read_address(table);
+  if (known.eds) {
+    const EdsObject* object = known.eds->find(*place.object);
+    if (object != nullptr) place.type = object->type;
+  }
+  return place;
+}
+
+std::uint32_t default_cob_id(int pdo, int node) {
+  return static_cast<std::uint32_t>(0x80 + 0x100 * pdo + node);
+}
+
+/// `cob_id`, or `pdo` with the identifiers that nodes have by default; 0 where neither stands.
+std::uint32_t read_cob_id(const TomlTable& own, const TomlTable& base, int node) {
+  const bool has_own = own.has("cob_id") || own.has("pdo");
+  const TomlTable& table = has_own ? own : base;
+  if (table.has("cob_id")) {
+    table.refuse("pdo", "cannot stand beside cob_id");
+    const auto cob_id = table.integer<std::uint32_t>("cob_id", 0, standard_id_max, 0);
+    if (!can_be_tpdo(cob_id)) {
+      table.problem("cob_id", "is kept for other messages; a TPDO is in [0x101, 0x57F]");
+    }
+    return cob_id;
+  }
+  if (!table.has("pdo")) return 0;
+  return default_cob_id(table.integer("pdo", 1, 4, 1), node);
+}
+
+CanopenWrite read_write(const TomlTable& table, const CanopenDevice& known,
+                        const EdsFiles& eds_files) {
+  CanopenWrite write;
+  const Place place = read_object(table, known, eds_files);
+  if (!place.object && !table.has("object")) table.problem("index", "must be given, or object");
+  write.object = place.object.value_or(ObjectAddress{});
+  const ObjectType type = table.choice("type", type_names(), place.type.value_or(ObjectType{}));
+  if (!place.type && !place.unknown && !table.has("type")) table.problem("type", "must be given");
+  const int bits = type.length_bits;
+  write.bytes.resize(static_cast<std::size_t>((std::min(bits, 32) + 7) / 8));
+  if (bits > 32) {
+    table.problem("type", "must have at most 32 bits");
+    table.ignore_rest();
+    return write;
+  }
+  std::uint64_t raw = 0;
+  if (type.is_float) {
+    raw = std::bit_cast<std::uint32_t>(
+        static_cast<float>(table.number("value", Range::between(-1e30, 1e30))));
+  } else {
+    const std::int64_t span = std::int64_t{1} << bits;
+    const std::int64_t low = type.is_signed ? -span / 2 : 0;
+    raw = static_cast<std::uint64_t>(table.integer<std::int64_t>("value", low, low + span - 1));
+  }
+  for (std::size_t i = 0; i < write.bytes.size(); ++i) {
+    write.bytes[i] = static_cast<std::uint8_t>(raw >> (8 * i));
+  }
+  return write;
+}
+
+CanopenMapping read_mapping(const TomlTable& table, int node) {
+  CanopenMapping mapping;
+  mapping.cob_id = read_cob_id(table, table, node);
+  if (!table.has("cob_id") && !table.has("pdo")) table.problem("pdo", "must be given, or cob_id");
+  int bits = 0;
+  for (const TomlTable& entry : table.tables_required("object")) {
+    if (!entry.has("index")) entry.problem("index", "must be given");
+    mapping.objects.push_back({read_address(entry), entry.integer("length_bits", 1, 64)});
+    bits += mapping.objects.back().length_bits;
+  }
+  if (bits > 64) table.problem("object", "take " + std::to_string(bits) + " bits of 64");
+  return mapping;
+}
+
+std::vector<std::uint16_t> read_emergency_codes(const TomlTable& own, const TomlTable& base) {
+  const TomlTable& table = own.has("emergency_codes") ? own : base;
+  std::vector<std::uint16_t> codes;
+  for (const std::int64_t code : table.integers("emergency_codes", 0x0100, 0xFFFF, {})) {
+    codes.push_back(static_cast<std::uint16_t>(code));
+  }
+  return codes;
+}
+
+/// Where in the TPDO, or when the object is asked for.
+void read_way(const TomlTable& sensor, const TomlTable& device, const CanopenDevice& known,
+              const Place& place, CanopenChannel& channel) {
+  const bool polled = sensor.has("poll_s") || (device.has("poll_s") && !sensor.has("start_bit"));
+  if (place.object || place.unknown) {
+    channel.object = place.object.value_or(ObjectAddress{});
+    refuse_all(sensor, {"start_bit", "cob_id", "pdo"}, "cannot stand beside an object");
+    channel.way = polled ? CanopenWay::sdo : CanopenWay::pdo_object;
+    const Range range = Range::between(0.02, 3600.0);
+    channel.poll_s = sensor.number("poll_s", range, device.number("poll_s", range, 1.0));
+    const CanopenNodeConfig& node = known.node;
+    if (!polled && !place.unknown && node.mappings_read.empty() && node.mappings.empty()) {
+      sensor.problem("index", "needs mappings of its device: read_mappings or mapping; or poll_s");
+    }
+    return;
+  }
+  channel.way = CanopenWay::pdo_bits;
+  sensor.refuse("poll_s", "needs an object");
+  if (!sensor.has("start_bit")) {
+    sensor.problem("start_bit", "must be given, or an object (object, or index and sub)");
+  }
+  channel.signal.id = read_cob_id(sensor, device, known.node.node);
+  if (channel.signal.id == 0) sensor.problem("pdo", "must be given, or cob_id");
+  channel.signal.start_bit = sensor.integer("start_bit", 0, 63, 0);
+}
+
+}  // namespace
+
+std::shared_ptr<const EdsFile> EdsFiles::read(const TomlTable& device) {
+  if (!device.has("eds")) return nullptr;
+  const std::filesystem::path named = device.text("eds");
+  if (!folder_ || named.empty()) return nullptr;
+  const std::filesystem::path path = *folder_ / named;
+  if (const auto known = read_.find(path); known != read_.end()) return known->second;
+  std::shared_ptr<const EdsFile>& file = read_[path];
+  try {
+    EdsReading reading = read_eds_text(read_text_file(path), path.string());
+    problems_.insert(problems_.end(), reading.problems.begin(), reading.problems.end());
+    if (reading.problems.empty()) file = std::make_shared<EdsFile>(std::move(reading.file));
+  } catch (const ConfigurationError& error) {
+    device.problem("eds", error.problems().front().rule);
+  }
+  return file;
+}
+
+CanopenBusConfig read_canopen_bus(const TomlTable& table, const std::string& name) {
+  CanopenBusConfig bus;
+  bus.name = name;
+  bus.interface = read_interface(table);
+  bus.reconnect_s = table.number("reconnect_s", Range::between(0.01, 1), bus.reconnect_s);
+  bus.start_nodes = table.flag("start_nodes", bus.start_nodes);
+  if (table.has("own_node")) bus.own_node = table.integer("own_node", 1, node_max, node_max);
+  const Range period = Range::between(0.01, 60.0);
+  if (table.has("heartbeat_s") && bus.own_node == 0) {
+    table.problem("heartbeat_s", "needs own_node");
+  }
+  bus.heartbeat_s = table.number("heartbeat_s", period, bus.heartbeat_s);
+  if (table.has("sync_s")) bus.sync_s = table.number("sync_s", period);
+  bus.sdo_timeout_s = table.number("sdo_timeout_s", Range::between(0.01, 10.0), bus.sdo_timeout_s);
+  return bus;
+}
+
+CanopenDevice read_canopen_device(const TomlTable& table, const std::string& name,
+                                  EdsFiles& eds_files) {
+  CanopenDevice device;
+  CanopenNodeConfig& node = device.node;
+  node.name = name;
+  device.eds = eds_files.read(table);
+  node.node = table.integer("node", 1, node_max);
+  const Range period = Range::between(0.01, 60.0);
+  if (table.has("heartbeat_s")) node.heartbeat_s = table.number("heartbeat_s", period);
+  const double otherwise_s = 3.0 * node.heartbeat_s;
+  node.heartbeat_timeout_s =
+      table.number("heartbeat_timeout_s", Range::between(0.02, 3600.0), otherwise_s);
+  if (!(node.heartbeat_timeout_s > node.heartbeat_s) && node.heartbeat_s > 0.0) {
+    table.problem("heartbeat_timeout_s", "must be more than heartbeat_s");
+  }
+  if (table.has("pdo_period_s")) node.pdo_period_s = table.number("pdo_period_s", period);
+  node.emergency = table.choice<EmergencyForm>(
+      "emergency", {{"generic", EmergencyForm::generic}, {"jumo_cantrans", EmergencyForm::jumo}},
+      node.emergency);
+  for (const TomlTable& entry : table.tables("write")) {
+    node.writes.push_back(read_write(entry, device, eds_files));
+  }
+  for (const TomlTable& entry : table.tables("mapping")) {
+    node.mappings.push_back(read_mapping(entry, node.node));
+  }
+  for (const std::int64_t number : table.integers("read_mappings", 1, 512, {})) {
+    const int pdo = static_cast<int>(number);
+    const auto& read = node.mappings_read;
+    if (std::find(read.begin(), read.end(), pdo) != read.end()) {
+      table.problem("read_mappings", std::to_string(pdo), "is there twice");
+    } else {
+      node.mappings_read.push_back(pdo);
+    }
+  }
+  return device;
+}
+
+std::optional<CanopenChannel> read_canopen_channel(const TomlTable& sensor, const TomlTable& device,
+                                                   const CanopenDevice& known,
+                                                   const EdsFiles& eds_files) {
+  CanopenChannel channel;
+  const Place place = read_object(sensor, known, eds_files);
+  const ObjectType in_base = device.choice("type", type_names(), place.type.value_or(ObjectType{}));
+  const ObjectType type = sensor.choice("type", type_names(), place.type.value_or(in_base));
+  if (!place.type && !place.unknown && !sensor.has("type") && !device.has("type")) {
+    sensor.problem("type", "must be given");
+  }
+  channel.signal.length_bits = type.length_bits;
+  channel.signal.is_signed = type.is_signed && !type.is_float;
+  channel.signal.is_float = type.is_float;
+  read_way(sensor, device, known, place, channel);
+  if (channel.signal.start_bit + type.length_bits > 64) {
+    sensor.problem("start_bit", "the value must end within 8 bytes");
+    channel.signal.start_bit = 0;
+  }
+  channel.signal.scale = read_scale(sensor, read_scale(device, 1.0));
+  const Range range = Range::between(-1e4, 1e4);
+  channel.signal.offset =
+      sensor.number("offset_degC", range, device.number("offset_degC", range, 0.0));
+  channel.signal.sentinels = read_can_codes(sensor, device, channel.signal);
+  channel.emergency_codes = read_emergency_codes(sensor, device);
+  if (sensor.has("emergency_channel")) {
+    channel.emergency_channel = sensor.integer("emergency_channel", 1, 255, 1);
+    if (known.node.emergency == EmergencyForm::generic) {
+      sensor.problem("emergency_channel", "needs a device whose emergency messages name channels");
+    }
+  }
+  if (place.unknown) return std::nullopt;
+  return channel;
+}
+
+void check_canopen_node(const TomlTable& device, const CanopenBusConfig& bus,
+                        const CanopenNodeConfig& node) {
+  if (node.node == bus.own_node) device.problem("node", "is our own (own_node of the bus)");
+  for (const CanopenNodeConfig& other : bus.nodes) {
+    if (other.node == node.node) {
+      device.problem("node", "is that of the device " + other.name + " already");
+    }
+    for (const CanopenMapping& a : other.mappings) {
+      for (const CanopenMapping& b : node.mappings) {
+        if (a.cob_id != b.cob_id) continue;
+        device.problem("mapping", std::to_string(a.cob_id),
+                       "is the COB-ID of a TPDO of the device " + other.name + " already");
+      }
+    }
+  }
+}
+
+void check_canopen_channel(const TomlTable& sensor, const CanopenBusConfig& bus, std::size_t node,
+                           const CanopenChannel& channel) {
+  if (channel.way != CanopenWay::pdo_bits || channel.signal.id == 0) return;
+  for (std::size_t i = 0; i < bus.nodes.size(); ++i) {
+    if (i == node) continue;
+    const CanopenNodeConfig& other = bus.nodes[i];
+    const bool in_channel =
+        std::any_of(other.channels.begin(), other.channels.end(), [&](const CanopenChannel& each) {
+          return each.way == CanopenWay::pdo_bits && each.signal.id == channel.signal.id;
+        });
+    const bool in_mapping =
+        std::any_of(other.mappings.begin(), other.mappings.end(),
+                    [&](const CanopenMapping& each) { return each.cob_id == channel.signal.id; });
+    if (!in_channel && !in_mapping) continue;
+    sensor.problem(sensor.has("cob_id") ? "cob_id" : "pdo", std::to_string(channel.signal.id),
+                   "is the COB-ID of a TPDO of the device " + other.name + " already");
+    return;
+  }
+}
+
+}  // namespace thermocomp::sections

@@ -1,0 +1,18 @@
+/// The parts of the daemon's file that describe a J1939 bus, its devices and their parameters.
+#pragma once
+
+#include <string>
+
+#include "config/toml_reader.hpp"
+#include "drivers/can/j1939/j1939_config.hpp"
+
+namespace thermocomp::sections {
+
+[[nodiscard]] J1939BusConfig read_j1939_bus(const TomlTable& table, const std::string& name);
+/// @param bus  with the devices before it: an address belongs to one
+[[nodiscard]] J1939NodeConfig read_j1939_device(const TomlTable& table, const std::string& name,
+                                                const J1939BusConfig& bus);
+/// What `sensor` leaves out is as in `device`.
+[[nodiscard]] J1939Channel read_j1939_channel(const TomlTable& sensor, const TomlTable& device);
+
+}  // namespace thermocomp::sections

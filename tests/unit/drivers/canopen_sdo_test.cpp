@@ -1,0 +1,173 @@
+// SDO and EMCY, with the bytes of CiA 301 written out by hand.
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "drivers/can/canopen/emergency.hpp"
+#include "drivers/can/canopen/sdo_client.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes bytes_of(const CanFrame& frame) {
+  return {frame.payload().begin(), frame.payload().end()};
+}
+
+/// What a client has to send: identifier and bytes.
+struct Sent {
+  std::uint32_t id{0};
+  Bytes bytes;
+  bool operator==(const Sent&) const = default;
+};
+std::ostream& operator<<(std::ostream& out, const Sent& sent) {
+  out << std::hex << sent.id << '#';
+  for (const int byte : sent.bytes) out << ' ' << byte;
+  return out << std::dec;
+}
+
+template <class Machine>
+std::vector<Sent> sent_by(Machine& machine) {
+  std::vector<Sent> sent;
+  while (const auto frame = machine.next_frame()) {
+    CHECK_FALSE(frame->id.extended);
+    sent.push_back({frame->id.id, bytes_of(*frame)});
+  }
+  return sent;
+}
+
+}  // namespace
+
+TEST_CASE("SDO: an expedited read is one question and one answer", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x40, 0x40, 0x20, 0x01, 0, 0, 0, 0}}});
+  SECTION("with its length") {
+    client.take(Bytes{0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0x55, 0x55}, 1s);
+    const auto result = client.result();
+    REQUIRE(result);
+    CHECK(result->outcome == SdoOutcome::done);
+    CHECK(result->bytes == Bytes{0xE1, 0x00});
+  }
+  SECTION("without its length: four bytes") {
+    client.take(Bytes{0x42, 0x40, 0x20, 0x01, 1, 2, 3, 4}, 1s);
+    CHECK(client.result()->bytes == Bytes{1, 2, 3, 4});
+  }
+  CHECK_FALSE(client.busy());
+  CHECK_FALSE(client.result());
+}
+
+TEST_CASE("SDO: a segmented read alternates its toggle bit", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x1008, 0}, 1s);
+  sent_by(client);
+  client.take(Bytes{0x41, 0x08, 0x10, 0x00, 9, 0, 0, 0}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x60, 0, 0, 0, 0, 0, 0, 0}}});
+  client.take(Bytes{0x00, 'C', 'A', 'N', 't', 'r', 'a', 'n'}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x70, 0, 0, 0, 0, 0, 0, 0}}});
+  SECTION("the last segment says how much of it is unused") {
+    client.take(Bytes{0x1B, 's', 'T', 0, 0, 0, 0, 0}, 1s);
+    const auto result = client.result();
+    REQUIRE(result);
+    CHECK(std::string(result->bytes.begin(), result->bytes.end()) == "CANtransT");
+  }
+  SECTION("a toggle that stands still is an abort") {
+    client.take(Bytes{0x0B, 's', 'T', 0, 0, 0, 0, 0}, 1s);
+    CHECK(client.result()->outcome == SdoOutcome::broken);
+    CHECK(sent_by(client) ==
+          std::vector<Sent>{{0x605, {0x80, 0x08, 0x10, 0x00, 0x00, 0x00, 0x03, 0x05}}});
+  }
+  SECTION("fewer bytes than announced are an abort") {
+    client.take(Bytes{0x1D, 's', 0, 0, 0, 0, 0, 0}, 1s);
+    CHECK(client.result()->outcome == SdoOutcome::broken);
+  }
+}
+
+TEST_CASE("SDO: an announcement beyond the limit is refused", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x1008, 0}, 1s);
+  sent_by(client);
+  client.take(Bytes{0x41, 0x08, 0x10, 0x00, 0x01, 0x04, 0, 0}, 1s);
+  CHECK(client.result()->abort_code == 0x05040005);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x80, 0x08, 0x10, 0x00, 0x05, 0x00, 0x04, 0x05});
+}
+
+TEST_CASE("SDO: expedited writes say how many bytes count", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.write({0x1017, 0}, Bytes{0xE8, 0x03}, 1s);
+  CHECK(sent_by(client) == std::vector<Sent>{{0x605, {0x2B, 0x17, 0x10, 0x00, 0xE8, 0x03, 0, 0}}});
+  client.take(Bytes{0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0}, 1s);
+  CHECK(client.result()->outcome == SdoOutcome::done);
+  client.write({0x1800, 2}, Bytes{0x01}, 1s);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x2F, 0x00, 0x18, 0x02, 0x01, 0, 0, 0});
+  client.cancel();
+  client.write({0x1800, 1}, Bytes{0x85, 0x01, 0, 0}, 1s);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x23, 0x00, 0x18, 0x01, 0x85, 0x01, 0, 0});
+}
+
+TEST_CASE("SDO: an abort is told by name", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  client.take(Bytes{0x80, 0x40, 0x20, 0x01, 0x00, 0x00, 0x02, 0x06}, 1s);
+  const auto result = client.result();
+  REQUIRE(result);
+  CHECK(result->outcome == SdoOutcome::aborted);
+  CHECK(to_string(*result) == "2040:01: aborted by the node: 0x06020000 object does not exist");
+  CHECK(sdo_abort_name(0x06090030) == "invalid value");
+  CHECK(sdo_abort_name(0x12345678) == "unknown abort code");
+}
+
+TEST_CASE("SDO: silence ends a transfer, and the node is told", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  sent_by(client);
+  client.advance(1s + 99ms);
+  CHECK(client.busy());
+  client.advance(1s + 100ms);
+  CHECK(client.result()->outcome == SdoOutcome::timed_out);
+  CHECK(sent_by(client).at(0).bytes == Bytes{0x80, 0x40, 0x20, 0x01, 0x00, 0x00, 0x04, 0x05});
+  SECTION("a late answer is not taken for one to the next question") {
+    client.read({0x2040, 2}, 2s);
+    client.take(Bytes{0x4B, 0x40, 0x20, 0x01, 0xFF, 0x0F, 0, 0}, 2s);
+    CHECK(client.busy());
+    CHECK(client.second_answers() == 0);
+  }
+}
+
+TEST_CASE("SDO: a second answer betrays a second node", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  client.read({0x2040, 1}, 1s);
+  const Bytes answer{0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00, 0, 0};
+  client.take(answer, 1s);
+  CHECK(client.second_answers() == 0);
+  client.take(answer, 1s);
+  CHECK(client.second_answers() == 1);
+}
+
+TEST_CASE("EMCY: code, register and what the manufacturer adds", "[canopen][emergency]") {
+  const auto emergency = read_emergency(Bytes{0x30, 0x50, 0x01, 0x02, 0x01, 0, 0, 0});
+  REQUIRE(emergency);
+  CHECK(to_string(*emergency) == "0x5030 device hardware (register 0x01)");
+  CHECK_FALSE(read_emergency(Bytes{0x30, 0x50, 0x01}));
+
+  CanopenChannel channel;
+  channel.emergency_channel = 2;
+  const auto jumo = [&](Bytes data) {
+    return emergency_fault(*read_emergency(data), EmergencyForm::jumo, channel);
+  };
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x01, 0, 0, 0}) == Fault::open_circuit);
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x02, 0, 0, 0}) == Fault::short_circuit);
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x10, 0, 0, 0}) == Fault::short_circuit);
+  CHECK(jumo({0x30, 0x50, 0x01, 2, 0x44, 0, 0, 0}) == Fault::device_error);
+  CHECK_FALSE(jumo({0x30, 0x50, 0x01, 1, 0x01, 0, 0, 0}));
+  CHECK_FALSE(jumo({0x10, 0x81, 0x11, 2, 0x01, 0, 0, 0}));
+  CHECK(jumo({0, 0, 0, 2, 0, 0, 0, 0}) == Fault::none);
+  CHECK_FALSE(jumo({0, 0, 0, 1, 0, 0, 0, 0}));
+  CHECK(jumo({0, 0, 0, 0, 0, 0, 0, 0}) == Fault::none);
+}
