@@ -26,7 +26,8 @@ packages_test=(
   "${packages_demo[@]}" "${packages_modelling[@]}"
   # The finite elements are compared with it; test plans with the other.
   calculix-ccx python3-allpairspy
-  mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-numpy python3-pytest
+  mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-canmatrix
+  python3-numpy python3-pytest
   sqlite3 socat rt-tests user-mode-linux kmod iproute2 procps valgrind
   clang-tidy clang-tools clang-format gcovr
   # The fuzz targets: the compiler, libFuzzer and the sanitizers' runtime.
