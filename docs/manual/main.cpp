@@ -131,6 +131,7 @@ void write_formats(const fs::path& examples, const fs::path& folder) {
       {"THE CONFIGURATION", content(examples / "small_machine.toml")},
       {"THE MODEL FILE", content(examples / "small_machine_model.toml")},
       {"SENSORS AND CONTROLLER ON A CAN BUS", content(examples / "can.toml")},
+      {"SENSORS NAMED BY A DBC FILE", content(examples / "can_dbc.toml")},
   };
   page.see_also = {"thermocompd(8)", "thermocomp(1)"};
   write(folder / "thermocompd.toml.5", format_page(page));

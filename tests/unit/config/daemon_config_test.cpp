@@ -103,6 +103,27 @@ TEST_CASE("the CAN example is what its file says", "[config][can]") {
   CHECK(config.estimator.compensation.hold_while_cutting);
 }
 
+TEST_CASE("sensors of a CAN bus are named by its DBC file", "[config][can][dbc]") {
+  const DaemonConfig config = load_daemon_config(examples / "can_dbc.toml");
+  const auto& channels = config.can_buses.at(0).devices.at(0).channels;
+  REQUIRE(channels.size() == 2);
+  CHECK(channels[0].signal.id == 0x181);
+  CHECK(channels[0].signal.scale == 0.1);
+  CHECK(channels[0].signal.sentinels.at(0).code == 0x7FFF);
+  CHECK(channels[0].counter == CanField{60, 4, ByteOrder::little_endian});
+  CHECK(channels[1].sensor == 1);
+  CHECK(channels[1].signal.id == 0x18FEF1FE);
+  CHECK(channels[1].signal.extended_id);
+  CHECK(channels[1].signal.fd);
+  CHECK(channels[1].signal.offset == Approx(0.0).margin(1e-9));  // K in the file
+  CHECK(channels[1].signal.selectors.at(0).pages.at(0).first == 2);
+  CHECK(channels[1].counter == CanField{120, 4, ByteOrder::little_endian});
+}
+
+TEST_CASE("a replay needs no DBC file", "[config][can][dbc]") {
+  CHECK_NOTHROW(parse(example("can_dbc.toml"), "column_model.toml"));
+}
+
 TEST_CASE("a dry run reads back what it is offered", "[config]") {
   const DaemonConfig config = load_daemon_config(examples / "modbus_rtu.toml");
   CHECK(std::get<DryRunControllerConfig>(config.controller).axes == 1);
