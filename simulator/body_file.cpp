@@ -11,6 +11,11 @@ namespace {
 
 constexpr std::size_t states_max = 400;
 
+const Names<BodyPartKind> part_kinds = {{"room_film", BodyPartKind::room_film},
+                                        {"coolant_film", BodyPartKind::coolant_film},
+                                        {"joint", BodyPartKind::joint},
+                                        {"capacity", BodyPartKind::capacity}};
+
 std::vector<double> read_vector(const TomlTable& table, std::string_view key, std::size_t states) {
   std::vector<double> values = table.numbers(key);
   if (values.size() != states && table.has(key)) {
@@ -62,6 +67,19 @@ std::vector<BodyRow> read_rows(const TomlTable& root, std::string_view key, std:
   return rows;
 }
 
+BodyPart read_part(const TomlTable& table, std::size_t states) {
+  BodyPart part;
+  part.name = table.text("name");
+  part.kind = table.choice<BodyPartKind>("kind", part_kinds);
+  part.matrix = read_square(table, "matrix", states);
+  const bool film = part.kind == BodyPartKind::room_film || part.kind == BodyPartKind::coolant_film;
+  if (film)
+    part.inflow = read_vector(table, "inflow", states);
+  else
+    table.refuse("inflow", "only a film brings something in");
+  return part;
+}
+
 ReducedBody read_body(const TomlDocument& document) {
   const TomlTable root = document.root();
   ReducedBody body;
@@ -77,6 +95,7 @@ ReducedBody read_body(const TomlDocument& document) {
   }
   body.sensors = read_rows(root, "sensor", states);
   body.outputs = read_rows(root, "output", states);
+  for (const TomlTable& table : root.tables("part")) body.parts.push_back(read_part(table, states));
   document.finish();
   return body;
 }
@@ -147,6 +166,14 @@ std::string write_body(const ReducedBody& body, const std::string& comment) {
       append_text(text, "name", row.name);
       append(text, "row", row.row);
     }
+  }
+  for (const BodyPart& part : body.parts) {
+    text.append("[[part]]\n");
+    append_text(text, "name", part.name);
+    for (const auto& [name, kind] : part_kinds)
+      if (kind == part.kind) append_text(text, "kind", std::string(name));
+    append_square(text, "matrix", part.matrix, body.states());
+    if (!part.inflow.empty()) append(text, "inflow", part.inflow);
   }
   return text;
 }

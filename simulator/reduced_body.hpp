@@ -28,6 +28,17 @@ struct BodyRow {
   std::vector<double> row;
 };
 
+enum class BodyPartKind { room_film, coolant_film, joint, capacity };
+
+/// What one film, joint or part of the structure has in the matrices: `thermocomp diagnose
+/// --thermal` asks whether its strength is right. The simulator does not need it.
+struct BodyPart {
+  std::string name;
+  BodyPartKind kind{BodyPartKind::joint};
+  std::vector<double> matrix;  ///< in conductance, coolant_conductance or the capacity
+  std::vector<double> inflow;  ///< of a film, in room_inflow or coolant_inflow; else empty
+};
+
 struct ReducedBody {
   std::vector<double> conductance;          ///< row by row, states x states, symmetric
   std::vector<double> coolant_conductance;  ///< besides, while the coolant flows
@@ -37,6 +48,7 @@ struct ReducedBody {
   std::vector<BodySource> sources;
   std::vector<BodyRow> sensors;  ///< degC
   std::vector<BodyRow> outputs;  ///< um or urad
+  std::vector<BodyPart> parts;   ///< may be empty
 
   [[nodiscard]] std::size_t states() const noexcept { return one_degC.size(); }
 };

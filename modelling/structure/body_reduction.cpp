@@ -91,7 +91,7 @@ class Reducer {
   Reducer(const StructureSpec& spec, const Structure& structure, const HeatModel& heat)
       : spec_(spec), structure_(structure), heat_(heat), free_(free_model()) {}
 
-  ReducedBody reduce(const Statics& statics) {
+  ReducedBody reduce(const Statics& statics, bool with_parts) {
     const auto sensitivities = statics.sensitivities(structure_.rows);
     std::vector<Vector> outputs;
     for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
@@ -115,10 +115,56 @@ class Reducer {
     for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
       body.outputs.push_back({spec_.outputs[i].name, states_of(outputs[i])});
     }
+    if (with_parts) {
+      add_couplings(body);
+      add_capacities(body);
+    }
     return body;
   }
 
  private:
+  /// Each coupling is strength w w', so that its projection is strength v v' with v = V' w.
+  void add_couplings(ReducedBody& body) const {
+    Matrix everywhere(static_cast<Eigen::Index>(structure_.mesh.nodes_m.size()), basis_.cols());
+    for (Eigen::Index j = 0; j < basis_.cols(); ++j) {
+      const Vector field = basis_.col(j);
+      const std::vector<double> full =
+          heat_.reduction.expanded({field.data(), static_cast<std::size_t>(field.size())});
+      everywhere.col(j) = Eigen::Map<const Vector>(full.data(), everywhere.rows());
+    }
+    for (const NamedCouplings& named : heat_.named) {
+      Matrix matrix = Matrix::Zero(basis_.cols(), basis_.cols());
+      Vector inflow = Vector::Zero(basis_.cols());
+      for (const Coupling& coupling : named.couplings) {
+        Vector at = Vector::Zero(basis_.cols());
+        for (std::size_t i = 0; i < coupling.count; ++i)
+          at += coupling.weight[i] * everywhere.row(coupling.nodes[i]).transpose();
+        matrix += coupling.strength[0] * at * at.transpose();
+        inflow += coupling.strength[0] * at;
+      }
+      const bool film = named.kind != BodyPartKind::joint;
+      body.parts.push_back({named.name, named.kind,
+                            plain(Matrix(0.5 * (matrix + matrix.transpose()))),
+                            film ? plain(inflow) : std::vector<double>()});
+    }
+  }
+
+  void add_capacities(ReducedBody& body) const {
+    const Mesh& mesh = structure_.mesh;
+    for (std::size_t part = 0; part < mesh.part_names.size(); ++part) {
+      std::vector<Material> alone = structure_.material_of_part;
+      for (std::size_t other = 0; other < alone.size(); ++other)
+        if (other != part) alone[other].density_kg_per_m3 = 0.0;
+      const SparseSymmetric capacity =
+          heat_.reduction.reduced(heat_matrices(mesh, alone, {}).capacity);
+      const Matrix matrix = basis_.transpose() * times(capacity, basis_);
+      body.parts.push_back({mesh.part_names[part],
+                            BodyPartKind::capacity,
+                            plain(Matrix(0.5 * (matrix + matrix.transpose()))),
+                            {}});
+    }
+  }
+
   [[nodiscard]] Vector restricted(std::span<const double> full) const {
     Vector result(heat_.reduction.free_size());
     heat_.reduction.restrict_to_free(full,
@@ -213,7 +259,7 @@ class Reducer {
 }  // namespace
 
 ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
-                        const HeatModel& heat, const Statics& statics) {
+                        const HeatModel& heat, const Statics& statics, bool with_parts) {
   std::vector<Problem> problems;
   const auto problem = [&](const char* key, const char* rule) {
     problems.push_back({spec.file.string(), 0, key, "", rule});
@@ -227,7 +273,7 @@ ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
     problem("guideway", "a body for the simulator has outputs of one pose; leave guideways out");
   }
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
-  return Reducer(spec, structure, heat).reduce(statics);
+  return Reducer(spec, structure, heat).reduce(statics, with_parts);
 }
 
 }  // namespace thermocomp::structure

@@ -14,8 +14,10 @@ namespace thermocomp::structure {
 /// The response to every input is matched at each shift (s = 0: the steady state, exactly), that of
 /// the displacements with its slope; symmetric, so stable.
 /// Source: E. J. Grimme, Krylov projection methods for model reduction, 1997.
+/// @param with_parts  also what each film, joint and part has in the matrices
 /// @throws ConfigurationError: sensors outside their part, no sensors, outputs on a guideway
 [[nodiscard]] ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
-                                      const HeatModel& heat, const Statics& statics);
+                                      const HeatModel& heat, const Statics& statics,
+                                      bool with_parts = false);
 
 }  // namespace thermocomp::structure

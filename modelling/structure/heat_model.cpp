@@ -145,7 +145,7 @@ HeatModel build_heat_model(const StructureSpec& spec, const Structure& structure
   const std::size_t nodes = mesh.nodes_m.size();
   RegionFinder finder(mesh, spec.file.string());
   HeatModel heat{Reduction(static_cast<Index>(nodes), 1), {}, {}, std::vector<double>(nodes, 0.0),
-                 std::vector<double>(nodes, 0.0),         {}};
+                 std::vector<double>(nodes, 0.0),         {}, {}};
   for (const JointSpec& joint : spec.joints) {
     if (joint.bonded && !joint.conductance_W_per_m2_K) {
       tie_faces(finder, mesh, joint, heat.reduction);
@@ -153,6 +153,7 @@ HeatModel build_heat_model(const StructureSpec& spec, const Structure& structure
       auto contact = couplings_between(finder, mesh, joint);
       scale(contact, *joint.conductance_W_per_m2_K);
       heat.dry.insert(heat.dry.end(), contact.begin(), contact.end());
+      heat.named.push_back({joint.name, BodyPartKind::joint, std::move(contact)});
     }
   }
   std::vector<Coupling> wet;
@@ -162,6 +163,10 @@ HeatModel build_heat_model(const StructureSpec& spec, const Structure& structure
     add_inflow(couplings, convection.to_coolant ? heat.coolant_W_per_K : heat.room_W_per_K);
     auto& all = convection.to_coolant ? wet : heat.dry;
     all.insert(all.end(), couplings.begin(), couplings.end());
+    heat.named.push_back(
+        {convection.on.origin.value + (convection.to_coolant ? "|coolant" : "|room"),
+         convection.to_coolant ? BodyPartKind::coolant_film : BodyPartKind::room_film,
+         std::move(couplings)});
   }
   const std::vector<double> volumes_m3 = nodal_volumes(mesh);
   for (const HeatSpec& source : spec.heats) {

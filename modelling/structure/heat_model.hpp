@@ -6,8 +6,16 @@
 
 #include "modelling/structure/conduction.hpp"
 #include "modelling/structure/structure_model.hpp"
+#include "simulator/reduced_body.hpp"
 
 namespace thermocomp::structure {
+
+/// What one film or one joint is made of.
+struct NamedCouplings {
+  std::string name;
+  BodyPartKind kind{BodyPartKind::joint};
+  std::vector<Coupling> couplings;
+};
 
 /// Everything that conducts and carries heat, bound to a structure's mesh.
 struct HeatModel {
@@ -18,6 +26,7 @@ struct HeatModel {
   std::vector<double> coolant_W_per_K;  ///< the same of the coolant
   /// For each [[heat]] how it spreads over the nodes, adding up to 1. Shape (heats)(nodes).
   std::vector<std::vector<double>> shares;
+  std::vector<NamedCouplings> named{};  ///< joints that conduct, then convections
 };
 
 /// @throws ConfigurationError: regions without faces or nodes, parts that no heat can leave

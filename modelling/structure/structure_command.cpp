@@ -27,6 +27,7 @@ struct Options {
   std::string vtu;
   std::string picture;
   std::string plant;
+  bool plant_parts{false};
   SolverChoice solver;
 };
 
@@ -99,7 +100,8 @@ int run(const Options& options) {
     progress.say("a small state space for the simulator");
     const HeatModel heat = build_heat_model(spec, structure);
     write(options.plant,
-          body_text(options, structure, reduce_body(spec, structure, heat, statics)));
+          body_text(options, structure,
+                    reduce_body(spec, structure, heat, statics, options.plant_parts)));
   }
   write(options.model, write_model(model));
   progress.say("done");
@@ -124,6 +126,8 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option(
       "--plant", options->plant,
       "the machine's body for thermocomp-sim: a reduced model of heat and displacement");
+  sub->add_flag("--plant-parts", options->plant_parts,
+                "into the same file: each film, joint and part, for thermocomp diagnose --thermal");
   const std::map<std::string, Backend> backends{{"cholmod", Backend::cholmod},
                                                 {"petsc", Backend::petsc}};
   sub->add_option("--solver", options->solver.backend,

@@ -74,6 +74,42 @@ void add_lumps(const PlantConfig& config, ThermalPlant& plant) {
   }
 }
 
+PartKind kind_of(BodyPartKind kind) {
+  switch (kind) {
+    case BodyPartKind::room_film:
+      return PartKind::room_film;
+    case BodyPartKind::coolant_film:
+      return PartKind::coolant_film;
+    case BodyPartKind::joint:
+      return PartKind::joint;
+    case BodyPartKind::capacity:
+      break;
+  }
+  return PartKind::capacity;
+}
+
+/// The films, joints and capacities that the body's file tells apart; the coolant's whole film
+/// where it tells nothing.
+void add_body_parts(const ReducedBody& body, ThermalPlant& plant) {
+  for (const BodyPart& part : body.parts) {
+    if (part.kind == BodyPartKind::coolant_film && !plant.coolant_signal) continue;
+    plant.parts.push_back({kind_of(part.kind),
+                           part.name,
+                           square_of(part.matrix, body.states()),
+                           vector_of(part.inflow),
+                           "",
+                           {}});
+  }
+  if (body.parts.empty() && plant.coolant_signal &&
+      plant.network.coolant_inflow.squaredNorm() > 0.0)
+    plant.parts.push_back({PartKind::coolant_film,
+                           "coolant",
+                           plant.network.coolant_conductance,
+                           plant.network.coolant_inflow,
+                           "",
+                           {}});
+}
+
 void add_body(const PlantConfig& config, ThermalPlant& plant) {
   const ReducedBody& body = *config.body;
   const auto states = static_cast<Eigen::Index>(body.states());
@@ -88,13 +124,7 @@ void add_body(const PlantConfig& config, ThermalPlant& plant) {
                                source.exponent, vector_of(source.inflow)});
     plant.source_names.push_back(source.name);
   }
-  if (plant.coolant_signal && network.coolant_inflow.squaredNorm() > 0.0)
-    plant.parts.push_back({PartKind::coolant_film,
-                           "coolant",
-                           network.coolant_conductance,
-                           network.coolant_inflow,
-                           "coefficient_W_per_m2_K",
-                           {}});
+  add_body_parts(body, plant);
   // Heat into the point of a sensor enters the states by that sensor's own row: the fields are
   // orthonormal in the heat capacity.
   for (const BodyRow& sensor : body.sensors)

@@ -15,6 +15,8 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double least_step_K = 1e-9;
+/// Lumps are right to some per cent of a sensor's motion at best: less is not named.
+constexpr double motion_share_min = 0.05;
 
 /// Readings held over missing ones, relative to the first.
 Column rise_of(const Column& measured_degC) {
@@ -116,6 +118,7 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   const auto catalogue = std::make_shared<NetworkHypotheses>(plant, train_runs, rows);
   Thresholds thresholds;
   thresholds.one_unit = true;
+  thresholds.motion_share_min = motion_share_min;
   Search search(train_data, thresholds, NetworkHypotheses::all(catalogue),
                 [&](const std::vector<Explanation>& found) { catalogue->accept(found); });
   const SearchResult result = search.run();
