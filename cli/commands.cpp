@@ -8,6 +8,7 @@
 #include "cli/modelling_dispatch.hpp"
 #include "cli/observe_commands.hpp"
 #include "cli/operate_commands.hpp"
+#include "cli/scan_command.hpp"
 
 namespace thermocomp::cli {
 
@@ -21,6 +22,7 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
   app.require_subcommand(1);
   app.footer("Exit status: 0 success, 1 the answer is no, 2 bad use, bad input or unreachable.");
   add_check_command(app, action);
+  add_scan_command(app, action);
   add_observe_commands(app, global, action);
   add_operate_commands(app, global, action);
   add_history_commands(app, action);

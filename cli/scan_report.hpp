@@ -1,0 +1,61 @@
+/// What `thermocomp scan` found, as text for a person and as JSON.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "estimator/types.hpp"
+
+namespace thermocomp::cli {
+
+struct ScanChannel {
+  std::string sensor;
+  std::string place;  ///< "input 0 int16 x 0.1"
+  std::string raw;    ///< bytes in the order of the wire, "00 D7"; empty: none came
+  double temp_degC{not_a_number};
+  Fault fault{Fault::never_read};
+  std::string why;                 ///< empty when good
+  std::vector<std::string> hints;  ///< what it may be instead, and what to do
+  std::optional<double> round_trip_ms;
+  std::optional<double> age_s;
+  [[nodiscard]] bool good() const noexcept { return fault == Fault::none; }
+};
+
+struct ScanDevice {
+  std::string name;
+  std::string address;  ///< "unit 3"; empty on a CAN bus
+  bool answers{false};
+  std::string note;  ///< what is wrong with the device as a whole
+  std::vector<ScanChannel> channels;
+};
+
+struct ScanBus {
+  std::string name;
+  std::string kind;   ///< as in the configuration
+  std::string where;  ///< "192.168.10.20:502", "/dev/ttyUSB0", "can0"
+  std::string error;  ///< empty: it could be used
+  std::string note;
+  std::string found;  ///< what a search for units or nodes found; empty: none was asked for
+  std::vector<int> found_numbers;
+  std::vector<ScanDevice> devices;
+};
+
+struct ScanReport {
+  std::string file;
+  std::vector<ScanBus> buses;
+};
+
+[[nodiscard]] std::size_t count_channels(const ScanReport& report);
+[[nodiscard]] std::size_t count_good(const ScanReport& report);
+
+/// @param colours  for a terminal
+[[nodiscard]] std::string scan_text(const ScanReport& report, bool colours);
+[[nodiscard]] nlohmann::ordered_json scan_json(const ScanReport& report);
+
+/// Bytes as two hexadecimal digits each, a space between.
+[[nodiscard]] std::string hex_bytes(const std::vector<std::uint8_t>& bytes);
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,157 @@
+"""A simulated machine on a Modbus TCP port and on a pseudo terminal, and the scan of both."""
+
+import json
+import os
+import pathlib
+import signal
+import socket
+import struct
+import subprocess
+import time
+
+import pytest
+
+BIN = pathlib.Path(os.environ.get("THERMOCOMP_BIN", "build/release/bin"))
+SOURCE = pathlib.Path(os.environ.get("THERMOCOMP_SOURCE", "."))
+PATIENCE_S = 60.0
+ROOM_DEGC = 25.0
+
+PLANT = f"""format = 1
+[plant]
+[room]
+mean_degC = {ROOM_DEGC}
+[[node]]
+name = "body"
+capacity_J_per_K = 1e6
+[[thermocouple]]
+name = "body"
+node = "body"
+[[bus]]
+name = "net"
+kind = "modbus_tcp"
+[[bus]]
+name = "line"
+kind = "modbus_rtu"
+device = "LINE"
+baud = 115200
+"""
+
+MODEL = """format = 1
+inputs = ["t_degC"]
+outputs = ["z_um"]
+reference = [20.0]
+matrix_um_per_K = [[1.0]]
+"""
+
+
+class Simulator:
+    def __init__(self, folder, machine):
+        self.line = folder / "line"
+        (folder / "machine.toml").write_text(machine.replace("LINE", str(self.line)))
+        errors = folder / "simulator_errors"  # a file: many of them would fill a pipe
+        with open(errors, "w", encoding="utf-8") as sink:
+            self.process = subprocess.Popen(
+                [str(BIN / "thermocomp-sim"), str(folder / "machine.toml")],
+                stdout=subprocess.PIPE, stderr=sink, text=True)
+        line = self.process.stdout.readline()
+        if not line:
+            raise AssertionError("no ready line: " + errors.read_text()[:2000])
+        self.port = json.loads(line)["ports"]["net"]
+
+    def read(self, unit, function, address, count):
+        """Words, or bits, as they stand in the answer: a client that is not ours to trust."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE_S) as link:
+            link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, unit, function, address, count))
+            head = receive(link, 9)
+            assert head[7] == function, f"exception {head[8]}"
+            body = receive(link, head[8])
+        if function in (1, 2):
+            return [(body[i // 8] >> (i % 8)) & 1 for i in range(count)]
+        return list(struct.unpack(f">{count}H", body))
+
+    def end(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        self.process.communicate(timeout=PATIENCE_S)
+
+
+def receive(link, count):
+    data = b""
+    while len(data) < count:
+        piece = link.recv(count - len(data))
+        assert piece, "connection closed"
+        data += piece
+    return data
+
+
+@pytest.fixture
+def simulate(tmp_path):
+    running = []
+
+    def start(machine):
+        running.append(Simulator(tmp_path, machine))
+        return running[-1]
+
+    yield start
+    for simulator in running:
+        simulator.end()
+
+
+def bus(simulator, kind, **keys):
+    if kind == "modbus_tcp":
+        keys = {"host": "127.0.0.1", "port": simulator.port, **keys}
+    else:
+        keys = {"device": str(simulator.line), "baud": 115200, "parity": "none", **keys}
+    return table("[[bus]]", name="bus", kind=kind, **keys)
+
+
+def table(head, **keys):
+    """A TOML table; a value that is a str in a tuple stands as it is."""
+    def shown(value):
+        if isinstance(value, tuple):
+            return value[0]
+        if isinstance(value, bool):
+            return str(value).lower()
+        return json.dumps(value) if isinstance(value, (str, list)) else repr(value)
+    return head + "\n" + "".join(f"{key} = {shown(value)}\n" for key, value in keys.items())
+
+
+def configuration(folder, buses, devices, sensors):
+    """A daemon's file with these buses and devices; sensors: (name, keys)."""
+    (folder / "model.toml").write_text(MODEL)
+    text = "format = 1\n[model]\nfile = \"model.toml\"\n" + buses
+    text += devices
+    text += "".join(table("[[sensor]]", name=name, **keys) for name, keys in sensors)
+    names = json.dumps([name for name, _ in sensors])
+    text += f'[[block]]\nname = "all"\ninput = "t_degC"\nsensors = {names}\n'
+    text += '[controller]\nname = "none"\nkind = "dry_run"\n'
+    text += '[[axis]]\nname = "z"\noutput = "z_um"\noffset_um_max = 60.0\nrate_um_per_s_max = 0.5\n'
+    path = folder / "thermocompd.toml"
+    path.write_text(text)
+    return path
+
+
+def thermocomp(*arguments, timeout_s=PATIENCE_S):
+    return subprocess.run([str(BIN / "thermocomp"), *map(str, arguments)], capture_output=True,
+                          text=True, timeout=timeout_s)
+
+
+def scan(path, *options):
+    """The scan as JSON, and its channels by their sensors' names."""
+    done = thermocomp("scan", path, "--json", *options)
+    assert done.returncode in (0, 1), done.stderr
+    report = json.loads(done.stdout)
+    channels = {channel["sensor"]: channel for found in report["buses"]
+                for device in found["devices"] for channel in device["channels"]}
+    assert done.returncode == (0 if report["good"] == report["channels"] else 1)
+    return report, channels
+
+
+def eventually(check, what):
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        value = check()
+        if value:
+            return value
+        time.sleep(0.05)
+    raise AssertionError("never happened: " + what)
