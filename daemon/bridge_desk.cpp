@@ -40,7 +40,7 @@ BridgeReport read_report(const BridgeControllerConfig& config, const json& param
       invalid("controller_state takes session, taking, applied_um and signals");
   BridgeReport report;
   const json session = params.value("session", json());
-  if (!session.is_number_unsigned() || session == 0)
+  if (!session.is_number_integer() || session <= 0)
     invalid("params.session must be a whole number from 1");
   report.session = session.get<std::uint64_t>();
   const json taking = params.value("taking", json());

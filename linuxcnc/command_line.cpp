@@ -6,8 +6,17 @@
 namespace thermocomp_linuxcnc {
 namespace {
 
+/// CLI::Range takes "nan" for a number within.
+CLI::Validator between(double low, double high) {
+  return {[low, high](const std::string& text) -> std::string {
+            double value = 0.0;
+            const bool is_number = CLI::detail::lexical_cast(text, value);
+            return is_number && value >= low && value <= high ? "" : "not within the bounds";
+          },
+          "FLOAT in [" + CLI::detail::to_string(low) + ", " + CLI::detail::to_string(high) + "]"};
+}
+
 void add_bridge_options(CLI::App& app, BridgeOptions& bridge) {
-  const auto seconds = CLI::Range(0.01, 60.0);
   app.add_option("--name", bridge.name, "of the HAL component")->capture_default_str();
   app.add_option("--axes", bridge.axes, "letters of the axes that take an offset")
       ->capture_default_str()
@@ -21,20 +30,20 @@ void add_bridge_options(CLI::App& app, BridgeOptions& bridge) {
   app.add_option("--socket", bridge.socket, "status socket of thermocompd")->capture_default_str();
   app.add_option("--period-s", bridge.period_s, "of the exchange with the daemon")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 0.5));
+      ->check(between(0.01, 0.5));
   app.add_option("--offset-mm-max", bridge.limits.offset_mm_max, "a larger offset is refused")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 1.0));
+      ->check(between(0.001, 1.0));
   app.add_option("--fresh-s", bridge.limits.fresh_s, "offsets are fresh so long after an answer")
       ->capture_default_str()
-      ->check(seconds);
+      ->check(between(0.01, 60.0));
   app.add_option("--mismatch-mm", bridge.limits.mismatch_mm,
                  "applied and asked for may differ by so much")
       ->capture_default_str()
-      ->check(CLI::Range(0.0001, 1.0));
+      ->check(between(0.0001, 1.0));
   app.add_option("--mismatch-after-s", bridge.limits.mismatch_after_s, "... or longer by more")
       ->capture_default_str()
-      ->check(seconds);
+      ->check(between(0.01, 60.0));
 }
 
 struct HalTexts {

@@ -152,7 +152,10 @@ void write_warning(Writer& out) {
   out.net("tc-fresh", "tc.fresh.out", "tc.stale.in");
   out.net("tc-stale", "tc.stale.out", "tc.warn.in0");
   out.line("net tc-bridge-warning => tc.warn.in1");
-  out.net("tc-warning", "tc.warn.out", "tc.message.trigger");
+  out.net("tc-warning", "tc.warn.out", "tc.tell.in0");
+  // A machine that is off needs no message; one that is switched on without offsets does.
+  out.from_machine("motion.motion-enabled", "tc-enabled", "tc.tell.in1");
+  out.net("tc-tell", "tc.tell.out", "tc.message.trigger");
 }
 
 void write_limits(Writer& out, const std::string& axis) {
@@ -166,7 +169,8 @@ void write_limits(Writer& out, const std::string& axis) {
   out.net("tc-gated-" + axis, "tc.gate-" + axis + ".out", limit + ".in");
 }
 
-const char* const warning_parts[] = {"tc.alive", "tc.fresh", "tc.stale", "tc.warn", "tc.message"};
+const char* const warning_parts[] = {"tc.alive", "tc.fresh", "tc.stale",
+                                     "tc.warn",  "tc.tell",  "tc.message"};
 constexpr const char* message_text =
     "messages=\"thermocomp: the thermal offsets are not fresh or not applied - they are held\"";
 
@@ -177,7 +181,7 @@ void write_joint(Writer& out) {
   out.load("offset", "offset");
   out.load("sum2", "back");
   out.load("oneshot", "", "tc.alive");
-  out.load("and2", "", "tc.fresh");
+  out.load("and2", "", "tc.fresh,tc.tell");
   out.load("not", "", "tc.stale");
   out.load("or2", "", "tc.warn");
   out.line(std::string("loadrt message names=tc.message ") + message_text);
@@ -232,7 +236,7 @@ constexpr double count_mm = 1e-5;
 
 void write_external(Writer& out) {
   const HalFileOptions& options = out.options();
-  out.load("and2", "", "tc.on,tc.fresh");
+  out.load("and2", "", "tc.on,tc.fresh,tc.tell");
   out.load("not", "", "tc.clear,tc.stale");
   out.load("mux2", "gate");
   out.load("limit3", "limit");
@@ -296,13 +300,16 @@ std::string hal_file(const HalFileOptions& options) {
 
 std::string rejoin_file(const HalFileOptions& options, const std::string& name) {
   check(options);
-  if (name.empty() || name == options.name)
-    throw BadOption("the component that takes over needs a name of its own");
+  if (name.empty()) throw BadOption("the component that takes over needs a name");
   Writer out(options);
-  for (const char* pin : {"heartbeat", "fresh", "warning"}) out.line("unlinkp " + out.bridge(pin));
-  out.each([&](const std::string& axis, const std::string&, const std::string&) {
-    out.line("unlinkp " + out.bridge("offset-" + axis));
-  });
+  if (name != options.name) {
+    // A component that ended in order took its pins with it; a killed one still holds its signals.
+    for (const char* pin : {"heartbeat", "fresh", "warning"})
+      out.line("unlinkp " + out.bridge(pin));
+    out.each([&](const std::string& axis, const std::string&, const std::string&) {
+      out.line("unlinkp " + out.bridge("offset-" + axis));
+    });
+  }
   load_bridge(out, name);
   connect_bridge(out, name);
   return out.text();

@@ -47,9 +47,10 @@ class BadOption : public std::runtime_error {
 /// @throws BadOption: no axis, an axis or joint twice, a letter or a number that cannot be
 [[nodiscard]] std::string hal_file(const HalFileOptions& options);
 
-/// For a bridge that was killed: its component cannot be had again before LinuxCNC ends, so another
-/// one, `name`, takes over its signals. For `halcmd -f` in the running LinuxCNC.
-/// @param options  as for the file in use; its `name` is the dead component's
+/// For a bridge that ended while LinuxCNC runs, to be given to `halcmd -f`. After SIGTERM it can be
+/// loaded again under its own name. After a kill its component cannot be had again before LinuxCNC
+/// ends: another one, of another name, takes over its signals.
+/// @param options  as for the file in use, but `name` is that of the bridge that ended
 [[nodiscard]] std::string rejoin_file(const HalFileOptions& options, const std::string& name);
 
 }  // namespace thermocomp_linuxcnc

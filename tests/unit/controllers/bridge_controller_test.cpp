@@ -1,0 +1,165 @@
+// A controller behind a bridge: what the link makes of its reports, in a time of the test's own.
+#include "drivers/controllers/bridge_controller.hpp"
+
+#include <chrono>
+
+#include <catch2/catch.hpp>
+
+#include "estimator/checks.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+nanoseconds test_now{};
+nanoseconds now_of_test() noexcept {
+  return test_now;
+}
+
+struct Bench {
+  Bench() : link({"mill", 1.0, {"x", "z"}, {"x_mm"}}, now_of_test) {
+    test_now = 1000s;
+    link.start();
+    told.session = 7;
+    told.taking = true;
+    told.applied_um[0] = 5.0;
+    told.applied_um[1] = -3.0;
+    told.signals[0] = 120.0;
+  }
+  BridgeAnswer report() {
+    test_now += 50ms;
+    const auto answer = link.report(told);
+    REQUIRE(answer);
+    return *answer;
+  }
+  ControllerState state() {
+    ControllerState newest;
+    link.newest(newest);
+    return newest;
+  }
+  /// As a cycle does: of the epoch that it has seen.
+  void want(double x_um, double z_um) {
+    OffsetCommand command;
+    command.link_epoch = state().link_epoch;
+    command.offset_um = {x_um, z_um};
+    command.valid = {true, true};
+    link.offer(command);
+  }
+
+  BridgeController link;
+  BridgeReport told;
+};
+
+}  // namespace
+
+TEST_CASE("a report is published and the answer is the newest command", "[controllers][bridge]") {
+  Bench bench;
+  CHECK_FALSE(bench.state().online);
+  const BridgeAnswer first = bench.report();
+  CHECK(first.anew);
+  CHECK_FALSE(first.valid[0]);
+  const ControllerState state = bench.state();
+  CHECK(state.online);
+  CHECK(state.link_epoch == 1);
+  CHECK(state.applied_um[1] == -3.0);
+  CHECK(state.signals[0] == 120.0);
+  bench.want(5.5, -3.5);
+  const BridgeAnswer second = bench.report();
+  CHECK_FALSE(second.anew);
+  CHECK(second.valid[0]);
+  CHECK(second.offset_um[0] == 5.5);
+  CHECK(second.offset_um[1] == -3.5);
+  CHECK_FALSE(second.valid[2]);  // no axis of this configuration
+  CHECK(bench.link.health().writes == 1);
+}
+
+TEST_CASE("a bridge that falls silent is offline, and begins a new epoch when it is back",
+          "[controllers][bridge]") {
+  Bench bench;
+  bench.report();
+  bench.want(5.0, -3.0);
+  CHECK(bench.report().valid[0]);
+  test_now += 1001ms;
+  CHECK_FALSE(bench.state().online);
+  CHECK_FALSE(bench.link.health().connected);
+  const BridgeAnswer back = bench.report();
+  CHECK(back.anew);
+  CHECK_FALSE(back.valid[0]);  // what was wanted before the silence is not sent after it
+  CHECK(bench.state().link_epoch == 2);
+  CHECK(bench.state().online);
+}
+
+TEST_CASE("nothing that was wanted before a re-homing is sent after it", "[controllers][bridge]") {
+  Bench bench;
+  bench.report();
+  bench.want(5.0, -3.0);
+  bench.report();
+  bench.told.applied_um[0] = 0.0;
+  const BridgeAnswer answer = bench.report();
+  CHECK(answer.anew);
+  CHECK_FALSE(answer.valid[0]);
+  CHECK(bench.state().link_epoch == 2);
+}
+
+TEST_CASE("a controller that takes no offsets is online, and not in step",
+          "[controllers][bridge]") {
+  Bench bench;
+  bench.report();
+  bench.want(5.0, -3.0);
+  bench.report();
+  bench.told.taking = false;
+  bench.told.applied_um[0] = 0.0;
+  const BridgeAnswer off = bench.report();
+  CHECK(off.anew);
+  CHECK_FALSE(off.valid[0]);
+  CHECK(bench.state().online);
+  CHECK(std::isnan(bench.state().applied_um[0]));
+  CHECK(bench.state().signals[0] == 120.0);
+  bench.want(5.0, -3.0);
+  CHECK_FALSE(bench.report().valid[0]);
+  CHECK_FALSE(bench.report().anew);  // nothing new about being off
+  bench.told.taking = true;
+  CHECK(bench.report().anew);
+  CHECK(bench.state().applied_um[0] == 0.0);
+}
+
+TEST_CASE("an axis of which the bridge knows nothing is not in step", "[controllers][bridge]") {
+  Bench bench;
+  bench.told.applied_um[1] = not_a_number;
+  bench.report();
+  bench.want(1.0, 1.0);
+  CHECK_FALSE(bench.report().valid[0]);
+  CHECK(std::isnan(bench.state().applied_um[0]));
+}
+
+TEST_CASE("of two bridges the one that came first is heard until it is silent",
+          "[controllers][bridge]") {
+  Bench bench;
+  bench.report();
+  BridgeReport other = bench.told;
+  other.session = 8;
+  CHECK_FALSE(bench.link.report(other));
+  CHECK(bench.link.health().read_errors == 1);
+  CHECK_FALSE(bench.report().anew);
+  test_now += 1100ms;
+  const auto taken = bench.link.report(other);
+  REQUIRE(taken);
+  CHECK(taken->anew);
+  CHECK(bench.link.health().connects == 2);
+}
+
+TEST_CASE("a hung cycle's offsets are not sent for ever", "[controllers][bridge]") {
+  Bench bench;
+  bench.report();
+  bench.want(5.0, -3.0);
+  CHECK(bench.report().valid[0]);
+  for (int i = 0; i < 20; ++i) bench.report();
+  CHECK_FALSE(bench.report().valid[0]);  // more than a second old
+}
+
+TEST_CASE("what cannot be is refused at the start", "[controllers][bridge]") {
+  CHECK_THROWS_AS(BridgeController({"m", 0.0, {"x"}, {}}), InvalidValue);
+  CHECK_THROWS_AS(BridgeController({"m", 1.0, std::vector<std::string>(17, "x"), {}}),
+                  InvalidValue);
+}
