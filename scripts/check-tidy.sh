@@ -10,7 +10,7 @@ build=build/release
 
 folders=("$@")
 if ((${#folders[@]} == 0)); then
-  folders=(config modelling drivers estimator daemon simulator cli docs bench tests)
+  folders=(config modelling drivers estimator daemon simulator cli linuxcnc docs bench tests)
 fi
 pattern="$PWD/($(IFS='|' && echo "${folders[*]}"))/.*\.cpp$"
 

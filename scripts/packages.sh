@@ -34,6 +34,8 @@ packages_test=(
   clang libclang-rt-14-dev
   # Sanitizer builds on real CAN, with the kernel that guest-kernel.sh fetches.
   qemu-system-x86 busybox-static
+  # The real controller of tests/linuxcnc, and what its bridge is built with.
+  linuxcnc-uspace linuxcnc-uspace-dev
   # The Debian packages, and the booted systemd that they are tested in.
   debhelper lintian mmdebstrap systemd-container man-db groff-base
 )

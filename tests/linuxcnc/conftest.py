@@ -1,0 +1,6 @@
+"""The helpers of the daemon's tests are these tests' too."""
+
+import pathlib
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "integration" / "daemon"))
