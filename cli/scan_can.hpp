@@ -6,6 +6,8 @@
 
 #include "cli/scan_modbus.hpp"
 #include "cli/scan_report.hpp"
+#include "drivers/can/canopen/canopen_config.hpp"
+#include "drivers/can/j1939/j1939_config.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
 
 namespace thermocomp::cli {
@@ -15,5 +17,15 @@ namespace thermocomp::cli {
 [[nodiscard]] ScanBus scan_can(const CanBusConfig& config, const ScanSensors& sensors,
                                double listen_s,
                                const std::function<void(const std::string&)>& progress);
+
+/// The same for the protocols above CAN. A CANopen bus is worked as the daemon would work it: the
+/// nodes are set up, started and asked as the configuration says. On a J1939 bus NAMEs are asked
+/// for, and our own is claimed if the configuration has one.
+[[nodiscard]] ScanBus scan_canopen(const CanopenBusConfig& config, const ScanSensors& sensors,
+                                   double listen_s,
+                                   const std::function<void(const std::string&)>& progress);
+[[nodiscard]] ScanBus scan_j1939(const J1939BusConfig& config, const ScanSensors& sensors,
+                                 double listen_s,
+                                 const std::function<void(const std::string&)>& progress);
 
 }  // namespace thermocomp::cli

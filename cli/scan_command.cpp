@@ -65,6 +65,14 @@ ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
     if (!wanted(bus.name)) continue;
     report.buses.push_back(scan_can(bus, sensors, options.listen_s, progress));
   }
+  for (const CanopenBusConfig& bus : config.canopen_buses) {
+    if (!wanted(bus.name)) continue;
+    report.buses.push_back(scan_canopen(bus, sensors, options.listen_s, progress));
+  }
+  for (const J1939BusConfig& bus : config.j1939_buses) {
+    if (!wanted(bus.name)) continue;
+    report.buses.push_back(scan_j1939(bus, sensors, options.listen_s, progress));
+  }
   if (report.buses.empty()) {
     throw Failure(options.bus + ": no such bus in " + options.file + " that can be scanned");
   }

@@ -6,12 +6,11 @@ presets: function, address and words of a channel at 25.0 degC, and of each code
 """
 
 import json
-import pathlib
 import struct
 import tomllib
 
 import pytest
-from conftest import PLANT, ROOM_DEGC, SOURCE, bus, configuration, scan, table
+from conftest import PLANT, ROOM_DEGC, SOURCE, bus, configuration, scan, table, thermocomp
 
 INPUT, HOLDING, DISCRETE = 4, 3, 2
 FUNCTION = {"input": INPUT, "holding": HOLDING, "discrete_input": DISCRETE}
@@ -63,16 +62,20 @@ DEVICES = {
 MODBUS = sorted(DEVICES)
 
 
+def all_preset_files():
+    return {path.stem: tomllib.loads(path.read_text())
+            for path in (SOURCE / "config" / "devices").glob("*.toml")}
+
+
 def preset_files():
-    files = {path.stem: tomllib.loads(path.read_text())
-             for path in (SOURCE / "config" / "devices").glob("*.toml")}
-    return {name: preset for name, preset in files.items() if preset["protocol"] == "modbus"}
+    return {name: preset for name, preset in all_preset_files().items()
+            if preset["protocol"] == "modbus"}
 
 
 def test_every_preset_is_tested_here_and_names_its_source():
     presets = preset_files()
     assert sorted(presets) == MODBUS
-    for preset in presets.values():
+    for preset in all_preset_files().values():
         assert preset["document"] and preset["section"] and preset["maker"] and preset["model"]
 
 
@@ -161,3 +164,17 @@ def test_the_registers_are_where_the_manual_has_them(simulate, name):
             assert read == 0x3F & ~0x02
         else:
             assert read == word, event
+
+
+@pytest.mark.parametrize("name", sorted(name for name, preset in all_preset_files().items()
+                                        if preset["protocol"] != "modbus"))
+def test_presets_for_other_buses_load_with_all_their_channels(tmp_path, name):
+    preset = all_preset_files()[name]
+    keys = {"canopen": {"node": 5, "scale": 0.1}, "j1939": {"address": 0x80}, "can": {}}
+    path = configuration(
+        tmp_path, table("[[bus]]", name="bus", kind=preset["protocol"], interface="can0"),
+        table("[[device]]", name="d", bus="bus", preset=name, **keys[preset["protocol"]]),
+        [(f"s{c['channel']}", {"device": "d", "channel": c["channel"]})
+         for c in preset["channel"]])
+    done = thermocomp("check", path)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,188 @@
+// CANopen and J1939 in a scan: the daemon's own protocol, worked for a while from here.
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <poll.h>
+#include <span>
+
+#include "cli/scan_can.hpp"
+#include "drivers/can/can_protocol.hpp"
+#include "drivers/can/can_socket.hpp"
+#include "drivers/can/canopen/canopen_line.hpp"
+#include "drivers/can/j1939/j1939_line.hpp"
+#include "drivers/monotonic_clock.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+std::string hexadecimal(const char* before, std::uint32_t value, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%s0x%0*X", before, digits, value);
+  return text;
+}
+
+std::string number_text(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+struct Worked {
+  std::vector<Reading> readings;
+  std::vector<UnitHealth> units;
+  std::map<CanId, std::size_t> frames;
+  nanoseconds ended_at{};
+};
+
+/// Feeds the protocol with the bus for `listen_s`, and sends what it wants to send.
+Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s) {
+  Worked worked;
+  const nanoseconds end = monotonic_now() + from_seconds(listen_s);
+  protocol.opened(monotonic_now());
+  while (socket.is_open() && monotonic_now() < end) {
+    pollfd wait{socket.descriptor(), POLLIN, 0};
+    constexpr int slice_ms = 10;
+    static_cast<void>(::poll(&wait, 1, slice_ms));
+    for (const CanFrame& frame : socket.receive()) {
+      ++worked.frames[frame.id];
+      protocol.take(frame);
+    }
+    protocol.advance(monotonic_now());
+    while (const auto frame = protocol.next_frame()) {
+      if (!socket.send(*frame)) break;
+    }
+  }
+  worked.ended_at = monotonic_now();
+  worked.readings.assign(protocol.readings().begin(), protocol.readings().end());
+  worked.units = protocol.health(worked.ended_at);
+  return worked;
+}
+
+std::string heard_text(const Worked& worked) {
+  constexpr std::size_t text_max = 200;
+  std::string text = "identifiers on the bus:";
+  for (const auto& [id, count] : worked.frames) {
+    text.append(hexadecimal(" ", id.id, id.extended ? 8 : 3)).append(" (");
+    text.append(std::to_string(count)).append(")");
+    if (text.size() > text_max) return text + " ...";
+  }
+  if (worked.frames.empty()) {
+    text = "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
+  }
+  return text;
+}
+
+ScanChannel show(const Reading& reading, nanoseconds now, const PlausibleRange& range) {
+  ScanChannel result;
+  result.fault = reading.fault;
+  result.temp_degC = reading.temp_degC;
+  if (reading.taken_at != nanoseconds{0}) {
+    result.age_s = static_cast<double>((now - reading.taken_at).count()) * 1e-9;
+  }
+  if (reading.fault == Fault::never_read) result.why = "nothing came that carries it";
+  if (reading.fault != Fault::none) return result;
+  if (reading.temp_degC >= range.min_degC && reading.temp_degC <= range.max_degC) return result;
+  result.fault = Fault::out_of_range;
+  result.why = number_text(reading.temp_degC) + " degC is no temperature of [" +
+               number_text(range.min_degC) + ", " + number_text(range.max_degC) + "] ([screening])";
+  result.hints.emplace_back("compare type, scale and place with the manual");
+  return result;
+}
+
+/// What a reading of the protocol is of.
+struct Place {
+  std::size_t device;
+  std::size_t sensor;
+  std::string text;
+};
+
+struct ProtocolBus {
+  std::string name;
+  std::string kind;
+  std::string interface;
+  std::vector<ScanDevice> devices;
+  std::vector<Place> places;
+};
+
+ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors& sensors,
+                      double listen_s, const std::function<void(const std::string&)>& progress) {
+  ScanBus bus;
+  bus.name = what.name;
+  bus.kind = what.kind;
+  bus.where = what.interface;
+  CanSocket socket(what.interface, {});
+  socket.also_want({{0, false}, 0});  // everything: what is there beside what is looked for
+  socket.also_want({{0, true}, 0});
+  Worked worked;
+  if (socket.open()) {
+    progress("bus " + what.name + ": working it as the daemon would, for " + number_text(listen_s) +
+             " s");
+    worked = work(protocol, socket, listen_s);
+    bus.error = socket.error();
+    bus.note = heard_text(worked);
+  } else {
+    bus.error = "cannot be opened: " + socket.error();
+  }
+  const std::vector<std::size_t> order = protocol.sensors();
+  for (const Place& place : what.places) {
+    const auto at = static_cast<std::size_t>(std::find(order.begin(), order.end(), place.sensor) -
+                                             order.begin());
+    Reading reading;
+    reading.fault = Fault::no_answer;
+    if (at < worked.readings.size()) reading = worked.readings[at];
+    ScanChannel shown = show(reading, worked.ended_at, sensors.ranges.at(place.sensor));
+    shown.sensor = sensors.names.at(place.sensor);
+    shown.place = place.text;
+    what.devices[place.device].channels.push_back(std::move(shown));
+  }
+  for (std::size_t i = 0; i < what.devices.size() && i < worked.units.size(); ++i) {
+    what.devices[i].answers = worked.units[i].answering;
+    what.devices[i].note = worked.units[i].last_error;
+  }
+  bus.devices = std::move(what.devices);
+  return bus;
+}
+
+std::string place_of(const CanopenChannel& channel) {
+  if (channel.way == CanopenWay::pdo_bits) {
+    return hexadecimal("TPDO ", channel.signal.id, 3) + " bit " +
+           std::to_string(channel.signal.start_bit);
+  }
+  const char* way = channel.way == CanopenWay::sdo ? "SDO " : "TPDO object ";
+  return hexadecimal(way, channel.object.index, 4) + " sub " + std::to_string(channel.object.sub);
+}
+
+}  // namespace
+
+ScanBus scan_canopen(const CanopenBusConfig& config, const ScanSensors& sensors, double listen_s,
+                     const std::function<void(const std::string&)>& progress) {
+  ProtocolBus bus{config.name, "canopen", config.interface, {}, {}};
+  for (const CanopenNodeConfig& node : config.nodes) {
+    for (const CanopenChannel& channel : node.channels) {
+      bus.places.push_back({bus.devices.size(), channel.sensor, place_of(channel)});
+    }
+    bus.devices.push_back({node.name, "node " + std::to_string(node.node), false, "", {}});
+  }
+  CanopenLine line(config);
+  return scan_protocol(std::move(bus), line, sensors, listen_s, progress);
+}
+
+ScanBus scan_j1939(const J1939BusConfig& config, const ScanSensors& sensors, double listen_s,
+                   const std::function<void(const std::string&)>& progress) {
+  ProtocolBus bus{config.name, "j1939", config.interface, {}, {}};
+  for (const J1939NodeConfig& node : config.nodes) {
+    for (const J1939Channel& channel : node.channels) {
+      std::string place = "PGN ";
+      place.append(std::to_string(channel.parameter.pgn)).append(" byte ");
+      place.append(std::to_string(channel.parameter.start_byte + 1));
+      bus.places.push_back({bus.devices.size(), channel.sensor, std::move(place)});
+    }
+    const std::string address =
+        node.address ? "address " + std::to_string(*node.address) : "by its NAME";
+    bus.devices.push_back({node.name, address, false, "", {}});
+  }
+  J1939Line line(config);
+  return scan_protocol(std::move(bus), line, sensors, listen_s, progress);
+}
+
+}  // namespace thermocomp::cli
