@@ -140,7 +140,7 @@ std::vector<std::string> hints_for_words(const ModbusChannel& channel,
   hint_codes(channel, words, hints);
   if (!hints.empty()) return hints;
   hint_orders(channel, words, range, hints);
-  hint_scales(channel, words, range, hints);
+  if (hints.empty()) hint_scales(channel, words, range, hints);
   return hints;
 }
 
