@@ -18,7 +18,7 @@ class PlainDevice:
 
     def start(self):
         with self.lock:
-            self.tables = {2: {}, 3: {}, 4: {}}
+            self.tables = {1: {}, 2: {}, 3: {}, 4: {}}
         self.links = []
         self.server = socket.create_server(("127.0.0.1", self.port))
         self.threads = [threading.Thread(target=self.accept, args=(self.server,))]
@@ -68,10 +68,10 @@ class PlainDevice:
             if function in (3, 4):
                 words = [self.tables[function].get(address + i, 0) for i in range(count)]
                 return struct.pack(f">BB{count}H", function, 2 * count, *words)
-            if function == 2:
-                bits = sum(self.tables[2].get(address + i, 0) << i for i in range(count))
+            if function in (1, 2):
+                bits = sum(self.tables[function].get(address + i, 0) << i for i in range(count))
                 size = (count + 7) // 8
-                return struct.pack(">BB", 2, size) + bits.to_bytes(size, "little")
+                return struct.pack(">BB", function, size) + bits.to_bytes(size, "little")
             if function == 16:
                 for i, word in enumerate(struct.unpack(f">{count}H", pdu[6:])):
                     self.tables[3][address + i] = word
@@ -235,3 +235,52 @@ def assert_slewed(orders, slack_s=0.7):
     for (earlier_s, earlier), (later_s, later) in zip(orders, orders[1:]):
         allowed = RATE_UM_PER_S * (later_s - earlier_s + slack_s) + 0.001
         assert abs(later - earlier) <= allowed, (earlier_s, earlier, later_s, later)
+
+
+class PlainAmplifier(PlainController):
+    """The amplifier of a piezo: register 0 is the voltage to give, in 0.01 V. What the piezo does
+    with it hangs on its past: it lags by PLAY_V behind a voltage unless that was reached from 0 V."""
+
+    CURVE = ((0.0, -22.0), (25.0, -16.5), (50.0, -9.4), (75.0, -1.3), (100.0, 7.2),
+             (125.0, 15.4), (150.0, 22.8))
+    PLAY_V = 8.0
+
+    def start(self):
+        self.volts = []  # each voltage that differs from the one before
+        self.bent_V = 0.0  # what the ceramic has followed
+        self.obeys = True
+        super().start()
+
+    def written(self):
+        voltage = 0.01 * self.tables[3].get(0, 0)
+        if not self.volts or self.volts[-1] != voltage:
+            self.volts.append(voltage)
+        if not self.obeys:
+            return
+        if voltage == 0.0:
+            self.bent_V = 0.0
+        else:  # upwards it follows, downwards it stays behind
+            self.bent_V = max(voltage, min(self.bent_V, voltage + self.PLAY_V))
+        self.tables[4][10] = round(100 * voltage)
+
+    def give(self, voltage):
+        """Whatever was written: as with the amplifier's own knob."""
+        with self.lock:
+            self.obeys = False
+            self.tables[4][10] = round(100 * voltage)
+
+    def obey(self):
+        with self.lock:
+            self.obeys = True
+
+    def displacement_um(self):
+        with self.lock:
+            at = self.bent_V
+        for (low_V, low_um), (high_V, high_um) in zip(self.CURVE, self.CURVE[1:]):
+            if at <= high_V:
+                return low_um + (at - low_V) / (high_V - low_V) * (high_um - low_um)
+        return self.CURVE[-1][1]
+
+    def all_volts(self):
+        with self.lock:
+            return list(self.volts)
