@@ -117,8 +117,9 @@ class EdsReader {
 
   void problem(int line, const std::string& key, std::string_view value, const std::string& rule) {
     if (problems_.size() >= problems_max) return;
+    const std::string_view shown = value.empty() && !key.empty() ? "(missing)" : value;
     problems_.push_back({name_, line, printed(key.substr(0, shown_max)),
-                         printed(value.substr(0, shown_max)), rule});
+                         printed(shown.substr(0, shown_max)), rule});
   }
 
   void read_lines(std::string_view text) {
@@ -146,7 +147,7 @@ class EdsReader {
     const std::string name(trimmed(content.substr(1, content.size() - 2)));
     const auto [found, is_new] = sections_.try_emplace(lower(name), Section{name, line, {}});
     if (is_new) return &found->second;
-    problem(line, name, "",
+    problem(line, "", name,
             "stands there twice, first in line " + std::to_string(found->second.line));
     nowhere_ = {};
     return &nowhere_;
@@ -218,7 +219,7 @@ class EdsReader {
     const bool is_sub = key.size() > 4;
     const auto parent = sections_.find(key.substr(0, 4));
     if (is_sub && parent == sections_.end()) {
-      problem(section.line, section.name, "", "is a part of an object that is not there");
+      problem(section.line, "", section.name, "is a part of an object that is not there");
       return;
     }
     if (kind && *kind != object_variable && *kind != object_domain) {
@@ -237,7 +238,7 @@ class EdsReader {
     if (type) object.type = type_of(*type);
     // 1018sub1 and 1018sub01 are one address.
     if (!objects_.try_emplace(address, std::move(object)).second) {
-      problem(section.line, section.name, "", "is an object that stands there already");
+      problem(section.line, "", section.name, "is an object that stands there already");
     }
   }
 

@@ -10,6 +10,7 @@
 
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
+#include "simulator/field_node_config.hpp"
 #include "simulator/plant_config.hpp"
 
 namespace thermocomp {
@@ -141,6 +142,8 @@ struct MachineConfig {
   std::vector<SimulatedDevice> devices;
   std::optional<SimulatedController> controller;
   std::vector<EventConfig> events;
+  std::vector<SimulatedCanopenNode> canopen_nodes;
+  std::vector<SimulatedJ1939Node> j1939_nodes;
 };
 
 }  // namespace thermocomp

@@ -34,5 +34,7 @@ class NameList {
 [[nodiscard]] std::vector<std::string> plant_columns(const PlantConfig& plant);
 /// [[bus]], [[device]], [[channel]], [controller], [[axis]], [[event]].
 void read_devices(const TomlTable& root, sections::Presets& presets, MachineConfig& machine);
+/// [[canopen_node]] and [[j1939_node]]; after the plant.
+void read_field_nodes(const TomlTable& root, MachineConfig& machine);
 
 }  // namespace thermocomp

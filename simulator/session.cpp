@@ -18,6 +18,7 @@
 #include "config/run_file.hpp"
 #include "simulator/event_loop.hpp"
 #include "simulator/plant.hpp"
+#include "simulator/field_nodes.hpp"
 #include "simulator/simulated_machine.hpp"
 #include "simulator/truth_record.hpp"
 
@@ -106,6 +107,7 @@ class Session {
         stop_signals_(loop_),
         truth_(columns, options.truth),
         devices_(loop_, machine, columns, source),
+        nodes_(machine, columns, source),
         row_(columns.size(), 0.0) {}
   virtual ~Session() = default;
   Session(const Session&) = delete;
@@ -117,6 +119,7 @@ class Session {
     announce();
     started_ = EventLoop::now();
     start();
+    nodes_.switch_on(started_);
     tick(started_);
     loop_.run();
     finish();
@@ -143,14 +146,19 @@ class Session {
   StopSignals stop_signals_;
   TruthRecord truth_;
   SimulatedMachine devices_;
+  FieldNodes nodes_;
   StatusLine status_;
   std::vector<double> row_;
   nanoseconds started_{};
 
  private:
   void announce() {
-    const std::string line = ready_line(devices_.places());
-    for (const BusPlace& place : devices_.places()) {
+    std::vector<BusPlace> places = devices_.places();
+    for (const FieldNodes::Place& node : nodes_.places()) {
+      places.push_back({node.name, SimulatedBusKind::can, 0, node.interface, node.unavailable});
+    }
+    const std::string line = ready_line(places);
+    for (const BusPlace& place : places) {
       if (place.unavailable.empty()) continue;
       std::cerr << "thermocomp-sim: " << place.name << " is unavailable: " << place.unavailable
                 << std::endl;
@@ -169,6 +177,7 @@ class Session {
   void tick(nanoseconds due) {
     const nanoseconds now = EventLoop::now();
     on_tick(now);
+    nodes_.update(now, row_);
     const nanoseconds next = std::max(due + from_seconds(options_.tick_s), now);
     loop_.at(next, [this, next] { tick(next); });
   }

@@ -117,7 +117,6 @@ class CanopenNode {
   RateWatch heartbeats_;
   std::uint64_t second_answers_seen_{0};
   nanoseconds second_answer_until_{};  ///< a second node is taken to be there until then
-  bool was_doubtful_{false};
   std::string conflict_;
   std::string setup_error_;
   std::string poll_error_;
