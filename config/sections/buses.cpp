@@ -74,10 +74,19 @@ class BusReader {
       if (!misnamed_device_) device.table.problem("name", "no sensor is on this device");
       device.table.ignore_rest();
     }
+    drop_empty_buses();
     return std::move(result_);
   }
 
  private:
+  /// Without files a device with a preset is left out; a bus of such devices only is none.
+  void drop_empty_buses() {
+    std::erase_if(result_.modbus, [](const auto& bus) { return bus.devices.empty(); });
+    std::erase_if(result_.can, [](const auto& bus) { return bus.devices.empty(); });
+    std::erase_if(result_.canopen, [](const auto& bus) { return bus.nodes.empty(); });
+    std::erase_if(result_.j1939, [](const auto& bus) { return bus.nodes.empty(); });
+  }
+
   void read_bus(const TomlTable& table, std::set<std::string>& names) {
     const std::string name = unique_name(table, names);
     const BusKind kind = table.choice<BusKind>("kind",

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "config/daemon_config.hpp"
 #include "config/sections/modbus_values.hpp"
 #include "config/sections/presets.hpp"
 #include "files.hpp"
@@ -89,4 +90,45 @@ TEST_CASE("without folders no preset is looked for and none is a problem") {
   const TomlDocument device = TomlDocument::from_text("preset = \"wago_750_458\"\n", "d.toml");
   CHECK(presets.of_device(device.root()) == nullptr);
   CHECK(device.all_problems().empty());
+}
+
+TEST_CASE("a configuration kept with a history loads without the presets it names") {
+  const std::string text = R"(format = 1
+[model]
+file = "m.toml"
+[[bus]]
+name = "net"
+kind = "modbus_tcp"
+host = "h"
+[[device]]
+name = "d"
+bus = "net"
+preset = "wago_750_458"
+unit = 1
+[[sensor]]
+name = "s"
+device = "d"
+channel = 1
+[[block]]
+name = "b"
+input = "t_degC"
+sensors = ["s"]
+[controller]
+name = "n"
+kind = "dry_run"
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = 60.0
+rate_um_per_s_max = 0.5
+)";
+  const std::string model = R"(format = 1
+inputs = ["t_degC"]
+outputs = ["z_um"]
+reference = [20.0]
+matrix_um_per_K = [[1.0]]
+)";
+  const DaemonConfig config = parse_daemon_config(text, "c.toml", model, "m.toml");
+  CHECK(config.modbus_buses.empty());
+  CHECK(config.estimator.sensors.size() == 1);
 }
