@@ -120,6 +120,7 @@ class DbcReader {
  private:
   void problem(int line, std::string key, std::string value, std::string rule) {
     if (result_.problems.size() >= problems_max) return;
+    if (value.empty()) std::swap(key, value);  // about a name as a whole
     result_.problems.push_back({name_, line, std::move(key), std::move(value), std::move(rule)});
   }
 

@@ -12,17 +12,32 @@
 
 namespace thermocomp {
 
-/// The frames of one device, built from signals.
+/// The frames of one device, built from signals: one an identifier, or one a page of those whose
+/// content a multiplexor selects.
 class CanFrames {
  public:
   void define(const CanSignal& signal);
+  /// A counter in the frames of the signal's identifier. @pre the signal has been defined
+  void define_counter(const CanSignal& signal, const CanField& counter);
   /// Saturated where it does not fit; NaN as a float's NaN or an integer's highest code.
   void set_value(const CanSignal& signal, double value);
   void set_code(const CanSignal& signal, std::int64_t code);
-  [[nodiscard]] const std::map<CanId, CanFrame>& frames() const noexcept { return frames_; }
+  /// Every counter goes up by one.
+  void count();
+  /// In the order of identifiers and, of one identifier, of definition.
+  [[nodiscard]] std::vector<CanFrame> frames() const;
 
  private:
-  std::map<CanId, CanFrame> frames_;
+  struct Message {
+    std::vector<CanFrame> pages;
+    std::vector<CanField> counters;
+    bool selected{false};  ///< the pages are those of multiplexors
+  };
+  template <class Write>
+  void write(const CanSignal& signal, Write write_to);
+
+  std::map<CanId, Message> messages_;
+  std::uint64_t counted_{0};
 };
 
 /// A socket that is opened again by itself.

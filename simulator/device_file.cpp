@@ -2,9 +2,9 @@
 #include <map>
 
 #include "config/sections/presets.hpp"
-#include "drivers/can/signal_codec.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"
+#include "simulator/can_places.hpp"
 #include "simulator/fault_codes.hpp"
 #include "simulator/machine_file_parts.hpp"
 #include "simulator/scripted_events.hpp"
@@ -34,16 +34,14 @@ class Occupied {
             std::uint16_t mask = 0xFFFF) {
     return words_.take(unit, table, address, count, mask);
   }
-  bool take(const CanSignal& signal) {
-    CanBits& bits = frames_[{signal.id, signal.extended_id}];
-    const bool free = (bits & bits_of(signal)).none();
-    bits |= bits_of(signal);
-    return free;
+  bool take(const CanSignal& signal) { return frames_.take(signal); }
+  bool take(const CanSignal& signal, const CanField& counter) {
+    return frames_.take(signal, counter);
   }
 
  private:
   RegistersTaken words_;
-  std::map<std::pair<std::uint32_t, bool>, CanBits> frames_;
+  FramesTaken frames_;
 };
 
 SimulatedBus read_link(const TomlTable& table, SimulatedBusKind kind) {
@@ -83,36 +81,6 @@ ModbusValue read_place(const TomlTable& table, const ModbusValue& defaults) {
   const std::size_t words = words_of(value.table, value.encoding);
   if (value.address + words > 65536) table.problem("address", "has its last register beyond 65535");
   return value;
-}
-
-enum class CanUse { temperature, signal, bits };  // what its offset is called, and its sign
-
-CanSignal read_can(const TomlTable& table, CanUse use) {
-  CanSignal signal;
-  signal.id = table.integer<std::uint32_t>("id", 0, 0x1FFFFFFF);
-  signal.extended_id = table.flag("extended_id", signal.extended_id);
-  signal.start_bit = table.integer("start_bit", 0, 63);
-  signal.length_bits = table.integer("length_bits", 1, 64, signal.length_bits);
-  signal.byte_order = table.choice<ByteOrder>(
-      "byte_order",
-      {{"little_endian", ByteOrder::little_endian}, {"big_endian", ByteOrder::big_endian}},
-      signal.byte_order);
-  if (use == CanUse::bits) {
-    signal.is_signed = false;
-  } else {
-    signal.is_signed = table.flag("signed", signal.is_signed);
-    signal.is_float = table.flag("float", signal.is_float);
-    signal.scale = table.number("scale", Range::between(-1e6, 1e6), signal.scale);
-    const char* offset = use == CanUse::temperature ? "offset_degC" : "offset";
-    signal.offset = table.number(offset, Range::between(-1e6, 1e6), signal.offset);
-  }
-  try {
-    check(signal);
-  } catch (const InvalidValue& error) {
-    table.problem(error.key(), error.value(), error.rule());
-    return CanSignal{};
-  }
-  return signal;
 }
 
 /// Codes of any encoding; whether a channel's own can express them is looked at there.
@@ -268,6 +236,10 @@ void read_channel(Draft& state, const TomlTable& own, const std::vector<DeviceDe
     channel.can = read_can(table, CanUse::temperature);
     channel.codes = read_codes(table);
     take(state, device.bus, channel.can, table);
+    channel.counter = read_counter(table, channel.can);
+    if (channel.counter && !state.occupied[device.bus].take(channel.can, *channel.counter)) {
+      table.problem("counter", "shares a bit with another value of this frame");
+    }
   } else {
     read_registers(state, table, defaults[index], device, channel);
   }

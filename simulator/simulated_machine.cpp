@@ -108,6 +108,7 @@ struct SimulatedMachine::Parts {
       device.columns.push_back(index_in(columns, channel.column, channel.name, source));
       if (can) {
         device.frames.define(channel.can);
+        if (channel.counter) device.frames.define_counter(channel.can, *channel.counter);
         continue;
       }
       device.unit.define(channel.place, false);
@@ -376,6 +377,7 @@ struct SimulatedMachine::Parts {
       show_channel(device, device.config.channels[i], can, effect, value);
     }
     ++device.conversions;
+    device.frames.count();
     if (device.config.renewal) {
       device.unit.set(device.config.renewal->table, device.config.renewal->address,
                       device.conversions);

@@ -72,21 +72,6 @@ void read_form(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
   }
 }
 
-/// The multiplexor that a device or sensor names, and the number at which the sensor is there.
-void read_selector(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
-  const auto field = read_can_field(own, base, "multiplexor", signal.fd);
-  if (!field) {
-    own.refuse("multiplexor_value", "makes no sense without a multiplexor");
-    return;
-  }
-  const std::int64_t greatest =
-      field->length_bits >= 63 ? INT64_MAX : (std::int64_t{1} << field->length_bits) - 1;
-  if (!own.has("multiplexor_value")) own.problem("multiplexor_value", "must be given");
-  const auto page =
-      static_cast<std::uint64_t>(own.integer<std::int64_t>("multiplexor_value", 0, greatest, 0));
-  signal.selectors = {{*field, {{page, page}}}};
-}
-
 }  // namespace
 
 std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& base,
@@ -104,6 +89,20 @@ std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& ba
     return std::nullopt;
   }
   return CanField{number.start_bit, number.length_bits, number.byte_order};
+}
+
+std::vector<CanSelector> read_selectors(const TomlTable& own, const TomlTable& base, bool fd) {
+  const auto field = read_can_field(own, base, "multiplexor", fd);
+  if (!field) {
+    own.refuse("multiplexor_value", "makes no sense without a multiplexor");
+    return {};
+  }
+  const std::int64_t greatest =
+      field->length_bits >= 63 ? INT64_MAX : (std::int64_t{1} << field->length_bits) - 1;
+  if (!own.has("multiplexor_value")) own.problem("multiplexor_value", "must be given");
+  const auto page =
+      static_cast<std::uint64_t>(own.integer<std::int64_t>("multiplexor_value", 0, greatest, 0));
+  return {{*field, {{page, page}}}};
 }
 
 std::vector<Sentinel> read_can_codes(const TomlTable& own, const TomlTable& base,
@@ -138,7 +137,7 @@ CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse us
     signal.offset =
         own.number("offset_degC", range, base.number("offset_degC", range, signal.offset));
     signal.sentinels = read_can_codes(own, base, signal);
-    read_selector(own, base, signal);
+    signal.selectors = read_selectors(own, base, signal.fd);
   }
   return signal;
 }

@@ -31,6 +31,11 @@ enum class CanUse {
 [[nodiscard]] std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& base,
                                                      std::string_view key, bool fd);
 
+/// The multiplexor that `own` or else `base` names, and the number in `own` at which the value is
+/// there; none without one.
+[[nodiscard]] std::vector<CanSelector> read_selectors(const TomlTable& own, const TomlTable& base,
+                                                      bool fd);
+
 /// The lists of codes that are messages and no values, for a signal whose place is known.
 [[nodiscard]] std::vector<Sentinel> read_can_codes(const TomlTable& own, const TomlTable& base,
                                                    const CanSignal& signal);
