@@ -17,7 +17,7 @@ runs=build/fuzz/runs
 readonly input_seconds_max=5     # one input may take so long
 readonly memory_MB_max=2048      # of the process, with the sanitizer's own
 readonly allocation_MB_max=512   # asked for at once
-mapfile -t known < <(sed -n 's/^fuzz_target(\([a-z_]*\).*/\1/p' tests/fuzz/CMakeLists.txt)
+mapfile -t known < <(sed -n 's/^fuzz_target(\([a-z0-9_]*\).*/\1/p' tests/fuzz/CMakeLists.txt)
 
 fail() {
   echo "fuzz.sh: $*" >&2

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "drivers/controllers/make_controller.hpp"
+#include "drivers/sensors/can_protocol_source.hpp"
 #include "drivers/sensors/can_source.hpp"
 #include "drivers/sensors/modbus_source.hpp"
 #include "estimator/estimator.hpp"
@@ -33,6 +34,12 @@ void make_parts(const DaemonConfig& config) {
   for (const CanBusConfig& bus : config.can_buses) {
     const CanSource source(bus);
     FUZZ_PROMISE(source.health().units.size() == bus.devices.size());
+  }
+  for (const CanopenBusConfig& bus : config.canopen_buses) {
+    FUZZ_PROMISE(make_source(bus)->health().units.size() == bus.nodes.size());
+  }
+  for (const J1939BusConfig& bus : config.j1939_buses) {
+    FUZZ_PROMISE(make_source(bus)->health().units.size() == bus.nodes.size());
   }
   FUZZ_PROMISE(make_controller(config.controller) != nullptr);
 }

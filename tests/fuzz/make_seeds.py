@@ -157,6 +157,18 @@ def socket_seeds():
                    "disable", "cycle_end", "reload", "controller_state"):
         write("socket_request", method, request(method, {}))
     write("socket_request", "measured", request("measured", {"axis": "z", "value_um": -3.5}))
+
+    # Of a model that corrects itself: often, far off and then agreeing, cycle ends between.
+    def probing(value, number=1):
+        return request("measured", {"axis": "z", "value_um": value}, number)
+
+    write("socket_request", "probings", "".join(
+        probing(value, number) + request("cycle_end", {}) + request("status", {})
+        for number, value in enumerate((2.5, 3.0, 80.0, 80.5, -1e-3))))
+    write("socket_request", "probing_after_reference",
+          probing(9) + request("reference", {}) + probing(-9))
+    write("socket_request", "measured_wrong", request("measured", {}) + probing("3") +
+          probing(1e308) + probing(None) + request("measured", {"axis": 0, "value_um": 1}))
     write("socket_request", "prove", request("prove", {"axis": "z", "value_um": 5}))
     write("socket_request", "wrong_axis", request("prove", {"axis": "q", "value_um": 1e300}))
     write("socket_request", "subscribe", request("subscribe", {"methods": ["status"],
@@ -177,7 +189,9 @@ def state_seeds():
     state = {"format": 1, "program": "thermocomp", "enabled": True,
              "reference_degC": {"bed_degC": 20.5, "spindle_degC": 21},
              "model_reference_degC": {"bed_degC": 20.0}, "reference_signals": {"spindle_rpm": 0},
-             "offset_um": {"z": -12.25}}
+             "offset_um": {"z": -12.25}, "held_um": {"z": 11.5},
+             "correction": {"z.gain1": 1.125, "z.gain1_sd": 0.0625, "z.gain1_used": 1.0,
+                            "z.bias_um": -0.5, "z.phase": 2}}
     write("state_file", "good", json.dumps(state, indent=2))
     write("state_file", "newer", json.dumps(dict(state, format=2)))
     write("state_file", "format_large", json.dumps(dict(state, format=1e300)))
@@ -267,6 +281,72 @@ def can_seeds():
           bytes(30))
 
 
+def canopen_seeds():
+    """A frame: a step below 0xB0, the identifier's place in the target's list, eight bytes."""
+    sdo, heartbeat, emergency, pdo = 0, 1, 2, 3
+
+    def frame(which, *data):
+        return bytes([0, which]) + bytes(data).ljust(8, b"\0")
+
+    def short(which, *data):
+        return bytes([0xB4 + len(data), which]) + bytes(data)  # 0xB4 % 9 is 0
+
+    pause = b"\xC0"
+    value = frame(pdo, 0xE1, 0x00)
+    errors = frame(sdo, 0x4F, 0x01, 0x10, 0x00)
+    write("canopen_bus", "plain", b"\0" + errors + value + pause +
+          frame(sdo, 0x4B, 0x40, 0x20, 0x01, 0xE1))
+    write("canopen_bus", "reboot", b"\x10" + errors + value + short(heartbeat, 0) + pause + errors +
+          short(heartbeat, 5) + value + b"\xE0\xFF" * 2 + short(heartbeat, 5))
+    write("canopen_bus", "settings", b"\x48" + frame(sdo, 0x60, 0x10, 0x61, 0x01) +
+          frame(sdo, 0x4B, 0x10, 0x61, 0x01, 20) + frame(sdo, 0x60, 0x17, 0x10) +
+          frame(sdo, 0x4B, 0x17, 0x10, 0, 100) + errors + value + short(heartbeat, 5) * 20)
+    write("canopen_bus", "mapping", b"\x80" + frame(sdo, 0x43, 0, 0x18, 1, 0x95, 1, 0, 0x40) +
+          frame(sdo, 0x4F, 0, 0x1A, 0, 1) + frame(sdo, 0x43, 0, 0x1A, 1, 0x10, 1, 0x30, 0x71) +
+          errors + frame(7, 0xE1))
+    write("canopen_bus", "emergency", b"\0" + errors + value +
+          frame(emergency, 0x30, 0x50, 1, 1, 1) + value + frame(emergency, 0x10, 0x42, 1) +
+          frame(emergency, 0, 0, 0, 1) + value + frame(emergency))
+    write("canopen_bus", "segments", b"\0" + errors + pause +
+          frame(sdo, 0x41, 0x40, 0x20, 0x01, 9) + frame(sdo, 0, *b"CANtran") +
+          frame(sdo, 0x1B, *b"sT"))
+    write("canopen_bus", "abort_and_bus", b"\x27" + frame(sdo, 0x80, 1, 0x10, 0, 0, 0, 2, 6) +
+          b"\xFC" + value + b"\xFC" + errors + value * 16)
+
+
+def j1939_seeds():
+    name = struct.pack("<Q", 0x8000FF0012345678)
+
+    def frame(which, data):
+        return bytes([0, which]) + bytes(data).ljust(8, b"\0")
+
+    group, announce, packet, request, addressed, claim = 0, 1, 2, 3, 4, 5
+    write("j1939_bus", "group", b"\0" + frame(group, [63, 0, 0x25, 1, 0xFE, 0xFF]) +
+          frame(group, [7, 0xFF] + [0xFE] * 6))
+    message = bytes(range(32))
+    packets = [bytes([i + 1]) + message[7 * i:7 * i + 7].ljust(7, b"\xff") for i in range(5)]
+    bam = bytes([32, 32, 0, 5, 0xFF, 0x10, 0xFF, 0])
+    write("j1939_bus", "broadcast", b"\0" + frame(announce, bam) +
+          b"".join(frame(packet, each) for each in packets))
+    write("j1939_bus", "transport", b"\2" + bam + b"".join(packets))
+    write("j1939_bus", "to_us", b"\1" + frame(request, [16, 32, 0, 5, 2, 0, 0xEF, 0]) +
+          b"".join(frame(addressed, each) for each in packets))
+    write("j1939_bus", "overdue", b"\1" + frame(request, [16, 32, 0, 5, 2, 0, 0xEF, 0]) +
+          frame(addressed, packets[0]) + b"\xE0\xFF" + frame(announce, bam) + b"\xE0\xFF")
+    write("j1939_bus", "claims", b"\1" + frame(claim, name) + frame(9, name) +
+          frame(7, name) + frame(6, [0, 0xEE, 0]) + b"\xFC\xFC" + frame(claim, name))
+
+
+def eds_seeds():
+    sheet = (ROOT / "config/examples/two_channel_module.eds").read_text()
+    write("eds_file", "module.eds", sheet)
+    write("eds_file", "twice.eds", sheet + "\n[1017]\nParameterName=again\n")
+    write("eds_file", "orphan.eds", "[7130sub1]\nParameterName=a\nDataType=0x0003\n")
+    write("eds_file", "compact.eds", "[7130]\nParameterName=PV\nObjectType=0x8\nDataType=3\n"
+          "CompactSubObj=4\n[7130Name]\nNrOfEntries=1\n2=Spindle\n")
+    write("eds_file", "broken.eds", "a=1\n[]\n[1017\nb\n=c\n[1017]\nDataType=017\n")
+
+
 def history_seeds(history):
     # kind, detail, cycle, index, time, value: see chunk_codec.hpp
     records = bytes([0, 0, 0, 0, 2, 0x62, 0x34, 0x40]) + bytes([0, 0, 2, 0, 2, 0])
@@ -317,6 +397,8 @@ def dictionaries():
     dictionary("daemon_config", toml | model | {"#### model\n"} |
                literals("config/daemon_config.cpp", "config/sections/*.cpp"))
     dictionary("machine_file", toml | literals("simulator/*_file.cpp", "config/sections/*.cpp"))
+    dictionary("eds_file", {"[7130sub1]", "[7130]", "[7130Name]", "ParameterName=", "ObjectType=0x8",
+                            "DataType=0x0003", "CompactSubObj=", "0xFE", "; ", "\r\n"})
     dictionary("run_file", {"time_s", "_degC", "_um", ",", "nan", "inf", "1e308", "1e-320", "\r\n",
                             "# ", "@", ":", "-0"})
     dictionary("socket_request", {'{"jsonrpc":"2.0","id":1,"method":"', '"params":{', "}\n", "\xff",
@@ -334,6 +416,9 @@ def main():
     state_seeds()
     modbus_seeds()
     can_seeds()
+    canopen_seeds()
+    j1939_seeds()
+    eds_seeds()
     history_seeds(sys.argv[1] if len(sys.argv) > 1 else None)
     dictionaries()
 

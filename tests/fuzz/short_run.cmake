@@ -6,7 +6,7 @@ set_tests_properties(fuzz_build PROPERTIES FIXTURES_SETUP fuzz_programs PROCESSO
 
 file(STRINGS ${CMAKE_SOURCE_DIR}/tests/fuzz/CMakeLists.txt fuzz_lines REGEX "^fuzz_target\\(")
 foreach(line ${fuzz_lines})
-  string(REGEX MATCH "^fuzz_target\\(([a-z_]+)" ignored "${line}")
+  string(REGEX MATCH "^fuzz_target\\(([a-z0-9_]+)" ignored "${line}")
   add_test(NAME fuzz_${CMAKE_MATCH_1}
     COMMAND ${CMAKE_SOURCE_DIR}/scripts/fuzz.sh --no-build --seconds 10 ${CMAKE_MATCH_1})
   set_tests_properties(fuzz_${CMAKE_MATCH_1} PROPERTIES FIXTURES_REQUIRED fuzz_programs

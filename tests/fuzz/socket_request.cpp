@@ -23,18 +23,25 @@ using std::chrono::milliseconds;
 
 namespace {
 
+/// What the model's displacement changes by between two steps, at most, whatever its gains.
+constexpr double rise_um_a_step = 0.5;
 constexpr std::uint8_t waits = 0xFF;  ///< is no part of UTF-8: here the client waits a round
 
-/// A daemon without threads: a report that stands still, commands that are checked and counted.
+/// A daemon without threads: commands are checked and reach an estimator that corrects itself by
+/// probings and follows cycle ends.
 class Desk {
  public:
   Desk()
       : file_("status.sock"),
         config_(with_socket(file_.path())),
         estimator_(config_.estimator, config_.model),
+        readings_(config_.estimator.sensors.size()),
         report_(estimator_.make_report()),
         server_(config_.socket, without_rates()) {
-    estimator_.report(report_);
+    controller_.online = true;
+    controller_.link_epoch = 1;
+    controller_.applied_um.fill(0.0);
+    step();
     add_operator_methods(
         server_, {[this] { return view(); }, [this](const Command& asked) { take(asked); },
                   [] {
@@ -48,6 +55,11 @@ class Desk {
   static DaemonConfig with_socket(const std::filesystem::path& path) {
     DaemonConfig config = fuzz::small_config();
     config.socket.path = path;
+    config.estimator.compensation.update = UpdateRule::each_cycle;
+    CorrectionConfig& correction = config.estimator.correction;
+    correction.form = CorrectionForm::recursive;
+    for (const std::string& input : config.model.inputs) correction.groups.push_back({input});
+    correction.bias_drift_um_per_sqrt_h = 5.0;
     return config;
   }
   /// Time stands still between two inputs here: rates would only make clients wait.
@@ -64,12 +76,41 @@ class Desk {
   void take(const Command& asked) {
     FUZZ_PROMISE(asked.axis < config_.estimator.axes.size());
     FUZZ_PROMISE(std::isfinite(asked.value_um));
+    const double before_um = displacement_um(asked.axis);
     estimator_.apply(asked);
+    step();
+    const CorrectionConfig& correction = config_.estimator.correction;
+    for (std::size_t g = 0; g < correction.groups.size(); ++g) {
+      const double gain = report_.axes[asked.axis].correction.gain[g];
+      FUZZ_PROMISE(gain >= correction.gain_min && gain <= correction.gain_max);
+    }
+    // A new reference takes the learned bias away.
+    if (asked.kind != CommandKind::reference)
+      FUZZ_PROMISE(std::abs(displacement_um(asked.axis) - before_um) <=
+                   correction.step_um_max + rise_um_a_step);
+  }
+  /// One cycle, in which the machine warms by little.
+  void step() {
+    ++steps_;
+    now_ += milliseconds(100);
+    for (Reading& reading : readings_)
+      reading = {20.0 + 0.001 * static_cast<double>(std::min(steps_, 5000L)), now_, Fault::none};
+    controller_.taken_at = now_;
+    OffsetCommand command;
+    estimator_.step(now_, readings_, controller_, command);
+    controller_.applied_um = command.offset_um;
+    estimator_.report(report_);
+  }
+  [[nodiscard]] double displacement_um(std::size_t axis) const {
+    return report_.axes[axis].displacement_um;
   }
 
   fuzz::ScratchFile file_;
   DaemonConfig config_;
   Estimator estimator_;
+  nanoseconds now_{std::chrono::hours(1)};
+  long steps_{0};
+  std::vector<Reading> readings_;
   Report report_;
   ControllerState controller_;
   CycleTiming timing_;

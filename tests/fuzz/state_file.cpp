@@ -17,7 +17,8 @@ void check_numbers(const std::map<std::string, double>& values) {
 bool same(const PersistentState& a, const PersistentState& b) {
   return a.enabled == b.enabled && a.reference_degC == b.reference_degC &&
          a.model_reference_degC == b.model_reference_degC &&
-         a.reference_signals == b.reference_signals && a.offset_um == b.offset_um;
+         a.reference_signals == b.reference_signals && a.offset_um == b.offset_um &&
+         a.held_um == b.held_um && a.correction == b.correction;
 }
 
 }  // namespace
@@ -41,6 +42,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   check_numbers(loaded.state.model_reference_degC);
   check_numbers(loaded.state.reference_signals);
   check_numbers(loaded.state.offset_um);
+  check_numbers(loaded.state.held_um);
+  check_numbers(loaded.state.correction);
   FUZZ_PROMISE(save_state_file(copy.path(), loaded.state).empty());
   const LoadedState again = load_state_file(copy.path(), fallback);
   FUZZ_PROMISE(again.found && same(again.state, loaded.state));

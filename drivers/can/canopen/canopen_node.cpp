@@ -30,7 +30,7 @@ constexpr int mapped_max = 64;
 constexpr nanoseconds first_pause = 1s;
 constexpr nanoseconds longest_pause = 10s;
 constexpr nanoseconds start_again_every = 1s;
-constexpr nanoseconds second_answer_lasts = 10s;
+constexpr nanoseconds second_answer_lasts = 5s;
 constexpr nanoseconds silent_after = 5s;
 
 std::uint16_t pdo_object(std::uint16_t first, std::size_t number) {

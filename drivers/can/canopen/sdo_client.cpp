@@ -186,8 +186,8 @@ void SdoClient::take(std::span<const std::uint8_t> data, nanoseconds now) {
     take_first(data, now);
   } else if (state_ == State::reading_segments && specifier == told_segment) {
     take_segment(data, now);
-  } else if (state_ == State::reading_segments && specifier == told_read) {
-    ++second_answers_;  // the transfer has begun: somebody else answers too
+  } else if (specifier == told_read || specifier == told_written) {
+    ++second_answers_;  // to what has been answered: somebody else answers too
   } else {
     abort(SdoOutcome::broken, unknown_specifier);
   }

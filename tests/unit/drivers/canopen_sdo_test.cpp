@@ -150,6 +150,20 @@ TEST_CASE("SDO: a second answer betrays a second node", "[canopen][sdo]") {
   CHECK(client.second_answers() == 1);
 }
 
+TEST_CASE("SDO: a write confirmed twice while it is read back is no answer to the reading",
+          "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  const Bytes confirmed{0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0};
+  client.write({0x1017, 0}, Bytes{0xE8, 0x03}, 1s);
+  client.take(confirmed, 1s);
+  client.read({0x1017, 0}, 1s);
+  client.take(confirmed, 1s);
+  CHECK(client.busy());
+  CHECK(client.second_answers() == 1);
+  client.take(Bytes{0x4B, 0x17, 0x10, 0x00, 0xE8, 0x03, 0, 0}, 1s);
+  CHECK(client.result()->outcome == SdoOutcome::done);
+}
+
 TEST_CASE("EMCY: code, register and what the manufacturer adds", "[canopen][emergency]") {
   const auto emergency = read_emergency(Bytes{0x30, 0x50, 0x01, 0x02, 0x01, 0, 0, 0});
   REQUIRE(emergency);

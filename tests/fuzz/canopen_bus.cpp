@@ -1,0 +1,118 @@
+/// CANopen: any frames at any times to a line of two nodes, one of which uses all that there is.
+#include <cmath>
+#include <string>
+
+#include "drivers/can/canopen/canopen_line.hpp"
+#include "fuzz.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr int frames_at_once_max = 64;
+
+CanopenChannel channel_of(CanopenWay way, std::size_t sensor, ObjectAddress object) {
+  CanopenChannel channel;
+  channel.sensor = sensor;
+  channel.way = way;
+  channel.object = object;
+  channel.signal.length_bits = 16;
+  channel.signal.scale = 0.1;
+  if (way == CanopenWay::pdo_bits) channel.signal.id = 0x185;
+  return channel;
+}
+
+CanopenBusConfig configuration(std::uint8_t kind) {
+  CanopenBusConfig bus;
+  bus.name = "bus";
+  bus.interface = "can0";
+  bus.start_nodes = (kind & 1) == 0;
+  bus.sync_s = (kind & 2) != 0 ? 0.05 : 0.0;
+  bus.own_node = (kind & 4) != 0 ? 127 : 0;
+  bus.nodes.resize(2);
+  CanopenNodeConfig& all = bus.nodes[0];
+  all.name = "all";
+  all.node = 5;
+  all.heartbeat_s = (kind & 8) != 0 ? 0.1 : 0.0;
+  all.heartbeat_timeout_s = (kind & 16) != 0 ? 0.3 : 0.0;
+  all.pdo_period_s = (kind & 32) != 0 ? 0.1 : 0.0;
+  if ((kind & 64) != 0) all.writes = {{{0x6110, 1}, {20, 0}}};
+  if ((kind & 128) != 0) all.mappings_read = {1};
+  all.emergency = EmergencyForm::jumo;
+  all.channels = {channel_of(CanopenWay::pdo_bits, 0, {}),
+                  channel_of(CanopenWay::sdo, 1, {0x2040, 1})};
+  all.channels[0].emergency_channel = 1;
+  all.channels[1].emergency_codes = {0x4210};
+  if (!all.mappings_read.empty()) {
+    all.channels.push_back(channel_of(CanopenWay::pdo_object, 2, {0x7130, 1}));
+  }
+  CanopenNodeConfig& plain = bus.nodes[1];
+  plain.name = "plain";
+  plain.node = 6;
+  plain.mappings = {{0x186, {{{0x7130, 1}, 16}, {{0x7130, 2}, 16}}}};
+  plain.channels = {channel_of(CanopenWay::pdo_object, 3, {0x7130, 2})};
+  return bus;
+}
+
+void check_line(CanopenLine& line, nanoseconds now, bool open) {
+  for (const Reading& reading : line.readings()) {
+    FUZZ_PROMISE(std::isfinite(reading.temp_degC) == (reading.fault == Fault::none));
+    FUZZ_PROMISE(reading.taken_at <= now);
+    FUZZ_PROMISE(open || reading.fault == Fault::no_answer);
+  }
+  int sent = 0;
+  while (const auto frame = line.next_frame()) {
+    FUZZ_PROMISE(open);
+    FUZZ_PROMISE(!frame->id.extended && frame->id.id <= 0x7FF && frame->size <= 8);
+    FUZZ_PROMISE(++sent <= frames_at_once_max);
+  }
+  for (const UnitHealth& unit : line.health(now)) {
+    FUZZ_PROMISE(unit.last_error.size() < 200);
+    for (const char c : unit.last_error) FUZZ_PROMISE(c >= 0x20 && c < 0x7F);
+    FUZZ_PROMISE(open || !unit.answering);
+  }
+}
+
+/// Most of them among those that mean something here.
+std::uint32_t identifier_from(fuzz::ByteFeed& feed) {
+  constexpr std::uint32_t ours[] = {0x585, 0x705, 0x085, 0x185, 0x186, 0x706, 0x586, 0x195};
+  const std::uint8_t which = feed.u8();
+  return which < 0xF0 ? ours[which % std::size(ours)] : feed.u16() & 0x7FFu;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::ByteFeed feed(data, size);
+  CanopenLine line(configuration(feed.u8()));
+  nanoseconds now = 1000s;
+  bool open = true;
+  line.opened(now);
+  check_line(line, now, open);
+  while (!feed.empty()) {
+    const std::uint8_t step = feed.u8();
+    if (step < 0xC0) {
+      CanFrame frame;
+      frame.id = {identifier_from(feed), step == 0xBF};
+      const auto bytes = feed.take(step < 0xB0 ? 8 : step % 9);
+      frame.size = bytes.size();
+      std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+      frame.received_at = now;
+      line.take(frame);
+    } else if (step < 0xFC) {
+      now += (step & 0x20) != 0 ? 1ms * feed.u8() : 20ms;
+    } else if (open) {
+      open = false;
+      line.closed(now);
+    } else {
+      open = true;
+      line.opened(now);
+    }
+    line.advance(now);
+    check_line(line, now, open);
+  }
+  line.closed(now);
+  check_line(line, now, false);
+  return 0;
+}

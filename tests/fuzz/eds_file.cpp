@@ -1,0 +1,36 @@
+/// Electronic data sheets: what loads can be found by address and by name, what is refused is named.
+#include "config/eds_file.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "fuzz.hpp"
+
+using namespace thermocomp;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  const std::string name = "module.eds";
+  const EdsReading reading = read_eds_text(text, name);
+  if (!reading.problems.empty()) {
+    FUZZ_PROMISE(reading.problems.size() <= 100);
+    const fuzz::NamedText files[] = {{name, text}};
+    fuzz::check_problems(reading.problems, files);
+    return 0;
+  }
+  FUZZ_PROMISE(!reading.file.objects.empty());
+  const EdsObject* before = nullptr;
+  for (const EdsObject& object : reading.file.objects) {
+    FUZZ_PROMISE(reading.file.find(object.address) == &object);
+    const auto named = reading.file.find(object.name);
+    FUZZ_PROMISE(!named.empty());
+    for (const char c : object.name) FUZZ_PROMISE(c >= 0x20 && c < 0x7F);
+    if (object.type) FUZZ_PROMISE(object.type->length_bits >= 1 && object.type->length_bits <= 64);
+    if (before != nullptr) {
+      FUZZ_PROMISE(std::pair(before->address.index, before->address.sub) <
+                   std::pair(object.address.index, object.address.sub));
+    }
+    before = &object;
+  }
+  return 0;
+}
