@@ -12,7 +12,7 @@ namespace {
 /// No thermometer resolves less; a denormal or a tiny float is made of another number's bytes.
 constexpr double float_degC_min = 1e-6;
 
-std::string degC(double value) {
+std::string temperature_text(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.2f degC", value);
   return text;
@@ -40,7 +40,7 @@ void hint_orders(const ModbusChannel& channel, std::span<const std::uint16_t> wo
     const Decoded decoded = decode_as(channel, order, channel.scale, words);
     if (!fits(channel, decoded, range)) continue;
     hints.push_back("word_order = \"" + order_name(order) + "\" would make it " +
-                    degC(decoded.value));
+                    temperature_text(decoded.value));
   }
 }
 
@@ -52,7 +52,7 @@ void hint_scales(const ModbusChannel& channel, std::span<const std::uint16_t> wo
     if (!fits(channel, decoded, range) || decoded.value == channel.offset_degC) continue;
     char text[80];
     std::snprintf(text, sizeof text, "scale = %g would make it ", scale);
-    hints.push_back(text + degC(decoded.value));
+    hints.push_back(text + temperature_text(decoded.value));
     return;
   }
 }

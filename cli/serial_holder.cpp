@@ -41,7 +41,7 @@ SerialHolder holder_of(const std::string& device) {
     if (!is_number(number) || number == std::to_string(::getpid())) continue;
     if (!has_open(entry.path(), real)) continue;
     const std::string name = name_of(entry.path());
-    holder.name = name + " (process " + number + ")";
+    holder.name.assign(name).append(" (process ").append(number).append(")");
     if (name == "thermocompd") {
       holder.is_daemon = true;
       return holder;

@@ -156,7 +156,7 @@ TomlTable Presets::over_channel(const TomlTable& sensor, const TomlTable& device
                                        list_keys(preset.thermocouples));
     sensor.ignore_rest();
   }
-  const TomlTable typed = thermocouple == nullptr ? sensor : sensor.over(*thermocouple);
+  TomlTable typed = thermocouple == nullptr ? sensor : sensor.over(*thermocouple);
   if (!sensor.has("channel")) {
     if (!sensor.has("address")) sensor.problem("channel", "must be given");
     return typed;

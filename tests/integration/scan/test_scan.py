@@ -63,7 +63,7 @@ def test_each_mistake_is_told_for_what_it_is(simulate, tmp_path, kind):
 
 def test_the_text_says_the_same(simulate, tmp_path):
     simulator = simulate(MACHINE)
-    path = configuration(tmp_path, bus(simulator, "modbus_rtu", timeout_ms=3000.0), DEVICES,
+    path = configuration(tmp_path, bus(simulator, "modbus_rtu", timeout_ms=1500.0), DEVICES,
                          SENSORS)
     done = thermocomp("scan", path)
     assert done.returncode == 1
@@ -77,7 +77,7 @@ def test_a_search_finds_the_units_that_answer_and_says_what_it_sends(simulate, t
     simulator = simulate(MACHINE)
     sensors = [("spindle", {"device": "spindle_module", "address": 0})]
     devices = DEVICES[DEVICES.index('[[device]]\nname = "spindle_module"'):]
-    path = configuration(tmp_path, bus(simulator, "modbus_rtu", timeout_ms=3000.0), devices,
+    path = configuration(tmp_path, bus(simulator, "modbus_rtu", timeout_ms=1500.0), devices,
                          sensors)
     done = thermocomp("scan", path, "--find", "--units", "3-5")
     assert "asking units 3 to 5" in done.stderr and "one request each" in done.stderr
