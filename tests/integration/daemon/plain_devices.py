@@ -248,30 +248,16 @@ class PlainAmplifier(PlainController):
     def start(self):
         self.volts = []  # each voltage that differs from the one before
         self.bent_V = 0.0  # what the ceramic has followed
-        self.obeys = True
         super().start()
 
     def written(self):
         voltage = 0.01 * self.tables[3].get(0, 0)
         if not self.volts or self.volts[-1] != voltage:
             self.volts.append(voltage)
-        if not self.obeys:
-            return
         if voltage == 0.0:
             self.bent_V = 0.0
         else:  # upwards it follows, downwards it stays behind
             self.bent_V = max(voltage, min(self.bent_V, voltage + self.PLAY_V))
-        self.tables[4][10] = round(100 * voltage)
-
-    def give(self, voltage):
-        """Whatever was written: as with the amplifier's own knob."""
-        with self.lock:
-            self.obeys = False
-            self.tables[4][10] = round(100 * voltage)
-
-    def obey(self):
-        with self.lock:
-            self.obeys = True
 
     def displacement_um(self):
         with self.lock:
