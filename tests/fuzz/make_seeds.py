@@ -347,6 +347,12 @@ def eds_seeds():
     write("eds_file", "broken.eds", "a=1\n[]\n[1017\nb\n=c\n[1017]\nDataType=017\n")
 
 
+def dbc_seeds():
+    write("dbc_file", "every_kind.dbc",
+          (ROOT / "tests/integration/can/every_kind.dbc").read_bytes())
+    write("dbc_file", "examples_can_dbc.dbc", (ROOT / "config/examples/can_dbc.dbc").read_bytes())
+
+
 def history_seeds(history):
     # kind, detail, cycle, index, time, value: see chunk_codec.hpp
     records = bytes([0, 0, 0, 0, 2, 0x62, 0x34, 0x40]) + bytes([0, 0, 2, 0, 2, 0])
@@ -397,6 +403,10 @@ def dictionaries():
     dictionary("daemon_config", toml | model | {"#### model\n"} |
                literals("config/daemon_config.cpp", "config/sections/*.cpp"))
     dictionary("machine_file", toml | literals("simulator/*_file.cpp", "config/sections/*.cpp"))
+    dictionary("dbc_file", {'BA_ "VFrameFormat" BO_ ', 'BA_DEF_ BO_ "VFrameFormat" ENUM ', "@1+",
+                            "BO_ 385 NODE: 8 A\n", "BS_:", "BU_:", "CM_ ", "NS_ :", "VAL_ ", "@0-",
+                            "SG_MUL_VAL_ 385 T P 0-1;", "SIG_VALTYPE_ 385 T : 1;", "4294967295",
+                            ' SG_ T m1M : 0|8@1+ (1,0) [0|0] "" B\n', "1e308"})
     dictionary("eds_file", {"[7130sub1]", "[7130]", "[7130Name]", "ParameterName=", "ObjectType=0x8",
                             "DataType=0x0003", "CompactSubObj=", "0xFE", "; ", "\r\n"})
     dictionary("run_file", {"time_s", "_degC", "_um", ",", "nan", "inf", "1e308", "1e-320", "\r\n",
@@ -419,6 +429,7 @@ def main():
     canopen_seeds()
     j1939_seeds()
     eds_seeds()
+    dbc_seeds()
     history_seeds(sys.argv[1] if len(sys.argv) > 1 else None)
     dictionaries()
 
