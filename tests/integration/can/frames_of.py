@@ -39,10 +39,17 @@ def random_raw(signal, random):
     if signal.is_float:
         value = random.choice([0.0, -1.5, random.uniform(-1e3, 1e3),
                                random.uniform(-1, 1) * 10.0 ** random.randint(-30, 30)])
-        return value if signal.size == 64 else struct.unpack("<f", struct.pack("<f", value))[0]
+        return nearest_raw(signal, value)
     low, high = ((-(1 << (signal.size - 1)), (1 << (signal.size - 1)) - 1) if signal.is_signed
                  else (0, (1 << signal.size) - 1))
     return random.choice([low, high, random.randint(low, high), random.randint(low, high)])
+
+
+def nearest_raw(signal, value):
+    """What the signal can hold that is nearest to a raw value."""
+    if not signal.is_float:
+        return round(value)
+    return value if signal.size == 64 else struct.unpack("<f", struct.pack("<f", value))[0]
 
 
 def in_ranges(value, signal):
