@@ -9,7 +9,7 @@ import time
 import pytest
 
 from cnc import hal_file
-from lab import eventually
+from lab import assert_replays_exactly, eventually
 from recording import SMOOTH, recording
 from warm_mill import AXES, FOLLOWS_um, STEADY, WarmMill, expected_um, largest
 
@@ -26,8 +26,8 @@ class Scenario:
 
     def check(self, event):
         """In step again, the error after an absolute move, and the offset that is in effect."""
-        axes = self.mill.in_step()
-        errors = self.mill.errors_um(**PLACE_mm)
+        self.mill.in_step()
+        errors, axes = self.mill.errors_um(**PLACE_mm)
         doubled = max(abs(axes[a]["applied"] - expected_um(a)) for a in AXES)
         self.rows.append((event, largest(errors), doubled))
         print(f"{event:48} {largest(errors):9.3f} {doubled:9.3f}")
@@ -106,7 +106,7 @@ def test_unhome_and_home(scenario):
 def test_touch_off(scenario):
     mill = scenario.mill
     mill.cnc.mdi("G54", "G10 L20 P1 X0 Y0 Z0", "G0 X5 Y5 Z-5")
-    errors = mill.errors_here_um(**{a: PLACE_mm[a] + (5 if a != "z" else -5) for a in AXES})
+    errors, _ = mill.errors_here_um(**{a: PLACE_mm[a] + (5 if a != "z" else -5) for a in AXES})
     assert largest(errors) <= FOLLOWS_um, errors
     mill.cnc.mdi("G10 L2 P1 X1 Y2 Z-3", "G92 X7", "G92.1", "G10 L2 P1 X0 Y0 Z0")
     scenario.check("touch-off, G10 L20, G10 L2, G92")
@@ -187,6 +187,8 @@ def test_linuxcnc_restarted(scenario):
     scenario.check("LinuxCNC restarted")
 
 
-def test_no_event_left_an_error(scenario):
+def test_no_event_left_an_error_and_all_of_it_replays(scenario):
     assert len(scenario.rows) == 14
+    scenario.mill.daemon.end()
+    assert_replays_exactly(scenario.mill.daemon.history, scenario.mill.folder / "replay.csv")
     print(f"largest_error_um_{WAY} {max(row[1] for row in scenario.rows):.3f}")

@@ -159,27 +159,40 @@ class WarmMill:
     def drives_mm(self):
         return dict(zip(AXES, self.cnc.pins(*(f"drive-{a}.out" for a in AXES))))
 
-    def in_step(self, tolerance_um=0.2):
-        """Waits until the daemon compensates and LinuxCNC applies what it wants; its axes."""
-        def settled():
-            status = self.daemon.status()
-            axes = {axis["name"]: axis for axis in status["axes"]}
-            good = status["mode"] == "compensating" and all(
-                axis["driven"] and None not in (axis["applied"], axis["target"]) and
-                abs(axis["applied"] - axis["target"]) <= tolerance_um for axis in axes.values())
-            return good and axes
-        return eventually(settled, "LinuxCNC applies what the daemon wants")
+    def settled(self, tolerance_um=0.2):
+        """The axes of the daemon's status when it compensates and LinuxCNC applies what it wants,
+        else nothing."""
+        status = self.daemon.status()
+        axes = {axis["name"]: axis for axis in status["axes"]}
+        good = status["mode"] == "compensating" and all(
+            axis["driven"] and None not in (axis["applied"], axis["target"]) and
+            abs(axis["applied"] - axis["target"]) <= tolerance_um for axis in axes.values())
+        return axes if good else None
+
+    def in_step(self):
+        return eventually(self.settled, "LinuxCNC applies what the daemon wants")
 
     def errors_um(self, **target_mm):
-        """After an absolute move there: drive less command less wanted offset, an axis each."""
+        """After an absolute move there: drive less command less wanted offset, an axis each; and
+        the daemon's axes of that moment."""
         self.cnc.mdi("G53 G0 " + " ".join(f"{a.upper()}{mm}" for a, mm in target_mm.items()))
         return self.errors_here_um(**target_mm)
 
     def errors_here_um(self, **target_mm):
-        time.sleep(0.05)  # the drives are a servo period behind
-        drives = self.drives_mm()
-        axes = {axis["name"]: axis for axis in self.daemon.status()["axes"]}
-        return {a: 1000.0 * (drives[a] - mm) - axes[a]["offset"] for a, mm in target_mm.items()}
+        def look():
+            # Drives and daemon are asked one after the other: nothing may have moved meanwhile.
+            before = self.settled()
+            time.sleep(0.15)  # longer than the daemon's report and the bridge's exchange
+            drives = self.drives_mm()
+            time.sleep(0.15)
+            after = self.settled()
+            if not before or not after:
+                return None
+            if any(abs(before[a]["offset"] - after[a]["offset"]) > 0.05 for a in AXES):
+                return None
+            return ({a: 1000.0 * (drives[a] - mm) - after[a]["offset"]
+                     for a, mm in target_mm.items()}, after)
+        return eventually(look, "everything stands still")
 
 
 def largest(errors_um):
