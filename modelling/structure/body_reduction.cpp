@@ -14,6 +14,8 @@ namespace {
 
 /// 1/s: from the steady state to what happens within minutes.
 constexpr std::array<double, 4> shifts_per_s{0.0, 1.0 / 14400.0, 1.0 / 2400.0, 1.0 / 400.0};
+/// Of these for what a film, a joint or a capacity of another strength would do.
+constexpr std::array<double, 2> part_shifts_per_s{0.0, 1.0 / 2400.0};
 constexpr double new_direction_least = 1e-7;
 constexpr double um = 1e6;
 
@@ -97,6 +99,7 @@ class Reducer {
     for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
       outputs.push_back(um * restricted(sensitivities[i]));
     }
+    if (with_parts) find_parts();
     find_basis(outputs);
     ReducedBody body;
     const Matrix coolant_part = times(free_.flooded, basis_) - times(free_.dry, basis_);
@@ -150,18 +153,32 @@ class Reducer {
   }
 
   void add_capacities(ReducedBody& body) const {
+    for (std::size_t part = 0; part < capacities_.size(); ++part) {
+      const Matrix matrix = basis_.transpose() * times(capacities_[part], basis_);
+      body.parts.push_back({structure_.mesh.part_names[part],
+                            BodyPartKind::capacity,
+                            plain(Matrix(0.5 * (matrix + matrix.transpose()))),
+                            {}});
+    }
+  }
+
+  /// What changes with a strength is, first of all, an even flow: over a film, across a joint, into
+  /// a part. The fields that such flows make must be in the basis, or a weak joint could not open.
+  void find_parts() {
     const Mesh& mesh = structure_.mesh;
+    for (const NamedCouplings& named : heat_.named) {
+      std::vector<double> flow(mesh.nodes_m.size(), 0.0);
+      for (const Coupling& coupling : named.couplings)
+        for (std::size_t i = 0; i < coupling.count; ++i)
+          flow[coupling.nodes[i]] += coupling.strength[0] * coupling.weight[i];
+      flows_.push_back(restricted(flow));
+    }
     for (std::size_t part = 0; part < mesh.part_names.size(); ++part) {
       std::vector<Material> alone = structure_.material_of_part;
       for (std::size_t other = 0; other < alone.size(); ++other)
         if (other != part) alone[other].density_kg_per_m3 = 0.0;
-      const SparseSymmetric capacity =
-          heat_.reduction.reduced(heat_matrices(mesh, alone, {}).capacity);
-      const Matrix matrix = basis_.transpose() * times(capacity, basis_);
-      body.parts.push_back({mesh.part_names[part],
-                            BodyPartKind::capacity,
-                            plain(Matrix(0.5 * (matrix + matrix.transpose()))),
-                            {}});
+      capacities_.push_back(heat_.reduction.reduced(heat_matrices(mesh, alone, {}).capacity));
+      flows_.push_back(times(capacities_.back(), Vector(Vector::Ones(flows_.front().size()))));
     }
   }
 
@@ -209,6 +226,8 @@ class Reducer {
       add_responses(free_.flooded, free_.capacity_flooded, shift, with_coolant, basis);
       add_responses(free_.flooded, free_.capacity_flooded, shift, outputs, basis);
     }
+    for (const double shift : part_shifts_per_s)
+      if (!flows_.empty()) add_responses(free_.dry, free_.capacity, shift, flows_, basis);
     basis_ = basis.matrix();
     const Matrix conduction = basis_.transpose() * times(free_.dry, basis_);
     const Eigen::SelfAdjointEigenSolver<Matrix> solver(0.5 * (conduction + conduction.transpose()));
@@ -252,8 +271,10 @@ class Reducer {
   const Structure& structure_;
   const HeatModel& heat_;
   FreeModel free_;
-  Matrix basis_;  ///< V
-  Vector rates_;  ///< of V^T L V
+  std::vector<Vector> flows_;                ///< of films, joints and parts, where asked for
+  std::vector<SparseSymmetric> capacities_;  ///< of each part alone
+  Matrix basis_;                             ///< V
+  Vector rates_;                             ///< of V^T L V
 };
 
 }  // namespace

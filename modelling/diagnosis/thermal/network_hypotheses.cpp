@@ -101,7 +101,8 @@ NetworkHypotheses::NetworkHypotheses(const ThermalPlant& plant, const ThermalRun
     add_slow_sensor(sensor);
     for (std::size_t run = 0; run < runs.runs.size(); ++run) add_faults(run, sensor);
   }
-  bases_.push_back({plant.network, stacked(plant.network)});
+  const NetworkSimulation unchanged(plant.network);
+  bases_.push_back({unchanged, stacked(unchanged)});
 }
 
 void NetworkHypotheses::add_part(const NetworkPart& part) {
@@ -241,10 +242,10 @@ std::vector<Hypothesis> NetworkHypotheses::all(const std::shared_ptr<NetworkHypo
   return all;
 }
 
-std::vector<Column> NetworkHypotheses::stacked(const HeatNetwork& network) const {
-  std::vector<Column> all(network.sensors.size(), Column(rows_.time_s.size()));
+std::vector<Column> NetworkHypotheses::stacked(const NetworkSimulation& simulation) const {
+  std::vector<Column> all(simulation.network().sensors.size(), Column(rows_.time_s.size()));
   for (std::size_t run = 0; run < runs_.runs.size(); ++run) {
-    const std::vector<Column> readings = simulated_degC(network, runs_, run);
+    const std::vector<Column> readings = simulation.readings_degC(runs_, run);
     const Block& block = rows_.runs[run];
     for (std::size_t sensor = 0; sensor < all.size(); ++sensor)
       all[sensor].segment(block.begin, block.end - block.begin) =
@@ -264,9 +265,9 @@ Eigen::MatrixXd NetworkHypotheses::columns(std::size_t cause, const Shape& shape
   };
   auto known = std::find_if(known_.begin(), known_.end(), same);
   if (known == known_.end()) {
-    HeatNetwork changed = bases_[base].network;
+    HeatNetwork changed = bases_[base].simulation.network();
     of.apply(changed, shape, 1.0);
-    std::vector<Column> readings = stacked(changed);
+    std::vector<Column> readings = stacked(NetworkSimulation(changed, &bases_[base].simulation));
     for (std::size_t i = 0; i < readings.size(); ++i) readings[i] -= bases_[base].stacked[i];
     if (known_.size() >= columns_kept) known_.pop_back();
     known_.push_front({cause, base, shape, std::move(readings)});
@@ -287,14 +288,16 @@ std::size_t NetworkHypotheses::cause_of(const Hypothesis& hypothesis) const {
 void NetworkHypotheses::accept(const std::vector<Explanation>& found) {
   known_.clear();
   accepted_.clear();
-  bases_.resize(1);
+  bases_.erase(bases_.begin() + 1, bases_.end());
   for (const Explanation& each : found) {
     const std::size_t cause = cause_of(*each.hypothesis);
     if (!causes_[cause].apply) continue;
-    HeatNetwork changed = bases_.back().network;
+    HeatNetwork changed = bases_.back().simulation.network();
     causes_[cause].apply(changed, each.shape, gain_of({each, {}, {}, {}}).value);
     accepted_.push_back(cause);
-    bases_.push_back({changed, stacked(changed)});
+    NetworkSimulation simulation(changed, &bases_.back().simulation);
+    std::vector<Column> readings = stacked(simulation);
+    bases_.push_back({std::move(simulation), std::move(readings)});
   }
 }
 

@@ -39,7 +39,7 @@ class NetworkHypotheses {
     double at{0.0};  ///< signal at which a missing source has its heat
   };
   struct Base {
-    HeatNetwork network;
+    NetworkSimulation simulation;
     std::vector<Column> stacked;  ///< readings, one column a sensor
   };
   struct Known {
@@ -56,7 +56,7 @@ class NetworkHypotheses {
   void add_slow_sensor(std::size_t sensor);
   void add_faults(std::size_t run, std::size_t sensor);
   [[nodiscard]] Eigen::MatrixXd columns(std::size_t cause, const Shape& shape, std::size_t output);
-  [[nodiscard]] std::vector<Column> stacked(const HeatNetwork& network) const;
+  [[nodiscard]] std::vector<Column> stacked(const NetworkSimulation& simulation) const;
   [[nodiscard]] std::size_t cause_of(const Hypothesis& hypothesis) const;
   [[nodiscard]] double largest(std::size_t signal) const;
 

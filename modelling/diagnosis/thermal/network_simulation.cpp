@@ -43,36 +43,6 @@ Column held(const RunFile& file, const std::string& column) {
   return result;
 }
 
-/// The network in the modes of C^-1/2 K C^-1/2, for one state of the coolant.
-struct Modes {
-  Vector rate_per_s;
-  Matrix to_modes;
-  Matrix from_modes;
-  Matrix drive;  ///< of room, coolant and sources, one a column
-};
-
-Modes modes_of(const HeatNetwork& network, bool flows) {
-  const Eigen::Index n = network.capacity.rows();
-  Matrix conductance = network.conductance;
-  if (flows) conductance += network.coolant_conductance;
-  Matrix inflow = Matrix::Zero(n, 2 + static_cast<Eigen::Index>(network.sources.size()));
-  inflow.col(0) = network.room_inflow;
-  if (flows) inflow.col(1) = network.coolant_inflow;
-  for (std::size_t i = 0; i < network.sources.size(); ++i)
-    inflow.col(2 + static_cast<Eigen::Index>(i)) =
-        network.sources[i].heat_W * network.sources[i].inflow;
-  const Eigen::LLT<Matrix> root(network.capacity);
-  THERMOCOMP_ENSURE(root.info() == Eigen::Success);
-  Matrix rates = root.matrixL().solve(conductance);
-  rates = root.matrixL().solve(Matrix(rates.transpose()));
-  const Eigen::SelfAdjointEigenSolver<Matrix> solver(0.5 * (rates + rates.transpose()));
-  THERMOCOMP_ENSURE(solver.info() == Eigen::Success);
-  const Matrix& shapes = solver.eigenvectors();
-  return {solver.eigenvalues().cwiseMax(slowest_per_s),
-          shapes.transpose() * Matrix(root.matrixL()).transpose(), root.matrixU().solve(shapes),
-          shapes.transpose() * root.matrixL().solve(inflow)};
-}
-
 /// Room, coolant and the sources' shares in each row, shape (2 + sources, rows).
 Matrix drives(const HeatNetwork& network, const ThermalRuns& runs, const ThermalRun& run) {
   Matrix all(2 + static_cast<Eigen::Index>(network.sources.size()), run.rows());
@@ -150,7 +120,56 @@ void lag(const Column& time_s, double lag_s, Column& values) {
   }
 }
 
+/// What room, coolant and sources bring into each state, one a column.
+Matrix inflows(const HeatNetwork& network, bool flows) {
+  Matrix inflow =
+      Matrix::Zero(network.capacity.rows(), 2 + static_cast<Eigen::Index>(network.sources.size()));
+  inflow.col(0) = network.room_inflow;
+  if (flows) inflow.col(1) = network.coolant_inflow;
+  for (std::size_t i = 0; i < network.sources.size(); ++i)
+    inflow.col(2 + static_cast<Eigen::Index>(i)) =
+        network.sources[i].heat_W * network.sources[i].inflow;
+  return inflow;
+}
+
 }  // namespace
+
+/// The modes of C^-1/2 K C^-1/2, for one state of the coolant.
+struct NetworkSimulation::Modes {
+  Vector rate_per_s;
+  Matrix to_modes;
+  Matrix from_modes;
+  Matrix into_modes;  ///< of heat
+
+  Modes(const Matrix& capacity, const Matrix& conductance) {
+    const Eigen::LLT<Matrix> root(capacity);
+    THERMOCOMP_ENSURE(root.info() == Eigen::Success);
+    Matrix rates = root.matrixL().solve(conductance);
+    rates = root.matrixL().solve(Matrix(rates.transpose()));
+    const Eigen::SelfAdjointEigenSolver<Matrix> solver(0.5 * (rates + rates.transpose()));
+    THERMOCOMP_ENSURE(solver.info() == Eigen::Success);
+    rate_per_s = solver.eigenvalues().cwiseMax(slowest_per_s);
+    from_modes = root.matrixU().solve(solver.eigenvectors());
+    to_modes = solver.eigenvectors().transpose() * Matrix(root.matrixL()).transpose();
+    into_modes = from_modes.transpose();
+  }
+};
+
+NetworkSimulation::NetworkSimulation(const HeatNetwork& network, const NetworkSimulation* like)
+    : network_(network) {
+  if (like != nullptr && like->network_.capacity == network.capacity &&
+      like->network_.conductance == network.conductance &&
+      like->network_.coolant_conductance == network.coolant_conductance) {
+    dry_ = like->dry_;
+    flooded_ = like->flooded_;
+    return;
+  }
+  dry_ = std::make_shared<Modes>(network.capacity, network.conductance);
+  flooded_ = network.coolant_conductance.isZero(0.0)
+                 ? dry_
+                 : std::make_shared<Modes>(network.capacity,
+                                           network.conductance + network.coolant_conductance);
+}
 
 std::vector<std::string> shared_signals(const std::vector<RunFile>& files) {
   std::vector<std::string> names;
@@ -212,34 +231,30 @@ ThermalRuns thermal_runs(const ThermalPlant& plant, const std::vector<RunFile>& 
   return all;
 }
 
-std::vector<Column> simulated_degC(const HeatNetwork& network, const ThermalRuns& runs,
-                                   std::size_t index) {
+std::vector<Column> NetworkSimulation::readings_degC(const ThermalRuns& runs,
+                                                     std::size_t index) const {
   const ThermalRun& run = runs.runs[index];
-  const Matrix drive = drives(network, runs, run);
+  const Matrix drive = drives(network_, runs, run);
   const Matrix between = 0.5 * (drive.leftCols(run.rows() - 1) + drive.rightCols(run.rows() - 1));
-  const bool ever_flows = run.coolant_flows.maxCoeff() > 0.0;
-  const bool ever_dry = run.coolant_flows.minCoeff() < 1.0;
-  Modes modes[2];
+  const Modes* const modes[2] = {dry_.get(), flooded_.get()};
   Matrix into[2];
-  for (const bool flows : {false, true}) {
-    if (flows ? !ever_flows : !ever_dry) continue;
-    modes[flows] = modes_of(network, flows);
-    into[flows].noalias() = modes[flows].drive * between;
-  }
+  for (const bool flows : {false, true})
+    into[flows].noalias() = Matrix(modes[flows]->into_modes * inflows(network_, flows)) * between;
   bool flows = run.coolant_flows[0] > 0.0;
-  Matrix states(network.capacity.rows(), run.rows());  // in the modes of its own row
-  Vector state = modes[flows].to_modes * start_state(network, run);
+  Matrix states(network_.capacity.rows(), run.rows());  // in the modes of its own row
+  Vector state = modes[flows]->to_modes * start_state(network_, run);
   Eigen::ArrayXd keep;
   Eigen::ArrayXd gain;
   double step_s = -1.0;
   for (Eigen::Index row = 0; row + 1 < run.rows(); ++row) {
     const bool now = run.coolant_flows[row] > 0.0;
     const double dt_s = run.time_s[row + 1] - run.time_s[row];
-    if (now != flows) state = modes[now].to_modes * (modes[flows].from_modes * state);
+    if (now != flows) state = modes[now]->to_modes * (modes[flows]->from_modes * state);
     states.col(row) = state;
     if (now != flows || !(std::abs(dt_s - step_s) < 1e-9 * dt_s)) {
-      keep = (-dt_s * modes[now].rate_per_s.array()).exp();
-      gain = -(-dt_s * modes[now].rate_per_s.array()).expm1() / modes[now].rate_per_s.array();
+      const Eigen::ArrayXd rate_per_s = modes[now]->rate_per_s.array();
+      keep = (-dt_s * rate_per_s).exp();
+      gain = -(-dt_s * rate_per_s).expm1() / rate_per_s;
       step_s = dt_s;
     }
     flows = now;
@@ -247,11 +262,10 @@ std::vector<Column> simulated_degC(const HeatNetwork& network, const ThermalRuns
   }
   states.rightCols(1) = state;
   std::vector<Column> readings;
-  for (const NetworkSensor& sensor : network.sensors) {
+  for (const NetworkSensor& sensor : network_.sensors) {
+    const Eigen::RowVectorXd rows[2] = {sensor.row * modes[0]->from_modes,
+                                        sensor.row * modes[1]->from_modes};
     Column values(run.rows());
-    Eigen::RowVectorXd rows[2];
-    for (const bool wet : {false, true})
-      if (modes[wet].from_modes.size() > 0) rows[wet] = sensor.row * modes[wet].from_modes;
     for (Eigen::Index row = 0; row < run.rows(); ++row) {
       // The last row's state is in the modes of the step that led to it.
       const Eigen::Index of = std::min(row, std::max<Eigen::Index>(0, run.rows() - 2));

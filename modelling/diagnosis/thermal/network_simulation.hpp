@@ -1,6 +1,7 @@
 /// Temperatures that a thermal network gives to the sensors over a measured run.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -38,12 +39,25 @@ struct ThermalRuns {
 /// Operating signals (no positions) that every one of the files has.
 [[nodiscard]] std::vector<std::string> shared_signals(const std::vector<RunFile>& files);
 
-/// Readings of the sensors, shape (sensors)(rows). Between two rows signals, room and coolant are
-/// the mean of both; the solution within a step is exact. The start is the field that agrees with
-/// the first readings and is otherwise in balance with room and constant sources:
-///
-///   x_0 = argmin x'Kx / 2 - q'x  with  row_s . x = reading_s of every sensor
-[[nodiscard]] std::vector<Column> simulated_degC(const HeatNetwork& network,
-                                                 const ThermalRuns& runs, std::size_t run);
+/// A network made ready to run: its modes are found once.
+class NetworkSimulation {
+ public:
+  /// @param like  a network that may have the same matrices, whose modes are then taken over
+  explicit NetworkSimulation(const HeatNetwork& network, const NetworkSimulation* like = nullptr);
+
+  /// Readings of the sensors, shape (sensors)(rows). Between two rows signals, room and coolant
+  /// are the mean of both; the solution within a step is exact. The start is the field that agrees
+  /// with the first readings and is otherwise in balance with room and constant sources:
+  ///
+  ///   x_0 = argmin x'Kx / 2 - q'x  with  row_s . x = reading_s of every sensor
+  [[nodiscard]] std::vector<Column> readings_degC(const ThermalRuns& runs, std::size_t run) const;
+  [[nodiscard]] const HeatNetwork& network() const noexcept { return network_; }
+
+ private:
+  struct Modes;
+  HeatNetwork network_;
+  std::shared_ptr<const Modes> dry_;
+  std::shared_ptr<const Modes> flooded_;
+};
 
 }  // namespace thermocomp::diagnosis

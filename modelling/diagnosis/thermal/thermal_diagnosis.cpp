@@ -54,6 +54,7 @@ MeasuredData data_of(const ThermalPlant& plant, const ThermalRuns& runs) {
     data.model.outputs.push_back(sensor.column);
     data.model.inputs.push_back(sensor.column);
   }
+  const NetworkSimulation simulation(plant.network);
   for (std::size_t i = 0; i < runs.runs.size(); ++i) {
     const ThermalRun& of = runs.runs[i];
     MeasuredRun run;
@@ -61,7 +62,7 @@ MeasuredData data_of(const ThermalPlant& plant, const ThermalRuns& runs) {
     run.time_s = of.time_s;
     run.begin = of.begin;
     run.signals = of.signals;
-    run.model_um = simulated_degC(plant.network, runs, i);
+    run.model_um = simulation.readings_degC(runs, i);
     run.measured_um = of.measured_degC;
     for (const Column& measured : of.measured_degC) run.inputs_K.push_back(rise_of(measured));
     data.runs.push_back(std::move(run));
@@ -74,9 +75,10 @@ MeasuredData data_of(const ThermalPlant& plant, const ThermalRuns& runs) {
 /// measured - simulated over the selected rows, of every sensor.
 std::vector<Residuals> residuals_of(const HeatNetwork& network, const ThermalRuns& runs) {
   std::vector<Residuals> all(network.sensors.size());
+  const NetworkSimulation simulation(network);
   for (std::size_t i = 0; i < runs.runs.size(); ++i) {
     const ThermalRun& run = runs.runs[i];
-    const std::vector<Column> simulated = simulated_degC(network, runs, i);
+    const std::vector<Column> simulated = simulation.readings_degC(runs, i);
     for (std::size_t sensor = 0; sensor < all.size(); ++sensor)
       all[sensor].by_run.emplace_back(
           (run.measured_degC[sensor] - simulated[sensor]).tail(run.rows() - run.begin));
