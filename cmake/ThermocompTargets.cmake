@@ -10,7 +10,11 @@ endif()
 
 find_program(CCACHE ccache)
 if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+  # A copy of the tree finds what this one compiled, and the other way round: paths below the sources
+  # count relative to them, and the compiler speaks one language to all.
+  set(CMAKE_CXX_COMPILER_LAUNCHER
+    ${CMAKE_COMMAND} -E env --unset=LANG --unset=LC_ALL --unset=LC_CTYPE --unset=LC_MESSAGES
+    CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
 endif()
 
 set(THERMOCOMP_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
@@ -23,6 +27,13 @@ target_compile_options(thermocomp_flags INTERFACE
   -Wall -Wextra -Wpedantic -Werror -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast
   -Wnon-virtual-dtor -Woverloaded-virtual -Wcast-align -Wformat=2 -Wimplicit-fallthrough
   -ffp-contract=off)
+# The packages are hardened as Debian does it, and what is tested is what is installed: every release
+# build has these flags, and debian/rules adds none.
+if(CMAKE_BUILD_TYPE STREQUAL "Release")
+  target_compile_options(thermocomp_flags INTERFACE
+    -fstack-protector-strong -D_FORTIFY_SOURCE=2 -ffile-prefix-map=${CMAKE_SOURCE_DIR}=.)
+  target_link_options(thermocomp_flags INTERFACE -Wl,-z,relro -Wl,-z,now)
+endif()
 if(THERMOCOMP_SANITIZE)
   target_compile_options(thermocomp_flags INTERFACE
     -fsanitize=${THERMOCOMP_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)

@@ -13,7 +13,7 @@ jobs=${3:-$(nproc)}
 copy=$folder/source
 mkdir -p "$copy"
 # Objects stay, and with the files' own times they are still up to date.
-find "$copy" -mindepth 1 -maxdepth 1 ! -name 'obj-*' -exec rm -rf {} +
+find "$copy" -mindepth 1 -maxdepth 1 ! -name build -exec rm -rf {} +
 tar -C "$source_tree" --exclude=./build --exclude=./.git --exclude=./demo_output -cf - . |
   tar -C "$copy" -xf -
 rm -f "$folder"/*.deb "$folder"/*.changes "$folder"/*.buildinfo
