@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/checks.hpp"
+#include "estimator/estimator_config.hpp"
 #include "estimator/name_index.hpp"
 
 namespace thermocomp {
@@ -216,9 +217,11 @@ CorrectionReport RunningCorrection::report() const noexcept {
   CorrectionReport report;
   for (std::size_t g = 0; g < groups_; ++g) {
     report.gain[g] = learned_[g];
+    report.gain_used[g] = used_[g];
     report.gain_sd[g] = std::sqrt(std::max(0.0, covariance_[g][g]));
   }
   report.bias_um = groups_ == 0 ? 0.0 : learned_[groups_];
+  report.bias_used_um = groups_ == 0 ? 0.0 : used_[groups_];
   report.sd_um = sd_um();
   report.probing_wanted = report.sd_um > config_.probe_sd_um;
   report.phase = phase_;
@@ -233,9 +236,12 @@ std::map<std::string, double> RunningCorrection::persistent(const CorrectionRepo
     if (report.gain[g] == 0.0 && report.gain_sd[g] == 0.0) continue;  // there is no such group
     values[gain_key(g)] = report.gain[g];
     values[gain_key(g).append("_sd")] = report.gain_sd[g];
+    if (report.gain_used[g] != report.gain[g])
+      values[gain_key(g).append("_used")] = report.gain_used[g];
   }
   if (values.empty()) return values;
   values["bias_um"] = report.bias_um;
+  if (report.bias_used_um != report.bias_um) values["bias_used_um"] = report.bias_used_um;
   values["phase"] = report.phase;
   return values;
 }
@@ -248,17 +254,28 @@ void RunningCorrection::restore(const std::map<std::string, double>& of_all_axes
     return found == values.end() ? otherwise : found->second;
   };
   for (std::size_t g = 0; g < groups_; ++g) {
+    const auto is_gain = [&](double value) {
+      return value >= config_.gain_min && value <= config_.gain_max;
+    };
     const double gain = find(gain_key(g), 1.0);
-    if (!(gain >= config_.gain_min && gain <= config_.gain_max)) continue;
+    if (!is_gain(gain)) continue;
     learned_[g] = used_[g] = gain;
+    // What was learned mid-cut waits for its end in the next life too.
+    const double gain_used = find(gain_key(g).append("_used"), gain);
+    if (is_gain(gain_used)) used_[g] = gain_used;
     // The past of the machine is not known any more: at least as sure as at a first start, never
     // surer than before it.
     const double sd = find(gain_key(g).append("_sd"), config_.gain_sd);
     if (sd >= 0 && sd <= config_.gain_sd) covariance_[g][g] = sd * sd;
   }
+  // Several probings together may have taught more than one step.
+  const auto is_bias = [](double value) { return std::abs(value) <= offset_um_max_of_any_axis; };
   const double bias_um = find("bias_um", 0.0);
-  if (groups_ > 0 && std::abs(bias_um) <= config_.step_um_max)
-    learned_[groups_] = used_[groups_] = bias_um;
+  if (groups_ > 0 && is_bias(bias_um)) {
+    const double bias_used_um = find("bias_used_um", bias_um);
+    learned_[groups_] = bias_um;
+    used_[groups_] = is_bias(bias_used_um) ? bias_used_um : bias_um;
+  }
   if (find("phase", 1.0) == 2.0) phase_ = 2;
 }
 

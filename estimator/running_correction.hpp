@@ -18,9 +18,11 @@ namespace thermocomp {
 
 /// What there is to know about one axis' correction.
 struct CorrectionReport {
-  std::array<double, correction_groups_max> gain{};     ///< in use, one a group
-  std::array<double, correction_groups_max> gain_sd{};  ///< as of the last probing
+  std::array<double, correction_groups_max> gain{};       ///< learned, one a group
+  std::array<double, correction_groups_max> gain_used{};  ///< in use: mid-cut those from before it
+  std::array<double, correction_groups_max> gain_sd{};    ///< as of the last probing
   double bias_um{0.0};
+  double bias_used_um{0.0};
   double sd_um{0.0};           ///< of the corrected displacement now, as far as gains go
   bool probing_wanted{false};  ///< sd_um is above probe_sd_um
   std::uint8_t phase{1};       ///< two_phase: 1 or 2
@@ -60,7 +62,7 @@ class RunningCorrection {
   void restart() noexcept;
 
   [[nodiscard]] CorrectionReport report() const noexcept;
-  /// Gains by name ("gain1", ...), as in `report`; allocates.
+  /// Gains by name ("gain1", ...), as in `report`, and those in use where they differ; allocates.
   [[nodiscard]] static std::map<std::string, double> persistent(const CorrectionReport& report);
   /// Before the first step, from "AXIS.gain1" and so on. Values that are no gains are ignored.
   void restore(const std::map<std::string, double>& of_all_axes, const std::string& axis);

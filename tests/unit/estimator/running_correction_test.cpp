@@ -186,6 +186,38 @@ TEST_CASE("gains survive a restart by name, foreign values do not come in", "[co
   CHECK(other.report().gain[1] == 1.0);
 }
 
+TEST_CASE("a restart in a cut does not bring in what was learned in it", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::recursive);
+  config.bias_drift_um_per_sqrt_h = 5.0;
+  RunningCorrection correction(config, tie_model(), 0);
+  const std::vector<double> rise{5.0, 1.0};
+  correction.step(60s, rise, true);
+  correction.measured(30.0, model_um(5.0, 1.0));
+  correction.step(61s, rise, false);
+  CHECK(correction.correction_um() == 0.0);
+  std::map<std::string, double> kept;
+  for (const auto& [key, value] : RunningCorrection::persistent(correction.report()))
+    kept[std::string("z.").append(key)] = value;
+  RunningCorrection next(config, tie_model(), 0);
+  next.restore(kept, "z");
+  next.step(1s, rise, false);
+  CHECK(next.correction_um() == 0.0);
+  next.step(2s, rise, true);
+  correction.step(62s, rise, true);
+  CHECK(next.correction_um() == correction.correction_um());
+  CHECK(next.correction_um() != 0.0);
+}
+
+TEST_CASE("a bias learned in several steps survives a restart", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::recursive);
+  config.step_um_max = 2.0;
+  RunningCorrection correction(config, tie_model(), 0);
+  correction.restore({{"z.bias_um", 7.5}}, "z");
+  CHECK(correction.report().bias_um == 7.5);
+  correction.restore({{"z.bias_um", 1e9}}, "z");
+  CHECK(correction.report().bias_um == 7.5);
+}
+
 TEST_CASE("a group that names no input of the model is refused", "[correction]") {
   CorrectionConfig config = config_of(CorrectionForm::recursive);
   config.groups[1] = {"t9_degC"};
