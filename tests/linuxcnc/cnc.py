@@ -51,11 +51,11 @@ def hal_file(way, *options):
 class LinuxCnc:
     """One run of LinuxCNC; its operator's methods are this object's."""
 
-    def __init__(self, folder, way, daemon_socket, bridge_arguments=""):
+    def __init__(self, folder, way, daemon_socket):
         self.folder = folder
         self.way = way
-        self.daemon_socket = daemon_socket
-        self.bridge_arguments = bridge_arguments
+        # A second is enough to see that a warning comes, and that it does not come at once.
+        self.bridge_arguments = f"--socket {daemon_socket} --mismatch-after-s 1.0"
         self.process = None
 
     def prepare(self):
@@ -66,7 +66,7 @@ class LinuxCnc:
         ini = ini.replace("HALFILE = thermal.hal", "HALFILE = thermal.hal\nHALFILE = sampler.hal")
         (self.folder / f"{self.way}.ini").write_text(ini)
         (self.folder / "thermal.hal").write_text(
-            hal_file(self.way, f"--arguments=--socket {self.daemon_socket} {self.bridge_arguments}"))
+            hal_file(self.way, f"--arguments={self.bridge_arguments}"))
         (self.folder / "sampler.hal").write_text(sampler_file())
         shutil.copy(HERE / "machine_operator.py", self.folder)
         for path in (self.folder, *self.folder.rglob("*")):

@@ -96,7 +96,7 @@ def test_unhome_and_home(scenario):
         mill.cnc.mdi("G53 G0 " + " ".join(f"{a}{mm}" for a, mm in HOME_mm.items()))
         with recording(mill.cnc) as made:
             mill.cnc.unhome()
-            time.sleep(1.0 if i == 2 else 0.1)
+            time.sleep(0.5 if i == 2 else 0.1)
         if i == 2:
             print(f"un-homed with 30 um in effect: step_um_per_ms {made[0].largest_step_um():.3f}")
         mill.cnc.home()
@@ -147,7 +147,7 @@ def test_daemon_killed_and_restarted(scenario):
 
 def rejoin(mill, name, old):
     (mill.cnc.folder / "rejoin.hal").write_text(
-        hal_file(WAY, f"--arguments=--socket {mill.cnc.daemon_socket}", "--name", old,
+        hal_file(WAY, f"--arguments={mill.cnc.bridge_arguments}", "--name", old,
                  "--rejoin", name))
     status, said = mill.cnc.halcmd("-f", "/mnt/rejoin.hal")
     assert status == 0, said

@@ -100,12 +100,12 @@ def test_lost_data_in_mid_program_hold_the_offset_and_warn(mill):
     held_um = [a["offset"] for a in status["axes"]]
     eventually(lambda: signals_true(mill, "tc-warning"), "the warning, of the daemon's mode")
     with recording(mill.cnc) as held:
-        time.sleep(1.5)
+        time.sleep(1.0)
     mill.daemon.kill()
     eventually(lambda: not signals_true(mill, "tc-fresh"), "the offsets are not fresh")
     assert signals_true(mill, "tc-warning")
     with recording(mill.cnc) as alone:
-        time.sleep(1.5)
+        time.sleep(1.0)
     assert mill.cnc.running()
     for seen in held + alone:
         assert np.ptp(seen.position_mm, axis=0).max() > 1.0  # in mid-program
