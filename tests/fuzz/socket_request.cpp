@@ -84,8 +84,8 @@ class Desk {
       const double gain = report_.axes[asked.axis].correction.gain[g];
       FUZZ_PROMISE(gain >= correction.gain_min && gain <= correction.gain_max);
     }
-    // A new reference takes the learned bias away.
-    if (asked.kind != CommandKind::reference)
+    // A new reference takes the learned bias away; before the first prediction there is nothing.
+    if (asked.kind != CommandKind::reference && std::isfinite(before_um))
       FUZZ_PROMISE(std::abs(displacement_um(asked.axis) - before_um) <=
                    correction.step_um_max + rise_um_a_step);
   }
