@@ -17,8 +17,8 @@
 
 #include "config/run_file.hpp"
 #include "simulator/event_loop.hpp"
-#include "simulator/plant.hpp"
 #include "simulator/field_nodes.hpp"
+#include "simulator/plant.hpp"
 #include "simulator/simulated_machine.hpp"
 #include "simulator/truth_record.hpp"
 

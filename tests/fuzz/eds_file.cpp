@@ -1,4 +1,5 @@
-/// Electronic data sheets: what loads can be found by address and by name, what is refused is named.
+/// Electronic data sheets: what loads can be found by address and by name, what is refused is
+/// named.
 #include "config/eds_file.hpp"
 
 #include <algorithm>
