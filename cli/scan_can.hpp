@@ -21,8 +21,9 @@ namespace thermocomp::cli {
 /// The same for the protocols above CAN. A CANopen bus is worked as the daemon would work it: the
 /// nodes are set up, started and asked as the configuration says. On a J1939 bus NAMEs are asked
 /// for, and our own is claimed if the configuration has one.
+/// @param find_nodes  asks every node number for its object 1000 (device type) afterwards
 [[nodiscard]] ScanBus scan_canopen(const CanopenBusConfig& config, const ScanSensors& sensors,
-                                   double listen_s,
+                                   double listen_s, bool find_nodes,
                                    const std::function<void(const std::string&)>& progress);
 [[nodiscard]] ScanBus scan_j1939(const J1939BusConfig& config, const ScanSensors& sensors,
                                  double listen_s,

@@ -67,7 +67,8 @@ ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
   }
   for (const CanopenBusConfig& bus : config.canopen_buses) {
     if (!wanted(bus.name)) continue;
-    report.buses.push_back(scan_canopen(bus, sensors, options.listen_s, progress));
+    report.buses.push_back(
+        scan_canopen(bus, sensors, options.listen_s, options.search.wanted, progress));
   }
   for (const J1939BusConfig& bus : config.j1939_buses) {
     if (!wanted(bus.name)) continue;
@@ -105,8 +106,8 @@ void add_scan_command(CLI::App& app, Action& action) {
   sub->add_option("--listen", options->listen_s, "seconds to listen to a CAN bus for (default 3)")
       ->check(CLI::Range(0.1, 600.0));
   sub->add_flag("--find", options->search.wanted,
-                "also ask the units of each Modbus bus that the configuration does not name");
-  sub->add_option("--units", options->units, "units that --find asks (default 1-32)")
+                "also ask the units and CANopen nodes that the configuration does not name");
+  sub->add_option("--units", options->units, "Modbus units that --find asks (default 1-32)")
       ->type_name("A-B");
   sub->callback([&action, options] { action = [options] { return run_scan(*options); }; });
 }

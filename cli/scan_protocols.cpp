@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <map>
 #include <poll.h>
+#include <set>
 #include <span>
 
 #include "cli/scan_can.hpp"
@@ -89,6 +90,59 @@ ScanChannel show(const Reading& reading, nanoseconds now, const PlausibleRange& 
   return result;
 }
 
+constexpr int nodes_max = 127;
+
+/// An SDO request to read object 1000, which every node has.
+CanFrame device_type_request(int node) {
+  constexpr std::uint32_t request_base = 0x600;
+  CanFrame frame;
+  frame.id = {request_base + static_cast<std::uint32_t>(node), false};
+  frame.size = 8;
+  frame.data[0] = 0x40;
+  frame.data[2] = 0x10;
+  return frame;
+}
+
+/// Notes who answers or shows itself by a heartbeat, until `end`.
+void collect_nodes(CanSocket& socket, nanoseconds end, std::set<int>& nodes) {
+  constexpr std::uint32_t answer_base = 0x580;
+  constexpr std::uint32_t heartbeat_base = 0x700;
+  do {
+    pollfd wait{socket.descriptor(), POLLIN, 0};
+    static_cast<void>(::poll(&wait, 1, 2));
+    for (const CanFrame& frame : socket.receive()) {
+      const std::uint32_t node = frame.id.id & 0x7FU;
+      const std::uint32_t base = frame.id.id - node;
+      if (frame.id.extended || node == 0) continue;
+      if (base == answer_base || base == heartbeat_base) nodes.insert(static_cast<int>(node));
+    }
+  } while (socket.is_open() && monotonic_now() < end);
+}
+
+void find_canopen_nodes(const CanopenBusConfig& config, CanSocket& socket, ScanBus& bus,
+                        const std::function<void(const std::string&)>& progress) {
+  progress("bus " + config.name +
+           ": asking nodes 1 to 127 for object 1000 (SDO), one frame each, about 1 s");
+  std::set<int> nodes;
+  for (int node = 1; node <= nodes_max && socket.is_open(); ++node) {
+    static_cast<void>(socket.send(device_type_request(node)));
+    collect_nodes(socket, monotonic_now() + from_seconds(0.004), nodes);
+  }
+  collect_nodes(socket, monotonic_now() + from_seconds(0.5), nodes);
+  std::set<int> configured;
+  for (const CanopenNodeConfig& node : config.nodes) configured.insert(node.node);
+  std::string all;
+  std::string unknown;
+  for (const int node : nodes) {
+    bus.found_numbers.push_back(node);
+    all.append(all.empty() ? "" : ", ").append(std::to_string(node));
+    if (configured.contains(node)) continue;
+    unknown.append(unknown.empty() ? "" : ", ").append(std::to_string(node));
+  }
+  bus.found = "nodes 1 to 127 searched: " + (all.empty() ? "none is there" : all + " are there");
+  if (!unknown.empty()) bus.found += "; not in the configuration: " + unknown;
+}
+
 /// What a reading of the protocol is of.
 struct Place {
   std::size_t device;
@@ -104,8 +158,10 @@ struct ProtocolBus {
   std::vector<Place> places;
 };
 
+/// @param afterwards  what else is done with the open bus
 ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors& sensors,
-                      double listen_s, const std::function<void(const std::string&)>& progress) {
+                      double listen_s, const std::function<void(const std::string&)>& progress,
+                      const std::function<void(CanSocket&, ScanBus&)>& afterwards) {
   ScanBus bus;
   bus.name = what.name;
   bus.kind = what.kind;
@@ -120,6 +176,7 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
     worked = work(protocol, socket, listen_s);
     bus.error = socket.error();
     bus.note = heard_text(worked);
+    afterwards(socket, bus);
   } else {
     bus.error = "cannot be opened: " + socket.error();
   }
@@ -155,7 +212,7 @@ std::string place_of(const CanopenChannel& channel) {
 }  // namespace
 
 ScanBus scan_canopen(const CanopenBusConfig& config, const ScanSensors& sensors, double listen_s,
-                     const std::function<void(const std::string&)>& progress) {
+                     bool find_nodes, const std::function<void(const std::string&)>& progress) {
   ProtocolBus bus{config.name, "canopen", config.interface, {}, {}};
   for (const CanopenNodeConfig& node : config.nodes) {
     for (const CanopenChannel& channel : node.channels) {
@@ -164,7 +221,10 @@ ScanBus scan_canopen(const CanopenBusConfig& config, const ScanSensors& sensors,
     bus.devices.push_back({node.name, "node " + std::to_string(node.node), false, "", {}});
   }
   CanopenLine line(config);
-  return scan_protocol(std::move(bus), line, sensors, listen_s, progress);
+  return scan_protocol(std::move(bus), line, sensors, listen_s, progress,
+                       [&](CanSocket& socket, ScanBus& shown) {
+                         if (find_nodes) find_canopen_nodes(config, socket, shown, progress);
+                       });
 }
 
 ScanBus scan_j1939(const J1939BusConfig& config, const ScanSensors& sensors, double listen_s,
@@ -182,7 +242,8 @@ ScanBus scan_j1939(const J1939BusConfig& config, const ScanSensors& sensors, dou
     bus.devices.push_back({node.name, address, false, "", {}});
   }
   J1939Line line(config);
-  return scan_protocol(std::move(bus), line, sensors, listen_s, progress);
+  return scan_protocol(std::move(bus), line, sensors, listen_s, progress,
+                       [](CanSocket&, ScanBus&) {});
 }
 
 }  // namespace thermocomp::cli
