@@ -540,6 +540,7 @@ auto* find_by_name(Entries& entries, std::string_view name) noexcept {
 
 std::vector<std::string> names_of(const auto& entries) {
   std::vector<std::string> names;
+  names.reserve(entries.size());
   for (const auto& entry : entries) names.push_back(entry.name);
   return names;
 }
