@@ -34,7 +34,7 @@ using identification::TieCoefficients;
 constexpr double step_s = 10.0;
 constexpr double temperature_noise_K = 0.0316;  // 0.1 K a reading, one a second, ten in a step
 constexpr double probing_noise_um = 0.3;
-constexpr int probing_every_steps = 30;  // 5 min
+constexpr std::size_t probing_every_steps = 30;  // 5 min
 constexpr double hours = 5.0;
 constexpr double tie_mm = 250.0;
 constexpr double tie_places = 10.0;
