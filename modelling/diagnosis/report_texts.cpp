@@ -69,7 +69,8 @@ constexpr std::array<CauseTexts, 23> texts = {{
 /// Of a thermal network: the subject is a signal and a place.
 std::string_view key_of(const NamedFinding& finding) {
   const bool network = finding.subject.find('|') != std::string::npos;
-  return finding.cause == "missing_heat_source" && network ? "missing_heat" : finding.cause;
+  if (finding.cause == "missing_heat_source" && network) return "missing_heat";
+  return finding.cause;
 }
 
 const CauseTexts* texts_of(std::string_view cause) {

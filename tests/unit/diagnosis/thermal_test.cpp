@@ -1,0 +1,209 @@
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include <catch2/catch.hpp>
+
+#include "config/problems.hpp"
+#include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/thermal/network_simulation.hpp"
+#include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::diagnosis;
+
+namespace {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "thermocomp-XXXXXX").string();
+    if (mkdtemp(name.data()) != nullptr) path_ = name;
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  [[nodiscard]] std::filesystem::path file(const std::string& text) const {
+    std::ofstream(path_ / "machine.toml") << text;
+    return path_ / "machine.toml";
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+const std::string network = R"(
+format = 1
+[plant]
+[[signal]]
+name = "spindle_rpm"
+kind = "steps"
+times_s = [0]
+values = [0]
+[[node]]
+name = "head"
+capacity_J_per_K = 20e3
+room_W_per_K = 8.0
+[[node]]
+name = "column"
+capacity_J_per_K = 40e3
+room_W_per_K = 6.0
+[[link]]
+between = ["head", "column"]
+conductance_W_per_K = 10.0
+[[source]]
+node = "head"
+signal = "spindle_rpm"
+heat_W = 200.0
+at = 6000.0
+[[thermocouple]]
+name = "head"
+node = "head"
+[[thermocouple]]
+name = "column"
+node = "column"
+)";
+const std::string room = "[[thermocouple]]\nname = \"room\"\nnode = \"room\"\n";
+
+/// What the machine is; as the network says where nothing is changed.
+struct Truth {
+  double head_film_W_per_K{8.0};
+  double joint_W_per_K{10.0};
+  double heat_W{200.0};
+  double column_J_per_K{40e3};
+};
+
+/// A run of `rows` minutes, by small explicit steps.
+RunFile run_of(const Truth& truth, unsigned seed, int rows) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  std::uniform_int_distribution<int> speed(0, 3);
+  RunFile run;
+  run.name = "run.csv";
+  run.columns = {"time_s", "spindle_rpm", "room_degC", "head_degC", "column_degC"};
+  run.values.resize(5);
+  double head = 21.0;
+  double column = 21.0;
+  double rpm = 0.0;
+  for (int row = 0; row < rows; ++row) {
+    if (row % 60 == 20) rpm = 2000.0 * speed(random);
+    const double air = 21.0 + 0.8 * std::sin(row / 200.0);
+    const double values[] = {60.0 * row, rpm, air, head + noise(random), column + noise(random)};
+    for (std::size_t i = 0; i < 5; ++i) run.values[i].push_back(values[i]);
+    for (int step = 0; step < 60; ++step) {
+      const double across_W = truth.joint_W_per_K * (head - column);
+      head +=
+          (truth.heat_W * rpm / 6000.0 - across_W - truth.head_film_W_per_K * (head - air)) / 20e3;
+      column += (across_W - 6.0 * (column - air)) / truth.column_J_per_K;
+    }
+  }
+  run.selected_end = run.rows();
+  return run;
+}
+
+Diagnosis diagnosis_of(const Truth& truth, ReportData* report = nullptr) {
+  const TemporaryFolder folder;
+  return diagnose_thermal(load_thermal_plant(folder.file(network + room)), {run_of(truth, 1, 600)},
+                          {"train.csv"}, {run_of(truth, 2, 400)}, {"test.csv"}, report);
+}
+
+double parameter(const NamedFinding& finding, const std::string& name) {
+  for (const Parameter& each : finding.parameters)
+    if (each.name == name) return each.values.at("");
+  return NAN;
+}
+
+}  // namespace
+
+TEST_CASE("a network that is right is left alone", "[diagnosis][thermal]") {
+  const Diagnosis answer = diagnosis_of({});
+  CHECK(answer.verdict == "none");
+  CHECK(answer.outputs.at("head_degC").test_rms_um < 0.15);
+}
+
+TEST_CASE("what is wrong in a network is named with its size and its gain",
+          "[diagnosis][thermal]") {
+  Truth film;
+  film.head_film_W_per_K = 16.0;
+  Truth joint;
+  joint.joint_W_per_K = 4.0;
+  Truth heat;
+  heat.heat_W = 300.0;
+  Truth capacity;
+  capacity.column_J_per_K = 80e3;
+  struct Case {
+    Truth truth;
+    const char *cause, *subject, *key;
+    double value;
+  };
+  for (const Case& each :
+       {Case{film, "wrong_film_coefficient", "head|room", "room_W_per_K", 16.0},
+        Case{joint, "wrong_conductance", "column|head", "conductance_W_per_K", 4.0},
+        Case{heat, "wrong_heat_source", "spindle_rpm|head", "heat_W", 300.0},
+        Case{capacity, "wrong_heat_capacity", "column", "capacity_J_per_K", 80e3}}) {
+    CAPTURE(each.cause);
+    ReportData report;
+    const Diagnosis answer = diagnosis_of(each.truth, &report);
+    REQUIRE(answer.findings.size() == 1);
+    const NamedFinding& finding = answer.findings.front();
+    CHECK(finding.cause == each.cause);
+    CHECK(finding.subject == each.subject);
+    CHECK(parameter(finding, each.key) == Approx(each.value).epsilon(0.05));
+    CHECK(answer.outputs.at("column_degC").extended_test_rms_um < 0.15);
+    const std::string json = diagnosis_json(answer);
+    CHECK(json.find("\"test_rms_K\"") != std::string::npos);
+    CHECK(json.find("_um\"") == std::string::npos);
+    CHECK(report_html(answer, report).find("RMS and peak in K.") != std::string::npos);
+  }
+}
+
+TEST_CASE("steps that the converter makes are noise, not structure", "[diagnosis][thermal]") {
+  const TemporaryFolder folder;
+  const ThermalPlant plant = load_thermal_plant(folder.file(network + room));
+  RunFile train = run_of({}, 1, 600);
+  RunFile test = run_of({}, 2, 400);
+  for (RunFile* run : {&train, &test})
+    for (const std::size_t column : {3U, 4U})
+      for (double& value : run->values[column]) value = std::round(2.0 * value) / 2.0;
+  CHECK(diagnose_thermal(plant, {train}, {"a"}, {test}, {"b"}).verdict == "none");
+}
+
+TEST_CASE("a thermal network without what it needs is refused", "[diagnosis][thermal]") {
+  const TemporaryFolder folder;
+  CHECK_THROWS_AS(load_thermal_plant(folder.file(network)), ConfigurationError);
+  CHECK_THROWS_AS(load_thermal_plant(folder.file("format = 1\n")), ConfigurationError);
+  const ThermalPlant plant = load_thermal_plant(folder.file(network + room));
+  const RunFile good = run_of({}, 1, 100);
+  for (const char* missing : {"spindle_rpm", "room_degC"}) {
+    RunFile bad = good;
+    for (std::string& column : bad.columns)
+      if (column == missing) column = "other_on";
+    CAPTURE(missing);
+    CHECK_THROWS_AS(diagnose_thermal(plant, {good}, {"a"}, {bad}, {"b"}), ConfigurationError);
+  }
+  RunFile blind = good;
+  for (const std::size_t column : {3U, 4U})
+    for (double& value : blind.values[column]) value = NAN;
+  CHECK_THROWS_AS(diagnose_thermal(plant, {blind}, {"a"}, {good}, {"b"}), ConfigurationError);
+}
+
+TEST_CASE("rows may come at any times and readings may be missing", "[diagnosis][thermal]") {
+  const TemporaryFolder folder;
+  const ThermalPlant plant = load_thermal_plant(folder.file(network + room));
+  RunFile run = run_of({}, 3, 300);
+  RunFile thinned = run;
+  for (std::vector<double>& values : thinned.values) {
+    std::vector<double> kept;
+    for (std::size_t row = 0; row < values.size(); ++row)
+      if (row < 40 || row % 7 != 3) kept.push_back(values[row]);
+    values = kept;
+  }
+  thinned.selected_end = thinned.rows();
+  thinned.values[3][10] = NAN;
+  const ThermalRuns runs = thermal_runs(plant, {run, thinned}, {"a", "b"}, {"spindle_rpm"});
+  const NetworkSimulation simulation(plant.network);
+  CHECK(simulation.readings_degC(runs, 0)[0].tail(1)[0] ==
+        Approx(simulation.readings_degC(runs, 1)[0].tail(1)[0]).margin(0.15));
+}
