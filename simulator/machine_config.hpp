@@ -49,9 +49,9 @@ struct SimulatedChannel {
   std::string column;  ///< of the plant or of the replayed run file
   ModbusValue place;   ///< value = raw * scale + offset_degC
   double offset_degC{0.0};
-  CanSignal can;     ///< on a CAN bus instead of `place`
+  CanSignal can;                      ///< on a CAN bus instead of `place`
   std::optional<CanField> counter{};  ///< in its frame, counts conversions
-  FaultCodes codes;  ///< in place of the value
+  FaultCodes codes;                   ///< in place of the value
   std::optional<SimulatedStatus> status;
 };
 
