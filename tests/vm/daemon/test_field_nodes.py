@@ -1,5 +1,5 @@
-"""thermocompd between simulated CANopen and J1939 nodes on vcan0 and vcan1, with faults, reboots and
-doubles of the nodes. Each state is waited for; nothing is assumed to happen within a time."""
+"""thermocompd between simulated CANopen and J1939 nodes on vcan0 and vcan1, with faults, reboots
+and doubles of the nodes. Each state is waited for; nothing is assumed to happen within a time."""
 
 import pathlib
 import threading
