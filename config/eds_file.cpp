@@ -123,6 +123,8 @@ class EdsReader {
   }
 
   void read_lines(std::string_view text) {
+    constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+    if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
     Section* section = nullptr;
     int line = 0;
     while (!text.empty() && problems_.size() < problems_max) {

@@ -33,8 +33,18 @@ bool can_be_tpdo(std::uint32_t cob_id) {
 struct Place {
   std::optional<ObjectAddress> object;
   std::optional<ObjectType> type;  ///< of the data sheet
-  bool unknown{false};             ///< a name, and no data sheets are opened
+  bool unknown{false};             ///< a name, and no data sheet says of what; that was told
 };
+
+/// Names as they may be written: whole ones, and parts behind the '/'.
+std::vector<std::string> short_and_long_names(const EdsFile& eds) {
+  std::vector<std::string> names = eds.names();
+  for (std::size_t i = 0, count = names.size(); i < count; ++i) {
+    const std::size_t slash = names[i].find('/');
+    if (slash != std::string::npos) names.push_back(names[i].substr(slash + 1));
+  }
+  return names;
+}
 
 Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles& eds_files) {
   Place place;
@@ -43,22 +53,24 @@ Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles
   if (name.empty()) return place;
   if (!known.eds) {
     place.unknown = true;
-    if (!eds_files.opens_files()) return place;
-    table.problem("object", "needs the data sheet of its device: eds");
+    if (eds_files.opens_files() && !known.names_eds)
+      table.problem("object", "needs the data sheet of its device: eds");
     return place;
   }
   const auto found = known.eds->find(name);
   if (found.size() == 1) {
     place.object = found.front()->address;
     place.type = found.front()->type;
-    if (!place.type) table.problem("object", "is no number in the data sheet");
+    place.unknown = !place.type;
+    if (place.unknown) table.problem("object", "is no number in the data sheet");
     return place;
   }
+  place.unknown = true;
   if (!found.empty()) {
     table.problem("object", "is not clear; may be " + found[0]->name + " or " + found[1]->name);
     return place;
   }
-  const std::string near = nearest_name(name, known.eds->names());
+  const std::string near = nearest_name(name, short_and_long_names(*known.eds));
   std::string rule = "is no object of the data sheet";
   if (!near.empty()) rule.append("; did you mean ").append(near).append("?");
   table.problem("object", rule);
@@ -168,7 +180,8 @@ void read_way(const TomlTable& sensor, const TomlTable& device, const CanopenDev
     channel.poll_s = sensor.number("poll_s", range, device.number("poll_s", range, 1.0));
     const CanopenNodeConfig& node = known.node;
     if (!polled && !place.unknown && node.mappings_read.empty() && node.mappings.empty()) {
-      sensor.problem("index", "needs mappings of its device: read_mappings or mapping; or poll_s");
+      sensor.problem(sensor.has("object") ? "object" : "index",
+                     "needs mappings of its device: read_mappings or mapping; or poll_s");
     }
     return;
   }
@@ -223,6 +236,7 @@ CanopenDevice read_canopen_device(const TomlTable& table, const std::string& nam
   CanopenDevice device;
   CanopenNodeConfig& node = device.node;
   node.name = name;
+  device.names_eds = table.has("eds");
   device.eds = eds_files.read(table);
   node.node = table.integer("node", 1, node_max);
   const Range period = Range::between(0.01, 60.0);
@@ -241,7 +255,14 @@ CanopenDevice read_canopen_device(const TomlTable& table, const std::string& nam
     node.writes.push_back(read_write(entry, device, eds_files));
   }
   for (const TomlTable& entry : table.tables("mapping")) {
-    node.mappings.push_back(read_mapping(entry, node.node));
+    CanopenMapping mapping = read_mapping(entry, node.node);
+    const auto& known = node.mappings;
+    if (std::any_of(known.begin(), known.end(),
+                    [&](const CanopenMapping& each) { return each.cob_id == mapping.cob_id; })) {
+      entry.problem(entry.has("cob_id") ? "cob_id" : "pdo", std::to_string(mapping.cob_id),
+                    "is the COB-ID of a TPDO of this device already");
+    }
+    node.mappings.push_back(std::move(mapping));
   }
   for (const std::int64_t number : table.integers("read_mappings", 1, 512, {})) {
     const int pdo = static_cast<int>(number);

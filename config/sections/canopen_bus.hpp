@@ -36,13 +36,14 @@ class EdsFiles {
 /// A node and its data sheet.
 struct CanopenDevice {
   CanopenNodeConfig node;
-  std::shared_ptr<const EdsFile> eds;
+  bool names_eds{false};
+  std::shared_ptr<const EdsFile> eds;  ///< nullptr: none is named, or it cannot be read
 };
 
 [[nodiscard]] CanopenBusConfig read_canopen_bus(const TomlTable& table, const std::string& name);
 [[nodiscard]] CanopenDevice read_canopen_device(const TomlTable& table, const std::string& name,
                                                 EdsFiles& eds_files);
-/// nullopt: it is an object by name, and no data sheets are opened.
+/// nullopt: it is an object by name, and no data sheet says which.
 /// What `sensor` leaves out is as in `device`.
 [[nodiscard]] std::optional<CanopenChannel> read_canopen_channel(const TomlTable& sensor,
                                                                  const TomlTable& device,

@@ -1,6 +1,4 @@
 // Configurations whose CAN signals are named: what is wrong with the names, or with the file.
-#include <filesystem>
-#include <fstream>
 #include <string>
 
 #include "config/daemon_config.hpp"
@@ -11,38 +9,9 @@ using namespace thermocomp::test;
 
 namespace {
 
-/// A folder with the example, edited.
-class Folder {
+class Folder : public ExampleFolder {
  public:
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "thermocomp-dbc-XXXXXX").string();
-    REQUIRE(::mkdtemp(name.data()) != nullptr);
-    path_ = name;
-    write("column_model.toml", example("column_model.toml"));
-    write("can_dbc.dbc", example("can_dbc.dbc"));
-    write("can_dbc.toml", example("can_dbc.toml"));
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  ~Folder() { std::filesystem::remove_all(path_); }
-
-  void edit(const std::string& file, const std::string& from, const std::string& to) const {
-    write(file, edited(text_of(path_ / file), from, to));
-  }
-  [[nodiscard]] DaemonConfig load() const { return load_daemon_config(path_ / "can_dbc.toml"); }
-  [[nodiscard]] std::string told() const {
-    std::string text;
-    for (const Problem& problem : problems_of([&] { return load(); })) {
-      text += to_string(problem).substr(path_.string().size() + 1) + "\n";
-    }
-    return text;
-  }
-
- private:
-  void write(const std::string& file, const std::string& text) const {
-    std::ofstream(path_ / file) << text;
-  }
-  std::filesystem::path path_;
+  Folder() : ExampleFolder({"can_dbc.toml", "can_dbc.dbc", "column_model.toml"}) {}
 };
 
 /// What is told after one edit of the configuration.

@@ -11,6 +11,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "config/daemon_config.hpp"
 #include "config/problems.hpp"
 
 namespace thermocomp::test {
@@ -53,6 +54,42 @@ std::vector<Problem> problems_of(Load load) {
   }
   return {};
 }
+
+/// A folder with examples, to be edited: what a file says that the configuration names.
+class ExampleFolder {
+ public:
+  /// @param files  the configuration first
+  explicit ExampleFolder(const std::vector<std::string>& files) : config_(files.at(0)) {
+    std::string name =
+        (std::filesystem::temp_directory_path() / "thermocomp-config-XXXXXX").string();
+    REQUIRE(::mkdtemp(name.data()) != nullptr);
+    path_ = name;
+    for (const std::string& file : files) write(file, example(file));
+  }
+  ExampleFolder(const ExampleFolder&) = delete;
+  ExampleFolder& operator=(const ExampleFolder&) = delete;
+  ~ExampleFolder() { std::filesystem::remove_all(path_); }
+
+  void edit(const std::string& file, const std::string& from, const std::string& to) const {
+    write(file, edited(text_of(path_ / file), from, to));
+  }
+  [[nodiscard]] DaemonConfig load() const { return load_daemon_config(path_ / config_); }
+  /// All problems, one a line, without the folder.
+  [[nodiscard]] std::string told() const {
+    std::string text;
+    for (const Problem& problem : problems_of([&] { return load(); })) {
+      text += to_string(problem).substr(path_.string().size() + 1) + "\n";
+    }
+    return text;
+  }
+
+ private:
+  void write(const std::string& file, const std::string& text) const {
+    std::ofstream(path_ / file, std::ios::binary) << text;
+  }
+  std::string config_;
+  std::filesystem::path path_;
+};
 
 /// One way of breaking a good text and what has to be said about it.
 struct Broken {
