@@ -55,6 +55,9 @@ class Desk {
   static DaemonConfig with_socket(const std::filesystem::path& path) {
     DaemonConfig config = fuzz::small_config();
     config.socket.path = path;
+    // The promise about steps is one about probings; smoothed values leap once a period.
+    for (SensorConfig& sensor : config.estimator.sensors)
+      sensor.smoothing.form = SmoothingForm::off;
     config.estimator.compensation.update = UpdateRule::each_cycle;
     CorrectionConfig& correction = config.estimator.correction;
     correction.form = CorrectionForm::recursive;
