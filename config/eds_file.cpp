@@ -254,12 +254,13 @@ class EdsReader {
     }
     const auto names = sections_.find(lower(section.name) + "name");
     for (std::uint64_t sub = 1; sub <= count; ++sub) {
-      std::string own = name + std::to_string(sub);
+      std::string own = std::string(name).append(std::to_string(sub));
       if (names != sections_.end()) {
         const std::string given = text_of(names->second, std::to_string(sub).c_str());
         if (!given.empty()) own = given;
       }
-      add(section, {address.first, static_cast<std::uint8_t>(sub)}, name + "/" + own);
+      add(section, {address.first, static_cast<std::uint8_t>(sub)},
+          std::string(name).append("/").append(own));
     }
   }
 
