@@ -69,7 +69,7 @@ CanBusConfig every_signal() {
     device.name = "node" + std::to_string(i);
     for (int place = 0; place < 4; ++place) {
       CanChannel& channel = device.channels.emplace_back();
-      channel.sensor = static_cast<std::size_t>(4 * i + place);
+      channel.sensor = 4 * static_cast<std::size_t>(i) + static_cast<std::size_t>(place);
       channel.signal.id = first_id + static_cast<std::uint32_t>(i);
       channel.signal.byte_order = place % 2 == 0 ? ByteOrder::little_endian : ByteOrder::big_endian;
       channel.signal.start_bit = 16 * place + (place % 2 == 0 ? 0 : 7);

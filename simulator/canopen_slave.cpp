@@ -51,7 +51,8 @@ void CanopenSlave::boot(nanoseconds now) {
   objects_[{0x1A00, 0}] = number(count, 1);
   for (std::size_t i = 0; i < count; ++i) {
     const auto sub = static_cast<std::uint8_t>(i + 1);
-    objects_[{0x1A00, sub}] = number((std::uint64_t{values} << 16) | (sub << 8u) | 16u, 4);
+    objects_[{0x1A00, sub}] =
+        number((std::uint64_t{values} << 16) | (std::uint64_t{sub} << 8u) | 16u, 4);
     objects_[{0x6110, sub}] = number(0, 2);
     objects_[{values, sub}] = number(0, 2);
   }

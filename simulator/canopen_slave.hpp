@@ -48,9 +48,9 @@ class CanopenSlave {
   std::map<Key, std::vector<std::uint8_t>> objects_;
   std::vector<std::uint8_t> segments_;  ///< left of a segmented read
   std::vector<std::uint8_t> faults_;    ///< told of each channel: 0, or byte 5 of the emergency
-  nanoseconds pdo_at_;
-  nanoseconds heartbeat_at_;
-  nanoseconds emergency_at_;
+  nanoseconds pdo_at_{};
+  nanoseconds heartbeat_at_{};
+  nanoseconds emergency_at_{};
   bool synced_{false};
   std::deque<CanFrame> frames_;
 };

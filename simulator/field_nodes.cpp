@@ -17,8 +17,10 @@ std::vector<std::size_t> find_columns(const std::vector<Channel>& channels, cons
   for (const Channel& channel : channels) {
     const auto place = std::find(columns.begin(), columns.end(), channel.column);
     if (place == columns.end()) {
-      throw std::runtime_error(source + ": has no column " + channel.column + ", which " + user +
-                               " shows");
+      std::string text = source;
+      text.append(": has no column ").append(channel.column).append(", which ");
+      text.append(user).append(" shows");
+      throw std::runtime_error(text);
     }
     found.push_back(static_cast<std::size_t>(place - columns.begin()));
   }

@@ -79,7 +79,7 @@ TEST_CASE("FD and classic frames, pages and counters are read on one interface",
   REQUIRE(bus.becomes(0, 22.5));
   const nanoseconds taken_at = bus.newest(0).taken_at;
   // 32 bytes, the value in bytes 25 and 26; the first frame is of another page.
-  const std::string zeros(2 * 24, '0');
+  const std::string zeros(48, '0');
   REQUIRE(shell("cansend vcan0 182##003" + zeros + "FF000000000000"));
   REQUIRE(shell("cansend vcan0 182##002" + zeros + "E2000000000000"));
   REQUIRE(bus.becomes(1, 22.6));

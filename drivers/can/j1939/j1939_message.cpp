@@ -15,8 +15,8 @@ constexpr std::uint64_t error_byte = 0xFE;
 constexpr std::uint64_t not_available_byte = 0xFF;
 
 std::size_t bytes_needed(const J1939Parameter& parameter) noexcept {
-  return static_cast<std::size_t>(parameter.start_byte +
-                                  (parameter.start_bit + parameter.length_bits + 7) / 8);
+  const int bytes = parameter.start_byte + (parameter.start_bit + parameter.length_bits + 7) / 8;
+  return static_cast<std::size_t>(bytes);
 }
 
 /// Fault::none where the raw value is one.

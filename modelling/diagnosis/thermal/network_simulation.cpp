@@ -98,7 +98,7 @@ Vector start_state(const HeatNetwork& network, const ThermalRun& run) {
     readings[i] = start_degC(run, sensor);
   }
   const Eigen::LDLT<Matrix> factor(stiff);
-  const Vector balance = factor.solve(inflow);
+  Vector balance = factor.solve(inflow);
   if (count == 0) return balance;
   const Matrix answer = factor.solve(rows.transpose());
   Matrix give = rows * answer;

@@ -135,8 +135,10 @@ TEST_CASE("what is wrong in a network is named with its size and its gain",
   capacity.column_J_per_K = 80e3;
   struct Case {
     Truth truth;
-    const char *cause, *subject, *key;
-    double value;
+    const char* cause = nullptr;
+    const char* subject = nullptr;
+    const char* key = nullptr;
+    double value = 0.0;
   };
   for (const Case& each :
        {Case{film, "wrong_film_coefficient", "head|room", "room_W_per_K", 16.0},

@@ -275,7 +275,7 @@ TEST_CASE("mappings are asked for and objects found in them", "[canopen][node]")
   Bus bus(bus_of({node}));
   CHECK(bus.line.wanted().size() == 1);  // everything: the identifier is not known yet
   CHECK(bus.sent() == std::vector<Sent>{{0x605, {0x40, 0x00, 0x18, 0x01, 0, 0, 0, 0}}});
-  const auto answer = [&](Bytes data) { bus.put(0x585, data); };
+  const auto answer = [&](const Bytes& data) { bus.put(0x585, data); };
   SECTION("where they are") {
     answer({0x43, 0x00, 0x18, 0x01, 0x95, 0x01, 0x00, 0x40});  // 0x195, no RTR
     CHECK(bus.sent().at(0).bytes == Bytes{0x40, 0x00, 0x1A, 0x00, 0, 0, 0, 0});

@@ -158,7 +158,7 @@ TEST_CASE("codes at the top of 8, 16, 32 and other lengths are no temperatures",
 }
 
 TEST_CASE("parameters that cannot be are refused by key", "[j1939]") {
-  const auto key_of = [](J1939Parameter parameter) -> std::string {
+  const auto key_of = [](const J1939Parameter& parameter) -> std::string {
     try {
       check(parameter);
     } catch (const InvalidValue& error) {

@@ -112,7 +112,7 @@ TEST_CASE("each event of a simulated node becomes its fault, and heals", "[nodes
     pair.run(1s);
     CHECK(pair.fault(0) == Fault::none);
     pair.run(2s);
-    const std::vector<Fault> during{pair.fault(0), pair.fault(1), pair.fault(2)};
+    std::vector<Fault> during{pair.fault(0), pair.fault(1), pair.fault(2)};
     pair.run(4s);
     for (std::size_t i = 0; i < 3; ++i) CHECK(pair.fault(i) == Fault::none);
     return during;
