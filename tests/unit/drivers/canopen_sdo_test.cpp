@@ -6,43 +6,12 @@
 
 #include <catch2/catch.hpp>
 
+#include "canopen_frames.hpp"
 #include "drivers/can/canopen/emergency.hpp"
 #include "drivers/can/canopen/sdo_client.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
-
-namespace {
-
-using Bytes = std::vector<std::uint8_t>;
-
-Bytes bytes_of(const CanFrame& frame) {
-  return {frame.payload().begin(), frame.payload().end()};
-}
-
-/// What a client has to send: identifier and bytes.
-struct Sent {
-  std::uint32_t id{0};
-  Bytes bytes;
-  bool operator==(const Sent&) const = default;
-};
-std::ostream& operator<<(std::ostream& out, const Sent& sent) {
-  out << std::hex << sent.id << '#';
-  for (const int byte : sent.bytes) out << ' ' << byte;
-  return out << std::dec;
-}
-
-template <class Machine>
-std::vector<Sent> sent_by(Machine& machine) {
-  std::vector<Sent> sent;
-  while (const auto frame = machine.next_frame()) {
-    CHECK_FALSE(frame->id.extended);
-    sent.push_back({frame->id.id, bytes_of(*frame)});
-  }
-  return sent;
-}
-
-}  // namespace
 
 TEST_CASE("SDO: an expedited read is one question and one answer", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
