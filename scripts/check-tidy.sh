@@ -1,6 +1,6 @@
 #!/bin/bash
 # clang-tidy over the translation units of the release build.
-#   scripts/check-tidy.sh [FOLDER...]     default: every folder with code, about 5 minutes on 2 CPUs
+#   scripts/check-tidy.sh [FOLDER...]     default: every folder with code, about 13 minutes on 2 CPUs
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 source scripts/common.sh

@@ -122,6 +122,7 @@ void CanProtocolSource::note_health() {
   health_.state_since = socket_.state_since();
   health_.error_frames = socket_.errors().error_frames;
   health_.bus_offs = socket_.errors().bus_off;
+  health_.restarts = socket_.errors().restarted;
   health_.dropped = socket_.errors().dropped;
   health_.units = std::move(units);
 }
