@@ -7,12 +7,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <signal.h>
 #include <string>
-#include <unistd.h>
 #include <vector>
-
-#include <sys/wait.h>
 
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
@@ -100,27 +96,6 @@ double ratio_of_times(const char* name, ModbusConnection& connection, int cycles
   return median(ratios);
 }
 
-/// Runs `body` in a process of its own while this object lives.
-class ServerProcess {
- public:
-  template <class Body>
-  explicit ServerProcess(Body body) : process_(::fork()) {
-    if (process_ == 0) {
-      body();
-      ::_exit(0);
-    }
-  }
-  ServerProcess(const ServerProcess&) = delete;
-  ServerProcess& operator=(const ServerProcess&) = delete;
-  ~ServerProcess() {
-    ::kill(process_, SIGKILL);
-    ::waitpid(process_, nullptr, 0);
-  }
-
- private:
-  pid_t process_;
-};
-
 double measure(const char* name, const ModbusLine& line, int cycles) {
   ModbusConnection connection(line);
   if (!connection.connect()) give_up(connection.last_error().c_str());
@@ -132,8 +107,9 @@ double measure(const char* name, const ModbusLine& line, int cycles) {
 int main() {
   const bench::PseudoTerminal terminal;
   const bench::TcpListener listener;
-  const ServerProcess serial([&terminal] { bench::serve_rtu(terminal, 1); });
-  const ServerProcess tcp([&listener] { bench::serve_tcp(listener); });
+  const bench::ServerProcess serial([&terminal] { bench::serve_rtu(terminal, 1); });
+  const bench::ServerProcess tcp([&listener] { bench::serve_tcp(listener); });
+  bench::stay_on_processor(0);
   ModbusLine line;
   line.timeout_ms = 2000.0;
   line.link = ModbusRtu{terminal.device(), 19200, 'N', 8, 1, false};

@@ -1,7 +1,13 @@
-/// The servers of bench/modbus_poll: libmodbus' own server over TCP, and a paced serial line.
+/// The servers of bench/modbus_poll and bench/coalesce: libmodbus' own server over TCP, and a paced
+/// serial line.
 #pragma once
 
+#include <csignal>
+#include <cstddef>
 #include <string>
+#include <unistd.h>
+
+#include <sys/wait.h>
 
 namespace bench {
 
@@ -41,5 +47,32 @@ class PseudoTerminal {
 /// Serves the units 1..living; others are silent. Answers after the time the request and the
 /// answer take at 19200 baud, plus 3 ms for the device.
 [[noreturn]] void serve_rtu(const PseudoTerminal& line, std::size_t living);
+
+/// Server and client each on a processor of their own: left to the scheduler, a round runs two to
+/// three times as fast when both happen to share one, and the rounds' ratios say nothing.
+void stay_on_processor(unsigned number);
+
+/// A server in a process of its own, ended with this object.
+class ServerProcess {
+ public:
+  /// @param body  called in the new process, on the second processor
+  template <class Body>
+  explicit ServerProcess(Body body) : process_(::fork()) {
+    if (process_ == 0) {
+      stay_on_processor(1);
+      body();
+      ::_exit(0);
+    }
+  }
+  ServerProcess(const ServerProcess&) = delete;
+  ServerProcess& operator=(const ServerProcess&) = delete;
+  ~ServerProcess() {
+    ::kill(process_, SIGKILL);
+    ::waitpid(process_, nullptr, 0);
+  }
+
+ private:
+  pid_t process_;
+};
 
 }  // namespace bench

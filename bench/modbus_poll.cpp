@@ -17,15 +17,11 @@
 #include <cstdlib>
 #include <cstring>
 #include <numeric>
-#include <sched.h>
-#include <signal.h>
 #include <string>
 #include <thread>
-#include <unistd.h>
 #include <vector>
 
 #include <modbus/modbus.h>
-#include <sys/wait.h>
 
 #include "drivers/monotonic_clock.hpp"
 #include "drivers/sensors/modbus_source.hpp"
@@ -38,38 +34,6 @@ using namespace std::chrono_literals;
 
 constexpr int channels = 32;
 constexpr int registers = 2 * channels;
-
-/// Server and client each on a processor of their own: left to the scheduler, a round runs two to
-/// three times as fast when both happen to share one, and the rounds' ratios say nothing.
-void stay_on_processor(unsigned number) {
-  const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  CPU_SET(number % processors, &set);
-  ::sched_setaffinity(0, sizeof set, &set);  // refused: measured all the same, only noisier
-}
-
-/// A server in a process of its own, ended with this object.
-class ServerProcess {
- public:
-  template <class Body>
-  explicit ServerProcess(Body body) : process_(::fork()) {
-    if (process_ == 0) {
-      stay_on_processor(1);
-      body();
-      ::_exit(0);
-    }
-  }
-  ServerProcess(const ServerProcess&) = delete;
-  ServerProcess& operator=(const ServerProcess&) = delete;
-  ~ServerProcess() {
-    ::kill(process_, SIGKILL);
-    ::waitpid(process_, nullptr, 0);
-  }
-
- private:
-  pid_t process_;
-};
 
 double seconds_of(nanoseconds time) {
   return static_cast<double>(time.count()) * 1e-9;
@@ -172,7 +136,7 @@ double our_rate(int port, nanoseconds duration) {
 
 double rate_over_libmodbus() {
   const bench::TcpListener listener;
-  const ServerProcess server([&listener] { bench::serve_tcp(listener); });
+  const bench::ServerProcess server([&listener] { bench::serve_tcp(listener); });
   constexpr int rounds = 31;
   std::vector<double> ratios;
   std::vector<double> bare_rates;
@@ -208,8 +172,9 @@ double living_rate_half_dead() {
   constexpr std::size_t living = 4;
   const bench::PseudoTerminal line_alone;
   const bench::PseudoTerminal line_shared;
-  const ServerProcess server_alone([&line_alone] { bench::serve_rtu(line_alone, living); });
-  const ServerProcess server_shared([&line_shared] { bench::serve_rtu(line_shared, living); });
+  const bench::ServerProcess server_alone([&line_alone] { bench::serve_rtu(line_alone, living); });
+  const bench::ServerProcess server_shared(
+      [&line_shared] { bench::serve_rtu(line_shared, living); });
   ModbusSource alone(serial_bus(line_alone.device(), 4));
   ModbusSource shared(serial_bus(line_shared.device(), 8));
   alone.start();
@@ -236,7 +201,7 @@ double living_rate_half_dead() {
 }  // namespace
 
 int main() {
-  stay_on_processor(0);
+  bench::stay_on_processor(0);
   const double over_libmodbus = rate_over_libmodbus();
   const double half_dead = living_rate_half_dead();
   std::printf("rate_over_libmodbus %.3f ratio\n", over_libmodbus);
