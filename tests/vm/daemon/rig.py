@@ -154,6 +154,9 @@ class Rig:
             zip(("body", "table"), (body_machine, table_machine), theirs)}
         self.daemon = lab.daemon(daemon_text(*interfaces)).start()
         self.daemon.wait_for_mode("compensating")
+        # The status shows the buses as they were up to a second ago: not connected yet.
+        eventually(lambda: all(bus["connected"] for bus in self.daemon.status()["buses"]),
+                   "both buses are told to be connected")
 
     def start_machine(self, name, text):
         folder = self.lab.folder / name
