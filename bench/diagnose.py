@@ -1,5 +1,7 @@
-"""Times `thermocomp diagnose` beside diagnose_numpy.py on the data of diagnose_data.py."""
+"""Times `thermocomp diagnose` beside diagnose_numpy.py on the data of diagnose_data.py, and compares
+what both weighed and found."""
 
+import json
 import pathlib
 import resource
 import statistics
@@ -10,7 +12,9 @@ import tempfile
 import diagnose_data
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROUNDS = 3
+ROUNDS = 5
+HIDDEN = ("missing_heat_source", "s0_rpm")
+AGREEMENT = 1e-6
 
 
 def cpu_s(command, folder):
@@ -21,30 +25,53 @@ def cpu_s(command, folder):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
 
 
+def difference(ours, numpy):
+    """Largest difference of anything weighed (2 ln L, shares of left-out rows) and of the findings'
+    parameters, relative to 1 or to their size; infinite when other hypotheses came into question."""
+    name = lambda each: (each.get("round"), each["cause"], each["subject"])
+    if [name(w) for w in ours["weighed"]] != [name(w) for w in numpy["weighed"]]:
+        return float("inf")
+    pairs = [(a[key], b[key]) for a, b in zip(ours["weighed"], numpy["weighed"])
+             for key in ("score", "left_out_gain", "log_left")]
+    if [name(f) for f in ours["findings"]] != [name(f) for f in numpy["findings"]]:
+        return float("inf")
+    for finding, other in zip(ours["findings"], numpy["findings"]):
+        parameters = finding["parameters"]
+        pairs += [(parameters["tau_s"], other["shape"]),
+                  (parameters["gain_um_per_unit"]["z_um"], other["gain"])]
+    return max(abs(a - b) / max(1.0, abs(a)) for a, b in pairs)
+
+
 def main(program):
     with tempfile.TemporaryDirectory() as folder:
         diagnose_data.write(folder)
-        ours = [program, "diagnose", "--model", "model.toml", "--train", "train.csv", "--test",
-                "test.csv", "--weighed"]
-        taken = {"ours": [], "numpy": [], "grids": []}
+        answer = pathlib.Path(folder) / "answer.json"
+        commands = {"diagnose": [program, "diagnose", "--model", "model.toml", "--train", "train.csv",
+                                 "--test", "test.csv", "--weighed", "--json", str(answer)],
+                    "numpy": ["/usr/bin/python3", str(HERE / "diagnose_numpy.py"), folder],
+                    "diagnose_start": [program, "diagnose", "--help"],
+                    "numpy_start": ["/usr/bin/python3", "-c", "import json, tomllib, numpy"]}
+        taken, said = {name: [] for name in commands}, {}
         for _ in range(ROUNDS):
-            seconds, said = cpu_s(ours, folder)
-            taken["ours"].append(seconds)
-            if "missing_heat_source of s0_rpm" not in said:
-                raise SystemExit("diagnose did not find what was hidden:\n" + said)
-            searches = max(int(line.split()[1][:-1]) for line in said.splitlines()
-                           if line.startswith("weighed"))
-            seconds, said = cpu_s(["/usr/bin/python3", str(HERE / "diagnose_numpy.py"), folder,
-                                   str(searches)], folder)
-            taken["numpy"].append(seconds)
-            taken["grids"].append(float(said.split()[0]))
-            if "missing_heat_source 0" not in said:
-                raise SystemExit("numpy did not find what was hidden: " + said)
-    ours, numpy = (statistics.median(taken[name]) for name in ("ours", "numpy"))
-    print(f"diagnose_seconds {ours:.3f} s")
-    print(f"numpy_seconds {numpy:.3f} s")
-    print(f"numpy_grids_alone_seconds {statistics.median(taken['grids']):.3f} s")
-    print(f"time_over_numpy {ours / numpy:.4f} ratio")
+            for name, command in commands.items():
+                seconds, said[name] = cpu_s(command, folder)
+                taken[name].append(seconds)
+        ours, numpy = json.loads(answer.read_text()), json.loads(said["numpy"])
+    for answer in (ours, numpy):
+        if [(f["cause"], f["subject"]) for f in answer["findings"]] != [HIDDEN]:
+            raise SystemExit("not found what was hidden: " + json.dumps(answer["findings"]))
+    apart = difference(ours, numpy)
+    if not apart <= AGREEMENT:
+        raise SystemExit("diagnose and numpy do not make the same search: %g" % apart)
+    median = {name: statistics.median(values) for name, values in taken.items()}
+    print(f"largest_difference {apart:.1e} ratio")
+    for name in ("diagnose_start", "numpy_start"):
+        print(f"{name}_seconds {median[name]:.3f} s")
+    print(f"diagnose_seconds {median['diagnose']:.3f} s")
+    print(f"numpy_seconds {median['numpy']:.3f} s")
+    work = {name: median[name] - median[name + "_start"] for name in ("diagnose", "numpy")}
+    print(f"without_start_over_numpy {work['diagnose'] / work['numpy']:.4f} ratio")
+    print(f"time_over_numpy {median['diagnose'] / median['numpy']:.4f} ratio")
 
 
 if __name__ == "__main__":

@@ -94,7 +94,7 @@ int run(const Options& options) {
       write((folder / "model.toml").string(), write_model(diagnosis.extended));
     write((folder / "report.html").string(), report_html(diagnosis, report));
   }
-  if (!options.json.empty()) write(options.json, diagnosis_json(diagnosis));
+  if (!options.json.empty()) write(options.json, diagnosis_json(diagnosis, options.weighed));
   if (options.json != "-") print(diagnosis);
   if (options.json != "-" && options.weighed) print_weighed(diagnosis);
   return 0;
@@ -116,7 +116,7 @@ void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
   command->add_option("--test", options->test, "runs on which the gain is measured")->required();
   command->add_option("--out", options->folder, "folder for the report and the extended model");
   command->add_option("--json", options->json, "file for the answer as JSON; - is the output");
-  command->add_flag("--weighed", options->weighed, "also print what came into question");
+  command->add_flag("--weighed", options->weighed, "also tell what came into question");
   command->callback([options, &action] { action = [options] { return run(*options); }; });
 }
 

@@ -79,6 +79,7 @@ struct Diagnosis {
                                  ReportData* report = nullptr);
 
 /// The answer as JSON (indented, a newline at the end). Numbers that are not known are null.
-[[nodiscard]] std::string diagnosis_json(const Diagnosis& diagnosis);
+/// @param weighed  adds what came into question
+[[nodiscard]] std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed = false);
 
 }  // namespace thermocomp::diagnosis

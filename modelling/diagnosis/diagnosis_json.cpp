@@ -69,9 +69,21 @@ Json finding_json(const NamedFinding& finding, const std::string& unit) {
           {key_of("test_rms", unit), finding.test.empty() ? Json(nullptr) : test}};
 }
 
+Json weighed_json(const Diagnosis& diagnosis) {
+  Json all = Json::array();
+  for (const Weighed& each : diagnosis.weighed)
+    all.push_back({{"round", each.round},
+                   {"cause", each.cause},
+                   {"subject", each.subject},
+                   {"score", number(each.score)},
+                   {"left_out_gain", number(each.left_out_gain)},
+                   {"log_left", number(each.log_left)}});
+  return all;
+}
+
 }  // namespace
 
-std::string diagnosis_json(const Diagnosis& diagnosis) {
+std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
   const std::string& unit = diagnosis.unit;
   const std::string test_rms = key_of("test_rms", unit);
   const std::string test_peak = key_of("test_peak", unit);
@@ -89,11 +101,12 @@ std::string diagnosis_json(const Diagnosis& diagnosis) {
   Json findings = Json::array();
   for (const NamedFinding& finding : diagnosis.findings)
     findings.push_back(finding_json(finding, unit));
-  const Json answer = {{"verdict", diagnosis.verdict},
-                       {"baseline", baseline},
-                       {"findings", findings},
-                       {"extended", extended},
-                       {"unexplained_fraction", unexplained}};
+  Json answer = {{"verdict", diagnosis.verdict},
+                 {"baseline", baseline},
+                 {"findings", findings},
+                 {"extended", extended},
+                 {"unexplained_fraction", unexplained}};
+  if (weighed) answer["weighed"] = weighed_json(diagnosis);
   return answer.dump(2) + "\n";
 }
 
