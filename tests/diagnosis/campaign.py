@@ -58,34 +58,33 @@ def errors(finding, truth):
     return out
 
 
-def examine(task):
-    """@return (task, what was hidden, the answer)"""
+def examined(task, make, model=("--model", "model.toml")):
+    """@param make  writes the files of a case; those that are there already stay
+    @return (task, what was hidden, the answer)"""
     program, keep, kind, level, seed, causes = task
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(keep or temporary) / ("%d_%d_%s" % (level, seed, "+".join(causes)))
         facts = folder / "truth.json"
         if not facts.exists():
-            hidden.make(folder, seed, level, causes)
-        return task, json.loads(facts.read_text()), diagnose(program, folder)
+            make(folder, seed, level, causes)
+        return task, json.loads(facts.read_text()), diagnose(program, folder, model)
 
 
-def tasks_of(options, level):
-    tasks = []
+def examine(task):
+    return examined(task, hidden.make)
 
-    def add(kind, seed, causes):
-        tasks.append((options.program, options.keep, kind, level, seed, causes))
 
-    for i in range(options.cases):
-        add("single", options.seed + i, [hidden.CAUSES[i % len(hidden.CAUSES)]])
-    for i in range(options.null):
-        add("null", NULL_SEED + options.seed + i, [])
-    for i in range(options.outside):
-        add("outside", OUTSIDE_SEED + options.seed + i, [hidden.OUTSIDE[i % len(hidden.OUTSIDE)]])
-    for i in range(options.double):
-        random = np.random.default_rng(i + 7)
-        pair = [str(c) for c in random.choice(hidden.ALWAYS, 2, replace=False)]
-        add("double", DOUBLE_SEED + options.seed + i, pair)
-    return tasks
+def tasks_of(options, level, catalogue):
+    """@param catalogue  causes of single cases, effects outside, causes of pairs"""
+    causes, outside, of_pairs = catalogue
+    pair = lambda i: [str(c) for c in np.random.default_rng(i + 7).choice(of_pairs, 2,
+                                                                          replace=False)]
+    kinds = [("single", 0, options.cases, lambda i: [causes[i % len(causes)]]),
+             ("null", NULL_SEED, options.null, lambda i: []),
+             ("outside", OUTSIDE_SEED, options.outside, lambda i: [outside[i % len(outside)]]),
+             ("double", DOUBLE_SEED, options.double, pair)]
+    return [(options.program, options.keep, kind, level, base + options.seed + i, hide(i))
+            for kind, base, count, hide in kinds for i in range(count)]
 
 
 def said(answer):
@@ -183,13 +182,26 @@ def print_confusion(confusion):
         print("  %-22s -> %s" % (cause, ", ".join("%s %d" % (first, n) for n, first in row)))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+def counted(tasks, examine, levels, show, unit, jobs=2):
+    """@return a Count for each level"""
+    counts = {level: Count(level, show, unit) for level in levels}
+    with multiprocessing.Pool(jobs) as pool:
+        for done, (task, truth, answer) in enumerate(pool.imap(examine, tasks), 1):
+            counts[task[3]].add(task, truth, answer)
+            progress(done, len(tasks))
+    for count in counts.values():
+        count.report()
+    return counts
+
+
+def long_campaign(text, examine, catalogue, numbers, unit="um"):
+    """Runs what the command line asks for.
+    @param text  what the program does
+    @param numbers  of single cases, untouched machines, effects outside, pairs at each level"""
+    parser = argparse.ArgumentParser(description=text.split("\n")[0])
     parser.add_argument("program")
-    parser.add_argument("--cases", type=int, default=144)
-    parser.add_argument("--null", type=int, default=100)
-    parser.add_argument("--outside", type=int, default=40)
-    parser.add_argument("--double", type=int, default=40)
+    for name, number in zip(("cases", "null", "outside", "double"), numbers):
+        parser.add_argument("--" + name, type=int, default=number)
     parser.add_argument("--levels", default="1,2,3")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
@@ -199,15 +211,26 @@ def main():
     options.program = str(pathlib.Path(options.program).resolve())
     if options.keep:
         options.keep = str(pathlib.Path(options.keep).resolve())
-    counts = {int(l): Count(int(l), options.show) for l in options.levels.split(",")}
-    tasks = [task for level in counts for task in tasks_of(options, level)]
-    with multiprocessing.Pool(options.jobs) as pool:
-        for done, (task, truth, answer) in enumerate(pool.imap(examine, tasks), 1):
-            counts[task[3]].add(task, truth, answer)
-            progress(done, len(tasks))
-    for count in counts.values():
-        count.report()
+    levels = [int(level) for level in options.levels.split(",")]
+    tasks = [task for level in levels for task in tasks_of(options, level, catalogue)]
+    counted(tasks, examine, levels, options.show, unit, options.jobs)
+
+
+def short_campaign(program, examine, level, causes, nulls, wrong_max, unit="um"):
+    """Every cause once and some untouched machines.
+    @return exit status: 1 when more than wrong_max are wrong or an untouched machine is not left
+    alone"""
+    tasks = [(program, None, "single", level, seed, [cause]) for seed, cause in enumerate(causes)]
+    tasks += [(program, None, "null", level, NULL_SEED + seed, []) for seed in range(nulls)]
+    count = counted(tasks, examine, [level], True, unit)[level]
+    wrong = count.total["single"] - count.right["single"]
+    return 0 if wrong <= wrong_max and count.right["null"] == count.total["null"] else 1
+
+
+def main():
+    catalogue = hidden.CAUSES, hidden.OUTSIDE, hidden.ALWAYS
+    long_campaign(__doc__, examine, catalogue, (144, 100, 40, 40))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

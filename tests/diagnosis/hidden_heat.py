@@ -205,9 +205,13 @@ def centred_rms(values):
     return np.sqrt(np.mean((values - values.mean(axis=0)) ** 2, axis=0))
 
 
+class NothingToSee(Exception):
+    """No change of this kind shows on this machine."""
+
+
 class Case:
-    def __init__(self, seed, level):
-        self.random = np.random.default_rng([seed, level, 77])
+    def __init__(self, seed, level, attempt=0):
+        self.random = np.random.default_rng([seed, level, 77] + [attempt] * (attempt > 0))
         self.level = LEVELS[level]
         self.sample = int(self.random.choice([6, 6, 12]))
         self.body = Body(self.random)
@@ -267,7 +271,7 @@ class Case:
                 self.body, self.after = body, after
                 self.truth.append(truth)
                 return
-        raise RuntimeError("no visible " + cause)
+        raise NothingToSee(cause)
 
     def _changed(self, cause):
         random = self.random
@@ -379,7 +383,13 @@ class Case:
 
 
 def make(folder, seed, level, causes):
-    case = Case(seed, level)
-    for cause in causes:
-        case.hide(cause)
-    case.write(folder)
+    """On the first machine of the seed on which the causes show."""
+    for attempt in range(10):
+        case = Case(seed, level, attempt)
+        try:
+            for cause in causes:
+                case.hide(cause)
+            return case.write(folder)
+        except NothingToSee:
+            continue
+    raise RuntimeError("no machine shows " + ", ".join(causes))
