@@ -1,0 +1,176 @@
+"""From a structure to its parts to what is wrong with them: structure --plant-parts, simulate,
+diagnose --thermal."""
+import json
+import pathlib
+import tomllib
+
+import pytest
+
+from conftest import PROGRAM, run
+
+pytestmark = pytest.mark.skipif(
+    not (pathlib.Path(PROGRAM).parent / "thermocomp-modelling").exists(),
+    reason="thermocomp-modelling is not in this build")
+
+STRUCTURE = """
+format = 1
+[[material]]
+name = "cast_iron"
+youngs_modulus_GPa = 110.0
+poisson_ratio = 0.25
+expansion_um_per_m_K = 11.0
+conductivity_W_per_m_K = 50.0
+density_kg_per_m3 = 7200.0
+heat_capacity_J_per_kg_K = 500.0
+[[part]]
+name = "column"
+material = "cast_iron"
+size_mm = [{size}, {size}, {size}]
+[[part.box]]
+from_mm = [0, 0, 0]
+to_mm = [300, 300, 900]
+[[part]]
+name = "head"
+material = "cast_iron"
+size_mm = [{size}, {size}, {size}]
+[[part.box]]
+from_mm = [0, -300, 500]
+to_mm = [300, 0, 800]
+[[spring]]
+on = {{ part = "column", z_mm = [0, 0] }}
+stiffness_N_per_um = [300, 300, 600]
+[[joint]]
+name = "head_on_column"
+from = {{ part = "head", y_mm = [0, 0] }}
+to = {{ part = "column", y_mm = [0, 0] }}
+conductance_W_per_m2_K = {joint}
+[[block]]
+name = "column_degC"
+on = {{ part = "column" }}
+[[block]]
+name = "head_degC"
+on = {{ part = "head" }}
+[[output]]
+name = "z_um"
+direction = "z"
+tool = {{ part = "head", at_mm = [150, -300, 500] }}
+work = {{ part = "column", at_mm = [150, 0, 0] }}
+[room]
+temp_degC = 20.0
+[[convection]]
+on = {{ part = "column" }}
+coefficient_W_per_m2_K = {column_film}
+[[convection]]
+on = {{ part = "head" }}
+coefficient_W_per_m2_K = 10.0
+[[heat]]
+name = "bearing"
+on = {{ part = "head", z_mm = [500, 500] }}
+heat_W = 150.0
+signal = "spindle_rpm"
+at = 6000.0
+[[sensor]]
+name = "head_front"
+part = "head"
+at_mm = [150, -300, 650]
+[[sensor]]
+name = "head_rear"
+part = "head"
+at_mm = [150, 0, 800]
+[[sensor]]
+name = "column_low"
+part = "column"
+at_mm = [0, 150, 200]
+[[sensor]]
+name = "column_high"
+part = "column"
+at_mm = [150, 300, 700]
+"""
+
+MACHINE = """
+format = 1
+seed = {seed}
+duration_h = {hours}
+pitch_s = 60.0
+[plant]
+step_s = 60.0
+body = "body.toml"
+[room]
+mean_degC = 21.0
+daily_swing_K = 1.0
+wander_K = 0.2
+[[signal]]
+name = "spindle_rpm"
+kind = "random"
+values = [0, 2000, 6000]
+dwell_s_min = 1200.0
+dwell_s_max = 5400.0
+[[output]]
+name = "z_um"
+""" + "".join(f"""
+[[thermocouple]]
+name = "{name}"
+node = "{name}"
+noise_K = 0.02
+resolution_K = 0.05
+""" for name in ("head_front", "head_rear", "column_low", "column_high", "room"))
+
+
+def machine(folder, size=150, joint=300.0, column_film=8.0):
+    """machine.toml and body.toml of a structure, its elements so large [mm]."""
+    folder.mkdir()
+    text = STRUCTURE.format(size=size, joint=joint, column_film=column_film)
+    (folder / "structure.toml").write_text(text)
+    made = run("structure", folder / "structure.toml", "-o", folder / "model.toml", "--plant",
+               folder / "body.toml", "--plant-parts")
+    assert made.returncode == 0, made.stderr
+    (folder / "machine.toml").write_text(MACHINE.format(seed=1, hours=1.0))
+    return folder
+
+
+def measured(folder):
+    """Runs of the machine: for training and for testing."""
+    files = []
+    for seed, hours in ((11, 14.0), (12, 8.0)):
+        (folder / "machine.toml").write_text(MACHINE.format(seed=seed, hours=hours))
+        files.append(folder / f"run_{seed}.csv")
+        made = run("simulate", folder / "machine.toml", "-o", files[-1])
+        assert made.returncode == 0, made.stderr
+    return files
+
+
+def diagnosis(model, runs, *more):
+    answer = run("diagnose", "--thermal", model / "machine.toml", "--train", runs[0], "--test",
+                 runs[1], "--json", "-", *more)
+    assert answer.returncode == 0, answer.stderr
+    return json.loads(answer.stdout)
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    return machine(tmp_path_factory.mktemp("body") / "model")
+
+
+def test_a_body_names_its_films_joints_and_parts(model):
+    parts = tomllib.loads((model / "body.toml").read_text())["part"]
+    assert {(part["kind"], part["name"]) for part in parts} == {
+        ("capacity", "column"), ("capacity", "head"), ("joint", "head_on_column"),
+        ("room_film", "part column|room"), ("room_film", "part head|room")}
+
+
+def test_a_body_that_is_right_is_left_alone(model, tmp_path):
+    answer = diagnosis(model, measured(machine(tmp_path / "truth", size=100)))
+    assert answer["verdict"] == "none" and answer["findings"] == []
+
+
+@pytest.mark.parametrize("cause, subject, changed, factor", [
+    ("wrong_conductance", "head_on_column", {"joint": 90.0}, 0.3),
+    ("wrong_film_coefficient", "part column|room", {"column_film": 20.0}, 2.5)])
+def test_what_is_wrong_with_a_body_is_named(model, tmp_path, cause, subject, changed, factor):
+    """The machine has finer elements than the model that is given to the diagnosis."""
+    answer = diagnosis(model, measured(machine(tmp_path / "truth", size=100, **changed)))
+    finding = answer["findings"][0]
+    assert (finding["cause"], finding["subject"]) == (cause, subject), answer
+    assert finding["parameters"]["factor"] == pytest.approx(factor, rel=0.25)
+    for test in finding["test_rms_K"].values():
+        assert test["after"] < test["before"]
