@@ -172,5 +172,5 @@ def test_what_is_wrong_with_a_body_is_named(model, tmp_path, cause, subject, cha
     finding = answer["findings"][0]
     assert (finding["cause"], finding["subject"]) == (cause, subject), answer
     assert finding["parameters"]["factor"] == pytest.approx(factor, rel=0.25)
-    for test in finding["test_rms_K"].values():
-        assert test["after"] < test["before"]
+    most = max(finding["test_rms_K"].values(), key=lambda test: test["before"])
+    assert most["after"] < 0.5 * most["before"]
