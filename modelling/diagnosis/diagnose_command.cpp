@@ -14,6 +14,7 @@
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/thermal/corrected_machine.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 
 namespace thermocomp::diagnosis {
@@ -82,18 +83,28 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   return diagnose(load_model(options.model), train, options.train, test, options.test, report);
 }
 
+/// The report, and the model or machine file with what was found.
+void write_folder(const Options& options, const Diagnosis& diagnosis, const ReportData& report) {
+  const std::filesystem::path folder(options.folder);
+  std::filesystem::create_directories(folder);
+  if (options.thermal.empty())
+    write((folder / "model.toml").string(), write_model(diagnosis.extended));
+  else if (const auto text = corrected_machine(options.thermal, diagnosis.findings))
+    write((folder / "machine.toml").string(), *text);
+  write((folder / "report.html").string(), report_html(diagnosis, report));
+}
+
 int run(const Options& options) {
   if (options.model.empty() == options.thermal.empty())
     throw std::runtime_error("diagnose needs either --model or --thermal");
+  const std::filesystem::path corrected = std::filesystem::path(options.folder) / "machine.toml";
+  if (!options.folder.empty() && std::filesystem::exists(corrected) &&
+      std::filesystem::exists(options.thermal) &&
+      std::filesystem::equivalent(corrected, options.thermal))
+    throw std::runtime_error(corrected.string() + ": --out would write over the machine file");
   ReportData report;
   const Diagnosis diagnosis = diagnosis_of(options, options.folder.empty() ? nullptr : &report);
-  if (!options.folder.empty()) {
-    const std::filesystem::path folder(options.folder);
-    std::filesystem::create_directories(folder);
-    if (options.thermal.empty())
-      write((folder / "model.toml").string(), write_model(diagnosis.extended));
-    write((folder / "report.html").string(), report_html(diagnosis, report));
-  }
+  if (!options.folder.empty()) write_folder(options, diagnosis, report);
   if (!options.json.empty()) write(options.json, diagnosis_json(diagnosis, options.weighed));
   if (options.json != "-") print(diagnosis);
   if (options.json != "-" && options.weighed) print_weighed(diagnosis);
@@ -114,7 +125,8 @@ void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
       ->add_option("--train", options->train, "runs from which causes are found: RUN.csv[@T0:T1]")
       ->required();
   command->add_option("--test", options->test, "runs on which the gain is measured")->required();
-  command->add_option("--out", options->folder, "folder for the report and the extended model");
+  command->add_option("--out", options->folder,
+                      "folder for the report and the extended model or corrected machine");
   command->add_option("--json", options->json, "file for the answer as JSON; - is the output");
   command->add_flag("--weighed", options->weighed, "also tell what came into question");
   command->callback([options, &action] { action = [options] { return run(*options); }; });

@@ -1,5 +1,5 @@
-"""From a structure to its parts to what is wrong with them: structure --plant-parts, simulate,
-diagnose --thermal."""
+"""From a machine to what is wrong with its heat flow: structure --plant-parts, simulate,
+diagnose --thermal, and the machine file that it corrects."""
 import json
 import pathlib
 import tomllib
@@ -94,7 +94,7 @@ duration_h = {hours}
 pitch_s = 60.0
 [plant]
 step_s = 60.0
-body = "body.toml"
+{body}
 [room]
 mean_degC = 21.0
 daily_swing_K = 1.0
@@ -107,13 +107,49 @@ dwell_s_min = 1200.0
 dwell_s_max = 5400.0
 [[output]]
 name = "z_um"
-""" + "".join(f"""
+"""
+BODY = 'body = "body.toml"'
+
+LUMPS = """
+[[node]]
+name = "head"
+capacity_J_per_K = 20000
+room_W_per_K = {head_film}
+[[node]]
+name = "column"
+capacity_J_per_K = 40e3
+room_W_per_K = 6.0
+[[link]]
+between = ["head", "column"]                 # as read from a drawing
+conductance_W_per_K = {joint}
+[[source]]
+node = "head"
+signal = "spindle_rpm"
+heat_W = {heat_W}
+at = 6000.0
+"""
+
+
+def thermocouples(names, lag_s=0.0):
+    return "".join(f"""
 [[thermocouple]]
 name = "{name}"
 node = "{name}"
 noise_K = 0.02
 resolution_K = 0.05
-""" for name in ("head_front", "head_rear", "column_low", "column_high", "room"))
+lag_s = {lag_s if name == "head" else 0.0}
+""" for name in [*names, "room"])
+
+
+SENSORS = thermocouples(["head_front", "head_rear", "column_low", "column_high"])
+
+
+def lumped_machine(folder, head_film=8.0, joint=10.0, heat_W=200.0, lag_s=0.0):
+    folder.mkdir()
+    text = LUMPS.format(head_film=head_film, joint=joint, heat_W=heat_W)
+    text += thermocouples(["head", "column"], lag_s)
+    (folder / "machine.toml").write_text(MACHINE.format(seed=1, hours=1.0, body="") + text)
+    return folder
 
 
 def machine(folder, size=150, joint=300.0, column_film=8.0):
@@ -124,15 +160,17 @@ def machine(folder, size=150, joint=300.0, column_film=8.0):
     made = run("structure", folder / "structure.toml", "-o", folder / "model.toml", "--plant",
                folder / "body.toml", "--plant-parts")
     assert made.returncode == 0, made.stderr
-    (folder / "machine.toml").write_text(MACHINE.format(seed=1, hours=1.0))
+    (folder / "machine.toml").write_text(MACHINE.format(seed=1, hours=1.0, body=BODY) + SENSORS)
     return folder
 
 
 def measured(folder):
     """Runs of the machine: for training and for testing."""
+    text = (folder / "machine.toml").read_text()
     files = []
     for seed, hours in ((11, 14.0), (12, 8.0)):
-        (folder / "machine.toml").write_text(MACHINE.format(seed=seed, hours=hours))
+        longer = text.replace("seed = 1\nduration_h = 1.0", f"seed = {seed}\nduration_h = {hours}")
+        (folder / "machine.toml").write_text(longer)
         files.append(folder / f"run_{seed}.csv")
         made = run("simulate", folder / "machine.toml", "-o", files[-1])
         assert made.returncode == 0, made.stderr
@@ -174,3 +212,35 @@ def test_what_is_wrong_with_a_body_is_named(model, tmp_path, cause, subject, cha
     assert finding["parameters"]["factor"] == pytest.approx(factor, rel=0.25)
     most = max(finding["test_rms_K"].values(), key=lambda test: test["before"])
     assert most["after"] < 0.5 * most["before"]
+
+
+@pytest.mark.parametrize("changed, key", [
+    ({"head_film": 16.0}, "room_W_per_K"), ({"joint": 4.0}, "conductance_W_per_K"),
+    ({"heat_W": 320.0}, "heat_W"), ({"lag_s": 900.0}, "lag_s")])
+def test_the_corrected_machine_file_gives_what_was_measured(tmp_path, changed, key):
+    model, truth = lumped_machine(tmp_path / "model"), lumped_machine(tmp_path / "truth", **changed)
+    runs, out = measured(truth), tmp_path / "out"
+    before = diagnosis(model, runs, "--out", out)
+    assert len(before["findings"]) == 1, before
+    wanted = [line for line in (truth / "machine.toml").read_text().splitlines()
+              if line.startswith(key)]
+    found = tomllib.loads((out / "machine.toml").read_text())
+    values = {**found["node"][0], **found["link"][0], **found["source"][0],
+              **found["thermocouple"][0]}
+    assert values[key] == pytest.approx(float(wanted[0].split("=")[1]), rel=0.1)
+    after = diagnosis(out, runs)
+    assert after["verdict"] == "none"
+    for sensor, said in before["extended"].items():
+        assert after["baseline"][sensor]["test_rms_K"] == pytest.approx(said["test_rms_K"], rel=1e-6)
+    worst = max(before["baseline"], key=lambda name: before["baseline"][name]["test_rms_K"])
+    assert after["baseline"][worst]["test_rms_K"] < 0.3 * before["baseline"][worst]["test_rms_K"]
+
+
+def test_a_machine_file_is_not_written_over(tmp_path):
+    model = lumped_machine(tmp_path / "model")
+    text = (model / "machine.toml").read_text()
+    run_file = measured(lumped_machine(tmp_path / "truth"))[1]
+    answer = run("diagnose", "--thermal", model / "machine.toml", "--train", run_file, "--test",
+                 run_file, "--out", model)
+    assert answer.returncode == 2 and "would write over" in answer.stderr
+    assert (model / "machine.toml").read_text() == text
