@@ -83,24 +83,25 @@ double BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
 
 bool BlockBank::update(Block& block, double& temp_degC) noexcept {
   double sum_degC = 0.0;
-  double without_deviation_degC = 0.0;  // what the sum is while some are missing
+  for (const std::size_t sensor : block.sensors) sum_degC += values_K_[sensor];
+  if (std::isnan(sum_degC)) return update_without_the_missing(block, temp_degC);
+  temp_degC = sum_degC / static_cast<double>(block.sensors.size());
+  for (std::size_t i = 0; i < block.sensors.size(); ++i)
+    block.deviation_K[i] = values_K_[block.sensors[i]] - temp_degC;
+  return true;
+}
+
+bool BlockBank::update_without_the_missing(const Block& block, double& temp_degC) const noexcept {
+  double sum_degC = 0.0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < block.sensors.size(); ++i) {
     const double value_K = values_K_[block.sensors[i]];
     if (std::isnan(value_K)) continue;
-    sum_degC += value_K;
-    without_deviation_degC += value_K - block.deviation_K[i];
+    sum_degC += value_K - block.deviation_K[i];
     ++count;
   }
-  if (count == 0) return false;
-  if (count < block.sensors.size()) {
-    temp_degC = without_deviation_degC / static_cast<double>(count);
-    return true;
-  }
-  temp_degC = sum_degC / static_cast<double>(count);
-  for (std::size_t i = 0; i < block.sensors.size(); ++i)
-    block.deviation_K[i] = values_K_[block.sensors[i]] - temp_degC;
-  return true;
+  if (count > 0) temp_degC = sum_degC / static_cast<double>(count);
+  return count > 0;
 }
 
 void BlockBank::report(std::span<SensorReport> sensors) const noexcept {

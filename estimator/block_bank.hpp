@@ -59,6 +59,8 @@ class BlockBank {
   /// Index of the reference sensor in the previous bank, or no_sensor.
   [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
+  [[nodiscard]] bool update_without_the_missing(const Block& block,
+                                                double& temp_degC) const noexcept;
 
   std::vector<Sensor> sensors_;
   std::vector<double> values_K_;  ///< of this step, one a sensor; NaN: not to be used
