@@ -93,7 +93,10 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
     return;
   }
   if (decoded.fault != Fault::none) {
-    result.why = "the device's code for it";
+    CanSignal alone = signal;
+    alone.status.reset();
+    result.why = decode(payload, alone).fault == Fault::none ? "the status beside it says so"
+                                                             : "the device's code for it";
     return;
   }
   if (decoded.value >= range.min_degC && decoded.value <= range.max_degC) return;

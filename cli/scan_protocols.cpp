@@ -1,7 +1,9 @@
 // CANopen and J1939 in a scan: the daemon's own protocol, worked for a while from here.
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <map>
+#include <optional>
 #include <poll.h>
 #include <set>
 #include <span>
@@ -11,6 +13,7 @@
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/canopen/canopen_line.hpp"
 #include "drivers/can/j1939/j1939_line.hpp"
+#include "drivers/can/signal_codec.hpp"
 #include "drivers/monotonic_clock.hpp"
 
 namespace thermocomp::cli {
@@ -30,6 +33,7 @@ std::string number_text(double value) {
 
 struct Worked {
   std::vector<Reading> readings;
+  std::vector<RawReading> raw;
   std::vector<UnitHealth> units;
   std::map<CanId, std::size_t> frames;
   nanoseconds ended_at{};
@@ -55,6 +59,7 @@ Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s) {
   }
   worked.ended_at = monotonic_now();
   worked.readings.assign(protocol.readings().begin(), protocol.readings().end());
+  worked.raw = protocol.raw();
   worked.units = protocol.health(worked.ended_at);
   return worked;
 }
@@ -73,15 +78,80 @@ std::string heard_text(const Worked& worked) {
   return text;
 }
 
-ScanChannel show(const Reading& reading, nanoseconds now, const PlausibleRange& range) {
+std::string raw_text(const RawReading& raw) {
+  std::string text = hex_bytes(raw.value);
+  if (!raw.status.empty()) text += ", status " + hex_bytes(raw.status);
+  return text;
+}
+
+constexpr const char* its_code = "the device's code for it";
+
+bool has_code(const std::vector<Sentinel>& sentinels, std::int64_t code) {
+  return std::any_of(sentinels.begin(), sentinels.end(),
+                     [&](const Sentinel& each) { return each.code == code; });
+}
+
+std::string too_few(const RawReading& raw) {
+  return "only " + std::to_string(raw.value.size()) + " bytes came";
+}
+
+/// Why bytes that came are no value. What the bytes do not say the node said otherwise.
+std::string why_not(const CanopenChannel& channel, Fault fault, const RawReading& raw) {
+  if (fault == Fault::bad_frame) return too_few(raw);
+  CanSignal value = channel.signal;
+  value.status.reset();
+  if (channel.way != CanopenWay::pdo_bits) value.start_bit = 0;
+  if (decode(raw.value, value).fault == fault) return its_code;
+  std::optional<CanStatus> status = channel.signal.status;
+  std::vector<std::uint8_t> bytes = raw.value;
+  if (channel.status) {
+    status = channel.status->number;
+    bytes = raw.status;
+  }
+  if (status && bytes.size() >= bytes_needed(status->field)) {
+    const std::uint64_t number = extract_raw(bytes, status->field);
+    if (fault_of(*status, number) == fault) {
+      return hexadecimal("the status beside it is ", static_cast<std::uint32_t>(number), 2);
+    }
+  }
+  return "the bytes would be a value, but the node is in trouble, see above";
+}
+
+std::string why_not(const J1939Parameter& parameter, Fault fault, const RawReading& raw) {
+  constexpr std::size_t frame_bytes = 8;
+  if (fault == Fault::bad_frame) return too_few(raw);
+  J1939Parameter place = parameter;
+  const auto bytes = static_cast<std::size_t>((place.start_bit + place.length_bits + 7) / 8);
+  if (static_cast<std::size_t>(place.start_byte) + bytes > frame_bytes &&
+      raw.value.size() <= frame_bytes) {
+    place.start_byte = 0;  // of a longer group only its bytes are there
+  }
+  const std::uint64_t number = extract_raw(raw.value, place);
+  if (has_code(place.sentinels, static_cast<std::int64_t>(number))) return its_code;
+  constexpr std::uint64_t not_available = 0xFF;
+  constexpr std::uint64_t error = 0xFE;
+  if (place.length_bits % 8 != 0) return "a message of the standard, no value";
+  const std::uint64_t top = number >> (place.length_bits - 8);
+  if (top == not_available) return "the standard's \"not available\"";
+  return top == error ? "the standard's \"error\"" : "beyond the standard's range for values";
+}
+
+/// Why there is no value; empty where the device's note says it.
+using Why = std::function<std::string(Fault, const RawReading&)>;
+
+ScanChannel show(const Reading& reading, const RawReading& raw, const Why& why, nanoseconds now,
+                 const PlausibleRange& range) {
   ScanChannel result;
   result.fault = reading.fault;
   result.temp_degC = reading.temp_degC;
+  result.raw = raw_text(raw);
   if (reading.taken_at != nanoseconds{0}) {
     result.age_s = static_cast<double>((now - reading.taken_at).count()) * 1e-9;
   }
-  if (reading.fault == Fault::never_read) result.why = "nothing came that carries it";
-  if (reading.fault != Fault::none) return result;
+  if (reading.fault != Fault::none) {
+    result.why = raw.value.empty() ? "nothing came that carries it" : why(reading.fault, raw);
+    return result;
+  }
   if (reading.temp_degC >= range.min_degC && reading.temp_degC <= range.max_degC) return result;
   result.fault = Fault::out_of_range;
   result.why = number_text(reading.temp_degC) + " degC is no temperature of [" +
@@ -148,6 +218,7 @@ struct Place {
   std::size_t device;
   std::size_t sensor;
   std::string text;
+  Why why;
 };
 
 struct ProtocolBus {
@@ -186,8 +257,13 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
                                              order.begin());
     Reading reading;
     reading.fault = Fault::no_answer;
-    if (at < worked.readings.size()) reading = worked.readings[at];
-    ScanChannel shown = show(reading, worked.ended_at, sensors.ranges.at(place.sensor));
+    RawReading raw;
+    if (at < worked.readings.size()) {
+      reading = worked.readings[at];
+      raw = worked.raw[at];
+    }
+    ScanChannel shown =
+        show(reading, raw, place.why, worked.ended_at, sensors.ranges.at(place.sensor));
     shown.sensor = sensors.names.at(place.sensor);
     shown.place = place.text;
     what.devices[place.device].channels.push_back(std::move(shown));
@@ -216,7 +292,10 @@ ScanBus scan_canopen(const CanopenBusConfig& config, const ScanSensors& sensors,
   ProtocolBus bus{config.name, "canopen", config.interface, {}, {}};
   for (const CanopenNodeConfig& node : config.nodes) {
     for (const CanopenChannel& channel : node.channels) {
-      bus.places.push_back({bus.devices.size(), channel.sensor, place_of(channel)});
+      bus.places.push_back({bus.devices.size(), channel.sensor, place_of(channel),
+                            [&channel](Fault fault, const RawReading& raw) {
+                              return why_not(channel, fault, raw);
+                            }});
     }
     bus.devices.push_back({node.name, "node " + std::to_string(node.node), false, "", {}});
   }
@@ -235,7 +314,10 @@ ScanBus scan_j1939(const J1939BusConfig& config, const ScanSensors& sensors, dou
       std::string place = "PGN ";
       place.append(std::to_string(channel.parameter.pgn)).append(" byte ");
       place.append(std::to_string(channel.parameter.start_byte + 1));
-      bus.places.push_back({bus.devices.size(), channel.sensor, std::move(place)});
+      bus.places.push_back({bus.devices.size(), channel.sensor, std::move(place),
+                            [&channel](Fault fault, const RawReading& raw) {
+                              return why_not(channel.parameter, fault, raw);
+                            }});
     }
     const std::string address =
         node.address ? "address " + std::to_string(*node.address) : "by its NAME";

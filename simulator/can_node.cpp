@@ -73,6 +73,16 @@ void CanFrames::set_code(const CanSignal& signal, std::int64_t code) {
         [&](std::span<std::uint8_t> data) { encode(static_cast<double>(code), data, plain); });
 }
 
+void CanFrames::set_status(const CanSignal& signal, std::int64_t number) {
+  if (!signal.status) return;
+  const CanField& field = signal.status->field;
+  const std::uint64_t mask = signal.status->mask;
+  write(signal, [&](std::span<std::uint8_t> data) {
+    const std::uint64_t others = extract_raw(data, field) & ~mask;
+    insert_raw(data, field, others | (static_cast<std::uint64_t>(number) & mask));
+  });
+}
+
 void CanFrames::count() {
   ++counted_;
   for (auto& [id, message] : messages_) {

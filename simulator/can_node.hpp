@@ -22,6 +22,8 @@ class CanFrames {
   /// Saturated where it does not fit; NaN as a float's NaN or an integer's highest code.
   void set_value(const CanSignal& signal, double value);
   void set_code(const CanSignal& signal, std::int64_t code);
+  /// Beside the value, if the signal has a status; bits outside its mask stay.
+  void set_status(const CanSignal& signal, std::int64_t number);
   /// Every counter goes up by one.
   void count();
   /// In the order of identifiers and, of one identifier, of definition.

@@ -43,8 +43,10 @@ CanSignal read_can(const TomlTable& table, CanUse use) {
       {{"little_endian", ByteOrder::little_endian}, {"big_endian", ByteOrder::big_endian}},
       signal.byte_order);
   read_form(table, use, signal);
-  if (use == CanUse::temperature)
+  if (use == CanUse::temperature) {
     signal.selectors = sections::read_selectors(table, table, signal.fd);
+    signal.status = sections::read_can_status(table, table, signal.fd);
+  }
   try {
     check(signal);
   } catch (const InvalidValue& error) {

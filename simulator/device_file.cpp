@@ -233,9 +233,15 @@ void read_channel(Draft& state, const TomlTable& own, const std::vector<DeviceDe
   SimulatedDevice& device = state.machine.devices[index];
   state.channel_places.emplace_back(index, device.channels.size());
   if (state.machine.buses[device.bus].kind == SimulatedBusKind::can) {
-    channel.can = read_can(table, CanUse::temperature);
-    channel.codes = read_codes(table);
+    const TomlTable full = preset == nullptr ? table : table.over(defaults[index].table);
+    channel.can = read_can(full, CanUse::temperature);
+    channel.codes = read_codes(full);
+    if (full.has("status")) channel.can_status = read_can_status_codes(full.table("status"));
     take(state, device.bus, channel.can, table);
+    if (channel.can.status &&
+        !state.occupied[device.bus].take(channel.can, channel.can.status->field)) {
+      table.problem("status", "shares a bit with another value of this frame");
+    }
     channel.counter = read_counter(table, channel.can);
     if (channel.counter && !state.occupied[device.bus].take(channel.can, *channel.counter)) {
       table.problem("counter", "shares a bit with another value of this frame");
@@ -409,7 +415,7 @@ void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& 
   const SimulatedChannel& channel = channels[event.channel];
   const auto has = [&](const FaultCodes& codes) { return codes.contains(*fault); };
   if (!has(channel.codes) && !(channel.status && has(channel.status->codes)) &&
-      *fault != ChannelFault::open_circuit) {
+      !has(channel.can_status.codes) && *fault != ChannelFault::open_circuit) {
     table.problem("kind", "the channel's device has no code for it");
   }
   if (!table.has("code")) return;
@@ -420,7 +426,8 @@ void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& 
     return found != codes.end() && std::find(found->second.begin(), found->second.end(),
                                              *event.channel_code) != found->second.end();
   };
-  if (!lists(channel.codes) && !(channel.status && lists(channel.status->codes))) {
+  if (!lists(channel.codes) && !(channel.status && lists(channel.status->codes)) &&
+      !lists(channel.can_status.codes)) {
     table.problem("code", "must be one that the channel's device has for it");
   }
 }

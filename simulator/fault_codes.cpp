@@ -38,6 +38,14 @@ SimulatedStatus read_simulated_status(const TomlTable& table) {
   return status;
 }
 
+CanStatusCodes read_can_status_codes(const TomlTable& table) {
+  CanStatusCodes status;
+  status.codes = read_fault_codes(table, INT64_MIN, INT64_MAX);  // the place's reader has limits
+  const auto good = table.integers("good_codes", INT64_MIN, INT64_MAX, std::vector<std::int64_t>{});
+  if (!good.empty()) status.good = good.front();
+  return status;
+}
+
 bool RegistersTaken::take(int unit, ModbusTable table, std::size_t address, std::size_t count,
                           std::uint16_t mask) {
   bool free = true;

@@ -19,6 +19,9 @@ namespace thermocomp {
 /// A status beside a value: a bit that is 1 at any fault unless codes are listed, or a register.
 [[nodiscard]] SimulatedStatus read_simulated_status(const TomlTable& table);
 
+/// The numbers of a status beside a value in a frame; its place is read elsewhere.
+[[nodiscard]] CanStatusCodes read_can_status_codes(const TomlTable& table);
+
 /// Which registers of a unit are taken. Bits of one register may belong to several statuses.
 class RegistersTaken {
  public:

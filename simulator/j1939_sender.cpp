@@ -10,10 +10,11 @@
 namespace thermocomp {
 namespace {
 
-constexpr double scale_degC = 0.03125;
-constexpr double offset_degC = -273.0;
-constexpr double greatest = 0xFAFF;
-constexpr std::uint16_t error_code = 0xFE00;
+// Of the highest byte, or of the whole where that is less.
+constexpr std::uint64_t greatest = 0xFA;
+constexpr std::uint64_t beyond = 0xFB;
+constexpr std::uint64_t error_code = 0xFE;
+constexpr std::uint64_t not_available = 0xFF;
 constexpr std::size_t frame_bytes = 8;
 constexpr std::size_t packet_bytes = 7;
 constexpr std::uint8_t broadcast_announce = 32;
@@ -23,19 +24,41 @@ constexpr std::uint8_t broadcast_announce = 32;
 J1939Sender::J1939Sender(const SimulatedJ1939Node& config, nanoseconds now)
     : config_(config), switched_on_(now), groups_at_(now) {
   for (const J1939NodeChannel& channel : config_.channels) {
-    std::vector<std::uint8_t>& group = groups_[channel.pgn];
-    const auto end = static_cast<std::size_t>(channel.start_byte) + 2;
+    std::vector<std::uint8_t>& group = groups_[channel.place.pgn];
+    const auto bytes = static_cast<std::size_t>(channel.place.length_bits / 8);
+    const std::size_t end = static_cast<std::size_t>(channel.place.start_byte) + bytes;
     group.resize(std::max({group.size(), end, frame_bytes}), 0xFF);  // not available
   }
   claim();
 }
 
-bool J1939Sender::happens(NodeEventKind kind, nanoseconds now, std::size_t channel) const {
-  const double time_s = std::chrono::duration<double>(now - switched_on_).count();
+bool J1939Sender::happens(NodeEventKind kind, nanoseconds now) const {
   return std::any_of(config_.events.begin(), config_.events.end(), [&](const NodeEvent& event) {
-    return event.kind == kind && event.channel == channel && time_s >= event.at_s &&
-           time_s < event.at_s + event.duration_s;
+    return event.kind == kind && is_now(event, now);
   });
+}
+
+bool J1939Sender::is_now(const NodeEvent& event, nanoseconds now) const {
+  const double time_s = std::chrono::duration<double>(now - switched_on_).count();
+  return time_s >= event.at_s && time_s < event.at_s + event.duration_s;
+}
+
+/// What stands in place of the channel's value: the event's code, or the first of its fault, or the
+/// standard's; none: it measures.
+std::optional<std::uint64_t> J1939Sender::code_of(std::size_t channel, nanoseconds now) const {
+  const auto event =
+      std::find_if(config_.events.begin(), config_.events.end(), [&](const NodeEvent& each) {
+        return channel_fault(each.kind) && each.channel == channel && is_now(each, now);
+      });
+  if (event == config_.events.end()) return std::nullopt;
+  if (event->code) return static_cast<std::uint64_t>(*event->code);
+  const J1939NodeChannel& from = config_.channels[channel];
+  const auto listed = code_for(from.codes, channel_fault(event->kind), std::nullopt);
+  if (listed) return static_cast<std::uint64_t>(*listed);
+  const int shift = from.place.length_bits - 8;
+  if (event->kind == NodeEventKind::over_range) return beyond << shift;
+  if (event->kind == NodeEventKind::channel_error) return not_available << shift;
+  return error_code << shift;
 }
 
 void J1939Sender::put(std::uint32_t pgn, std::span<const std::uint8_t> data) {
@@ -89,13 +112,15 @@ void J1939Sender::update(nanoseconds now, std::span<const double> temps_degC) {
   const nanoseconds period = from_seconds(config_.period_s);
   groups_at_ = now - groups_at_ < period ? groups_at_ + period : now + period;
   for (std::size_t i = 0; i < config_.channels.size(); ++i) {
-    const J1939NodeChannel& channel = config_.channels[i];
-    const double counts = std::round((temps_degC[i] - offset_degC) / scale_degC);
-    const bool is_open = happens(NodeEventKind::open_circuit, now, i) || std::isnan(counts);
-    const auto raw =
-        is_open ? error_code : static_cast<std::uint16_t>(std::clamp(counts, 0.0, greatest));
-    put_little_endian(groups_.at(channel.pgn), static_cast<std::size_t>(channel.start_byte), 2,
-                      raw);
+    const J1939Parameter& place = config_.channels[i].place;
+    const double highest = std::ldexp(static_cast<double>(greatest + 1), place.length_bits - 8) - 1;
+    const double counts = std::round((temps_degC[i] - place.offset) / place.scale);
+    const auto value = std::isnan(counts)
+                           ? error_code << (place.length_bits - 8)
+                           : static_cast<std::uint64_t>(std::clamp(counts, 0.0, highest));
+    put_little_endian(groups_.at(place.pgn), static_cast<std::size_t>(place.start_byte),
+                      static_cast<std::size_t>(place.length_bits / 8),
+                      code_of(i, now).value_or(value));
   }
   for (const auto& [pgn, bytes] : groups_) send_group(pgn, bytes);
 }

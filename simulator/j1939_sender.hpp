@@ -26,7 +26,9 @@ class J1939Sender {
   void claim();
   void send_group(std::uint32_t pgn, std::span<const std::uint8_t> bytes);
   void put(std::uint32_t pgn, std::span<const std::uint8_t> data);
-  [[nodiscard]] bool happens(NodeEventKind kind, nanoseconds now, std::size_t channel = 0) const;
+  [[nodiscard]] bool is_now(const NodeEvent& event, nanoseconds now) const;
+  [[nodiscard]] bool happens(NodeEventKind kind, nanoseconds now) const;
+  [[nodiscard]] std::optional<std::uint64_t> code_of(std::size_t channel, nanoseconds now) const;
 
   const SimulatedJ1939Node config_;
   const nanoseconds switched_on_;

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,11 +28,6 @@ struct SimulatedBus {
   std::string interface;      ///< CAN
 };
 
-/// What a device can say of a channel instead of its temperature.
-enum class ChannelFault { open_circuit, short_circuit, over_range, under_range, error };
-/// Raw codes for it; the first of a list is shown unless an event names another.
-using FaultCodes = std::map<ChannelFault, std::vector<std::int64_t>>;
-
 /// A register or bit beside a value; it has `good` in the bits of its mask while all is well.
 struct SimulatedStatus {
   ModbusTable table{ModbusTable::discrete_input};
@@ -53,6 +47,7 @@ struct SimulatedChannel {
   std::optional<CanField> counter{};  ///< in its frame, counts conversions
   FaultCodes codes;                   ///< in place of the value
   std::optional<SimulatedStatus> status;
+  CanStatusCodes can_status{};  ///< numbers of the status that `can` has
 };
 
 struct SimulatedDevice {

@@ -18,7 +18,7 @@ MachineConfig read_machine(const TomlDocument& document, sections::Presets prese
   if (root.has("plant"))
     machine.plant = read_plant(root, std::filesystem::path(document.name()).parent_path());
   read_devices(root, presets, machine);
-  read_field_nodes(root, machine);
+  read_field_nodes(root, presets, machine);
   presets.ignore_rest();  // not every key of a device is a simulated one's
   std::vector<Problem> problems = document.all_problems();
   const std::vector<Problem> preset_problems = presets.problems();

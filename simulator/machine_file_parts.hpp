@@ -35,6 +35,6 @@ class NameList {
 /// [[bus]], [[device]], [[channel]], [controller], [[axis]], [[event]].
 void read_devices(const TomlTable& root, sections::Presets& presets, MachineConfig& machine);
 /// [[canopen_node]] and [[j1939_node]]; after the plant.
-void read_field_nodes(const TomlTable& root, MachineConfig& machine);
+void read_field_nodes(const TomlTable& root, sections::Presets& presets, MachineConfig& machine);
 
 }  // namespace thermocomp

@@ -323,22 +323,16 @@ struct SimulatedMachine::Parts {
 
   // -------------------------------------------------------------- devices
 
-  /// The code that is shown for the fault: the event's if it is listed, else the first listed.
   static std::optional<std::int64_t> code_for(const FaultCodes& codes,
                                               const ChannelEffect& effect) {
-    if (!effect.fault) return std::nullopt;
-    const auto found = codes.find(*effect.fault);
-    if (found == codes.end()) return std::nullopt;
-    const auto& listed = found->second;
-    const bool named =
-        effect.code && std::find(listed.begin(), listed.end(), *effect.code) != listed.end();
-    return named ? *effect.code : listed.front();
+    return thermocomp::code_for(codes, effect.fault, effect.code);
   }
 
   /// A device that tells a fault beside the value leaves a temperature in the value's place; one
   /// that has no code at all for an open circuit shows its highest value, or NaN.
   static double shown(const SimulatedChannel& channel, const ChannelEffect& effect, double value) {
-    const bool told_beside = channel.status && code_for(channel.status->codes, effect);
+    const bool told_beside = (channel.status && code_for(channel.status->codes, effect)) ||
+                             code_for(channel.can_status.codes, effect);
     return effect.fault == ChannelFault::open_circuit && !told_beside ? not_a_number : value;
   }
 
@@ -350,6 +344,8 @@ struct SimulatedMachine::Parts {
     if (can) {
       code ? device.frames.set_code(channel.can, *code)
            : device.frames.set_value(channel.can, shown(channel, seen, value));
+      const CanStatusCodes& status = channel.can_status;
+      device.frames.set_status(channel.can, code_for(status.codes, seen).value_or(status.good));
       return;
     }
     if (code) {

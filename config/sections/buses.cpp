@@ -172,11 +172,10 @@ class BusReader {
       case BusKind::unknown:
         return table.ignore_rest();
       case BusKind::can:
-        refuse_all(
-            table,
-            {"unit", "period_s", "registers_per_request_max", "gap_registers_max",
-             "one_register_a_request", "renewal", "table", "encoding", "word_order", "status"},
-            "makes no sense on a CAN bus");
+        refuse_all(table,
+                   {"unit", "period_s", "registers_per_request_max", "gap_registers_max",
+                    "one_register_a_request", "renewal", "table", "encoding", "word_order"},
+                   "makes no sense on a CAN bus");
         device.index = result_.can[device.bus].devices.size();
         result_.can[device.bus].devices.push_back({name, {}});
         return;
@@ -242,7 +241,7 @@ class BusReader {
       case BusKind::unknown:
         return sensor.ignore_rest();
       case BusKind::can: {
-        refuse_all(sensor, {"table", "address", "encoding", "word_order", "status"},
+        refuse_all(sensor, {"table", "address", "encoding", "word_order"},
                    "makes no sense on a CAN bus");
         CanChannel channel = read_can_channel(sensor, device.table, databases_[device.bus]);
         channel.sensor = index;

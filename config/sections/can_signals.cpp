@@ -72,13 +72,8 @@ void read_form(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
   }
 }
 
-}  // namespace
-
-std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& base,
-                                       std::string_view key, bool fd) {
-  const TomlTable& source = own.has(key) ? own : base;
-  if (!source.has(key)) return std::nullopt;
-  const TomlTable table = source.table(key);
+/// The number that `table` gives the place of; none where it does not fit into the frame.
+std::optional<CanField> read_field(const TomlTable& table, bool fd) {
   CanSignal number;
   number.fd = fd;
   number.start_bit = table.integer("start_bit", 0, (fd ? fd_bits_max : classic_bits_max) - 1);
@@ -91,14 +86,42 @@ std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& ba
   return CanField{number.start_bit, number.length_bits, number.byte_order};
 }
 
+std::int64_t greatest_of(const CanField& field) {
+  return field.length_bits >= 63 ? INT64_MAX : (std::int64_t{1} << field.length_bits) - 1;
+}
+
+}  // namespace
+
+std::optional<CanField> read_can_field(const TomlTable& own, const TomlTable& base,
+                                       std::string_view key, bool fd) {
+  const TomlTable& source = own.has(key) ? own : base;
+  if (!source.has(key)) return std::nullopt;
+  return read_field(source.table(key), fd);
+}
+
+CanStatus read_status_numbers(const TomlTable& table, const CanField& field) {
+  const std::int64_t greatest = greatest_of(field);
+  const std::int64_t mask = table.integer<std::int64_t>("mask", 1, greatest, greatest);
+  return {field, static_cast<std::uint64_t>(mask), read_status_codes(table, greatest, mask)};
+}
+
+std::optional<CanStatus> read_can_status(const TomlTable& own, const TomlTable& base, bool fd) {
+  const TomlTable& source = own.has("status") ? own : base;
+  if (!source.has("status")) return std::nullopt;
+  const TomlTable table = source.table("status");
+  const auto field = read_field(table, fd);
+  if (field) return read_status_numbers(table, *field);
+  table.ignore_rest();
+  return std::nullopt;
+}
+
 std::vector<CanSelector> read_selectors(const TomlTable& own, const TomlTable& base, bool fd) {
   const auto field = read_can_field(own, base, "multiplexor", fd);
   if (!field) {
     own.refuse("multiplexor_value", "makes no sense without a multiplexor");
     return {};
   }
-  const std::int64_t greatest =
-      field->length_bits >= 63 ? INT64_MAX : (std::int64_t{1} << field->length_bits) - 1;
+  const std::int64_t greatest = greatest_of(*field);
   if (!own.has("multiplexor_value")) own.problem("multiplexor_value", "must be given");
   const auto page =
       static_cast<std::uint64_t>(own.integer<std::int64_t>("multiplexor_value", 0, greatest, 0));
@@ -133,11 +156,12 @@ CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse us
   signal.scale = read_scale(own, read_scale(base, 1.0));
   if (use == CanUse::signal) signal.offset = own.number("offset", Range::any(), 0.0);
   if (use == CanUse::temperature) {
-    const Range range = Range::between(-1e4, 1e4);
+    const Range range = Range::between(-1e5, 1e5);  // of unsigned numbers with many bits
     signal.offset =
         own.number("offset_degC", range, base.number("offset_degC", range, signal.offset));
     signal.sentinels = read_can_codes(own, base, signal);
     signal.selectors = read_selectors(own, base, signal.fd);
+    signal.status = read_can_status(own, base, signal.fd);
   }
   return signal;
 }

@@ -36,6 +36,13 @@ enum class CanUse {
 [[nodiscard]] std::vector<CanSelector> read_selectors(const TomlTable& own, const TomlTable& base,
                                                       bool fd);
 
+/// `status = { start_bit, length_bits, byte_order, mask, lists of codes }` in the signal's frame,
+/// in `own` or else in `base`; none where neither has it.
+[[nodiscard]] std::optional<CanStatus> read_can_status(const TomlTable& own, const TomlTable& base,
+                                                       bool fd);
+/// Mask and codes of a status whose place is known.
+[[nodiscard]] CanStatus read_status_numbers(const TomlTable& table, const CanField& field);
+
 /// The lists of codes that are messages and no values, for a signal whose place is known.
 [[nodiscard]] std::vector<Sentinel> read_can_codes(const TomlTable& own, const TomlTable& base,
                                                    const CanSignal& signal);

@@ -168,6 +168,27 @@ std::vector<std::uint16_t> read_emergency_codes(const TomlTable& own, const Toml
   return codes;
 }
 
+/// In the TPDO of the value, or an object of its own that is asked for after the value.
+void read_status(const TomlTable& sensor, const TomlTable& device, CanopenChannel& channel) {
+  const TomlTable& source = sensor.has("status") ? sensor : device;
+  if (!source.has("status")) return;
+  if (channel.way == CanopenWay::pdo_bits) {
+    channel.signal.status = read_can_status(sensor, device, false);
+    return;
+  }
+  const TomlTable table = source.table("status");
+  if (channel.way == CanopenWay::pdo_object) {
+    source.problem("status", "needs a value with start_bit, or an object with poll_s");
+    table.ignore_rest();
+    return;
+  }
+  if (!table.has("index")) table.problem("index", "must be given");
+  CanopenStatus status;
+  status.object = read_address(table);
+  status.number = read_status_numbers(table, {0, table.integer("length_bits", 1, 32, 8)});
+  channel.status = std::move(status);
+}
+
 /// Where in the TPDO, or when the object is asked for.
 void read_way(const TomlTable& sensor, const TomlTable& device, const CanopenDevice& known,
               const Place& place, CanopenChannel& channel) {
@@ -214,6 +235,12 @@ std::shared_ptr<const EdsFile> EdsFiles::read(const TomlTable& device) {
   return file;
 }
 
+EmergencyForm read_emergency_form(const TomlTable& device) {
+  return device.choice<EmergencyForm>(
+      "emergency", {{"generic", EmergencyForm::generic}, {"jumo_cantrans", EmergencyForm::jumo}},
+      EmergencyForm::generic);
+}
+
 CanopenBusConfig read_canopen_bus(const TomlTable& table, const std::string& name) {
   CanopenBusConfig bus;
   bus.name = name;
@@ -248,9 +275,7 @@ CanopenDevice read_canopen_device(const TomlTable& table, const std::string& nam
     table.problem("heartbeat_timeout_s", "must be more than heartbeat_s");
   }
   if (table.has("pdo_period_s")) node.pdo_period_s = table.number("pdo_period_s", period);
-  node.emergency = table.choice<EmergencyForm>(
-      "emergency", {{"generic", EmergencyForm::generic}, {"jumo_cantrans", EmergencyForm::jumo}},
-      node.emergency);
+  node.emergency = read_emergency_form(table);
   for (const TomlTable& entry : table.tables("write")) {
     node.writes.push_back(read_write(entry, device, eds_files));
   }
@@ -290,6 +315,7 @@ std::optional<CanopenChannel> read_canopen_channel(const TomlTable& sensor, cons
   channel.signal.is_signed = type.is_signed && !type.is_float;
   channel.signal.is_float = type.is_float;
   read_way(sensor, device, known, place, channel);
+  read_status(sensor, device, channel);
   if (channel.signal.start_bit + type.length_bits > 64) {
     sensor.problem("start_bit", "the value must end within 8 bytes");
     channel.signal.start_bit = 0;

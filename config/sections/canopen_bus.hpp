@@ -40,6 +40,9 @@ struct CanopenDevice {
   std::shared_ptr<const EdsFile> eds;  ///< nullptr: none is named, or it cannot be read
 };
 
+/// What the emergency messages of the device say.
+[[nodiscard]] EmergencyForm read_emergency_form(const TomlTable& device);
+
 [[nodiscard]] CanopenBusConfig read_canopen_bus(const TomlTable& table, const std::string& name);
 [[nodiscard]] CanopenDevice read_canopen_device(const TomlTable& table, const std::string& name,
                                                 EdsFiles& eds_files);

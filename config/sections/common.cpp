@@ -32,4 +32,22 @@ std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base, st
   return sentinels;
 }
 
+std::vector<Sentinel> read_status_codes(const TomlTable& table, std::int64_t high,
+                                        std::int64_t mask) {
+  std::vector<Sentinel> codes = read_codes(table, table, 0, high);
+  const std::size_t faults = codes.size();
+  for (const std::int64_t good : table.integers("good_codes", 0, high, {})) {
+    for (std::size_t i = 0; i < faults; ++i) {
+      if (codes[i].code != good) continue;
+      table.problem("good_codes", std::to_string(good), "must not be the code of a fault too");
+    }
+    codes.push_back({good, Fault::none});
+  }
+  for (const Sentinel& code : codes) {
+    if ((code.code & ~mask) == 0) continue;
+    table.problem("mask", "hides bits of the code " + std::to_string(code.code));
+  }
+  return codes;
+}
+
 }  // namespace thermocomp::sections

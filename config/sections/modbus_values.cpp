@@ -150,17 +150,6 @@ std::uint16_t read_address(const TomlTable& table) {
   return static_cast<std::uint16_t>(table.integer("address", 0, address_max));
 }
 
-/// Values of the status that say that all is well although they are not 0.
-void read_good_codes(const TomlTable& table, std::int64_t high, ModbusStatus& status) {
-  for (const std::int64_t code : table.integers("good_codes", 0, high, {})) {
-    for (const Sentinel& listed : status.codes) {
-      if (listed.code != code) continue;
-      table.problem("good_codes", std::to_string(code), "must not be the code of a fault too");
-    }
-    status.codes.push_back({code, Fault::none});
-  }
-}
-
 /// @param base_address  where the device's registers begin; bits do not move with them
 ModbusStatus read_status(const TomlTable& table, int base_address) {
   ModbusStatus status;
@@ -168,8 +157,7 @@ ModbusStatus read_status(const TomlTable& table, int base_address) {
   status.address = read_address(table);
   if (is_bit(status.table)) {
     table.refuse("mask", "makes no sense for a bit");
-    status.codes = read_codes(table, table, 0, 1);
-    read_good_codes(table, 1, status);
+    status.codes = read_status_codes(table, 1, 1);
     return status;
   }
   if (status.address + base_address > address_max) {
@@ -179,13 +167,7 @@ ModbusStatus read_status(const TomlTable& table, int base_address) {
   }
   const int mask = table.integer("mask", 1, 0xFFFF, 0xFFFF);
   status.mask = static_cast<std::uint16_t>(mask);
-  status.codes = read_codes(table, table, 0, 0xFFFF);
-  read_good_codes(table, 0xFFFF, status);
-  for (const Sentinel& code : status.codes) {
-    if ((code.code & ~static_cast<std::int64_t>(mask)) != 0) {
-      table.problem("mask", "hides bits of the code " + std::to_string(code.code));
-    }
-  }
+  status.codes = read_status_codes(table, 0xFFFF, mask);
   return status;
 }
 

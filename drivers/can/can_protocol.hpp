@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +15,12 @@
 #include "estimator/types.hpp"
 
 namespace thermocomp {
+
+/// The bytes behind a reading, as they came; empty: none since the bus or its node was lost.
+struct RawReading {
+  std::vector<std::uint8_t> value;   ///< frame, object, or part of a long message
+  std::vector<std::uint8_t> status;  ///< where it is asked for apart
+};
 
 class CanProtocol {
  public:
@@ -36,6 +43,8 @@ class CanProtocol {
   [[nodiscard]] virtual std::optional<CanFrame> next_frame() = 0;
 
   [[nodiscard]] virtual std::span<const Reading> readings() const = 0;
+  /// What each reading was decoded from, for a person.
+  [[nodiscard]] virtual std::vector<RawReading> raw() const = 0;
   [[nodiscard]] virtual std::vector<UnitHealth> health(nanoseconds now) const = 0;
 };
 

@@ -100,6 +100,7 @@ void check(const CanSignal& signal) {
     check(selector.field, signal.fd);
     require(!selector.pages.empty(), "multiplexor", 0.0, "must have a value");
   }
+  if (signal.status) check(signal.status->field, signal.fd);
 }
 
 std::size_t bytes_needed(const CanField& field) noexcept {
@@ -111,6 +112,7 @@ std::size_t bytes_needed(const CanSignal& signal) noexcept {
   for (const CanSelector& selector : signal.selectors) {
     bytes = std::max(bytes, bytes_needed(selector.field));
   }
+  if (signal.status) bytes = std::max(bytes, bytes_needed(signal.status->field));
   return bytes;
 }
 
@@ -182,6 +184,14 @@ bool carries(std::span<const std::uint8_t> payload, const CanSignal& signal) noe
       });
 }
 
+Fault fault_of(const CanStatus& status, std::uint64_t number) noexcept {
+  const std::uint64_t masked = number & status.mask;
+  for (const Sentinel& code : status.codes) {
+    if (static_cast<std::uint64_t>(code.code) == masked) return code.fault;
+  }
+  return masked == 0 ? Fault::none : Fault::device_error;
+}
+
 CanValue decode(std::span<const std::uint8_t> payload, const CanSignal& signal) noexcept {
   if (payload.size() < bytes_needed(signal)) return {};
   const std::uint64_t raw = extract_raw(payload, signal);
@@ -199,6 +209,10 @@ CanValue decode(std::span<const std::uint8_t> payload, const CanSignal& signal) 
   }
   const double value = counts * signal.scale + signal.offset;
   if (!std::isfinite(value)) return {not_a_number, Fault::out_of_range};
+  if (signal.status) {
+    const Fault fault = fault_of(*signal.status, extract_raw(payload, signal.status->field));
+    if (fault != Fault::none) return {not_a_number, fault};
+  }
   return {value, Fault::none};
 }
 

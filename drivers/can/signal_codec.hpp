@@ -59,8 +59,12 @@ struct CanValue {
   Fault fault{Fault::bad_frame};
 };
 
+/// What a status with this number says of its value.
+[[nodiscard]] Fault fault_of(const CanStatus& status, std::uint64_t number) noexcept;
+
 /// value = raw * scale + offset. A frame too short for the signal is bad_frame, a raw value listed
-/// as a sentinel is the sentinel's fault, a float that is not finite is out_of_range.
+/// as a sentinel is the sentinel's fault, a float that is not finite is out_of_range; else the
+/// status in the frame decides, if the signal has one.
 /// @pre check(signal) and carries(payload, signal)
 [[nodiscard]] CanValue decode(std::span<const std::uint8_t> payload,
                               const CanSignal& signal) noexcept;

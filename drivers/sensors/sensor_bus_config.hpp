@@ -126,6 +126,15 @@ struct CanSelector {
   bool operator==(const CanSelector&) const = default;
 };
 
+/// A number beside a value that says whether the value is good.
+struct CanStatus {
+  CanField field;
+  std::uint64_t mask{~std::uint64_t{0}};  ///< bits looked at
+  /// masked number -> fault (none: good); a number not listed and not 0 is device_error
+  std::vector<Sentinel> codes;
+  bool operator==(const CanStatus&) const = default;
+};
+
 /// Where a value stands in a CAN frame, with the numbering of CanField.
 struct CanSignal {
   std::uint32_t id{0};
@@ -140,6 +149,7 @@ struct CanSignal {
   double offset{0.0};
   std::vector<Sentinel> sentinels;
   std::vector<CanSelector> selectors{};  ///< all must agree; empty: it is in every frame
+  std::optional<CanStatus> status{};     ///< in the same frame
   bool operator==(const CanSignal&) const = default;
 };
 

@@ -47,6 +47,13 @@ enum class CanopenWay {
   sdo          ///< an object, asked for every poll_s
 };
 
+/// An object beside a polled one that says whether its value is good.
+struct CanopenStatus {
+  ObjectAddress object;
+  CanStatus number;  ///< in the object's bytes
+  bool operator==(const CanopenStatus&) const = default;
+};
+
 struct CanopenChannel {
   std::size_t sensor{0};  ///< index of the sensor in the configuration
   CanopenWay way{CanopenWay::pdo_bits};
@@ -54,6 +61,8 @@ struct CanopenChannel {
   /// Form and scale; for pdo_bits also `id` and `start_bit`. length_bits is that of the object.
   CanSignal signal;
   double poll_s{1.0};
+  /// Only for sdo: the value counts between two statuses that call it good.
+  std::optional<CanopenStatus> status{};
   int emergency_channel{0};  ///< by which emergency messages name it; 0: they do not
   /// Emergency error codes that make it a device_error until the errors are reset.
   std::vector<std::uint16_t> emergency_codes;

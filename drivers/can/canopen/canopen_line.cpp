@@ -172,6 +172,14 @@ void CanopenLine::collect() {
   }
 }
 
+std::vector<RawReading> CanopenLine::raw() const {
+  std::vector<RawReading> all;
+  for (const CanopenNode& node : nodes_) {
+    all.insert(all.end(), node.raw().begin(), node.raw().end());
+  }
+  return all;
+}
+
 std::vector<UnitHealth> CanopenLine::health(nanoseconds now) const {
   std::vector<UnitHealth> units;
   units.reserve(nodes_.size());

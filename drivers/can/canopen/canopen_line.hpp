@@ -23,6 +23,7 @@ class CanopenLine final : public CanProtocol {
   void advance(nanoseconds now) override;
   [[nodiscard]] std::optional<CanFrame> next_frame() override;
   [[nodiscard]] std::span<const Reading> readings() const override { return readings_; }
+  [[nodiscard]] std::vector<RawReading> raw() const override;
   [[nodiscard]] std::vector<UnitHealth> health(nanoseconds now) const override;
 
  private:

@@ -37,6 +37,15 @@ std::uint16_t pdo_object(std::uint16_t first, std::size_t number) {
   return static_cast<std::uint16_t>(first + number - 1);
 }
 
+/// The whole TPDO; of an object that was found in it the object's bytes.
+std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> data,
+                                       const CanopenChannel& channel) {
+  const auto first = static_cast<std::size_t>(channel.signal.start_bit / 8);
+  if (channel.way == CanopenWay::pdo_bits || first >= data.size()) return data;
+  const auto bytes = static_cast<std::size_t>((channel.signal.length_bits + 7) / 8);
+  return data.subspan(first, std::min(bytes, data.size() - first));
+}
+
 }  // namespace
 
 std::vector<std::size_t> place_channels(const CanopenMapping& mapping,
@@ -66,8 +75,10 @@ CanopenNode::CanopenNode(const CanopenNodeConfig& config, const CanopenBusConfig
       writes_(config.writes),
       channels_(config.channels),
       readings_(config.channels.size()),
+      raw_(config.channels.size()),
       emergencies_(config.channels.size()),
       poll_at_(config.channels.size()),
+      vouched_for_(config.channels.size()),
       client_(config.node, from_seconds(bus.sdo_timeout_s)),
       retry_pause_(first_pause),
       heartbeats_(from_seconds(config.heartbeat_s)) {
@@ -93,7 +104,7 @@ void CanopenNode::opened(nanoseconds now) {
 
 void CanopenNode::closed(nanoseconds now) {
   client_.cancel();
-  polled_.reset();
+  forget_poll();
   frames_.clear();
   jobs_.clear();
   phase_ = Phase::closed;
@@ -104,7 +115,7 @@ void CanopenNode::closed(nanoseconds now) {
 
 void CanopenNode::begin_setup(nanoseconds now) {
   client_.cancel();
-  polled_.reset();
+  forget_poll();
   poll_error_.clear();
   told_.clear();
   lost_ = false;
@@ -349,7 +360,10 @@ bool CanopenNode::take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> d
     has_channel = true;
     const CanValue decoded = decode(data, channel.signal);
     is_short = is_short || decoded.fault == Fault::bad_frame;
-    if (!lost_) show(i, decoded, at);
+    if (lost_) continue;
+    const auto shown = bytes_of(data, channel);
+    raw_[i].value.assign(shown.begin(), shown.end());
+    show(i, decoded, at);
   }
   if (is_short) ++counters_.bad_frames;
   if (has_channel && !is_short) {
@@ -371,7 +385,11 @@ void CanopenNode::lose(std::size_t channel, Fault fault, nanoseconds at) {
 }
 
 void CanopenNode::lose_all(Fault fault, nanoseconds at) {
-  for (std::size_t i = 0; i < readings_.size(); ++i) lose(i, fault, at);
+  for (std::size_t i = 0; i < readings_.size(); ++i) {
+    lose(i, fault, at);
+    raw_[i] = {};
+    vouched_for_[i] = 0;
+  }
 }
 
 // -------------------------------------------------------------------- polling and watching
@@ -392,20 +410,52 @@ void CanopenNode::poll(nanoseconds now) {
 
 void CanopenNode::take_poll(const SdoResult& result, nanoseconds now) {
   const std::size_t channel = *polled_;
-  polled_.reset();
   if (result.outcome != SdoOutcome::done) {
     const bool silent = result.outcome == SdoOutcome::timed_out;
     poll_error_ = to_string(result);
+    forget_poll();
+    vouched_for_[channel] = 0;
     return lose(channel, silent ? Fault::no_answer : Fault::device_error, now);
   }
+  if (status_awaited_) return take_status(result, now);
   poll_error_.clear();
   ++counters_.answers;
+  raw_[channel] = {result.bytes, {}};
+  const auto& status = channels_[channel].status;
+  if (status && result.bytes.size() <= canopen_bytes_max) {
+    status_awaited_ = true;
+    ++counters_.requests;
+    return client_.read(status->object, now);
+  }
+  forget_poll();
   if (result.bytes.size() > canopen_bytes_max) {
     poll_error_ = to_string(result.object) + ": " + std::to_string(result.bytes.size()) +
                   " bytes are no number";
     return lose(channel, Fault::bad_frame, now);
   }
   show(channel, decode(result.bytes, channels_[channel].signal), now);
+}
+
+/// Between two good statuses there is a value; after the first one it is asked for at once.
+void CanopenNode::take_status(const SdoResult& result, nanoseconds now) {
+  const std::size_t channel = *polled_;
+  forget_poll();
+  raw_[channel].status = result.bytes;
+  const CanStatus& status = channels_[channel].status->number;
+  const bool is_short = result.bytes.size() < bytes_needed(status.field);
+  const Fault fault =
+      is_short ? Fault::bad_frame : fault_of(status, extract_raw(result.bytes, status.field));
+  const bool vouched_before = vouched_for_[channel] != 0;
+  vouched_for_[channel] = fault == Fault::none ? 1 : 0;
+  if (fault != Fault::none) return lose(channel, fault, now);
+  if (vouched_before)
+    return show(channel, decode(raw_[channel].value, channels_[channel].signal), now);
+  poll_at_[channel] = now;
+}
+
+void CanopenNode::forget_poll() noexcept {
+  polled_.reset();
+  status_awaited_ = false;
 }
 
 void CanopenNode::take_result(nanoseconds now) {
@@ -431,7 +481,7 @@ void CanopenNode::watch_heartbeat(nanoseconds now) {
   if (now - heard_at_ <= timeout) return;
   lost_ = true;
   client_.cancel();
-  polled_.reset();
+  forget_poll();
   lose_all(Fault::no_answer, now);
 }
 

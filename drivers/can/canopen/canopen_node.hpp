@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/can/can_protocol.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/canopen/emergency.hpp"
@@ -45,8 +46,9 @@ class CanopenNode {
   void advance(nanoseconds now);
   [[nodiscard]] std::optional<CanFrame> next_frame();
 
-  /// Order of the node's channels.
+  /// Order of the node's channels, also that of the next two.
   [[nodiscard]] std::span<const Reading> readings() const noexcept { return readings_; }
+  [[nodiscard]] const std::vector<RawReading>& raw() const noexcept { return raw_; }
   [[nodiscard]] const std::vector<CanopenChannel>& channels() const noexcept { return channels_; }
   /// Of TPDOs that the node said are its own, in this life.
   [[nodiscard]] std::span<const std::uint32_t> cob_ids_told() const noexcept { return told_; }
@@ -81,6 +83,8 @@ class CanopenNode {
   void setup_done(nanoseconds now);
   void poll(nanoseconds now);
   void take_poll(const SdoResult& result, nanoseconds now);
+  void take_status(const SdoResult& result, nanoseconds now);
+  void forget_poll() noexcept;
   void take_result(nanoseconds now);
   void watch_heartbeat(nanoseconds now);
   void watch_duplicates(nanoseconds now);
@@ -98,14 +102,17 @@ class CanopenNode {
   std::vector<CanopenWrite> writes_;
   std::vector<CanopenChannel> channels_;
   std::vector<Reading> readings_;
+  std::vector<RawReading> raw_;
   std::vector<std::optional<Fault>> emergencies_;  ///< of the channels
   std::vector<nanoseconds> poll_at_;
-  std::vector<Watched> watched_;  ///< a TPDO each
+  std::vector<char> vouched_for_;  ///< whether the status after the last poll was good
+  std::vector<Watched> watched_;   ///< a TPDO each
   SdoClient client_;
 
   Phase phase_{Phase::closed};
   std::deque<Job> jobs_;
   std::optional<std::size_t> polled_;  ///< channel whose answer is awaited
+  bool status_awaited_{false};         ///< its value is in raw_
   CanopenMapping mapping_;             ///< being asked for
   int entries_{0};
   std::vector<std::uint32_t> told_;

@@ -31,6 +31,16 @@ std::string hexadecimal(std::uint64_t name) {
   return text.data();
 }
 
+/// A group of one frame whole; of a longer one the bytes of the parameter.
+std::span<const std::uint8_t> bytes_of(std::span<const std::uint8_t> group,
+                                       const J1939Parameter& parameter) {
+  constexpr std::size_t frame_bytes = 8;
+  const auto first = static_cast<std::size_t>(parameter.start_byte);
+  if (group.size() <= frame_bytes || first >= group.size()) return group;
+  const int bytes = (parameter.start_bit + parameter.length_bits + 7) / 8;
+  return group.subspan(first, std::min(group.size() - first, static_cast<std::size_t>(bytes)));
+}
+
 /// The group from anybody.
 CanFilter filter_of(std::uint32_t pgn) {
   return {identifier({pgn, 0, 0, 0}), is_addressed(pgn) ? any_specific : any_source};
@@ -49,6 +59,7 @@ J1939Line::J1939Line(J1939BusConfig config)
     made.counters.name = node.name;
     for (const J1939Channel& channel : node.channels) check(channel.parameter);
     readings_.resize(readings_.size() + node.channels.size());
+    raw_.resize(readings_.size());
   }
   const int own = config_.own_address.value_or(0);
   require(own >= 0 && own <= address_max, "own_address", own, "must be in [0, 253]");
@@ -121,6 +132,7 @@ void J1939Line::closed(nanoseconds now) {
 void J1939Line::lose(std::size_t node, nanoseconds at) {
   for (std::size_t i = 0; i < config_.nodes[node].channels.size(); ++i) {
     readings_[nodes_[node].first + i] = {not_a_number, at, Fault::no_answer};
+    raw_[nodes_[node].first + i] = {};
   }
 }
 
@@ -239,6 +251,8 @@ void J1939Line::take_group(std::uint32_t pgn, std::uint8_t source,
       if (channels[i].parameter.pgn != pgn) continue;
       const CanValue decoded = decode(bytes, channels[i].parameter);
       readings_[node.first + i] = {decoded.value, at, decoded.fault};
+      const auto shown = bytes_of(bytes, channels[i].parameter);
+      raw_[node.first + i].value.assign(shown.begin(), shown.end());
       has_channel = true;
       is_short = is_short || decoded.fault == Fault::bad_frame;
     }

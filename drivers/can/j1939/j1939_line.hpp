@@ -28,6 +28,7 @@ class J1939Line final : public CanProtocol {
   void advance(nanoseconds now) override;
   [[nodiscard]] std::optional<CanFrame> next_frame() override;
   [[nodiscard]] std::span<const Reading> readings() const override { return readings_; }
+  [[nodiscard]] std::vector<RawReading> raw() const override { return raw_; }
   [[nodiscard]] std::vector<UnitHealth> health(nanoseconds now) const override;
 
   /// Our address while it is ours.
@@ -56,6 +57,7 @@ class J1939Line final : public CanProtocol {
   const J1939BusConfig config_;
   std::vector<Node> nodes_;
   std::vector<Reading> readings_;  ///< the nodes' after each other
+  std::vector<RawReading> raw_;
   TransportReceiver transport_;
   std::optional<std::uint8_t> own_address_;
   std::string own_error_;

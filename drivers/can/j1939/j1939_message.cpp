@@ -70,12 +70,17 @@ void check(const J1939Parameter& parameter) {
           0.0, "must be a fault");
 }
 
-CanValue decode(std::span<const std::uint8_t> message, const J1939Parameter& parameter) noexcept {
-  if (message.size() < bytes_needed(parameter)) return {};
+std::uint64_t extract_raw(std::span<const std::uint8_t> message,
+                          const J1939Parameter& parameter) noexcept {
   const auto first = static_cast<std::size_t>(parameter.start_byte);
   const std::uint64_t bytes = little_endian(message, first, 8);
   const std::uint64_t mask = (std::uint64_t{1} << parameter.length_bits) - 1;
-  const std::uint64_t raw = (bytes >> parameter.start_bit) & mask;
+  return (bytes >> parameter.start_bit) & mask;
+}
+
+CanValue decode(std::span<const std::uint8_t> message, const J1939Parameter& parameter) noexcept {
+  if (message.size() < bytes_needed(parameter)) return {};
+  const std::uint64_t raw = extract_raw(message, parameter);
   for (const Sentinel& sentinel : parameter.sentinels) {
     if (sentinel.code == static_cast<std::int64_t>(raw)) return {not_a_number, sentinel.fault};
   }

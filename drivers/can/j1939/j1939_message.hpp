@@ -39,6 +39,10 @@ struct J1939Id {
 /// @throws InvalidValue for a place or PGN that cannot be; the keys are those of J1939Parameter
 void check(const J1939Parameter& parameter);
 
+/// The parameter's bits; those beyond the message's end are 0. @pre check(parameter) passes
+[[nodiscard]] std::uint64_t extract_raw(std::span<const std::uint8_t> message,
+                                        const J1939Parameter& parameter) noexcept;
+
 /// value = raw * scale + offset. Raw values at the top are no values (J1939-71, 5.1.4): of 8, 16,
 /// 24 and 32 bits the highest byte 0xFE is an error, 0xFF not available, 0xFB to 0xFD reserved
 /// (out_of_range); of other lengths all ones is not available and one less an error. A message too

@@ -109,6 +109,18 @@ TEST_CASE("a CANopen sensor is refused by key and rule", "[canopen][config]") {
              {"channels that messages do not name", spindle, spindle + "\nemergency_channel = 2",
               "emergency_channel = 2\nscale", "sensor[spindle].emergency_channel",
               "messages name channels"},
+             {"a status that is not asked for", "index = 0x6150", "length_bits = 8", "status = {",
+              "sensor[motor].status.index", "must be given"},
+             {"a status of bits beside an object", "index = 0x6150", "start_bit = 0, index = 1",
+              "start_bit = 0, index", "sensor[motor].status.start_bit", ""},
+             {"a code that the mask hides", "mask = 0x07", "mask = 0x01", "mask = 0x01",
+              "sensor[motor].status.mask", "hides bits of the code 3"},
+             {"a status behind the 8th byte", "start_bit = 16",
+              "start_bit = 16\nstatus = { start_bit = 60, length_bits = 8 }", "status = {",
+              "sensor[column_back].status.start_bit", "does not fit"},
+             {"a status beside a mapped object", spindle,
+              spindle + "\nstatus = { index = 0x6150, sub = 2 }",
+              "status = { index = 0x6150, sub = 2", "sensor[spindle].status", "with poll_s"},
              {"a code that cannot come", "[0x7FFF]", "[0x18000]", "",
               "device[cantrans].over_range_codes", ""}});
 }

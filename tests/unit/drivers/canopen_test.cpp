@@ -316,6 +316,47 @@ TEST_CASE("objects are polled, and each way of failing is its own fault", "[cano
   CHECK(bus.error().empty());
 }
 
+TEST_CASE("a polled value counts between two statuses that call it good", "[canopen][node]") {
+  CanopenChannel channel = object_channel(CanopenWay::sdo, {0x9130, 1});
+  channel.status = {{0x6150, 1}, {{0, 8, ByteOrder::little_endian}, 0x07, {}}};
+  channel.status->number.codes = {{3, Fault::out_of_range}};
+  Bus bus(bus_of({node_5({channel})}));
+  const auto value = [&] { bus.put(0x585, {0x4B, 0x30, 0x91, 0x01, 0xE1, 0x00, 0, 0}); };
+  const auto status = [&](std::uint8_t number) {
+    CHECK(bus.sent().back().bytes == Bytes{0x40, 0x50, 0x61, 0x01, 0, 0, 0, 0});
+    bus.put(0x585, {0x4F, 0x50, 0x61, 0x01, number, 0, 0, 0});
+  };
+  value();
+  CHECK(bus.fault() == Fault::no_answer);
+  status(0x00);
+  CHECK(bus.fault() == Fault::no_answer);  // was it good when the value was taken?
+  value();
+  status(0x10);  // a bit that nobody looks at
+  CHECK(bus.temp_degC() == Approx(22.5));
+  CHECK(bus.line.raw()[0].value == Bytes{0xE1, 0x00});
+  CHECK(bus.line.raw()[0].status == Bytes{0x10});
+  bus.wait(1s);
+  value();
+  CHECK(bus.temp_degC() == Approx(22.5));
+  status(0x03);
+  CHECK(bus.fault() == Fault::out_of_range);
+  bus.wait(1s);
+  value();
+  status(0x00);
+  CHECK(bus.fault() == Fault::out_of_range);
+  value();
+  status(0x00);
+  CHECK(bus.temp_degC() == Approx(22.5));
+  bus.wait(1s);
+  value();
+  status(0x01);  // a number that nobody explains
+  CHECK(bus.fault() == Fault::device_error);
+  bus.wait(1s);
+  value();
+  bus.wait(500ms);
+  CHECK(bus.fault() == Fault::no_answer);
+}
+
 TEST_CASE("a JUMO CANtrans with a broken and a shorted thermocouple", "[canopen][node]") {
   CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0), in_pdo(1, 0x185, 16)});
   node.emergency = EmergencyForm::jumo;

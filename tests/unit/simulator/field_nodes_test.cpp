@@ -145,7 +145,15 @@ TEST_CASE("a simulated J1939 node: single frames, packets, NAME and error code",
   SimulatedJ1939Node sender;
   sender.address = 0x80;
   sender.name_claimed = 0x00FF001234;
-  sender.channels = {{"a_degC", 0xFF10, 2}, {"b_degC", 0xFF11, 20}};
+  J1939Parameter place;
+  place.pgn = 0xFF10;
+  place.start_byte = 2;
+  place.scale = 0.03125;
+  place.offset = -273.0;
+  place.error = Fault::open_circuit;
+  sender.channels = {{"a_degC", place}, {"b_degC", place}};
+  sender.channels[1].place.pgn = 0xFF11;
+  sender.channels[1].place.start_byte = 20;
   sender.events = {{NodeEventKind::open_circuit, 0, 2.0, long_s}};
   J1939BusConfig bus;
   bus.name = "bus";
@@ -153,15 +161,7 @@ TEST_CASE("a simulated J1939 node: single frames, packets, NAME and error code",
   J1939NodeConfig& device = bus.nodes.emplace_back();
   device.name = "module";
   device.name_claimed = sender.name_claimed;
-  for (std::size_t i = 0; i < 2; ++i) {
-    J1939Parameter parameter;
-    parameter.pgn = sender.channels[i].pgn;
-    parameter.start_byte = sender.channels[i].start_byte;
-    parameter.scale = 0.03125;
-    parameter.offset = -273.0;
-    parameter.error = Fault::open_circuit;
-    device.channels.push_back({i, parameter});
-  }
+  for (std::size_t i = 0; i < 2; ++i) device.channels.push_back({i, sender.channels[i].place});
   nanoseconds now{1000s};
   J1939Line line(bus);
   line.opened(now);
