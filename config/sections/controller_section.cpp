@@ -215,7 +215,6 @@ class ControllerReader {
 
   static ModbusAxis read_piezo_axis(const TomlTable& table, const AxisConfig& axis,
                                     WrittenRegisters& written) {
-    refuse_all(table, {"applied"}, "makes no sense for a piezo: its displacement is not read back");
     ModbusAxis place;
     const TomlTable offset = table.table("offset");
     place.offset = read_modbus_value(offset, RegisterUse::written);
@@ -228,6 +227,9 @@ class ControllerReader {
     piezo.settle_s = own.number("settle_s", Range::any(), piezo.settle_s);
     piezo.steady_s = own.number("steady_s", Range::any(), piezo.steady_s);
     piezo.step_um = own.number("step_um", Range::any(), piezo.step_um);
+    piezo.tolerance_V = own.number("tolerance_V", Range::any(), piezo.tolerance_V);
+    if (table.has("applied"))
+      place.applied = read_modbus_value(table.table("applied"), RegisterUse::number);
     place.piezo = piezo;
     if (!own) return place;
     try {
@@ -238,11 +240,17 @@ class ControllerReader {
     }
     check_reach(table, "piezo", Range::between(piezo.curve_um.front(), piezo.curve_um.back()),
                 axis);
-    const Range volts = reach(place.offset);
-    if (offset && !volts.contains(piezo.curve_V.back()))
-      table.problem("offset", "must be able to hold the curve's voltages, but reaches from " +
-                                  number_text(volts.min) + " to " + number_text(volts.max));
+    if (offset) check_volts(table, "offset", place.offset, piezo);
+    if (place.applied) check_volts(table, "applied", *place.applied, piezo);
     return place;
+  }
+
+  static void check_volts(const TomlTable& table, std::string_view key, const ModbusValue& value,
+                          const PiezoConfig& piezo) {
+    const Range volts = reach(value);
+    if (!volts.contains(piezo.curve_V.back()))
+      table.problem(key, "must be able to hold the curve's voltages, but reaches from " +
+                             number_text(volts.min) + " to " + number_text(volts.max));
   }
 
   static ModbusAxis read_modbus_axis(const TomlTable& table, const AxisConfig& axis,

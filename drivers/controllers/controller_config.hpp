@@ -31,7 +31,7 @@ struct ModbusSignal {
 struct ModbusAxis {
   ModbusValue offset;
   std::optional<ModbusValue> applied;  ///< none: the controller does not read back
-  /// `offset` takes volts of an amplifier, not um; there is no read-back then.
+  /// `offset` takes volts of an amplifier, not um, and `applied` shows volts.
   std::optional<PiezoConfig> piezo{};
   bool operator==(const ModbusAxis&) const = default;
 };

@@ -106,7 +106,7 @@ ModbusDialogue::ModbusDialogue(ModbusControllerConfig config, ModbusConnection& 
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     if (!config_.axes[axis].applied) continue;
     read_values_.push_back(*config_.axes[axis].applied);
-    read_targets_.push_back(&state_.applied_um[axis]);
+    read_targets_.push_back(config_.axes[axis].piezo ? &shown_V_[axis] : &state_.applied_um[axis]);
   }
   for (const ModbusSignal& signal : config_.signals) {
     read_values_.push_back(signal.value);
@@ -175,9 +175,9 @@ bool ModbusDialogue::synchronise() {
     lose();
     return false;
   }
-  gate_.synchronised(state_.applied_um);
-  for (auto& piezo : piezos_)
-    if (piezo) piezo->restart();
+  restart_piezos();
+  show_piezos();
+  gate_.synchronised(without_leaps_um());
   publish(true);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
@@ -193,8 +193,9 @@ void ModbusDialogue::exchange() {
     if (!ending_.load()) lose();
     return;
   }
-  if (!gate_.explains(state_.applied_um)) {
-    gate_.synchronised(state_.applied_um);
+  show_piezos();
+  if (!gate_.explains(without_leaps_um())) {
+    gate_.synchronised(without_leaps_um());
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = "the controller applies what it was not sent: started anew from there";
   }
@@ -312,6 +313,36 @@ void ModbusDialogue::take(std::span<const std::vector<std::uint16_t>> answers) {
         format_in(value.table, {value.encoding, value.word_order, value.scale, 0.0});
     *read_targets_[i] = decode(words.subspan(place.word), format, {}).value;
   }
+}
+
+/// A new epoch begins: what the amplifiers show, where they do, is where their axes stand.
+void ModbusDialogue::restart_piezos() {
+  for (std::size_t axis = 0; axis < piezos_.size(); ++axis) {
+    if (!piezos_[axis]) continue;
+    if (config_.axes[axis].applied)
+      piezos_[axis]->restart_at(shown_V_[axis]);
+    else
+      piezos_[axis]->restart();
+  }
+}
+
+void ModbusDialogue::show_piezos() {
+  for (std::size_t axis = 0; axis < piezos_.size(); ++axis) {
+    if (!piezos_[axis] || !config_.axes[axis].applied) continue;
+    piezos_[axis]->show(connection_.now(), shown_V_[axis]);
+    state_.applied_um[axis] = piezos_[axis]->applied_um();
+    if (piezos_[axis]->obeyed()) continue;
+    const std::scoped_lock lock(health_mutex_);
+    health_.last_error = "the amplifier of axis " + std::to_string(axis + 1) + " shows " +
+                         std::to_string(shown_V_[axis]) + " V and not what it was told";
+  }
+}
+
+std::array<double, axes_max> ModbusDialogue::without_leaps_um() const noexcept {
+  std::array<double, axes_max> applied_um = state_.applied_um;
+  for (std::size_t axis = 0; axis < piezos_.size(); ++axis)
+    if (piezos_[axis]) applied_um[axis] = not_a_number;
+  return applied_um;
 }
 
 void ModbusDialogue::publish(bool online) {

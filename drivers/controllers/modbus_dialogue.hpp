@@ -2,6 +2,7 @@
 /// applies and measures out of them.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <mutex>
 #include <optional>
@@ -21,7 +22,8 @@ namespace thermocomp {
 /// Each period: reads everything back and publishes it, then writes the newest command (offsets,
 /// then valid bits, then heartbeat, neighbours in one request) - unless an axis stands where
 /// nothing sent lately can have taken it: that begins a new epoch and nothing is written
-/// (WriteGate).
+/// (WriteGate). A piezo leaps to every new offset by way of 0 V: whether it stands where it was
+/// told is left to its drive and to the estimator's comparison.
 ///
 /// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
 /// heartbeat counts up with every command written and starts anew when its register is full. Valid
@@ -56,6 +58,9 @@ class ModbusDialogue {
   [[nodiscard]] double written_value(std::size_t axis, double offset_um);
   bool read_all();
   void take(std::span<const std::vector<std::uint16_t>> answers);
+  void restart_piezos();
+  void show_piezos();
+  [[nodiscard]] std::array<double, axes_max> without_leaps_um() const noexcept;
   void publish(bool online);
   void lose();
   /// Repeats `exchange` as the line's `retries` say. Notes why it failed in the end.
@@ -70,6 +75,7 @@ class ModbusDialogue {
   ModbusConnection& connection_;
   WriteGate gate_;
   std::vector<std::optional<PiezoDrive>> piezos_;  ///< one an axis
+  std::array<double, axes_max> shown_V_{};         ///< by the amplifiers of piezos
   std::uint64_t heartbeat_{0};
   ControllerState state_;  ///< the thread's own
   WaitFreeSlot<ControllerState> states_;

@@ -18,6 +18,7 @@ struct PiezoConfig {
   double settle_s{0.2};       ///< at 0 V
   double steady_s{1.0};       ///< an offset must stand still for so long before it is followed
   double step_um{0.2};        ///< a smaller change is not followed
+  double tolerance_V{1.0};    ///< read back and written voltage may differ by this much
   inline void validate() const;  ///< @throws InvalidValue
   bool operator==(const PiezoConfig&) const = default;
 };
@@ -46,6 +47,8 @@ inline void PiezoConfig::validate() const {
   require(curve_V.back() <= 1000.0, "curve_V", curve_V.back(), "must be at most 1000 V");
   require(settle_s >= 0 && settle_s <= 10, "settle_s", settle_s, "must be in [0, 10]");
   require(steady_s >= 0 && steady_s <= 600, "steady_s", steady_s, "must be in [0, 600]");
+  require(tolerance_V >= 0.001 && tolerance_V <= 100, "tolerance_V", tolerance_V,
+          "must be in [0.001, 100]");
   require(step_um >= 0.01 && step_um <= 10, "step_um", step_um, "must be in [0.01, 10]");
 }
 

@@ -10,6 +10,8 @@ namespace {
 
 /// Offsets that differ by less stand still: a register's rounding, not a movement.
 constexpr double still_um = 0.01;
+/// What an amplifier and its read-back may take, beside the time it is given at 0 V.
+constexpr double amplifier_s = 0.5;
 
 /// y over x, straight between points; x strictly increases.
 double between(const std::vector<double>& x, const std::vector<double>& y, double at) noexcept {
@@ -37,7 +39,42 @@ double displacement_at(const PiezoConfig& config, double volt) noexcept {
 
 PiezoDrive::PiezoDrive(const PiezoConfig& config) : config_((config.validate(), config)) {}
 
+void PiezoDrive::restart_at(double read_V) noexcept {
+  known_ = zeroing_ = false;
+  volt_ = asked_um_ = followed_um_ = not_a_number;
+  written_since_.reset();
+  obeyed_ = true;
+  if (!(std::abs(read_V) > config_.tolerance_V)) return;
+  known_ = true;
+  volt_ = std::clamp(read_V, config_.curve_V.front(), config_.curve_V.back());
+  followed_um_ = displacement_at(config_, volt_);
+}
+
+void PiezoDrive::show(nanoseconds now, double read_V) noexcept {
+  const bool on_its_way =
+      written_since_ && seconds(now - *written_since_) < config_.settle_s + amplifier_s;
+  // Before the first voltage it rests until the offset stands still, and is meant to.
+  const double meant_V = std::isfinite(volt_) ? volt_ : 0.0;
+  const bool as_meant = std::abs(read_V - meant_V) <= config_.tolerance_V;
+  // One that has not obeyed does so again when it shows what it was told, not while it may be on
+  // its way; then it has come from anywhere but 0 V, unless that is where it is.
+  const bool again = as_meant && !obeyed_ && meant_V > config_.tolerance_V;
+  if ((!as_meant && !on_its_way) || again) known_ = false;
+  obeyed_ = as_meant || (obeyed_ && on_its_way && std::isfinite(read_V));
+  if (obeyed_ && std::isfinite(asked_um_))
+    applied_um_ = asked_um_;
+  else
+    applied_um_ = std::abs(read_V) <= config_.tolerance_V ? 0.0 : displacement_at(config_, read_V);
+}
+
 double PiezoDrive::step(nanoseconds now, double offset_um) noexcept {
+  const double before_V = volt_;
+  const double volt = next(now, offset_um);
+  if (std::isfinite(volt) && volt != before_V) written_since_ = now;
+  return volt;
+}
+
+double PiezoDrive::next(nanoseconds now, double offset_um) noexcept {
   if (!std::isfinite(offset_um)) return volt_;
   if (!(std::abs(offset_um - asked_um_) <= still_um)) {
     asked_um_ = offset_um;

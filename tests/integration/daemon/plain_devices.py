@@ -239,7 +239,8 @@ def assert_slewed(orders, slack_s=0.7):
 
 class PlainAmplifier(PlainController):
     """The amplifier of a piezo: register 0 is the voltage to give, in 0.01 V. What the piezo does
-    with it hangs on its past: it lags by PLAY_V behind a voltage unless that was reached from 0 V."""
+    with it hangs on its past: it lags by PLAY_V behind a voltage unless that was reached from 0 V.
+    Input register 10 shows the voltage it gives."""
 
     CURVE = ((0.0, -22.0), (25.0, -16.5), (50.0, -9.4), (75.0, -1.3), (100.0, 7.2),
              (125.0, 15.4), (150.0, 22.8))
@@ -248,10 +249,25 @@ class PlainAmplifier(PlainController):
     def start(self):
         self.volts = []  # each voltage that differs from the one before
         self.bent_V = 0.0  # what the ceramic has followed
+        self.obeys = True
         super().start()
 
     def written(self):
-        voltage = 0.01 * self.tables[3].get(0, 0)
+        if self.obeys:
+            self.follow(0.01 * self.tables[3].get(0, 0))
+
+    def give(self, voltage):
+        """This voltage, whatever is written, until it obeys."""
+        with self.lock:
+            self.obeys = False
+            self.follow(voltage)
+
+    def obey(self):
+        with self.lock:
+            self.obeys = True
+
+    def follow(self, voltage):
+        self.tables[4][10] = round(100 * voltage)
         if not self.volts or self.volts[-1] != voltage:
             self.volts.append(voltage)
         if voltage == 0.0:

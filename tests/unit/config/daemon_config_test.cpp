@@ -231,12 +231,19 @@ TEST_CASE("a piezo's curve is read, must rise, and must reach the axis' bound", 
   CHECK(controller.axes[0].piezo->curve_V.size() == 7);
   CHECK_FALSE(config.estimator.controller_reads_back);
   const std::string text = example("piezo.toml");
+  const std::string shown = "offset_um_max = 20.0\napplied = { table = \"input\", address = 0, ";
+  CHECK(parse(edited(text, "offset_um_max = 20.0", shown + "encoding = \"uint16\", scale = 0.1 }"),
+              "column_model.toml")
+            .estimator.controller_reads_back);
   const std::vector<std::pair<std::pair<std::string, std::string>, const char*>> bad = {
       {{"offset_um_max = 20.0", "offset_um_max = 30.0"}, "reaches from -22 to 22.8"},
       {{"-9.4", "-19.4"}, "can be inverted"},
       {{"curve_V = [0,", "curve_V = [1,"}, "must begin at 0 V"},
       {{"settle_s = 0.2", "settle_s = -1"}, "settle_s"},
       {{"scale = 0.01 }  # volts", "scale = 0.001 }"}, "hold the curve's voltages"},
+      {{"offset_um_max = 20.0", shown + "encoding = \"uint16\", scale = 0.001 }"},
+       "hold the curve's voltages"},
+      {{"step_um = 0.2", "step_um = 0.2\ntolerance_V = 0"}, "tolerance_V"},
   };
   for (const auto& [edit, rule] : bad) {
     INFO(edit.second);

@@ -64,6 +64,73 @@ TEST_CASE("a new voltage comes after 0 V, once the offset stands still", "[piezo
   CHECK(drive.step(9s, 7.1) == drive.step(20s, 7.1));
 }
 
+TEST_CASE("what an amplifier shows after a restart is kept until another offset is asked for",
+          "[piezo]") {
+  PiezoDrive drive(measured_piezo());
+  drive.restart_at(50.0);
+  drive.show(0s, 50.0);
+  CHECK(drive.obeyed());
+  CHECK(drive.applied_um() == 2.0);
+  CHECK(drive.step(0s, 2.0) == 50.0);
+  CHECK(drive.step(5s, 2.0) == 50.0);
+  CHECK(drive.step(6s, 6.6) == 50.0);
+  drive.show(6s, 50.0);
+  CHECK(drive.applied_um() == 6.6);  // it waits for this to stand still, and is meant to
+  CHECK(drive.step(7s, 6.6) == 0.0);
+  drive.show(7100ms, 30.0);  // on the way down
+  CHECK(drive.obeyed());
+  CHECK(drive.applied_um() == 6.6);
+  CHECK(drive.step(7200ms, 6.6) == Approx(60.0));
+  drive.show(10s, 60.4);
+  CHECK(drive.obeyed());
+  CHECK(drive.applied_um() == 6.6);
+}
+
+TEST_CASE("an amplifier at rest after a restart starts from nothing", "[piezo]") {
+  PiezoDrive drive(measured_piezo());
+  drive.restart_at(0.3);
+  drive.show(0s, 0.3);
+  CHECK(drive.obeyed());
+  CHECK(drive.applied_um() == 0.0);
+  CHECK(std::isnan(drive.step(0s, 2.0)));
+  drive.show(500ms, 0.3);
+  CHECK(drive.applied_um() == 2.0);
+  CHECK(drive.step(1s, 2.0) == 0.0);
+}
+
+TEST_CASE("an amplifier that does not obey shows where the tool is and is told again", "[piezo]") {
+  PiezoDrive drive(measured_piezo());
+  drive.restart_at(50.0);
+  CHECK(drive.step(0s, 2.0) == 50.0);
+  const auto [shown_V, applied_um] =
+      GENERATE(table<double, double>({{20.0, -12.0}, {0.2, 0.0}, {51.1, 2.506}, {400.0, 25.0}}));
+  drive.show(10s, shown_V);
+  CHECK_FALSE(drive.obeyed());
+  CHECK(drive.applied_um() == Approx(applied_um));
+  CHECK(drive.step(10s, 2.0) == 0.0);  // stands still for long
+  drive.show(10100ms, shown_V);
+  CHECK(drive.step(10200ms, 2.0) == 50.0);
+  drive.show(10300ms, shown_V);
+  CHECK(drive.obeyed() == (shown_V < 1.0));  // at 0 V it showed what it was told
+  CHECK(drive.step(10800ms, 2.0) == 50.0);   // it is given time ...
+  drive.show(10900ms, shown_V);
+  CHECK(drive.step(10900ms, 2.0) == 0.0);  // ... and told again
+  CHECK(drive.step(11100ms, 2.0) == 50.0);
+  drive.show(11300ms, 50.0);  // it obeys again, but has not come from 0 V
+  CHECK(drive.obeyed());
+  CHECK(drive.applied_um() == 2.0);
+  CHECK(drive.step(11300ms, 2.0) == 0.0);
+}
+
+TEST_CASE("a voltage that is no number stands for no offset", "[piezo]") {
+  PiezoDrive drive(measured_piezo());
+  drive.restart_at(not_a_number);
+  CHECK(std::isnan(drive.step(0s, 2.0)));
+  drive.show(0s, not_a_number);
+  CHECK_FALSE(drive.obeyed());
+  CHECK(std::isnan(drive.applied_um()));
+}
+
 TEST_CASE("without returning to zero the voltage goes straight there", "[piezo]") {
   PiezoConfig config = measured_piezo();
   config.return_to_zero = false;
@@ -81,7 +148,10 @@ TEST_CASE("whatever is asked for, the voltage stays within the curve", "[piezo][
   for (int i = 0; i < 2000; ++i) {
     now += std::chrono::milliseconds(engine() % 400);
     const double asked[]{static_cast<double>(engine() % 200) - 100.0, not_a_number, INFINITY, 3.0};
+    const double shown[]{0.0, 50.0, 1e6, -3.0, not_a_number};
     if (engine() % 97 == 0) drive.restart();
+    if (engine() % 89 == 0) drive.restart_at(shown[engine() % 5]);
+    if (engine() % 7 == 0) drive.show(now, shown[engine() % 5]);
     const double volt = drive.step(now, asked[engine() % 4]);
     if (!std::isnan(volt)) CHECK((volt >= 0.0 && volt <= 100.0));
   }
