@@ -92,13 +92,15 @@ double Search::price(const Hypothesis& hypothesis) const {
   return sum + hypothesis.handicap;
 }
 
-std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
-                                             const Settings& settings) const {
-  std::vector<Trial> trials;
+std::vector<std::vector<Search::Trial>> Search::weigh_under_each(
+    const Hypothesis& hypothesis, const Shapes& shapes,
+    const std::vector<Settings>& settings) const {
+  using Equations = std::vector<Setting::Equations>;  // one an output
+  std::vector<std::vector<Trial>> trials(settings.size());
   for (std::size_t first = 0; first < shapes.size(); first += shapes_at_once) {
     const std::size_t count = std::min(shapes_at_once, shapes.size() - first);
-    std::vector<std::vector<Setting::Equations>> equations(
-        count, std::vector<Setting::Equations>(outputs_.size()));
+    std::vector<std::vector<Equations>> equations(
+        settings.size(), std::vector<Equations>(count, Equations(outputs_.size())));
     for (const std::size_t output : measured_) {
       if (!concerns(hypothesis, output)) continue;
       Eigen::MatrixXd side_by_side;
@@ -109,14 +111,22 @@ std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const
         if (i == 0) side_by_side.resize(columns.rows(), width * static_cast<Eigen::Index>(count));
         side_by_side.middleCols(width * static_cast<Eigen::Index>(i), width) = columns;
       }
-      std::vector<Setting::Equations> groups =
-          settings[output]->equations_of_groups(side_by_side, width);
-      for (std::size_t i = 0; i < count; ++i) equations[i][output] = std::move(groups[i]);
+      for (std::size_t under = 0; under < settings.size(); ++under) {
+        std::vector<Setting::Equations> groups =
+            settings[under][output]->equations_of_groups(side_by_side, width);
+        for (std::size_t i = 0; i < count; ++i) equations[under][i][output] = std::move(groups[i]);
+      }
     }
-    for (const auto& of_shape : equations)
-      trials.push_back(trial_of(hypothesis, of_shape, settings));
+    for (std::size_t under = 0; under < settings.size(); ++under)
+      for (const Equations& of_shape : equations[under])
+        trials[under].push_back(trial_of(hypothesis, of_shape, settings[under]));
   }
   return trials;
+}
+
+std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
+                                             const Settings& settings) const {
+  return std::move(weigh_under_each(hypothesis, shapes, {settings}).front());
 }
 
 Search::Trial Search::weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
@@ -171,20 +181,25 @@ bool Search::acts(const Explanation& explanation) {
                      [](const Eigen::VectorXd& gains) { return gains.size() > 0; });
 }
 
-Explanation Search::profile(const Hypothesis& hypothesis, const Settings& settings) const {
+std::vector<Explanation> Search::profile(const Hypothesis& hypothesis,
+                                         const std::vector<Settings>& settings) const {
   const std::vector<std::vector<double>> grid = grid_of(hypothesis);
-  Explanation best{&hypothesis, grid.front(), std::vector<Eigen::VectorXd>(outputs_.size()),
-                   0.0,         settings,     0.0,
-                   0.0};
-  std::vector<Trial> trials = weigh_all(hypothesis, grid, settings);
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    if (!(trials[i].score > best.score)) continue;
-    best.score = trials[i].score;
-    best.shape = grid[i];
-    best.gains = std::move(trials[i].gains);
+  std::vector<std::vector<Trial>> trials = weigh_under_each(hypothesis, grid, settings);
+  std::vector<Explanation> bests;
+  for (std::size_t under = 0; under < settings.size(); ++under) {
+    Explanation best{&hypothesis, grid.front(),    std::vector<Eigen::VectorXd>(outputs_.size()),
+                     0.0,         settings[under], 0.0,
+                     0.0};
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      if (!(trials[under][i].score > best.score)) continue;
+      best.score = trials[under][i].score;
+      best.shape = grid[i];
+      best.gains = std::move(trials[under][i].gains);
+    }
+    best.score -= price(hypothesis);
+    bests.push_back(std::move(best));
   }
-  best.score -= price(hypothesis);
-  return best;
+  return bests;
 }
 
 Search::Settings Search::likeliest_settings(const Explanation& explanation) const {
@@ -290,13 +305,16 @@ std::vector<Explanation> Search::ranked() {
     likeliest[output] = &outputs_[output].setting();
     plain[output] = outputs_[output].settings().front().get();
   }
+  std::vector<Settings> settings = {likeliest};
+  if (plain != likeliest) settings.push_back(plain);
+  std::vector<std::vector<Explanation>> under_each(settings.size());
+  for (const Hypothesis& hypothesis : hypotheses_) {
+    std::vector<Explanation> bests = profile(hypothesis, settings);
+    for (std::size_t under = 0; under < settings.size(); ++under)
+      if (bests[under].score > 0) under_each[under].push_back(std::move(bests[under]));
+  }
   std::vector<Explanation> candidates;
-  for (const Settings& settings : {likeliest, plain}) {
-    std::vector<Explanation> all;
-    for (const Hypothesis& hypothesis : hypotheses_) {
-      Explanation best = profile(hypothesis, settings);
-      if (best.score > 0) all.push_back(std::move(best));
-    }
+  for (std::vector<Explanation>& all : under_each) {
     const auto better = [](const auto& a, const auto& b) { return a.score > b.score; };
     std::sort(all.begin(), all.end(), better);
     all.resize(std::min(all.size(), shortlist_of_each));

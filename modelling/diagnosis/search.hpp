@@ -89,6 +89,10 @@ class Search {
 
   using Shapes = std::vector<std::vector<double>>;
 
+  /// The same trials under each of the settings, one a shape: columns are made once.
+  [[nodiscard]] std::vector<std::vector<Trial>> weigh_under_each(
+      const Hypothesis& hypothesis, const Shapes& shapes,
+      const std::vector<Settings>& settings) const;
   /// One trial a shape.
   [[nodiscard]] std::vector<Trial> weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
                                              const Settings& settings) const;
@@ -97,7 +101,9 @@ class Search {
   [[nodiscard]] Trial trial_of(const Hypothesis& hypothesis,
                                const std::vector<Setting::Equations>& equations,
                                const Settings& settings) const;
-  [[nodiscard]] Explanation profile(const Hypothesis& hypothesis, const Settings& settings) const;
+  /// The best of the grid under each of the settings.
+  [[nodiscard]] std::vector<Explanation> profile(const Hypothesis& hypothesis,
+                                                 const std::vector<Settings>& settings) const;
   [[nodiscard]] Settings likeliest_settings(const Explanation& explanation) const;
   void refine(Explanation& explanation) const;
   void settle(Explanation& explanation) const;
