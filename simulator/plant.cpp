@@ -228,9 +228,6 @@ double Plant::node_degC(std::size_t node) const {
 double Plant::room_degC() const noexcept {
   return parts_->room_degC;
 }
-double Plant::coolant_degC() const noexcept {
-  return parts_->coolant_degC;
-}
 double Plant::signal(std::size_t signal) const {
   return parts_->signals.at(signal);
 }

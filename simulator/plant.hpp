@@ -29,7 +29,6 @@ class Plant {
   /// @pre the plant has lumps (checked)
   [[nodiscard]] double node_degC(std::size_t node) const;
   [[nodiscard]] double room_degC() const noexcept;
-  [[nodiscard]] double coolant_degC() const noexcept;
   [[nodiscard]] double signal(std::size_t signal) const;
   /// Heat of all sources into a lump, now [W].
   [[nodiscard]] double heat_W(std::size_t node) const;

@@ -513,18 +513,4 @@ Exchange ModbusConnection::write_registers(int unit, std::uint16_t address,
   return exchange;
 }
 
-Exchange ModbusConnection::write_coil(int unit, std::uint16_t address, bool on) {
-  Pdu request;
-  request.push(MODBUS_FC_WRITE_SINGLE_COIL);
-  request.push_word(address);
-  request.push_word(on ? 0xFF00 : 0);
-  Exchange exchange = implementation_->exchange(unit, request, 5);
-  if (!exchange.ok()) return exchange;
-  const auto answer = implementation_->answer();
-  const bool confirmed =
-      std::equal(answer.begin(), answer.end(), request.view().begin(), request.view().end());
-  if (!confirmed) implementation_->reject(unit, exchange, "the answer confirms another write");
-  return exchange;
-}
-
 }  // namespace thermocomp

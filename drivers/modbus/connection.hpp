@@ -79,8 +79,6 @@ class ModbusConnection {
   Exchange read(int unit, ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words);
   /// Writes holding registers (function 16; at most 123). ok: the unit has confirmed them.
   Exchange write_registers(int unit, std::uint16_t address, std::span<const std::uint16_t> words);
-  /// Writes one coil (function 5).
-  Exchange write_coil(int unit, std::uint16_t address, bool on);
 
   /// Before this time the unit is not asked for these registers, because an answer to an earlier
   /// request may still come; 0: at any time.

@@ -292,13 +292,6 @@ ShapeValues shape_values(Shape shape, const Vec3& local) {
   return values_of(shape_info(shape), local);
 }
 
-std::optional<Shape> volume_shape_of(std::string_view name) {
-  for (const Shape shape : {Shape::tet4, Shape::tet10, Shape::hex8, Shape::hex20}) {
-    if (shape_info(shape).name == name) return shape;
-  }
-  return std::nullopt;
-}
-
 Vec3 clamped_local(Shape shape, Vec3 local) {
   const ShapeInfo& info = shape_info(shape);
   if (info.corners != info.dimension + 1) {

@@ -7,7 +7,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -54,7 +53,6 @@ struct ShapeInfo {
 
 [[nodiscard]] const ShapeInfo& shape_info(Shape shape);
 [[nodiscard]] ShapeValues shape_values(Shape shape, const Vec3& local);
-[[nodiscard]] std::optional<Shape> volume_shape_of(std::string_view name);
 /// The nearest point of the reference element.
 [[nodiscard]] Vec3 clamped_local(Shape shape, Vec3 local);
 

@@ -254,19 +254,6 @@ TEST_CASE("a dry run applies what it is offered and shows it", "[controllers]") 
   CHECK_FALSE(state.online);
 }
 
-TEST_CASE("the resolution of an offset is its scale, none for a float", "[controllers]") {
-  ModbusControllerConfig modbus;
-  modbus.axes.resize(2);
-  modbus.axes[0].offset.scale = -0.01;
-  modbus.axes[1].offset.encoding = Encoding::float32;
-  CHECK(offset_resolution_um(modbus) == std::vector<double>{0.01, 0.0});
-  CanControllerConfig can;
-  can.axes.resize(1);
-  can.axes[0].offset.scale = 0.1;
-  CHECK(offset_resolution_um(can) == std::vector<double>{0.1});
-  CHECK(offset_resolution_um(DryRunControllerConfig{"bench", 2}) == std::vector<double>{0.0, 0.0});
-}
-
 TEST_CASE("a CAN controller that cannot be is refused", "[controllers][can]") {
   CanControllerConfig good;
   good.name = "cnc";

@@ -64,7 +64,6 @@ TEST_CASE("registers and bits of every table are read, writes are confirmed", "[
   REQUIRE(read_inputs(connection, 1, 0, many).ok());
   CHECK(many[124] == 1124);
   CHECK(connection.write_registers(7, 5, words).ok());
-  CHECK(connection.write_coil(7, 5, true).ok());
 }
 
 TEST_CASE("exceptions, silence and wrong answers are told apart", "[connection]") {
