@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numeric>
 
@@ -131,6 +132,7 @@ class Catalogue {
   void add_run_faults(std::size_t run);
   void add_displacement_faults(std::size_t run, std::size_t output);
   void add_sensor_faults(std::size_t run, std::size_t input);
+  void share_columns(Hypothesis& fault, std::size_t input) const;
   [[nodiscard]] ShapeParameter onsets(std::size_t run, const char* name, double first, double last,
                                       std::size_t count) const;
 
@@ -349,13 +351,12 @@ void Catalogue::add_period(std::size_t output) {
                                                   2 * static_cast<Eigen::Index>(data_.runs.size()));
     for (std::size_t run = 0; run < data_.runs.size(); ++run) {
       const auto column = 2 * static_cast<Eigen::Index>(run);
-      const auto phase = [&](const MeasuredRun& of) -> Column {
-        return turn / shape[0] * of.time_s;
-      };
-      waves.col(column) =
-          in_run(run, [&](const MeasuredRun& of) -> Column { return phase(of).array().sin(); });
-      waves.col(column + 1) =
-          in_run(run, [&](const MeasuredRun& of) -> Column { return phase(of).array().cos(); });
+      const Block& block = rows_.runs[run];
+      for (Eigen::Index row = block.begin; row < block.end; ++row) {
+        const double phase = turn / shape[0] * rows_.time_s[row];
+        waves(row, column) = std::sin(phase);
+        waves(row, column + 1) = std::cos(phase);
+      }
     }
     return waves;
   };
@@ -401,6 +402,15 @@ void Catalogue::add_displacement_faults(std::size_t run, std::size_t output) {
   };
 }
 
+/// A fault that is alike at every sensor of a run acts through the sensor's coefficient alone.
+void Catalogue::share_columns(Hypothesis& fault, std::size_t input) const {
+  if (!data_.model.guideways.empty()) return;  // the coefficient changes from row to row
+  fault.pattern = fault.cause + std::to_string(*fault.run);
+  fault.scale = [this, input](std::size_t output) {
+    return -data_.model.matrix_um_per_K[output][input];
+  };
+}
+
 void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
   const std::string& name = data_.model.inputs[input];
   const auto fault = [&](const char* cause, const char* onset, const char* gain, double first,
@@ -419,18 +429,20 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
       return -data_.coefficient(of, output, input).cwiseProduct(reading_K(of));
     }));
   };
-  fault("sensor_step", "at_s", "step_K", 0.02, 64).columns = [column](const Shape& shape,
-                                                                      std::size_t output) {
+  Hypothesis& step = fault("sensor_step", "at_s", "step_K", 0.02, 64);
+  step.columns = [column](const Shape& shape, std::size_t output) {
     return column(output, [&](const MeasuredRun& of) -> Column {
       return (of.time_s.array() >= shape[0]).cast<double>();
     });
   };
-  fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24).columns = [column](const Shape& shape,
-                                                                               std::size_t output) {
+  share_columns(step, input);
+  Hypothesis& drift = fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24);
+  drift.columns = [column](const Shape& shape, std::size_t output) {
     return column(output, [&](const MeasuredRun& of) -> Column {
       return ((of.time_s.array() - shape[0]) / 3600.0).max(0.0);
     });
   };
+  share_columns(drift, input);
   // reading = room + gain (T - room): the reading misses (1 / gain - 1) (reading - room).
   const auto named_room = [](const std::string& column_name) {
     return column_name.find("room") != std::string::npos ||
@@ -443,17 +455,23 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
   const auto room = std::find_if(inputs.begin(), inputs.end(), named_room) - inputs.begin();
   if (static_cast<std::size_t>(room) == input) return;
   Hypothesis& loose = fault("sensor_loose", "at_s", "gain", 0.03, 48);
-  loose.columns = [column, input, other, room, n_others = others.size(), n_inputs = inputs.size()](
-                      const Shape& shape, std::size_t output) {
+  const auto whole = [column, input, other, room, n_others = others.size(),
+                      n_inputs = inputs.size()](std::size_t output) {
     return column(output, [&](const MeasuredRun& of) -> Column {
-      Column room_degC = Column::Constant(of.rows(), of.inputs_degC[input][0]);
       if (static_cast<std::size_t>(other) < n_others)
-        room_degC = of.others_degC[static_cast<std::size_t>(other)];
-      else if (static_cast<std::size_t>(room) < n_inputs)
-        room_degC = of.inputs_degC[static_cast<std::size_t>(room)];
-      const Column loss = (of.time_s.array() >= shape[0]).cast<double>();
-      return -loss.cwiseProduct(of.inputs_degC[input] - room_degC);
+        return of.others_degC[static_cast<std::size_t>(other)] - of.inputs_degC[input];
+      if (static_cast<std::size_t>(room) < n_inputs)
+        return of.inputs_degC[static_cast<std::size_t>(room)] - of.inputs_degC[input];
+      return of.inputs_degC[input][0] - of.inputs_degC[input].array();
     });
+  };
+  const auto columns = std::make_shared<std::map<std::size_t, Eigen::MatrixXd>>();
+  loose.columns = [this, whole, columns](const Shape& shape, std::size_t output) {
+    const auto known = columns->find(output);
+    const Eigen::MatrixXd& lost = known != columns->end()
+                                      ? known->second
+                                      : columns->emplace(output, whole(output)).first->second;
+    return Eigen::MatrixXd((rows_.time_s.array() >= shape[0]).select(lost.array(), 0.0).matrix());
   };
   loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
 }

@@ -50,6 +50,10 @@ struct Hypothesis {
   bool in_every_output{false};  ///< an output without its share speaks against it
   /// Columns for an output over the stacked rows, shape (rows, gains or 1).
   std::function<Eigen::MatrixXd(const std::vector<double>& shape, std::size_t output)> columns{};
+  /// Hypotheses of one pattern have the same grid and the same columns, each times its scale for
+  /// the output; empty: it shares its columns with none.
+  std::string pattern{};
+  std::function<double(std::size_t output)> scale{};
   /// Whether a gain is physically possible; empty: all are.
   std::function<bool(double gain, std::size_t output)> possible{};
 };

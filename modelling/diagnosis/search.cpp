@@ -22,6 +22,8 @@ constexpr double structure_share_min = 0.03;
 constexpr double structure_noises_min = 1.5;
 constexpr int refit_rounds = 2;
 constexpr std::size_t shapes_at_once = 8;
+/// Columns of smaller factors are made for themselves.
+constexpr double scale_min = 1e-6;
 /// Explanations are as good as each other when what they leave differs by less than this share.
 constexpr double tie_share = 0.1;
 constexpr std::size_t weighed_shown = 12;
@@ -92,15 +94,12 @@ double Search::price(const Hypothesis& hypothesis) const {
   return sum + hypothesis.handicap;
 }
 
-std::vector<std::vector<Search::Trial>> Search::weigh_under_each(
-    const Hypothesis& hypothesis, const Shapes& shapes,
-    const std::vector<Settings>& settings) const {
-  using Equations = std::vector<Setting::Equations>;  // one an output
-  std::vector<std::vector<Trial>> trials(settings.size());
+Search::Equations Search::equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
+                                               const std::vector<Settings>& settings) const {
+  Equations equations(settings.size(),
+                      {shapes.size(), Equations::value_type::value_type(outputs_.size())});
   for (std::size_t first = 0; first < shapes.size(); first += shapes_at_once) {
     const std::size_t count = std::min(shapes_at_once, shapes.size() - first);
-    std::vector<std::vector<Equations>> equations(
-        settings.size(), std::vector<Equations>(count, Equations(outputs_.size())));
     for (const std::size_t output : measured_) {
       if (!concerns(hypothesis, output)) continue;
       Eigen::MatrixXd side_by_side;
@@ -114,19 +113,47 @@ std::vector<std::vector<Search::Trial>> Search::weigh_under_each(
       for (std::size_t under = 0; under < settings.size(); ++under) {
         std::vector<Setting::Equations> groups =
             settings[under][output]->equations_of_groups(side_by_side, width);
-        for (std::size_t i = 0; i < count; ++i) equations[under][i][output] = std::move(groups[i]);
+        for (std::size_t i = 0; i < count; ++i)
+          equations[under][first + i][output] = std::move(groups[i]);
       }
     }
-    for (std::size_t under = 0; under < settings.size(); ++under)
-      for (const Equations& of_shape : equations[under])
-        trials[under].push_back(trial_of(hypothesis, of_shape, settings[under]));
   }
-  return trials;
+  return equations;
+}
+
+Search::Equations Search::equations_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
+                                            const std::vector<Settings>& settings,
+                                            Patterns& patterns) const {
+  const auto scaled = [&](Equations equations, bool inverse) {
+    for (auto& of_setting : equations)
+      for (auto& of_shape : of_setting)
+        for (const std::size_t output : measured_) {
+          const double scale = hypothesis.scale(output);
+          const double factor = inverse ? 1.0 / scale : scale;
+          of_shape[output].square *= factor * factor;
+          of_shape[output].right *= factor;
+        }
+    return equations;
+  };
+  const bool shares = !hypothesis.pattern.empty() &&
+                      std::all_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
+                        return std::abs(hypothesis.scale(output)) > scale_min;
+                      });
+  if (!shares) return equations_under_each(hypothesis, grid, settings);
+  const auto known = patterns.find(hypothesis.pattern);
+  if (known != patterns.end()) return scaled(known->second, false);
+  Equations equations = equations_under_each(hypothesis, grid, settings);
+  patterns.emplace(hypothesis.pattern, scaled(equations, true));
+  return equations;
 }
 
 std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
                                              const Settings& settings) const {
-  return std::move(weigh_under_each(hypothesis, shapes, {settings}).front());
+  const Equations equations = equations_under_each(hypothesis, shapes, {settings});
+  std::vector<Trial> trials;
+  for (const auto& of_shape : equations.front())
+    trials.push_back(trial_of(hypothesis, of_shape, settings));
+  return trials;
 }
 
 Search::Trial Search::weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
@@ -182,19 +209,21 @@ bool Search::acts(const Explanation& explanation) {
 }
 
 std::vector<Explanation> Search::profile(const Hypothesis& hypothesis,
-                                         const std::vector<Settings>& settings) const {
+                                         const std::vector<Settings>& settings,
+                                         Patterns& patterns) const {
   const std::vector<std::vector<double>> grid = grid_of(hypothesis);
-  std::vector<std::vector<Trial>> trials = weigh_under_each(hypothesis, grid, settings);
+  const Equations equations = equations_of_grid(hypothesis, grid, settings, patterns);
   std::vector<Explanation> bests;
   for (std::size_t under = 0; under < settings.size(); ++under) {
     Explanation best{&hypothesis, grid.front(),    std::vector<Eigen::VectorXd>(outputs_.size()),
                      0.0,         settings[under], 0.0,
                      0.0};
     for (std::size_t i = 0; i < grid.size(); ++i) {
-      if (!(trials[under][i].score > best.score)) continue;
-      best.score = trials[under][i].score;
+      Trial trial = trial_of(hypothesis, equations[under][i], settings[under]);
+      if (!(trial.score > best.score)) continue;
+      best.score = trial.score;
       best.shape = grid[i];
-      best.gains = std::move(trials[under][i].gains);
+      best.gains = std::move(trial.gains);
     }
     best.score -= price(hypothesis);
     bests.push_back(std::move(best));
@@ -307,9 +336,10 @@ std::vector<Explanation> Search::ranked() {
   }
   std::vector<Settings> settings = {likeliest};
   if (plain != likeliest) settings.push_back(plain);
+  Patterns patterns;
   std::vector<std::vector<Explanation>> under_each(settings.size());
   for (const Hypothesis& hypothesis : hypotheses_) {
-    std::vector<Explanation> bests = profile(hypothesis, settings);
+    std::vector<Explanation> bests = profile(hypothesis, settings, patterns);
     for (std::size_t under = 0; under < settings.size(); ++under)
       if (bests[under].score > 0) under_each[under].push_back(std::move(bests[under]));
   }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <functional>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "modelling/diagnosis/evidence.hpp"
@@ -89,10 +91,17 @@ class Search {
 
   using Shapes = std::vector<std::vector<double>>;
 
-  /// The same trials under each of the settings, one a shape: columns are made once.
-  [[nodiscard]] std::vector<std::vector<Trial>> weigh_under_each(
-      const Hypothesis& hypothesis, const Shapes& shapes,
-      const std::vector<Settings>& settings) const;
+  /// Under each of the settings, of each shape, one an output.
+  using Equations = std::vector<std::vector<std::vector<Setting::Equations>>>;
+  /// Those of the grids of hypotheses that share their columns but for a factor, by pattern.
+  using Patterns = std::map<std::string, Equations>;
+
+  /// Columns are made once for all settings.
+  [[nodiscard]] Equations equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
+                                               const std::vector<Settings>& settings) const;
+  [[nodiscard]] Equations equations_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
+                                            const std::vector<Settings>& settings,
+                                            Patterns& patterns) const;
   /// One trial a shape.
   [[nodiscard]] std::vector<Trial> weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
                                              const Settings& settings) const;
@@ -103,7 +112,8 @@ class Search {
                                const Settings& settings) const;
   /// The best of the grid under each of the settings.
   [[nodiscard]] std::vector<Explanation> profile(const Hypothesis& hypothesis,
-                                                 const std::vector<Settings>& settings) const;
+                                                 const std::vector<Settings>& settings,
+                                                 Patterns& patterns) const;
   [[nodiscard]] Settings likeliest_settings(const Explanation& explanation) const;
   void refine(Explanation& explanation) const;
   void settle(Explanation& explanation) const;
