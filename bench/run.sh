@@ -1,6 +1,7 @@
 #!/bin/sh
 # The benchmarks. Without an argument: their names, one a line. With one: runs it; the last lines
-# of its output are "NAME VALUE UNIT". Exit status 0 when it could measure, 2 for an unknown name.
+# of its output are "NAME VALUE UNIT". Exit status 0 when it could measure, 2 for an unknown name, 77
+# where the measured data that it needs are not there.
 # Everything else (building, progress, what is compared with what) goes to stderr.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -18,8 +19,14 @@ if [ $# -eq 0 ]; then
   exit 0
 fi
 if [ $# -ne 1 ] || ! list | grep -qxF -- "$1"; then
-  echo "bench/run.sh: no benchmark of that name; there are:" $(list) >&2
+  echo "bench/run.sh: no benchmark of that name; there are: $(list | tr '\n' ' ')" >&2
   exit 2
+fi
+
+data=${THERMOCOMP_DATA:-$source_dir/../shared/data}
+if grep -q THERMOCOMP_DATA "$here/$1.sh" && [ ! -d "$data/spindle_46h" ]; then
+  echo "bench/run.sh: skipped: $1 needs data that are not in $data (THERMOCOMP_DATA)" >&2
+  exit 77
 fi
 
 # A benchmark finds the programs here; THERMOCOMP_BENCH_BUILD names another, already built folder.

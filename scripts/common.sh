@@ -14,7 +14,8 @@ build_jobs() {
   if ((memory_GiB < cpus)); then echo "$memory_GiB"; else echo "$cpus"; fi
 }
 
-# stage "what" command...: says what begins, and how long it took or that it failed.
+# stage "what" command...: says what begins, and how long it took, that it was left out (status 77) or
+# that it failed.
 stage() {
   local title=$1 began=$SECONDS status=0
   shift
@@ -22,6 +23,8 @@ stage() {
   "$@" || status=$?
   if ((status == 0)); then
     echo "== $title: done in $((SECONDS - began)) s"
+  elif ((status == 77)); then
+    echo "== $title: left out"
   else
     echo "== $title: FAILED after $((SECONDS - began)) s (status $status)" >&2
   fi
