@@ -547,6 +547,12 @@ SearchResult Search::run() {
       result.weighed.push_back({round, candidates[i].hypothesis->cause,
                                 candidates[i].hypothesis->subject, candidates[i].score,
                                 candidates[i].left_out_gain, candidates[i].log_left});
+    if (thresholds_.one_unit) {
+      const auto first = std::find_if(
+          candidates.begin(), candidates.end(),
+          [&](const Explanation& each) { return earned(each, result.findings.empty()); });
+      if (first != candidates.end()) std::rotate(candidates.begin(), first, first + 1);
+    }
     if (candidates.empty() || !earned(candidates.front(), result.findings.empty())) break;
     Finding finding{candidates.front(), {}, {}, {}};
     for (std::size_t i = 1; i < candidates.size(); ++i) {

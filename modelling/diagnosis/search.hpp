@@ -36,7 +36,8 @@ struct Thresholds {
   double carried_share_min{0.3};
   std::size_t findings_max{4};
   /// Outputs have one unit and much the same noise: shares are of all their squares together, since
-  /// a cause that is plain in one of them leaves most others as they are.
+  /// a cause that is plain in one of them leaves most others as they are. For the same reason what
+  /// is likeliest need not be large enough to be named; then the best that is comes first.
   bool one_unit{false};
 };
 
