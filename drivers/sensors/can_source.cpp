@@ -28,115 +28,79 @@ std::vector<CanId> identifiers(const CanBusConfig& config) {
   return ids;
 }
 
+std::vector<UnitHealth> units_of(const CanBusConfig& config) {
+  std::vector<UnitHealth> units;
+  for (const CanDeviceConfig& device : config.devices) units.emplace_back().name = device.name;
+  return units;
+}
+
 }  // namespace
 
-CanSource::CanSource(CanBusConfig config)
-    : config_(std::move(config)),
-      socket_(config_.interface, identifiers(config_)),
-      readings_(identifiers(config_).size()),
-      last_good_(config_.devices.size()),
-      slot_(readings_) {
-  for (std::size_t device = 0; device < config_.devices.size(); ++device) {
-    for (const CanChannel& channel : config_.devices[device].channels) {
-      check(channel.signal);
-      if (channel.counter) check(*channel.counter, channel.signal.fd);
-      channels_.push_back(
-          {id_of(channel.signal), channel.signal, channel.counter, device, channel.sensor});
-    }
-    health_.units.emplace_back().name = config_.devices[device].name;
-  }
-  std::stable_sort(channels_.begin(), channels_.end(),
-                   [](const Channel& a, const Channel& b) { return a.id < b.id; });
-  health_.name = config_.name;
-  health_.kind = "can";
-  health_.state = to_string(socket_.state());
-  health_.state_since = socket_.state_since();
-}
+CanSource::CanSource(const CanBusConfig& config) : CanSource(config, channels_of(config)) {}
+
+CanSource::CanSource(const CanBusConfig& config, std::vector<Channel> channels)
+    : CanInterfaceSource(
+          {config.name, "can", config.interface, config.reconnect_s, look_every, gather},
+          identifiers(config), sensors_of(channels), units_of(config)),
+      channels_(std::move(channels)),
+      readings_(channels_.size()),
+      units_(units_of(config)),
+      last_good_(config.devices.size()) {}
 
 CanSource::~CanSource() {
   stop();
 }
 
-void CanSource::start() {
-  if (const std::string reason = can_unavailable(); !reason.empty()) {
-    throw DriverError(config_.name + ": this system has no CAN sockets: " + reason);
-  }
-  thread_.start(config_.name, [this] { run(); });
-}
-
-void CanSource::stop() noexcept {
-  stopping_.store(true);
-  wake_.signal();
-  thread_.join();
-}
-
-void CanSource::newest(std::span<Reading> all) noexcept {
-  slot_.fresh();
-  const std::vector<Reading>& newest = slot_.front();
-  for (std::size_t i = 0; i < channels_.size(); ++i) {
-    THERMOCOMP_ENSURE(channels_[i].sensor < all.size());
-    all[channels_[i].sensor] = newest[i];
-  }
-}
-
-BusHealth CanSource::health() const {
-  const std::scoped_lock lock(health_mutex_);
-  return health_;
-}
-
-void CanSource::run() {
-  while (!stopping_.load()) {
-    if (!socket_.is_open() && !open()) {
-      wake_.wait_until(monotonic_now() + from_seconds(config_.reconnect_s));
-      continue;
+std::vector<CanSource::Channel> CanSource::channels_of(const CanBusConfig& config) {
+  std::vector<Channel> channels;
+  for (std::size_t device = 0; device < config.devices.size(); ++device) {
+    for (const CanChannel& channel : config.devices[device].channels) {
+      check(channel.signal);
+      if (channel.counter) check(*channel.counter, channel.signal.fd);
+      channels.push_back(
+          {id_of(channel.signal), channel.signal, channel.counter, device, channel.sensor});
     }
-    wake_.wait_until(monotonic_now() + look_every, socket_.descriptor());
-    const bool was_bus_off = socket_.bus_off();
-    receive();
-    if (!socket_.is_open() || (socket_.bus_off() && !was_bus_off)) lose_all();
-    note_health();
-    wake_.wait_until(monotonic_now() + gather);
   }
-  socket_.close();
+  std::stable_sort(channels.begin(), channels.end(),
+                   [](const Channel& a, const Channel& b) { return a.id < b.id; });
+  return channels;
 }
 
-void CanSource::receive() {
-  std::span<const CanFrame> frames;
-  do {
-    frames = socket_.receive();
-    take(frames);
-  } while (frames.size() == CanSocket::batch_max && !stopping_.load());
+std::vector<std::size_t> CanSource::sensors_of(const std::vector<Channel>& channels) {
+  std::vector<std::size_t> sensors;
+  for (const Channel& channel : channels) sensors.push_back(channel.sensor);
+  return sensors;
 }
 
-bool CanSource::open() {
-  const bool opened = socket_.open();
-  if (opened) {
-    const std::scoped_lock lock(health_mutex_);
-    ++health_.connects;
-  } else {
-    lose_all();
-  }
-  note_health();
-  return opened;
-}
+void CanSource::bus_opened(nanoseconds) {}
 
 /// Marks every reading that is not marked yet; the time is that of the loss.
-void CanSource::lose_all() {
-  const nanoseconds now = monotonic_now();
+void CanSource::bus_closed(nanoseconds now) {
   for (Reading& reading : readings_) {
     if (reading.fault != Fault::no_answer) reading = {not_a_number, now, Fault::no_answer};
   }
   for (Channel& channel : channels_) channel.count_of_frame = channel.count_of_page = std::nullopt;
-  publish();
 }
 
-void CanSource::take(std::span<const CanFrame> frames) {
-  if (frames.empty()) return;
-  {
-    const std::scoped_lock lock(health_mutex_);
+void CanSource::work() {
+  constexpr int batches_max = 16;  // so that readings are handed over in a flood too
+  for (int batch = 0; batch < batches_max; ++batch) {
+    const auto frames = socket().receive();
     for (const CanFrame& frame : frames) take(frame);
+    if (frames.size() < CanSocket::batch_max) return;
   }
-  publish();
+}
+
+void CanSource::write_readings(std::vector<Reading>& readings) {
+  readings = readings_;  // same size: copies, never allocates
+}
+
+std::vector<UnitHealth> CanSource::units(nanoseconds now) {
+  for (std::size_t i = 0; i < last_good_.size(); ++i) {
+    units_[i].answering =
+        usable() && last_good_[i] != nanoseconds{0} && now - last_good_[i] < silent_after;
+  }
+  return units_;
 }
 
 /// Keeps the counter of a channel of this frame's identifier.
@@ -166,12 +130,11 @@ void CanSource::note_arrival(Arrival arrival, UnitHealth& unit) {
   }
 }
 
-/// @pre health_mutex_ is held
 void CanSource::take(const CanFrame& frame) {
   const auto [first, last] =
       std::equal_range(channels_.begin(), channels_.end(), Channel{frame.id, {}, {}, 0, 0},
                        [](const Channel& a, const Channel& b) { return a.id < b.id; });
-  std::size_t counted = config_.devices.size();  // each device once a frame
+  std::size_t counted = last_good_.size();  // each device once a frame
   for (auto channel = first; channel != last; ++channel) {
     Arrival arrival = arrival_of(frame, *channel);
     if (arrival == Arrival::other_page) continue;
@@ -184,31 +147,8 @@ void CanSource::take(const CanFrame& frame) {
     }
     if (channel->device == counted) continue;
     counted = channel->device;
-    note_arrival(arrival, health_.units[channel->device]);
+    note_arrival(arrival, units_[channel->device]);
     if (arrival == Arrival::renewed) last_good_[channel->device] = frame.received_at;
-  }
-}
-
-void CanSource::publish() {
-  slot_.back() = readings_;  // same size: copies, never allocates
-  slot_.publish();
-}
-
-void CanSource::note_health() {
-  const nanoseconds now = monotonic_now();
-  const bool connected = socket_.is_open() && !socket_.bus_off();
-  const std::scoped_lock lock(health_mutex_);
-  health_.connected = connected;
-  health_.last_error = socket_.error();
-  health_.state = to_string(socket_.state());
-  health_.state_since = socket_.state_since();
-  health_.error_frames = socket_.errors().error_frames;
-  health_.bus_offs = socket_.errors().bus_off;
-  health_.restarts = socket_.errors().restarted;
-  health_.dropped = socket_.errors().dropped;
-  for (std::size_t i = 0; i < last_good_.size(); ++i) {
-    health_.units[i].answering =
-        connected && last_good_[i] != nanoseconds{0} && now - last_good_[i] < silent_after;
   }
 }
 

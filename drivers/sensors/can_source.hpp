@@ -1,19 +1,14 @@
 /// Thermocouple readings from the frames of one CAN interface.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <mutex>
 #include <optional>
 #include <vector>
 
-#include "drivers/bus_thread.hpp"
 #include "drivers/can/can_socket.hpp"
+#include "drivers/sensors/can_interface_source.hpp"
 #include "drivers/sensors/sensor_bus_config.hpp"
-#include "drivers/sensors/sensor_source.hpp"
-#include "drivers/wait_free_slot.hpp"
-#include "drivers/wake_event.hpp"
 
 namespace thermocomp {
 
@@ -24,17 +19,11 @@ namespace thermocomp {
 ///
 /// Frames are fetched in batches, each 10 ms at the earliest after the one before: their times are
 /// the kernel's, and a full bus costs little.
-class CanSource final : public SensorSource {
+class CanSource final : public CanInterfaceSource {
  public:
   /// @throws InvalidValue for a signal, interface or number of identifiers that cannot be
-  explicit CanSource(CanBusConfig config);
+  explicit CanSource(const CanBusConfig& config);
   ~CanSource() override;
-
-  /// @throws DriverError when the system has no CAN sockets at all
-  void start() override;
-  void stop() noexcept override;
-  void newest(std::span<Reading> all) noexcept override;
-  [[nodiscard]] BusHealth health() const override;
 
  private:
   struct Channel {
@@ -50,28 +39,23 @@ class CanSource final : public SensorSource {
   };
   enum class Arrival { other_page, stood_still, renewed, bad_frame };
 
-  void run();
-  bool open();
-  void receive();
-  void take(std::span<const CanFrame> frames);
+  void bus_opened(nanoseconds now) override;
+  void bus_closed(nanoseconds now) override;
+  void work() override;
+  void write_readings(std::vector<Reading>& readings) override;
+  [[nodiscard]] std::vector<UnitHealth> units(nanoseconds now) override;
+
+  static std::vector<Channel> channels_of(const CanBusConfig& config);
+  static std::vector<std::size_t> sensors_of(const std::vector<Channel>& channels);
+  explicit CanSource(const CanBusConfig& config, std::vector<Channel> channels);
   void take(const CanFrame& frame);
   static Arrival arrival_of(const CanFrame& frame, Channel& channel) noexcept;
   static void note_arrival(Arrival arrival, UnitHealth& unit);
-  void lose_all();
-  void publish();
-  void note_health();
 
-  const CanBusConfig config_;
   std::vector<Channel> channels_;  ///< in the order of the identifiers
-  CanSocket socket_;
-  WakeEvent wake_;
-  std::atomic<bool> stopping_{false};
-  std::vector<Reading> readings_;       ///< one a channel; the thread's own
+  std::vector<Reading> readings_;  ///< one a channel
+  std::vector<UnitHealth> units_;
   std::vector<nanoseconds> last_good_;  ///< arrival of each device's last good frame; 0: none
-  WaitFreeSlot<std::vector<Reading>> slot_;
-  mutable std::mutex health_mutex_;
-  BusHealth health_;
-  BusThread thread_;
 };
 
 }  // namespace thermocomp

@@ -37,6 +37,13 @@ CanSignal signal_from(fuzz::ByteFeed& feed) {
     selector.pages.resize(feed.u8() % 3);
     for (CanSelector::Pages& pages : selector.pages) pages = {feed.u8(), feed.u8()};
   }
+  if ((kind & 64) != 0) {
+    CanStatus& status = signal.status.emplace();
+    status.field = {static_cast<std::int8_t>(feed.u8()), static_cast<std::int8_t>(feed.u8()),
+                    feed.u8() % 2 == 0 ? ByteOrder::little_endian : ByteOrder::big_endian};
+    status.mask = feed.u64();
+    status.codes = {{feed.u8(), Fault::none}, {feed.u8(), Fault::open_circuit}};
+  }
   return signal;
 }
 
@@ -82,6 +89,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FUZZ_PROMISE(std::isfinite(decoded.value) == (decoded.fault == Fault::none));
   const bool too_short = payload.size() < bytes_needed(signal);
   FUZZ_PROMISE(!too_short || decoded.fault == Fault::bad_frame);
+  // Without its status the same bytes are a value, or they are none for another reason.
+  if (signal.status && !too_short) {
+    CanSignal alone = signal;
+    alone.status.reset();
+    const Fault told = fault_of(*signal.status, extract_raw(payload, signal.status->field));
+    const Fault own = decode(payload, alone).fault;
+    FUZZ_PROMISE(decoded.fault == (own == Fault::none ? told : own));
+  }
   FUZZ_PROMISE(bytes_needed(signal) >= 1 &&
                bytes_needed(signal) <= (signal.fd ? can_bytes_max : can_classic_bytes_max));
   if (too_short) return 0;
@@ -95,6 +110,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                         std::abs(signal.offset) <= 1e3 && !signal.is_float;
   if (fitted && ordinary && std::abs(any) < 1e9) {
     signal.sentinels.clear();
+    signal.status.reset();
     const CanValue again = decode(payload, signal);
     FUZZ_PROMISE(again.fault == Fault::none);
     FUZZ_PROMISE(std::abs(again.value - any) <= 0.5 * resolution(signal) + 1e-6);

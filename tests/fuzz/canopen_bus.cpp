@@ -44,6 +44,10 @@ CanopenBusConfig configuration(std::uint8_t kind) {
                   channel_of(CanopenWay::sdo, 1, {0x2040, 1})};
   all.channels[0].emergency_channel = 1;
   all.channels[1].emergency_codes = {0x4210};
+  if ((kind & 32) != 0) {
+    all.channels[0].signal.status = {{32, 8, ByteOrder::little_endian}, 0x07, {}};
+    all.channels[1].status = {{0x6150, 1}, {{0, 8, ByteOrder::little_endian}, 0x07, {}}};
+  }
   if (!all.mappings_read.empty()) {
     all.channels.push_back(channel_of(CanopenWay::pdo_object, 2, {0x7130, 1}));
   }
@@ -60,6 +64,10 @@ void check_line(CanopenLine& line, nanoseconds now, bool open) {
     FUZZ_PROMISE(std::isfinite(reading.temp_degC) == (reading.fault == Fault::none));
     FUZZ_PROMISE(reading.taken_at <= now);
     FUZZ_PROMISE(open || reading.fault == Fault::no_answer);
+  }
+  FUZZ_PROMISE(line.raw().size() == line.readings().size());
+  for (const RawReading& raw : line.raw()) {
+    FUZZ_PROMISE(open || (raw.value.empty() && raw.status.empty()));
   }
   int sent = 0;
   while (const auto frame = line.next_frame()) {

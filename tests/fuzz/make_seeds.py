@@ -12,6 +12,7 @@ import pathlib
 import re
 import struct
 import sys
+import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -105,7 +106,7 @@ def toml_seeds():
         name = f"{path.parent.name}_{path.name}"
         if path in models:
             continue
-        if "machine" in path.name and "[model]" not in text:
+        if ("machine" in path.name or "nodes" in path.name) and "[model]" not in text:
             write("machine_file", name, text)
         elif "[model]" in text:
             model = path.parent / re.search(r'\[model\]\s*file = "([^"]+)"', text).group(1)
@@ -131,6 +132,31 @@ def toml_seeds():
                        "dotted.toml": "a.b.c.d = 1\n[a.b]\n[[a.b.e]]\n'' = {}\n"}.items():
         for target in ("model_file", "daemon_config", "machine_file"):
             write(target, name, text)
+
+
+def preset_seeds():
+    """Each preset in a configuration of its bus, with its first two channels."""
+    buses = {"modbus": ('kind = "modbus_tcp"\nhost = "10.0.0.2"\n', "unit = 3\n"),
+             "can": ('kind = "can"\ninterface = "can0"\n', ""),
+             "canopen": ('kind = "canopen"\ninterface = "can0"\n', "node = 5\n"),
+             "j1939": ('kind = "j1939"\ninterface = "can0"\n', "address = 128\n")}
+    for path in sorted((ROOT / "config" / "devices").glob("*.toml")):
+        preset = tomllib.loads(path.read_text())
+        bus, unit = buses[preset["protocol"]]
+        channels = [each["channel"] for each in preset["channel"]][:2]
+        types = [each["name"] for each in preset.get("thermocouple", [])][:1]
+        needed = "".join(f'thermocouple = "{each}"\n' for each in types)
+        if "scale" not in preset["device"] and not types:
+            needed += "scale = 0.1\n"
+        text = ('format = 1\n[model]\nfile = "model.toml"\n[[bus]]\nname = "b"\n' + bus +
+                '[[device]]\nname = "d"\nbus = "b"\npreset = "module"\n' + unit + needed)
+        for channel in channels:
+            text += f'[[sensor]]\nname = "s{channel}"\ndevice = "d"\nchannel = {channel}\n'
+        names = json.dumps([f"s{channel}" for channel in channels])
+        text += f'[[block]]\nname = "all"\ninput = "t_degC"\nsensors = {names}\n'
+        text += '[controller]\nname = "n"\nkind = "dry_run"\n[[axis]]\nname = "z"\n'
+        text += 'output = "z_um"\noffset_um_max = 60.0\nrate_um_per_s_max = 0.5\n'
+        write("preset_file", path.name, bare(path) + "#### configuration\n" + text)
 
 
 def run_seeds():
@@ -402,6 +428,8 @@ def dictionaries():
     dictionary("model_file", toml | model)
     dictionary("daemon_config", toml | model | {"#### model\n"} |
                literals("config/daemon_config.cpp", "config/sections/*.cpp"))
+    dictionary("preset_file", toml | {"#### configuration\n"} |
+               literals("config/sections/*.cpp"))
     dictionary("machine_file", toml | literals("simulator/*_file.cpp", "config/sections/*.cpp"))
     dictionary("dbc_file", {'BA_ "VFrameFormat" BO_ ', 'BA_DEF_ BO_ "VFrameFormat" ENUM ', "@1+",
                             "BO_ 385 NODE: 8 A\n", "BS_:", "BU_:", "CM_ ", "NS_ :", "VAL_ ", "@0-",
@@ -421,6 +449,7 @@ def dictionaries():
 
 def main():
     toml_seeds()
+    preset_seeds()
     run_seeds()
     socket_seeds()
     state_seeds()

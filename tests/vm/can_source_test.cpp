@@ -13,6 +13,7 @@
 #include "../unit/controllers/cycle_stub.hpp"
 #include "can_bus.hpp"
 #include "drivers/can/can_socket.hpp"
+#include "drivers/sensors/can_protocol_source.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
@@ -360,4 +361,22 @@ TEST_CASE("an interface that is pulled out and put back is read again", "[vm][so
     REQUIRE(shell("ip link del vcan8"));
     REQUIRE(eventually([&] { return !source.health().connected; }));
   }
+}
+
+TEST_CASE("a CANopen bus whose interface was never there has no temperature", "[vm][source]") {
+  CanopenBusConfig bus;
+  bus.name = "module_bus";
+  bus.interface = "vcan9";
+  bus.nodes.resize(1);
+  bus.nodes[0].name = "a";
+  bus.nodes[0].channels.resize(1);
+  bus.nodes[0].channels[0].signal = temperature(0x181, 0);
+  const auto source = make_source(bus);
+  source->start();
+  std::vector<Reading> readings(1);
+  CHECK(eventually([&] {
+    source->newest(readings);
+    return readings[0].fault == Fault::no_answer;
+  }));
+  CHECK_FALSE(source->health().connected);
 }

@@ -1,10 +1,12 @@
 """`thermocomp scan` on lines with the usual mistakes: each is told for what it is."""
 
+import re
 import struct
 import subprocess
 
 import pytest
-from conftest import BIN, PLANT, ROOM_DEGC, bus, configuration, eventually, scan, table, thermocomp
+from conftest import (BIN, PLANT, ROOM_DEGC, SOURCE, bus, configuration, eventually, scan, table,
+                      thermocomp)
 
 MACHINE = PLANT + "".join(
     table("[[device]]", name=f"{where}_floats", bus=where, unit=3, table="holding",
@@ -71,6 +73,25 @@ def test_the_text_says_the_same(simulate, tmp_path):
                   "address = 3", "unit 9 does not answer", "2 of 6 channels give a temperature"):
         assert words in done.stdout, done.stdout
     assert "reading device" in done.stderr
+
+
+def without_figures(text):
+    """What may differ from run to run: times, and where and whose the line is."""
+    text = re.sub(r" +$", "", re.sub(r" +also open in .*\n", "", text), flags=re.M)
+    text = re.sub(r"\d+\.\d ms", "N ms", re.sub(r"\d+\.\d s old", "N s old", text))
+    text = re.sub(r"within \d+ ms", "within N ms", text)
+    return re.sub(r"bus \w+ \(modbus_rtu, [^,]+,", "bus (modbus_rtu,", text).splitlines()
+
+
+def test_the_output_in_the_documentation_is_what_is_printed(simulate, tmp_path):
+    text = (SOURCE / "docs" / "commissioning.md").read_text()
+    shown = next(block for block in text.split("```") if "one wrong address" not in block
+                 and "channels give a temperature" in block)
+    simulator = simulate(MACHINE)
+    path = configuration(tmp_path, bus(simulator, "modbus_rtu", timeout_ms=3000.0), DEVICES,
+                         SENSORS)
+    done = thermocomp("scan", path, "--find", "--units", "3-5")
+    assert without_figures(done.stdout) == without_figures(shown.lstrip("\n")), done.stdout
 
 
 def test_a_search_finds_the_units_that_answer_and_says_what_it_sends(simulate, tmp_path):

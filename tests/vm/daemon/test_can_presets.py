@@ -127,13 +127,14 @@ class Plan:
         self.machine = "format = 1\n" + toml("[[bus]]", name="plain", kind="can", interface=CAN_BUS)
         self.devices = ""
         self.sensors = {}  # name: (device, channel, expected fault)
-        self.units = {}    # (preset, event, code): node, address or None
+        self.units = {}    # (preset, event, code): number of the node
         for protocol in ("canopen", "j1939"):
             for name, preset in preset_files(protocol).items():
                 for case in [(None, None, None), *PRESETS[name][3]]:
                     self.add_node(protocol, name, preset, *case[:3])
         for name, preset in preset_files("can").items():
             self.add_plain(name, preset)
+        self.shown = {f"s{self.units[case]}_1": shown for case, shown in SHOWN.items()}
 
     def add_node(self, protocol, name, preset, event, code, fault):
         number = FIRST_NODE + len(self.units)
@@ -203,6 +204,21 @@ def plan(tmp_path_factory):
         lab.end()
 
 
+# What a person is shown of a first channel: (preset, event, code): bytes, why.
+SHOWN = {
+    ("jumo_cantrans_t", None, None): ("FA 00 00 00 00", ""),
+    ("jumo_cantrans_t", "over_range", 2): ("FA 00 00 00 02", "the status beside it is 0x02"),
+    ("esd_can_cbx_thermo", None, None): ("A8 61 00 00, status 00", ""),
+    ("esd_can_cbx_thermo", "open_circuit", 1): ("A8 61 00 00, status 01",
+                                                "the status beside it is 0x01"),
+    ("axiomatic_axtc4co", "open_circuit", -512): ("00 FE", "the device's code for it"),
+    ("j1939_exhaust_ports", "open_circuit", 0xFE00): ("00 FE 40 25 40 25 40 25",
+                                                      'the standard\'s "error"'),
+    ("j1939_exhaust_ports", "channel_error", 0xFFFF): ("FF FF 40 25 40 25 40 25",
+                                                       'the standard\'s "not available"'),
+}
+
+
 def scan(path):
     done = subprocess.run([BIN / "thermocomp", "scan", path, "--json", "--listen", "5"],
                           capture_output=True, text=True, timeout=PATIENCE_S)
@@ -225,10 +241,20 @@ def test_every_preset_gives_the_temperature_and_each_code_its_fault(plan):
                 assert channel["temp_degC"] == pytest.approx(ROOM_DEGC, abs=0.05), (name, channel)
             if channel["fault"] == (fault or "none"):
                 missing.pop(name, None)
-                # What a person is shown: the bytes, and why they are no temperature.
+                # The bytes, and why they are no temperature.
                 assert channel["raw"] and bool(channel["why"]) == bool(fault), (name, channel)
+                if name in plan.shown:
+                    assert (channel["raw"], channel["why"]) == plan.shown[name]
         shown = {name: (fault, seen[name]) for name, (_, _, fault) in missing.items()}
         assert time.monotonic() < end, f"never shown: {shown}"
+
+
+def test_the_text_for_a_person_has_the_bytes_too(plan):
+    done = subprocess.run([BIN / "thermocomp", "scan", plan.path, "--bus", "j1939"],
+                          capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode == 1, done.stderr
+    line = "PGN 65187 byte 1  00 FE 40 25 40 25 40 25  -> open_circuit"
+    assert line in done.stdout and 'the standard\'s "error"' in done.stdout, done.stdout
 
 
 def frames(interface, sent=()):

@@ -1,0 +1,78 @@
+/// What every source of readings on a CAN interface has: socket, thread, hand-over, health.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/bus_thread.hpp"
+#include "drivers/can/can_socket.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "drivers/wait_free_slot.hpp"
+#include "drivers/wake_event.hpp"
+
+namespace thermocomp {
+
+/// An interface that is missing, down or bus-off is tried again for ever. What frames mean is for
+/// the derived class, whose hooks run on the thread only; its destructor must call stop().
+class CanInterfaceSource : public SensorSource {
+ public:
+  /// @throws DriverError when the system has no CAN sockets at all
+  void start() final;
+  void stop() noexcept final;
+  void newest(std::span<Reading> all) noexcept final;
+  [[nodiscard]] BusHealth health() const final;
+
+ protected:
+  struct Setting {
+    std::string name;
+    std::string kind;  ///< as BusHealth tells it
+    std::string interface;
+    double reconnect_s{0.5};
+    nanoseconds patience;  ///< work() is called at least so often while the interface is open
+    nanoseconds gather{};  ///< pause after work(), so that frames come in batches
+  };
+  /// @param wanted   identifiers to receive; more by socket().also_want()
+  /// @param sensors  of each reading the index in the whole configuration
+  /// @param units    as they are before the start
+  /// @throws InvalidValue for an interface or a number of identifiers that cannot be
+  CanInterfaceSource(Setting setting, std::vector<CanId> wanted, std::vector<std::size_t> sensors,
+                     std::vector<UnitHealth> units);
+
+  /// The bus can be used from now on ...
+  virtual void bus_opened(nanoseconds now) = 0;
+  /// ... no longer, or not yet: every reading becomes no_answer.
+  virtual void bus_closed(nanoseconds now) = 0;
+  /// Receives what has come and does what is due.
+  virtual void work() = 0;
+  /// @param readings  one a sensor, to be overwritten; of the right size
+  virtual void write_readings(std::vector<Reading>& readings) = 0;
+  [[nodiscard]] virtual std::vector<UnitHealth> units(nanoseconds now) = 0;
+
+  [[nodiscard]] CanSocket& socket() noexcept { return socket_; }
+  /// The bus is open and not bus-off, as the hooks were told last.
+  [[nodiscard]] bool usable() const noexcept { return usable_.value_or(false); }
+  /// Calls bus_opened() or bus_closed() where the link has changed.
+  void follow_link();
+
+ private:
+  void run();
+  void open();
+  void publish();
+
+  const Setting setting_;
+  const std::vector<std::size_t> sensors_;
+  CanSocket socket_;
+  WakeEvent wake_;
+  std::atomic<bool> stopping_{false};
+  std::optional<bool> usable_;  ///< none: the hooks were told nothing yet
+  WaitFreeSlot<std::vector<Reading>> slot_;
+  mutable std::mutex health_mutex_;
+  BusHealth health_;
+  BusThread thread_;
+};
+
+}  // namespace thermocomp
