@@ -1,6 +1,7 @@
 #include "modelling/diagnosis/diagnosis.hpp"
 
 #include <cmath>
+#include <map>
 #include <random>
 
 #include <Eigen/Cholesky>
@@ -10,6 +11,7 @@
 #include "config/problems.hpp"
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/coloured_noise.hpp"
+#include "modelling/diagnosis/hypothesis.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;
@@ -139,6 +141,29 @@ TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "
   CHECK(answer.extended.terms.empty());
 }
 
+TEST_CASE("hypotheses of one pattern have the same columns but for their scale", "[diagnosis]") {
+  ThermalModel model = one_input();
+  model.inputs.emplace_back("t2_degC");
+  model.matrix_um_per_K = {{5.0, -3.0}};
+  RunFile run = run_with(1, 300, [](double, double, int) { return 0.0; });
+  run.columns.emplace_back("t2_degC");
+  run.values.push_back(run.values[1]);
+  const MeasuredData data = measured_data(model, {run}, {"a"}, shared_columns(model, {run}));
+  std::map<std::string, std::vector<Hypothesis>> by_pattern;
+  for (const Hypothesis& each : hypotheses(data, stacked_rows(data)))
+    if (!each.pattern.empty()) by_pattern[each.pattern].push_back(each);
+  REQUIRE(by_pattern.size() == 2);  // steps and drifts
+  for (const auto& [pattern, alike] : by_pattern) {
+    CAPTURE(pattern);
+    REQUIRE(alike.size() == 2);
+    CHECK(alike[0].scale(0) == -5.0);
+    CHECK(alike[1].scale(0) == 3.0);
+    REQUIRE(alike[0].shape[0].grid == alike[1].shape[0].grid);
+    const std::vector<double> shape = {alike[0].shape[0].grid[7]};
+    CHECK((alike[0].columns(shape, 0) / -5.0).isApprox(alike[1].columns(shape, 0) / 3.0, 1e-12));
+  }
+}
+
 TEST_CASE("nothing is said where there is nothing", "[diagnosis]") {
   const Diagnosis answer = diagnosis_of([](double, double, int) { return 0.0; });
   CHECK(answer.verdict == "none");
@@ -167,6 +192,14 @@ TEST_CASE("missing values are left out, and a run without any is refused", "[dia
   CHECK(answer.findings[0].cause == "speed_growth");
   train.values[3].assign(train.rows(), NAN);
   CHECK_THROWS_AS(diagnose(one_input(), {train}, {"a"}, {test}, {"b"}), ConfigurationError);
+}
+
+TEST_CASE("what came into question stands in the JSON where it is asked for", "[diagnosis]") {
+  const Diagnosis answer = diagnosis_of([](double rpm, double, int) { return 4e-7 * rpm * rpm; });
+  CHECK(diagnosis_json(answer).find("\"weighed\"") == std::string::npos);
+  const std::string json = diagnosis_json(answer, true);
+  CHECK(json.find("\"weighed\"") != std::string::npos);
+  CHECK(json.find("\"log_left\"") != std::string::npos);
 }
 
 TEST_CASE("the answer as JSON has the parts that others read", "[diagnosis]") {

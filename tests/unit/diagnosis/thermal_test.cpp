@@ -2,12 +2,14 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <random>
 
 #include <catch2/catch.hpp>
 
 #include "config/problems.hpp"
 #include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/thermal/corrected_machine.hpp"
 #include "modelling/diagnosis/thermal/network_simulation.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 
@@ -189,6 +191,40 @@ TEST_CASE("a thermal network without what it needs is refused", "[diagnosis][the
   for (const std::size_t column : {3U, 4U})
     for (double& value : blind.values[column]) value = NAN;
   CHECK_THROWS_AS(diagnose_thermal(plant, {blind}, {"a"}, {good}, {"b"}), ConfigurationError);
+}
+
+TEST_CASE("the corrected machine file has what was found, and says what it cannot have",
+          "[diagnosis][thermal]") {
+  const auto found = [](const char* cause, const char* subject,
+                        const std::map<std::string, double>& values) {
+    NamedFinding finding;
+    finding.cause = cause;
+    finding.subject = subject;
+    for (const auto& [name, value] : values)
+      finding.parameters.push_back({name, {{"", value}}, {}});
+    return finding;
+  };
+  const TemporaryFolder folder;
+  const auto text =
+      corrected_machine(folder.file(network + room),
+                        {found("wrong_film_coefficient", "column|room", {{"factor", 1.5}}),
+                         found("missing_heat_source", "feed_mm_per_min|column",
+                               {{"heat_W", 30.0}, {"at", 5000.0}, {"power", 2.0}}),
+                         found("wrong_conductance", "column|head", {{"factor", 0.25}}),
+                         found("slow_sensor", "head_degC", {{"tau_s", 300.0}}),
+                         found("wrong_ambient", "head|room", {{"offset_K", 2.0}})});
+  REQUIRE(text.has_value());
+  CHECK(text->find("# No key carries wrong_ambient of head|room.") != std::string::npos);
+  const HeatNetwork corrected = load_thermal_plant(folder.file(*text)).network;
+  CHECK(corrected.room_inflow[1] == Approx(9.0));
+  CHECK(corrected.conductance(0, 1) == Approx(-2.5));
+  CHECK(corrected.sensors[0].lag_s == Approx(300.0));
+  REQUIRE(corrected.sources.size() == 2);
+  CHECK(corrected.sources[1].signal == "feed_mm_per_min");
+  CHECK(corrected.sources[1].heat_W == Approx(30.0));
+  CHECK(corrected.sources[1].exponent == Approx(2.0));
+  CHECK(corrected.sources[1].inflow[1] == 1.0);
+  CHECK_FALSE(corrected_machine(folder.file("[plant]\nbody = \"body.toml\"\n"), {}).has_value());
 }
 
 TEST_CASE("rows may come at any times and readings may be missing", "[diagnosis][thermal]") {
