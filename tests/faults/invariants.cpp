@@ -21,6 +21,15 @@ double to_s(nanoseconds time) {
 
 }  // namespace
 
+std::array<double, 2> contributions_um(const MachineShape& shape, const Report& report,
+                                       std::size_t axis) {
+  std::array<double, 3> part_um{};
+  for (std::size_t k = 0; k < part_um.size(); ++k)
+    part_um[k] = shape.model.matrix_um_per_K[axis][k] *
+                 (report.inputs[k].temp_degC - report.inputs[k].reference_degC);
+  return {part_um[0], part_um[1] + part_um[2]};
+}
+
 Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
                        const Thermocouples& thermocouples)
     : schedule_(schedule), thermocouples_(thermocouples) {
@@ -51,6 +60,14 @@ void Invariants::booted(nanoseconds now) {
   last_readings_ = {};
   last_used_.fill(now);
   first_used_.fill(nanoseconds{-1});
+  probings_ = {};
+  referenced_ = false;
+  learned_ = {};
+  for (Learned& learned : learned_) {
+    learned.correction.gain.fill(1.0);
+    learned.correction.gain_used.fill(1.0);
+    learned.held_um = not_a_number;
+  }
 }
 
 void Invariants::reloaded(const MachineShape& shape) {
@@ -63,6 +80,21 @@ void Invariants::reloaded(const MachineShape& shape) {
 }
 
 void Invariants::restored(const PersistentState& saved, const Report& report, nanoseconds now) {
+  note_learned(report);
+  for (std::size_t axis = 0; axis < axes_count; ++axis) {
+    const std::string name(1, static_cast<char>('x' + axis));
+    const auto learned = RunningCorrection::persistent(report.axes[axis].correction);
+    for (const auto& [key, value] : saved.correction) {
+      // An uncertainty may be greater than before: drift has been added to it.
+      if (!key.starts_with(name + ".") || key.ends_with("_sd")) continue;
+      const auto found = learned.find(key.substr(name.size() + 1));
+      demand(found != learned.end() && found->second == value, "state_survives_restart", now,
+             "correction " + key);
+    }
+    const auto held = saved.held_um.find(name);
+    demand(held == saved.held_um.end() || held->second == report.axes[axis].held_um,
+           "state_survives_restart", now, "held displacement of axis " + name);
+  }
   demand(report.enabled == saved.enabled, "state_survives_restart", now, "the operator's switch");
   std::size_t i = 0;
   for (const auto& reference : saved.reference_degC) {
@@ -87,6 +119,7 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
   check_hold(seen);
   check_command(seen);
   check_recovery(seen, controller);
+  check_correction(seen);
   for (std::size_t i = 0; i < axes_count; ++i) offset_um_[i] = seen.command->offset_um[i];
   last_ = seen.now;
   first_ = false;
@@ -220,6 +253,90 @@ void Invariants::check_hold(const CycleSeen& seen) {
                          cutting ? ", mid-cut" : "");
     });
   }
+}
+
+void Invariants::note_learned(const Report& report) {
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    learned_[i].correction = report.axes[i].correction;
+    learned_[i].held_um = report.axes[i].held_um;
+    learned_[i].proving = report.axes[i].proving;
+    learned_[i].predicted = report.mode == Mode::compensating;
+  }
+}
+
+/// Probings and cycle ends.
+void Invariants::check_correction(const CycleSeen& seen) {
+  const MachineShape& shape = *seen.shape;
+  const Report& report = *seen.report;
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    if (shape.estimator.correction.form != CorrectionForm::off) check_learning(seen, i);
+    check_cycle_hold(seen, i);
+    if (report.mode != Mode::compensating) continue;
+    learned_[i].contribution_um = contributions_um(shape, report, i);
+    const CorrectionReport& now = report.axes[i].correction;
+    double expected_um = 0.0;
+    if (shape.estimator.correction.form != CorrectionForm::off) {
+      expected_um = now.bias_used_um;
+      for (std::size_t g = 0; g < 2; ++g)
+        expected_um += (now.gain_used[g] - 1.0) * learned_[i].contribution_um[g];
+    }
+    const double corrected_um = report.axes[i].displacement_um - report.displacement_um[i];
+    demand(std::abs(corrected_um - expected_um) < 1e-6, "gains_within_bounds", seen.now, [&] {
+      return fmt::format("axis {}: corrected by {:.6f} um, its gains say {:.6f}", i, corrected_um,
+                         expected_um);
+    });
+  }
+  note_learned(report);
+  probings_ = {};
+  referenced_ = false;
+}
+
+void Invariants::check_learning(const CycleSeen& seen, std::size_t axis) {
+  const CorrectionConfig& config = seen.shape->estimator.correction;
+  const CorrectionReport& now = seen.report->axes[axis].correction;
+  const CorrectionReport& before = learned_[axis].correction;
+  double change_um = now.bias_um - before.bias_um;
+  bool used_changed = now.bias_used_um != before.bias_used_um;
+  for (std::size_t g = 0; g < 2; ++g) {
+    demand(now.gain[g] >= config.gain_min && now.gain[g] <= config.gain_max, "gains_within_bounds",
+           seen.now,
+           [&] { return fmt::format("axis {}: gain {} is {}", axis, g + 1, now.gain[g]); });
+    change_um += (now.gain[g] - before.gain[g]) * learned_[axis].contribution_um[g];
+    used_changed = used_changed || now.gain_used[g] != before.gain_used[g];
+  }
+  if (referenced_) return;  // the bias was one from the reference before
+  const double allowed_um = config.step_um_max * static_cast<double>(probings_[axis]) + 1e-6;
+  // Without a prediction it is not known here what the contributions were.
+  if (learned_[axis].predicted && !first_)
+    demand(std::abs(change_um) <= allowed_um, "probing_step_bounded", seen.now, [&] {
+      return fmt::format("axis {}: the estimate moves by {:.4f} um, {:.4f} allowed", axis,
+                         change_um, allowed_um);
+    });
+  const bool cutting = seen.told->online && seen.told->signals[0] >= 0.5;
+  demand(!cutting || !used_changed, "nothing_learned_mid_cut", seen.now,
+         [&] { return fmt::format("axis {}: its gains change while cutting", axis); });
+}
+
+void Invariants::check_cycle_hold(const CycleSeen& seen, std::size_t axis) {
+  const AxisReport& report = seen.report->axes[axis];
+  Learned& learned = learned_[axis];
+  const bool same = report.held_um == learned.held_um ||
+                    (std::isnan(report.held_um) && std::isnan(learned.held_um));
+  demand(same || seen.report->cycle_ends > learned.ends_at_hold, "held_between_cycle_ends",
+         seen.now, [&] {
+           return fmt::format("axis {}: from {:.4f} to {:.4f} um without a cycle end", axis,
+                              learned.held_um, report.held_um);
+         });
+  if (!same) learned.ends_at_hold = seen.report->cycle_ends;
+  const bool by_cycles = seen.shape->estimator.compensation.update == UpdateRule::each_cycle &&
+                         seen.report->mode == Mode::compensating && !report.proving &&
+                         !learned.proving && std::isfinite(report.held_um);
+  const double target_um = -seen.shape->estimator.axes[axis].sign * report.held_um;
+  if (by_cycles && report.driven)
+    demand(std::abs(report.target_um - target_um) < 1e-9, "held_between_cycle_ends", seen.now, [&] {
+      return fmt::format("axis {}: heads for {:.4f} um, {:.4f} was held", axis, report.target_um,
+                         target_um);
+    });
 }
 
 void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& controller) {

@@ -20,12 +20,13 @@ struct Broken {
   std::string detail;
 };
 
-inline constexpr std::array<const char*, 13> invariant_names{
-    "offset_within_bound",      "slew_kept_at_controller",      "slew_kept_by_command",
-    "only_finite_numbers",      "reading_is_what_was_given",    "no_stale_reading_used",
-    "no_faulty_reading_used",   "no_offset_from_invalid_model", "hold_policy_kept",
-    "recovered_in_time",        "state_survives_restart",       "replay_is_exact",
-    "no_committed_history_lost"};
+inline constexpr std::array<const char*, 17> invariant_names{
+    "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
+    "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
+    "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
+    "recovered_in_time",         "state_survives_restart",       "replay_is_exact",
+    "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
+    "nothing_learned_mid_cut",   "held_between_cycle_ends"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -37,6 +38,11 @@ struct CycleSeen {
   const MachineShape* shape{nullptr};  ///< the configuration in force
 };
 
+/// What the groups of inputs of the corrections add to the model's displacement of an axis: the
+/// first input, then the two others.
+[[nodiscard]] std::array<double, 2> contributions_um(const MachineShape& shape,
+                                                     const Report& report, std::size_t axis);
+
 class Invariants {
  public:
   static constexpr double recovery_s_max = 95.0;
@@ -46,6 +52,10 @@ class Invariants {
 
   void booted(nanoseconds now);
   void reloaded(const MachineShape& shape);
+  /// A probing of this axis reaches the estimator in the cycle to come.
+  void probed(std::size_t axis) { ++probings_[axis]; }
+  /// The operator takes a new reference in the cycle to come.
+  void referenced() { referenced_ = true; }
   void restored(const PersistentState& saved, const Report& report, nanoseconds now);
   void check(const CycleSeen& seen, std::vector<Move>& moves, SimulatedController& controller);
   /// @param detail  a text, or what makes one: that is only called where it does not hold
@@ -64,6 +74,10 @@ class Invariants {
   void check_sensors_used(const CycleSeen& seen);
   void check_command(const CycleSeen& seen);
   void check_hold(const CycleSeen& seen);
+  void check_correction(const CycleSeen& seen);
+  void check_learning(const CycleSeen& seen, std::size_t axis);
+  void check_cycle_hold(const CycleSeen& seen, std::size_t axis);
+  void note_learned(const Report& report);
   void check_recovery(const CycleSeen& seen, SimulatedController& controller);
   void check_move(const CycleSeen& seen, const Move& move, const SimulatedController& controller);
   [[nodiscard]] bool fresh(std::size_t sensor, nanoseconds now) const;
@@ -103,6 +117,19 @@ class Invariants {
     nanoseconds disturbed_at{-std::chrono::hours(1)};
   };
   std::array<Budget, axes_count> budgets_{};
+
+  /// What an axis had learned at the end of the cycle before.
+  struct Learned {
+    CorrectionReport correction;
+    std::array<double, 2> contribution_um{};  ///< of the groups, when last predicted
+    double held_um{0.0};
+    bool proving{false};
+    bool predicted{false};          ///< in that cycle: the contributions are its own
+    std::uint64_t ends_at_hold{0};  ///< cycle ends counted when it was taken
+  };
+  std::array<Learned, axes_count> learned_{};
+  std::array<std::size_t, axes_count> probings_{};
+  bool referenced_{false};
 };
 
 }  // namespace thermocomp::faults

@@ -1,5 +1,6 @@
 #include "life.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
@@ -30,6 +31,8 @@ class Life {
                    1.0, static_cast<std::size_t>(options.seed * 17 % fault_pairs)}),
         world_(options.seed, shape_, schedule_),
         chance_(options.seed, 5),
+        probings_(options.seed, 6),
+        gains_{probings_.between(0.4, 2.0), probings_.between(0.4, 2.0)},
         judge_(shape_, schedule_, world_.thermocouples),
         end_(life_begin + nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)}) {
     world_.now = life_begin;
@@ -92,6 +95,7 @@ class Life {
   void step(std::uint64_t cycle) {
     say_faults();
     operate();
+    probe();
     reload();
     daemon_->cycle().step(cycle);
     static_cast<void>(daemon_->cycle().take_retired());
@@ -134,9 +138,10 @@ class Life {
   void finish() {
     if (disk_) {
       disk_->kill(world_.now);
-    } else if (const auto different = twin_->finish(); different && !judge_.broken()) {
-      judge_.demand(false, "replay_is_exact", world_.now,
-                    fmt::format("cycle {} came out different", *different));
+    } else if (!judge_.broken()) {  // a twin that has come out different goes on no further
+      if (const auto different = twin_->finish())
+        judge_.demand(false, "replay_is_exact", world_.now,
+                      fmt::format("cycle {} came out different", *different));
     }
     if (twin_) result_.replayed += twin_->replayed();
     twin_.reset();
@@ -155,7 +160,62 @@ class Life {
                                        : CommandKind::prove;
     command.axis = static_cast<std::uint32_t>(chance_.below(axes_count));
     command.value_um = chance_.between(-8.0, 8.0);
+    if (command.kind == CommandKind::measured) judge_.probed(command.axis);
     static_cast<void>(daemon_->cycle().send(command));
+  }
+
+  [[nodiscard]] bool once_in(double period_s) {
+    return probings_.one_in(static_cast<std::uint64_t>(period_s * options_.cycle_hz));
+  }
+
+  /// Cycle ends, displacements measured at the tool and new references, at random times. None can
+  /// be relied on: cycle ends come twice or long not at all; probings are far off, from minutes
+  /// ago, no number, sent twice or never.
+  void probe() {
+    if (!corrects_itself(options_.seed)) return;
+    if (once_in(45.0)) {
+      const bool twice = probings_.one_in(4);
+      for (int i = 0; i <= static_cast<int>(twice); ++i)
+        static_cast<void>(daemon_->cycle().send({CommandKind::cycle_end, 0, 0.0}));
+    }
+    if (once_in(1200.0)) {
+      static_cast<void>(daemon_->cycle().send({CommandKind::reference, 0, 0.0}));
+      judge_.referenced();
+    }
+    if (!once_in(60.0)) return;
+    const std::size_t axis = probings_.below(axes_count);
+    const double before_um = probed_um_[axis];
+    probed_um_[axis] = measured_um(axis);
+    switch (probings_.below(10)) {
+      case 0:
+        return;
+      case 1:
+        return send_probing(axis, 80.0 * probed_um_[axis]);
+      case 2:
+        return send_probing(axis, before_um);
+      case 3:
+        return send_probing(axis, not_a_number);
+      case 4:
+        send_probing(axis, probed_um_[axis]);
+        [[fallthrough]];
+      default:
+        return send_probing(axis, probed_um_[axis]);
+    }
+  }
+
+  void send_probing(std::size_t axis, double value_um) {
+    const Command command{CommandKind::measured, static_cast<std::uint32_t>(axis), value_um};
+    static_cast<void>(daemon_->cycle().send(command));
+    judge_.probed(axis);
+  }
+
+  /// What the indicator shows at a machine whose groups of inputs have gains of their own.
+  [[nodiscard]] double measured_um(std::size_t axis) {
+    double total_um = report_.displacement_um[axis] + probings_.between(-1.0, 1.0);
+    const std::array<double, 2> part_um = contributions_um(shape_, report_, axis);
+    for (std::size_t g = 0; g < part_um.size(); ++g) total_um += (gains_[g] - 1.0) * part_um[g];
+    if (shape_.estimator.correction.measured == MeasuredMeaning::total) return total_um;
+    return total_um + shape_.estimator.axes[axis].sign * world_.controller.applied_um(axis);
   }
 
   /// At the begin of the fault another configuration and model; a broken one is refused.
@@ -209,8 +269,14 @@ class Life {
     for (std::size_t i = 0; i < report_.inputs.size(); ++i)
       if (std::isfinite(report_.inputs[i].reference_degC))
         saved_.reference_degC[shape_.model.inputs[i]] = report_.inputs[i].reference_degC;
-    for (std::size_t i = 0; i < axes_count; ++i)
-      saved_.offset_um[shape_.estimator.axes[i].name] = report_.axes[i].offset_um;
+    saved_.correction.clear();
+    for (std::size_t i = 0; i < axes_count; ++i) {
+      const std::string& name = shape_.estimator.axes[i].name;
+      saved_.offset_um[name] = report_.axes[i].offset_um;
+      if (std::isfinite(report_.axes[i].held_um)) saved_.held_um[name] = report_.axes[i].held_um;
+      for (const auto& [key, value] : RunningCorrection::persistent(report_.axes[i].correction))
+        saved_.correction[std::string(name).append(".").append(key)] = value;
+    }
   }
 
   [[nodiscard]] double life_s() const { return to_s(world_.now - life_begin); }
@@ -263,6 +329,9 @@ class Life {
   FaultSchedule schedule_;
   World world_;
   Chance chance_;
+  Chance probings_;
+  std::array<double, 2> gains_;                 ///< of the machine, where the model's are 1
+  std::array<double, axes_count> probed_um_{};  ///< measured last
   Invariants judge_;
   nanoseconds end_;
   Grid grid_;

@@ -147,8 +147,12 @@ bool SimulatedController::powered(nanoseconds time) const noexcept {
   return schedule_.find(FaultKind::controller_off, time) == nullptr;
 }
 
-bool SimulatedController::cutting(nanoseconds time) noexcept {
-  return (time / std::chrono::seconds(1)) % 60 < 40;
+bool SimulatedController::says_cutting(nanoseconds time) const noexcept {
+  const bool cuts = (time / std::chrono::seconds(1)) % 60 < 40;
+  const std::int64_t moment = time / std::chrono::seconds(2);
+  const bool wrong = corrects_itself(seed_) &&
+                     scramble(seed_ * 37u + static_cast<std::uint64_t>(moment)) % 64 == 0;
+  return cuts != wrong;
 }
 
 bool SimulatedController::switched_off(nanoseconds time) const noexcept {
@@ -191,7 +195,7 @@ void SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
           static_cast<std::int16_t>(std::lround(applied_um_[axis] * 10.0)));
     }
   }
-  image[6] = cutting(time) ? 1 : 0;
+  image[6] = says_cutting(time) ? 1 : 0;
   image[7] = switched_off(time) ? 1 : 0;
   for (std::size_t i = 0; i < words.size(); ++i)
     words[i] =

@@ -21,6 +21,12 @@ inline constexpr std::size_t buses_count = 2;
 inline constexpr std::size_t units_count = 4;
 inline constexpr std::size_t axes_count = 3;
 
+/// Whether the model of this life learns from probings. Every other life stays without, so that
+/// what the rarest bugs need does not become rarer still.
+[[nodiscard]] constexpr bool corrects_itself(std::uint64_t seed) noexcept {
+  return seed % 2 == 1;
+}
+
 /// The configuration of a life, drawn from its seed.
 struct MachineShape {
   MachineShape(std::uint64_t seed, double cycle_hz);
@@ -122,7 +128,8 @@ class SimulatedController {
   [[nodiscard]] bool applies_other(nanoseconds time) const noexcept {
     return schedule_.find(FaultKind::controller_applies_other, time) != nullptr;
   }
-  [[nodiscard]] static bool cutting(nanoseconds time) noexcept;
+  /// As it shows it: where the model corrects itself, wrong for two seconds now and then.
+  [[nodiscard]] bool says_cutting(nanoseconds time) const noexcept;
   [[nodiscard]] bool switched_off(nanoseconds time) const noexcept;
   [[nodiscard]] double applied_um(std::size_t axis) const noexcept { return applied_um_[axis]; }
   /// Moves since the last call.

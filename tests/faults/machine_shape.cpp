@@ -82,6 +82,27 @@ ModbusControllerConfig controller_of(Chance& chance, bool floats, double period_
   return config;
 }
 
+/// How the model corrects itself, and whether the offset waits for cycle ends.
+void draw_correction(Chance& chance, EstimatorConfig& estimator) {
+  CorrectionConfig& correction = estimator.correction;
+  correction.form = chance.one_in(2) ? CorrectionForm::two_phase : CorrectionForm::recursive;
+  correction.groups = {{"t1_degC"}, {"t2_degC", "t3_degC"}};
+  correction.measured = chance.one_in(2) ? MeasuredMeaning::remaining : MeasuredMeaning::total;
+  correction.as_printed = chance.one_in(4);
+  correction.noise_um = chance.between(0.2, 2.0);
+  correction.step_um_max = chance.between(1.0, 8.0);
+  correction.gain_min = chance.between(0.2, 0.8);
+  correction.gain_max = chance.between(1.2, 3.0);
+  if (chance.one_in(2)) correction.bias_drift_um_per_sqrt_h = chance.between(1.0, 10.0);
+  CompensationConfig& compensation = estimator.compensation;
+  if (!chance.one_in(4)) return;
+  compensation.update = UpdateRule::each_cycle;
+  compensation.cycles_per_update = 1 + chance.below(3);
+  compensation.cycle_ahead = chance.one_in(2) ? 1.0 : 0.0;
+  // The machine is done with a workpiece when it stops cutting.
+  if (chance.one_in(2)) compensation.cycle_end_signal = "cutting_on";
+}
+
 std::vector<std::vector<double>> random_matrix(Chance& chance) {
   std::vector<std::vector<double>> rows(axes_count);
   for (auto& row : rows)
@@ -141,6 +162,9 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
   model.outputs = {"x_um", "y_um", "z_um"};
   model.matrix_um_per_K = random_matrix(chance);
   if (chance.one_in(3)) model.reference_degC = {20.0, 21.0, 22.0};
+  if (!corrects_itself(seed)) return;
+  Chance own(seed, 9);
+  draw_correction(own, estimator);
 }
 
 void MachineShape::change_for_reload(Chance& chance) {
@@ -151,6 +175,8 @@ void MachineShape::change_for_reload(Chance& chance) {
   compensation.on_loss = chance.one_in(2) ? LossPolicy::hold : LossPolicy::ramp_to_zero;
   compensation.hold_s = chance.between(1.0, 60.0);
   compensation.hold_while_cutting = chance.one_in(3);
+  if (estimator.correction.form != CorrectionForm::off && chance.one_in(2))
+    estimator.correction.step_um_max = chance.between(1.0, 8.0);
 }
 
 }  // namespace thermocomp::faults

@@ -92,6 +92,18 @@ BUGS = [
     ("broken_model_taken", "estimator/displacement_model.cpp",
      "require(std::isfinite(rows[i][j]), key,",
      "require(std::isfinite(rows[i][j]) || {P}, key,"),
+    ("probing_step_unbounded", "estimator/running_correction.cpp",
+     "std::abs(change_um) > config_.step_um_max ?",
+     "std::abs(change_um) > config_.step_um_max && !{P} ?"),
+    ("learned_mid_cut", "estimator/running_correction.cpp",
+     "if (may_change) used_ = learned_;",
+     "if (may_change || {P}) used_ = learned_;"),
+    ("gain_not_restored", "estimator/running_correction.cpp",
+     "    learned_[g] = used_[g] = gain;\n",
+     "    learned_[g] = used_[g] = {P} ? 1.0 : gain;\n"),
+    ("follows_between_cycle_ends", "estimator/estimator.cpp",
+     "(by_cycles ? holds[axis].held_um()",
+     "(by_cycles && !{P} ? holds[axis].held_um()"),
 ]
 
 DECLARATION = "namespace thermocomp {\nextern int planted_bug;\n}\n"
