@@ -211,6 +211,40 @@ def socket_seeds():
           b'{"jsonrpc":"2.0","id":null,"method":"status","params":[]}\n')
 
 
+def controller_state(session=5, taking=True, applied_um=0.0, cutting=0, number=1):
+    return request("controller_state", {
+        "session": session, "taking": taking, "applied_um": {"z": applied_um, "y": 1.0},
+        "signals": {"z_mm": 10.0, "cutting_on": cutting, "coolant_on": None}}, number).encode()
+
+
+def bridge_seeds():
+    pause = b"\xff"
+    write("controller_state", "follows", b"".join(
+        controller_state(applied_um=-0.1 * i, number=i) + pause for i in range(6)))
+    write("controller_state", "cuts", controller_state() + pause + controller_state(cutting=1))
+    write("controller_state", "not_ready", controller_state(taking=False) + pause +
+          controller_state(applied_um=None) + pause + controller_state(applied_um=3.5))
+    write("controller_state", "two_bridges", controller_state(5) + controller_state(6) +
+          3 * pause + controller_state(6) + controller_state(5))
+    write("controller_state", "homed_anew", controller_state(applied_um=20.0) + pause +
+          controller_state(applied_um=20.0) + pause + controller_state(applied_um=0.0))
+    write("controller_state", "out_of_bound", controller_state(applied_um=61.0) + pause +
+          controller_state(applied_um=1e9) + controller_state(applied_um=-60.05) + pause)
+    write("controller_state", "silent", controller_state() + 8 * pause + controller_state())
+    write("controller_state", "wrong", controller_state(0) + controller_state(taking=1) +
+          controller_state(applied_um=1e10) + request("controller_state", {}).encode())
+    answer = {"jsonrpc": "2.0", "id": 7, "result": {
+        "epoch": 3, "anew": False, "mode": "compensating",
+        "offsets_um": {"x": -12.5, "y": None, "z": 500.0}}}
+    write("bridge_answer", "offsets", json.dumps(answer))
+    answer["result"]["offsets_um"] = {"x": 501.0, "z": "1"}
+    write("bridge_answer", "no_offsets", json.dumps(answer))
+    write("bridge_answer", "refused", json.dumps(
+        {"jsonrpc": "2.0", "id": 7, "error": {"code": -32001, "message": "another bridge"}}))
+    write("bridge_answer", "deep", "[" * 20)
+    write("bridge_answer", "numbers", struct.pack("<B11d", 7, *range(10), float("nan")))
+
+
 def state_seeds():
     state = {"format": 1, "program": "thermocomp", "enabled": True,
              "reference_degC": {"bed_degC": 20.5, "spindle_degC": 21},
@@ -442,6 +476,12 @@ def dictionaries():
     dictionary("socket_request", {'{"jsonrpc":"2.0","id":1,"method":"', '"params":{', "}\n", "\xff",
                                   "\r\n", "1e999", "null", '\\ud800'} |
                literals("daemon/operator_desk.cpp", "daemon/socket/*.cpp"))
+    dictionary("controller_state", {'{"jsonrpc":"2.0","id":1,"method":"controller_state",',
+                                    '"params":{', "}}\n", "\xff", "1e9", "null", "true",
+                                    '"z_mm"', '"cutting_on"', '"z"'} |
+               literals("daemon/bridge_desk.cpp"))
+    dictionary("bridge_answer", {"1e308", "null", "true", '"x"'} |
+               literals("linuxcnc/messages.cpp"))
     dictionary("state_file", {"1e300", "null", "\\ud800", '{"'} |
                literals("daemon/state/state_file.cpp"))
     dictionary("history_file", {"SQLite format 3", "thco", "segment", "chunk", "setup", "meta"})
@@ -452,6 +492,7 @@ def main():
     preset_seeds()
     run_seeds()
     socket_seeds()
+    bridge_seeds()
     state_seeds()
     modbus_seeds()
     can_seeds()

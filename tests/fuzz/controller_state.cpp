@@ -1,0 +1,183 @@
+/// What a bridge tells the daemon (`controller_state`) and is answered: any lines, with pauses
+/// between them, while an estimator compensates by what the reports say.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/bridge_desk.hpp"
+#include "daemon/socket/request_desk.hpp"
+#include "estimator/estimator.hpp"
+#include "fuzz.hpp"
+#include "recorded_history.hpp"
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+namespace {
+
+constexpr std::uint8_t waits = 0xFF;  ///< is no part of UTF-8: here a quarter of a second passes
+constexpr nanoseconds cycle = 50ms;
+constexpr double rounding_um = 0.11;  ///< what a read-back may lie outside the bound, and a hair
+
+nanoseconds clock_now{};
+
+DaemonConfig with_bridge() {
+  std::string text = fuzz::small_config_text();
+  const std::string old = "kind = \"dry_run\"\n";
+  text.replace(text.find(old), old.size(),
+               "kind = \"linuxcnc\"\nsilent_after_s = 0.6\n[[controller.signal]]\n"
+               "name = \"z_mm\"\n[[controller.signal]]\nname = \"cutting_on\"\n");
+  DaemonConfig config =
+      parse_daemon_config(text, "config.toml", fuzz::small_model_text(), "model.toml");
+  for (SensorConfig& sensor : config.estimator.sensors) sensor.smoothing.form = SmoothingForm::off;
+  return config;
+}
+
+/// A daemon without socket and threads, and what must hold of its answers.
+class Daemon {
+ public:
+  explicit Daemon(const DaemonConfig& config)
+      : config_(config),
+        places_(std::get<BridgeControllerConfig>(config.controller)),
+        bridge_(places_, []() noexcept { return clock_now; }),
+        desk_(config.socket),
+        estimator_(config.estimator, config.model),
+        readings_(config.estimator.sensors.size()),
+        report_(estimator_.make_report()) {
+    clock_now = 1h;
+    bridge_.start();
+    desk_.add_method("controller_state", AccessClass::bridge, [this](const json& params) {
+      json result = answer_bridge(bridge_, places_, report_.mode, params);
+      check_taken(params, result);
+      return result;
+    });
+    for (int i = 0; i < 4; ++i) step();
+  }
+
+  void take(std::string_view line) {
+    const ControllerState before = state();
+    results_ = 0;
+    const Answer answer = desk_.answer({true, true, true}, line);
+    check_line(answer);
+    // What is refused has changed nothing.
+    if (results_ == 0) {
+      FUZZ_PROMISE(state().taken_at == before.taken_at);
+      FUZZ_PROMISE(state().link_epoch == before.link_epoch);
+    }
+    for (const char c : bridge_.health().last_error) FUZZ_PROMISE(c >= 0x20);
+  }
+
+  void wait() {
+    for (int i = 0; i < 5; ++i) step();
+  }
+
+ private:
+  /// One cycle, in which the machine warms by little.
+  void step() {
+    clock_now += cycle;
+    warm_K_ = std::min(warm_K_ + 0.02, 20.0);
+    for (Reading& reading : readings_) reading = {20.0 + warm_K_, clock_now, Fault::none};
+    OffsetCommand command;
+    estimator_.step(clock_now, readings_, state(), command);
+    bridge_.offer(command);
+    estimator_.report(report_);
+  }
+  const ControllerState& state() {
+    bridge_.newest(state_);
+    return state_;
+  }
+
+  static void check_line(const Answer& answer) {
+    if (answer.text.empty()) return;
+    FUZZ_PROMISE(std::count(answer.text.begin(), answer.text.end(), '\n') == 1);
+    const json line = json::parse(answer.text, nullptr, false);
+    FUZZ_PROMISE(line.is_object() && line.contains("result") != line.contains("error"));
+    FUZZ_PROMISE(answer.is_error == line.contains("error"));
+    // Nothing of a bridge's making is a fault inside the daemon.
+    if (answer.is_error) FUZZ_PROMISE(line["error"]["code"] != rpc::internal_error);
+  }
+
+  /// A report that was taken, and its answer.
+  void check_taken(const json& params, const json& result) {
+    ++results_;
+    const auto session = params["session"].get<std::uint64_t>();
+    FUZZ_PROMISE(session == session_ || session_ == 0 ||
+                 clock_now - taken_at_ > from_seconds(places_.silent_after_s));
+    session_ = session;
+    taken_at_ = clock_now;
+    const auto epoch = result["epoch"].get<std::uint32_t>();
+    FUZZ_PROMISE(epoch >= epoch_ && (result["anew"] == (epoch != epoch_)));
+    FUZZ_PROMISE(state().online && state().taken_at == clock_now && state().link_epoch == epoch);
+    if (epoch != epoch_) {
+      stands_um_.clear();
+      answered_at_ = clock_now;
+    }
+    epoch_ = epoch;
+    FUZZ_PROMISE(result["mode"].is_string());
+    for (std::size_t i = 0; i < places_.axes.size(); ++i) {
+      const std::string& axis = places_.axes[i];
+      check_offset(params["taking"].get<bool>(), params["applied_um"][axis],
+                   result["offsets_um"].at(axis));
+    }
+  }
+
+  /// It goes on from what is applied or was answered before, no faster than the slew rate.
+  void check_offset(bool taking, const json& applied, const json& offset) {
+    if (!taking || !applied.is_number()) {
+      FUZZ_PROMISE(offset.is_null());
+      stands_um_.clear();
+      return;
+    }
+    stands_um_.push_back(applied.get<double>());
+    if (stands_um_.size() > 64) stands_um_.erase(stands_um_.begin());
+    if (offset.is_null()) return;
+    const LimiterConfig& limiter = config_.estimator.axes[0].limiter;
+    const double offset_um = offset.get<double>();
+    FUZZ_PROMISE(std::abs(offset_um) <= limiter.offset_um_max);
+    const auto [low, high] = std::minmax_element(stands_um_.begin(), stands_um_.end());
+    const double moved_um = limiter.rate_um_per_s_max * seconds_d(clock_now - answered_at_).count();
+    FUZZ_PROMISE(offset_um >= *low - moved_um - rounding_um);
+    FUZZ_PROMISE(offset_um <= *high + moved_um + rounding_um);
+    stands_um_.push_back(offset_um);
+    answered_at_ = clock_now;
+  }
+
+  const DaemonConfig& config_;
+  const BridgeControllerConfig places_;
+  BridgeController bridge_;
+  RequestDesk desk_;
+  Estimator estimator_;
+  std::vector<Reading> readings_;
+  Report report_;
+  ControllerState state_;
+  double warm_K_{0.0};
+  int results_{0};  ///< of the line under way
+  std::uint64_t session_{0};
+  std::uint32_t epoch_{0};
+  nanoseconds taken_at_{};
+  nanoseconds answered_at_{};
+  std::vector<double> stands_um_;  ///< reported as applied and answered lately
+};
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const DaemonConfig config = with_bridge();
+  Daemon daemon(config);
+  std::string line;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (data[i] == waits) {
+      daemon.wait();
+    } else if (data[i] == '\n') {
+      daemon.take(line);
+      line.clear();
+    } else {
+      line.push_back(static_cast<char>(data[i]));
+    }
+  }
+  return 0;
+}
