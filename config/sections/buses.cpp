@@ -279,8 +279,7 @@ class BusReader {
   /// A value is read in one request, or it could be half old and half new.
   static void check_request(const TomlTable& sensor, const ModbusChannel& channel,
                             const ModbusDeviceConfig& device) {
-    const int count = register_count(
-        {channel.table, channel.address, channel.encoding, channel.word_order, channel.scale});
+    const auto count = static_cast<int>(words_of(channel.table, channel.encoding));
     if (count > device.registers_per_request_max) {
       sensor.problem("address", "the value takes " + std::to_string(count) +
                                     " registers, more than registers_per_request_max");

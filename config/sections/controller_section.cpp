@@ -34,7 +34,7 @@ void check_bits(const TomlTable& table, double greatest, std::size_t axes) {
 class WrittenRegisters {
  public:
   void add(const TomlTable& table, std::string_view key, const ModbusValue& value) {
-    for (int i = 0; i < register_count(value); ++i) {
+    for (int i = 0; i < static_cast<int>(words_of(value.table, value.encoding)); ++i) {
       const auto [entry, is_new] = used_.emplace(value.address + i, table.path());
       if (is_new) continue;
       table.problem(key, "register " + std::to_string(value.address + i) + " is written by " +

@@ -45,25 +45,6 @@ const Names<ModbusTable>& writable_tables() {
   return names;
 }
 
-bool is_bit(ModbusTable table) {
-  return table == ModbusTable::coil || table == ModbusTable::discrete_input;
-}
-
-int registers(Encoding encoding) {
-  switch (encoding) {
-    case Encoding::int16:
-    case Encoding::uint16:
-      return 1;
-    case Encoding::int32:
-    case Encoding::uint32:
-    case Encoding::float32:
-      return 2;
-    case Encoding::float64:
-      break;
-  }
-  return 4;
-}
-
 struct Codes {
   std::int64_t low;
   std::int64_t high;
@@ -140,7 +121,8 @@ ModbusRtu read_rtu(const TomlTable& table) {
 }
 
 /// A value that began below the last register and would pass it.
-void check_address(const TomlTable& table, int address, int count) {
+void check_address(const TomlTable& table, int address, Encoding encoding) {
+  const auto count = static_cast<int>(registers_of(encoding));
   if (address + count - 1 <= address_max) return;
   table.problem("address", "the value takes " + std::to_string(count) +
                                " registers and would pass register 65535");
@@ -155,7 +137,7 @@ ModbusStatus read_status(const TomlTable& table, int base_address) {
   ModbusStatus status;
   status.table = table.choice("table", all_tables());
   status.address = read_address(table);
-  if (is_bit(status.table)) {
+  if (is_bit_table(status.table)) {
     table.refuse("mask", "makes no sense for a bit");
     status.codes = read_status_codes(table, 1, 1);
     return status;
@@ -209,7 +191,7 @@ ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use) {
                                                                   : register_tables();
   value.table = table.choice("table", tables);
   value.address = read_address(table);
-  if (is_bit(value.table)) {
+  if (is_bit_table(value.table)) {
     refuse_all(table, {"encoding", "word_order", "scale"}, "makes no sense for a bit");
     value.encoding = Encoding::uint16;
     return value;
@@ -223,7 +205,7 @@ ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use) {
     value.scale = read_scale(table, value.scale);
   }
   value.word_order = table.choice("word_order", word_orders(), value.word_order);
-  check_address(table, value.address, registers(value.encoding));
+  check_address(table, value.address, value.encoding);
   return value;
 }
 
@@ -249,7 +231,7 @@ ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& devi
                                       device.number("offset_degC", Range::between(-1e4, 1e4), 0));
   const int base_address = device.integer("base_address", 0, address_max, 0);
   const int address = base_address + read_address(sensor);
-  check_address(sensor, address, registers(channel.encoding));
+  check_address(sensor, address, channel.encoding);
   channel.address = static_cast<std::uint16_t>(std::min(address, address_max));
   const Codes codes = codes_of(channel.encoding);
   channel.sentinels = read_codes(sensor, device, codes.low, codes.high);
@@ -265,10 +247,6 @@ ModbusRenewal read_modbus_renewal(const TomlTable& table) {
   renewal.table = table.choice("table", register_tables());
   renewal.address = read_address(table);
   return renewal;
-}
-
-int register_count(const ModbusValue& value) {
-  return is_bit(value.table) ? 1 : registers(value.encoding);
 }
 
 Range reach(const ModbusValue& value) {

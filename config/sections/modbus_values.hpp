@@ -25,9 +25,6 @@ enum class RegisterUse {
 
 [[nodiscard]] ModbusRenewal read_modbus_renewal(const TomlTable& table);
 
-/// Registers (or bits) that the value takes.
-[[nodiscard]] int register_count(const ModbusValue& value);
-
 /// The numbers that raw * scale can be, least and greatest.
 [[nodiscard]] Range reach(const ModbusValue& value);
 

@@ -93,21 +93,6 @@ std::uint64_t nearest_bits(double raw, Encoding encoding, bool& saturated) noexc
 
 }  // namespace
 
-std::size_t registers_of(Encoding encoding) noexcept {
-  switch (encoding) {
-    case Encoding::int16:
-    case Encoding::uint16:
-      return 1;
-    case Encoding::int32:
-    case Encoding::uint32:
-    case Encoding::float32:
-      return 2;
-    case Encoding::float64:
-      break;
-  }
-  return 4;
-}
-
 std::uint64_t bits_of(std::span<const std::uint16_t> registers, Encoding encoding,
                       WordOrder order) noexcept {
   const std::size_t count = registers_of(encoding);

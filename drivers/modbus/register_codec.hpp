@@ -22,18 +22,6 @@ namespace thermocomp {
 
 inline constexpr std::size_t registers_of_value_max = 4;
 
-/// Registers a value takes: 1, 2 or 4.
-[[nodiscard]] std::size_t registers_of(Encoding encoding) noexcept;
-
-[[nodiscard]] constexpr bool is_bit_table(ModbusTable table) noexcept {
-  return table == ModbusTable::coil || table == ModbusTable::discrete_input;
-}
-
-/// Words a value takes in a table; a coil or discrete input is one word, 0 or 1.
-[[nodiscard]] inline std::size_t words_of(ModbusTable table, Encoding encoding) noexcept {
-  return is_bit_table(table) ? 1 : registers_of(encoding);
-}
-
 /// How a number stands in registers: value = raw * scale + offset.
 struct NumberFormat {
   Encoding encoding{Encoding::int16};

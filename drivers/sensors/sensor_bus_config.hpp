@@ -17,6 +17,31 @@ enum class Encoding { int16, uint16, int32, uint32, float32, float64 };
 enum class WordOrder { abcd, dcba, badc, cdab };
 enum class ModbusTable { coil, discrete_input, holding, input };
 
+/// Registers a value takes: 1, 2 or 4.
+[[nodiscard]] constexpr std::size_t registers_of(Encoding encoding) noexcept {
+  switch (encoding) {
+    case Encoding::int16:
+    case Encoding::uint16:
+      return 1;
+    case Encoding::int32:
+    case Encoding::uint32:
+    case Encoding::float32:
+      return 2;
+    case Encoding::float64:
+      break;
+  }
+  return 4;
+}
+
+[[nodiscard]] constexpr bool is_bit_table(ModbusTable table) noexcept {
+  return table == ModbusTable::coil || table == ModbusTable::discrete_input;
+}
+
+/// Words a value takes in a table; a coil or discrete input is one word, 0 or 1.
+[[nodiscard]] constexpr std::size_t words_of(ModbusTable table, Encoding encoding) noexcept {
+  return is_bit_table(table) ? 1 : registers_of(encoding);
+}
+
 struct ModbusTcp {
   std::string host;
   int port{502};
