@@ -417,16 +417,16 @@ void CanopenNode::take_poll(const SdoResult& result, nanoseconds now) {
     vouched_for_[channel] = 0;
     return lose(channel, silent ? Fault::no_answer : Fault::device_error, now);
   }
-  if (status_awaited_) return take_status(result, now);
+  if (polled_value_) return take_status(result, now);
   poll_error_.clear();
   ++counters_.answers;
-  raw_[channel] = {result.bytes, {}};
   const auto& status = channels_[channel].status;
   if (status && result.bytes.size() <= canopen_bytes_max) {
-    status_awaited_ = true;
+    polled_value_ = result.bytes;
     ++counters_.requests;
     return client_.read(status->object, now);
   }
+  raw_[channel] = {result.bytes, {}};
   forget_poll();
   if (result.bytes.size() > canopen_bytes_max) {
     poll_error_ = to_string(result.object) + ": " + std::to_string(result.bytes.size()) +
@@ -439,23 +439,26 @@ void CanopenNode::take_poll(const SdoResult& result, nanoseconds now) {
 /// Between two good statuses there is a value; after the first one it is asked for at once.
 void CanopenNode::take_status(const SdoResult& result, nanoseconds now) {
   const std::size_t channel = *polled_;
+  const RawReading raw{*polled_value_, result.bytes};
   forget_poll();
-  raw_[channel].status = result.bytes;
   const CanStatus& status = channels_[channel].status->number;
   const bool is_short = result.bytes.size() < bytes_needed(status.field);
   const Fault fault =
       is_short ? Fault::bad_frame : fault_of(status, extract_raw(result.bytes, status.field));
   const bool vouched_before = vouched_for_[channel] != 0;
   vouched_for_[channel] = fault == Fault::none ? 1 : 0;
+  if (fault == Fault::none && !vouched_before) {
+    poll_at_[channel] = now;
+    return;
+  }
+  raw_[channel] = raw;
   if (fault != Fault::none) return lose(channel, fault, now);
-  if (vouched_before)
-    return show(channel, decode(raw_[channel].value, channels_[channel].signal), now);
-  poll_at_[channel] = now;
+  show(channel, decode(raw.value, channels_[channel].signal), now);
 }
 
 void CanopenNode::forget_poll() noexcept {
   polled_.reset();
-  status_awaited_ = false;
+  polled_value_.reset();
 }
 
 void CanopenNode::take_result(nanoseconds now) {

@@ -112,8 +112,9 @@ class CanopenNode {
   Phase phase_{Phase::closed};
   std::deque<Job> jobs_;
   std::optional<std::size_t> polled_;  ///< channel whose answer is awaited
-  bool status_awaited_{false};         ///< its value is in raw_
-  CanopenMapping mapping_;             ///< being asked for
+  /// Of that channel, until its status has come too.
+  std::optional<std::vector<std::uint8_t>> polled_value_;
+  CanopenMapping mapping_;  ///< being asked for
   int entries_{0};
   std::vector<std::uint32_t> told_;
   nanoseconds retry_at_{};
