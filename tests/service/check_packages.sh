@@ -37,8 +37,8 @@ fail() {
 
 # What stands beside the machine stays small, and no file is in two packages.
 beside_machine=$(depends_of thermocomp thermocomp-simulator)
-for library in gmsh cholmod blas occt; do
-  [[ $beside_machine != *"$library"* ]] || fail "the daemon's packages depend on lib$library"
+for library in gmsh cholmod blas occt linuxcnc; do
+  [[ $beside_machine != *"$library"* ]] || fail "the daemon's packages depend on $library"
 done
 twice=$(for file in "$packages"/*.deb; do
   dpkg-deb --fsys-tarfile "$file" | tar -t | grep -v '/$'
