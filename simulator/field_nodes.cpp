@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace thermocomp {
 namespace {
@@ -60,6 +61,7 @@ struct FieldNodes::Node {
   std::vector<std::size_t> columns;
   std::vector<double> temps_degC;
   CanSocket socket;
+  bool measured{false};
   nanoseconds tried_at{};
   std::optional<SimulatedCanopenNode> as_canopen;
   std::optional<SimulatedJ1939Node> as_j1939;
@@ -105,6 +107,8 @@ void FieldNodes::update(nanoseconds now, std::span<const double> row) {
       node->tried_at = now;
       node->socket.open();
     }
+    // Before its first look at the temperatures a node has none to answer with.
+    if (!std::exchange(node->measured, true)) node->update(now, row);
     while (node->socket.is_open()) {
       const auto frames = node->socket.receive();
       for (const CanFrame& frame : frames) node->take(frame, now);
