@@ -68,6 +68,7 @@ std::vector<CanSource::Channel> CanSource::channels_of(const CanBusConfig& confi
 
 std::vector<std::size_t> CanSource::sensors_of(const std::vector<Channel>& channels) {
   std::vector<std::size_t> sensors;
+  sensors.reserve(channels.size());
   for (const Channel& channel : channels) sensors.push_back(channel.sensor);
   return sensors;
 }
