@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
 namespace thermocomp::diagnosis {
 namespace {
 
@@ -37,6 +39,38 @@ double noise_of(const Column& residual, const Eigen::Array<bool, Eigen::Dynamic,
   const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
   std::nth_element(differences.begin(), middle, differences.end());
   return std::max(noise_um_min, *middle / (0.6745 * std::sqrt(6.0)));
+}
+
+/// An error of this standard deviation that moves nothing beside the noise of all rows together is
+/// left out.
+constexpr double seen_min = 0.1;
+
+/// Displacement that errors of the model's coefficients add, each of one standard deviation: the
+/// principal columns of coefficient times temperature, as independent of each other
+/// as the errors are.
+Eigen::MatrixXd coefficient_columns_of(const MeasuredData& data, const StackedRows& rows,
+                                       std::size_t output,
+                                       const Eigen::Array<bool, Eigen::Dynamic, 1>& present,
+                                       double noise_um) {
+  if (!(data.coefficient_sd > 0)) return Eigen::MatrixXd(rows.time_s.size(), 0);
+  Eigen::MatrixXd all(rows.time_s.size(), static_cast<Eigen::Index>(data.model.inputs.size()));
+  for (std::size_t input = 0; input < data.model.inputs.size(); ++input) {
+    for (std::size_t i = 0; i < data.runs.size(); ++i) {
+      const MeasuredRun& run = data.runs[i];
+      const Block& block = rows.runs[i];
+      const Eigen::Index count = block.end - block.begin;
+      all.col(static_cast<Eigen::Index>(input)).segment(block.begin, count) =
+          data.coefficient(run, output, input).cwiseProduct(run.calm_inputs_K[input]).tail(count);
+    }
+  }
+  all *= data.coefficient_sd;
+  for (Eigen::Index row = 0; row < all.rows(); ++row)
+    if (!present[row]) all.row(row).setZero();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(all.transpose() * all);
+  Eigen::Index seen = 0;
+  for (const double square : parts.eigenvalues())
+    seen += square > seen_min * noise_um * noise_um ? 1 : 0;
+  return all * parts.eigenvectors().rightCols(seen);
 }
 
 }  // namespace
@@ -91,7 +125,8 @@ OutputEvidence::OutputEvidence(const MeasuredData& data, const StackedRows& rows
       present_(rows.time_s.size()),
       measured_residual_(Column::Zero(rows.time_s.size())),
       offsets_(
-          Eigen::MatrixXd::Zero(rows.time_s.size(), static_cast<Eigen::Index>(data.runs.size()))) {
+          Eigen::MatrixXd::Zero(rows.time_s.size(), static_cast<Eigen::Index>(data.runs.size()))),
+      no_columns_(rows.time_s.size(), 0) {
   for (std::size_t i = 0; i < data.runs.size(); ++i) {
     const MeasuredRun& run = data.runs[i];
     const Block& block = rows.runs[i];
@@ -106,18 +141,19 @@ OutputEvidence::OutputEvidence(const MeasuredData& data, const StackedRows& rows
   noise_um_ = noise_of(residual_, present_, rows.runs);
   if (output < data.least_noise_um.size())
     noise_um_ = std::max(noise_um_, data.least_noise_um[output]);
+  coefficient_columns_ = coefficient_columns_of(data, rows, output, present_, noise_um_);
   accept({});
 }
 
-double OutputEvidence::centred_rms() const {
+double OutputEvidence::centred_rms(const Column& values) const {
   double sum = 0.0;
   for (const Block& run : rows_.runs) {
     const Eigen::Index count = run.end - run.begin;
     const auto present = present_.segment(run.begin, count);
-    const auto values = residual_.segment(run.begin, count).array();
+    const auto of_run = values.segment(run.begin, count).array();
     const double n = std::max(1.0, static_cast<double>(present.count()));
-    const double mean = present.select(values, 0.0).sum() / n;
-    sum += present.select((values - mean).square(), 0.0).sum();
+    const double mean = present.select(of_run, 0.0).sum() / n;
+    sum += present.select((of_run - mean).square(), 0.0).sum();
   }
   return std::sqrt(sum / std::max(1.0, static_cast<double>(present_.count())));
 }
@@ -148,24 +184,13 @@ void OutputEvidence::accept(const std::vector<Explanation>& found) {
       residual_ -= columns * each.gains[output_];
     }
   }
-  Eigen::MatrixXd common(rows_.time_s.size(), offsets_.cols() + free_columns);
-  common.leftCols(offsets_.cols()) = offsets_;
-  Eigen::Index at = offsets_.cols();
+  free_columns_.resize(rows_.time_s.size(), free_columns);
+  Eigen::Index at = 0;
   for (const Eigen::MatrixXd& columns : free) {
-    common.middleCols(at, columns.cols()) = columns;
+    free_columns_.middleCols(at, columns.cols()) = columns;
     at += columns.cols();
   }
-  for (Eigen::Index row = 0; row < common.rows(); ++row)
-    if (!present_[row]) common.row(row).setZero();
-  free_columns_ = common.rightCols(free_columns);
-  settings_.clear();
-  const double variance = noise_um_ * noise_um_;
-  Eigen::VectorXd precision =
-      Eigen::VectorXd::Constant(common.cols(), variance / (accepted_sd_um * accepted_sd_um));
-  precision.head(offsets_.cols()).setConstant(variance / (offset_sd_um * offset_sd_um));
-  for (const NoiseShape& shape : noise_shapes(centred_rms(), noise_um_))
-    settings_.push_back(
-        std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision));
+  add_settings();
   const auto likelihood = [](const auto& setting) {
     return setting->twice_log_likelihood(setting->squares());
   };
@@ -173,6 +198,37 @@ void OutputEvidence::accept(const std::vector<Explanation>& found) {
       std::max_element(settings_.begin(), settings_.end(), [&](const auto& a, const auto& b) {
         return likelihood(a) < likelihood(b);
       })->get();
+}
+
+void OutputEvidence::add_settings() {
+  const Eigen::MatrixXd& coefficients = coefficient_columns();
+  Eigen::MatrixXd common(rows_.time_s.size(),
+                         offsets_.cols() + coefficients.cols() + free_columns_.cols());
+  common.leftCols(offsets_.cols()) = offsets_;
+  common.middleCols(offsets_.cols(), coefficients.cols()) = coefficients;
+  common.rightCols(free_columns_.cols()) = free_columns_;
+  for (Eigen::Index row = 0; row < common.rows(); ++row)
+    if (!present_[row]) common.row(row).setZero();
+  const double variance = noise_um_ * noise_um_;
+  Eigen::VectorXd precision =
+      Eigen::VectorXd::Constant(common.cols(), variance / (accepted_sd_um * accepted_sd_um));
+  precision.head(offsets_.cols()).setConstant(variance / (offset_sd_um * offset_sd_um));
+  settings_.clear();
+  for (const NoiseShape& shape : noise_shapes(centred_rms(residual_), noise_um_)) {
+    // The likelihood knows noise and prior by a common factor only, which the prior must not have:
+    // large noise would make large errors likely. The factor is that of the same noise when the
+    // coefficients are right.
+    precision.segment(offsets_.cols(), coefficients.cols()).setConstant(1e12);
+    auto right = std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision);
+    if (coefficients.cols() == 0) {
+      settings_.push_back(std::move(right));
+      continue;
+    }
+    precision.segment(offsets_.cols(), coefficients.cols())
+        .setConstant(right->squares() / right->present_rows());
+    settings_.push_back(
+        std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision));
+  }
 }
 
 Eigen::MatrixXd columns_of(const Hypothesis& hypothesis, const std::vector<double>& shape,

@@ -84,11 +84,18 @@ class OutputEvidence {
   [[nodiscard]] const Eigen::Array<bool, Eigen::Dynamic, 1>& present() const { return present_; }
   /// Whether no row's value is missing.
   [[nodiscard]] bool complete() const { return present_.all(); }
-  /// RMS of the residual, each run's mean taken off.
-  [[nodiscard]] double centred_rms() const;
+  /// RMS of values over the stacked rows where the output has one, each run's mean taken off.
+  [[nodiscard]] double centred_rms(const Column& values) const;
   /// Columns of the accepted explanations that are fitted anew each time, shape (rows, m); they are
   /// the last ones of every setting's common columns.
   [[nodiscard]] const Eigen::MatrixXd& free_columns() const noexcept { return free_columns_; }
+  /// Whether the model's coefficients may all be a little wrong. Counts from the next accept() on.
+  void doubt_coefficients(bool doubted) { coefficients_doubted_ = doubted; }
+  /// What wrong coefficients add, shape (rows, m): common columns before the free ones. None when
+  /// they are not doubted.
+  [[nodiscard]] const Eigen::MatrixXd& coefficient_columns() const noexcept {
+    return coefficients_doubted_ ? coefficient_columns_ : no_columns_;
+  }
   [[nodiscard]] const Column& measured_residual() const noexcept { return measured_residual_; }
   /// The measured displacement over the stacked rows; 0 where missing.
   [[nodiscard]] Column measured(const MeasuredData& data) const;
@@ -97,6 +104,9 @@ class OutputEvidence {
   [[nodiscard]] std::size_t output() const noexcept { return output_; }
 
  private:
+  /// One setting for each shape of noise.
+  void add_settings();
+
   const StackedRows& rows_;
   std::size_t output_;
   Eigen::Array<bool, Eigen::Dynamic, 1> present_;
@@ -104,6 +114,9 @@ class OutputEvidence {
   Column residual_;           ///< explanations without a gain subtracted
   Eigen::MatrixXd offsets_;
   Eigen::MatrixXd free_columns_;
+  Eigen::MatrixXd coefficient_columns_;
+  Eigen::MatrixXd no_columns_;
+  bool coefficients_doubted_{false};
   double noise_um_{0.0};  ///< of a single value, from the residual's second differences
   std::vector<std::unique_ptr<Setting>> settings_;
   const Setting* setting_{nullptr};

@@ -146,7 +146,7 @@ class Catalogue {
 void Catalogue::add_input(std::size_t input) {
   const std::string& name = data_.model.inputs[input];
   const auto rise_K = [input](const MeasuredRun& run) -> const Column& {
-    return run.inputs_K[input];
+    return run.calm_inputs_K[input];
   };
   if (!moves_anywhere(rise_K)) return;
   const auto whole = [this, rise_K](const Shape&, std::size_t) -> Eigen::MatrixXd {
@@ -193,7 +193,7 @@ void Catalogue::add_reading_errors(std::size_t input) {
   play.in_every_output = true;
   play.columns = [this, input](const Shape& shape, std::size_t output) -> Eigen::MatrixXd {
     return coefficient_times(input, output, [&](const MeasuredRun& run) -> Column {
-      const Column& rise_K = run.inputs_K[input];
+      const Column& rise_K = run.calm_inputs_K[input];
       return through(Play(shape[0]), run.time_s, rise_K) - rise_K;
     });
   };
@@ -209,7 +209,7 @@ void Catalogue::add_swaps(std::size_t input) {
       return stacked([&](const MeasuredRun& run) -> Column {
         const Column weight =
             data_.coefficient(run, output, input) - data_.coefficient(run, output, other);
-        return weight.cwiseProduct(run.inputs_K[other] - run.inputs_K[input]);
+        return weight.cwiseProduct(run.calm_inputs_K[other] - run.calm_inputs_K[input]);
       });
     };
   }
@@ -249,7 +249,7 @@ void Catalogue::add_positions(const std::string& name,
 void Catalogue::add_other(std::size_t other) {
   const std::string& name = data_.others[other];
   const auto rise_K = [other](const MeasuredRun& run) -> const Column& {
-    return run.others_K[other];
+    return run.calm_others_K[other];
   };
   if (!moves_anywhere(rise_K)) return;
   ShapeParameter lag = lag_times(60.0, 6 * 3600.0, 20);
@@ -307,7 +307,8 @@ void Catalogue::add_output(std::size_t output) {
     play.output = output;
     play.columns = [this, model_um](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
       return stacked([&](const MeasuredRun& run) -> Column {
-        return through(Play(shape[0]), run.time_s, model_um(run)) - model_um(run);
+        const Column calm_um = calm(run.time_s, model_um(run));
+        return through(Play(shape[0]), run.time_s, calm_um) - calm_um;
       });
     };
     std::vector<double> shifts = logarithmic_grid(std::max(5.0, 0.2 * step_s_), 3600.0, 14);

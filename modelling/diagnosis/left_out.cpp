@@ -1,6 +1,7 @@
 #include "modelling/diagnosis/left_out.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -90,53 +91,56 @@ std::vector<std::vector<double>> shapes_of(const Explanation& explanation) {
   return shapes;
 }
 
+/// Of an output in some rows.
 struct Squares {
-  double before{0.0};
-  double after{0.0};
+  double measured{0.0};  ///< what there is to explain
+  double beside{0.0};    ///< what errors of the coefficients leave of it
+  double after{0.0};     ///< what the hypothesis leaves of that
+  double alone{0.0};     ///< what it leaves with the coefficients as they are
+  Squares& operator+=(const Squares& other) {
+    measured += other.measured;
+    beside += other.beside;
+    after += other.after;
+    alone += other.alone;
+    return *this;
+  }
 };
 
-/// What is left of an output without (`before`) and with the hypothesis.
-struct Left {
-  Column before;
-  Column after;
-};
+/// The same as columns.
+using Left = std::array<Column, 4>;
 
-/// Squares of both in a block when each run's mean outside of it is taken off.
+/// Squares in a block when each run's mean outside of it is taken off.
 Squares squares_in_block(const OutputEvidence& evidence, const Left& left, const StackedRows& rows,
                          const Block& block) {
-  Squares sum;
+  std::array<double, 4> sum{};
   for (const Block& run : rows.runs) {
     if (block.begin < run.begin || block.begin >= run.end) continue;
     const bool alone = block.begin == run.begin && block.end == run.end;
-    double before_um = 0.0;
-    double after_um = 0.0;
     double count = 0.0;
+    std::array<double, 4> mean_um{};
     for (Eigen::Index row = run.begin; row < run.end; ++row) {
       const bool inside = row >= block.begin && row < block.end;
       if (!evidence.present()[row] || (inside && !alone)) continue;
-      before_um += left.before[row];
-      after_um += left.after[row];
+      for (std::size_t i = 0; i < left.size(); ++i) mean_um[i] += left[i][row];
       count += 1.0;
     }
     if (!(count > 0)) continue;
     for (Eigen::Index row = block.begin; row < block.end; ++row) {
       if (!evidence.present()[row]) continue;
-      const double before = left.before[row] - before_um / count;
-      const double after = left.after[row] - after_um / count;
-      sum.before += before * before;
-      sum.after += after * after;
+      for (std::size_t i = 0; i < left.size(); ++i) {
+        const double value_um = left[i][row] - mean_um[i] / count;
+        sum[i] += value_um * value_um;
+      }
     }
   }
-  return sum;
+  return {sum[0], sum[1], sum[2], sum[3]};
 }
 
 /// Gains of the hypothesis from the rows without a block, and what 2 ln L loses by the misfit.
 struct BlockFit {
   double misfit{std::numeric_limits<double>::infinity()};
   std::vector<Eigen::VectorXd> gains;
-  /// Gains of the accepted columns, without and with the hypothesis.
-  std::vector<Eigen::VectorXd> accepted_before;
-  std::vector<Eigen::VectorXd> accepted_after;
+  std::vector<Eigen::VectorXd> common;  ///< of the common columns, beside the hypothesis
 };
 
 BlockFit fit_without(const Explanation& explanation, const std::vector<std::size_t>& acting,
@@ -144,7 +148,7 @@ BlockFit fit_without(const Explanation& explanation, const std::vector<std::size
   std::vector<Reduced> reduced;
   reduced.reserve(products.size());
   for (const BlockProducts& each : products) reduced.push_back(without_block(each, block));
-  BlockFit fit{0.0, {}, {}, {}};
+  BlockFit fit{0.0, {}, {}};
   double square = 0.0;
   double right = 0.0;
   for (std::size_t i = 0; i < acting.size(); ++i) {
@@ -163,22 +167,36 @@ BlockFit fit_without(const Explanation& explanation, const std::vector<std::size
     fit.misfit +=
         explanation.settings[acting[i]]->present_rows() * std::log(std::max(squares, 1e-12));
     fit.gains.push_back(gains);
-    const Eigen::VectorXd before = reduced[i].carried.rightCols(1);
-    fit.accepted_before.push_back(before);
-    fit.accepted_after.emplace_back(before - reduced[i].carried.leftCols(gains.size()) * gains);
+    fit.common.emplace_back(reduced[i].carried.rightCols(1) -
+                            reduced[i].carried.leftCols(gains.size()) * gains);
   }
   return fit;
 }
 
-/// What a fit leaves of the output number `i` of those acted on.
-Left left_of(const BlockFit& fit, std::size_t i, const OutputEvidence& evidence,
-             const Explanation& explanation, const std::vector<double>& shape) {
+/// Of an output's common columns without any hypothesis.
+BlockProducts common_products(const OutputEvidence& evidence, const StackedRows& rows) {
+  return products(evidence.setting(), Eigen::MatrixXd(rows.time_s.size(), 0), rows);
+}
+
+/// What the last of the common gains, those of accepted explanations, leave of the residual, and
+/// what those of wrong coefficients leave of that.
+std::array<Column, 2> left_by(const OutputEvidence& evidence, const Eigen::VectorXd& common) {
   const Eigen::MatrixXd& accepted = evidence.free_columns();
-  Left left{evidence.residual(), evidence.residual()};
-  left.before -= accepted * fit.accepted_before[i].tail(accepted.cols());
-  left.after -= accepted * fit.accepted_after[i].tail(accepted.cols());
-  left.after -= columns_of(*explanation.hypothesis, shape, evidence) * fit.gains[i];
-  return left;
+  const Eigen::MatrixXd& coefficients = evidence.coefficient_columns();
+  const Column left = evidence.residual() - accepted * common.tail(accepted.cols());
+  const Eigen::Index first = common.size() - accepted.cols() - coefficients.cols();
+  return {left, left - coefficients * common.segment(first, coefficients.cols())};
+}
+
+/// What a fit leaves of the output number `i` of those acted on.
+/// @param common_without  gains of the common columns without the hypothesis
+Left left_of(const BlockFit& fit, std::size_t i, const OutputEvidence& evidence,
+             const Explanation& explanation, const std::vector<double>& shape,
+             const Eigen::VectorXd& common_without) {
+  const Column measured = left_by(evidence, common_without)[0];
+  const auto [accepted_taken, beside] = left_by(evidence, fit.common[i]);
+  const Column explained = columns_of(*explanation.hypothesis, shape, evidence) * fit.gains[i];
+  return {measured, beside, beside - explained, accepted_taken - explained};
 }
 
 std::vector<std::size_t> acting_outputs(const Explanation& explanation) {
@@ -188,27 +206,48 @@ std::vector<std::size_t> acting_outputs(const Explanation& explanation) {
   return acting;
 }
 
+double log_ratio(double after, double before) {
+  return before > 0 ? 0.5 * std::log(std::max(after / before, 1e-12)) : 0.0;
+}
+
 /// @param by_output  of the outputs that it acts on
 LeftOutGain gain_of(const std::vector<Squares>& by_output) {
   LeftOutGain gain;
   double left = 0.0;
+  double left_alone = 0.0;
   double outputs = 0.0;
-  Squares all;
+  double all_before = 0.0;
+  double all_after = 0.0;
   for (const Squares& squares : by_output) {
-    all.before += squares.before;
-    all.after += squares.after;
-    if (!(squares.before > 0)) continue;
-    const double ratio = squares.after / squares.before;
-    left += ratio;
+    // A hypothesis that only undoes what it makes the coefficients do has explained nothing, and
+    // knowing it alone must be a gain: the coefficients of the extended model stay as they are.
+    const double before = std::min(squares.measured, squares.beside);
+    all_before += before;
+    all_after += squares.after;
+    if (!(before > 0)) continue;
+    left += squares.after / before;
+    left_alone += squares.alone / squares.measured;
     outputs += 1.0;
-    gain.log_left += 0.5 * std::log(std::max(ratio, 1e-12));
+    gain.log_left += log_ratio(squares.after, squares.measured);
   }
-  if (outputs > 0) gain.share = 1.0 - std::sqrt(left / outputs);
-  if (all.before > 0) gain.share_of_all = 1.0 - std::sqrt(all.after / all.before);
+  if (outputs > 0) gain.share = 1.0 - std::sqrt(std::max(left, left_alone) / outputs);
+  if (all_before > 0) gain.share_of_all = 1.0 - std::sqrt(all_after / all_before);
   return gain;
 }
 
 }  // namespace
+
+double log_left_without(const OutputEvidence& evidence, const StackedRows& rows) {
+  if (evidence.coefficient_columns().cols() == 0) return 0.0;
+  const BlockProducts common = common_products(evidence, rows);
+  Squares sum;
+  for (std::size_t block = 0; block < rows.blocks.size(); ++block) {
+    const auto without = left_by(evidence, without_block(common, block).carried);
+    sum += squares_in_block(evidence, {without[0], without[1], without[1], without[1]}, rows,
+                            rows.blocks[block]);
+  }
+  return log_ratio(sum.after, sum.measured);
+}
 
 LeftOutGain gain_on_left_out_blocks(const Explanation& explanation, const StackedRows& rows,
                                     const std::vector<OutputEvidence>& outputs) {
@@ -231,13 +270,14 @@ LeftOutGain gain_on_left_out_blocks(const Explanation& explanation, const Stacke
     }
   }
   std::vector<Squares> sums(acting.size());
-  for (std::size_t block = 0; block < blocks; ++block) {
-    for (std::size_t i = 0; i < best[block].gains.size(); ++i) {
-      const OutputEvidence& evidence = outputs[acting[i]];
-      const Left left = left_of(best[block], i, evidence, explanation, best_shape[block]);
-      const Squares part = squares_in_block(evidence, left, rows, rows.blocks[block]);
-      sums[i].before += part.before;
-      sums[i].after += part.after;
+  for (std::size_t i = 0; i < acting.size(); ++i) {
+    const OutputEvidence& evidence = outputs[acting[i]];
+    const BlockProducts common = common_products(evidence, rows);
+    for (std::size_t block = 0; block < blocks; ++block) {
+      if (best[block].gains.empty()) continue;
+      const Left left = left_of(best[block], i, evidence, explanation, best_shape[block],
+                                without_block(common, block).carried);
+      sums[i] += squares_in_block(evidence, left, rows, rows.blocks[block]);
     }
   }
   return gain_of(sums);
@@ -256,12 +296,21 @@ LeftOutGain gain_on_fitted_rows(const Explanation& explanation, const StackedRow
   std::vector<Squares> sums(acting.size());
   for (std::size_t i = 0; i < acting.size(); ++i) {
     const OutputEvidence& evidence = outputs[acting[i]];
-    const Left left = left_of(fit, i, evidence, explanation, explanation.shape);
-    for (const Block& run : rows.runs) {
-      const Squares part = squares_in_block(evidence, left, rows, run);
-      sums[i].before += part.before;
-      sums[i].after += part.after;
+    const BlockProducts common = common_products(evidence, rows);
+    Left left;
+    left.fill(Column::Zero(rows.time_s.size()));
+    for (std::size_t block = 0; block < rows.blocks.size(); ++block) {
+      BlockFit without = fit;
+      const Eigen::MatrixXd carried = without_block(all[i], block).carried;
+      without.common[i] =
+          carried.rightCols(1) - carried.leftCols(fit.gains[i].size()) * fit.gains[i];
+      const Left part = left_of(without, i, evidence, explanation, explanation.shape,
+                                without_block(common, block).carried);
+      const Block& of = rows.blocks[block];
+      for (std::size_t k = 0; k < left.size(); ++k)
+        left[k].segment(of.begin, of.end - of.begin) = part[k].segment(of.begin, of.end - of.begin);
     }
+    for (const Block& run : rows.runs) sums[i] += squares_in_block(evidence, left, rows, run);
   }
   return gain_of(sums);
 }

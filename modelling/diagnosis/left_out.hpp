@@ -11,8 +11,8 @@ struct LeftOutGain {
   double share{0.0};
   /// The same with all outputs in one unit: what is large counts.
   double share_of_all{0.0};
-  /// Sum over all outputs of ln(RMS with / RMS without): how explanations of different outputs
-  /// compare. Negative: better than nothing.
+  /// Sum over its outputs of ln(RMS that is left / RMS of the residual): how explanations of
+  /// different outputs compare. Negative: better than nothing.
   double log_left{0.0};
 };
 
@@ -22,7 +22,12 @@ struct LeftOutGain {
                                                   const StackedRows& rows,
                                                   const std::vector<OutputEvidence>& outputs);
 
-/// The same in the rows of the fit, for a fault that is located within one run.
+/// The log_left of an output that no hypothesis acts on: what errors of the coefficients alone
+/// leave of rows that they were not fitted to; 0 where they are taken as right.
+[[nodiscard]] double log_left_without(const OutputEvidence& evidence, const StackedRows& rows);
+
+/// For a fault that is located within one run: its shape and gains from all rows, everything else
+/// from the other blocks.
 [[nodiscard]] LeftOutGain gain_on_fitted_rows(const Explanation& explanation,
                                               const StackedRows& rows,
                                               const std::vector<OutputEvidence>& outputs);

@@ -5,6 +5,7 @@
 
 #include "config/units.hpp"
 #include "estimator/displacement_model.hpp"
+#include "modelling/diagnosis/series.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -189,11 +190,20 @@ Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
   return model_over(alone, unit, *this)[output];
 }
 
+namespace {
+/// A matrix that was fitted or calculated is right to a few per cent.
+constexpr double coefficient_sd = 0.03;
+}  // namespace
+
 MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
                            const std::vector<std::string>& names, const SharedColumns& columns) {
-  MeasuredData data{model, columns.others, columns.signals, {}};
+  MeasuredData data{model, columns.others, columns.signals, {}, {}, coefficient_sd};
   for (std::size_t i = 0; i < runs.size(); ++i)
     data.runs.push_back(measured_run(runs[i], names[i], data));
+  for (MeasuredRun& run : data.runs) {
+    for (const Column& rise_K : run.inputs_K) run.calm_inputs_K.push_back(calm(run.time_s, rise_K));
+    for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));
+  }
   return data;
 }
 

@@ -23,7 +23,10 @@ struct MeasuredRun {
   std::vector<Column> others_K;  ///< rise of MeasuredData::others
   std::vector<Column> others_degC;
   std::vector<Column> inputs_degC;
-  std::vector<Column> signals;      ///< order of MeasuredData::signals
+  std::vector<Column> signals;  ///< order of MeasuredData::signals
+  /// inputs_K and others_K without the noise of single values, as far as it can be seen.
+  std::vector<Column> calm_inputs_K;
+  std::vector<Column> calm_others_K;
   std::vector<Column> model_um;     ///< order of the outputs, relative to the output's first row
   std::vector<Column> measured_um;  ///< the same; NaN: missing
   [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }
@@ -37,6 +40,9 @@ struct MeasuredData {
   /// Least noise of a single value of each output, as the steps of its converter make it; empty:
   /// nothing is known.
   std::vector<double> least_noise_um{};
+  /// How far every coefficient of the model may be wrong without being a cause of its own: standard
+  /// deviation, as a share of the coefficient. 0: they are never doubted.
+  double coefficient_sd{0.0};
 
   /// The model's coefficient of an input [um/K] in each row: matrix and guideways.
   [[nodiscard]] Column coefficient(const MeasuredRun& run, std::size_t output,

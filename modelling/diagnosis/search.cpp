@@ -26,6 +26,8 @@ constexpr std::size_t shapes_at_once = 8;
 constexpr double scale_min = 1e-6;
 /// Explanations are as good as each other when what they leave differs by less than this share.
 constexpr double tie_share = 0.1;
+/// Errors of the coefficients are reckoned with when they leave less by this share.
+constexpr double doubt_share = 0.2;
 constexpr std::size_t weighed_shown = 12;
 
 std::vector<std::vector<double>> grid_of(const Hypothesis& hypothesis) {
@@ -40,27 +42,6 @@ std::vector<std::vector<double>> grid_of(const Hypothesis& hypothesis) {
     points = std::move(longer);
   }
   return points;
-}
-
-double root_mean_square(const Column& values,
-                        const Eigen::Array<bool, Eigen::Dynamic, 1>& present) {
-  const double count = static_cast<double>(present.count());
-  return count > 0 ? std::sqrt(values.squaredNorm() / count) : 0.0;
-}
-
-/// The residual without each run's mean.
-Column centred(const Column& values, const OutputEvidence& evidence, const StackedRows& rows) {
-  Column out = values;
-  for (const Block& run : rows.runs) {
-    const Eigen::Index count = run.end - run.begin;
-    const auto present = evidence.present().segment(run.begin, count);
-    const double n = static_cast<double>(present.count());
-    if (!(n > 0)) continue;
-    const double mean = present.select(values.segment(run.begin, count).array(), 0.0).sum() / n;
-    out.segment(run.begin, count) =
-        present.select(values.segment(run.begin, count).array() - mean, 0.0);
-  }
-  return out;
 }
 
 }  // namespace
@@ -389,6 +370,8 @@ void Search::measure_left_out(Explanation& explanation) const {
                                : gain_on_left_out_blocks(explanation, rows_, outputs_);
   explanation.left_out_gain = thresholds_.one_unit ? gain.share_of_all : gain.share;
   explanation.log_left = gain.log_left;
+  for (const std::size_t output : measured_)
+    if (explanation.gains[output].size() == 0) explanation.log_left += log_left_without_[output];
 }
 
 void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
@@ -397,6 +380,27 @@ void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
     if (i != but) found.push_back(findings[i].explanation);
   if (accepted_) accepted_(found);
   for (OutputEvidence& output : outputs_) output.accept(found);
+  log_left_without_.assign(outputs_.size(), 0.0);
+  for (const std::size_t output : measured_)
+    log_left_without_[output] = log_left_without(outputs_[output], rows_);
+}
+
+/// Coefficients are doubted when the best explanation beside their errors predicts rows left out
+/// clearly better than the best one without.
+std::vector<Explanation> Search::first_candidates() {
+  const auto candidates = [this](bool doubted) {
+    for (OutputEvidence& output : outputs_) output.doubt_coefficients(doubted);
+    accept({}, 0);
+    return ranked();
+  };
+  const auto least_left = [](const std::vector<Explanation>& of) {
+    return of.empty() ? 0.0 : of.front().log_left;
+  };
+  const double beside_errors =
+      data_.coefficient_sd > 0 ? least_left(candidates(true)) : std::numeric_limits<double>::max();
+  std::vector<Explanation> right = candidates(false);
+  if (!(beside_errors < least_left(right) - doubt_share)) return right;
+  return candidates(true);
 }
 
 void Search::refit(std::vector<Finding>& findings) {
@@ -468,16 +472,11 @@ double Search::carried_share(const std::vector<Finding>& findings, std::size_t o
   }
   const double noise = evidence.noise_um() * evidence.noise_um();
   const auto variance = [&](const Column& values) {
-    const double rms = root_mean_square(centred(values, evidence, rows_), evidence.present());
+    const double rms = evidence.centred_rms(values);
     return std::max(0.0, rms * rms - noise);
   };
   const double before = variance(evidence.measured_residual());
   return before > 0 ? 1.0 - variance(left) / before : 0.0;
-}
-
-double Search::centred_rms_um(const Column& values, std::size_t output) const {
-  const OutputEvidence& evidence = outputs_[output];
-  return root_mean_square(centred(values, evidence, rows_), evidence.present());
 }
 
 /// Whether what it explains can be seen beside noise and motion in one of the outputs.
@@ -488,9 +487,9 @@ bool Search::matters(const Explanation& explanation, bool first) const {
     const OutputEvidence& evidence = outputs_[output];
     const Column explained =
         columns_of(*explanation.hypothesis, explanation.shape, evidence) * gains;
-    const double motion_um = centred_rms_um(evidence.measured(data_), output);
-    const double residual_um = centred_rms_um(evidence.measured_residual(), output);
-    return centred_rms_um(explained, output) >
+    const double motion_um = evidence.centred_rms(evidence.measured(data_));
+    const double residual_um = evidence.centred_rms(evidence.measured_residual());
+    return evidence.centred_rms(explained) >
            std::max({evidence.noise_um(), thresholds_.motion_share_min * motion_um,
                      first ? 0.0 : thresholds_.later_share_min * residual_um});
   });
@@ -523,10 +522,10 @@ bool Search::structure_left() const {
   return std::any_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
     const OutputEvidence& evidence = outputs_[output];
     const double noise_um = evidence.noise_um();
-    const double residual_um = centred_rms_um(evidence.measured_residual(), output);
+    const double residual_um = evidence.centred_rms(evidence.measured_residual());
     const double structure_um =
         std::sqrt(std::max(0.0, residual_um * residual_um - noise_um * noise_um));
-    const double motion_um = centred_rms_um(evidence.measured(data_), output);
+    const double motion_um = evidence.centred_rms(evidence.measured(data_));
     return structure_um > structure_share_min * motion_um &&
            structure_um > structure_noises_min * noise_um;
   });
@@ -536,8 +535,8 @@ SearchResult Search::run() {
   SearchResult result;
   // A refit can drop what a later finding explains better: rounds are counted, not findings.
   for (std::size_t round = 1; round <= thresholds_.findings_max; ++round) {
-    accept(result.findings, result.findings.size());
-    std::vector<Explanation> candidates = ranked();
+    if (round > 1) accept(result.findings, result.findings.size());
+    std::vector<Explanation> candidates = round > 1 ? ranked() : first_candidates();
     std::erase_if(candidates, [&](const Explanation& each) {
       return std::any_of(result.findings.begin(), result.findings.end(), [&](const Finding& found) {
         return found.explanation.hypothesis == each.hypothesis;

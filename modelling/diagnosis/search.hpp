@@ -124,6 +124,7 @@ class Search {
   void choose(std::vector<Explanation>& candidates) const;
   void measure_left_out(Explanation& explanation) const;
   void accept(const std::vector<Finding>& findings, std::size_t but);
+  [[nodiscard]] std::vector<Explanation> first_candidates();
   void refit(std::vector<Finding>& findings);
   void measure_spread(std::vector<Finding>& findings);
   [[nodiscard]] double shape_sd(const Explanation& explanation, std::size_t parameter) const;
@@ -135,7 +136,6 @@ class Search {
   [[nodiscard]] bool earned(const Explanation& explanation, bool first) const;
   [[nodiscard]] bool convincing(const std::vector<Finding>& findings) const;
   [[nodiscard]] bool matters(const Explanation& explanation, bool first) const;
-  [[nodiscard]] double centred_rms_um(const Column& values, std::size_t output) const;
   [[nodiscard]] bool structure_left() const;
 
   const MeasuredData& data_;
@@ -143,7 +143,8 @@ class Search {
   StackedRows rows_;
   std::vector<Hypothesis> hypotheses_;
   std::vector<OutputEvidence> outputs_;
-  std::vector<std::size_t> measured_;  ///< outputs with values
+  std::vector<std::size_t> measured_;     ///< outputs with values
+  std::vector<double> log_left_without_;  ///< of an output that an explanation does not act on
   Accepted accepted_;
 };
 

@@ -33,6 +33,10 @@ Column through(Filter filter, const Column& time_s, const Column& input) {
 /// Smoothed forwards and backwards with tau_s, which shifts nothing.
 [[nodiscard]] Column smoothed(const Column& time_s, const Column& values, double tau_s);
 
+/// The values smoothed forwards and backwards over as many rows (0, 1, 2, 4 or 8) as predict a row
+/// left out best: the noise of single values goes, what the values do stays.
+[[nodiscard]] Column calm(const Column& time_s, const Column& values);
+
 /// The derivative of the values smoothed forwards and backwards with tau_s.
 [[nodiscard]] Column slope_per_s(const Column& time_s, const Column& values, double tau_s);
 

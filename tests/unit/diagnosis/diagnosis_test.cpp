@@ -1,5 +1,6 @@
 #include "modelling/diagnosis/diagnosis.hpp"
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <random>
@@ -12,6 +13,7 @@
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/coloured_noise.hpp"
 #include "modelling/diagnosis/hypothesis.hpp"
+#include "modelling/diagnosis/series.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;
@@ -162,6 +164,64 @@ TEST_CASE("hypotheses of one pattern have the same columns but for their scale",
     const std::vector<double> shape = {alike[0].shape[0].grid[7]};
     CHECK((alike[0].columns(shape, 0) / -5.0).isApprox(alike[1].columns(shape, 0) / 3.0, 1e-12));
   }
+}
+
+TEST_CASE("a reading is calmed of its noise, and left alone where it has none", "[diagnosis]") {
+  const Eigen::Index n = 400;
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  Column time_s(n);
+  Column truth(n);
+  Column noisy(n);
+  for (Eigen::Index row = 0; row < n; ++row) {
+    time_s[row] = 60.0 * static_cast<double>(row);
+    truth[row] = 5.0 * std::sin(time_s[row] / 3000.0);
+    noisy[row] = truth[row] + noise(random);
+  }
+  CHECK((calm(time_s, noisy) - truth).norm() < 0.6 * (noisy - truth).norm());
+  CHECK((calm(time_s, truth) - truth).cwiseAbs().maxCoeff() < 1e-9);
+}
+
+TEST_CASE("a cause is named with its size beside small errors of all coefficients", "[diagnosis]") {
+  // Four readings that follow the speed each in its own time; every coefficient is some per cent
+  // off.
+  const auto run_of = [](unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, 0.1);
+    std::uniform_int_distribution<int> speed(0, 3);
+    RunFile run;
+    run.name = "run.csv";
+    run.columns = {"time_s", "t1_degC", "t2_degC", "t3_degC", "t4_degC", "spindle_rpm", "z_um"};
+    run.values.resize(7);
+    const std::array<double, 4> per_row = {0.2, 0.05, 0.02, 0.01};
+    const std::array<double, 4> true_um_per_K = {9.0 * 1.03, -12.0 * 0.96, 10.0 * 1.02, 7.0 * 0.97};
+    std::array<double, 4> rise_K{};
+    double heat = 0.0;
+    double rpm = 0.0;
+    for (int row = 0; row < 700; ++row) {
+      if (row % 50 == 20) rpm = 1500.0 * speed(random);
+      run.values[0].push_back(60.0 * row);
+      double moved_um = 0.0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        rise_K[i] += (rpm / 500.0 - rise_K[i]) * per_row[i];
+        run.values[1 + i].push_back(20.0 + rise_K[i]);
+        moved_um += true_um_per_K[i] * rise_K[i];
+      }
+      run.values[5].push_back(rpm);
+      run.values[6].push_back(moved_um + 20.0 * heat + noise(random));
+      heat += (rpm * rpm / 4500.0 / 4500.0 - heat) / 100.0;
+    }
+    run.selected_end = run.rows();
+    return run;
+  };
+  ThermalModel model;
+  model.inputs = {"t1_degC", "t2_degC", "t3_degC", "t4_degC"};
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {{9.0, -12.0, 10.0, 7.0}};
+  const Diagnosis effect = diagnose(model, {run_of(1), run_of(2)}, {"a", "b"}, {run_of(3)}, {"c"});
+  REQUIRE(effect.findings.size() == 1);
+  CHECK(effect.findings[0].cause == "missing_heat_source");
+  CHECK(effect.findings[0].parameters.at(0).values.at("") == Approx(6000.0).epsilon(0.2));
 }
 
 TEST_CASE("nothing is said where there is nothing", "[diagnosis]") {
