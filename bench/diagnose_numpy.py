@@ -2,14 +2,16 @@
 """The search of `thermocomp diagnose` once more, batched in numpy, for one run with one output.
 
 The same hypotheses, grids, noise shapes, shortlists, refinement, witnesses, left-out blocks, rounds and
-spreads as the program, to the same numbers: diagnose.py compares them. Batched: the columns of all
+spreads as the program; diagnose.py compares the numbers. Batched: the columns of all
 subjects and grid points of a cause (1024 at a time); the whitening of all columns and of all eight
 blocks at once, under one noise or each under its own; cross products by one BLAS product; the
 refinement, the choice of noise and the left-out blocks of all candidates of both shortlists at once;
 small systems as stacks of matrices. The witnesses share one whitened matrix a noise. One after
 another go only the rounds, the steps within a refinement and, within a witness, the candidates.
-What is not done here and is in the program's time: other runs and outputs, missing rows, test rows,
-reports. Arguments: the folder of diagnose_data.py. Prints JSON: what was weighed, what was found.
+What is not done here and is in the program's time: common errors of all coefficients and calmed
+readings (the peer makes the search as it was before them, so that its numbers differ by what they
+change), other runs and outputs, missing rows, test rows, reports. Argument: the folder of
+diagnose_data.py. Prints JSON: what was weighed, what was found.
 """
 
 import os
