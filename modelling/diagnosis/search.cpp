@@ -385,22 +385,10 @@ void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
     log_left_without_[output] = log_left_without(outputs_[output], rows_);
 }
 
-/// Coefficients are doubted when the best explanation beside their errors predicts rows left out
-/// clearly better than the best one without.
-std::vector<Explanation> Search::first_candidates() {
-  const auto candidates = [this](bool doubted) {
-    for (OutputEvidence& output : outputs_) output.doubt_coefficients(doubted);
-    accept({}, 0);
-    return ranked();
-  };
-  const auto least_left = [](const std::vector<Explanation>& of) {
-    return of.empty() ? 0.0 : of.front().log_left;
-  };
-  const double beside_errors =
-      data_.coefficient_sd > 0 ? least_left(candidates(true)) : std::numeric_limits<double>::max();
-  std::vector<Explanation> right = candidates(false);
-  if (!(beside_errors < least_left(right) - doubt_share)) return right;
-  return candidates(true);
+std::vector<Explanation> Search::first_candidates(bool doubted) {
+  for (OutputEvidence& output : outputs_) output.doubt_coefficients(doubted);
+  accept({}, 0);
+  return ranked();
 }
 
 void Search::refit(std::vector<Finding>& findings) {
@@ -531,12 +519,33 @@ bool Search::structure_left() const {
   });
 }
 
+/// Coefficients are doubted when the best explanation beside their errors predicts rows left out
+/// clearly better than the best one without. These errors can take so much of a large cause that
+/// nothing is clear; then it is sought as if the coefficients were right. What is small stays
+/// theirs.
 SearchResult Search::run() {
+  const auto least_left = [](const std::vector<Explanation>& of) {
+    return of.empty() ? 0.0 : of.front().log_left;
+  };
+  const double beside_errors = data_.coefficient_sd > 0 ? least_left(first_candidates(true))
+                                                        : std::numeric_limits<double>::max();
+  std::vector<Explanation> right = first_candidates(false);
+  if (beside_errors < least_left(right) - doubt_share) {
+    SearchResult result = run_from(first_candidates(true));
+    if (!result.unexplained) return result;
+    right = first_candidates(false);
+  }
+  return run_from(std::move(right));
+}
+
+SearchResult Search::run_from(std::vector<Explanation> candidates) {
   SearchResult result;
   // A refit can drop what a later finding explains better: rounds are counted, not findings.
   for (std::size_t round = 1; round <= thresholds_.findings_max; ++round) {
-    if (round > 1) accept(result.findings, result.findings.size());
-    std::vector<Explanation> candidates = round > 1 ? ranked() : first_candidates();
+    if (round > 1) {
+      accept(result.findings, result.findings.size());
+      candidates = ranked();
+    }
     std::erase_if(candidates, [&](const Explanation& each) {
       return std::any_of(result.findings.begin(), result.findings.end(), [&](const Finding& found) {
         return found.explanation.hypothesis == each.hypothesis;

@@ -124,7 +124,11 @@ class Search {
   void choose(std::vector<Explanation>& candidates) const;
   void measure_left_out(Explanation& explanation) const;
   void accept(const std::vector<Finding>& findings, std::size_t but);
-  [[nodiscard]] std::vector<Explanation> first_candidates();
+  /// The explanations for the first finding, best first.
+  /// @param doubted  beside errors of all coefficients; holds for every later finding too
+  [[nodiscard]] std::vector<Explanation> first_candidates(bool doubted);
+  /// @param candidates  for the first finding, best first
+  [[nodiscard]] SearchResult run_from(std::vector<Explanation> candidates);
   void refit(std::vector<Finding>& findings);
   void measure_spread(std::vector<Finding>& findings);
   [[nodiscard]] double shape_sd(const Explanation& explanation, std::size_t parameter) const;
