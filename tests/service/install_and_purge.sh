@@ -23,6 +23,7 @@ if dpkg-query -W "$name" >/dev/null 2>&1; then skip "$name is installed on this 
 
 # What is mounted from here on is gone when this script ends.
 if [[ -z ${OWN_MOUNTS:-} ]]; then
+  unshare --mount true || skip "nothing can be mounted here"
   OWN_MOUNTS=yes exec unshare --mount "${BASH_SOURCE[0]}" "$name" "$folder"
 fi
 copy=$(mktemp -d)
@@ -53,7 +54,7 @@ if ! in_copy dpkg -i /tried.deb > "$copy/log" 2>&1; then
   cat "$copy/log"
   fail "cannot be installed"
 fi
-in_copy "$name" --help | grep -q 'Usage: ' || fail "does not show its help"
+in_copy "$name" --help | grep 'Usage: ' > /dev/null || fail "does not show its help"
 "use_${name#thermocomp-}" || fail "does not do its work"
 in_copy dpkg -P "$name" > "$copy/log" 2>&1 || { cat "$copy/log" && fail "cannot be purged"; }
 
