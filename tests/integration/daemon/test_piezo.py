@@ -65,12 +65,16 @@ def test_every_voltage_comes_from_0_V_and_is_that_of_the_curve(lab, read_back):
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
-def test_with_read_back_a_restart_leaves_the_tool_where_it_stands(lab):
+def compensating_with_read_back(lab, warmed_K):
     machine = PiezoMachine(lab, read_back=True)
-    daemon = machine.daemon.start()
-    daemon.wait_for_mode("compensating")
-    machine.warm_by(10.0)
-    machine.reaches(10.0)
+    machine.daemon.start().wait_for_mode("compensating")
+    machine.warm_by(warmed_K)
+    machine.reaches(warmed_K)
+    return machine, machine.daemon
+
+
+def test_with_read_back_a_restart_leaves_the_tool_where_it_stands(lab):
+    machine, daemon = compensating_with_read_back(lab, 10.0)
     before = machine.amplifier.all_volts()
     daemon.end()
     daemon.start().wait_for_mode("compensating")
@@ -83,11 +87,7 @@ def test_with_read_back_a_restart_leaves_the_tool_where_it_stands(lab):
 
 
 def test_an_amplifier_that_does_not_obey_is_seen_and_told_again(lab):
-    machine = PiezoMachine(lab, read_back=True)
-    daemon = machine.daemon.start()
-    daemon.wait_for_mode("compensating")
-    machine.warm_by(6.0)
-    machine.reaches(6.0)
+    machine, daemon = compensating_with_read_back(lab, 6.0)
     eventually(lambda: abs(daemon.axis()["applied"] - 6.0) < 0.1, "applied as asked for")
     machine.amplifier.give(75.0)
     eventually(lambda: abs(daemon.axis()["applied"] + 1.3) < 0.2, "what 75 V stand for")
