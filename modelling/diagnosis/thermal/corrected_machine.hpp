@@ -15,6 +15,7 @@ namespace thermocomp::diagnosis {
 /// the file are not kept. A signal that only a missing source needs is added, constantly 0.
 /// @param path  a machine file that load_thermal_plant() accepts
 /// @return the file's text; nothing where the machine is a body, whose matrices are not edited
+/// @throws toml::parse_error when the file has become unreadable since
 [[nodiscard]] std::optional<std::string> corrected_machine(
     const std::filesystem::path& path, const std::vector<NamedFinding>& findings);
 
