@@ -1,3 +1,4 @@
+// thermocomp-gmsh.so: meshes by Gmsh. Uses nothing of the program that loads it but headers.
 #include <algorithm>
 #include <cstdio>
 #include <gmsh.h>
@@ -5,7 +6,7 @@
 #include <unistd.h>
 #include <unordered_map>
 
-#include "modelling/structure/file_mesh.hpp"
+#include "modelling/structure/gmsh_module.hpp"
 
 namespace thermocomp::structure {
 namespace {
@@ -154,7 +155,7 @@ class GmshReader {
                       "\"; known are tet4, tet10, hex8 and hex20 (in Gmsh: order 1 or 2, with "
                       "Mesh.SecondOrderIncomplete = 1)");
       }
-      const std::size_t count = shape_info(*shape).nodes;
+      const std::size_t count = tags[t].empty() ? 0 : nodes[t].size() / tags[t].size();
       for (std::size_t e = 0; e < tags[t].size(); ++e) {
         std::vector<Index> mine;
         for (std::size_t i = 0; i < count; ++i) {
@@ -227,14 +228,7 @@ class GmshReader {
   std::unordered_map<int, std::vector<Index>> volumes_of_;  ///< by entity
 };
 
-void expect_file(const std::filesystem::path& path) {
-  if (!std::filesystem::is_regular_file(path)) throw MeshError(path.string() + ": no such file");
-}
-
-}  // namespace
-
-FileMesh read_msh(const std::filesystem::path& path) {
-  expect_file(path);
+FileMesh read_msh_file(const std::filesystem::path& path) {
   const GmshSession session(path);
   session.run([&] { gmsh::open(path.string()); });
   FileMesh mesh;
@@ -242,8 +236,7 @@ FileMesh read_msh(const std::filesystem::path& path) {
   return mesh;
 }
 
-FileMesh mesh_step(const std::filesystem::path& path, double size_m, Shape shape) {
-  expect_file(path);
+FileMesh mesh_step_file(const std::filesystem::path& path, double size_m, Shape shape) {
   const ReportsToStderr reports;
   const GmshSession session(path);
   FileMesh mesh;
@@ -262,4 +255,8 @@ FileMesh mesh_step(const std::filesystem::path& path, double size_m, Shape shape
   return mesh;
 }
 
+}  // namespace
 }  // namespace thermocomp::structure
+
+const thermocomp::structure::GmshFunctions thermocomp_gmsh_functions{
+    &thermocomp::structure::read_msh_file, &thermocomp::structure::mesh_step_file};

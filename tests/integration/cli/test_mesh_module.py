@@ -1,0 +1,116 @@
+"""What reads meshes is loaded when one is read: where it lies, and what is said without it."""
+import pathlib
+import shutil
+import tomllib
+
+import pytest
+
+from conftest import PROGRAM, run
+
+BIN = pathlib.Path(PROGRAM).parent
+MODULE = "thermocomp-gmsh.so"
+
+pytestmark = pytest.mark.skipif(not (BIN / MODULE).exists(),
+                                reason="thermocomp-modelling is not in this build, or reads no mesh")
+
+# A cube of 100 mm that nothing hinders from growing: 11 um/(m K) times 0.1 m.
+STRUCTURE = """
+format = 1
+[[material]]
+name = "cast_iron"
+youngs_modulus_GPa = 110.0
+poisson_ratio = 0.25
+expansion_um_per_m_K = 11.0
+[[part]]
+name = "cube"
+material = "cast_iron"
+mesh = "{mesh}"
+[[support]]
+on = {{ part = "cube", x_mm = [0, 0] }}
+directions = ["x"]
+[[support]]
+on = {{ part = "cube", y_mm = [0, 0] }}
+directions = ["y"]
+[[support]]
+on = {{ part = "cube", z_mm = [0, 0] }}
+directions = ["z"]
+[[block]]
+name = "cube_degC"
+rest = true
+[[output]]
+name = "z_um"
+direction = "z"
+tool = {{ part = "cube", at_mm = [50, 50, 100] }}
+"""
+CORNERS = [(0, 0, 0), (100, 0, 0), (100, 100, 0), (0, 100, 0),
+           (0, 0, 100), (100, 0, 100), (100, 100, 100), (0, 100, 100)]
+MSH = "\n".join(["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", "8",
+                 *(f"{i} {x} {y} {z}" for i, (x, y, z) in enumerate(CORNERS, 1)),
+                 "$EndNodes", "$Elements", "1", "1 5 2 1 1 1 2 3 4 5 6 7 8", "$EndElements", ""])
+INP = "\n".join(["*NODE", *(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(CORNERS, 1)),
+                 "*ELEMENT, TYPE=C3D8", "1, 1, 2, 3, 4, 5, 6, 7, 8", ""])
+
+
+@pytest.fixture
+def alone(tmp_path):
+    """The program where nothing lies beside it."""
+    (tmp_path / "bin").mkdir()
+    return pathlib.Path(shutil.copy(BIN / "thermocomp-modelling", tmp_path / "bin"))
+
+
+def structure(program, folder, mesh="cube.msh", command="structure"):
+    (folder / "cube.msh").write_text(MSH)
+    (folder / "cube.inp").write_text(INP)
+    (folder / "cube.toml").write_text(STRUCTURE.format(mesh=mesh))
+    (folder / "model.toml").unlink(missing_ok=True)
+    out = ["-o", folder / "model.toml"] if command == "structure" else []
+    return run(command, folder / "cube.toml", *out, program=program)
+
+
+def growth_um_per_K(answer, folder):
+    assert answer.returncode == 0, answer.stderr
+    return tomllib.loads((folder / "model.toml").read_text())["matrix_um_per_K"][0][0]
+
+
+def said(answer):
+    """What is said besides the progress, which is lines of an indentation."""
+    assert answer.returncode == 2
+    lines = [line for line in answer.stderr.splitlines() if "thermocomp" in line]
+    assert len(lines) == 1, answer.stderr
+    assert lines[0] == answer.stderr.splitlines()[-1]
+    return lines[0]
+
+
+def test_a_mesh_is_read_from_the_build_tree_and_where_it_is_installed(alone, tmp_path):
+    assert growth_um_per_K(structure(BIN / "thermocomp-modelling", tmp_path),
+                           tmp_path) == pytest.approx(1.1, rel=1e-9)
+    (tmp_path / "lib" / "thermocomp").mkdir(parents=True)
+    shutil.copy(BIN / MODULE, tmp_path / "lib" / "thermocomp")
+    assert growth_um_per_K(structure(alone, tmp_path), tmp_path) == pytest.approx(1.1, rel=1e-9)
+
+
+@pytest.mark.parametrize("command", ["structure", "place"])
+def test_a_missing_module_is_one_line_with_the_places_and_the_package(alone, tmp_path, command):
+    line = said(structure(alone, tmp_path, command=command))
+    for part in [MODULE, f"{tmp_path}/bin", f"{tmp_path}/lib/thermocomp",
+                 "package thermocomp-modelling", "libgmsh4.8"]:
+        assert part in line
+
+
+def test_what_cannot_be_loaded_is_one_line_with_the_file_and_the_reason(alone, tmp_path):
+    module = tmp_path / "bin" / MODULE
+    module.write_text("no library")
+    assert f"{module}: " in said(structure(alone, tmp_path))
+    # A library, but another one: it has no functions for meshes.
+    shutil.copy(next(pathlib.Path("/usr/lib").glob("*/libdl.so.2")), module)
+    line = said(structure(alone, tmp_path))
+    assert str(module) in line and "thermocomp_gmsh_functions" in line
+
+
+def test_nothing_else_needs_the_module(alone, tmp_path):
+    assert run("diagnose", "--help", program=alone).returncode == 0
+    answer = structure(alone, tmp_path, mesh="cube.inp")
+    assert growth_um_per_K(answer, tmp_path) == pytest.approx(1.1, rel=1e-9)
+    # A mesh file that is not there is told as such.
+    absent = structure(alone, tmp_path, mesh="nowhere.msh")
+    assert absent.returncode == 2 and "nowhere.msh: no such file" in absent.stderr
