@@ -1,5 +1,6 @@
 #include <array>
 #include <dlfcn.h>
+
 #include <system_error>
 
 #include "modelling/structure/gmsh_module.hpp"

@@ -44,6 +44,8 @@ twice=$(for file in "$packages"/*.deb; do
   dpkg-deb --fsys-tarfile "$file" | tar -t | grep -v '/$'
 done | sort | uniq -d)
 [[ -z $twice ]] || fail "in more than one package: $twice"
+# Only a module of it is linked with Gmsh; the package depends on it all the same.
+[[ $(depends_of thermocomp-modelling) == *libgmsh* ]] || fail "Gmsh does not come with the package"
 
 # Unpacked, because what it needs is large: it runs, and the command finds it.
 unpacked=$folder/unpacked
@@ -57,6 +59,9 @@ for command in structure place diagnose; do
   grep -q 'Usage: thermocomp-modelling ' "$folder/help" || fail "no help of $command"
   if grep -q 'not in this build' "$folder/help"; then fail "$command was left out"; fi
 done
+if objdump -p "$unpacked/usr/bin/thermocomp-modelling" | grep -q 'NEEDED .*gmsh'; then
+  fail "thermocomp-modelling loads Gmsh at every start"
+fi
 echo "thermocomp-modelling: structure, place, diagnose"
 
 if [[ $(id -u) -eq 0 ]]; then

@@ -40,7 +40,12 @@ in_copy() { chroot "$copy/root" env LC_ALL=C DEBIAN_FRONTEND=noninteractive "$@"
 use_modelling() {
   cp "$here/../../config/examples/structure.toml" "$copy/root/tried.toml"
   in_copy thermocomp-modelling structure /tried.toml -o /tried.model >/dev/null &&
-    grep -q '^matrix_um_per_K' "$copy/root/tried.model"
+    grep -q '^matrix_um_per_K' "$copy/root/tried.model" || return
+  # And what it loads only where a mesh is read.
+  cp "$here/../integration/cli/cube/cube.msh" "$copy/root/tried.msh"
+  sed 's/cube\.msh/tried.msh/' "$here/../integration/cli/cube/cube.toml" > "$copy/root/tried.toml"
+  in_copy thermocomp-modelling structure /tried.toml -o /tried.model >/dev/null &&
+    grep -qF '[1.1' "$copy/root/tried.model"
 }
 use_linuxcnc() {
   in_copy thermocomp-linuxcnc hal --way joint --axes x=0,z=2 > "$copy/root/tried.hal" &&

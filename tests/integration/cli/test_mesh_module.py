@@ -10,45 +10,17 @@ from conftest import PROGRAM, run
 BIN = pathlib.Path(PROGRAM).parent
 MODULE = "thermocomp-gmsh.so"
 
-pytestmark = pytest.mark.skipif(not (BIN / MODULE).exists(),
-                                reason="thermocomp-modelling is not in this build, or reads no mesh")
 
-# A cube of 100 mm that nothing hinders from growing: 11 um/(m K) times 0.1 m.
-STRUCTURE = """
-format = 1
-[[material]]
-name = "cast_iron"
-youngs_modulus_GPa = 110.0
-poisson_ratio = 0.25
-expansion_um_per_m_K = 11.0
-[[part]]
-name = "cube"
-material = "cast_iron"
-mesh = "{mesh}"
-[[support]]
-on = {{ part = "cube", x_mm = [0, 0] }}
-directions = ["x"]
-[[support]]
-on = {{ part = "cube", y_mm = [0, 0] }}
-directions = ["y"]
-[[support]]
-on = {{ part = "cube", z_mm = [0, 0] }}
-directions = ["z"]
-[[block]]
-name = "cube_degC"
-rest = true
-[[output]]
-name = "z_um"
-direction = "z"
-tool = {{ part = "cube", at_mm = [50, 50, 100] }}
-"""
-CORNERS = [(0, 0, 0), (100, 0, 0), (100, 100, 0), (0, 100, 0),
-           (0, 0, 100), (100, 0, 100), (100, 100, 100), (0, 100, 100)]
-MSH = "\n".join(["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", "8",
-                 *(f"{i} {x} {y} {z}" for i, (x, y, z) in enumerate(CORNERS, 1)),
-                 "$EndNodes", "$Elements", "1", "1 5 2 1 1 1 2 3 4 5 6 7 8", "$EndElements", ""])
-INP = "\n".join(["*NODE", *(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(CORNERS, 1)),
-                 "*ELEMENT, TYPE=C3D8", "1, 1, 2, 3, 4, 5, 6, 7, 8", ""])
+
+def reads_meshes():
+    """Whether the build has thermocomp-modelling with `structure`."""
+    program = BIN / "thermocomp-modelling"
+    return program.exists() and "  structure " in run("--help", program=program).stdout
+
+
+pytestmark = pytest.mark.skipif(not reads_meshes(), reason="`structure` is not in this build")
+
+CUBE = pathlib.Path(__file__).parent / "cube"  # grows by 1.1 um/K
 
 
 @pytest.fixture
@@ -59,9 +31,9 @@ def alone(tmp_path):
 
 
 def structure(program, folder, mesh="cube.msh", command="structure"):
-    (folder / "cube.msh").write_text(MSH)
-    (folder / "cube.inp").write_text(INP)
-    (folder / "cube.toml").write_text(STRUCTURE.format(mesh=mesh))
+    shutil.copytree(CUBE, folder, dirs_exist_ok=True)
+    text = (CUBE / "cube.toml").read_text()
+    (folder / "cube.toml").write_text(text.replace("cube.msh", mesh))
     (folder / "model.toml").unlink(missing_ok=True)
     out = ["-o", folder / "model.toml"] if command == "structure" else []
     return run(command, folder / "cube.toml", *out, program=program)
@@ -73,7 +45,7 @@ def growth_um_per_K(answer, folder):
 
 
 def said(answer):
-    """What is said besides the progress, which is lines of an indentation."""
+    """What is said after the progress."""
     assert answer.returncode == 2
     lines = [line for line in answer.stderr.splitlines() if "thermocomp" in line]
     assert len(lines) == 1, answer.stderr
