@@ -11,7 +11,6 @@ BIN = pathlib.Path(PROGRAM).parent
 MODULE = "thermocomp-gmsh.so"
 
 
-
 def reads_meshes():
     """Whether the build has thermocomp-modelling with `structure`."""
     program = BIN / "thermocomp-modelling"
@@ -19,7 +18,6 @@ def reads_meshes():
 
 
 pytestmark = pytest.mark.skipif(not reads_meshes(), reason="`structure` is not in this build")
-
 CUBE = pathlib.Path(__file__).parent / "cube"  # grows by 1.1 um/K
 
 
