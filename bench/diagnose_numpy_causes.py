@@ -1,87 +1,14 @@
 """The columns of every cause of `thermocomp diagnose`, batched: one call makes the columns of many
-subjects and shapes side by side. For one run of evenly spaced rows and one output.
-
-Recursions over time are cut into as many stretches as each has rows. All stretches advance together,
-and what one hands on to the next is added after: a low pass forgets by a factor, and play is a
-clipping, of which two in a row are one. So 1440 rows take 76 steps of numpy instead of 1440."""
+subjects and shapes side by side. For one run of evenly spaced rows and one output."""
 
 import dataclasses
-import math
-import pathlib
-import tomllib
 from typing import Callable
 
 import numpy as np
 
+from diagnose_numpy_data import low_pass, play, smoothed
+
 SPECIAL_CASE = 20.0  # what contains a simpler cause pays this
-
-
-def stretches(values):
-    """(rows, n) -> (m, m, n), the last row repeated to fill"""
-    m = math.isqrt(len(values) - 1) + 1
-    fill = np.broadcast_to(values[-1], (m * m - len(values), values.shape[1]))
-    return np.concatenate([values, fill]).reshape(m, m, -1)
-
-
-def low_pass(values, taus_s, step_s):
-    """values (rows, n), taus_s (n); 0 passes the values on"""
-    rows, first = len(values), values[0]
-    share = -np.expm1(-step_s / np.maximum(taus_s, 1e-300))
-    keep = 1.0 - share
-    out = stretches(values)
-    out *= share
-    for k in range(1, out.shape[1]):
-        out[:, k] += keep * out[:, k - 1]
-    fades = np.cumprod(np.broadcast_to(keep, (out.shape[1], len(share))), axis=0)
-    state = first
-    for stretch in out:
-        stretch += fades * state
-        state = stretch[-1]
-    return out.reshape(-1, len(share))[:rows]
-
-
-def play(values, widths):
-    """values (rows, n), widths (n)"""
-    rows, state = len(values), values[0]
-    low = stretches(values - 0.5 * widths)
-    high = stretches(values + 0.5 * widths)
-    for k in range(1, low.shape[1]):
-        bottom, top = low[:, k].copy(), high[:, k].copy()
-        np.clip(low[:, k - 1], bottom, top, out=low[:, k])
-        np.clip(high[:, k - 1], bottom, top, out=high[:, k])
-    for bottom, top in zip(low, high):
-        np.clip(state, bottom, top, out=bottom)
-        state = bottom[-1]
-    return low.reshape(-1, low.shape[2])[:rows]
-
-
-def smoothed(values, taus_s, step_s):
-    there = low_pass(values, taus_s, step_s)
-    return low_pass(there[::-1], taus_s, step_s)[::-1]
-
-
-class Data:
-    """The training run and the model of diagnose_data.py."""
-
-    def __init__(self, folder):
-        folder = pathlib.Path(folder)
-        with open(folder / "train.csv") as file:
-            names = file.readline().strip().split(",")
-            table = np.array([line.split(",") for line in file], dtype=float)
-        column = {name: table[:, i] for i, name in enumerate(names)}
-        model = tomllib.loads((folder / "model.toml").read_text())
-        self.time_s = column["time_s"]
-        self.step_s = float(np.median(np.diff(self.time_s)))
-        self.input_names = model["inputs"]
-        self.other_names = [n for n in names if n.endswith("_degC") and n not in self.input_names]
-        self.signal_names = [n for n in names if n.endswith(("_rpm", "_mm"))]
-        self.k = np.array(model["matrix_um_per_K"][0])
-        rises = lambda of: np.column_stack([column[n] - column[n][0] for n in of])
-        self.inputs, self.others = rises(self.input_names), rises(self.other_names)
-        self.signals = np.column_stack([column[n] for n in self.signal_names])
-        self.model = self.inputs @ self.k
-        self.measured = column["z_um"] - column["z_um"][0]
-        self.residual = self.measured - self.model
 
 
 @dataclasses.dataclass
@@ -96,14 +23,35 @@ class Cause:
     refined: str = ""         # "linear" or "logarithmic": how the shape is sought between points
     width: int = 1
     handicap: float = 0.0
+    scale: np.ndarray = None  # one a subject, whose columns are otherwise alike
     one_run: bool = False     # a fault of one run
     sensor: bool = False      # ... and of one reading, which is a witness
     possible: Callable = None  # (subject, gain) -> bool
+    number: int = 0            # its place among all
+
+    def unscaled(self, subject, shape, power):
+        """(rows, n, width)"""
+        made = self.make(subject, shape, power)
+        return made.reshape(len(made), -1, self.width)
+
+    def columns(self, subject, shape, power):
+        made = self.unscaled(subject, shape, power)
+        return made if self.scale is None else made * self.scale[subject, None]
+
+    def grid_of(self, subject):
+        return self.grid[subject] if self.grid.ndim == 2 else self.grid
 
     def points(self, subject):
         """(shape, power) of every grid point"""
-        grid = self.grid[subject] if self.grid.ndim == 2 else self.grid
-        return (np.repeat(grid, len(self.powers)), np.tile(self.powers, len(grid)))
+        grid = self.grid_of(subject)
+        return np.repeat(grid, len(self.powers)), np.tile(self.powers, len(grid))
+
+    def all_points(self):
+        """subject, shape and power of every grid point of all subjects"""
+        n, powers = len(self.subjects), len(self.powers)
+        grid = np.broadcast_to(self.grid, (n, self.grid.shape[-1]))
+        return (np.repeat(np.arange(n), grid.shape[1] * powers), np.repeat(grid.ravel(), powers),
+                np.tile(self.powers, grid.size))
 
 
 def pairs(*columns):
@@ -121,7 +69,8 @@ def geometric(low, high, count):
 
 def always_acting(d):
     dt, inputs, others = d.step_s, d.input_names, d.other_names
-    temps, k = np.hstack([d.inputs, d.others]), d.k
+    temps, inputs_K, k = d.calm_temps, d.calm_inputs, d.k
+    others_K = temps[:, len(inputs):]
     rpm = np.array([n.endswith("_rpm") for n in d.signal_names])
     speeds, rpm_names = d.signals[:, rpm], [n for n, is_rpm in zip(d.signal_names, rpm) if is_rpm]
     x = d.signals[:, ~rpm][:, :1]
@@ -129,38 +78,53 @@ def always_acting(d):
     span = np.ptp(d.inputs, axis=0)[:, None]
 
     def slow(i, s, _):
-        late = smoothed(d.inputs[:, i], 0.25 * s, dt)
+        late = smoothed(d.inputs.take(i, axis=1), 0.25 * s, dt)
         return k[i] * s * np.gradient(late, dt, axis=0)
 
-    yield Cause("wrong_coefficient", inputs, "own", lambda i, s, p: d.inputs[:, i])
-    yield Cause("thermal_lag", inputs, "own",
-                lambda i, s, p: low_pass(d.inputs[:, i], s, dt) - d.inputs[:, i],
+    def lag(i, s, _):
+        now = inputs_K.take(i, axis=1)
+        return low_pass(now, s, dt) - now
+
+    def loose_joint(i, s, _):
+        now = inputs_K.take(i, axis=1)
+        return k[i] * (play(now, s) - now)
+
+    def along(i, _, __):
+        now = temps.take(i, axis=1)
+        return pairs(x * now, now)
+
+    def swap(i, _, __):
+        a, b = first[i], second[i]
+        return (k[a] - k[b]) * (inputs_K.take(b, axis=1) - inputs_K.take(a, axis=1))
+
+    powers = pairs(speeds, speeds ** 2)
+    yield Cause("wrong_coefficient", inputs, "own", lambda i, s, p: inputs_K.take(i, axis=1))
+    yield Cause("thermal_lag", inputs, "own", lag,
                 geometric(max(60.0, 0.5 * dt), 14400.0, 20), refined="logarithmic",
                 possible=lambda i, gain: (gain / k[i] > 0) & (gain / k[i] <= 1.1))
-    yield Cause("nonlinear_expansion", inputs + others, "own", lambda i, s, p: temps[:, i] ** 2)
-    yield Cause("position_dependence", [n + "|x_mm" for n in inputs + others], "own",
-                lambda i, s, p: pairs(x * temps[:, i], temps[:, i]), width=2, handicap=SPECIAL_CASE)
+    yield Cause("nonlinear_expansion", inputs + others, "own",
+                lambda i, s, p: temps.take(i, axis=1) ** 2)
+    yield Cause("position_dependence", [n + "|x_mm" for n in inputs + others], "own", along,
+                width=2, handicap=SPECIAL_CASE)
     yield Cause("slow_sensor", inputs, "none", slow, geometric(max(20.0, 0.5 * dt), 3600.0, 16),
                 refined="logarithmic")
-    yield Cause("hysteresis", inputs, "none",
-                lambda i, s, p: k[i] * (play(d.inputs[:, i], s) - d.inputs[:, i]),
+    yield Cause("hysteresis", inputs, "none", loose_joint,
                 linear(0.04 * span, 0.8 * span, 16), refined="linear")
     yield Cause("sensor_swap", [inputs[a] + "|" + inputs[b] for a, b in zip(first, second)], "none",
-                lambda i, s, p: (k[first[i]] - k[second[i]]) *
-                (d.inputs[:, second[i]] - d.inputs[:, first[i]]))
+                swap)
     yield Cause("missing_temperature", others, "own",
-                lambda i, s, p: low_pass(d.others[:, i], s, dt),
+                lambda i, s, p: low_pass(others_K.take(i, axis=1), s, dt),
                 np.r_[0.0, geometric(60.0, 21600.0, 20)], refined="logarithmic")
     yield Cause("missing_heat_source", rpm_names, "own",
-                lambda i, s, p: low_pass(speeds[:, i] ** p, s, dt), geometric(120.0, 21600.0, 22),
-                powers=(1.0, 2.0), refined="logarithmic")
+                lambda i, s, p: low_pass(powers.take(2 * i + (p > 1.5), axis=1), s, dt),
+                geometric(120.0, 21600.0, 22), powers=(1.0, 2.0), refined="logarithmic")
     yield Cause("speed_growth", rpm_names, "own", lambda i, s, p: speeds[:, i] ** 2)
 
 
 def of_the_output(d):
     dt = d.step_s
-    model = d.model[:, None]
-    smooth = smoothed(model, np.array([2.0 * dt]), dt)[:, 0]
+    model = d.calm_model
+    smooth = smoothed(d.model[:, None], np.array([2.0 * dt]), dt)[:, 0]
     late = geometric(max(5.0, 0.2 * dt), 3600.0, 14)
     length_s = d.time_s[-1] - d.time_s[0]
     periods, frequency = [], 5.0 / length_s
@@ -176,7 +140,7 @@ def of_the_output(d):
         return pairs(np.sin(turns), np.cos(turns))
 
     yield Cause("hysteresis", ["z_um"], "none",
-                lambda i, s, p: play(model[:, 0 * i], s) - model, np.ptp(d.model) *
+                lambda i, s, p: play(model.repeat(len(s), axis=1), s) - model, np.ptp(d.model) *
                 linear(0.03, 0.7, 20), refined="linear")
     yield Cause("time_shift", ["z_um"], "none", shifted, np.r_[-late[::-1], late], refined="linear")
     yield Cause("periodic_disturbance", ["z_um"], "own", wave, np.array(periods),
@@ -193,17 +157,21 @@ def faults(d):
                 onsets(0.02, 0.98, 64), refined="linear", one_run=True)
     yield Cause("displacement_drift", ["z_um"], "own",
                 lambda i, s, p: (time_s - begin_s + 0.0 * s) / 3600.0, one_run=True)
-    yield Cause("sensor_step", d.input_names, make=lambda i, s, p: -d.k[i] * (time_s >= s),
-                grid=onsets(0.02, 0.95, 64), **sensor)
+    yield Cause("sensor_step", d.input_names, make=lambda i, s, p: 1.0 * (time_s >= s),
+                grid=onsets(0.02, 0.95, 64), scale=-d.k, **sensor)
     yield Cause("sensor_drift", d.input_names,
-                make=lambda i, s, p: -d.k[i] * np.maximum((time_s - s) / 3600.0, 0.0),
-                grid=onsets(0.0, 0.95, 24), **sensor)
+                make=lambda i, s, p: np.maximum((time_s - s) / 3600.0, 0.0),
+                grid=onsets(0.0, 0.95, 24), scale=-d.k, **sensor)
     # No reading is named a room's: a loose sensor falls back to where it began.
+    lost = d.k * d.inputs
     yield Cause("sensor_loose", d.input_names,
-                make=lambda i, s, p: d.k[i] * d.inputs[:, i] * (time_s >= s),
+                make=lambda i, s, p: lost.take(i, axis=1) * (time_s >= s),
                 grid=onsets(0.03, 0.95, 48), **sensor,
                 possible=lambda i, lost: (lost > 0.02) & (lost < 20.0))
 
 
 def all_causes(d):
-    return [*always_acting(d), *of_the_output(d), *faults(d)]
+    causes = [*always_acting(d), *of_the_output(d), *faults(d)]
+    for number, cause in enumerate(causes):
+        cause.number = number
+    return causes
