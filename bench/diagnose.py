@@ -25,6 +25,15 @@ def cpu_s(command, folder):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
 
 
+def blas():
+    """The library that multiplies numpy's matrices: Debian has several behind one name."""
+    code = ("import numpy; print(*{line.split()[-1] for line in open('/proc/self/maps') "
+            "if 'blas' in line})")
+    done = subprocess.run(["/usr/bin/python3", "-c", code], capture_output=True, text=True,
+                          check=True)
+    return " ".join(sorted(pathlib.Path(path).name for path in done.stdout.split()))
+
+
 def difference(ours, numpy):
     """Largest difference of anything weighed (2 ln L, shares of left-out rows), of the findings'
     parameters and of the test rows, relative to 1 or to their size; infinite when other hypotheses
@@ -52,6 +61,7 @@ def difference(ours, numpy):
 
 
 def main(program):
+    print(f"numpy multiplies with {blas()}", file=sys.stderr)
     with tempfile.TemporaryDirectory() as folder:
         diagnose_data.write(folder)
         answer = pathlib.Path(folder) / "answer.json"
