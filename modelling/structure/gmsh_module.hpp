@@ -1,5 +1,5 @@
 /// What thermocomp-gmsh.so offers to the program that loads it. Only that module is linked with
-/// Gmsh: its ninety libraries cost more than all else at a start, and few commands read a mesh.
+/// Gmsh: its eighty libraries cost more than all else at a start, and few commands read a mesh.
 /// Program and module come from one build; what is thrown on one side is caught on the other.
 #pragma once
 
