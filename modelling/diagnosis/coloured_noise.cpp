@@ -5,11 +5,50 @@
 #include <cmath>
 
 namespace thermocomp::diagnosis {
+namespace {
+
+/// Neighbouring columns, whose recursions run side by side.
+template <std::size_t lanes>
+[[gnu::always_inline]] inline void whiten_lanes(const Eigen::VectorXd& keep,
+                                                const Eigen::VectorXd& gain,
+                                                const Eigen::VectorXd& scale, Eigen::Index columns,
+                                                const double* from, double* to) {
+  std::array<double, lanes> state{};
+  for (Eigen::Index row = 0; row < keep.size(); ++row, from += columns, to += columns) {
+    const double keep_now = keep[row];
+    const double gain_now = gain[row];
+    const double scale_now = scale[row];
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const double predicted = state[lane] * keep_now;
+      const double innovation = from[lane] - predicted;
+      to[lane] = innovation * scale_now;
+      state[lane] = predicted + gain_now * innovation;
+    }
+  }
+}
+
+THERMOCOMP_VECTORISED void whiten(const Eigen::VectorXd& keep, const Eigen::VectorXd& gain,
+                                  const Eigen::VectorXd& scale, Eigen::Index columns,
+                                  const double* from, double* to) {
+  Eigen::Index at = 0;
+  for (; at + 16 <= columns; at += 16)
+    whiten_lanes<16>(keep, gain, scale, columns, from + at, to + at);
+  for (; at + 8 <= columns; at += 8)
+    whiten_lanes<8>(keep, gain, scale, columns, from + at, to + at);
+  for (; at + 4 <= columns; at += 4)
+    whiten_lanes<4>(keep, gain, scale, columns, from + at, to + at);
+  for (; at + 2 <= columns; at += 2)
+    whiten_lanes<2>(keep, gain, scale, columns, from + at, to + at);
+  for (; at < columns; ++at) whiten_lanes<1>(keep, gain, scale, columns, from + at, to + at);
+}
+
+}  // namespace
 
 Whitener::Whitener(const NoiseShape& shape, const Eigen::VectorXd& time_s,
                    const std::vector<Block>& blocks,
                    const Eigen::Array<bool, Eigen::Dynamic, 1>& present)
-    : keep_(Eigen::VectorXd::Zero(time_s.size())),
+    : wanders_(shape.ratio > 0),
+      keep_(Eigen::VectorXd::Zero(time_s.size())),
       gain_(Eigen::VectorXd::Zero(time_s.size())),
       scale_(Eigen::VectorXd::Zero(time_s.size())) {
   for (const Block& block : blocks) {
@@ -29,48 +68,18 @@ Whitener::Whitener(const NoiseShape& shape, const Eigen::VectorXd& time_s,
   }
 }
 
-Eigen::VectorXd Whitener::apply(const Eigen::Ref<const Eigen::VectorXd>& column) const {
+Eigen::VectorXd Whitener::apply(const Eigen::VectorXd& column) const {
   Eigen::VectorXd white(column.size());
-  double state = 0.0;
-  for (Eigen::Index row = 0; row < column.size(); ++row) {
-    state *= keep_[row];
-    const double innovation = column[row] - state;
-    white[row] = innovation * scale_[row];
-    state += gain_[row] * innovation;
-  }
+  whiten(keep_, gain_, scale_, 1, column.data(), white.data());
   return white;
 }
 
-Eigen::MatrixXd Whitener::apply_all(const Eigen::Ref<const Eigen::MatrixXd>& columns) const {
-  constexpr Eigen::Index lanes = 8;
-  using Lanes = Eigen::Array<double, lanes, 1>;
-  Eigen::MatrixXd white(columns.rows(), columns.cols());
-  if (gain_.isZero(0.0)) {  // no wandering part
+Panel Whitener::apply(const Panel& columns) const {
+  Panel white(columns.rows(), columns.cols());
+  if (wanders_)
+    whiten(keep_, gain_, scale_, columns.cols(), columns.data(), white.data());
+  else
     white = scale_.asDiagonal() * columns;
-    return white;
-  }
-  for (Eigen::Index first = 0; first < columns.cols(); first += lanes) {
-    const Eigen::Index count = std::min(lanes, columns.cols() - first);
-    std::array<const double*, lanes> from{};
-    std::array<double*, lanes> to{};
-    for (Eigen::Index lane = 0; lane < count; ++lane) {
-      from[static_cast<std::size_t>(lane)] =
-          columns.data() + (first + lane) * columns.outerStride();
-      to[static_cast<std::size_t>(lane)] = white.data() + (first + lane) * white.outerStride();
-    }
-    Lanes state = Lanes::Zero();
-    Lanes value = Lanes::Zero();
-    for (Eigen::Index row = 0; row < columns.rows(); ++row) {
-      for (Eigen::Index lane = 0; lane < count; ++lane)
-        value[lane] = from[static_cast<std::size_t>(lane)][row];
-      state *= keep_[row];
-      const Lanes innovation = value - state;
-      const Lanes scaled = innovation * scale_[row];
-      state += gain_[row] * innovation;
-      for (Eigen::Index lane = 0; lane < count; ++lane)
-        to[static_cast<std::size_t>(lane)][row] = scaled[lane];
-    }
-  }
   return white;
 }
 

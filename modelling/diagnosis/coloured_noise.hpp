@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "modelling/diagnosis/panel.hpp"
+
 namespace thermocomp::diagnosis {
 
 /// Covariance of two rows: sigma^2 (1[i = j] + ratio exp(-|t_i - t_j| / tau_s)).
@@ -29,13 +31,14 @@ class Whitener {
   Whitener(const NoiseShape& shape, const Eigen::VectorXd& time_s, const std::vector<Block>& blocks,
            const Eigen::Array<bool, Eigen::Dynamic, 1>& present);
 
-  [[nodiscard]] Eigen::VectorXd apply(const Eigen::Ref<const Eigen::VectorXd>& column) const;
-  /// The same for every column at once: the recursions of several columns run side by side.
-  [[nodiscard]] Eigen::MatrixXd apply_all(const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
+  [[nodiscard]] Eigen::VectorXd apply(const Eigen::VectorXd& column) const;
+  /// The same for every column at once.
+  [[nodiscard]] Panel apply(const Panel& columns) const;
   /// Logarithm of the determinant of the covariance, sigma = 1.
   [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
 
  private:
+  bool wanders_;
   Eigen::VectorXd keep_;   ///< factor of the state from the row before; 0 at a block's start
   Eigen::VectorXd gain_;   ///< 0 in rows without a value
   Eigen::VectorXd scale_;  ///< 1 / spread of the innovation; 0 in rows without a value

@@ -78,39 +78,82 @@ Eigen::MatrixXd coefficient_columns_of(const MeasuredData& data, const StackedRo
 Setting::Setting(const NoiseShape& shape, const StackedRows& rows,
                  const Eigen::Array<bool, Eigen::Dynamic, 1>& present, const Column& residual,
                  const Eigen::MatrixXd& common, const Eigen::VectorXd& precision)
-    : whitener_(shape, rows.time_s, rows.blocks, present),
-      common_(common.rows(), common.cols()),
-      residual_(whitener_.apply(residual)),
+    : whitener_(std::make_shared<const Whitener>(shape, rows.time_s, rows.blocks, present)),
       precision_(precision),
       present_rows_(static_cast<double>(present.count())) {
-  common_ = whitener_.apply_all(common);
-  Eigen::MatrixXd square = common_.transpose() * common_;
-  square.diagonal() += precision;
+  Panel columns(common.rows(), 1 + common.cols());
+  columns << residual, common;
+  against_ = whitener_->apply(columns);
+  reckon();
+}
+
+Setting::Setting(const Setting& other, const Eigen::MatrixXd& more, double precision)
+    : whitener_(other.whitener_),
+      against_(other.against_.rows(), other.against_.cols() + more.cols()),
+      precision_(other.precision_.size() + more.cols()),
+      present_rows_(other.present_rows_) {
+  against_ << other.against_, whitener_->apply(Panel(more));
+  precision_ << other.precision_, Eigen::VectorXd::Constant(more.cols(), precision);
+  reckon();
+}
+
+void Setting::reckon() {
+  const Eigen::Index common = precision_.size();
+  const Eigen::MatrixXd all = cross_products(against_, against_, 0, against_.rows());
+  Eigen::MatrixXd square = all.bottomRightCorner(common, common);
+  square.diagonal() += precision_;
   factor_.compute(square);
-  common_residual_ = factor_.matrixL().solve(common_.transpose() * residual_);
-  squares_ = residual_.squaredNorm() - common_residual_.squaredNorm();
-  log_determinant_ = whitener_.log_determinant() - precision.array().log().sum() +
+  common_residual_ = factor_.matrixL().solve(all.col(0).tail(common));
+  squares_ = all(0, 0) - common_residual_.squaredNorm();
+  log_determinant_ = whitener_->log_determinant() - precision_.array().log().sum() +
                      2.0 * factor_.matrixLLT().diagonal().array().log().sum();
 }
 
 Setting::Equations Setting::equations(const Eigen::MatrixXd& columns) const {
-  return equations_of_groups(columns, columns.cols()).front();
+  return equations_of_groups({this}, columns, columns.cols()).front().front();
 }
 
-std::vector<Setting::Equations> Setting::equations_of_groups(const Eigen::MatrixXd& columns,
-                                                             Eigen::Index width) const {
-  const Eigen::MatrixXd white = whitener_.apply_all(columns);
-  const Eigen::MatrixXd shared = factor_.matrixL().solve(common_.transpose() * white);
-  const Eigen::VectorXd right =
-      white.transpose() * residual_ - shared.transpose() * common_residual_;
-  std::vector<Equations> groups;
-  for (Eigen::Index first = 0; first < columns.cols(); first += width) {
-    const auto own = white.middleCols(first, width);
-    const auto common = shared.middleCols(first, width);
-    groups.push_back(
-        {own.transpose() * own - common.transpose() * common, right.segment(first, width)});
+Eigen::VectorXd Setting::Equations::gains() const {
+  if (right.size() != 1) return square.ldlt().solve(right);
+  return Eigen::VectorXd::Constant(1, square(0, 0) > 0 ? right[0] / square(0, 0) : 0.0);
+}
+
+std::vector<std::vector<Setting::Equations>> Setting::equations_of_groups(
+    const std::vector<const Setting*>& settings, const Panel& columns, Eigen::Index width) {
+  std::vector<std::vector<Equations>> all(settings.size());
+  for (std::size_t first = 0; first < settings.size(); ++first) {
+    if (!all[first].empty()) continue;
+    std::vector<std::size_t> alike;
+    for (std::size_t i = first; i < settings.size(); ++i)
+      if (settings[i]->whitener_ == settings[first]->whitener_) alike.push_back(i);
+    const auto most =
+        std::max_element(alike.begin(), alike.end(), [&](std::size_t a, std::size_t b) {
+          return settings[a]->against_.cols() < settings[b]->against_.cols();
+        });
+    const Panel white = settings[first]->whitener_->apply(columns);
+    const Eigen::MatrixXd products =
+        cross_products(settings[*most]->against_, white, 0, white.rows());
+    const Eigen::MatrixXd own = neighbour_products(white, width, 0, white.rows());
+    for (const std::size_t i : alike) all[i] = settings[i]->without_common(products, own);
   }
-  return groups;
+  return all;
+}
+
+std::vector<Setting::Equations> Setting::without_common(const Eigen::MatrixXd& products,
+                                                        const Eigen::MatrixXd& own) const {
+  const Eigen::Index width = own.rows();
+  const Eigen::MatrixXd shared = factor_.matrixL().solve(products.middleRows(1, precision_.size()));
+  const Eigen::VectorXd right = products.row(0).transpose() - shared.transpose() * common_residual_;
+  std::vector<Equations> all;
+  for (Eigen::Index first = 0; first < own.cols(); first += width) {
+    const auto beside = shared.middleCols(first, width);
+    Eigen::MatrixXd square(width, width);
+    for (Eigen::Index i = 0; i < width; ++i)
+      for (Eigen::Index j = i; j < width; ++j)
+        square(i, j) = square(j, i) = own(j - i, first + i) - beside.col(i).dot(beside.col(j));
+    all.push_back({std::move(square), right.segment(first, width)});
+  }
+  return all;
 }
 
 double Setting::twice_log_likelihood(double squares) const {
@@ -191,53 +234,63 @@ void OutputEvidence::accept(const std::vector<Explanation>& found) {
     at += columns.cols();
   }
   add_settings();
+  doubted_ = {};
+  if (coefficients_doubted_) add_doubted_settings();
+}
+
+void OutputEvidence::doubt_coefficients(bool doubted) {
+  coefficients_doubted_ = doubted;
+  if (doubted && doubted_.settings.empty()) add_doubted_settings();
+}
+
+void OutputEvidence::Stance::find_likeliest() {
   const auto likelihood = [](const auto& setting) {
     return setting->twice_log_likelihood(setting->squares());
   };
-  setting_ =
-      std::max_element(settings_.begin(), settings_.end(), [&](const auto& a, const auto& b) {
-        return likelihood(a) < likelihood(b);
-      })->get();
+  likeliest = std::max_element(settings.begin(), settings.end(), [&](const auto& a, const auto& b) {
+                return likelihood(a) < likelihood(b);
+              })->get();
 }
 
 void OutputEvidence::add_settings() {
-  const Eigen::MatrixXd& coefficients = coefficient_columns();
-  Eigen::MatrixXd common(rows_.time_s.size(),
-                         offsets_.cols() + coefficients.cols() + free_columns_.cols());
-  common.leftCols(offsets_.cols()) = offsets_;
-  common.middleCols(offsets_.cols(), coefficients.cols()) = coefficients;
-  common.rightCols(free_columns_.cols()) = free_columns_;
+  Eigen::MatrixXd common(rows_.time_s.size(), offsets_.cols() + free_columns_.cols());
+  common << offsets_, free_columns_;
   for (Eigen::Index row = 0; row < common.rows(); ++row)
     if (!present_[row]) common.row(row).setZero();
   const double variance = noise_um_ * noise_um_;
   Eigen::VectorXd precision =
       Eigen::VectorXd::Constant(common.cols(), variance / (accepted_sd_um * accepted_sd_um));
   precision.head(offsets_.cols()).setConstant(variance / (offset_sd_um * offset_sd_um));
-  settings_.clear();
-  for (const NoiseShape& shape : noise_shapes(centred_rms(residual_), noise_um_)) {
+  right_ = {};
+  for (const NoiseShape& shape : noise_shapes(centred_rms(residual_), noise_um_))
+    right_.settings.push_back(
+        std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision));
+  right_.find_likeliest();
+}
+
+void OutputEvidence::add_doubted_settings() {
+  for (const auto& right : right_.settings) {
     // The likelihood knows noise and prior by a common factor only, which the prior must not have:
     // large noise would make large errors likely. The factor is that of the same noise when the
     // coefficients are right.
-    precision.segment(offsets_.cols(), coefficients.cols()).setConstant(1e12);
-    auto right = std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision);
-    if (coefficients.cols() == 0) {
-      settings_.push_back(std::move(right));
-      continue;
-    }
-    precision.segment(offsets_.cols(), coefficients.cols())
-        .setConstant(right->squares() / right->present_rows());
-    settings_.push_back(
-        std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision));
+    doubted_.settings.push_back(std::make_unique<Setting>(
+        *right, coefficient_columns_, right->squares() / right->present_rows()));
   }
+  doubted_.find_likeliest();
 }
 
-Eigen::MatrixXd columns_of(const Hypothesis& hypothesis, const std::vector<double>& shape,
-                           const OutputEvidence& evidence) {
-  Eigen::MatrixXd columns = hypothesis.columns(shape, evidence.output());
+Panel columns_of(const Hypothesis& hypothesis, const Shapes& shapes,
+                 const OutputEvidence& evidence) {
+  Panel columns = hypothesis.columns(shapes, evidence.output());
   if (evidence.complete()) return columns;
   for (Eigen::Index row = 0; row < columns.rows(); ++row)
     if (!evidence.present()[row]) columns.row(row).setZero();
   return columns;
+}
+
+Eigen::MatrixXd columns_of(const Hypothesis& hypothesis, const Shape& shape,
+                           const OutputEvidence& evidence) {
+  return columns_of(hypothesis, Shapes{shape}, evidence);
 }
 
 }  // namespace thermocomp::diagnosis

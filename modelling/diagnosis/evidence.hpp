@@ -18,7 +18,7 @@ class Setting;
 /// A hypothesis with its shape and gains settled.
 struct Explanation {
   const Hypothesis* hypothesis{nullptr};
-  std::vector<double> shape;
+  Shape shape;
   std::vector<Eigen::VectorXd> gains;    ///< one an output; empty: the output has no share
   double score{0.0};                     ///< gain of 2 ln L, the price of its parameters taken off
   std::vector<const Setting*> settings;  ///< one an output: under which it is likeliest
@@ -37,30 +37,39 @@ class Setting {
   Setting(const NoiseShape& shape, const StackedRows& rows,
           const Eigen::Array<bool, Eigen::Dynamic, 1>& present, const Column& residual,
           const Eigen::MatrixXd& common, const Eigen::VectorXd& precision);
+  /// The other one with more common columns.
+  /// @param precision  of each of them
+  Setting(const Setting& other, const Eigen::MatrixXd& more, double precision);
 
   /// Normal equations of columns, the common ones taken out. S is the sum of squares without them.
   struct Equations {
     Eigen::MatrixXd square;
     Eigen::VectorXd right;
+    [[nodiscard]] Eigen::VectorXd gains() const;
   };
   [[nodiscard]] Equations equations(const Eigen::MatrixXd& columns) const;
-  /// The same for several groups of `width` columns each, side by side in `columns`.
-  [[nodiscard]] std::vector<Equations> equations_of_groups(const Eigen::MatrixXd& columns,
-                                                           Eigen::Index width) const;
+  /// The same for several groups of `width` columns each, side by side, under each of the settings.
+  [[nodiscard]] static std::vector<std::vector<Equations>> equations_of_groups(
+      const std::vector<const Setting*>& settings, const Panel& columns, Eigen::Index width);
   [[nodiscard]] double squares() const noexcept { return squares_; }
   [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
   [[nodiscard]] double present_rows() const noexcept { return present_rows_; }
   /// 2 ln L for a sum of squares, constants left out.
   [[nodiscard]] double twice_log_likelihood(double squares) const;
-  [[nodiscard]] const Whitener& whitener() const noexcept { return whitener_; }
-  [[nodiscard]] const Eigen::MatrixXd& common() const noexcept { return common_; }
-  [[nodiscard]] const Column& residual() const noexcept { return residual_; }
+  [[nodiscard]] const Whitener& whitener() const noexcept { return *whitener_; }
+  /// The residual and the common columns, whitened, shape (rows, 1 + m).
+  [[nodiscard]] const Panel& against() const noexcept { return against_; }
   [[nodiscard]] const Eigen::VectorXd& precision() const noexcept { return precision_; }
 
  private:
-  Whitener whitener_;
-  Eigen::MatrixXd common_;  ///< whitened
-  Column residual_;         ///< whitened
+  void reckon();
+  /// @param products  against' columns; more of them count for settings of more common columns
+  /// @param own  neighbour_products of the columns
+  [[nodiscard]] std::vector<Equations> without_common(const Eigen::MatrixXd& products,
+                                                      const Eigen::MatrixXd& own) const;
+
+  std::shared_ptr<const Whitener> whitener_;  ///< shared by settings that begin alike
+  Panel against_;
   Eigen::VectorXd precision_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Eigen::VectorXd common_residual_;  ///< factor^-1 common' residual
@@ -77,22 +86,25 @@ class OutputEvidence {
   /// Takes the explanations as found: their columns become free, or are subtracted.
   void accept(const std::vector<Explanation>& found);
   /// The noise under which the residual is likeliest.
-  [[nodiscard]] const Setting& setting() const { return *setting_; }
-  /// The settings among which settle() chooses.
-  [[nodiscard]] const std::vector<std::unique_ptr<Setting>>& settings() const { return settings_; }
+  [[nodiscard]] const Setting& setting() const { return *stance().likeliest; }
+  /// The settings among which settle() chooses: white noise first.
+  [[nodiscard]] const std::vector<std::unique_ptr<Setting>>& settings() const {
+    return stance().settings;
+  }
   [[nodiscard]] const Column& residual() const noexcept { return residual_; }
   [[nodiscard]] const Eigen::Array<bool, Eigen::Dynamic, 1>& present() const { return present_; }
   /// Whether no row's value is missing.
   [[nodiscard]] bool complete() const { return present_.all(); }
   /// RMS of values over the stacked rows where the output has one, each run's mean taken off.
   [[nodiscard]] double centred_rms(const Column& values) const;
-  /// Columns of the accepted explanations that are fitted anew each time, shape (rows, m); they are
-  /// the last ones of every setting's common columns.
+  /// Columns of the accepted explanations that are fitted anew each time, shape (rows, m): common
+  /// columns of every setting after the runs' offsets.
   [[nodiscard]] const Eigen::MatrixXd& free_columns() const noexcept { return free_columns_; }
-  /// Whether the model's coefficients may all be a little wrong. Counts from the next accept() on.
-  void doubt_coefficients(bool doubted) { coefficients_doubted_ = doubted; }
-  /// What wrong coefficients add, shape (rows, m): common columns before the free ones. None when
-  /// they are not doubted.
+  /// Whether the model's coefficients may all be a little wrong. The settings of both stances stay
+  /// until something is accepted.
+  void doubt_coefficients(bool doubted);
+  /// What wrong coefficients add, shape (rows, m): the last common columns. None when they are not
+  /// doubted.
   [[nodiscard]] const Eigen::MatrixXd& coefficient_columns() const noexcept {
     return coefficients_doubted_ ? coefficient_columns_ : no_columns_;
   }
@@ -104,8 +116,16 @@ class OutputEvidence {
   [[nodiscard]] std::size_t output() const noexcept { return output_; }
 
  private:
-  /// One setting for each shape of noise.
+  struct Stance {
+    std::vector<std::unique_ptr<Setting>> settings;  ///< one for each shape of noise
+    const Setting* likeliest{nullptr};
+    void find_likeliest();
+  };
+
+  [[nodiscard]] const Stance& stance() const { return coefficients_doubted_ ? doubted_ : right_; }
   void add_settings();
+  /// Those of the coefficients taken as right, with errors of the coefficients beside.
+  void add_doubted_settings();
 
   const StackedRows& rows_;
   std::size_t output_;
@@ -118,13 +138,16 @@ class OutputEvidence {
   Eigen::MatrixXd no_columns_;
   bool coefficients_doubted_{false};
   double noise_um_{0.0};  ///< of a single value, from the residual's second differences
-  std::vector<std::unique_ptr<Setting>> settings_;
-  const Setting* setting_{nullptr};
+  Stance right_;
+  Stance doubted_;  ///< empty until it is asked for
 };
 
-/// The columns over the stacked rows, 0 where the output has no value.
-[[nodiscard]] Eigen::MatrixXd columns_of(const Hypothesis& hypothesis,
-                                         const std::vector<double>& shape,
+/// The columns over the stacked rows, 0 where the output has no value: those of one shape after
+/// those of another.
+[[nodiscard]] Panel columns_of(const Hypothesis& hypothesis, const Shapes& shapes,
+                               const OutputEvidence& evidence);
+/// Of one shape.
+[[nodiscard]] Eigen::MatrixXd columns_of(const Hypothesis& hypothesis, const Shape& shape,
                                          const OutputEvidence& evidence);
 
 }  // namespace thermocomp::diagnosis

@@ -2,19 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <numeric>
 
 #include "config/units.hpp"
-#include "estimator/low_pass.hpp"
-#include "estimator/play.hpp"
 #include "modelling/diagnosis/series.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
-
-using Shape = std::vector<double>;
 
 constexpr std::size_t blocks_wanted = 8;
 constexpr double block_rows_min = 12;
@@ -83,6 +78,22 @@ class Catalogue {
     return out;
   }
 
+  /// A column for each shape.
+  /// @param make  Panel(const MeasuredRun&, const std::vector<double>& first parameter of each
+  /// shape)
+  template <class Make>
+  Panel stacked(const Shapes& shapes, Make make) const {
+    std::vector<double> firsts;
+    for (const Shape& shape : shapes) firsts.push_back(shape[0]);
+    Panel out(rows_.time_s.size(), std::ssize(shapes));
+    for (std::size_t i = 0; i < data_.runs.size(); ++i) {
+      const Block& block = rows_.runs[i];
+      out.middleRows(block.begin, block.end - block.begin) =
+          make(data_.runs[i], firsts).bottomRows(block.end - block.begin);
+    }
+    return out;
+  }
+
   /// Zero outside of one run.
   template <class Make>
   Column in_run(std::size_t run, Make make) const {
@@ -90,6 +101,22 @@ class Catalogue {
     const Block& block = rows_.runs[run];
     out.segment(block.begin, block.end - block.begin) =
         make(data_.runs[run]).segment(data_.runs[run].begin, block.end - block.begin);
+    return out;
+  }
+
+  /// For each shape what `make` gives from its first parameter on, a time of this run; else zero.
+  template <class Make>
+  Panel since(std::size_t run, const Shapes& shapes, Make make) const {
+    const Block& block = rows_.runs[run];
+    const Column whole = make(data_.runs[run]);
+    Panel out = Panel::Zero(rows_.time_s.size(), std::ssize(shapes));
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const double* const time_s = rows_.time_s.data();
+      const Eigen::Index first =
+          std::lower_bound(time_s + block.begin, time_s + block.end, shapes[i][0]) - time_s;
+      out.col(static_cast<Eigen::Index>(i)).segment(first, block.end - first) =
+          whole.tail(block.end - first);
+    }
     return out;
   }
 
@@ -111,11 +138,10 @@ class Catalogue {
     return found_.back();
   }
 
-  Column coefficient_times(std::size_t input, std::size_t output,
-                           const std::function<Column(const MeasuredRun&)>& rise_K) const {
-    return stacked([&](const MeasuredRun& run) -> Column {
-      return data_.coefficient(run, output, input).cwiseProduct(rise_K(run));
-    });
+  Panel times_coefficient(const MeasuredRun& run, std::size_t output, std::size_t input,
+                          Panel columns_K) const {
+    columns_K.array().colwise() *= data_.coefficient(run, output, input).array();
+    return columns_K;
   }
 
   void add_input(std::size_t input);
@@ -149,15 +175,13 @@ void Catalogue::add_input(std::size_t input) {
     return run.calm_inputs_K[input];
   };
   if (!moves_anywhere(rise_K)) return;
-  const auto whole = [this, rise_K](const Shape&, std::size_t) -> Eigen::MatrixXd {
-    return stacked(rise_K);
-  };
-  add({"wrong_coefficient", name, Form::own_gains, {}, {"delta_um_per_K"}}).columns = whole;
+  add({"wrong_coefficient", name, Form::own_gains, {}, {"delta_um_per_K"}}).columns =
+      one_by_one([this, rise_K](const Shape&, std::size_t) { return stacked(rise_K); });
   Hypothesis& lag = add(
       {"thermal_lag", name, Form::own_gains, {lag_times(60.0, 4 * 3600.0, 20)}, {"gain_um_per_K"}});
-  lag.columns = [this, rise_K](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
-    return stacked([&](const MeasuredRun& run) -> Column {
-      return through(LowPass(shape[0]), run.time_s, rise_K(run)) - rise_K(run);
+  lag.columns = [this, rise_K](const Shapes& shapes, std::size_t) {
+    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) -> Panel {
+      return lagged(run.time_s, rise_K(run), taus_s).colwise() - rise_K(run);
     });
   };
   if (data_.model.guideways.empty()) {
@@ -176,9 +200,13 @@ void Catalogue::add_reading_errors(std::size_t input) {
   const std::string& name = data_.model.inputs[input];
   Hypothesis& slow = add({"slow_sensor", name, Form::no_gain, {lag_times(20.0, 3600.0, 16)}});
   slow.in_every_output = true;
-  slow.columns = [this, input](const Shape& shape, std::size_t output) -> Eigen::MatrixXd {
-    return coefficient_times(input, output, [&](const MeasuredRun& run) -> Column {
-      return shape[0] * slope_per_s(run.time_s, run.inputs_K[input], slope_smoothing * shape[0]);
+  slow.columns = [this, input](const Shapes& shapes, std::size_t output) {
+    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
+      std::vector<double> spans_s;
+      for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
+      Panel ahead_K = slopes_per_s(run.time_s, run.inputs_K[input], spans_s);
+      ahead_K *= Eigen::Map<const Eigen::VectorXd>(taus_s.data(), ahead_K.cols()).asDiagonal();
+      return times_coefficient(run, output, input, std::move(ahead_K));
     });
   };
   double range_K = 0.0;
@@ -191,10 +219,10 @@ void Catalogue::add_reading_errors(std::size_t input) {
                           Form::no_gain,
                           {{"width_K", linear_grid(0.04 * range_K, 0.8 * range_K, 16)}}});
   play.in_every_output = true;
-  play.columns = [this, input](const Shape& shape, std::size_t output) -> Eigen::MatrixXd {
-    return coefficient_times(input, output, [&](const MeasuredRun& run) -> Column {
+  play.columns = [this, input](const Shapes& shapes, std::size_t output) {
+    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& widths_K) {
       const Column& rise_K = run.calm_inputs_K[input];
-      return through(Play(shape[0]), run.time_s, rise_K) - rise_K;
+      return times_coefficient(run, output, input, played(rise_K, widths_K).colwise() - rise_K);
     });
   };
 }
@@ -205,22 +233,23 @@ void Catalogue::add_swaps(std::size_t input) {
     if (!(names[input] < names[other])) continue;
     Hypothesis& swap = add({"sensor_swap", names[input] + "|" + names[other], Form::no_gain});
     swap.in_every_output = true;
-    swap.columns = [this, input, other](const Shape&, std::size_t output) -> Eigen::MatrixXd {
+    swap.columns = one_by_one([this, input, other](const Shape&, std::size_t output) {
       return stacked([&](const MeasuredRun& run) -> Column {
         const Column weight =
             data_.coefficient(run, output, input) - data_.coefficient(run, output, other);
         return weight.cwiseProduct(run.calm_inputs_K[other] - run.calm_inputs_K[input]);
       });
-    };
+    });
   }
 }
 
 void Catalogue::add_square(const std::string& name,
                            const std::function<const Column&(const MeasuredRun&)>& rise_K) {
   add({"nonlinear_expansion", name, Form::own_gains, {}, {"gain_um_per_K2"}}).columns =
-      [this, rise_K](const Shape&, std::size_t) -> Eigen::MatrixXd {
-    return stacked([&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
-  };
+      one_by_one([this, rise_K](const Shape&, std::size_t) {
+        return stacked(
+            [&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
+      });
 }
 
 void Catalogue::add_positions(const std::string& name,
@@ -235,14 +264,14 @@ void Catalogue::add_positions(const std::string& name,
     Hypothesis& along =
         add({"position_dependence", subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}});
     along.handicap = special_case_handicap;  // without the position: a coefficient
-    along.columns = [this, rise_K, signal](const Shape&, std::size_t) -> Eigen::MatrixXd {
+    along.columns = one_by_one([this, rise_K, signal](const Shape&, std::size_t) {
       Eigen::MatrixXd both(rows_.time_s.size(), 2);
       both.col(0) = stacked([&](const MeasuredRun& run) -> Column {
         return run.signals[signal].cwiseProduct(rise_K(run));
       });
       both.col(1) = stacked(rise_K);
       return both;
-    };
+    });
   }
 }
 
@@ -255,11 +284,11 @@ void Catalogue::add_other(std::size_t other) {
   ShapeParameter lag = lag_times(60.0, 6 * 3600.0, 20);
   lag.grid.insert(lag.grid.begin(), 0.0);
   add({"missing_temperature", name, Form::own_gains, {lag}, {"gain_um_per_K"}}).columns =
-      [this, rise_K](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
-    return stacked([&](const MeasuredRun& run) -> Column {
-      return through(LowPass(shape[0]), run.time_s, rise_K(run));
-    });
-  };
+      [this, rise_K](const Shapes& shapes, std::size_t) {
+        return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
+          return lagged(run.time_s, rise_K(run), taus_s);
+        });
+      };
   add_square(name, rise_K);
   add_positions(name, rise_K);
 }
@@ -276,19 +305,24 @@ void Catalogue::add_signal(std::size_t signal) {
                           Form::own_gains,
                           {lag_times(120.0, 6 * 3600.0, 22), power},
                           {"gain_um_per_unit"}});
-  heat.columns = [this, values](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
-    return stacked([&](const MeasuredRun& run) -> Column {
-      const Column& u = values(run);
-      return through(LowPass(shape[0]), run.time_s,
-                     shape[1] > 1.5 ? Column(u.array().square()) : u);
+  heat.columns = [this, values](const Shapes& shapes, std::size_t) {
+    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
+      Panel heats = lagged(run.time_s, values(run), taus_s);
+      const Panel of_squares = lagged(run.time_s, values(run).array().square(), taus_s);
+      for (std::size_t i = 0; i < shapes.size(); ++i) {
+        const auto column = static_cast<Eigen::Index>(i);
+        if (shapes[i][1] > 1.5) heats.col(column) = of_squares.col(column);
+      }
+      return heats;
     });
   };
   const auto unit = unit_of(name).suffix;
   if (unit != "_rpm" && unit != "_mm_per_min" && !unit.empty()) return;
   add({"speed_growth", name, Form::own_gains, {}, {"gain_um_per_unit2"}}).columns =
-      [this, values](const Shape&, std::size_t) -> Eigen::MatrixXd {
-    return stacked([&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
-  };
+      one_by_one([this, values](const Shape&, std::size_t) {
+        return stacked(
+            [&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
+      });
 }
 
 void Catalogue::add_output(std::size_t output) {
@@ -305,24 +339,25 @@ void Catalogue::add_output(std::size_t output) {
                             Form::no_gain,
                             {{"width_um", linear_grid(0.03 * range_um, 0.7 * range_um, 20)}}});
     play.output = output;
-    play.columns = [this, model_um](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
-      return stacked([&](const MeasuredRun& run) -> Column {
-        const Column calm_um = calm(run.time_s, model_um(run));
-        return through(Play(shape[0]), run.time_s, calm_um) - calm_um;
-      });
+    play.columns = [this, model_um](const Shapes& shapes, std::size_t) {
+      return stacked(shapes,
+                     [&](const MeasuredRun& run, const std::vector<double>& widths_um) -> Panel {
+                       const Column calm_um = calm(run.time_s, model_um(run));
+                       return played(calm_um, widths_um).colwise() - calm_um;
+                     });
     };
     std::vector<double> shifts = logarithmic_grid(std::max(5.0, 0.2 * step_s_), 3600.0, 14);
     for (std::size_t i = 0, count = shifts.size(); i < count; ++i)
       shifts.insert(shifts.begin(), -shifts[2 * i]);
     Hypothesis& shift = add({"time_shift", name, Form::no_gain, {{"shift_s", shifts}}});
     shift.output = output;
-    shift.columns = [this, model_um](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
+    shift.columns = one_by_one([this, model_um](const Shape& shape, std::size_t) {
       return stacked([&](const MeasuredRun& run) -> Column {
         // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
-        const Column smooth_um = smoothed(run.time_s, model_um(run), 2.0 * step_s_);
+        const Column smooth_um = smoothed(run.time_s, model_um(run), {2.0 * step_s_});
         return shifted(run.time_s, smooth_um, shape[0]) - smooth_um;
       });
-    };
+    });
   }
   add_period(output);
 }
@@ -346,20 +381,22 @@ void Catalogue::add_period(std::size_t output) {
                             {{"period_s", periods, true, false}},
                             gains});
   period.output = output;
-  period.columns = [this](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
-    constexpr double turn = 6.283185307179586;
-    Eigen::MatrixXd waves = Eigen::MatrixXd::Zero(rows_.time_s.size(),
-                                                  2 * static_cast<Eigen::Index>(data_.runs.size()));
+  period.columns = [this](const Shapes& shapes, std::size_t) {
+    std::vector<double> periods_s;
+    for (const Shape& shape : shapes) periods_s.push_back(shape[0]);
+    const Eigen::Index width = 2 * std::ssize(data_.runs);
+    Panel all = Panel::Zero(rows_.time_s.size(), width * std::ssize(shapes));
     for (std::size_t run = 0; run < data_.runs.size(); ++run) {
-      const auto column = 2 * static_cast<Eigen::Index>(run);
       const Block& block = rows_.runs[run];
-      for (Eigen::Index row = block.begin; row < block.end; ++row) {
-        const double phase = turn / shape[0] * rows_.time_s[row];
-        waves(row, column) = std::sin(phase);
-        waves(row, column + 1) = std::cos(phase);
+      const Eigen::Index count = block.end - block.begin;
+      const Waves waves_of = waves(rows_.time_s.segment(block.begin, count), periods_s);
+      for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
+        const Eigen::Index column = width * i + 2 * static_cast<Eigen::Index>(run);
+        all.col(column).segment(block.begin, count) = waves_of.sines.col(i);
+        all.col(column + 1).segment(block.begin, count) = waves_of.cosines.col(i);
       }
     }
-    return waves;
+    return all;
   };
 }
 
@@ -389,18 +426,17 @@ void Catalogue::add_displacement_faults(std::size_t run, std::size_t output) {
                           {"step_um"},
                           output,
                           run});
-  step.columns = [this, run](const Shape& shape, std::size_t) -> Eigen::MatrixXd {
-    return in_run(run, [&](const MeasuredRun& of) -> Column {
-      return (of.time_s.array() >= shape[0]).cast<double>();
-    });
+  step.columns = [this, run](const Shapes& shapes, std::size_t) {
+    return since(run, shapes,
+                 [](const MeasuredRun& of) -> Column { return Column::Ones(of.rows()); });
   };
   Hypothesis& drift =
       add({"displacement_drift", name, Form::own_gains, {}, {"rate_um_per_h"}, output, run});
-  drift.columns = [this, run](const Shape&, std::size_t) -> Eigen::MatrixXd {
+  drift.columns = one_by_one([this, run](const Shape&, std::size_t) {
     return in_run(run, [&](const MeasuredRun& of) -> Column {
       return (of.time_s.array() - of.time_s[of.begin]) / 3600.0;
     });
-  };
+  });
 }
 
 /// A fault that is alike at every sensor of a run acts through the sensor's coefficient alone.
@@ -425,24 +461,21 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
     return added;
   };
   // What a false reading adds to model and reading alike is missing in the measured displacement.
-  const auto column = [this, run, input](std::size_t output, const auto& reading_K) {
-    return Eigen::MatrixXd(in_run(run, [&](const MeasuredRun& of) -> Column {
-      return -data_.coefficient(of, output, input).cwiseProduct(reading_K(of));
-    }));
+  const auto missing_um = [this, input](const MeasuredRun& of, std::size_t output) -> Column {
+    return -data_.coefficient(of, output, input);
   };
   Hypothesis& step = fault("sensor_step", "at_s", "step_K", 0.02, 64);
-  step.columns = [column](const Shape& shape, std::size_t output) {
-    return column(output, [&](const MeasuredRun& of) -> Column {
-      return (of.time_s.array() >= shape[0]).cast<double>();
-    });
+  step.columns = [this, run, missing_um](const Shapes& shapes, std::size_t output) {
+    return since(run, shapes, [&](const MeasuredRun& of) { return missing_um(of, output); });
   };
   share_columns(step, input);
   Hypothesis& drift = fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24);
-  drift.columns = [column](const Shape& shape, std::size_t output) {
-    return column(output, [&](const MeasuredRun& of) -> Column {
-      return ((of.time_s.array() - shape[0]) / 3600.0).max(0.0);
+  drift.columns = one_by_one([this, run, missing_um](const Shape& shape, std::size_t output) {
+    return in_run(run, [&](const MeasuredRun& of) -> Column {
+      const Column growing_h = ((of.time_s.array() - shape[0]) / 3600.0).max(0.0);
+      return missing_um(of, output).cwiseProduct(growing_h);
     });
-  };
+  });
   share_columns(drift, input);
   // reading = room + gain (T - room): the reading misses (1 / gain - 1) (reading - room).
   const auto named_room = [](const std::string& column_name) {
@@ -456,23 +489,18 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
   const auto room = std::find_if(inputs.begin(), inputs.end(), named_room) - inputs.begin();
   if (static_cast<std::size_t>(room) == input) return;
   Hypothesis& loose = fault("sensor_loose", "at_s", "gain", 0.03, 48);
-  const auto whole = [column, input, other, room, n_others = others.size(),
-                      n_inputs = inputs.size()](std::size_t output) {
-    return column(output, [&](const MeasuredRun& of) -> Column {
-      if (static_cast<std::size_t>(other) < n_others)
-        return of.others_degC[static_cast<std::size_t>(other)] - of.inputs_degC[input];
-      if (static_cast<std::size_t>(room) < n_inputs)
-        return of.inputs_degC[static_cast<std::size_t>(room)] - of.inputs_degC[input];
-      return of.inputs_degC[input][0] - of.inputs_degC[input].array();
-    });
+  const auto lost_K = [input, other, room, n_others = others.size(),
+                       n_inputs = inputs.size()](const MeasuredRun& of) -> Column {
+    if (static_cast<std::size_t>(other) < n_others)
+      return of.others_degC[static_cast<std::size_t>(other)] - of.inputs_degC[input];
+    if (static_cast<std::size_t>(room) < n_inputs)
+      return of.inputs_degC[static_cast<std::size_t>(room)] - of.inputs_degC[input];
+    return of.inputs_degC[input][0] - of.inputs_degC[input].array();
   };
-  const auto columns = std::make_shared<std::map<std::size_t, Eigen::MatrixXd>>();
-  loose.columns = [this, whole, columns](const Shape& shape, std::size_t output) {
-    const auto known = columns->find(output);
-    const Eigen::MatrixXd& lost = known != columns->end()
-                                      ? known->second
-                                      : columns->emplace(output, whole(output)).first->second;
-    return Eigen::MatrixXd((rows_.time_s.array() >= shape[0]).select(lost.array(), 0.0).matrix());
+  loose.columns = [this, run, missing_um, lost_K](const Shapes& shapes, std::size_t output) {
+    return since(run, shapes, [&](const MeasuredRun& of) -> Column {
+      return missing_um(of, output).cwiseProduct(lost_K(of));
+    });
   };
   loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
 }
@@ -505,9 +533,9 @@ std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& 
   const auto catalogue = std::make_shared<Catalogue>(data, rows);
   std::vector<Hypothesis> all = catalogue->all();
   for (Hypothesis& hypothesis : all)
-    hypothesis.columns = [catalogue, columns = std::move(hypothesis.columns)](
-                             const std::vector<double>& shape, std::size_t output) {
-      return columns(shape, output);
+    hypothesis.columns = [catalogue, columns = std::move(hypothesis.columns)](const Shapes& shapes,
+                                                                              std::size_t output) {
+      return columns(shapes, output);
     };
   return all;
 }

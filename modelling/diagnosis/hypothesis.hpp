@@ -13,6 +13,10 @@
 
 namespace thermocomp::diagnosis {
 
+/// The shape parameters' values, in their order.
+using Shape = std::vector<double>;
+using Shapes = std::vector<Shape>;
+
 /// How the columns of a hypothesis enter the displacement.
 enum class Form {
   own_gains,    ///< each output has gains of its own
@@ -48,8 +52,9 @@ struct Hypothesis {
   /// 2 ln L that it must gain beyond others: for what contains a simpler cause as a special case.
   double handicap{0.0};
   bool in_every_output{false};  ///< an output without its share speaks against it
-  /// Columns for an output over the stacked rows, shape (rows, gains or 1).
-  std::function<Eigen::MatrixXd(const std::vector<double>& shape, std::size_t output)> columns{};
+  /// Columns for an output over the stacked rows, those of one shape after those of another, shape
+  /// (rows, shapes times gains or 1).
+  std::function<Panel(const Shapes& shapes, std::size_t output)> columns{};
   /// Hypotheses of one pattern have the same grid and the same columns, each times its scale for
   /// the output; empty: it shares its columns with none.
   std::string pattern{};
@@ -57,6 +62,21 @@ struct Hypothesis {
   /// Whether a gain is physically possible; empty: all are.
   std::function<bool(double gain, std::size_t output)> possible{};
 };
+
+/// Columns that are made for one shape at a time.
+/// @param make  Eigen::MatrixXd(const Shape&, std::size_t output)
+template <class Make>
+[[nodiscard]] std::function<Panel(const Shapes&, std::size_t)> one_by_one(Make make) {
+  return [make](const Shapes& shapes, std::size_t output) {
+    Panel all;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const Eigen::MatrixXd columns = make(shapes[i], output);
+      if (i == 0) all.resize(columns.rows(), columns.cols() * std::ssize(shapes));
+      all.middleCols(columns.cols() * static_cast<Eigen::Index>(i), columns.cols()) = columns;
+    }
+    return all;
+  };
+}
 
 /// Every cause of the catalogue with every subject that it can have in these data.
 [[nodiscard]] std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& rows);

@@ -3,61 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <optional>
-
-#include <Eigen/Cholesky>
 
 namespace thermocomp::diagnosis {
 namespace {
-
-/// Whitened cross products of one output, block by block: common columns, hypothesis, residual.
-struct BlockProducts {
-  std::vector<Eigen::MatrixXd> blocks;
-  Eigen::MatrixXd total;
-  Eigen::Index common{0};
-  Eigen::Index free{0};
-};
-
-BlockProducts products(const Setting& setting, const Eigen::MatrixXd& columns,
-                       const StackedRows& rows) {
-  BlockProducts result;
-  result.common = setting.common().cols();
-  result.free = columns.cols();
-  Eigen::MatrixXd all(columns.rows(), result.common + result.free + 1);
-  all.leftCols(result.common) = setting.common();
-  all.middleCols(result.common, result.free) = setting.whitener().apply_all(columns);
-  all.rightCols(1) = setting.residual();
-  result.total = Eigen::MatrixXd::Zero(all.cols(), all.cols());
-  for (Eigen::Index i = 0; i < result.common; ++i) result.total(i, i) = setting.precision()[i];
-  for (const Block& block : rows.blocks) {
-    const auto part = all.middleRows(block.begin, block.end - block.begin);
-    result.blocks.emplace_back(part.transpose() * part);
-    result.total += result.blocks.back();
-  }
-  return result;
-}
-
-/// Normal equations of the hypothesis without one block, the common columns taken out.
-struct Reduced {
-  Eigen::MatrixXd square;
-  Eigen::VectorXd right;
-  double squares{0.0};
-  Eigen::MatrixXd carried;  ///< what the common columns carry of each other one
-};
-
-/// @param block  none of them: all rows stay
-Reduced without_block(const BlockProducts& products, std::optional<std::size_t> block) {
-  Eigen::MatrixXd rest = products.total;
-  if (block) rest -= products.blocks[*block];
-  const Eigen::Index n = products.common;
-  const Eigen::Index m = products.free + 1;
-  const Eigen::MatrixXd carried = rest.topLeftCorner(n, n).ldlt().solve(rest.topRightCorner(n, m));
-  const Eigen::MatrixXd reduced =
-      rest.bottomRightCorner(m, m) - rest.bottomLeftCorner(m, n) * carried;
-  return {reduced.topLeftCorner(products.free, products.free),
-          reduced.topRightCorner(products.free, 1), reduced(m - 1, m - 1), carried};
-}
 
 /// Finer grids than this are only searched anew around the peak.
 constexpr std::size_t whole_grid_max = 40;
@@ -136,66 +84,23 @@ Squares squares_in_block(const OutputEvidence& evidence, const Left& left, const
   return {sum[0], sum[1], sum[2], sum[3]};
 }
 
-/// Gains of the hypothesis from the rows without a block, and what 2 ln L loses by the misfit.
-struct BlockFit {
-  double misfit{std::numeric_limits<double>::infinity()};
-  std::vector<Eigen::VectorXd> gains;
-  std::vector<Eigen::VectorXd> common;  ///< of the common columns, beside the hypothesis
-};
-
-BlockFit fit_without(const Explanation& explanation, const std::vector<std::size_t>& acting,
-                     const std::vector<BlockProducts>& products, std::optional<std::size_t> block) {
-  std::vector<Reduced> reduced;
-  reduced.reserve(products.size());
-  for (const BlockProducts& each : products) reduced.push_back(without_block(each, block));
-  BlockFit fit{0.0, {}, {}};
-  double square = 0.0;
-  double right = 0.0;
-  for (std::size_t i = 0; i < acting.size(); ++i) {
-    const double variance = explanation.settings[acting[i]]->squares();
-    square += reduced[i].square(0, 0) / variance;
-    right += reduced[i].right[0] / variance;
-  }
-  for (std::size_t i = 0; i < acting.size(); ++i) {
-    Eigen::VectorXd gains = Eigen::VectorXd::Ones(1);
-    if (explanation.hypothesis->form == Form::own_gains)
-      gains = reduced[i].square.ldlt().solve(reduced[i].right);
-    else if (explanation.hypothesis->form == Form::shared_gain)
-      gains *= square > 0 ? right / square : 0.0;
-    const double squares = reduced[i].squares - 2.0 * gains.dot(reduced[i].right) +
-                           gains.dot(reduced[i].square * gains);
-    fit.misfit +=
-        explanation.settings[acting[i]]->present_rows() * std::log(std::max(squares, 1e-12));
-    fit.gains.push_back(gains);
-    fit.common.emplace_back(reduced[i].carried.rightCols(1) -
-                            reduced[i].carried.leftCols(gains.size()) * gains);
-  }
-  return fit;
-}
-
-/// Of an output's common columns without any hypothesis.
-BlockProducts common_products(const OutputEvidence& evidence, const StackedRows& rows) {
-  return products(evidence.setting(), Eigen::MatrixXd(rows.time_s.size(), 0), rows);
-}
-
-/// What the last of the common gains, those of accepted explanations, leave of the residual, and
-/// what those of wrong coefficients leave of that.
+/// What the common gains of accepted explanations leave of the residual, and what those of wrong
+/// coefficients leave of that.
 std::array<Column, 2> left_by(const OutputEvidence& evidence, const Eigen::VectorXd& common) {
   const Eigen::MatrixXd& accepted = evidence.free_columns();
   const Eigen::MatrixXd& coefficients = evidence.coefficient_columns();
-  const Column left = evidence.residual() - accepted * common.tail(accepted.cols());
-  const Eigen::Index first = common.size() - accepted.cols() - coefficients.cols();
-  return {left, left - coefficients * common.segment(first, coefficients.cols())};
+  const Eigen::Index first = common.size() - coefficients.cols() - accepted.cols();
+  const Column left = evidence.residual() - accepted * common.segment(first, accepted.cols());
+  return {left, left - coefficients * common.tail(coefficients.cols())};
 }
 
-/// What a fit leaves of the output number `i` of those acted on.
-/// @param common_without  gains of the common columns without the hypothesis
-Left left_of(const BlockFit& fit, std::size_t i, const OutputEvidence& evidence,
-             const Explanation& explanation, const std::vector<double>& shape,
+/// What a fit leaves of an output.
+/// @param common  gains of the common columns beside the hypothesis
+/// @param common_without  without it
+Left left_of(const OutputEvidence& evidence, const Column& explained, const Eigen::VectorXd& common,
              const Eigen::VectorXd& common_without) {
   const Column measured = left_by(evidence, common_without)[0];
-  const auto [accepted_taken, beside] = left_by(evidence, fit.common[i]);
-  const Column explained = columns_of(*explanation.hypothesis, shape, evidence) * fit.gains[i];
+  const auto [accepted_taken, beside] = left_by(evidence, common);
   return {measured, beside, beside - explained, accepted_taken - explained};
 }
 
@@ -237,80 +142,188 @@ LeftOutGain gain_of(const std::vector<Squares>& by_output) {
 
 }  // namespace
 
-double log_left_without(const OutputEvidence& evidence, const StackedRows& rows) {
+const LeftOut::Common& LeftOut::common(const Setting& setting) {
+  const auto known = common_.find(&setting);
+  if (known != common_.end()) return known->second;
+  const Panel& against = setting.against();
+  const Eigen::Index n = setting.precision().size();
+  std::vector<Eigen::MatrixXd> blocks;
+  Eigen::MatrixXd total = Eigen::MatrixXd::Zero(1 + n, 1 + n);
+  total.diagonal().tail(n) = setting.precision();
+  for (const Block& block : rows_.blocks) {
+    blocks.push_back(cross_products(against, against, block.begin, block.end));
+    total += blocks.back();
+  }
+  blocks.emplace_back(Eigen::MatrixXd::Zero(1 + n, 1 + n));
+  Common all;
+  for (const Eigen::MatrixXd& block : blocks) {
+    const Eigen::MatrixXd rest = total - block;
+    CommonWithout without{rest.bottomRightCorner(n, n).ldlt(), {}, 0.0};
+    without.carried = without.factor.solve(rest.col(0).tail(n));
+    without.squares = rest(0, 0) - rest.col(0).tail(n).dot(without.carried);
+    all.push_back(std::move(without));
+  }
+  return common_.emplace(&setting, std::move(all)).first->second;
+}
+
+std::vector<std::vector<LeftOut::Reduced>> LeftOut::reduced(const Setting& setting,
+                                                            const Panel& columns,
+                                                            Eigen::Index width) {
+  const Common& common = this->common(setting);
+  const Eigen::Index n = setting.precision().size();
+  const Panel white = setting.whitener().apply(columns);
+  struct Products {
+    Eigen::MatrixXd against;
+    Eigen::MatrixXd own;
+  };
+  std::vector<Products> blocks;
+  Products total{Eigen::MatrixXd::Zero(1 + n, white.cols()),
+                 Eigen::MatrixXd::Zero(width, white.cols())};
+  for (const Block& block : rows_.blocks) {
+    blocks.push_back({cross_products(setting.against(), white, block.begin, block.end),
+                      neighbour_products(white, width, block.begin, block.end)});
+    total.against += blocks.back().against;
+    total.own += blocks.back().own;
+  }
+  blocks.push_back(
+      {Eigen::MatrixXd::Zero(1 + n, white.cols()), Eigen::MatrixXd::Zero(width, white.cols())});
+  std::vector<std::vector<Reduced>> groups(static_cast<std::size_t>(white.cols() / width));
+  for (std::size_t block = 0; block < blocks.size(); ++block) {
+    const Eigen::MatrixXd against = total.against - blocks[block].against;
+    const Eigen::MatrixXd own = total.own - blocks[block].own;
+    const Eigen::MatrixXd carried = common[block].factor.solve(against.bottomRows(n));
+    for (std::size_t group = 0; group < groups.size(); ++group) {
+      const Eigen::Index first = width * static_cast<Eigen::Index>(group);
+      const auto beside = against.block(1, first, n, width);
+      Reduced of{-beside.transpose() * carried.middleCols(first, width),
+                 against.row(0).segment(first, width).transpose() -
+                     beside.transpose() * common[block].carried,
+                 common[block].squares, carried.middleCols(first, width)};
+      for (Eigen::Index i = 0; i < width; ++i)
+        for (Eigen::Index j = 0; j < width; ++j)
+          of.square(i, j) += own(std::abs(i - j), first + std::min(i, j));
+      groups[group].push_back(std::move(of));
+    }
+  }
+  return groups;
+}
+
+LeftOut::BlockFit LeftOut::fit(const Explanation& explanation,
+                               const std::vector<std::size_t>& acting,
+                               const std::vector<const Reduced*>& reduced) const {
+  BlockFit fit{0.0, {}, {}, {}};
+  double square = 0.0;
+  double right = 0.0;
+  for (std::size_t i = 0; i < acting.size(); ++i) {
+    const double variance = explanation.settings[acting[i]]->squares();
+    square += reduced[i]->square(0, 0) / variance;
+    right += reduced[i]->right[0] / variance;
+  }
+  for (std::size_t i = 0; i < acting.size(); ++i) {
+    const Reduced& of = *reduced[i];
+    Eigen::VectorXd gains = Eigen::VectorXd::Ones(1);
+    if (explanation.hypothesis->form == Form::own_gains)
+      gains = of.square.ldlt().solve(of.right);
+    else if (explanation.hypothesis->form == Form::shared_gain)
+      gains *= square > 0 ? right / square : 0.0;
+    const double squares = of.squares - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
+    fit.misfit +=
+        explanation.settings[acting[i]]->present_rows() * std::log(std::max(squares, 1e-12));
+    fit.gains.push_back(gains);
+  }
+  return fit;
+}
+
+std::vector<LeftOut::BlockFit> LeftOut::best_without_each(const Explanation& explanation,
+                                                          const std::vector<std::size_t>& acting) {
+  const Shapes shapes = shapes_of(explanation);
+  std::vector<std::vector<std::vector<Reduced>>> all;
+  for (const std::size_t output : acting) {
+    const Panel columns = columns_of(*explanation.hypothesis, shapes, outputs_[output]);
+    all.push_back(
+        reduced(*explanation.settings[output], columns, columns.cols() / std::ssize(shapes)));
+  }
+  std::vector<BlockFit> best(rows_.blocks.size());
+  for (std::size_t block = 0; block < best.size(); ++block) {
+    for (std::size_t shape = 0; shape < shapes.size(); ++shape) {
+      std::vector<const Reduced*> of;
+      for (const auto& of_output : all) of.push_back(&of_output[shape][block]);
+      BlockFit fit = this->fit(explanation, acting, of);
+      if (!(fit.misfit < best[block].misfit)) continue;
+      for (std::size_t i = 0; i < acting.size(); ++i)
+        fit.common.emplace_back(common(*explanation.settings[acting[i]])[block].carried -
+                                of[i]->carried * fit.gains[i]);
+      fit.shape = shapes[shape];
+      best[block] = std::move(fit);
+    }
+  }
+  return best;
+}
+
+double LeftOut::log_left_without(std::size_t output) {
+  const OutputEvidence& evidence = outputs_[output];
   if (evidence.coefficient_columns().cols() == 0) return 0.0;
-  const BlockProducts common = common_products(evidence, rows);
+  const Common& common = this->common(evidence.setting());
   Squares sum;
-  for (std::size_t block = 0; block < rows.blocks.size(); ++block) {
-    const auto without = left_by(evidence, without_block(common, block).carried);
-    sum += squares_in_block(evidence, {without[0], without[1], without[1], without[1]}, rows,
-                            rows.blocks[block]);
+  for (std::size_t block = 0; block < rows_.blocks.size(); ++block) {
+    const auto without = left_by(evidence, common[block].carried);
+    sum += squares_in_block(evidence, {without[0], without[1], without[1], without[1]}, rows_,
+                            rows_.blocks[block]);
   }
   return log_ratio(sum.after, sum.measured);
 }
 
-LeftOutGain gain_on_left_out_blocks(const Explanation& explanation, const StackedRows& rows,
-                                    const std::vector<OutputEvidence>& outputs) {
+LeftOutGain LeftOut::gain_on_left_out_blocks(const Explanation& explanation) {
   const std::vector<std::size_t> acting = acting_outputs(explanation);
-  const std::size_t blocks = rows.blocks.size();
+  const std::size_t blocks = rows_.blocks.size();
   if (blocks < 2) return {};
-  std::vector<BlockFit> best(blocks);
-  std::vector<std::vector<double>> best_shape(blocks);
-  for (const std::vector<double>& shape : shapes_of(explanation)) {
-    std::vector<BlockProducts> all;
-    all.reserve(acting.size());
-    for (const std::size_t output : acting)
-      all.push_back(products(*explanation.settings[output],
-                             columns_of(*explanation.hypothesis, shape, outputs[output]), rows));
-    for (std::size_t block = 0; block < blocks; ++block) {
-      BlockFit fit = fit_without(explanation, acting, all, block);
-      if (!(fit.misfit < best[block].misfit)) continue;
-      best[block] = std::move(fit);
-      best_shape[block] = shape;
-    }
-  }
+  const std::vector<BlockFit> best = best_without_each(explanation, acting);
   std::vector<Squares> sums(acting.size());
   for (std::size_t i = 0; i < acting.size(); ++i) {
-    const OutputEvidence& evidence = outputs[acting[i]];
-    const BlockProducts common = common_products(evidence, rows);
+    const OutputEvidence& evidence = outputs_[acting[i]];
+    const Common& without = common(evidence.setting());
     for (std::size_t block = 0; block < blocks; ++block) {
       if (best[block].gains.empty()) continue;
-      const Left left = left_of(best[block], i, evidence, explanation, best_shape[block],
-                                without_block(common, block).carried);
-      sums[i] += squares_in_block(evidence, left, rows, rows.blocks[block]);
+      const Column explained =
+          columns_of(*explanation.hypothesis, best[block].shape, evidence) * best[block].gains[i];
+      const Left left = left_of(evidence, explained, best[block].common[i], without[block].carried);
+      sums[i] += squares_in_block(evidence, left, rows_, rows_.blocks[block]);
     }
   }
   return gain_of(sums);
 }
 
-LeftOutGain gain_on_fitted_rows(const Explanation& explanation, const StackedRows& rows,
-                                const std::vector<OutputEvidence>& outputs) {
+LeftOutGain LeftOut::gain_on_fitted_rows(const Explanation& explanation) {
   const std::vector<std::size_t> acting = acting_outputs(explanation);
-  std::vector<BlockProducts> all;
+  std::vector<std::vector<Reduced>> all;
+  std::vector<Panel> columns;
+  std::vector<const Reduced*> of_all_rows;
   all.reserve(acting.size());
-  for (const std::size_t output : acting)
-    all.push_back(products(*explanation.settings[output],
-                           columns_of(*explanation.hypothesis, explanation.shape, outputs[output]),
-                           rows));
-  const BlockFit fit = fit_without(explanation, acting, all, std::nullopt);
+  for (const std::size_t output : acting) {
+    columns.push_back(
+        columns_of(*explanation.hypothesis, Shapes{explanation.shape}, outputs_[output]));
+    all.push_back(
+        reduced(*explanation.settings[output], columns.back(), columns.back().cols()).front());
+    of_all_rows.push_back(&all.back().back());
+  }
+  const BlockFit fit = this->fit(explanation, acting, of_all_rows);
   std::vector<Squares> sums(acting.size());
   for (std::size_t i = 0; i < acting.size(); ++i) {
-    const OutputEvidence& evidence = outputs[acting[i]];
-    const BlockProducts common = common_products(evidence, rows);
+    const OutputEvidence& evidence = outputs_[acting[i]];
+    const Common& without = common(evidence.setting());
+    const Common& beside = common(*explanation.settings[acting[i]]);
+    const Column explained = columns[i] * fit.gains[i];
     Left left;
-    left.fill(Column::Zero(rows.time_s.size()));
-    for (std::size_t block = 0; block < rows.blocks.size(); ++block) {
-      BlockFit without = fit;
-      const Eigen::MatrixXd carried = without_block(all[i], block).carried;
-      without.common[i] =
-          carried.rightCols(1) - carried.leftCols(fit.gains[i].size()) * fit.gains[i];
-      const Left part = left_of(without, i, evidence, explanation, explanation.shape,
-                                without_block(common, block).carried);
-      const Block& of = rows.blocks[block];
+    left.fill(Column::Zero(rows_.time_s.size()));
+    for (std::size_t block = 0; block < rows_.blocks.size(); ++block) {
+      const Left part =
+          left_of(evidence, explained, beside[block].carried - all[i][block].carried * fit.gains[i],
+                  without[block].carried);
+      const Block& of = rows_.blocks[block];
       for (std::size_t k = 0; k < left.size(); ++k)
         left[k].segment(of.begin, of.end - of.begin) = part[k].segment(of.begin, of.end - of.begin);
     }
-    for (const Block& run : rows.runs) sums[i] += squares_in_block(evidence, left, rows, run);
+    for (const Block& run : rows_.runs) sums[i] += squares_in_block(evidence, left, rows_, run);
   }
   return gain_of(sums);
 }

@@ -35,7 +35,7 @@ const char* phase_name(Phase phase) {
 std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
   Column mean_K = Column::Zero(run.rows());
   for (const Column& input : run.inputs_K) mean_K += input;
-  const Column slope = slope_per_s(run.time_s, mean_K, slope_smoothing_s);
+  const Column slope = slopes_per_s(run.time_s, mean_K, {slope_smoothing_s});
   const double steepest = slope.cwiseAbs().maxCoeff();
   std::vector<Phase> phases;
   double changed_at_s = -1e300;

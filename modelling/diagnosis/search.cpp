@@ -14,35 +14,16 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr std::size_t shortlist_of_each = 20;
-/// An output counts as acted on when its 2 ln L gains this much beyond the price of its gains.
-constexpr double output_gain_min = 6.0;
 /// Structure is called unexplained when its RMS is above this share of the measured motion's ...
 constexpr double structure_share_min = 0.03;
 /// ... and this many times the noise.
 constexpr double structure_noises_min = 1.5;
 constexpr int refit_rounds = 2;
-constexpr std::size_t shapes_at_once = 8;
-/// Columns of smaller factors are made for themselves.
-constexpr double scale_min = 1e-6;
 /// Explanations are as good as each other when what they leave differs by less than this share.
 constexpr double tie_share = 0.1;
 /// Errors of the coefficients are reckoned with when they leave less by this share.
 constexpr double doubt_share = 0.2;
 constexpr std::size_t weighed_shown = 12;
-
-std::vector<std::vector<double>> grid_of(const Hypothesis& hypothesis) {
-  std::vector<std::vector<double>> points = {{}};
-  for (const ShapeParameter& parameter : hypothesis.shape) {
-    std::vector<std::vector<double>> longer;
-    for (const auto& point : points)
-      for (const double value : parameter.grid) {
-        longer.push_back(point);
-        longer.back().push_back(value);
-      }
-    points = std::move(longer);
-  }
-  return points;
-}
 
 }  // namespace
 
@@ -75,141 +56,9 @@ double Search::price(const Hypothesis& hypothesis) const {
   return sum + hypothesis.handicap;
 }
 
-Search::Equations Search::equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
-                                               const std::vector<Settings>& settings) const {
-  Equations equations(settings.size(),
-                      {shapes.size(), Equations::value_type::value_type(outputs_.size())});
-  for (std::size_t first = 0; first < shapes.size(); first += shapes_at_once) {
-    const std::size_t count = std::min(shapes_at_once, shapes.size() - first);
-    for (const std::size_t output : measured_) {
-      if (!concerns(hypothesis, output)) continue;
-      Eigen::MatrixXd side_by_side;
-      Eigen::Index width = 0;
-      for (std::size_t i = 0; i < count; ++i) {
-        const Eigen::MatrixXd columns = columns_of(hypothesis, shapes[first + i], outputs_[output]);
-        width = columns.cols();
-        if (i == 0) side_by_side.resize(columns.rows(), width * static_cast<Eigen::Index>(count));
-        side_by_side.middleCols(width * static_cast<Eigen::Index>(i), width) = columns;
-      }
-      for (std::size_t under = 0; under < settings.size(); ++under) {
-        std::vector<Setting::Equations> groups =
-            settings[under][output]->equations_of_groups(side_by_side, width);
-        for (std::size_t i = 0; i < count; ++i)
-          equations[under][first + i][output] = std::move(groups[i]);
-      }
-    }
-  }
-  return equations;
-}
-
-Search::Equations Search::equations_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
-                                            const std::vector<Settings>& settings,
-                                            Patterns& patterns) const {
-  const auto scaled = [&](Equations equations, bool inverse) {
-    for (auto& of_setting : equations)
-      for (auto& of_shape : of_setting)
-        for (const std::size_t output : measured_) {
-          const double scale = hypothesis.scale(output);
-          const double factor = inverse ? 1.0 / scale : scale;
-          of_shape[output].square *= factor * factor;
-          of_shape[output].right *= factor;
-        }
-    return equations;
-  };
-  const bool shares = !hypothesis.pattern.empty() &&
-                      std::all_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
-                        return std::abs(hypothesis.scale(output)) > scale_min;
-                      });
-  if (!shares) return equations_under_each(hypothesis, grid, settings);
-  const auto known = patterns.find(hypothesis.pattern);
-  if (known != patterns.end()) return scaled(known->second, false);
-  Equations equations = equations_under_each(hypothesis, grid, settings);
-  patterns.emplace(hypothesis.pattern, scaled(equations, true));
-  return equations;
-}
-
-std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
-                                             const Settings& settings) const {
-  const Equations equations = equations_under_each(hypothesis, shapes, {settings});
-  std::vector<Trial> trials;
-  for (const auto& of_shape : equations.front())
-    trials.push_back(trial_of(hypothesis, of_shape, settings));
-  return trials;
-}
-
-Search::Trial Search::weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
-                            const Settings& settings) const {
-  return weigh_all(hypothesis, {shape}, settings).front();
-}
-
-Search::Trial Search::trial_of(const Hypothesis& hypothesis,
-                               const std::vector<Setting::Equations>& equations,
-                               const Settings& settings) const {
-  Trial trial;
-  trial.gains.resize(outputs_.size());
-  double square = 0.0;
-  double right = 0.0;
-  for (const std::size_t output : measured_) {
-    if (equations[output].right.size() == 0) continue;
-    const double variance = settings[output]->squares();
-    square += equations[output].square(0, 0) / variance;
-    right += equations[output].right[0] / variance;
-  }
-  const double shared = square > 0 ? right / square : 0.0;
-  if (hypothesis.form == Form::shared_gain && hypothesis.possible &&
-      !hypothesis.possible(shared, 0))
-    return trial;
-  for (const std::size_t output : measured_) {
-    const Setting::Equations& of = equations[output];
-    if (of.right.size() == 0) continue;
-    Eigen::VectorXd gains = Eigen::VectorXd::Ones(1);
-    double gain_price = 0.0;
-    if (hypothesis.form == Form::own_gains) {
-      gains = of.square.ldlt().solve(of.right);
-      if (!gains.allFinite()) continue;
-      if (hypothesis.possible && !hypothesis.possible(gains[0], output)) continue;
-      gain_price = static_cast<double>(gains.size()) * std::log(settings[output]->present_rows());
-    } else if (hypothesis.form == Form::shared_gain) {
-      gains *= shared;
-    }
-    const double squares =
-        settings[output]->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
-    const double gain = settings[output]->twice_log_likelihood(squares) -
-                        settings[output]->twice_log_likelihood(settings[output]->squares()) -
-                        gain_price;
-    if (hypothesis.form == Form::own_gains && gain < output_gain_min) continue;
-    trial.score += gain;
-    trial.gains[output] = gains;
-  }
-  return trial;
-}
-
 bool Search::acts(const Explanation& explanation) {
   return std::any_of(explanation.gains.begin(), explanation.gains.end(),
                      [](const Eigen::VectorXd& gains) { return gains.size() > 0; });
-}
-
-std::vector<Explanation> Search::profile(const Hypothesis& hypothesis,
-                                         const std::vector<Settings>& settings,
-                                         Patterns& patterns) const {
-  const std::vector<std::vector<double>> grid = grid_of(hypothesis);
-  const Equations equations = equations_of_grid(hypothesis, grid, settings, patterns);
-  std::vector<Explanation> bests;
-  for (std::size_t under = 0; under < settings.size(); ++under) {
-    Explanation best{&hypothesis, grid.front(),    std::vector<Eigen::VectorXd>(outputs_.size()),
-                     0.0,         settings[under], 0.0,
-                     0.0};
-    for (std::size_t i = 0; i < grid.size(); ++i) {
-      Trial trial = trial_of(hypothesis, equations[under][i], settings[under]);
-      if (!(trial.score > best.score)) continue;
-      best.score = trial.score;
-      best.shape = grid[i];
-      best.gains = std::move(trial.gains);
-    }
-    best.score -= price(hypothesis);
-    bests.push_back(std::move(best));
-  }
-  return bests;
 }
 
 Search::Settings Search::likeliest_settings(const Explanation& explanation) const {
@@ -223,7 +72,7 @@ Search::Settings Search::likeliest_settings(const Explanation& explanation) cons
     for (const auto& setting : outputs_[output].settings()) {
       const Setting::Equations of = setting->equations(columns);
       Eigen::VectorXd gains = fixed;
-      if (explanation.hypothesis->form == Form::own_gains) gains = of.square.ldlt().solve(of.right);
+      if (explanation.hypothesis->form == Form::own_gains) gains = of.gains();
       if (gains.size() == 0) continue;
       const double squares =
           setting->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
@@ -309,21 +158,11 @@ void Search::settle_anew(Explanation& explanation) const {
 }
 
 std::vector<Explanation> Search::ranked() {
-  Settings likeliest(outputs_.size(), nullptr);
-  Settings plain(outputs_.size(), nullptr);
-  for (const std::size_t output : measured_) {
-    likeliest[output] = &outputs_[output].setting();
-    plain[output] = outputs_[output].settings().front().get();
-  }
-  std::vector<Settings> settings = {likeliest};
-  if (plain != likeliest) settings.push_back(plain);
-  Patterns patterns;
-  std::vector<std::vector<Explanation>> under_each(settings.size());
-  for (const Hypothesis& hypothesis : hypotheses_) {
-    std::vector<Explanation> bests = profile(hypothesis, settings, patterns);
-    for (std::size_t under = 0; under < settings.size(); ++under)
-      if (bests[under].score > 0) under_each[under].push_back(std::move(bests[under]));
-  }
+  return judged(profile(profiled_settings()));
+}
+
+/// The best few under each of the settings, settled and chosen among.
+std::vector<Explanation> Search::judged(std::vector<std::vector<Explanation>> under_each) {
   std::vector<Explanation> candidates;
   for (std::vector<Explanation>& all : under_each) {
     const auto better = [](const auto& a, const auto& b) { return a.score > b.score; };
@@ -352,7 +191,8 @@ std::vector<Explanation> Search::ranked() {
 /// By what each leaves of rows it was not fitted to; among those that leave nearly the same, by
 /// likelihood.
 void Search::choose(std::vector<Explanation>& candidates) const {
-  for (Explanation& each : candidates) measure_left_out(each);
+  LeftOut left_out(rows_, outputs_);
+  for (Explanation& each : candidates) measure_left_out(each, left_out);
   std::sort(candidates.begin(), candidates.end(),
             [](const auto& a, const auto& b) { return a.log_left < b.log_left; });
   if (candidates.empty()) return;
@@ -364,10 +204,10 @@ void Search::choose(std::vector<Explanation>& candidates) const {
             [](const auto& a, const auto& b) { return a.score > b.score; });
 }
 
-void Search::measure_left_out(Explanation& explanation) const {
+void Search::measure_left_out(Explanation& explanation, LeftOut& left_out) const {
   const LeftOutGain gain = explanation.hypothesis->run
-                               ? gain_on_fitted_rows(explanation, rows_, outputs_)
-                               : gain_on_left_out_blocks(explanation, rows_, outputs_);
+                               ? left_out.gain_on_fitted_rows(explanation)
+                               : left_out.gain_on_left_out_blocks(explanation);
   explanation.left_out_gain = thresholds_.one_unit ? gain.share_of_all : gain.share;
   explanation.log_left = gain.log_left;
   for (const std::size_t output : measured_)
@@ -380,15 +220,43 @@ void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
     if (i != but) found.push_back(findings[i].explanation);
   if (accepted_) accepted_(found);
   for (OutputEvidence& output : outputs_) output.accept(found);
-  log_left_without_.assign(outputs_.size(), 0.0);
-  for (const std::size_t output : measured_)
-    log_left_without_[output] = log_left_without(outputs_[output], rows_);
+  measure_without();
 }
 
-std::vector<Explanation> Search::first_candidates(bool doubted) {
-  for (OutputEvidence& output : outputs_) output.doubt_coefficients(doubted);
+void Search::measure_without() {
+  LeftOut left_out(rows_, outputs_);
+  log_left_without_.assign(outputs_.size(), 0.0);
+  for (const std::size_t output : measured_)
+    log_left_without_[output] = left_out.log_left_without(output);
+}
+
+/// The explanations for the first finding in both stances. The columns of all hypotheses are made
+/// once for both.
+Search::BothStances Search::first_candidates() {
+  std::vector<Settings> settings;
+  std::vector<std::vector<Settings>> of_stance;
   accept({}, 0);
-  return ranked();
+  for (const bool doubted : {false, true}) {
+    if (doubted && !(data_.coefficient_sd > 0)) continue;
+    doubt(doubted);
+    of_stance.push_back(profiled_settings());
+    settings.insert(settings.end(), of_stance.back().begin(), of_stance.back().end());
+  }
+  std::vector<std::vector<Explanation>> under_each = profile(settings);
+  const auto middle = under_each.begin() + std::ssize(of_stance.front());
+  BothStances both;
+  if (of_stance.size() > 1)
+    both.beside_errors =
+        judged({std::make_move_iterator(middle), std::make_move_iterator(under_each.end())});
+  doubt(false);
+  both.right =
+      judged({std::make_move_iterator(under_each.begin()), std::make_move_iterator(middle)});
+  return both;
+}
+
+void Search::doubt(bool doubted) {
+  for (OutputEvidence& output : outputs_) output.doubt_coefficients(doubted);
+  measure_without();
 }
 
 void Search::refit(std::vector<Finding>& findings) {
@@ -527,15 +395,15 @@ SearchResult Search::run() {
   const auto least_left = [](const std::vector<Explanation>& of) {
     return of.empty() ? 0.0 : of.front().log_left;
   };
-  const double beside_errors = data_.coefficient_sd > 0 ? least_left(first_candidates(true))
-                                                        : std::numeric_limits<double>::max();
-  std::vector<Explanation> right = first_candidates(false);
-  if (beside_errors < least_left(right) - doubt_share) {
-    SearchResult result = run_from(first_candidates(true));
+  BothStances first = first_candidates();
+  if (least_left(first.beside_errors) < least_left(first.right) - doubt_share) {
+    doubt(true);
+    SearchResult result = run_from(std::move(first.beside_errors));
     if (!result.unexplained) return result;
-    right = first_candidates(false);
+    for (OutputEvidence& output : outputs_) output.doubt_coefficients(false);
+    first = {first_candidates().right, {}};
   }
-  return run_from(std::move(right));
+  return run_from(std::move(first.right));
 }
 
 SearchResult Search::run_from(std::vector<Explanation> candidates) {

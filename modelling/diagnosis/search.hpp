@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -68,6 +69,8 @@ struct SearchResult {
   std::vector<Weighed> weighed;  ///< the best few of every round
 };
 
+class LeftOut;
+
 /// Seeks causes in the training rows.
 class Search {
  public:
@@ -90,14 +93,16 @@ class Search {
   };
   using Settings = std::vector<const Setting*>;
 
-  using Shapes = std::vector<std::vector<double>>;
-
   /// Under each of the settings, of each shape, one an output.
   using Equations = std::vector<std::vector<std::vector<Setting::Equations>>>;
   /// Those of the grids of hypotheses that share their columns but for a factor, by pattern.
   using Patterns = std::map<std::string, Equations>;
 
-  /// Columns are made once for all settings.
+  /// Of hypotheses with as many columns and the same output. Columns are made once for all
+  /// settings.
+  [[nodiscard]] std::vector<Equations> equations_of_each(
+      const std::vector<const Hypothesis*>& hypotheses, const Shapes& shapes,
+      const std::vector<Settings>& settings) const;
   [[nodiscard]] Equations equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
                                                const std::vector<Settings>& settings) const;
   [[nodiscard]] Equations equations_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
@@ -111,10 +116,15 @@ class Search {
   [[nodiscard]] Trial trial_of(const Hypothesis& hypothesis,
                                const std::vector<Setting::Equations>& equations,
                                const Settings& settings) const;
-  /// The best of the grid under each of the settings.
-  [[nodiscard]] std::vector<Explanation> profile(const Hypothesis& hypothesis,
-                                                 const std::vector<Settings>& settings,
-                                                 Patterns& patterns) const;
+  [[nodiscard]] std::vector<Explanation> best_of_grid(const Hypothesis& hypothesis,
+                                                      const Shapes& grid,
+                                                      const Equations& equations,
+                                                      const std::vector<Settings>& settings) const;
+  /// Every hypothesis at the best point of its grid, under each of the settings.
+  [[nodiscard]] std::vector<std::vector<Explanation>> profile(
+      const std::vector<Settings>& settings) const;
+  [[nodiscard]] std::vector<Settings> profiled_settings() const;
+  [[nodiscard]] std::vector<Explanation> judged(std::vector<std::vector<Explanation>> under_each);
   [[nodiscard]] Settings likeliest_settings(const Explanation& explanation) const;
   void refine(Explanation& explanation) const;
   void settle(Explanation& explanation) const;
@@ -122,11 +132,17 @@ class Search {
   [[nodiscard]] double price(const Hypothesis& hypothesis) const;
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
   void choose(std::vector<Explanation>& candidates) const;
-  void measure_left_out(Explanation& explanation) const;
+  void measure_left_out(Explanation& explanation, LeftOut& left_out) const;
+  void measure_without();
   void accept(const std::vector<Finding>& findings, std::size_t but);
-  /// The explanations for the first finding, best first.
-  /// @param doubted  beside errors of all coefficients; holds for every later finding too
-  [[nodiscard]] std::vector<Explanation> first_candidates(bool doubted);
+  /// Best first.
+  struct BothStances {
+    std::vector<Explanation> right;          ///< the coefficients are
+    std::vector<Explanation> beside_errors;  ///< of all coefficients
+  };
+  [[nodiscard]] BothStances first_candidates();
+  /// Whether errors of all coefficients are reckoned with; holds for every later finding too.
+  void doubt(bool doubted);
   /// @param candidates  for the first finding, best first
   [[nodiscard]] SearchResult run_from(std::vector<Explanation> candidates);
   void refit(std::vector<Finding>& findings);

@@ -47,7 +47,7 @@ Column supposed_error(const Explanation& fault, const MeasuredRun& run, const Bl
     const Column factor =
         data.coefficient(run, output, *fault.hypothesis->sensor).tail(rows.end - rows.begin);
     if (!(factor.cwiseAbs().minCoeff() > 0)) continue;
-    const Eigen::MatrixXd columns = fault.hypothesis->columns(fault.shape, output);
+    const Panel columns = fault.hypothesis->columns({fault.shape}, output);
     return -columns.col(0).segment(rows.begin, rows.end - rows.begin).cwiseQuotient(factor) *
            fault.gains[output][0];
   }

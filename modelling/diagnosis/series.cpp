@@ -3,9 +3,76 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/low_pass.hpp"
-
 namespace thermocomp::diagnosis {
+namespace {
+
+/// Steps in time that differ by less are one.
+constexpr double regular_s = 1e-9;
+/// Waves are turned on by the angle of a step from row to row, and set anew so often: that keeps
+/// their phases right to rounding.
+constexpr Eigen::Index turned_rows = 64;
+
+/// The row after this one, by the angle of a step.
+THERMOCOMP_VECTORISED void turn_on(const double* sines_of_step, const double* cosines_of_step,
+                                   double* sines, double* cosines, Eigen::Index count) {
+#pragma GCC ivdep
+  for (Eigen::Index i = 0; i < count; ++i) {
+    sines[count + i] = sines[i] * cosines_of_step[i] + cosines[i] * sines_of_step[i];
+    cosines[count + i] = cosines[i] * cosines_of_step[i] - sines[i] * sines_of_step[i];
+  }
+}
+
+Panel beside_each_other(const Column& values, std::size_t times) {
+  return values.replicate(1, static_cast<Eigen::Index>(times));
+}
+
+/// LowPass over the rows [begin, end) of one step, a column each; the row before `begin` is done.
+/// @param stride  from a row to the next one in time: columns, or -columns for backwards
+THERMOCOMP_VECTORISED void low_pass(const double* shares, double* row, Eigen::Index rows,
+                                    Eigen::Index columns, Eigen::Index stride) {
+  for (Eigen::Index i = 0; i < rows; ++i, row += stride)
+#pragma GCC ivdep
+    for (Eigen::Index column = 0; column < columns; ++column) {
+      const double before = row[column - stride];
+      row[column] = before + shares[column] * (row[column] - before);
+    }
+}
+
+/// @param ahead  1: from the first row to the last; -1: from the last to the first
+void pass(const Column& time_s, const std::vector<double>& taus_s, Panel& values,
+          Eigen::Index ahead) {
+  const Eigen::Index rows = values.rows();
+  const auto place = [&](Eigen::Index i) { return ahead > 0 ? i : rows - 1 - i; };
+  const auto step_s = [&](Eigen::Index i) {
+    return std::abs(time_s[place(i)] - time_s[place(i - 1)]);
+  };
+  std::vector<double> shares(taus_s.size());
+  for (Eigen::Index i = 1; i < rows;) {
+    const double step = step_s(i);
+    const Eigen::Index begin = i;
+    while (i < rows && std::abs(step_s(i) - step) <= regular_s) ++i;
+    for (std::size_t column = 0; column < taus_s.size(); ++column)
+      shares[column] = -std::expm1(-step / taus_s[column]);
+    low_pass(shares.data(), values.data() + place(begin) * values.cols(), i - begin, values.cols(),
+             ahead * values.cols());
+  }
+}
+
+THERMOCOMP_VECTORISED void play(const double* half_widths, double* row, Eigen::Index rows,
+                                Eigen::Index columns) {
+  row += columns;
+  for (Eigen::Index i = 1; i < rows; ++i, row += columns)
+#pragma GCC ivdep
+    for (Eigen::Index column = 0; column < columns; ++column) {
+      const double low = row[column] - half_widths[column];
+      const double high = row[column] + half_widths[column];
+      const double before = row[column - columns];
+      const double raised = before < low ? low : before;
+      row[column] = raised > high ? high : raised;
+    }
+}
+
+}  // namespace
 
 Column shifted(const Column& time_s, const Column& values, double shift_s) {
   Column out(values.size());
@@ -25,10 +92,53 @@ Column shifted(const Column& time_s, const Column& values, double shift_s) {
   return out;
 }
 
-Column smoothed(const Column& time_s, const Column& values, double tau_s) {
-  const Column backwards_s = -time_s.reverse();
-  const Column there = through(LowPass(tau_s), time_s, values).reverse();
-  return through(LowPass(tau_s), backwards_s, there).reverse();
+Panel lagged(const Column& time_s, const Column& values, const std::vector<double>& taus_s) {
+  Panel out = beside_each_other(values, taus_s.size());
+  pass(time_s, taus_s, out, 1);
+  return out;
+}
+
+Panel played(const Column& values, const std::vector<double>& widths) {
+  Panel out = beside_each_other(values, widths.size());
+  std::vector<double> half_widths;
+  for (const double width : widths) half_widths.push_back(0.5 * width);
+  play(half_widths.data(), out.data(), out.rows(), out.cols());
+  return out;
+}
+
+Waves waves(const Column& time_s, const std::vector<double>& periods_s) {
+  constexpr double turn = 6.283185307179586;
+  const auto count = std::ssize(periods_s);
+  Waves all{Panel(time_s.size(), count), Panel(time_s.size(), count)};
+  const auto set = [&](double time, double* sines, double* cosines) {
+    for (std::size_t i = 0; i < periods_s.size(); ++i) {
+      const double phase = turn / periods_s[i] * time;
+      sines[i] = std::sin(phase);
+      cosines[i] = std::cos(phase);
+    }
+  };
+  std::vector<double> sines_of_step(periods_s.size());
+  std::vector<double> cosines_of_step(periods_s.size());
+  double step_s = 0.0;
+  for (Eigen::Index row = 0; row < time_s.size(); ++row) {
+    const double since_s = row > 0 ? time_s[row] - time_s[row - 1] : 0.0;
+    const bool regular = std::abs(since_s - step_s) <= regular_s;
+    if (row % turned_rows == 0 || !regular)
+      set(time_s[row], &all.sines(row, 0), &all.cosines(row, 0));
+    else
+      turn_on(sines_of_step.data(), cosines_of_step.data(), &all.sines(row - 1, 0),
+              &all.cosines(row - 1, 0), count);
+    if (regular) continue;
+    step_s = since_s;
+    set(step_s, sines_of_step.data(), cosines_of_step.data());
+  }
+  return all;
+}
+
+Panel smoothed(const Column& time_s, const Column& values, const std::vector<double>& taus_s) {
+  Panel out = lagged(time_s, values, taus_s);
+  pass(time_s, taus_s, out, -1);
+  return out;
 }
 
 Column calm(const Column& time_s, const Column& values) {
@@ -40,29 +150,34 @@ Column calm(const Column& time_s, const Column& values) {
   for (Eigen::Index row = 1; row < last; ++row)
     least += std::pow(values[row] - 0.5 * (values[row - 1] + values[row + 1]), 2);
   const double step_s = (time_s[last] - time_s[0]) / static_cast<double>(last);
-  for (const double rows : {1.0, 2.0, 4.0, 8.0}) {
-    Column smooth = smoothed(time_s, values, rows * step_s);
+  const std::vector<double> spans_rows = {1.0, 2.0, 4.0, 8.0};
+  std::vector<double> taus_s;
+  for (const double rows : spans_rows) taus_s.push_back(rows * step_s);
+  const Panel all = smoothed(time_s, values, taus_s);
+  for (std::size_t i = 0; i < spans_rows.size(); ++i) {
+    const double rows = spans_rows[i];
+    const Column smooth = all.col(static_cast<Eigen::Index>(i));
     // Weight of a value in its own smoothed one.
     const double share = -std::expm1(-1.0 / rows);
     const double own = share / (2.0 - share);
     const double left = ((values - smooth) / (1.0 - own)).segment(1, last - 1).squaredNorm();
     if (!(left < least)) continue;
     least = left;
-    best = std::move(smooth);
+    best = smooth;
   }
   return best;
 }
 
-Column slope_per_s(const Column& time_s, const Column& values, double tau_s) {
-  const Column smooth = smoothed(time_s, values, tau_s);
+Panel slopes_per_s(const Column& time_s, const Column& values, const std::vector<double>& taus_s) {
+  const Panel smooth = smoothed(time_s, values, taus_s);
   const Eigen::Index last = values.size() - 1;
-  Column slope = Column::Zero(values.size());
+  Panel slopes = Panel::Zero(smooth.rows(), smooth.cols());
   for (Eigen::Index row = 0; row <= last && last > 0; ++row) {
     const Eigen::Index low = std::max<Eigen::Index>(0, row - 1);
     const Eigen::Index high = std::min(last, row + 1);
-    slope[row] = (smooth[high] - smooth[low]) / (time_s[high] - time_s[low]);
+    slopes.row(row) = (smooth.row(high) - smooth.row(low)) / (time_s[high] - time_s[low]);
   }
-  return slope;
+  return slopes;
 }
 
 }  // namespace thermocomp::diagnosis

@@ -235,9 +235,9 @@ std::vector<Hypothesis> NetworkHypotheses::all(const std::shared_ptr<NetworkHypo
   std::vector<Hypothesis> all;
   for (std::size_t i = 0; i < self->causes_.size(); ++i) {
     all.push_back(self->causes_[i].hypothesis);
-    all.back().columns = [self, i](const Shape& shape, std::size_t output) {
+    all.back().columns = one_by_one([self, i](const Shape& shape, std::size_t output) {
       return self->columns(i, shape, output);
-    };
+    });
   }
   return all;
 }

@@ -222,7 +222,8 @@ TEST_CASE("hypotheses of one pattern have the same columns but for their scale",
     CHECK(alike[1].scale(0) == 3.0);
     REQUIRE(alike[0].shape[0].grid == alike[1].shape[0].grid);
     const std::vector<double> shape = {alike[0].shape[0].grid[7]};
-    CHECK((alike[0].columns(shape, 0) / -5.0).isApprox(alike[1].columns(shape, 0) / 3.0, 1e-12));
+    CHECK(
+        (alike[0].columns({shape}, 0) / -5.0).isApprox(alike[1].columns({shape}, 0) / 3.0, 1e-12));
   }
 }
 
