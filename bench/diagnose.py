@@ -15,6 +15,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROUNDS = 5
 HIDDEN = ("missing_heat_source", "s0_rpm")
 AGREEMENT = 1e-6
+# Not timed: little heat and wrong coefficients, which are reckoned with in all that is weighed.
+DOUBTFUL = {"heat_um_per_rpm": 0.001, "coefficient_sd": 0.3}
 
 
 def cpu_s(command, folder):
@@ -34,6 +36,20 @@ def blas():
     return " ".join(sorted(pathlib.Path(path).name for path in done.stdout.split()))
 
 
+def pairs_of_finding(finding, other):
+    pairs = []
+    if finding["cause"] == "missing_heat_source":
+        parameters, ci95 = finding["parameters"], finding["parameters_ci95"]
+        pairs += [(parameters["tau_s"], other["shape"]), (parameters["power"], other["power"]),
+                  (parameters["gain_um_per_unit"]["z_um"], other["gains"][0]),
+                  *zip(ci95["tau_s"], other["shape_ci95"]),
+                  *zip(ci95["gain_um_per_unit"]["z_um"], other["gains_ci95"][0])]
+    if finding["test_rms_um"]:
+        pairs += [(finding["test_rms_um"]["z_um"][key], other["test_rms_um"][key])
+                  for key in ("before", "after", "reduction")]
+    return pairs
+
+
 def difference(ours, numpy):
     """Largest difference of anything weighed (2 ln L, shares of left-out rows), of the findings'
     parameters and of the test rows, relative to 1 or to their size; infinite when other hypotheses
@@ -47,28 +63,45 @@ def difference(ours, numpy):
     pairs = [(a[key], b[key]) for a, b in zip(ours["weighed"], numpy["weighed"])
              for key in ("score", "left_out_gain", "log_left")]
     for finding, other in zip(ours["findings"], numpy["findings"]):
-        parameters, ci95 = finding["parameters"], finding["parameters_ci95"]
-        pairs += [(parameters["tau_s"], other["shape"]), (parameters["power"], other["power"]),
-                  (parameters["gain_um_per_unit"]["z_um"], other["gains"][0]),
-                  *zip(ci95["tau_s"], other["shape_ci95"]),
-                  *zip(ci95["gain_um_per_unit"]["z_um"], other["gains_ci95"][0]),
-                  *((finding["test_rms_um"]["z_um"][key], other["test_rms_um"][key])
-                    for key in ("before", "after", "reduction"))]
+        pairs += pairs_of_finding(finding, other)
     pairs += [(ours[part]["z_um"][key], value) for part in ("baseline", "extended")
               for key, value in numpy[part].items()]
     pairs.append((ours["unexplained_fraction"]["z_um"], numpy["unexplained_fraction"]))
     return max(abs(a - b) / max(1.0, abs(a)) for a, b in pairs)
 
 
+def commands_of(program, folder):
+    answer = str(pathlib.Path(folder) / "answer.json")
+    return {"diagnose": [program, "diagnose", "--model", "model.toml", "--weighed", "--train",
+                         "train.csv", "--test", "test.csv", "--json", answer],
+            "numpy": ["/usr/bin/python3", str(HERE / "diagnose_numpy.py"), folder]}
+
+
+def compared(folder, said):
+    """Both answers, which must be the same, and how far they are apart"""
+    ours, numpy = json.loads((pathlib.Path(folder) / "answer.json").read_text()), json.loads(said)
+    apart = difference(ours, numpy)
+    if not apart <= AGREEMENT:
+        raise SystemExit("diagnose and diagnose_numpy.py do not make the same search: largest "
+                         f"difference {apart:.1e}, at most {AGREEMENT:.0e} is allowed")
+    return numpy, apart
+
+
+def compare_doubtful(program):
+    with tempfile.TemporaryDirectory() as folder:
+        diagnose_data.write(folder, **DOUBTFUL)
+        said = [cpu_s(command, folder)[1] for command in commands_of(program, folder).values()]
+        numpy, apart = compared(folder, said[1])
+    if not numpy["coefficients_doubted"]:
+        raise SystemExit("the coefficients of the second day are not doubted")
+    return apart
+
+
 def main(program):
     print(f"numpy multiplies with {blas()}", file=sys.stderr)
     with tempfile.TemporaryDirectory() as folder:
         diagnose_data.write(folder)
-        answer = pathlib.Path(folder) / "answer.json"
-        commands = {"diagnose": [program, "diagnose", "--model", "model.toml", "--weighed",
-                                 "--train", "train.csv", "--test", "test.csv",
-                                 "--json", str(answer)],
-                    "numpy": ["/usr/bin/python3", str(HERE / "diagnose_numpy.py"), folder],
+        commands = {**commands_of(program, folder),
                     "diagnose_start": [program, "diagnose", "--help"],
                     "numpy_start": ["/usr/bin/python3", "-c", "import json, tomllib, numpy"]}
         taken, said = {name: [] for name in commands}, {}
@@ -76,16 +109,11 @@ def main(program):
             for name, command in commands.items():
                 seconds, said[name] = cpu_s(command, folder)
                 taken[name].append(seconds)
-        ours, numpy = json.loads(answer.read_text()), json.loads(said["numpy"])
-    for answer in (ours, numpy):
-        if [(f["cause"], f["subject"]) for f in answer["findings"]] != [HIDDEN]:
-            raise SystemExit("not found what was hidden: " + json.dumps(answer["findings"]))
-    apart = difference(ours, numpy)
-    if not apart <= AGREEMENT:
-        raise SystemExit("diagnose and diagnose_numpy.py do not make the same search: largest "
-                         f"difference {apart:.1e}, at most {AGREEMENT:.0e} is allowed")
+        numpy, apart = compared(folder, said["numpy"])
+    if [(f["cause"], f["subject"]) for f in numpy["findings"]] != [HIDDEN]:
+        raise SystemExit("not found what was hidden: " + json.dumps(numpy["findings"]))
+    print(f"largest_difference {max(apart, compare_doubtful(program)):.1e} ratio")
     median = {name: statistics.median(values) for name, values in taken.items()}
-    print(f"largest_difference {apart:.1e} ratio")
     for name in ("diagnose_start", "numpy_start"):
         print(f"{name}_seconds {median[name]:.3f} s")
     print(f"diagnose_seconds {median['diagnose']:.3f} s")

@@ -1,5 +1,5 @@
-"""A day of 64 channels, one row a minute: 56 temperatures, of which the model uses 48, six operating
-signals, a position and a displacement that holds heat which no sensor sees."""
+"""A day of 64 channels, one row a minute: 56 temperatures, of which the model uses 48, six
+operating signals, a position and a displacement that holds heat which no sensor sees."""
 
 import pathlib
 
@@ -33,17 +33,20 @@ def day(seed):
     return signals, position, temps
 
 
-def write(folder):
-    """train.csv, test.csv and model.toml."""
+def write(folder, heat_um_per_rpm=0.004, coefficient_sd=0.0):
+    """train.csv, test.csv and model.toml. coefficient_sd: errors of the model's coefficients, as
+    a share of each."""
     folder = pathlib.Path(folder)
     coefficients = np.random.default_rng(1).uniform(-3.0, 3.0, INPUTS)
+    errors = coefficient_sd * np.random.default_rng(5).normal(size=INPUTS)
     signals = [f"s{i}_rpm" for i in range(SIGNALS)]
     temps = [f"t{i:02d}_degC" for i in range(INPUTS + OTHERS)]
     header = ",".join(["time_s"] + signals + ["x_mm"] + temps + ["z_um"])
     for seed, name in ((2, "train.csv"), (3, "test.csv")):
         u, x, t = day(seed)
         noise = np.random.default_rng(seed + 10)
-        z = (t - t[0])[:, :INPUTS] @ coefficients + 0.004 * low_pass(u[:, 0], 2400.0)
+        z = (t - t[0])[:, :INPUTS] @ (coefficients * (1.0 + errors))
+        z = z + heat_um_per_rpm * low_pass(u[:, 0], 2400.0)
         z = z + noise.normal(0.0, 0.3, ROWS)
         t = t + noise.normal(0.0, 0.02, t.shape)
         table = np.column_stack([STEP_S * np.arange(ROWS), u, x, t, z])

@@ -78,7 +78,7 @@ class Diagnosis:
         unexplained_share, unexplained = self.unexplained_share(found), False
         if not named or 1.0 - left < 0.3:
             found, unexplained_share, unexplained = Candidates(), 1.0, self.structure_left()
-        return dict(weighed=weighed, found=found, others=others, spreads=spreads,
+        return dict(doubted=doubted, weighed=weighed, found=found, others=others, spreads=spreads,
                     unexplained=unexplained, unexplained_share=unexplained_share)
 
     def earned(self, c, first):
@@ -210,6 +210,7 @@ def main(folder):
     verdict = "effect" if findings else "unexplained" if result["unexplained"] else "none"
     print(json.dumps(dict(
         verdict=verdict, findings=findings, weighed=result["weighed"],
+        coefficients_doubted=result["doubted"],
         baseline=dict(train_rms_um=rms(train.residual), test_rms_um=rms(test.residual),
                       test_peak_um=peak(test.residual)),
         extended=dict(test_rms_um=rms(residual), test_peak_um=peak(residual)),
