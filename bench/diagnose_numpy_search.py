@@ -10,14 +10,7 @@ from diagnose_numpy_left_out import LeftOut
 from diagnose_numpy_witness import Witness
 
 SHORTLIST, POINTS, STEPS, AT_ONCE = 20, 6, 4, 128
-OUTPUT_GAIN_MIN, TIE, EQUAL = 6.0, 0.1, 1e-9
-
-
-def first_best(scores):
-    """Along the last axis. Shapes within a step of the rows give the same columns, which products
-    of matrices tell apart by rounding: the first of equals counts."""
-    most = scores.max(axis=-1, keepdims=True)
-    return np.argmax(scores >= most - EQUAL * np.maximum(1.0, np.abs(most)), axis=-1)
+OUTPUT_GAIN_MIN, TIE = 6.0, 0.1
 
 
 class Search:
@@ -80,7 +73,7 @@ class Search:
             forms = [np.full(len(subject), cause.form == form) for form in ("own", "none")]
             for chosen, setting, of in zip(lists, settings, equations):
                 score = self.trials(*of, setting, *forms, allowed)[0].reshape(n, -1)
-                best = first_best(score) + score.shape[1] * np.arange(n)
+                best = np.argmax(score, axis=1) + score.shape[1] * np.arange(n)
                 worth = score.ravel()[best] - price
                 for i in np.flatnonzero(worth > 0):
                     chosen.append((cause, i, shape[best[i]], power[best[i]], worth[i], setting))
@@ -143,9 +136,9 @@ class Search:
             step = (high - low) / (POINTS + 1)
             x = low + step * np.arange(1, POINTS + 1)[:, None]
             trial = self.weigh(c, which, value_of(x).T.ravel(), POINTS)
-            best = first_best(trial[0].reshape(-1, POINTS))
+            best = np.argmax(trial[0].reshape(-1, POINTS), axis=1)
             flat = one * POINTS + best
-            better = np.flatnonzero(trial[0][flat] > score + EQUAL * np.maximum(1.0, np.abs(score)))
+            better = np.flatnonzero(trial[0][flat] > score)
             score[better], gains[better], acts[better] = (t[flat[better]] for t in trial)
             at[better] = x[best, one][better]
             low, high = np.maximum(low, at - step), np.minimum(high, at + step)
