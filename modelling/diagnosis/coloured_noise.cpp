@@ -83,4 +83,43 @@ Panel Whitener::apply(const Panel& columns) const {
   return white;
 }
 
+// apply() with p the state that was predicted, m the state after the row, e the innovation:
+//   p = keep m_before, e = x - p, m = p + gain e, white = scale e.
+// Transposed: from the last row back, with `later` the weight of m in the rows after it.
+Panel Whitener::transposed(const Panel& white) const {
+  Panel out(white.rows(), white.cols());
+  Eigen::RowVectorXd later = Eigen::RowVectorXd::Zero(white.cols());
+  for (Eigen::Index row = white.rows() - 1; row >= 0; --row) {
+    out.row(row) = scale_[row] * white.row(row) + gain_[row] * later;
+    later = keep_[row] * (later - out.row(row));
+  }
+  return out;
+}
+
+// With `rest` the sum of squares that a unit of m leaves in the rows after it, a unit of x in a row
+// leaves scale^2 + gain^2 rest, and units of x in two rows leave a product that is a factor of the
+// earlier row times one of the later, both carried along by keep (1 - gain).
+Eigen::MatrixXd Whitener::squares_from_rows(const Panel& whole,
+                                            const std::vector<Eigen::Index>& first_rows) const {
+  Eigen::MatrixXd squares(std::ssize(first_rows), whole.cols());
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(whole.cols());
+  Eigen::RowVectorXd later = Eigen::RowVectorXd::Zero(whole.cols());
+  double rest = 0.0;
+  Eigen::Index row = whole.rows();
+  for (std::size_t i = first_rows.size(); i-- > 0;) {
+    while (row > first_rows[i]) {
+      --row;
+      const double scale = scale_[row] * scale_[row];
+      const double gain = gain_[row];
+      const double of_later = (1.0 - gain) * gain * rest - scale;
+      sum.array() += whole.row(row).array() *
+                     ((scale + gain * gain * rest) * whole.row(row) + 2.0 * gain * later).array();
+      later = keep_[row] * (of_later * whole.row(row) + (1.0 - gain) * later);
+      rest = keep_[row] * keep_[row] * (scale + (1.0 - gain) * (1.0 - gain) * rest);
+    }
+    squares.row(static_cast<Eigen::Index>(i)) = sum;
+  }
+  return squares;
+}
+
 }  // namespace thermocomp::diagnosis

@@ -34,6 +34,13 @@ class Whitener {
   [[nodiscard]] Eigen::VectorXd apply(const Eigen::VectorXd& column) const;
   /// The same for every column at once.
   [[nodiscard]] Panel apply(const Panel& columns) const;
+  /// The transposed of what apply() does: white' apply(x) = transposed(white)' x.
+  [[nodiscard]] Panel transposed(const Panel& white) const;
+  /// Sums of squares of whitened columns that are those of `whole` from a row on and zero before,
+  /// without whitening each: shape (first rows, columns of whole).
+  /// @param first_rows  ascending, one at least
+  [[nodiscard]] Eigen::MatrixXd squares_from_rows(
+      const Panel& whole, const std::vector<Eigen::Index>& first_rows) const;
   /// Logarithm of the determinant of the covariance, sigma = 1.
   [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
 

@@ -118,23 +118,55 @@ Eigen::VectorXd Setting::Equations::gains() const {
   return Eigen::VectorXd::Constant(1, square(0, 0) > 0 ? right[0] / square(0, 0) : 0.0);
 }
 
+std::vector<std::vector<std::size_t>> Setting::alike(const std::vector<const Setting*>& settings) {
+  std::vector<std::vector<std::size_t>> all;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const auto known = std::find_if(all.begin(), all.end(), [&](const auto& group) {
+      return settings[group.front()]->whitener_ == settings[i]->whitener_;
+    });
+    if (known == all.end())
+      all.push_back({i});
+    else
+      known->push_back(i);
+  }
+  for (auto& group : all)
+    std::sort(group.begin(), group.end(), [&](std::size_t a, std::size_t b) {
+      return settings[a]->against_.cols() > settings[b]->against_.cols();
+    });
+  return all;
+}
+
 std::vector<std::vector<Setting::Equations>> Setting::equations_of_groups(
     const std::vector<const Setting*>& settings, const Panel& columns, Eigen::Index width) {
   std::vector<std::vector<Equations>> all(settings.size());
-  for (std::size_t first = 0; first < settings.size(); ++first) {
-    if (!all[first].empty()) continue;
-    std::vector<std::size_t> alike;
-    for (std::size_t i = first; i < settings.size(); ++i)
-      if (settings[i]->whitener_ == settings[first]->whitener_) alike.push_back(i);
-    const auto most =
-        std::max_element(alike.begin(), alike.end(), [&](std::size_t a, std::size_t b) {
-          return settings[a]->against_.cols() < settings[b]->against_.cols();
-        });
-    const Panel white = settings[first]->whitener_->apply(columns);
-    const Eigen::MatrixXd products =
-        cross_products(settings[*most]->against_, white, 0, white.rows());
+  for (const std::vector<std::size_t>& group : alike(settings)) {
+    const Setting& most = *settings[group.front()];
+    const Panel white = most.whitener_->apply(columns);
+    const Eigen::MatrixXd products = cross_products(most.against_, white, 0, white.rows());
     const Eigen::MatrixXd own = neighbour_products(white, width, 0, white.rows());
-    for (const std::size_t i : alike) all[i] = settings[i]->without_common(products, own);
+    for (const std::size_t i : group) all[i] = settings[i]->without_common(products, own);
+  }
+  return all;
+}
+
+std::vector<std::vector<std::vector<Setting::Equations>>> Setting::equations_from_rows(
+    const std::vector<const Setting*>& settings, const Panel& whole,
+    const std::vector<Eigen::Index>& first_rows) {
+  std::vector<std::vector<std::vector<Equations>>> all(
+      settings.size(), std::vector<std::vector<Equations>>(first_rows.size()));
+  for (const std::vector<std::size_t>& group : alike(settings)) {
+    const Setting& most = *settings[group.front()];
+    const Panel against = most.whitener_->transposed(most.against_);
+    const Eigen::MatrixXd own = most.whitener_->squares_from_rows(whole, first_rows);
+    Eigen::MatrixXd products = Eigen::MatrixXd::Zero(against.cols(), whole.cols());
+    Eigen::Index end = whole.rows();
+    for (std::size_t row = first_rows.size(); row-- > 0;) {
+      products += cross_products(against, whole, first_rows[row], end);
+      end = first_rows[row];
+      for (const std::size_t i : group)
+        all[i][row] =
+            settings[i]->without_common(products, own.row(static_cast<Eigen::Index>(row)));
+    }
   }
   return all;
 }

@@ -51,6 +51,11 @@ class Setting {
   /// The same for several groups of `width` columns each, side by side, under each of the settings.
   [[nodiscard]] static std::vector<std::vector<Equations>> equations_of_groups(
       const std::vector<const Setting*>& settings, const Panel& columns, Eigen::Index width);
+  /// Of single columns that are those of `whole` from a row on and zero before, under each of the
+  /// settings: [setting][row][column].
+  [[nodiscard]] static std::vector<std::vector<std::vector<Equations>>> equations_from_rows(
+      const std::vector<const Setting*>& settings, const Panel& whole,
+      const std::vector<Eigen::Index>& first_rows);
   [[nodiscard]] double squares() const noexcept { return squares_; }
   [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
   [[nodiscard]] double present_rows() const noexcept { return present_rows_; }
@@ -63,6 +68,9 @@ class Setting {
 
  private:
   void reckon();
+  /// Places of the settings that share a whitener, those with the most common columns first.
+  [[nodiscard]] static std::vector<std::vector<std::size_t>> alike(
+      const std::vector<const Setting*>& settings);
   /// @param products  against' columns; more of them count for settings of more common columns
   /// @param own  neighbour_products of the columns
   [[nodiscard]] std::vector<Equations> without_common(const Eigen::MatrixXd& products,

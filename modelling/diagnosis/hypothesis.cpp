@@ -233,6 +233,12 @@ void Catalogue::add_swaps(std::size_t input) {
     if (!(names[input] < names[other])) continue;
     Hypothesis& swap = add({"sensor_swap", names[input] + "|" + names[other], Form::no_gain});
     swap.in_every_output = true;
+    if (data_.model.guideways.empty())
+      swap.of_readings = [this, input, other](std::size_t output) {
+        const auto& coefficients = data_.model.matrix_um_per_K[output];
+        const double weight = coefficients[input] - coefficients[other];
+        return std::vector<ReadingShare>{{other, weight}, {input, -weight}};
+      };
     swap.columns = one_by_one([this, input, other](const Shape&, std::size_t output) {
       return stacked([&](const MeasuredRun& run) -> Column {
         const Column weight =
@@ -497,11 +503,15 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
       return of.inputs_degC[static_cast<std::size_t>(room)] - of.inputs_degC[input];
     return of.inputs_degC[input][0] - of.inputs_degC[input].array();
   };
-  loose.columns = [this, run, missing_um, lost_K](const Shapes& shapes, std::size_t output) {
-    return since(run, shapes, [&](const MeasuredRun& of) -> Column {
+  const auto whole = [missing_um, lost_K](std::size_t output) {
+    return [missing_um, lost_K, output](const MeasuredRun& of) -> Column {
       return missing_um(of, output).cwiseProduct(lost_K(of));
-    });
+    };
   };
+  loose.columns = [this, run, whole](const Shapes& shapes, std::size_t output) {
+    return since(run, shapes, whole(output));
+  };
+  loose.from_onset = [this, run, whole](std::size_t output) { return in_run(run, whole(output)); };
   loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
 }
 

@@ -40,6 +40,11 @@ struct StackedRows {
 };
 [[nodiscard]] StackedRows stacked_rows(const MeasuredData& data);
 
+struct ReadingShare {
+  std::size_t input{0};
+  double weight{0.0};
+};
+
 struct Hypothesis {
   std::string cause{};
   std::string subject{};
@@ -55,6 +60,12 @@ struct Hypothesis {
   /// Columns for an output over the stacked rows, those of one shape after those of another, shape
   /// (rows, shapes times gains or 1).
   std::function<Panel(const Shapes& shapes, std::size_t output)> columns{};
+  /// How the same columns come from others that many hypotheses share; both may be empty.
+  /// Of the model's calm readings: how much of which for an output.
+  std::function<std::vector<ReadingShare>(std::size_t output)> of_readings{};
+  /// Of a column of the output: it counts from the shape's one time on in `run`, before it is zero.
+  /// Hypotheses of one cause and run have the same times.
+  std::function<Column(std::size_t output)> from_onset{};
   /// Hypotheses of one pattern have the same grid and the same columns, each times its scale for
   /// the output; empty: it shares its columns with none.
   std::string pattern{};

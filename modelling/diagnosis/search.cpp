@@ -25,6 +25,26 @@ constexpr double tie_share = 0.1;
 constexpr double doubt_share = 0.2;
 constexpr std::size_t weighed_shown = 12;
 
+/// @param equations  [setting][explanation]
+const Setting* likeliest_of(const std::vector<const Setting*>& settings,
+                            const std::vector<std::vector<Setting::Equations>>& equations,
+                            std::size_t place, const Explanation& explanation, std::size_t output) {
+  const Setting* likeliest = settings.front();
+  double best = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const Setting::Equations& of = equations[i][place];
+    const Eigen::VectorXd gains =
+        explanation.hypothesis->form == Form::own_gains ? of.gains() : explanation.gains[output];
+    const double squares =
+        settings[i]->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
+    const double likelihood = settings[i]->twice_log_likelihood(squares);
+    if (!(likelihood > best)) continue;
+    best = likelihood;
+    likeliest = settings[i];
+  }
+  return likeliest;
+}
+
 }  // namespace
 
 Search::Search(const MeasuredData& data, const Thresholds& thresholds)
@@ -37,6 +57,14 @@ Search::Search(const MeasuredData& data, const Thresholds& thresholds,
       rows_(stacked_rows(data)),
       hypotheses_(std::move(hypotheses)),
       accepted_(std::move(accepted)) {
+  readings_.resize(rows_.time_s.size(), std::ssize(data.model.inputs));
+  for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    const Block& block = rows_.runs[i];
+    const Eigen::Index count = block.end - block.begin;
+    for (std::size_t input = 0; input < data.runs[i].calm_inputs_K.size(); ++input)
+      readings_.col(static_cast<Eigen::Index>(input)).segment(block.begin, count) =
+          data.runs[i].calm_inputs_K[input].tail(count);
+  }
   for (std::size_t output = 0; output < data.model.outputs.size(); ++output) {
     outputs_.emplace_back(data, rows_, output);
     if (outputs_.back().measured()) measured_.push_back(output);
@@ -61,28 +89,31 @@ bool Search::acts(const Explanation& explanation) {
                      [](const Eigen::VectorXd& gains) { return gains.size() > 0; });
 }
 
-Search::Settings Search::likeliest_settings(const Explanation& explanation) const {
-  Settings settings = explanation.settings;
+/// Each explanation's noise becomes the one under which it is likeliest, gains fitted anew where
+/// they are its own.
+void Search::take_likeliest_settings(const std::vector<Explanation*>& explanations) const {
   for (const std::size_t output : measured_) {
-    if (!concerns(*explanation.hypothesis, output)) continue;
-    const Eigen::MatrixXd columns =
-        columns_of(*explanation.hypothesis, explanation.shape, outputs_[output]);
-    const Eigen::VectorXd& fixed = explanation.gains[output];
-    double best = -std::numeric_limits<double>::infinity();
-    for (const auto& setting : outputs_[output].settings()) {
-      const Setting::Equations of = setting->equations(columns);
-      Eigen::VectorXd gains = fixed;
-      if (explanation.hypothesis->form == Form::own_gains) gains = of.gains();
-      if (gains.size() == 0) continue;
-      const double squares =
-          setting->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
-      const double likelihood = setting->twice_log_likelihood(squares);
-      if (!(likelihood > best)) continue;
-      best = likelihood;
-      settings[output] = setting.get();
+    std::map<std::size_t, std::vector<Explanation*>> by_gains;
+    for (Explanation* each : explanations)
+      if (concerns(*each->hypothesis, output) &&
+          (each->hypothesis->form == Form::own_gains || each->gains[output].size() > 0))
+        by_gains[each->hypothesis->gains.size()].push_back(each);
+    std::vector<const Setting*> settings;
+    for (const auto& setting : outputs_[output].settings()) settings.push_back(setting.get());
+    for (const auto& [gains, alike] : by_gains) {
+      Panel columns;
+      for (std::size_t i = 0; i < alike.size(); ++i) {
+        const Panel of =
+            columns_of(*alike[i]->hypothesis, Shapes{alike[i]->shape}, outputs_[output]);
+        if (i == 0) columns.resize(of.rows(), of.cols() * std::ssize(alike));
+        columns.middleCols(of.cols() * static_cast<Eigen::Index>(i), of.cols()) = of;
+      }
+      const auto equations =
+          Setting::equations_of_groups(settings, columns, columns.cols() / std::ssize(alike));
+      for (std::size_t i = 0; i < alike.size(); ++i)
+        alike[i]->settings[output] = likeliest_of(settings, equations, i, *alike[i], output);
     }
   }
-  return settings;
 }
 
 void Search::refine(Explanation& explanation) const {
@@ -125,26 +156,29 @@ void Search::refine(Explanation& explanation) const {
   }
 }
 
-void Search::settle(Explanation& explanation) const {
-  const Hypothesis& hypothesis = *explanation.hypothesis;
+/// Shapes, noise and gains of explanations whose shapes are near the peak.
+void Search::settle(std::vector<Explanation*> explanations) const {
   // Near the peak first: under wandering noise a jump that is a few rows off explains nothing.
-  refine(explanation);
+  for (Explanation* each : explanations) refine(*each);
   for (int round = 0; round < 2; ++round) {
-    explanation.settings = likeliest_settings(explanation);
-    explanation.gains = weigh(hypothesis, explanation.shape, explanation.settings).gains;
-    if (!acts(explanation)) return;
-    refine(explanation);
+    take_likeliest_settings(explanations);
+    for (Explanation* each : explanations)
+      each->gains = weigh(*each->hypothesis, each->shape, each->settings).gains;
+    std::erase_if(explanations, [](const Explanation* each) { return !acts(*each); });
+    for (Explanation* each : explanations) refine(*each);
   }
-  Trial trial = weigh(hypothesis, explanation.shape, explanation.settings);
-  explanation.gains = std::move(trial.gains);
-  explanation.score = trial.score - price(hypothesis);
-  // The other noise has a price too: what counts is against the likeliest without the hypothesis.
-  for (const std::size_t output : measured_) {
-    if (explanation.gains[output].size() == 0) continue;
-    const Setting& without = outputs_[output].setting();
-    const Setting& with = *explanation.settings[output];
-    explanation.score +=
-        with.twice_log_likelihood(with.squares()) - without.twice_log_likelihood(without.squares());
+  for (Explanation* each : explanations) {
+    Trial trial = weigh(*each->hypothesis, each->shape, each->settings);
+    each->gains = std::move(trial.gains);
+    each->score = trial.score - price(*each->hypothesis);
+    // The other noise has a price too: what counts is against the likeliest without the hypothesis.
+    for (const std::size_t output : measured_) {
+      if (each->gains[output].size() == 0) continue;
+      const Setting& without = outputs_[output].setting();
+      const Setting& with = *each->settings[output];
+      each->score += with.twice_log_likelihood(with.squares()) -
+                     without.twice_log_likelihood(without.squares());
+    }
   }
 }
 
@@ -154,7 +188,7 @@ void Search::settle_anew(Explanation& explanation) const {
   for (const std::size_t output : measured_)
     explanation.settings[output] = outputs_[output].settings().front().get();
   explanation.gains = weigh(*explanation.hypothesis, explanation.shape, explanation.settings).gains;
-  settle(explanation);
+  settle({&explanation});
 }
 
 std::vector<Explanation> Search::ranked() {
@@ -170,8 +204,10 @@ std::vector<Explanation> Search::judged(std::vector<std::vector<Explanation>> un
     all.resize(std::min(all.size(), shortlist_of_each));
     candidates.insert(candidates.end(), all.begin(), all.end());
   }
+  std::vector<Explanation*> all;
+  for (Explanation& candidate : candidates) all.push_back(&candidate);
+  settle(std::move(all));
   for (Explanation& candidate : candidates) {
-    settle(candidate);
     if (candidate.hypothesis->sensor) candidate.score += sensor_says(data_, rows_, candidate);
   }
   std::sort(candidates.begin(), candidates.end(),

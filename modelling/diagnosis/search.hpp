@@ -98,13 +98,21 @@ class Search {
   /// Those of the grids of hypotheses that share their columns but for a factor, by pattern.
   using Patterns = std::map<std::string, Equations>;
 
+  using Group = std::vector<const Hypothesis*>;
+
+  [[nodiscard]] std::vector<Equations> no_equations(std::size_t hypotheses, std::size_t shapes,
+                                                    std::size_t settings) const;
   /// Of hypotheses with as many columns and the same output. Columns are made once for all
   /// settings.
   [[nodiscard]] std::vector<Equations> equations_of_each(
-      const std::vector<const Hypothesis*>& hypotheses, const Shapes& shapes,
-      const std::vector<Settings>& settings) const;
+      const Group& hypotheses, const Shapes& shapes, const std::vector<Settings>& settings) const;
   [[nodiscard]] Equations equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
                                                const std::vector<Settings>& settings) const;
+  [[nodiscard]] std::vector<Equations> equations_of_readings(
+      const Group& hypotheses, const std::vector<Settings>& settings) const;
+  /// Of hypotheses of one cause and run, over their grid.
+  [[nodiscard]] std::vector<Equations> equations_from_onset(
+      const Group& hypotheses, const std::vector<Settings>& settings) const;
   [[nodiscard]] Equations equations_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
                                             const std::vector<Settings>& settings,
                                             Patterns& patterns) const;
@@ -125,9 +133,9 @@ class Search {
       const std::vector<Settings>& settings) const;
   [[nodiscard]] std::vector<Settings> profiled_settings() const;
   [[nodiscard]] std::vector<Explanation> judged(std::vector<std::vector<Explanation>> under_each);
-  [[nodiscard]] Settings likeliest_settings(const Explanation& explanation) const;
+  void take_likeliest_settings(const std::vector<Explanation*>& explanations) const;
   void refine(Explanation& explanation) const;
-  void settle(Explanation& explanation) const;
+  void settle(std::vector<Explanation*> explanations) const;
   void settle_anew(Explanation& explanation) const;
   [[nodiscard]] double price(const Hypothesis& hypothesis) const;
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
@@ -161,6 +169,7 @@ class Search {
   const MeasuredData& data_;
   Thresholds thresholds_;
   StackedRows rows_;
+  Panel readings_;  ///< the model's calm readings over the stacked rows
   std::vector<Hypothesis> hypotheses_;
   std::vector<OutputEvidence> outputs_;
   std::vector<std::size_t> measured_;     ///< outputs with values

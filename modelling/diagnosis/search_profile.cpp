@@ -39,6 +39,13 @@ Panel side_by_side(const std::vector<const Hypothesis*>& hypotheses, const Shape
   return all;
 }
 
+std::vector<const Setting*> of_output(const std::vector<std::vector<const Setting*>>& settings,
+                                      std::size_t output) {
+  std::vector<const Setting*> all;
+  for (const auto& each : settings) all.push_back(each[output]);
+  return all;
+}
+
 }  // namespace
 
 Search::Equations Search::equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
@@ -47,12 +54,9 @@ Search::Equations Search::equations_under_each(const Hypothesis& hypothesis, con
 }
 
 std::vector<Search::Equations> Search::equations_of_each(
-    const std::vector<const Hypothesis*>& hypotheses, const Shapes& shapes,
-    const std::vector<Settings>& settings) const {
-  using OfShapes = Equations::value_type;
-  std::vector<Equations> equations(
-      hypotheses.size(),
-      Equations(settings.size(), OfShapes(shapes.size(), OfShapes::value_type(outputs_.size()))));
+    const Group& hypotheses, const Shapes& shapes, const std::vector<Settings>& settings) const {
+  std::vector<Equations> equations =
+      no_equations(hypotheses.size(), shapes.size(), settings.size());
   for (std::size_t first = 0; first < shapes.size(); first += shapes_at_once) {
     const Shapes some(shapes.begin() + static_cast<std::ptrdiff_t>(first),
                       shapes.begin() + static_cast<std::ptrdiff_t>(
@@ -62,9 +66,7 @@ std::vector<Search::Equations> Search::equations_of_each(
       const Panel columns = side_by_side(hypotheses, some, outputs_[output]);
       const std::size_t groups = some.size() * hypotheses.size();
       const Eigen::Index width = columns.cols() / static_cast<Eigen::Index>(groups);
-      std::vector<const Setting*> of_output;
-      for (const Settings& each : settings) of_output.push_back(each[output]);
-      auto all = Setting::equations_of_groups(of_output, columns, width);
+      auto all = Setting::equations_of_groups(of_output(settings, output), columns, width);
       for (std::size_t under = 0; under < settings.size(); ++under)
         for (std::size_t i = 0; i < groups; ++i)
           equations[i / some.size()][under][first + i % some.size()][output] =
@@ -177,7 +179,8 @@ std::vector<Explanation> Search::best_of_grid(const Hypothesis& hypothesis, cons
   return bests;
 }
 
-/// Hypotheses with one shape are weighed many at once; their columns must be as many.
+/// What follows from columns that many hypotheses share is weighed with these; of the others those
+/// with one shape many at once, the rest one grid after another.
 std::vector<std::vector<Explanation>> Search::profile(const std::vector<Settings>& settings) const {
   std::vector<std::vector<Explanation>> under_each(settings.size());
   const auto keep = [&](const Hypothesis& hypothesis, const Shapes& grid,
@@ -186,27 +189,93 @@ std::vector<std::vector<Explanation>> Search::profile(const std::vector<Settings
     for (std::size_t under = 0; under < settings.size(); ++under)
       if (bests[under].score > 0) under_each[under].push_back(std::move(bests[under]));
   };
+  Group of_readings;
+  std::map<std::pair<std::string, std::size_t>, Group> from_onset;
+  std::map<std::pair<std::size_t, std::optional<std::size_t>>, Group> lone;
   Patterns patterns;
-  std::map<std::pair<std::size_t, std::optional<std::size_t>>, std::vector<const Hypothesis*>> lone;
-  const auto weigh_lone = [&](std::vector<const Hypothesis*>& some) {
-    if (some.empty()) return;
-    const Shapes grid = {{}};
-    const std::vector<Equations> equations = equations_of_each(some, grid, settings);
-    for (std::size_t i = 0; i < some.size(); ++i) keep(*some[i], grid, equations[i]);
-    some.clear();
-  };
   for (const Hypothesis& hypothesis : hypotheses_) {
-    if (hypothesis.shape.empty()) {
-      auto& some = lone[{hypothesis.gains.size(), hypothesis.output}];
-      some.push_back(&hypothesis);
-      if (some.size() == shapes_at_once) weigh_lone(some);
-      continue;
-    }
-    const Shapes grid = grid_of(hypothesis);
-    keep(hypothesis, grid, equations_of_grid(hypothesis, grid, settings, patterns));
+    if (hypothesis.of_readings)
+      of_readings.push_back(&hypothesis);
+    else if (hypothesis.from_onset)
+      from_onset[{hypothesis.cause, *hypothesis.run}].push_back(&hypothesis);
+    else if (hypothesis.shape.empty())
+      lone[{hypothesis.gains.size(), hypothesis.output}].push_back(&hypothesis);
+    else
+      keep(hypothesis, grid_of(hypothesis),
+           equations_of_grid(hypothesis, grid_of(hypothesis), settings, patterns));
   }
-  for (auto& [alike, some] : lone) weigh_lone(some);
+  const auto keep_all = [&](const Group& group, const Shapes& grid,
+                            const std::vector<Equations>& equations) {
+    for (std::size_t i = 0; i < group.size(); ++i) keep(*group[i], grid, equations[i]);
+  };
+  keep_all(of_readings, {{}}, equations_of_readings(of_readings, settings));
+  for (const auto& [alike, group] : from_onset)
+    keep_all(group, grid_of(*group.front()), equations_from_onset(group, settings));
+  for (const auto& [alike, group] : lone)
+    for (std::size_t first = 0; first < group.size(); first += shapes_at_once) {
+      const Group some(group.begin() + static_cast<std::ptrdiff_t>(first),
+                       group.begin() + static_cast<std::ptrdiff_t>(
+                                           std::min(first + shapes_at_once, group.size())));
+      keep_all(some, {{}}, equations_of_each(some, {{}}, settings));
+    }
   return under_each;
+}
+
+std::vector<Search::Equations> Search::equations_of_readings(
+    const Group& hypotheses, const std::vector<Settings>& settings) const {
+  std::vector<Equations> equations = no_equations(hypotheses.size(), 1, settings.size());
+  if (hypotheses.empty()) return equations;
+  for (const std::size_t output : measured_) {
+    const auto all =
+        Setting::equations_of_groups(of_output(settings, output), readings_, readings_.cols());
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      const std::vector<ReadingShare> shares = hypotheses[i]->of_readings(output);
+      for (std::size_t under = 0; under < settings.size(); ++under) {
+        const Setting::Equations& of = all[under].front();
+        double square = 0.0;
+        double right = 0.0;
+        for (const ReadingShare& a : shares) {
+          const auto row = static_cast<Eigen::Index>(a.input);
+          right += a.weight * of.right[row];
+          for (const ReadingShare& b : shares)
+            square += a.weight * b.weight * of.square(row, static_cast<Eigen::Index>(b.input));
+        }
+        equations[i][under].front()[output] = {Eigen::MatrixXd::Constant(1, 1, square),
+                                               Eigen::VectorXd::Constant(1, right)};
+      }
+    }
+  }
+  return equations;
+}
+
+std::vector<Search::Equations> Search::equations_from_onset(
+    const Group& hypotheses, const std::vector<Settings>& settings) const {
+  const std::vector<double>& onsets_s = hypotheses.front()->shape.front().grid;
+  std::vector<Equations> equations =
+      no_equations(hypotheses.size(), onsets_s.size(), settings.size());
+  const Block& run = rows_.runs[*hypotheses.front()->run];
+  const double* const time_s = rows_.time_s.data();
+  std::vector<Eigen::Index> first_rows;
+  for (const double onset_s : onsets_s)
+    first_rows.push_back(std::lower_bound(time_s + run.begin, time_s + run.end, onset_s) - time_s);
+  Panel whole(rows_.time_s.size(), std::ssize(hypotheses));
+  for (const std::size_t output : measured_) {
+    for (std::size_t i = 0; i < hypotheses.size(); ++i)
+      whole.col(static_cast<Eigen::Index>(i)) = hypotheses[i]->from_onset(output);
+    auto all = Setting::equations_from_rows(of_output(settings, output), whole, first_rows);
+    for (std::size_t i = 0; i < hypotheses.size(); ++i)
+      for (std::size_t under = 0; under < settings.size(); ++under)
+        for (std::size_t onset = 0; onset < onsets_s.size(); ++onset)
+          equations[i][under][onset][output] = std::move(all[under][onset][i]);
+  }
+  return equations;
+}
+
+std::vector<Search::Equations> Search::no_equations(std::size_t hypotheses, std::size_t shapes,
+                                                    std::size_t settings) const {
+  using OfShapes = Equations::value_type;
+  return std::vector<Equations>(
+      hypotheses, Equations(settings, OfShapes(shapes, OfShapes::value_type(outputs_.size()))));
 }
 
 /// The likeliest noise without any hypothesis, and white noise where that is another.

@@ -1,6 +1,7 @@
 #include "modelling/diagnosis/series.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace thermocomp::diagnosis {
@@ -26,16 +27,31 @@ Panel beside_each_other(const Column& values, std::size_t times) {
   return values.replicate(1, static_cast<Eigen::Index>(times));
 }
 
-/// LowPass over the rows [begin, end) of one step, a column each; the row before `begin` is done.
+/// Neighbouring columns through LowPass, whose recursions run side by side; the row before the
+/// first one is done.
 /// @param stride  from a row to the next one in time: columns, or -columns for backwards
+template <std::size_t lanes>
+[[gnu::always_inline]] inline void low_pass_lanes(const double* shares, double* row,
+                                                  Eigen::Index rows, Eigen::Index stride) {
+  std::array<double, lanes> state{};
+  std::array<double, lanes> share{};
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    state[lane] = (row - stride)[lane];
+    share[lane] = shares[lane];
+  }
+  for (Eigen::Index i = 0; i < rows; ++i, row += stride)
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      state[lane] += share[lane] * (row[lane] - state[lane]);
+      row[lane] = state[lane];
+    }
+}
+
 THERMOCOMP_VECTORISED void low_pass(const double* shares, double* row, Eigen::Index rows,
                                     Eigen::Index columns, Eigen::Index stride) {
-  for (Eigen::Index i = 0; i < rows; ++i, row += stride)
-#pragma GCC ivdep
-    for (Eigen::Index column = 0; column < columns; ++column) {
-      const double before = row[column - stride];
-      row[column] = before + shares[column] * (row[column] - before);
-    }
+  Eigen::Index at = 0;
+  for (; at + 16 <= columns; at += 16) low_pass_lanes<16>(shares + at, row + at, rows, stride);
+  for (; at + 4 <= columns; at += 4) low_pass_lanes<4>(shares + at, row + at, rows, stride);
+  for (; at < columns; ++at) low_pass_lanes<1>(shares + at, row + at, rows, stride);
 }
 
 /// @param ahead  1: from the first row to the last; -1: from the last to the first

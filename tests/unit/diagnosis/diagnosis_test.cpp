@@ -227,6 +227,44 @@ TEST_CASE("hypotheses of one pattern have the same columns but for their scale",
   }
 }
 
+TEST_CASE("columns that come from shared ones are those that a hypothesis makes itself",
+          "[diagnosis]") {
+  ThermalModel model = one_input();
+  model.inputs.emplace_back("t2_degC");
+  model.matrix_um_per_K = {{5.0, -3.0}};
+  RunFile run = run_with(1, 300, [](double, double, int) { return 0.0; });
+  run.columns.emplace_back("t2_degC");
+  run.values.push_back(run.values[1]);
+  for (double& degC : run.values.back()) degC = 20.0 + 0.3 * (degC - 20.0) * (degC - 20.0);
+  const MeasuredData data =
+      measured_data(model, {run, run}, {"a", "b"}, shared_columns(model, {run, run}));
+  const StackedRows rows = stacked_rows(data);
+  std::map<std::string, int> seen;
+  for (const Hypothesis& each : hypotheses(data, rows)) {
+    CAPTURE(each.cause, each.subject);
+    if (each.of_readings) {
+      Column sum = Column::Zero(rows.time_s.size());
+      for (const ReadingShare& share : each.of_readings(0))
+        for (std::size_t i = 0; i < rows.runs.size(); ++i)
+          sum.segment(rows.runs[i].begin, rows.runs[i].end - rows.runs[i].begin) +=
+              share.weight * data.runs[i].calm_inputs_K[share.input];
+      CHECK((sum - each.columns({{}}, 0).col(0)).norm() < 1e-9);
+      ++seen[each.cause];
+    }
+    if (each.from_onset) {
+      const double onset_s = each.shape.front().grid[20];
+      const Block& block = rows.runs[*each.run];
+      Column begun = each.from_onset(0);
+      for (Eigen::Index row = 0; row < begun.size(); ++row)
+        if (row < block.begin || row >= block.end || rows.time_s[row] < onset_s) begun[row] = 0.0;
+      REQUIRE(begun.norm() > 0);
+      CHECK(begun == each.columns({{onset_s}}, 0).col(0));
+      ++seen[each.cause];
+    }
+  }
+  CHECK(seen == std::map<std::string, int>{{"sensor_loose", 4}, {"sensor_swap", 1}});
+}
+
 TEST_CASE("a reading is calmed of its noise, and left alone where it has none", "[diagnosis]") {
   const Eigen::Index n = 400;
   std::mt19937 random(5);

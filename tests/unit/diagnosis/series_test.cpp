@@ -35,6 +35,13 @@ nanoseconds at(double time_s) {
   return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
 }
 
+/// Seven rows are missing, the others are two blocks.
+Whitener with_gap_and_blocks(const Series& series) {
+  Eigen::Array<bool, Eigen::Dynamic, 1> present(series.time_s.size());
+  for (Eigen::Index row = 0; row < present.size(); ++row) present[row] = row < 40 || row > 46;
+  return {{4.0, 3600.0}, series.time_s, {{0, 150}, {150, 300}}, present};
+}
+
 }  // namespace
 
 TEST_CASE("lags of many time constants are those of the estimator", "[diagnosis]") {
@@ -76,10 +83,7 @@ TEST_CASE("waves keep their phase over uneven rows", "[diagnosis]") {
 
 TEST_CASE("a column is whitened alike alone and among any number of others", "[diagnosis]") {
   const Series series = uneven();
-  Eigen::Array<bool, Eigen::Dynamic, 1> present(series.time_s.size());
-  for (Eigen::Index row = 0; row < present.size(); ++row) present[row] = row < 40 || row > 46;
-  const std::vector<Block> blocks = {{0, 150}, {150, 300}};
-  const Whitener whitener({4.0, 3600.0}, series.time_s, blocks, present);
+  const Whitener whitener = with_gap_and_blocks(series);
   const Column alone = whitener.apply(series.values);
   for (const Eigen::Index count : {1, 3, 23, 32}) {
     Panel many = Panel::Random(series.time_s.size(), count);
@@ -101,6 +105,32 @@ TEST_CASE("products of panels are those of their columns", "[diagnosis]") {
       const double next = column + 1 < count ? own(column, column + 1) : 0.0;
       CHECK(std::abs(neighbours(1, column) - next) < 1e-10);
     }
+  }
+}
+
+TEST_CASE("whitening transposed gives the same products", "[diagnosis]") {
+  const Series series = uneven();
+  const Whitener whitener = with_gap_and_blocks(series);
+  const Panel a = Panel::Random(series.time_s.size(), 3);
+  const Panel b = Panel::Random(series.time_s.size(), 5);
+  const Eigen::MatrixXd expected = a.transpose() * whitener.apply(b);
+  CHECK((whitener.transposed(a).transpose() * b - expected).norm() < 1e-12 * expected.norm());
+}
+
+TEST_CASE("columns that begin at a row have the squares of each whitened for itself",
+          "[diagnosis]") {
+  const Series series = uneven();
+  const Whitener whitener = with_gap_and_blocks(series);
+  const Panel whole = Panel::Random(series.time_s.size(), 4);
+  const std::vector<Eigen::Index> first_rows = {0, 1, 43, 149, 150, 151, 299, 300};
+  const Eigen::MatrixXd squares = whitener.squares_from_rows(whole, first_rows);
+  for (std::size_t i = 0; i < first_rows.size(); ++i) {
+    Panel from_row = whole;
+    from_row.topRows(first_rows[i]).setZero();
+    const Panel white = whitener.apply(from_row);
+    for (Eigen::Index column = 0; column < whole.cols(); ++column)
+      CHECK(std::abs(squares(static_cast<Eigen::Index>(i), column) -
+                     white.col(column).squaredNorm()) < 1e-10);
   }
 }
 
