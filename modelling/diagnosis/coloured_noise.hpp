@@ -34,6 +34,8 @@ class Whitener {
   [[nodiscard]] Eigen::VectorXd apply(const Eigen::VectorXd& column) const;
   /// The same for every column at once.
   [[nodiscard]] Panel apply(const Panel& columns) const;
+  /// White noise, and no row without a value: apply() gives what it gets.
+  [[nodiscard]] bool changes_nothing() const { return !wanders_ && scale_.isOnes(0.0); }
   /// The transposed of what apply() does: white' apply(x) = transposed(white)' x.
   [[nodiscard]] Panel transposed(const Panel& white) const;
   /// Sums of squares of whitened columns that are those of `whole` from a row on and zero before,

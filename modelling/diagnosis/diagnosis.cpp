@@ -72,7 +72,7 @@ Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
   std::vector<RunFile> all = train;
   all.insert(all.end(), test.begin(), test.end());
   const SharedColumns columns = shared_columns(model, all);
-  const MeasuredData train_data = measured_data(model, train, train_names, columns);
+  const MeasuredData train_data = training_data(model, train, train_names, columns);
   const MeasuredData test_data = measured_data(model, test, test_names, columns);
   Search search(train_data, Thresholds{});
   const SearchResult result = search.run();

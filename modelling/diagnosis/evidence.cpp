@@ -141,7 +141,9 @@ std::vector<std::vector<Setting::Equations>> Setting::equations_of_groups(
   std::vector<std::vector<Equations>> all(settings.size());
   for (const std::vector<std::size_t>& group : alike(settings)) {
     const Setting& most = *settings[group.front()];
-    const Panel white = most.whitener_->apply(columns);
+    Panel whitened;
+    if (!most.whitener_->changes_nothing()) whitened = most.whitener_->apply(columns);
+    const Panel& white = whitened.size() > 0 ? whitened : columns;
     const Eigen::MatrixXd products = cross_products(most.against_, white, 0, white.rows());
     const Eigen::MatrixXd own = neighbour_products(white, width, 0, white.rows());
     for (const std::size_t i : group) all[i] = settings[i]->without_common(products, own);

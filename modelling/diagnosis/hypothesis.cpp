@@ -313,12 +313,11 @@ void Catalogue::add_signal(std::size_t signal) {
                           {"gain_um_per_unit"}});
   heat.columns = [this, values](const Shapes& shapes, std::size_t) {
     return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
-      Panel heats = lagged(run.time_s, values(run), taus_s);
-      const Panel of_squares = lagged(run.time_s, values(run).array().square(), taus_s);
-      for (std::size_t i = 0; i < shapes.size(); ++i) {
-        const auto column = static_cast<Eigen::Index>(i);
-        if (shapes[i][1] > 1.5) heats.col(column) = of_squares.col(column);
-      }
+      const Column& u = values(run);
+      Panel heats = u.replicate(1, std::ssize(shapes));
+      for (std::size_t i = 0; i < shapes.size(); ++i)
+        if (shapes[i][1] > 1.5) heats.col(static_cast<Eigen::Index>(i)).array() *= u.array();
+      lag_each(run.time_s, taus_s, heats);
       return heats;
     });
   };
@@ -357,13 +356,17 @@ void Catalogue::add_output(std::size_t output) {
       shifts.insert(shifts.begin(), -shifts[2 * i]);
     Hypothesis& shift = add({"time_shift", name, Form::no_gain, {{"shift_s", shifts}}});
     shift.output = output;
-    shift.columns = one_by_one([this, model_um](const Shape& shape, std::size_t) {
-      return stacked([&](const MeasuredRun& run) -> Column {
+    shift.columns = [this, model_um](const Shapes& shapes, std::size_t) {
+      return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& shifts_s) {
         // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
         const Column smooth_um = smoothed(run.time_s, model_um(run), {2.0 * step_s_});
-        return shifted(run.time_s, smooth_um, shape[0]) - smooth_um;
+        Panel moved_um(run.rows(), std::ssize(shapes));
+        for (std::size_t i = 0; i < shapes.size(); ++i)
+          moved_um.col(static_cast<Eigen::Index>(i)) =
+              shifted(run.time_s, smooth_um, shifts_s[i]) - smooth_um;
+        return moved_um;
       });
-    });
+    };
   }
   add_period(output);
 }
@@ -396,11 +399,12 @@ void Catalogue::add_period(std::size_t output) {
       const Block& block = rows_.runs[run];
       const Eigen::Index count = block.end - block.begin;
       const Waves waves_of = waves(rows_.time_s.segment(block.begin, count), periods_s);
-      for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
-        const Eigen::Index column = width * i + 2 * static_cast<Eigen::Index>(run);
-        all.col(column).segment(block.begin, count) = waves_of.sines.col(i);
-        all.col(column + 1).segment(block.begin, count) = waves_of.cosines.col(i);
-      }
+      for (Eigen::Index row = 0; row < count; ++row)
+        for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
+          const Eigen::Index column = width * i + 2 * static_cast<Eigen::Index>(run);
+          all(block.begin + row, column) = waves_of.sines(row, i);
+          all(block.begin + row, column + 1) = waves_of.cosines(row, i);
+        }
     }
     return all;
   };

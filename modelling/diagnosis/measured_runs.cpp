@@ -200,6 +200,12 @@ MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>
   MeasuredData data{model, columns.others, columns.signals, {}, {}, coefficient_sd};
   for (std::size_t i = 0; i < runs.size(); ++i)
     data.runs.push_back(measured_run(runs[i], names[i], data));
+  return data;
+}
+
+MeasuredData training_data(const ThermalModel& model, const std::vector<RunFile>& runs,
+                           const std::vector<std::string>& names, const SharedColumns& columns) {
+  MeasuredData data = measured_data(model, runs, names, columns);
   for (MeasuredRun& run : data.runs) {
     for (const Column& rise_K : run.inputs_K) run.calm_inputs_K.push_back(calm(run.time_s, rise_K));
     for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));

@@ -24,7 +24,8 @@ struct MeasuredRun {
   std::vector<Column> others_degC;
   std::vector<Column> inputs_degC;
   std::vector<Column> signals;  ///< order of MeasuredData::signals
-  /// inputs_K and others_K without the noise of single values, as far as it can be seen.
+  /// inputs_K and others_K without the noise of single values, as far as it can be seen; of
+  /// training runs only.
   std::vector<Column> calm_inputs_K;
   std::vector<Column> calm_others_K;
   std::vector<Column> model_um;     ///< order of the outputs, relative to the output's first row
@@ -65,6 +66,11 @@ struct SharedColumns {
 /// @throws ConfigurationError when a run lacks an input or signal of the model, or has no measured
 ///         value of any output
 [[nodiscard]] MeasuredData measured_data(const ThermalModel& model,
+                                         const std::vector<RunFile>& runs,
+                                         const std::vector<std::string>& names,
+                                         const SharedColumns& columns);
+/// The same with calm readings, for the search.
+[[nodiscard]] MeasuredData training_data(const ThermalModel& model,
                                          const std::vector<RunFile>& runs,
                                          const std::vector<std::string>& names,
                                          const SharedColumns& columns);

@@ -116,8 +116,9 @@ void Search::take_likeliest_settings(const std::vector<Explanation*>& explanatio
   }
 }
 
-void Search::refine(Explanation& explanation) const {
+Search::Trial Search::refine(Explanation& explanation) const {
   const Hypothesis& hypothesis = *explanation.hypothesis;
+  Trial best = weigh(hypothesis, explanation.shape, explanation.settings);
   for (std::size_t i = 0; i < hypothesis.shape.size(); ++i) {
     const ShapeParameter& parameter = hypothesis.shape[i];
     if (parameter.discrete || parameter.grid.size() < 2) continue;
@@ -132,7 +133,6 @@ void Search::refine(Explanation& explanation) const {
     if (parameter.logarithmic && !(low > 0)) continue;  // no lag at all is a point of its own
     low = x_of(low);
     high = x_of(high);
-    Trial best = weigh(hypothesis, explanation.shape, explanation.settings);
     double best_x = x_of(explanation.shape[i]);
     constexpr int points = 6;
     for (int round = 0; round < 4; ++round) {
@@ -152,8 +152,9 @@ void Search::refine(Explanation& explanation) const {
       high = std::min(high, best_x + step);
     }
     explanation.shape[i] = value_of(best_x);
-    explanation.gains = std::move(best.gains);
   }
+  explanation.gains = best.gains;
+  return best;
 }
 
 /// Shapes, noise and gains of explanations whose shapes are near the peak.
@@ -162,15 +163,11 @@ void Search::settle(std::vector<Explanation*> explanations) const {
   for (Explanation* each : explanations) refine(*each);
   for (int round = 0; round < 2; ++round) {
     take_likeliest_settings(explanations);
-    for (Explanation* each : explanations)
-      each->gains = weigh(*each->hypothesis, each->shape, each->settings).gains;
+    for (Explanation* each : explanations) each->score = refine(*each).score;
     std::erase_if(explanations, [](const Explanation* each) { return !acts(*each); });
-    for (Explanation* each : explanations) refine(*each);
   }
   for (Explanation* each : explanations) {
-    Trial trial = weigh(*each->hypothesis, each->shape, each->settings);
-    each->gains = std::move(trial.gains);
-    each->score = trial.score - price(*each->hypothesis);
+    each->score -= price(*each->hypothesis);
     // The other noise has a price too: what counts is against the likeliest without the hypothesis.
     for (const std::size_t output : measured_) {
       if (each->gains[output].size() == 0) continue;

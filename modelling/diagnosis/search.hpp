@@ -134,7 +134,8 @@ class Search {
   [[nodiscard]] std::vector<Settings> profiled_settings() const;
   [[nodiscard]] std::vector<Explanation> judged(std::vector<std::vector<Explanation>> under_each);
   void take_likeliest_settings(const std::vector<Explanation*>& explanations) const;
-  void refine(Explanation& explanation) const;
+  /// @return what it comes to at its new shape
+  Trial refine(Explanation& explanation) const;
   void settle(std::vector<Explanation*> explanations) const;
   void settle_anew(Explanation& explanation) const;
   [[nodiscard]] double price(const Hypothesis& hypothesis) const;

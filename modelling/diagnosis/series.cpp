@@ -108,6 +108,10 @@ Column shifted(const Column& time_s, const Column& values, double shift_s) {
   return out;
 }
 
+void lag_each(const Column& time_s, const std::vector<double>& taus_s, Panel& columns) {
+  pass(time_s, taus_s, columns, 1);
+}
+
 Panel lagged(const Column& time_s, const Column& values, const std::vector<double>& taus_s) {
   Panel out = beside_each_other(values, taus_s.size());
   pass(time_s, taus_s, out, 1);

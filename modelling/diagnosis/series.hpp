@@ -10,6 +10,9 @@
 
 namespace thermocomp::diagnosis {
 
+/// Each column through LowPass of its own tau_s.
+void lag_each(const Column& time_s, const std::vector<double>& taus_s, Panel& columns);
+
 /// The column through LowPass filters, one of each tau_s, shape (rows, taus).
 [[nodiscard]] Panel lagged(const Column& time_s, const Column& values,
                            const std::vector<double>& taus_s);

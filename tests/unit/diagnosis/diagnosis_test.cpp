@@ -210,7 +210,7 @@ TEST_CASE("hypotheses of one pattern have the same columns but for their scale",
   RunFile run = run_with(1, 300, [](double, double, int) { return 0.0; });
   run.columns.emplace_back("t2_degC");
   run.values.push_back(run.values[1]);
-  const MeasuredData data = measured_data(model, {run}, {"a"}, shared_columns(model, {run}));
+  const MeasuredData data = training_data(model, {run}, {"a"}, shared_columns(model, {run}));
   std::map<std::string, std::vector<Hypothesis>> by_pattern;
   for (const Hypothesis& each : hypotheses(data, stacked_rows(data)))
     if (!each.pattern.empty()) by_pattern[each.pattern].push_back(each);
@@ -237,7 +237,7 @@ TEST_CASE("columns that come from shared ones are those that a hypothesis makes 
   run.values.push_back(run.values[1]);
   for (double& degC : run.values.back()) degC = 20.0 + 0.3 * (degC - 20.0) * (degC - 20.0);
   const MeasuredData data =
-      measured_data(model, {run, run}, {"a", "b"}, shared_columns(model, {run, run}));
+      training_data(model, {run, run}, {"a", "b"}, shared_columns(model, {run, run}));
   const StackedRows rows = stacked_rows(data);
   std::map<std::string, int> seen;
   for (const Hypothesis& each : hypotheses(data, rows)) {
