@@ -1,5 +1,5 @@
-"""Times `thermocomp diagnose` beside diagnose_numpy.py on the data of diagnose_data.py. Both must
-weigh and find the same: anything else is an error."""
+"""Times `thermocomp diagnose` beside diagnose_numpy.py, plain and tuned, on the data of
+diagnose_data.py. All must weigh and find the same: anything else is an error."""
 
 import json
 import pathlib
@@ -72,26 +72,30 @@ def difference(ours, numpy):
 
 def commands_of(program, folder):
     answer = str(pathlib.Path(folder) / "answer.json")
+    numpy = ["/usr/bin/python3", str(HERE / "diagnose_numpy.py"), folder]
     return {"diagnose": [program, "diagnose", "--model", "model.toml", "--weighed", "--train",
                          "train.csv", "--test", "test.csv", "--json", answer],
-            "numpy": ["/usr/bin/python3", str(HERE / "diagnose_numpy.py"), folder]}
+            "numpy": [*numpy, "--plain"], "numpy_tuned": numpy}
 
 
 def compared(folder, said):
-    """Both answers, which must be the same, and how far they are apart"""
-    ours, numpy = json.loads((pathlib.Path(folder) / "answer.json").read_text()), json.loads(said)
-    apart = difference(ours, numpy)
-    if not apart <= AGREEMENT:
-        raise SystemExit("diagnose and diagnose_numpy.py do not make the same search: largest "
-                         f"difference {apart:.1e}, at most {AGREEMENT:.0e} is allowed")
-    return numpy, apart
+    """The answer of the plain peer, and how far both peers' are from the program's: said, what
+    each command printed. All must be the same."""
+    ours = json.loads((pathlib.Path(folder) / "answer.json").read_text())
+    answers = {name: json.loads(said[name]) for name in ("numpy", "numpy_tuned")}
+    for name, answer in answers.items():
+        if not difference(ours, answer) <= AGREEMENT:
+            raise SystemExit(f"diagnose and {name} do not make the same search: largest difference "
+                             f"{difference(ours, answer):.1e}, at most {AGREEMENT:.0e} is allowed")
+    return answers["numpy"], max(difference(ours, answer) for answer in answers.values())
 
 
 def compare_doubtful(program):
     with tempfile.TemporaryDirectory() as folder:
         diagnose_data.write(folder, **DOUBTFUL)
-        said = [cpu_s(command, folder)[1] for command in commands_of(program, folder).values()]
-        numpy, apart = compared(folder, said[1])
+        said = {name: cpu_s(command, folder)[1]
+                for name, command in commands_of(program, folder).items()}
+        numpy, apart = compared(folder, said)
     if not numpy["coefficients_doubted"]:
         raise SystemExit("the coefficients of the second day are not doubted")
     return apart
@@ -109,18 +113,20 @@ def main(program):
             for name, command in commands.items():
                 seconds, said[name] = cpu_s(command, folder)
                 taken[name].append(seconds)
-        numpy, apart = compared(folder, said["numpy"])
+        numpy, apart = compared(folder, said)
     if [(f["cause"], f["subject"]) for f in numpy["findings"]] != [HIDDEN]:
         raise SystemExit("not found what was hidden: " + json.dumps(numpy["findings"]))
     print(f"largest_difference {max(apart, compare_doubtful(program)):.1e} ratio")
     median = {name: statistics.median(values) for name, values in taken.items()}
     for name in ("diagnose_start", "numpy_start"):
         print(f"{name}_seconds {median[name]:.3f} s")
-    print(f"diagnose_seconds {median['diagnose']:.3f} s")
-    print(f"numpy_seconds {median['numpy']:.3f} s")
-    work = {name: median[name] - median[name + "_start"] for name in ("diagnose", "numpy")}
-    print(f"without_start_over_numpy {work['diagnose'] / work['numpy']:.4f} ratio")
-    print(f"time_over_numpy {median['diagnose'] / median['numpy']:.4f} ratio")
+    for name in ("diagnose", "numpy", "numpy_tuned"):
+        print(f"{name}_seconds {median[name]:.3f} s")
+    work = median["diagnose"] - median["diagnose_start"]
+    for name, said_as in (("numpy_tuned", "tuned_numpy"), ("numpy", "numpy")):
+        work_of_numpy = median[name] - median["numpy_start"]
+        print(f"without_start_over_{said_as} {work / work_of_numpy:.4f} ratio")
+        print(f"time_over_{said_as} {median['diagnose'] / median[name]:.4f} ratio")
 
 
 if __name__ == "__main__":

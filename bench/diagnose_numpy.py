@@ -1,13 +1,19 @@
 #!/usr/bin/python3
 """`thermocomp diagnose` once more, batched in numpy, for one run with one output and evenly spaced
-rows without gaps. Argument: the folder of diagnose_data.py. Prints JSON, much as the program does.
+rows without gaps. Arguments: the folder of diagnose_data.py and, for the plain way, --plain. Prints
+JSON, much as the program does.
 
 The same hypotheses, grids, noise shapes, errors of coefficients, shortlists, refinement, witnesses,
 left-out blocks, rounds, spreads and test rows as in the program; diagnose.py compares the numbers.
-Batched: the columns of all subjects and grid points of a cause; the first search with and without
-errors of the coefficients (columns are made and whitened once for both); the shortlists of both,
+Batched: the columns of all subjects and grid points of a cause; all candidates of the shortlists,
 refined together; blocks and shapes of all candidates under one noise. Columns that differ by a
-factor only are weighed once. What cannot enter the numbers of a single output is left out."""
+factor only are weighed once. What cannot enter the numbers of a single output is left out.
+
+Two ways differ in what is below. diagnose_numpy_rows.py is plain: recursions (low pass, play,
+whitening) are loops over rows, on all columns at once and right for any spacing of rows, and the
+first search is made twice, with and without errors of the coefficients. diagnose_numpy_stretches.py
+is tuned to evenly spaced rows: stretches of rows advance together, whitening is a product with
+matrices, and columns of the first search are made and whitened once for both."""
 
 import os
 
@@ -21,6 +27,8 @@ import sys
 import numpy as np
 
 import diagnose_numpy_causes as causes
+import diagnose_numpy_rows as rows
+import diagnose_numpy_stretches as stretches
 from diagnose_numpy_candidates import Candidates, columns_of
 from diagnose_numpy_data import Data
 from diagnose_numpy_evidence import left_of
@@ -42,14 +50,21 @@ class Diagnosis:
 
     def run(self):
         """As Search::run: whether the coefficients are doubted shows in the first round."""
-        self.search.accept(Candidates(), (True, False))
-        doubted, right = self.search.ranked()
+        doubted, right = self.first_searches()
         least = lambda c: c.log_left[0] if len(c) else 0.0
         if least(doubted) < least(right) - DOUBT_SHARE:
             result = self.run_from(doubted, True)
             if not result["unexplained"]:
                 return result
         return self.run_from(right, False)
+
+    def first_searches(self):
+        """What came into question with errors of the coefficients, and without"""
+        ranked = []
+        for doubts in self.d.batching.FIRST_SEARCHES:
+            self.search.accept(Candidates(), doubts)
+            ranked += self.search.ranked()
+        return ranked
 
     def accept(self, found):
         self.search.accept(found, (self.doubted,))
@@ -202,8 +217,9 @@ def findings_of(result, test):
     return findings, residual
 
 
-def main(folder):
-    train, test = Data(folder, "train.csv", True), Data(folder, "test.csv", False)
+def main(folder, batching):
+    train = Data(folder, "train.csv", True, batching)
+    test = Data(folder, "test.csv", False, batching)
     result = Diagnosis(train).run()
     findings, residual = findings_of(result, test)
     peak = lambda values: float(np.abs(values).max())
@@ -218,4 +234,4 @@ def main(folder):
 
 
 if __name__ == "__main__":
-    main(pathlib.Path(sys.argv[1]))
+    main(pathlib.Path(sys.argv[1]), rows if "--plain" in sys.argv[2:] else stretches)

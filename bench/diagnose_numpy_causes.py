@@ -6,7 +6,7 @@ from typing import Callable
 
 import numpy as np
 
-from diagnose_numpy_data import low_pass, play, smoothed
+from diagnose_numpy_data import smoothed
 
 SPECIAL_CASE = 20.0  # what contains a simpler cause pays this
 
@@ -68,7 +68,8 @@ def geometric(low, high, count):
 
 
 def always_acting(d):
-    dt, inputs, others = d.step_s, d.input_names, d.other_names
+    dt, steps, inputs, others = d.step_s, d.steps_s, d.input_names, d.other_names
+    low_pass, play = d.batching.low_pass, d.batching.play
     temps, inputs_K, k = d.calm_temps, d.calm_inputs, d.k
     others_K = temps[:, len(inputs):]
     rpm = np.array([n.endswith("_rpm") for n in d.signal_names])
@@ -78,12 +79,12 @@ def always_acting(d):
     span = np.ptp(d.inputs, axis=0)[:, None]
 
     def slow(i, s, _):
-        late = smoothed(d.inputs.take(i, axis=1), 0.25 * s, dt)
-        return k[i] * s * np.gradient(late, dt, axis=0)
+        late = smoothed(d.batching, d.inputs.take(i, axis=1), 0.25 * s, steps)
+        return k[i] * s * np.gradient(late, d.time_s, axis=0)
 
     def lag(i, s, _):
         now = inputs_K.take(i, axis=1)
-        return low_pass(now, s, dt) - now
+        return low_pass(now, s, steps) - now
 
     def loose_joint(i, s, _):
         now = inputs_K.take(i, axis=1)
@@ -113,10 +114,11 @@ def always_acting(d):
     yield Cause("sensor_swap", [inputs[a] + "|" + inputs[b] for a, b in zip(first, second)], "none",
                 swap)
     yield Cause("missing_temperature", others, "own",
-                lambda i, s, p: low_pass(others_K.take(i, axis=1), s, dt),
+                lambda i, s, p: low_pass(others_K.take(i, axis=1), s, steps),
                 np.r_[0.0, geometric(60.0, 21600.0, 20)], refined="logarithmic")
     yield Cause("missing_heat_source", rpm_names, "own",
-                lambda i, s, p: low_pass(powers.take(2 * i + (p > 1.5), axis=1), s, dt),
+                lambda i, s, p: low_pass(powers.take(2 * i + (p > 1.5), axis=1), s,
+                                            steps),
                 geometric(120.0, 21600.0, 22), powers=(1.0, 2.0), refined="logarithmic")
     yield Cause("speed_growth", rpm_names, "own", lambda i, s, p: speeds[:, i] ** 2)
 
@@ -124,7 +126,7 @@ def always_acting(d):
 def of_the_output(d):
     dt = d.step_s
     model = d.calm_model
-    smooth = smoothed(d.model[:, None], np.array([2.0 * dt]), dt)[:, 0]
+    smooth = smoothed(d.batching, d.model[:, None], np.array([2.0 * dt]), d.steps_s)[:, 0]
     late = geometric(max(5.0, 0.2 * dt), 3600.0, 14)
     length_s = d.time_s[-1] - d.time_s[0]
     periods, frequency = [], 5.0 / length_s
@@ -140,8 +142,8 @@ def of_the_output(d):
         return pairs(np.sin(turns), np.cos(turns))
 
     yield Cause("hysteresis", ["z_um"], "none",
-                lambda i, s, p: play(model.repeat(len(s), axis=1), s) - model, np.ptp(d.model) *
-                linear(0.03, 0.7, 20), refined="linear")
+                lambda i, s, p: d.batching.play(model.repeat(len(s), axis=1), s) - model,
+                np.ptp(d.model) * linear(0.03, 0.7, 20), refined="linear")
     yield Cause("time_shift", ["z_um"], "none", shifted, np.r_[-late[::-1], late], refined="linear")
     yield Cause("periodic_disturbance", ["z_um"], "own", wave, np.array(periods),
                 refined="logarithmic", width=2)

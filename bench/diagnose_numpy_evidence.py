@@ -5,56 +5,6 @@ import numpy as np
 BLOCKS = 8
 WANDER_SHARES, WANDER_TAUS_S = (0.1, 0.3, 1.0), (1200.0, 3600.0, 10800.0)
 ACCEPTED_SD_UM = 1e4  # of an offset too
-STRETCH_MAX = 16
-
-
-class Noise:
-    """The filter that whitens a block, for several shapes (ratio, tau_s) of noise: `kind` is one's
-    place. Its state is linear in the rows before: within a stretch of rows white values are a
-    product with a matrix, and what a stretch hands on is one number a column."""
-
-    def __init__(self, shapes, block_rows, step_s):
-        ratio, tau_s = np.array(shapes).T
-        keep = np.exp(-step_s / tau_s)
-        variance = [ratio]
-        while len(variance) < block_rows:
-            later = ratio + keep ** 2 * (variance[-1] / (variance[-1] + 1.0) - ratio)
-            if np.all(np.abs(later - variance[-1]) <= 1e-15 * later):
-                later = np.broadcast_to(later, (block_rows - len(variance), len(ratio)))
-                variance.extend(later)
-            else:
-                variance.append(later)
-        variance = np.array(variance)
-        self.plain = ratio == 0.0
-        self.log_determinant = np.log(variance + 1.0).sum(axis=0)
-        size = max(n for n in range(1, STRETCH_MAX + 1) if block_rows % n == 0)
-        form = lambda values: values.T.reshape(len(ratio), -1, size)
-        gain, scale = form(variance / (variance + 1.0)), form(1.0 / np.sqrt(variance + 1.0))
-        keep = keep[:, None, None]
-        kept, added = keep * (1.0 - gain), keep * gain
-        before = np.zeros((*gain.shape[:2], size + 1, size))  # what rows leave in the state
-        fade = np.ones((*gain.shape[:2], size + 1))
-        for row in range(size):
-            before[:, :, row + 1] = kept[:, :, row, None] * before[:, :, row]
-            before[:, :, row + 1, row] = added[:, :, row]
-            fade[:, :, row + 1] = kept[:, :, row] * fade[:, :, row]
-        self.within = scale[..., None] * (np.eye(size) - before[:, :, :-1])
-        self.handed_on = before[:, :, -1:]
-        self.fade = fade[:, :, -1]
-        self.received = -(scale * fade[:, :, :-1])[..., None]
-
-    def white(self, columns, kind):
-        """columns (rows, n), rows of whole blocks"""
-        if self.plain[kind]:
-            return columns
-        within, fade = self.within[kind], self.fade[kind]
-        stretches = columns.reshape(-1, *within.shape[:2], columns.shape[1])
-        state = (self.handed_on[kind] @ stretches)[:, :, 0]
-        for i in range(1, len(fade)):
-            state[:, i] += fade[i] * state[:, i - 1]
-        out = within @ stretches
-        out[:, 1:] += self.received[kind][1:] * state[:, :-1, None]
-        return out.reshape(columns.shape)
 
 
 def own_products(white):
@@ -101,7 +51,7 @@ class Side:
         inverse = np.linalg.inv(factor)
         known = inverse @ gram[:, :-1, -1:]
         squares = gram[:, -1, -1] - np.sum(known[:, :, 0] ** 2, axis=1)
-        log_determinant = (BLOCKS * e.noise.log_determinant -
+        log_determinant = (e.noise.log_determinant -
                            np.log(self.precision).sum(axis=1) +
                            2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1))
         return (inverse, known), squares, log_determinant
@@ -127,10 +77,10 @@ class Evidence:
         size = self.residual.std()
         shapes = [(0.0, 1.0)] + [((share * size / d.noise_um) ** 2, tau_s)
                                  for share in WANDER_SHARES for tau_s in WANDER_TAUS_S]
-        self.noise = Noise(shapes, self.rows // BLOCKS, d.step_s)
+        self.noise = d.batching.Noise(shapes, BLOCKS, d.steps_s)
         self.kinds = len(shapes)
         both = np.hstack([self.common, self.residual[:, None]])
-        self.white = np.stack([self.noise.white(both, kind) for kind in range(self.kinds)])
+        self.white = np.stack([*self.noise.white(both, range(self.kinds))])
         self.sides = [Side(self, doubted) for doubted in doubts]
         self.squares = np.concatenate([side.squares for side in self.sides])
         self.log_determinant = np.concatenate([side.log_determinant for side in self.sides])
@@ -149,9 +99,9 @@ class Evidence:
         settings; whitened once a kind of noise"""
         rows, n, width = columns.shape
         flat, found = columns.reshape(rows, -1), {}
-        for kind in sorted({setting % self.kinds for setting in settings}):
+        kinds = sorted({setting % self.kinds for setting in settings})
+        for kind, white in zip(kinds, self.noise.white(flat, kinds)):
             alike = [setting for setting in settings if setting % self.kinds == kind]
-            white = self.noise.white(flat, kind)
             own = own_products(white.reshape(columns.shape))
             bases = np.hstack([self.basis[s] for s in alike]) if alike[1:] else self.basis[alike[0]]
             cross, first = bases.T @ white, 0

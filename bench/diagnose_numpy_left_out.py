@@ -107,7 +107,7 @@ class LeftOut:
         where = np.repeat(which, count)
         shape, power = np.array([point for each in shapes for point in each]).T
         raw = columns_of(c, where, shape, power)
-        white = e.noise.white(raw.reshape(e.rows, -1), setting % e.kinds)
+        white, = e.noise.white(raw.reshape(e.rows, -1), [setting % e.kinds])
         cross = products.white.transpose(0, 2, 1) @ in_blocks(white)
         own = np.stack([own_products(part) for part in in_blocks(white.reshape(raw.shape))])
         all_cross, all_own = cross.sum(axis=0, keepdims=True), own.sum(axis=0, keepdims=True)

@@ -9,7 +9,7 @@ from diagnose_numpy_evidence import Evidence, left_of, solved
 from diagnose_numpy_left_out import LeftOut
 from diagnose_numpy_witness import Witness
 
-SHORTLIST, POINTS, STEPS, AT_ONCE = 20, 6, 4, 128
+SHORTLIST, POINTS, STEPS = 20, 6, 4
 OUTPUT_GAIN_MIN, TIE = 6.0, 0.1
 
 
@@ -50,8 +50,9 @@ class Search:
         n = len(subject) if cause.scale is None else len(subject) // subjects
         make = cause.columns if cause.scale is None else cause.unscaled
         found = [([], []) for _ in settings]
-        for first in range(0, n, AT_ONCE):
-            part = slice(first, min(n, first + AT_ONCE))
+        at_once = self.d.batching.AT_ONCE
+        for first in range(0, n, at_once):
+            part = slice(first, min(n, first + at_once))
             columns = make(subject[part], shape[part], power[part])
             for parts, equations in zip(found, self.evidence.equations_under(columns, settings)):
                 for whole, each in zip(parts, equations):

@@ -5,9 +5,6 @@ import functools
 
 import numpy as np
 
-from diagnose_numpy_data import low_pass
-from diagnose_numpy_evidence import Noise
-
 SHAPES = [(ratio, tau_s) for ratio in (1.0, 30.0, 1000.0) for tau_s in (600.0, 3600.0, 20000.0)]
 PRECISION, SUPPORT_MAX = 1e-6, 400.0
 
@@ -18,26 +15,27 @@ class Witness:
 
     @functools.cached_property
     def noise(self):
-        return Noise(SHAPES, self.rows, self.d.step_s)
+        return self.d.batching.Noise(SHAPES, 1, self.d.steps_s)
 
     @functools.cached_property
     def neighbours(self):
         """Whitened under each noise (kinds, rows, n), their products, and the columns' sizes"""
         d = self.d
-        lag = lambda values, tau: low_pass(values, np.full(values.shape[1], tau), d.step_s)
+        lag = lambda values, tau: d.batching.low_pass(values, np.full(values.shape[1], tau),
+                                                      d.steps_s)
         every = np.hstack([np.ones((self.rows, 1)), d.temps, lag(d.temps, 1800.0),
                            lag(d.signals, 600.0), lag(d.signals, 3600.0)])
         size = np.abs(every).max(axis=0)
         size[size == 0] = 1.0
         every /= size
-        white = np.stack([self.noise.white(every, kind) for kind in range(len(SHAPES))])
+        white = np.stack([*self.noise.white(every, range(len(SHAPES)))])
         return white, white.transpose(0, 2, 1) @ white, size
 
     def says(self, sensors, errors):
         """2 ln L gained when errors (rows, n) are taken off the readings of the sensors (n)"""
         white, gram, size = self.neighbours
         kinds, total = len(SHAPES), gram.shape[1]
-        white_errors = np.stack([self.noise.white(errors, kind) for kind in range(kinds)])
+        white_errors = np.stack([*self.noise.white(errors, range(kinds))])
         cross = white.transpose(0, 2, 1) @ white_errors            # (kinds, total, n)
         squares = np.einsum("krn,krn->kn", white_errors, white_errors)
         says = np.empty(len(sensors))
