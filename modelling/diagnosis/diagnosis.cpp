@@ -7,6 +7,7 @@
 #include "modelling/diagnosis/gain_on_test.hpp"
 #include "modelling/diagnosis/named_finding.hpp"
 #include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/search_beside_fit.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -24,10 +25,33 @@ std::optional<Correction> correction_of(const NamedFinding& name, std::size_t ou
   return std::nullopt;
 }
 
+/// A search in rows that the model was fitted to must leave less by this share than one that takes
+/// the coefficients as right.
+constexpr double fitted_share = 0.2;
+
+/// Adds terms; what one kind does to one subject stays one term.
+void add_terms(ThermalModel& model, const std::vector<TermSpec>& terms) {
+  for (const TermSpec& term : terms) {
+    const auto known = std::find_if(model.terms.begin(), model.terms.end(), [&](const auto& each) {
+      return each.kind == "wrong_coefficient" && each.kind == term.kind &&
+             each.subject == term.subject;
+    });
+    if (known == model.terms.end()) {
+      model.terms.push_back(term);
+      continue;
+    }
+    for (const auto& [name, values] : term.per_output)
+      for (const auto& [output, value] : values) known->per_output[name][output] += value;
+  }
+}
+
 /// The model with each finding added after those before it, and what each gains.
 /// @return what terms cannot carry, over the test runs
+/// @param fitted  if given, the search that they come from: what their causes had put into the
+///                coefficients is taken out of them
 Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
-                   const MeasuredData& train, const MeasuredData& test) {
+                   const SearchBesideFit* fitted, const MeasuredData& train,
+                   const MeasuredData& test) {
   Corrections corrections;
   for (const Finding& finding : findings) {
     NamedFinding name = named_finding(finding, train, parameters_of(finding, train));
@@ -35,6 +59,11 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
     ThermalModel longer = diagnosis.extended;
     Corrections more = corrections;
     if (term) longer.terms.push_back(*term);
+    // Without what acts in every run the coefficients would be right for nothing.
+    if (fitted != nullptr && (term || name.run)) {
+      add_terms(longer, fitted->corrections(finding));
+      name.evidence += "; the model was fitted to these rows, its coefficients change with it";
+    }
     for (const std::string& output : name.outputs) {
       const auto index = static_cast<std::size_t>(
           std::find(train.model.outputs.begin(), train.model.outputs.end(), output) -
@@ -75,12 +104,19 @@ Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
   const MeasuredData train_data = training_data(model, train, train_names, columns);
   const MeasuredData test_data = measured_data(model, test, test_names, columns);
   Search search(train_data, Thresholds{});
-  const SearchResult result = search.run();
+  SearchResult result = search.run();
+  SearchBesideFit beside_fit(train_data, Thresholds{});
+  SearchResult of_fitted = beside_fit.run();
+  const bool fitted =
+      !of_fitted.findings.empty() &&
+      (result.findings.empty() || log_left_by(of_fitted) < log_left_by(result) - fitted_share);
+  if (fitted) result = std::move(of_fitted);
 
   Diagnosis diagnosis;
   diagnosis.extended = model;
   diagnosis.weighed = result.weighed;
-  const Corrections corrections = extend(diagnosis, result.findings, train_data, test_data);
+  const Corrections corrections =
+      extend(diagnosis, result.findings, fitted ? &beside_fit : nullptr, train_data, test_data);
   diagnosis.verdict = verdict_of(result);
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
     const Residuals base = residuals(model, {}, test_data, output);
