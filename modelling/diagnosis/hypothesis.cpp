@@ -203,6 +203,7 @@ void Catalogue::add_reading_errors(std::size_t input) {
   slow.columns = [this, input](const Shapes& shapes, std::size_t output) {
     return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
       std::vector<double> spans_s;
+      spans_s.reserve(taus_s.size());
       for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
       Panel ahead_K = slopes_per_s(run.time_s, run.inputs_K[input], spans_s);
       ahead_K *= Eigen::Map<const Eigen::VectorXd>(taus_s.data(), ahead_K.cols()).asDiagonal();

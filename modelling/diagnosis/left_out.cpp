@@ -247,6 +247,7 @@ std::vector<LeftOut::BlockFit> LeftOut::best_without_each(const Explanation& exp
   for (std::size_t block = 0; block < best.size(); ++block) {
     for (std::size_t shape = 0; shape < shapes.size(); ++shape) {
       std::vector<const Reduced*> of;
+      of.reserve(all.size());
       for (const auto& of_output : all) of.push_back(&of_output[shape][block]);
       BlockFit fit = this->fit(explanation, acting, of);
       if (!(fit.misfit < best[block].misfit)) continue;

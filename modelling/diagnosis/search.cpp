@@ -202,6 +202,7 @@ std::vector<Explanation> Search::judged(std::vector<std::vector<Explanation>> un
     candidates.insert(candidates.end(), all.begin(), all.end());
   }
   std::vector<Explanation*> all;
+  all.reserve(candidates.size());
   for (Explanation& candidate : candidates) all.push_back(&candidate);
   settle(std::move(all));
   for (Explanation& candidate : candidates) {

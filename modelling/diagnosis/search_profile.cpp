@@ -42,6 +42,7 @@ Panel side_by_side(const std::vector<const Hypothesis*>& hypotheses, const Shape
 std::vector<const Setting*> of_output(const std::vector<std::vector<const Setting*>>& settings,
                                       std::size_t output) {
   std::vector<const Setting*> all;
+  all.reserve(settings.size());
   for (const auto& each : settings) all.push_back(each[output]);
   return all;
 }
@@ -256,6 +257,7 @@ std::vector<Search::Equations> Search::equations_from_onset(
   const Block& run = rows_.runs[*hypotheses.front()->run];
   const double* const time_s = rows_.time_s.data();
   std::vector<Eigen::Index> first_rows;
+  first_rows.reserve(onsets_s.size());
   for (const double onset_s : onsets_s)
     first_rows.push_back(std::lower_bound(time_s + run.begin, time_s + run.end, onset_s) - time_s);
   Panel whole(rows_.time_s.size(), std::ssize(hypotheses));

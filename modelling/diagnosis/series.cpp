@@ -13,13 +13,15 @@ constexpr double regular_s = 1e-9;
 /// their phases right to rounding.
 constexpr Eigen::Index turned_rows = 64;
 
-/// The row after this one, by the angle of a step.
-THERMOCOMP_VECTORISED void turn_on(const double* sines_of_step, const double* cosines_of_step,
-                                   double* sines, double* cosines, Eigen::Index count) {
-#pragma GCC ivdep
+/// Sines and cosines of the next row, by the angle of a step.
+THERMOCOMP_VECTORISED void turn_on(const double* __restrict sines_of_step,
+                                   const double* __restrict cosines_of_step,
+                                   const double* __restrict sines, const double* __restrict cosines,
+                                   Eigen::Index count, double* __restrict next_sines,
+                                   double* __restrict next_cosines) {
   for (Eigen::Index i = 0; i < count; ++i) {
-    sines[count + i] = sines[i] * cosines_of_step[i] + cosines[i] * sines_of_step[i];
-    cosines[count + i] = cosines[i] * cosines_of_step[i] - sines[i] * sines_of_step[i];
+    next_sines[i] = sines[i] * cosines_of_step[i] + cosines[i] * sines_of_step[i];
+    next_cosines[i] = cosines[i] * cosines_of_step[i] - sines[i] * sines_of_step[i];
   }
 }
 
@@ -74,18 +76,32 @@ void pass(const Column& time_s, const std::vector<double>& taus_s, Panel& values
   }
 }
 
+/// Neighbouring columns through Play.
+template <std::size_t lanes>
+[[gnu::always_inline]] inline void play_lanes(const double* half_widths, double* row,
+                                              Eigen::Index rows, Eigen::Index columns) {
+  std::array<double, lanes> state{};
+  std::array<double, lanes> half_width{};
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    state[lane] = row[lane];
+    half_width[lane] = half_widths[lane];
+  }
+  for (Eigen::Index i = 0; i < rows; ++i, row += columns)
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const double low = row[lane] - half_width[lane];
+      const double high = row[lane] + half_width[lane];
+      const double raised = state[lane] < low ? low : state[lane];
+      state[lane] = raised > high ? high : raised;
+      row[lane] = state[lane];
+    }
+}
+
 THERMOCOMP_VECTORISED void play(const double* half_widths, double* row, Eigen::Index rows,
                                 Eigen::Index columns) {
-  row += columns;
-  for (Eigen::Index i = 1; i < rows; ++i, row += columns)
-#pragma GCC ivdep
-    for (Eigen::Index column = 0; column < columns; ++column) {
-      const double low = row[column] - half_widths[column];
-      const double high = row[column] + half_widths[column];
-      const double before = row[column - columns];
-      const double raised = before < low ? low : before;
-      row[column] = raised > high ? high : raised;
-    }
+  Eigen::Index at = 0;
+  for (; at + 16 <= columns; at += 16) play_lanes<16>(half_widths + at, row + at, rows, columns);
+  for (; at + 4 <= columns; at += 4) play_lanes<4>(half_widths + at, row + at, rows, columns);
+  for (; at < columns; ++at) play_lanes<1>(half_widths + at, row + at, rows, columns);
 }
 
 }  // namespace
@@ -121,6 +137,7 @@ Panel lagged(const Column& time_s, const Column& values, const std::vector<doubl
 Panel played(const Column& values, const std::vector<double>& widths) {
   Panel out = beside_each_other(values, widths.size());
   std::vector<double> half_widths;
+  half_widths.reserve(widths.size());
   for (const double width : widths) half_widths.push_back(0.5 * width);
   play(half_widths.data(), out.data(), out.rows(), out.cols());
   return out;
@@ -147,7 +164,7 @@ Waves waves(const Column& time_s, const std::vector<double>& periods_s) {
       set(time_s[row], &all.sines(row, 0), &all.cosines(row, 0));
     else
       turn_on(sines_of_step.data(), cosines_of_step.data(), &all.sines(row - 1, 0),
-              &all.cosines(row - 1, 0), count);
+              &all.cosines(row - 1, 0), count, &all.sines(row, 0), &all.cosines(row, 0));
     if (regular) continue;
     step_s = since_s;
     set(step_s, sines_of_step.data(), cosines_of_step.data());
@@ -172,6 +189,7 @@ Column calm(const Column& time_s, const Column& values) {
   const double step_s = (time_s[last] - time_s[0]) / static_cast<double>(last);
   const std::vector<double> spans_rows = {1.0, 2.0, 4.0, 8.0};
   std::vector<double> taus_s;
+  taus_s.reserve(spans_rows.size());
   for (const double rows : spans_rows) taus_s.push_back(rows * step_s);
   const Panel all = smoothed(time_s, values, taus_s);
   for (std::size_t i = 0; i < spans_rows.size(); ++i) {

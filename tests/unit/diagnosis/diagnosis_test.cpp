@@ -235,7 +235,7 @@ TEST_CASE("columns that come from shared ones are those that a hypothesis makes 
   RunFile run = run_with(1, 300, [](double, double, int) { return 0.0; });
   run.columns.emplace_back("t2_degC");
   run.values.push_back(run.values[1]);
-  for (double& degC : run.values.back()) degC = 20.0 + 0.3 * (degC - 20.0) * (degC - 20.0);
+  for (double& value : run.values.back()) value = 20.0 + 0.3 * (value - 20.0) * (value - 20.0);
   const MeasuredData data =
       training_data(model, {run, run}, {"a", "b"}, shared_columns(model, {run, run}));
   const StackedRows rows = stacked_rows(data);
