@@ -5,16 +5,23 @@ import numpy as np
 
 AT_ONCE = 1024  # columns that are made, whitened and multiplied together
 FIRST_SEARCHES = ((True,), (False,))  # with errors of the coefficients, then without: two searches
-NARROW = 12
+NARROW = 8  # columns, up to which numbers are quicker than arrays
 
 
-def narrow(values, keep):
-    """The same of one column, whose numbers are quicker by themselves than as arrays of one"""
-    out, state = [], 0.0
-    for value, kept in zip(values.tolist(), keep.tolist()):
-        state = value + kept * state
-        out.append(state)
-    return out
+def add_before(values, factors):
+    """values[i] += factors[i - 1] values[i - 1], row by row"""
+    before, scratch = values[0], np.empty_like(values[0])
+    for factor, now in zip(factors, values[1:]):
+        np.multiply(before, factor, scratch)
+        np.add(now, scratch, now)
+        before = now
+
+
+def narrow(values, factors):
+    """The same of one column: numbers are quicker by themselves than as arrays of one"""
+    before = float(values[0])
+    return [before := now + factor * before
+            for now, factor in zip(values[1:].tolist(), factors.tolist())]
 
 
 def low_pass(values, taus_s, steps_s):
@@ -27,13 +34,10 @@ def low_pass(values, taus_s, steps_s):
     np.multiply(values[1:], share if len(share) == 1 else share[which], out=out[1:])
     if values.shape[1] <= NARROW:
         for column in range(values.shape[1]):
-            out[:, column] = narrow(out[:, column], np.r_[0.0, keep[which, column]])
+            out[1:, column] = narrow(out[:, column], keep[which, column])
         return out
-    before, scratch, kept = out[0], np.empty_like(out[0]), [*keep]
-    for place, now in zip(which.tolist(), out[1:]):
-        np.multiply(before, kept[place], scratch)
-        np.add(now, scratch, now)
-        before = now
+    kept = [*keep]
+    add_before(out, [kept[place] for place in which.tolist()])
     return out
 
 
@@ -52,7 +56,9 @@ def play(values, widths):
 
 class Noise:
     """The Kalman filter that whitens blocks of rows, for several shapes (ratio, tau_s) of noise:
-    `kind` is one's place. Every block begins anew: blocks, and kinds, are columns too."""
+    `kind` is one's place. With a row's gain, what it tells beyond the rows before it is
+    v(i) = y(i) - keep y(i - 1) + keep (1 - gain) v(i - 1). Every block begins anew: blocks, and
+    kinds, are columns too."""
 
     def __init__(self, shapes, blocks, steps_s):
         ratio, tau_s = np.array(shapes).T
@@ -68,7 +74,7 @@ class Noise:
             variance[row + 1] = fresh[row] + kept[row] * (before / (before + 1.0))
         self.plain = ratio == 0.0
         self.log_determinant = np.log(variance + 1.0).sum(axis=(0, 2, 3))
-        self.keep, self.added = keep, keep * variance / (variance + 1.0)
+        self.keep, self.passed_on = keep, keep / (variance + 1.0)
         self.scale = 1.0 / np.sqrt(variance + 1.0)
 
     def white(self, columns, kinds):
@@ -78,15 +84,13 @@ class Noise:
         rows, blocks, n = values.shape
         white = np.empty((len(wandering), blocks, rows, n))
         if wandering:
-            state = np.zeros((len(wandering), blocks, n))
-            apart = np.empty_like(state)
-            filters = (each[:, wandering] for each in (self.keep, self.added, self.scale))
-            for value, out, keep, added, scale in zip(values, white.transpose(2, 0, 1, 3),
-                                                      *filters):
-                np.subtract(value, state, apart)
-                np.multiply(apart, scale, out)
-                np.multiply(apart, added, apart)
-                np.multiply(state, keep, state)
-                np.add(state, apart, state)
+            keep, passed_on, scale = (each[:, wandering]
+                                      for each in (self.keep, self.passed_on, self.scale))
+            out = white.transpose(2, 0, 1, 3)
+            out[0] = values[0]
+            np.multiply(values[:-1, None], -keep[:-1], out=out[1:])
+            out[1:] += values[1:, None]
+            add_before(out, passed_on)
+            out *= scale
         found = iter(white.reshape(-1, *columns.shape))
         return [columns if self.plain[kind] else next(found) for kind in kinds]
