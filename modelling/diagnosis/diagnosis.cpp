@@ -62,7 +62,9 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
     // Without what acts in every run the coefficients would be right for nothing.
     if (fitted != nullptr && (term || name.run)) {
       add_terms(longer, fitted->corrections(finding));
-      name.evidence += "; the model was fitted to these rows, its coefficients change with it";
+      name.evidence +=
+          "; the model was fitted to these rows, which hides most of a cause: its coefficients "
+          "change with it, and the gain on test rows says more than the name";
     }
     for (const std::string& output : name.outputs) {
       const auto index = static_cast<std::size_t>(
