@@ -38,6 +38,10 @@ class Cause:
         made = self.unscaled(subject, shape, power)
         return made if self.scale is None else made * self.scale[subject, None]
 
+    def twins(self):
+        """Subjects of which one output cannot say which it is"""
+        return np.flatnonzero(self.scale)
+
     def grid_of(self, subject):
         return self.grid[subject] if self.grid.ndim == 2 else self.grid
 

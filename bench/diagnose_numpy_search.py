@@ -9,6 +9,8 @@ from diagnose_numpy_evidence import Evidence, left_of, solved
 from diagnose_numpy_left_out import LeftOut
 from diagnose_numpy_witness import Witness
 
+# Of causes that differ by the subject's factor only, one stands for all; these many remain.
+TWINS_KEPT = 3
 SHORTLIST, POINTS, STEPS = 20, 6, 4
 OUTPUT_GAIN_MIN, TIE = 6.0, 0.1
 
@@ -76,7 +78,8 @@ class Search:
                 score = self.trials(*of, setting, *forms, allowed)[0].reshape(n, -1)
                 best = np.argmax(score, axis=1) + score.shape[1] * np.arange(n)
                 worth = score.ravel()[best] - price
-                for i in np.flatnonzero(worth > 0):
+                places = np.flatnonzero(worth > 0)
+                for i in places if cause.scale is None else places[:1]:
                     chosen.append((cause, i, shape[best[i]], power[best[i]], worth[i], setting))
         return Candidates(each for chosen in lists
                           for each in sorted(chosen, key=lambda c: -c[4])[:SHORTLIST])
@@ -192,13 +195,27 @@ class Search:
         self.settle(c)
 
     def hear_witnesses(self, c):
+        """Candidates with what the sensors say; of faults that the displacement cannot tell apart
+        those that they support best"""
+        twins = lambda i: c.cause[i].twins() if c.cause[i].scale is not None else [c.subject[i]]
+        heard = [(i, subject) for i in range(len(c)) for subject in
+                 (twins(i) if c.cause[i].sensor else [c.subject[i]])]
+        if not heard:
+            return c
+        place, subject = np.array(heard).T
+        first, c = c.subject[place], c.take(place)
+        for number in np.unique(c.number[[each.scale is not None for each in c.cause]]):
+            at, scale = np.flatnonzero(c.number == number), self.causes[number].scale
+            c.gains[at] *= (scale[first[at]] / scale[subject[at]])[:, None]
+        c.subject = subject
         faults = np.array([i for i in range(len(c)) if c.cause[i].sensor], dtype=int)
-        if not len(faults):
-            return
-        columns = columns_of(c, faults, c.shape[faults])[:, :, 0]
-        sensors = c.subject[faults]
-        errors = -columns / self.d.k[sensors] * np.where(c.acts[faults], c.gains[faults, 0], 0.0)
-        c.score[faults] += self.witness.says(sensors, errors)
+        if len(faults):
+            errors = -columns_of(c, faults, c.shape[faults])[:, :, 0] / self.d.k[subject[faults]]
+            errors *= np.where(c.acts[faults], c.gains[faults, 0], 0.0)
+            c.score[faults] += self.witness.says(subject[faults], errors)
+        order = np.lexsort((-c.score, place))
+        rank = np.arange(len(c)) - np.searchsorted(place, place)
+        return c.take(order[rank < TWINS_KEPT])
 
     def ranked(self):
         """What came into question on each of the sides, best first"""
@@ -206,7 +223,7 @@ class Search:
         settings = sorted({*e.likeliest, *range(0, len(e.squares), e.kinds)})
         c = self.shortlists(settings)
         self.settle(c)
-        self.hear_witnesses(c)
+        c = self.hear_witnesses(c)
         return [self.chosen(c, side) for side in range(len(e.sides))]
 
     def chosen(self, c, side):
@@ -216,6 +233,10 @@ class Search:
                 once.setdefault(c.key(i), i)
         c = c.take([i for i in once.values() if c.acts[i]])
         LeftOut(self.evidence, side).measure(c)
+        first = {}  # what twins leave is the same, which rounding must not order
+        for i in np.flatnonzero([each.scale is not None for each in c.cause]):
+            one = first.setdefault((c.number[i], c.shape[i], c.setting[i]), i)
+            c.log_left[i], c.left_out_gain[i] = c.log_left[one], c.left_out_gain[one]
         order = np.argsort(c.log_left, kind="stable")
         if len(order):
             tie = int(np.sum(c.log_left <= c.log_left[order[0]] + TIE))

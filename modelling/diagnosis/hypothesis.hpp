@@ -66,8 +66,8 @@ struct Hypothesis {
   /// Of a column of the output: it counts from the shape's one time on in `run`, before it is zero.
   /// Hypotheses of one cause and run have the same times.
   std::function<Column(std::size_t output)> from_onset{};
-  /// Hypotheses of one pattern have the same grid and the same columns, each times its scale for
-  /// the output; empty: it shares its columns with none.
+  /// Hypotheses of one pattern have the same form, price and grid and the same columns, each times
+  /// its scale for the output; empty: it shares its columns with none.
   std::string pattern{};
   std::function<double(std::size_t output)> scale{};
   /// Whether a gain is physically possible; empty: all are.

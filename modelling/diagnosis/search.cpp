@@ -8,7 +8,7 @@
 #include <Eigen/LU>
 
 #include "modelling/diagnosis/left_out.hpp"
-#include "modelling/diagnosis/sensor_witness.hpp"
+#include "modelling/diagnosis/shortlist.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -55,6 +55,7 @@ Search::Search(const MeasuredData& data, const Thresholds& thresholds,
     : data_(data),
       thresholds_(thresholds),
       rows_(stacked_rows(data)),
+      witness_(data_, rows_),
       hypotheses_(std::move(hypotheses)),
       accepted_(std::move(accepted)) {
   readings_.resize(rows_.time_s.size(), std::ssize(data.model.inputs));
@@ -194,22 +195,19 @@ std::vector<Explanation> Search::ranked() {
 
 /// The best few under each of the settings, settled and chosen among.
 std::vector<Explanation> Search::judged(std::vector<std::vector<Explanation>> under_each) {
+  std::vector<Place> places;
+  for (std::vector<Explanation>& all : under_each)
+    for (Place& place : shortlist(std::move(all), measured_, shortlist_of_each))
+      places.push_back(std::move(place));
+  std::vector<Explanation*> first;
+  for (Place& place : places) first.push_back(&place.first);
+  settle(std::move(first));
   std::vector<Explanation> candidates;
-  for (std::vector<Explanation>& all : under_each) {
-    const auto better = [](const auto& a, const auto& b) { return a.score > b.score; };
-    std::sort(all.begin(), all.end(), better);
-    all.resize(std::min(all.size(), shortlist_of_each));
-    candidates.insert(candidates.end(), all.begin(), all.end());
-  }
-  std::vector<Explanation*> all;
-  all.reserve(candidates.size());
-  for (Explanation& candidate : candidates) all.push_back(&candidate);
-  settle(std::move(all));
-  for (Explanation& candidate : candidates) {
-    if (candidate.hypothesis->sensor) candidate.score += sensor_says(data_, rows_, candidate);
-  }
-  std::sort(candidates.begin(), candidates.end(),
-            [](const auto& a, const auto& b) { return a.score > b.score; });
+  for (Place& place : places)
+    for (Explanation& each : witnessed(std::move(place), measured_, witness_))
+      candidates.push_back(std::move(each));
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const auto& a, const auto& b) { return a.score > b.score; });
   std::vector<Explanation> once;
   for (Explanation& candidate : candidates) {
     const bool known = std::any_of(once.begin(), once.end(), [&](const Explanation& each) {
@@ -225,17 +223,31 @@ std::vector<Explanation> Search::judged(std::vector<std::vector<Explanation>> un
 /// By what each leaves of rows it was not fitted to; among those that leave nearly the same, by
 /// likelihood.
 void Search::choose(std::vector<Explanation>& candidates) const {
-  LeftOut left_out(rows_, outputs_);
-  for (Explanation& each : candidates) measure_left_out(each, left_out);
-  std::sort(candidates.begin(), candidates.end(),
-            [](const auto& a, const auto& b) { return a.log_left < b.log_left; });
+  measure_left_out(candidates);
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const auto& a, const auto& b) { return a.log_left < b.log_left; });
   if (candidates.empty()) return;
   const double least = candidates.front().log_left;
   const auto tie = std::find_if(candidates.begin(), candidates.end(), [&](const auto& each) {
     return each.log_left > least + tie_share;
   });
-  std::sort(candidates.begin(), tie,
-            [](const auto& a, const auto& b) { return a.score > b.score; });
+  std::stable_sort(candidates.begin(), tie,
+                   [](const auto& a, const auto& b) { return a.score > b.score; });
+}
+
+void Search::measure_left_out(std::vector<Explanation>& candidates) const {
+  LeftOut left_out(rows_, outputs_);
+  for (auto each = candidates.begin(); each != candidates.end(); ++each) {
+    const auto twin = std::find_if(candidates.begin(), each, [&](const Explanation& before) {
+      return of_one_place(before, *each, measured_);
+    });
+    if (twin == each) {
+      measure_left_out(*each, left_out);
+    } else {
+      each->left_out_gain = twin->left_out_gain;
+      each->log_left = twin->log_left;
+    }
+  }
 }
 
 void Search::measure_left_out(Explanation& explanation, LeftOut& left_out) const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "modelling/diagnosis/evidence.hpp"
+#include "modelling/diagnosis/sensor_witness.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -141,6 +142,7 @@ class Search {
   [[nodiscard]] double price(const Hypothesis& hypothesis) const;
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
   void choose(std::vector<Explanation>& candidates) const;
+  void measure_left_out(std::vector<Explanation>& candidates) const;
   void measure_left_out(Explanation& explanation, LeftOut& left_out) const;
   void measure_without();
   void accept(const std::vector<Finding>& findings, std::size_t but);
@@ -171,6 +173,7 @@ class Search {
   Thresholds thresholds_;
   StackedRows rows_;
   Panel readings_;  ///< the model's calm readings over the stacked rows
+  SensorWitness witness_;
   std::vector<Hypothesis> hypotheses_;
   std::vector<OutputEvidence> outputs_;
   std::vector<std::size_t> measured_;     ///< outputs with values

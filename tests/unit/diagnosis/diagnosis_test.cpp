@@ -120,6 +120,23 @@ Diagnosis diagnosis_of_machine(const Readings& machine) {
                   {"c"});
 }
 
+/// Thirty readings of one output, of which one has an error from the 300th row of the first run on.
+/// The displacement shows an error, not of which reading it is.
+template <class Error>
+Diagnosis diagnosis_of_false_reading(std::size_t sensor, Error error_K) {
+  Readings machine;
+  for (int i = 0; i < 30; ++i) {
+    machine.per_row.push_back(0.01 + 0.003 * i);
+    machine.um_per_K.push_back((i % 2 == 0 ? 1.0 : -1.0) * (1.0 + 0.37 * (i * 7 % 10)));
+    machine.factor.push_back(1.0);
+  }
+  RunFile train = machine.run(1);
+  std::vector<double>& reading = train.values[3 + sensor];
+  for (std::size_t row = 300; row < reading.size(); ++row)
+    reading[row] += error_K(static_cast<double>(row - 300));
+  return diagnose(machine.model(), {train}, {"train"}, {machine.run(2)}, {"test"});
+}
+
 }  // namespace
 
 TEST_CASE("whitened columns give the generalised least squares of the covariance",
@@ -190,6 +207,27 @@ TEST_CASE("play of the joint is named with the width of its dead band", "[diagno
   const Parameter& width = answer.findings[0].parameters.front();
   // With one input, play of the output and of the temperature are the same.
   CHECK(width.values.at("") * (width.name == "width_K" ? 5.0 : 1.0) == Approx(6.0).epsilon(0.05));
+}
+
+TEST_CASE("of many sensors that one output cannot tell apart the faulty one is named",
+          "[diagnosis]") {
+  const std::size_t sensor = GENERATE(4U, 15U, 22U, 29U);
+  CAPTURE(sensor);
+  SECTION("it jumps") {
+    const Diagnosis answer = diagnosis_of_false_reading(sensor, [](double) { return 3.0; });
+    REQUIRE_FALSE(answer.findings.empty());
+    CHECK(answer.findings[0].cause == "sensor_step");
+    CHECK(answer.findings[0].subject ==
+          std::string("t").append(std::to_string(sensor + 1)).append("_degC"));
+  }
+  SECTION("it drifts") {
+    const Diagnosis answer =
+        diagnosis_of_false_reading(sensor, [](double row) { return 0.02 * row; });
+    REQUIRE_FALSE(answer.findings.empty());
+    CHECK(answer.findings[0].cause == "sensor_drift");
+    CHECK(answer.findings[0].subject ==
+          std::string("t").append(std::to_string(sensor + 1)).append("_degC"));
+  }
 }
 
 TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "[diagnosis]") {
