@@ -200,11 +200,12 @@ std::vector<Explanation> Search::judged(std::vector<std::vector<Explanation>> un
     for (Place& place : shortlist(std::move(all), measured_, shortlist_of_each))
       places.push_back(std::move(place));
   std::vector<Explanation*> first;
+  first.reserve(places.size());
   for (Place& place : places) first.push_back(&place.first);
   settle(std::move(first));
   std::vector<Explanation> candidates;
-  for (Place& place : places)
-    for (Explanation& each : witnessed(std::move(place), measured_, witness_))
+  for (const Place& place : places)
+    for (Explanation& each : witnessed(place, measured_, witness_))
       candidates.push_back(std::move(each));
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const auto& a, const auto& b) { return a.score > b.score; });

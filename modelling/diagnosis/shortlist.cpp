@@ -63,11 +63,12 @@ std::vector<Place> shortlist(std::vector<Explanation> weighed,
   });
   order.resize(std::min(order.size(), places));
   std::vector<Place> best;
+  best.reserve(order.size());
   for (const std::size_t place : order) best.push_back(std::move(all[place]));
   return best;
 }
 
-std::vector<Explanation> witnessed(Place place, const std::vector<std::size_t>& measured,
+std::vector<Explanation> witnessed(const Place& place, const std::vector<std::size_t>& measured,
                                    SensorWitness& witness) {
   const Hypothesis& leading = *place.first.hypothesis;
   std::vector<Explanation> all = {place.first};

@@ -22,7 +22,7 @@ struct Place {
 
 /// The explanations of a place whose first one is settled. Where they are faults of sensors, these
 /// are heard, and of twins those remain that the sensors support best.
-[[nodiscard]] std::vector<Explanation> witnessed(Place place,
+[[nodiscard]] std::vector<Explanation> witnessed(const Place& place,
                                                  const std::vector<std::size_t>& measured,
                                                  SensorWitness& witness);
 
