@@ -14,6 +14,8 @@ namespace {
 constexpr std::size_t blocks_wanted = 8;
 constexpr double block_rows_min = 12;
 constexpr double special_case_handicap = 20.0;
+/// Whatever wanders resembles a ramp for the length of a run.
+constexpr double clear_share_of_drift = 0.6;
 /// A derivative is taken of readings smoothed with this share of the time constant that it is for.
 constexpr double slope_smoothing = 0.25;
 
@@ -443,6 +445,7 @@ void Catalogue::add_displacement_faults(std::size_t run, std::size_t output) {
   };
   Hypothesis& drift =
       add({"displacement_drift", name, Form::own_gains, {}, {"rate_um_per_h"}, output, run});
+  drift.clear_share = clear_share_of_drift;
   drift.columns = one_by_one([this, run](const Shape&, std::size_t) {
     return in_run(run, [&](const MeasuredRun& of) -> Column {
       return (of.time_s.array() - of.time_s[of.begin]) / 3600.0;

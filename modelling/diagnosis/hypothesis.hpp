@@ -56,6 +56,9 @@ struct Hypothesis {
   std::optional<std::size_t> sensor{};  ///< a fault of the reading of this input
   /// 2 ln L that it must gain beyond others: for what contains a simpler cause as a special case.
   double handicap{0.0};
+  /// Least share of the RMS with which it is clear by itself, where likelihood shall not make it
+  /// so; 0: as others.
+  double clear_share{0.0};
   bool in_every_output{false};  ///< an output without its share speaks against it
   /// Columns for an output over the stacked rows, those of one shape after those of another, shape
   /// (rows, shapes times gains or 1).

@@ -274,6 +274,18 @@ double LeftOut::log_left_without(std::size_t output) {
   return log_ratio(sum.after, sum.measured);
 }
 
+double LeftOut::log_left_by_accepted(std::size_t output) {
+  const OutputEvidence& evidence = outputs_[output];
+  const Common& common = this->common(evidence.setting());
+  Squares sum;
+  for (std::size_t block = 0; block < rows_.blocks.size(); ++block) {
+    const auto left = left_by(evidence, common[block].carried);
+    sum += squares_in_block(evidence, {evidence.measured_residual(), left[0], left[1], left[1]},
+                            rows_, rows_.blocks[block]);
+  }
+  return log_ratio(sum.after, sum.measured);
+}
+
 LeftOutGain LeftOut::gain_on_left_out_blocks(const Explanation& explanation) {
   const std::vector<std::size_t> acting = acting_outputs(explanation);
   const std::size_t blocks = rows_.blocks.size();

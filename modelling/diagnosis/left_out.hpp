@@ -41,6 +41,10 @@ class LeftOut {
   /// leave of rows that they were not fitted to; 0 where they are taken as right.
   [[nodiscard]] double log_left_without(std::size_t output);
 
+  /// Of an output: ln(RMS that all accepted explanations and the errors of the coefficients leave
+  /// of rows that their gains were not fitted to / RMS of what the model leaves).
+  [[nodiscard]] double log_left_by_accepted(std::size_t output);
+
  private:
   /// The common columns and the residual of a setting when a block is left out.
   struct CommonWithout {

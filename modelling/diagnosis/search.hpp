@@ -41,6 +41,8 @@ struct Thresholds {
   /// a cause that is plain in one of them leaves most others as they are. For the same reason what
   /// is likeliest need not be large enough to be named; then the best that is comes first.
   bool one_unit{false};
+  /// Where one finding after another leaves a doubt, two are sought together.
+  bool in_pairs{true};
 };
 
 struct Finding {
@@ -155,7 +157,28 @@ class Search {
   /// Whether errors of all coefficients are reckoned with; holds for every later finding too.
   void doubt(bool doubted);
   /// @param candidates  for the first finding, best first
-  [[nodiscard]] SearchResult run_from(std::vector<Explanation> candidates);
+  /// @param errors_seen  the coefficients are taken as right although they hardly are
+  [[nodiscard]] SearchResult run_from(const std::vector<Explanation>& candidates, bool errors_seen);
+  /// Findings one after another.
+  struct Path {
+    std::vector<Finding> findings;
+    std::vector<Weighed> weighed{};
+    double log_left{0.0};  ///< of all together, over all outputs, their price added
+    double score{0.0};     ///< 2 ln L with all of them, their price taken off
+  };
+  /// Adds findings for as long as they are earned.
+  /// @param candidates  for the round `from_round`, where that is the first
+  void follow(Path& path, std::vector<Explanation> candidates, std::size_t from_round);
+  [[nodiscard]] bool in_doubt(const Path& path) const;
+  void reconsider(Path& path, const std::vector<Explanation>& firsts);
+  [[nodiscard]] std::vector<Path> pairs(const std::vector<Explanation>& firsts);
+  [[nodiscard]] bool stands(Path& path);
+  [[nodiscard]] bool each_earned(std::vector<Finding>& findings);
+  void measure(Path& path);
+  [[nodiscard]] SearchResult result_of(Path path);
+  /// With all other candidates as alternatives.
+  [[nodiscard]] static Finding finding_of(const std::vector<Explanation>& candidates,
+                                          std::size_t chosen);
   void refit(std::vector<Finding>& findings);
   void measure_spread(std::vector<Finding>& findings);
   [[nodiscard]] double shape_sd(const Explanation& explanation, std::size_t parameter) const;

@@ -91,6 +91,7 @@ SearchBesideFit::SearchBesideFit(const MeasuredData& data, const Thresholds& thr
       rows_(stacked_rows(data)),
       fit_(OwnFit::recognised(data, rows_)) {
   thresholds_.left_out_gain_min = left_out_gain_min;
+  thresholds_.in_pairs = false;
 }
 
 std::unique_ptr<SearchBesideFit::Group> SearchBesideFit::searched(

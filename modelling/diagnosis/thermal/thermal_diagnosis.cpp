@@ -120,6 +120,7 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   const auto catalogue = std::make_shared<NetworkHypotheses>(plant, train_runs, rows);
   Thresholds thresholds;
   thresholds.one_unit = true;
+  thresholds.in_pairs = false;
   thresholds.motion_share_min = motion_share_min;
   Search search(train_data, thresholds, NetworkHypotheses::all(catalogue),
                 [&](const std::vector<Explanation>& found) { catalogue->accept(found); });

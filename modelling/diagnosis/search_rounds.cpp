@@ -1,0 +1,215 @@
+// One finding after another, refitted together.
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include <Eigen/LU>
+
+#include "modelling/diagnosis/left_out.hpp"
+#include "modelling/diagnosis/search.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr int refit_rounds = 2;
+/// Errors of the coefficients are reckoned with when they leave less by this share.
+constexpr double doubt_share = 0.2;
+constexpr std::size_t weighed_shown = 12;
+
+}  // namespace
+
+void Search::accept(const std::vector<Finding>& findings, std::size_t but) {
+  std::vector<Explanation> found;
+  for (std::size_t i = 0; i < findings.size(); ++i)
+    if (i != but) found.push_back(findings[i].explanation);
+  if (accepted_) accepted_(found);
+  for (OutputEvidence& output : outputs_) output.accept(found);
+  measure_without();
+}
+
+void Search::measure_without() {
+  LeftOut left_out(rows_, outputs_);
+  log_left_without_.assign(outputs_.size(), 0.0);
+  for (const std::size_t output : measured_)
+    log_left_without_[output] = left_out.log_left_without(output);
+}
+
+/// The explanations for the first finding in both stances. The columns of all hypotheses are made
+/// once for both.
+Search::BothStances Search::first_candidates() {
+  std::vector<Settings> settings;
+  std::vector<std::vector<Settings>> of_stance;
+  accept({}, 0);
+  for (const bool doubted : {false, true}) {
+    if (doubted && !(data_.coefficient_sd > 0)) continue;
+    doubt(doubted);
+    of_stance.push_back(profiled_settings());
+    settings.insert(settings.end(), of_stance.back().begin(), of_stance.back().end());
+  }
+  std::vector<std::vector<Explanation>> under_each = profile(settings);
+  const auto middle = under_each.begin() + std::ssize(of_stance.front());
+  BothStances both;
+  if (of_stance.size() > 1)
+    both.beside_errors =
+        judged({std::make_move_iterator(middle), std::make_move_iterator(under_each.end())});
+  doubt(false);
+  both.right =
+      judged({std::make_move_iterator(under_each.begin()), std::make_move_iterator(middle)});
+  return both;
+}
+
+void Search::doubt(bool doubted) {
+  for (OutputEvidence& output : outputs_) output.doubt_coefficients(doubted);
+  measure_without();
+}
+
+void Search::refit(std::vector<Finding>& findings) {
+  for (int round = 0; findings.size() > 1 && round < refit_rounds; ++round) {
+    for (std::size_t i = 0; i < findings.size(); ++i) {
+      accept(findings, i);
+      Explanation& each = findings[i].explanation;
+      settle_anew(each);
+      if (!acts(each)) findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i--));
+    }
+  }
+}
+
+/// From the curvature of 2 ln L at its peak: it falls by 1 a standard deviation away.
+double Search::shape_sd(const Explanation& explanation, std::size_t parameter) const {
+  const ShapeParameter& of = explanation.hypothesis->shape[parameter];
+  if (of.discrete || !(explanation.score > 0)) return 0.0;
+  const double value = explanation.shape[parameter];
+  if (of.logarithmic && !(value > 0)) return 0.0;
+  const double range = of.logarithmic ? 1.0 : of.grid.back() - of.grid.front();
+  const auto at = [&](double move) {
+    std::vector<double> shape = explanation.shape;
+    shape[parameter] = of.logarithmic ? value * std::exp(move) : value + move;
+    return weigh(*explanation.hypothesis, shape, explanation.settings).score;
+  };
+  const double peak = at(0.0);
+  // The curvature is taken where it can be seen above rounding: a fall of a few units.
+  for (double step = 1e-3 * range; step < range; step *= 2.0) {
+    const double fall = peak - 0.5 * (at(step) + at(-step));
+    if (fall > 4.0) return step / std::sqrt(fall);
+  }
+  return range;
+}
+
+void Search::measure_spread(std::vector<Finding>& findings) {
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    accept(findings, i);
+    Finding& finding = findings[i];
+    Explanation& each = finding.explanation;
+    settle_anew(each);
+    if (!acts(each)) {
+      findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i--));
+      continue;
+    }
+    finding.shape_sd.clear();
+    for (std::size_t k = 0; k < each.shape.size(); ++k)
+      finding.shape_sd.push_back(shape_sd(each, k));
+    finding.gain_sd.assign(outputs_.size(), Eigen::VectorXd());
+    for (const std::size_t output : measured_) {
+      if (each.gains[output].size() == 0) continue;
+      const Setting& setting = *each.settings[output];
+      const Setting::Equations of =
+          setting.equations(columns_of(*each.hypothesis, each.shape, outputs_[output]));
+      const double squares = setting.squares() - 2.0 * each.gains[output].dot(of.right) +
+                             each.gains[output].dot(of.square * each.gains[output]);
+      const double variance = std::max(0.0, squares) / setting.present_rows();
+      finding.gain_sd[output] = (variance * of.square.inverse().diagonal()).array().sqrt();
+    }
+  }
+}
+
+/// Coefficients are doubted when the best explanation beside their errors predicts rows left out
+/// clearly better than the best one without. These errors can take so much of a large cause that
+/// nothing is clear; then it is sought as if the coefficients were right. What is small stays
+/// theirs.
+SearchResult Search::run() {
+  const auto least_left = [](const std::vector<Explanation>& of) {
+    return of.empty() ? 0.0 : of.front().log_left;
+  };
+  BothStances first = first_candidates();
+  const bool errors_seen = least_left(first.beside_errors) < least_left(first.right) - doubt_share;
+  if (errors_seen) {
+    doubt(true);
+    SearchResult result = run_from(first.beside_errors, false);
+    if (!result.unexplained) return result;
+    for (OutputEvidence& output : outputs_) output.doubt_coefficients(false);
+    first = {first_candidates().right, {}};
+  }
+  return run_from(first.right, errors_seen);
+}
+
+void Search::follow(Path& path, std::vector<Explanation> candidates, std::size_t from_round) {
+  // A refit can drop what a later finding explains better: rounds are counted, not findings.
+  for (std::size_t round = from_round; round <= thresholds_.findings_max; ++round) {
+    if (round > 1) {
+      accept(path.findings, path.findings.size());
+      candidates = ranked();
+    }
+    std::erase_if(candidates, [&](const Explanation& each) {
+      return std::any_of(path.findings.begin(), path.findings.end(), [&](const Finding& found) {
+        return found.explanation.hypothesis == each.hypothesis;
+      });
+    });
+    for (std::size_t i = 0; i < std::min(weighed_shown, candidates.size()); ++i)
+      path.weighed.push_back({round, candidates[i].hypothesis->cause,
+                              candidates[i].hypothesis->subject, candidates[i].score,
+                              candidates[i].left_out_gain, candidates[i].log_left});
+    if (thresholds_.one_unit) {
+      const auto first = std::find_if(
+          candidates.begin(), candidates.end(),
+          [&](const Explanation& each) { return earned(each, path.findings.empty()); });
+      if (first != candidates.end()) std::rotate(candidates.begin(), first, first + 1);
+    }
+    if (candidates.empty() || !earned(candidates.front(), path.findings.empty())) break;
+    path.findings.push_back(finding_of(candidates, 0));
+    refit(path.findings);
+  }
+}
+
+Finding Search::finding_of(const std::vector<Explanation>& candidates, std::size_t chosen) {
+  Finding finding{candidates[chosen], {}, {}, {}};
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Hypothesis& other = *candidates[i].hypothesis;
+    if (other.cause != candidates[chosen].hypothesis->cause ||
+        other.subject != candidates[chosen].hypothesis->subject)
+      finding.alternatives.push_back(candidates[i]);
+  }
+  return finding;
+}
+
+SearchResult Search::run_from(const std::vector<Explanation>& candidates, bool errors_seen) {
+  Path path;
+  follow(path, candidates, 1);
+  // What a clear finding leaves is the errors' then.
+  const bool settled = errors_seen && path.findings.size() == 1 && convincing(path.findings);
+  if (!settled && in_doubt(path)) reconsider(path, candidates);
+  return result_of(std::move(path));
+}
+
+SearchResult Search::result_of(Path path) {
+  SearchResult result;
+  result.findings = std::move(path.findings);
+  result.weighed = std::move(path.weighed);
+  const bool named = convincing(result.findings);
+  measure_spread(result.findings);
+  accept(result.findings, result.findings.size());
+  double left_variance = 1.0;
+  for (const Finding& finding : result.findings)
+    left_variance *= std::pow(1.0 - finding.explanation.left_out_gain, 2);
+  result.unexplained_share.assign(outputs_.size(), 0.0);
+  for (const std::size_t output : measured_)
+    result.unexplained_share[output] =
+        std::clamp(1.0 - carried_share(result.findings, output), 0.0, 1.0);
+  if (!named || 1.0 - left_variance < thresholds_.carried_share_min) {
+    result.findings.clear();
+    for (const std::size_t output : measured_) result.unexplained_share[output] = 1.0;
+    result.unexplained = structure_left();
+  }
+  return result;
+}
+
+}  // namespace thermocomp::diagnosis
