@@ -14,6 +14,7 @@
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/still_searching.hpp"
 #include "modelling/diagnosis/thermal/corrected_machine.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 
@@ -77,6 +78,7 @@ void print_weighed(const Diagnosis& diagnosis) {
 Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   const std::vector<RunFile> train = load_runs(options.train);
   const std::vector<RunFile> test = load_runs(options.test);
+  const StillSearching still_searching;
   if (!options.thermal.empty())
     return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
                             options.test, report);
