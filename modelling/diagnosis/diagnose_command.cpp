@@ -14,6 +14,7 @@
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/report_texts.hpp"
 #include "modelling/diagnosis/still_searching.hpp"
 #include "modelling/diagnosis/thermal/corrected_machine.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
@@ -58,6 +59,8 @@ void print(const Diagnosis& diagnosis) {
       std::printf("  %s, test rows: RMS %.3f -> %.3f (%.0f %%, 95 %%: %.0f to %.0f)\n",
                   output.c_str(), gain.before_um, gain.after_um, 100 * gain.reduction,
                   100 * gain.ci95.low, 100 * gain.ci95.high);
+    if (fails_on_test_runs(finding))
+      std::printf("  worse on the test runs: do not use it before more runs confirm it\n");
     for (const Alternative& other : finding.alternatives)
       std::printf("  or: %s of %s (support %.2g)\n", other.cause.c_str(), other.subject.c_str(),
                   other.relative_support);

@@ -136,8 +136,10 @@ std::string sentence_of(const NamedFinding& finding) {
     figures.append(figures.empty() ? "" : "; ").append(parameter_text(parameter));
   if (!figures.empty()) text.append("; ").append(figures);
   for (const auto& [output, gain] : finding.test)
-    text.append("; knowing it takes the error of ")
+    text.append(gain.reduction > 0 ? "; knowing it takes the error of "
+                                   : "; on the test runs it makes the error larger: that of ")
         .append(output)
+        .append(gain.reduction > 0 ? "" : " goes")
         .append(" from ")
         .append(number(gain.before_um))
         .append(" to ")
@@ -145,9 +147,19 @@ std::string sentence_of(const NamedFinding& finding) {
   return text + ".";
 }
 
+bool fails_on_test_runs(const NamedFinding& finding) {
+  return !finding.test.empty() &&
+         std::none_of(finding.test.begin(), finding.test.end(),
+                      [](const auto& of_output) { return of_output.second.reduction > 0; });
+}
+
 std::string what_to_do(const NamedFinding& finding) {
   const CauseTexts* of = texts_of(key_of(finding));
-  return of == nullptr ? std::string() : std::string(of->to_do);
+  const std::string usual = of == nullptr ? std::string() : std::string(of->to_do);
+  if (!fails_on_test_runs(finding)) return usual;
+  return "Do not use it yet: it holds for the training runs and not for the test runs. Take its "
+         "[[term]] out of the extended model and record more runs. If they confirm it: " +
+         usual;
 }
 
 std::string experiment_for(const NamedFinding& finding, const Alternative& other) {

@@ -10,6 +10,8 @@ namespace thermocomp::diagnosis {
 
 /// One or two sentences with the finding's own figures.
 [[nodiscard]] std::string sentence_of(const NamedFinding& finding);
+/// Whether no output gains by it on the test runs.
+[[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
 [[nodiscard]] std::string what_to_do(const NamedFinding& finding);
 /// The experiment that tells the finding from one of its alternatives.
 [[nodiscard]] std::string experiment_for(const NamedFinding& finding, const Alternative& other);

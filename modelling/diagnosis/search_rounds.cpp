@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include <Eigen/LU>
 
@@ -74,22 +75,30 @@ void Search::refit(std::vector<Finding>& findings) {
   }
 }
 
-/// From the curvature of 2 ln L at its peak: it falls by 1 a standard deviation away.
+/// From the curvature of 2 ln L at its peak: it falls by 1 a standard deviation away. Where a side
+/// of the peak is physically impossible, the other one tells.
 double Search::shape_sd(const Explanation& explanation, std::size_t parameter) const {
   const ShapeParameter& of = explanation.hypothesis->shape[parameter];
   if (of.discrete || !(explanation.score > 0)) return 0.0;
   const double value = explanation.shape[parameter];
   if (of.logarithmic && !(value > 0)) return 0.0;
   const double range = of.logarithmic ? 1.0 : of.grid.back() - of.grid.front();
-  const auto at = [&](double move) {
-    std::vector<double> shape = explanation.shape;
-    shape[parameter] = of.logarithmic ? value * std::exp(move) : value + move;
-    return weigh(*explanation.hypothesis, shape, explanation.settings).score;
+  const auto at = [&](double move) -> std::optional<double> {
+    Explanation moved = explanation;
+    moved.shape[parameter] = of.logarithmic ? value * std::exp(move) : value + move;
+    Trial trial = weigh(*moved.hypothesis, moved.shape, moved.settings);
+    moved.gains = std::move(trial.gains);
+    return acts(moved) ? std::optional<double>(trial.score) : std::nullopt;
   };
-  const double peak = at(0.0);
+  const std::optional<double> peak = at(0.0);
+  if (!peak) return range;
   // The curvature is taken where it can be seen above rounding: a fall of a few units.
   for (double step = 1e-3 * range; step < range; step *= 2.0) {
-    const double fall = peak - 0.5 * (at(step) + at(-step));
+    const std::optional<double> above = at(step);
+    const std::optional<double> below = at(-step);
+    if (!above && !below) return range;
+    const double fall =
+        *peak - 0.5 * (above.value_or(below.value_or(0.0)) + below.value_or(above.value_or(0.0)));
     if (fall > 4.0) return step / std::sqrt(fall);
   }
   return range;

@@ -74,6 +74,21 @@ bool has(const std::string& text, const std::string& what) {
 
 }  // namespace
 
+TEST_CASE("a finding that the test runs do not bear out is not recommended", "[diagnosis]") {
+  Diagnosis diagnosis = with_findings();
+  NamedFinding& finding = diagnosis.findings.front();
+  const std::string usual = what_to_do(finding);
+  REQUIRE_FALSE(fails_on_test_runs(finding));
+  finding.test["z_um"] = {2.4, 3.0, -0.25, {-0.4, -0.1}};
+  CHECK(fails_on_test_runs(finding));
+  CHECK(sentence_of(finding).find("makes the error larger: that of z_um goes from 2.4 to 3") !=
+        std::string::npos);
+  CHECK(what_to_do(finding).starts_with("Do not use it yet"));
+  CHECK(what_to_do(finding).ends_with(usual));
+  finding.test["x_um"] = {2.0, 1.0, 0.5, {0.4, 0.6}};
+  CHECK(what_to_do(finding) == usual);
+}
+
 TEST_CASE("the report needs nothing but itself", "[diagnosis][report]") {
   for (const Diagnosis& diagnosis : {none(), with_findings()}) {
     const std::string html = report_html(diagnosis, one_run());
