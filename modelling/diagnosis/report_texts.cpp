@@ -155,7 +155,7 @@ bool fails_on_test_runs(const NamedFinding& finding) {
 
 std::string what_to_do(const NamedFinding& finding) {
   const CauseTexts* of = texts_of(key_of(finding));
-  const std::string usual = of == nullptr ? std::string() : std::string(of->to_do);
+  std::string usual = of == nullptr ? std::string() : std::string(of->to_do);
   if (!fails_on_test_runs(finding)) return usual;
   return "Do not use it yet: it holds for the training runs and not for the test runs. Take its "
          "[[term]] out of the extended model and record more runs. If they confirm it: " +
