@@ -135,6 +135,18 @@ SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
 }
 
 RecordCursor HistoryReader::records(const SegmentInfo& segment) const {
+  // Told before anything is replayed: a far cycle that a damaged record names would be reached
+  // first.
+  Statement newest(
+      parts_->database,
+      "SELECT through_cycle FROM chunk WHERE segment = ? ORDER BY number DESC LIMIT 1");
+  newest.bind(segment.id);
+  if (segment.last_cycle >= static_cast<std::int64_t>(segment.first_cycle) &&
+      !(newest.step() && newest.number(0) >= segment.last_cycle)) {
+    throw HistoryError(parts_->file.string() + ": the chunks of segment " +
+                       std::to_string(segment.id) +
+                       " end before its last cycle (damaged, or deleted meanwhile)");
+  }
   return RecordCursor(*this, segment);
 }
 

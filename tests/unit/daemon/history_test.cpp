@@ -114,6 +114,21 @@ TEST_CASE(
   CHECK_THROWS_WITH(export_run(config.file, {}, {}, out, {}, parse_test_setup), names_file);
 }
 
+TEST_CASE("a segment that claims more cycles than its chunks hold is refused before it is replayed",
+          "[history][damage]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 3);
+  machine.start();
+  machine.run(500);
+  machine.stop();
+  run_sql(config.file, "UPDATE segment SET last_cycle = last_cycle + 1");
+  const HistoryReader reader(config.file);
+  CHECK_THROWS_WITH(reader.records(reader.segments().front()),
+                    Catch::Contains("end before its last cycle"));
+  CHECK_THROWS_WITH(replay_quietly(config.file), Catch::Contains(config.file.string()));
+}
+
 TEST_CASE("a state of a later time than its first cycle is refused", "[history][damage]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
