@@ -525,6 +525,20 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
 
 }  // namespace
 
+Shapes grid_of(const Hypothesis& hypothesis) {
+  Shapes points = {{}};
+  for (const ShapeParameter& parameter : hypothesis.shape) {
+    Shapes longer;
+    for (const auto& point : points)
+      for (const double value : parameter.grid) {
+        longer.push_back(point);
+        longer.back().push_back(value);
+      }
+    points = std::move(longer);
+  }
+  return points;
+}
+
 StackedRows stacked_rows(const MeasuredData& data) {
   StackedRows rows;
   Eigen::Index total = 0;

@@ -77,6 +77,9 @@ struct Hypothesis {
   std::function<bool(double gain, std::size_t output)> possible{};
 };
 
+/// Every point of the grid of its shape; one without values where it has no shape.
+[[nodiscard]] Shapes grid_of(const Hypothesis& hypothesis);
+
 /// Columns that are made for one shape at a time.
 /// @param make  Eigen::MatrixXd(const Shape&, std::size_t output)
 template <class Make>

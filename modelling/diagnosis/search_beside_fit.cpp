@@ -68,21 +68,6 @@ bool same_first(const SearchResult& a, const SearchResult& b) {
   return first.cause == other.cause && first.subject == other.subject;
 }
 
-/// All points of the shape's grid.
-Shapes grid_of(const Hypothesis& hypothesis) {
-  Shapes points = {{}};
-  for (const ShapeParameter& parameter : hypothesis.shape) {
-    Shapes longer;
-    for (const auto& point : points)
-      for (const double value : parameter.grid) {
-        longer.push_back(point);
-        longer.back().push_back(value);
-      }
-    points = std::move(longer);
-  }
-  return points;
-}
-
 }  // namespace
 
 SearchBesideFit::SearchBesideFit(const MeasuredData& data, const Thresholds& thresholds)

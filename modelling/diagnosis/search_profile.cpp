@@ -12,20 +12,6 @@ constexpr std::size_t shapes_at_once = 16;
 /// Columns of smaller factors are made for themselves.
 constexpr double scale_min = 1e-6;
 
-Shapes grid_of(const Hypothesis& hypothesis) {
-  Shapes points = {{}};
-  for (const ShapeParameter& parameter : hypothesis.shape) {
-    Shapes longer;
-    for (const auto& point : points)
-      for (const double value : parameter.grid) {
-        longer.push_back(point);
-        longer.back().push_back(value);
-      }
-    points = std::move(longer);
-  }
-  return points;
-}
-
 /// Columns of each shape of each hypothesis; all hypotheses have as many.
 Panel side_by_side(const std::vector<const Hypothesis*>& hypotheses, const Shapes& shapes,
                    const OutputEvidence& evidence) {
