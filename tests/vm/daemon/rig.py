@@ -132,11 +132,34 @@ class Recovery:
     reading_s: float
     compensating_s: float
     held_um: float  # spread of the offset while it was held
-    step_um: float  # largest in 10 ms, from the fault's begin until it had recovered
 
     def __str__(self):
         return (f"recovery: {self.fault:34s} {self.bus:10s} first reading {self.reading_s:5.2f} s, "
                 f"compensating {self.compensating_s:5.2f} s, held within {self.held_um:.3f} um")
+
+
+@dataclasses.dataclass
+class Window:
+    """An outage as the test saw it."""
+    fault: str
+    bus: str
+    holding: float  # CLOCK_MONOTONIC
+    held_until_s: float  # of the history
+    reading_s: float
+    compensating_s: float
+
+    def recovery(self, offsets, held_until):
+        held = [offset for at, offset in offsets if self.holding <= at < held_until]
+        assert held, f"{self.fault}: no record of the time without data"
+        return Recovery(self.fault, self.bus, self.reading_s, self.compensating_s,
+                        max(held) - min(held))
+
+
+def computed_until_s(cycle):
+    """Time of the history up to which the offsets were computed when the status was asked for. The
+    clock does not tell: a cycle carries the grid's time however late it runs, so one that was due
+    before a fault's end may have run after it."""
+    return (cycle["count"] + cycle["missed"] - 0.5) / cycle["rate_hz"]
 
 
 class Rig:
@@ -178,7 +201,6 @@ class Rig:
         """One fault from begin() to end(), until the daemon compensates again. `bus`: "body",
         "table" or "both". prepare() is what must be done before end() can end it."""
         lost = "table" if bus == "table" else "front"
-        began = time.monotonic()
         begin()
         eventually(lambda: not self.is_good(lost), f"{fault}: the reading is lost")
         eventually(lambda: self.daemon.status()["mode"] != "compensating", f"{fault}: held")
@@ -191,12 +213,15 @@ class Rig:
         time.sleep(0.2)
         holding = time.monotonic()
         time.sleep(1.0)
-        assert self.daemon.status()["mode"] != "compensating"
+        status = self.daemon.status()
+        assert status["mode"] != "compensating"
+        held_until_s = computed_until_s(status["cycle"])
         prepare()
         ending = time.monotonic()
         end()
         reading_s, compensating_s = self.wait_until_recovered(fault, lost, ending)
-        self.windows.append((fault, bus, began, holding, ending, reading_s, compensating_s))
+        self.windows.append(
+            Window(fault, bus, holding, held_until_s, reading_s, compensating_s))
         print(f"{fault}, {bus}: first reading after {reading_s:.2f} s, compensating after "
               f"{compensating_s:.2f} s")
 
@@ -223,15 +248,7 @@ class Rig:
                    zip(columns["time_s"], columns["z_offset_um"])]
         assert_slewed(offsets, self.monitor.offsets)
         assert_no_jump_on_the_bus(self.monitor.offsets)
-        return [self.recovery(offsets, *window) for window in self.windows]
-
-    @staticmethod
-    def recovery(offsets, fault, bus, began, holding, ending, reading_s, compensating_s):
-        held = [offset for at, offset in offsets if holding <= at <= ending]
-        assert held, f"{fault}: no record of the time without data"
-        around = [offset for at, offset in offsets if began <= at <= ending + compensating_s]
-        steps = [abs(b - a) for a, b in zip(around, around[1:])]
-        return Recovery(fault, bus, reading_s, compensating_s, max(held) - min(held), max(steps))
+        return [window.recovery(offsets, begin + window.held_until_s) for window in self.windows]
 
 
 class Simulated:
