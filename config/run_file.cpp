@@ -1,8 +1,10 @@
 #include "config/run_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <set>
 
 #include "config/number_text.hpp"
@@ -34,6 +36,37 @@ std::optional<double> finite_number(std::string_view field) {
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
+/// A number of digits and at most one point within them, so few that the digits and the power of
+/// ten are exact in a double: their quotient is then what std::from_chars gives, in a third of the
+/// time.
+/// @return how many characters of `text` it takes; 0 when it is another kind of number, or none
+std::size_t plain_number(std::string_view text, double& value) {
+  constexpr std::array<double, 16> power_of_ten{1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  const bool negative = at != end && *at == '-';
+  if (negative) ++at;
+  std::uint64_t digits = 0;
+  const auto take_digits = [&] {
+    const char* const first = at;
+    for (; at != end && *at >= '0' && *at <= '9'; ++at)
+      digits = 10 * digits + static_cast<std::uint64_t>(*at - '0');
+    return static_cast<std::size_t>(at - first);
+  };
+  const std::size_t whole = take_digits();
+  std::size_t fraction = 0;
+  if (at != end && *at == '.') {
+    ++at;
+    fraction = take_digits();
+    if (fraction == 0) return 0;
+  }
+  if (whole == 0 || whole + fraction >= power_of_ten.size()) return 0;
+  value = static_cast<double>(digits) / power_of_ten[fraction];
+  if (negative) value = -value;
+  return static_cast<std::size_t>(at - text.data());
+}
+
 /// Takes the part before the next separator off `rest`; false when nothing is left.
 bool take(std::string_view& rest, char separator, std::string_view& part) {
   if (rest.data() == nullptr) return false;
@@ -58,7 +91,10 @@ class RunParser {
         read_header(line);
         if (!problems_.empty()) break;  // no row can be judged
       } else if (!blank_to_the_end(line)) {
-        read_row(line);
+        if (take_plain_row(line))
+          check_time();
+        else
+          read_row(line);
       }
       if (problems_.size() >= problems_max) break;
     }
@@ -120,8 +156,25 @@ class RunParser {
     time_ = run_.find("time_s");
     if (!time_) add(line_number_, "time_s", "(missing)", "must be one of the columns");
     run_.values.resize(run_.columns.size());
-    const auto rows = static_cast<std::size_t>(std::count(rest_.begin(), rest_.end(), '\n')) + 1;
+    std::size_t rows = 1;
+    for (auto at = rest_.find('\n'); at != std::string_view::npos; at = rest_.find('\n', at + 1))
+      ++rows;
     for (auto& column : run_.values) column.reserve(rows);
+    row_.resize(run_.columns.size());
+  }
+
+  /// Nearly every row is one of plain numbers.
+  /// @return false when it is not, and nothing was taken
+  bool take_plain_row(std::string_view line) {
+    for (double& value : row_) {
+      const std::size_t length = plain_number(line, value);
+      if (length == 0) return false;
+      const bool last = &value == &row_.back();
+      if (last ? length < line.size() : length == line.size() || line[length] != ',') return false;
+      line.remove_prefix(last ? length : length + 1);
+    }
+    for (std::size_t i = 0; i < row_.size(); ++i) run_.values[i].push_back(row_[i]);
+    return true;
   }
 
   void read_row(std::string_view line) {
@@ -167,6 +220,7 @@ class RunParser {
   std::string_view rest_;
   int line_number_{0};
   RunFile run_;
+  std::vector<double> row_;
   std::optional<std::size_t> time_;
   std::optional<double> last_time_s_;
   bool bad_time_{false};  ///< the row's time has its problem already

@@ -1,6 +1,10 @@
 #include "config/run_file.hpp"
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <random>
 
 #include "files.hpp"
 
@@ -112,6 +116,64 @@ TEST_CASE("writing then reading a run changes no bit", "[config][run]") {
   CHECK(std::isnan(back.values[1][1]));
   CHECK(back.values[1][2] == 5e-324);
   CHECK(write_run(back) == write_run(run));
+}
+
+TEST_CASE("a number is read as the double nearest to it, however it is written",
+          "[config][run][property]") {
+  std::vector<std::string> texts{"0",
+                                 "-0",
+                                 "7",
+                                 "007",
+                                 "5.",
+                                 ".5",
+                                 "-.5",
+                                 "+2.",
+                                 "1e22",
+                                 "-2.5E-3",
+                                 "1e-30",
+                                 "0.1",
+                                 "2.30",
+                                 "1.0e0",
+                                 "9007199254740993",
+                                 "123456789012345",
+                                 "1234567.12345678",
+                                 "12345678.12345678",
+                                 "0.000000000000001",
+                                 "0.0000000000000001",
+                                 "179769313486231570000000000000000000000",
+                                 "99999999999999999999"};
+  std::mt19937_64 random(7);
+  const auto below = [&random](std::uint64_t count) { return random() % count; };
+  for (int i = 0; i < 20000; ++i) {
+    std::string text = below(4) == 0 ? "-" : "";
+    for (std::uint64_t digits = 1 + below(11); digits > 0; --digits)
+      text += static_cast<char>('0' + below(10));
+    const std::uint64_t fraction = below(11);
+    if (fraction > 0) text += '.';
+    for (std::uint64_t digits = fraction; digits > 0; --digits)
+      text += static_cast<char>('0' + below(10));
+    if (below(8) == 0) text += "e-" + std::to_string(below(20));
+    texts.push_back(std::move(text));
+  }
+  std::string file = "time_s,z_um\n";
+  for (std::size_t i = 0; i < texts.size(); ++i)
+    file.append(std::to_string(i)).append(",").append(texts[i]).append("\n");
+  const RunFile run = parse(file);
+  REQUIRE(run.rows() == texts.size());
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    const double expected = std::strtod(texts[i].c_str(), nullptr);
+    INFO(texts[i]);
+    CHECK(std::bit_cast<std::uint64_t>(run.column("z_um")[i]) ==
+          std::bit_cast<std::uint64_t>(expected));
+  }
+}
+
+TEST_CASE("what only begins like a number is refused", "[config][run]") {
+  for (const char* text : {"-", "1-", "1.2.3", "1.5x", "12 3", "1,", "--1", "1.e", "0x10"}) {
+    INFO(text);
+    CHECK_THROWS_AS(parse(std::string("time_s,z_um\n0,").append(text).append("\n")),
+                    ConfigurationError);
+  }
 }
 
 TEST_CASE("a selection is a half-open interval of time, and the run stays whole", "[config][run]") {
