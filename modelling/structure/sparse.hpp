@@ -39,14 +39,25 @@ class FactorisationError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A factor as the library that made it holds it (cholmod_module.hpp).
+class CholeskyFactor {
+ public:
+  CholeskyFactor() = default;
+  virtual ~CholeskyFactor() = default;
+  CholeskyFactor(const CholeskyFactor&) = delete;
+  CholeskyFactor& operator=(const CholeskyFactor&) = delete;
+
+  virtual void solve(std::span<double> right_sides) = 0;
+  virtual double reciprocal_condition() = 0;
+  [[nodiscard]] virtual double size_MB() const = 0;
+};
+
 /// A = L L^T, supernodal, ordered by nested dissection (METIS).
 class Cholesky {
  public:
-  /// @throws FactorisationError: not positive definite, or not enough memory
+  /// @throws FactorisationError: not positive definite, or not enough memory; std::runtime_error
+  ///         where thermocomp-cholmod.so cannot be loaded
   explicit Cholesky(const SparseSymmetric& matrix);
-  ~Cholesky();
-  Cholesky(Cholesky&&) noexcept;
-  Cholesky& operator=(Cholesky&&) noexcept;
 
   /// Solves A x = b in place for right sides one after the other, shape (right sides x size).
   void solve(std::span<double> right_sides) const;
@@ -55,8 +66,8 @@ class Cholesky {
   [[nodiscard]] double factor_MB() const;
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  Index size_;
+  std::unique_ptr<CholeskyFactor> factor_;  ///< of no matrix without rows
 };
 
 }  // namespace thermocomp::structure

@@ -44,8 +44,11 @@ twice=$(for file in "$packages"/*.deb; do
   dpkg-deb --fsys-tarfile "$file" | tar -t | grep -v '/$'
 done | sort | uniq -d)
 [[ -z $twice ]] || fail "in more than one package: $twice"
-# Only a module of it is linked with Gmsh; the package depends on it all the same.
-[[ $(depends_of thermocomp-modelling) == *libgmsh* ]] || fail "Gmsh does not come with the package"
+# Only modules of it are linked with Gmsh and CHOLMOD; the package depends on them all the same.
+for library in gmsh cholmod; do
+  [[ $(depends_of thermocomp-modelling) == *"lib$library"* ]] ||
+    fail "$library does not come with the package"
+done
 
 # Unpacked, because what it needs is large: it runs, and the command finds it.
 unpacked=$folder/unpacked
@@ -59,8 +62,8 @@ for command in structure place diagnose; do
   grep -q 'Usage: thermocomp-modelling ' "$folder/help" || fail "no help of $command"
   if grep -q 'not in this build' "$folder/help"; then fail "$command was left out"; fi
 done
-if objdump -p "$unpacked/usr/bin/thermocomp-modelling" | grep -q 'NEEDED .*gmsh'; then
-  fail "thermocomp-modelling loads Gmsh at every start"
+if objdump -p "$unpacked/usr/bin/thermocomp-modelling" | grep -E 'NEEDED .*(gmsh|cholmod|blas)'; then
+  fail "thermocomp-modelling loads at every start what few commands need"
 fi
 echo "thermocomp-modelling: structure, place, diagnose"
 

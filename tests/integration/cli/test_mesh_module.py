@@ -1,4 +1,5 @@
-"""What reads meshes is loaded when one is read: where it lies, and what is said without it."""
+"""What reads meshes and what factorises is loaded when it is needed: where it lies, and what is said
+without it."""
 import pathlib
 import shutil
 import tomllib
@@ -8,7 +9,8 @@ import pytest
 from conftest import PROGRAM, run
 
 BIN = pathlib.Path(PROGRAM).parent
-MODULE = "thermocomp-gmsh.so"
+MODULE = "thermocomp-gmsh.so"  # reads meshes
+FACTORISES = "thermocomp-cholmod.so"
 
 
 def reads_meshes():
@@ -55,7 +57,8 @@ def test_a_mesh_is_read_from_the_build_tree_and_where_it_is_installed(alone, tmp
     assert growth_um_per_K(structure(BIN / "thermocomp-modelling", tmp_path),
                            tmp_path) == pytest.approx(1.1, rel=1e-9)
     (tmp_path / "lib" / "thermocomp").mkdir(parents=True)
-    shutil.copy(BIN / MODULE, tmp_path / "lib" / "thermocomp")
+    for module in [MODULE, FACTORISES]:
+        shutil.copy(BIN / module, tmp_path / "lib" / "thermocomp")
     assert growth_um_per_K(structure(alone, tmp_path), tmp_path) == pytest.approx(1.1, rel=1e-9)
 
 
@@ -77,10 +80,18 @@ def test_what_cannot_be_loaded_is_one_line_with_the_file_and_the_reason(alone, t
     assert str(module) in line and "thermocomp_gmsh_functions" in line
 
 
-def test_nothing_else_needs_the_module(alone, tmp_path):
-    assert run("diagnose", "--help", program=alone).returncode == 0
+def test_a_mesh_in_text_needs_no_reader_but_what_factorises(alone, tmp_path):
+    line = said(structure(alone, tmp_path, mesh="cube.inp"))
+    for part in [FACTORISES, f"{tmp_path}/bin", f"{tmp_path}/lib/thermocomp",
+                 "package thermocomp-modelling", "libcholmod3"]:
+        assert part in line
+    shutil.copy(BIN / FACTORISES, tmp_path / "bin")
     answer = structure(alone, tmp_path, mesh="cube.inp")
     assert growth_um_per_K(answer, tmp_path) == pytest.approx(1.1, rel=1e-9)
     # A mesh file that is not there is told as such.
     absent = structure(alone, tmp_path, mesh="nowhere.msh")
     assert absent.returncode == 2 and "nowhere.msh: no such file" in absent.stderr
+
+
+def test_nothing_else_needs_the_modules(alone):
+    assert run("diagnose", "--help", program=alone).returncode == 0
