@@ -7,39 +7,63 @@
 namespace thermocomp::diagnosis {
 namespace {
 
+/// Factors of each row: m is the state after the row before, x the row's value.
+///   white = scale x - dropped m, m = carried m + gain x
+struct Factors {
+  const double* carried{nullptr};
+  const double* gain{nullptr};
+  const double* scale{nullptr};
+  const double* dropped{nullptr};
+  Eigen::Index rows{0};
+};
+
 /// Neighbouring columns, whose recursions run side by side.
+/// @param to  null: the whitened values are not wanted
+/// @param squares  of the whitened values
+/// @param plain  of the values as they are
 template <std::size_t lanes>
-[[gnu::always_inline]] inline void whiten_lanes(const Eigen::VectorXd& keep,
-                                                const Eigen::VectorXd& gain,
-                                                const Eigen::VectorXd& scale, Eigen::Index columns,
-                                                const double* from, double* to) {
+[[gnu::always_inline]] inline void whiten_lanes(const Factors& of, Eigen::Index columns,
+                                                const double* from, double* to, double* squares,
+                                                double* plain) {
   std::array<double, lanes> state{};
-  for (Eigen::Index row = 0; row < keep.size(); ++row, from += columns, to += columns) {
-    const double keep_now = keep[row];
-    const double gain_now = gain[row];
-    const double scale_now = scale[row];
+  std::array<double, lanes> sum{};
+  std::array<double, lanes> plain_sum{};
+  for (Eigen::Index row = 0; row < of.rows; ++row, from += columns) {
+    const double carried = of.carried[row];
+    const double gain = of.gain[row];
+    const double scale = of.scale[row];
+    const double dropped = of.dropped[row];
+    std::array<double, lanes> white{};
     for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const double predicted = state[lane] * keep_now;
-      const double innovation = from[lane] - predicted;
-      to[lane] = innovation * scale_now;
-      state[lane] = predicted + gain_now * innovation;
+      white[lane] = scale * from[lane] - dropped * state[lane];
+      state[lane] = carried * state[lane] + gain * from[lane];
+      sum[lane] += white[lane] * white[lane];
+      plain_sum[lane] += from[lane] * from[lane];
     }
+    if (to == nullptr) continue;
+    for (std::size_t lane = 0; lane < lanes; ++lane) to[lane] = white[lane];
+    to += columns;
+  }
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    squares[lane] = sum[lane];
+    plain[lane] = plain_sum[lane];
   }
 }
 
-THERMOCOMP_VECTORISED void whiten(const Eigen::VectorXd& keep, const Eigen::VectorXd& gain,
-                                  const Eigen::VectorXd& scale, Eigen::Index columns,
-                                  const double* from, double* to) {
+THERMOCOMP_VECTORISED void whiten(const Factors& of, Eigen::Index columns, const double* from,
+                                  double* to, double* squares, double* plain) {
   Eigen::Index at = 0;
+  const auto place = [&] { return to == nullptr ? nullptr : to + at; };
   for (; at + 16 <= columns; at += 16)
-    whiten_lanes<16>(keep, gain, scale, columns, from + at, to + at);
+    whiten_lanes<16>(of, columns, from + at, place(), squares + at, plain + at);
   for (; at + 8 <= columns; at += 8)
-    whiten_lanes<8>(keep, gain, scale, columns, from + at, to + at);
+    whiten_lanes<8>(of, columns, from + at, place(), squares + at, plain + at);
   for (; at + 4 <= columns; at += 4)
-    whiten_lanes<4>(keep, gain, scale, columns, from + at, to + at);
+    whiten_lanes<4>(of, columns, from + at, place(), squares + at, plain + at);
   for (; at + 2 <= columns; at += 2)
-    whiten_lanes<2>(keep, gain, scale, columns, from + at, to + at);
-  for (; at < columns; ++at) whiten_lanes<1>(keep, gain, scale, columns, from + at, to + at);
+    whiten_lanes<2>(of, columns, from + at, place(), squares + at, plain + at);
+  for (; at < columns; ++at)
+    whiten_lanes<1>(of, columns, from + at, place(), squares + at, plain + at);
 }
 
 }  // namespace
@@ -50,43 +74,72 @@ Whitener::Whitener(const NoiseShape& shape, const Eigen::VectorXd& time_s,
     : wanders_(shape.ratio > 0),
       keep_(Eigen::VectorXd::Zero(time_s.size())),
       gain_(Eigen::VectorXd::Zero(time_s.size())),
-      scale_(Eigen::VectorXd::Zero(time_s.size())) {
+      scale_(Eigen::VectorXd::Zero(time_s.size())),
+      carried_(time_s.size()),
+      dropped_(time_s.size()) {
   for (const Block& block : blocks) {
     double variance = shape.ratio;  // of the wandering part, before the row is seen
+    double step_s = 0.0;
+    double keep = 1.0;
+    double innovation = 0.0;
+    double log_innovation = 0.0;
     for (Eigen::Index row = block.begin; row < block.end; ++row) {
       if (row > block.begin) {
-        keep_[row] = std::exp(-(time_s[row] - time_s[row - 1]) / shape.tau_s);
-        variance = shape.ratio + keep_[row] * keep_[row] * (variance - shape.ratio);
+        // Rows are mostly as far from each other as those before them, and the innovation's spread
+        // comes to rest.
+        if (time_s[row] - time_s[row - 1] != step_s) {
+          step_s = time_s[row] - time_s[row - 1];
+          keep = std::exp(-step_s / shape.tau_s);
+        }
+        keep_[row] = keep;
+        variance = shape.ratio + keep * keep * (variance - shape.ratio);
       }
       if (!present[row]) continue;
-      const double innovation = variance + 1.0;
+      if (variance + 1.0 != innovation) {
+        innovation = variance + 1.0;
+        log_innovation = std::log(innovation);
+      }
       gain_[row] = variance / innovation;
       scale_[row] = 1.0 / std::sqrt(innovation);
-      log_determinant_ += std::log(innovation);
+      log_determinant_ += log_innovation;
       variance *= 1.0 - gain_[row];
     }
   }
+  carried_ = keep_.array() * (1.0 - gain_.array());
+  dropped_ = keep_.array() * scale_.array();
 }
 
 Eigen::VectorXd Whitener::apply(const Eigen::VectorXd& column) const {
-  Eigen::VectorXd white(column.size());
-  whiten(keep_, gain_, scale_, 1, column.data(), white.data());
-  return white;
+  return apply(Panel(column));
 }
 
 Panel Whitener::apply(const Panel& columns) const {
+  if (!wanders_) return scale_.asDiagonal() * columns;
+  Eigen::MatrixXd squares;
+  return apply(columns, squares);
+}
+
+Panel Whitener::apply(const Panel& columns, Eigen::MatrixXd& squares) const {
   Panel white(columns.rows(), columns.cols());
-  if (wanders_)
-    whiten(keep_, gain_, scale_, columns.cols(), columns.data(), white.data());
-  else
-    white = scale_.asDiagonal() * columns;
+  squares.resize(1, columns.cols());
+  Eigen::VectorXd plain(columns.cols());
+  whiten({carried_.data(), gain_.data(), scale_.data(), dropped_.data(), scale_.size()},
+         columns.cols(), columns.data(), white.data(), squares.data(), plain.data());
   return white;
+}
+
+Whitener::Squares Whitener::squares(const Panel& columns) const {
+  Squares of{Eigen::MatrixXd(1, columns.cols()), Eigen::MatrixXd(1, columns.cols())};
+  whiten({carried_.data(), gain_.data(), scale_.data(), dropped_.data(), scale_.size()},
+         columns.cols(), columns.data(), nullptr, of.white.data(), of.plain.data());
+  return of;
 }
 
 // apply() with p the state that was predicted, m the state after the row, e the innovation:
 //   p = keep m_before, e = x - p, m = p + gain e, white = scale e.
 // Transposed: from the last row back, with `later` the weight of m in the rows after it.
 Panel Whitener::transposed(const Panel& white) const {
+  if (changes_nothing()) return white;
   Panel out(white.rows(), white.cols());
   Eigen::RowVectorXd later = Eigen::RowVectorXd::Zero(white.cols());
   for (Eigen::Index row = white.rows() - 1; row >= 0; --row) {

@@ -34,10 +34,20 @@ class Whitener {
   [[nodiscard]] Eigen::VectorXd apply(const Eigen::VectorXd& column) const;
   /// The same for every column at once.
   [[nodiscard]] Panel apply(const Panel& columns) const;
+  /// The same with the squares of each whitened column.
+  /// @param squares  becomes of shape (1, columns)
+  [[nodiscard]] Panel apply(const Panel& columns, Eigen::MatrixXd& squares) const;
   /// White noise, and no row without a value: apply() gives what it gets.
   [[nodiscard]] bool changes_nothing() const { return !wanders_ && scale_.isOnes(0.0); }
   /// The transposed of what apply() does: white' apply(x) = transposed(white)' x.
   [[nodiscard]] Panel transposed(const Panel& white) const;
+  /// Sums of squares of each column, whitened and as it is, in one pass; each of shape (1,
+  /// columns).
+  struct Squares {
+    Eigen::MatrixXd white;
+    Eigen::MatrixXd plain;
+  };
+  [[nodiscard]] Squares squares(const Panel& columns) const;
   /// Sums of squares of whitened columns that are those of `whole` from a row on and zero before,
   /// without whitening each: shape (first rows, columns of whole).
   /// @param first_rows  ascending, one at least
@@ -51,6 +61,10 @@ class Whitener {
   Eigen::VectorXd keep_;   ///< factor of the state from the row before; 0 at a block's start
   Eigen::VectorXd gain_;   ///< 0 in rows without a value
   Eigen::VectorXd scale_;  ///< 1 / spread of the innovation; 0 in rows without a value
+  /// The same with few steps from state to state: factors of the state before in the state after
+  /// and in the whitened value.
+  Eigen::VectorXd carried_;
+  Eigen::VectorXd dropped_;
   double log_determinant_{0.0};
 };
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +14,7 @@
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/large_pages.hpp"
 #include "modelling/diagnosis/report_data.hpp"
 #include "modelling/diagnosis/report_texts.hpp"
 #include "modelling/diagnosis/still_searching.hpp"
@@ -79,13 +81,14 @@ void print_weighed(const Diagnosis& diagnosis) {
 }
 
 Diagnosis diagnosis_of(const Options& options, ReportData* report) {
-  const std::vector<RunFile> train = load_runs(options.train);
-  const std::vector<RunFile> test = load_runs(options.test);
+  std::vector<RunFile> train = load_runs(options.train);
+  std::vector<RunFile> test = load_runs(options.test);
   const StillSearching still_searching;
   if (!options.thermal.empty())
     return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
                             options.test, report);
-  return diagnose(load_model(options.model), train, options.train, test, options.test, report);
+  return diagnose(load_model(options.model), std::move(train), options.train, std::move(test),
+                  options.test, report);
 }
 
 /// The report, and the model or machine file with what was found.
@@ -107,6 +110,7 @@ int run(const Options& options) {
       std::filesystem::exists(options.thermal) &&
       std::filesystem::equivalent(corrected, options.thermal))
     throw std::runtime_error(corrected.string() + ": --out would write over the machine file");
+  use_large_pages();
   ReportData report;
   const Diagnosis diagnosis = diagnosis_of(options, options.folder.empty() ? nullptr : &report);
   if (!options.folder.empty()) write_folder(options, diagnosis, report);

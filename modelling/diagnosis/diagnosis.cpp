@@ -97,14 +97,14 @@ Corrections train_corrections(const Diagnosis& diagnosis, const MeasuredData& tr
 
 }  // namespace
 
-Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
-                   const std::vector<std::string>& train_names, const std::vector<RunFile>& test,
+Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
+                   const std::vector<std::string>& train_names, std::vector<RunFile> test,
                    const std::vector<std::string>& test_names, ReportData* report) {
-  std::vector<RunFile> all = train;
-  all.insert(all.end(), test.begin(), test.end());
-  const SharedColumns columns = shared_columns(model, all);
+  const SharedColumns columns = shared_columns(model, train, test);
   const MeasuredData train_data = training_data(model, train, train_names, columns);
   const MeasuredData test_data = measured_data(model, test, test_names, columns);
+  train.clear();
+  test.clear();
   Search search(train_data, Thresholds{});
   SearchResult result = search.run();
   SearchBesideFit beside_fit(train_data, Thresholds{});
@@ -121,15 +121,14 @@ Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
       extend(diagnosis, result.findings, fitted ? &beside_fit : nullptr, train_data, test_data);
   diagnosis.verdict = verdict_of(result);
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
-    const Residuals base = residuals(model, {}, test_data, output);
+    const Residuals base = residuals(test_data, output);
     const Residuals extended = residuals(diagnosis.extended, corrections, test_data, output);
-    diagnosis.outputs[model.outputs[output]] = {
-        root_mean_square(residuals(model, {}, train_data, output)),
-        root_mean_square(base),
-        peak(base),
-        root_mean_square(extended),
-        peak(extended),
-        result.unexplained_share[output]};
+    diagnosis.outputs[model.outputs[output]] = {root_mean_square(residuals(train_data, output)),
+                                                root_mean_square(base),
+                                                peak(base),
+                                                root_mean_square(extended),
+                                                peak(extended),
+                                                result.unexplained_share[output]};
   }
   if (report != nullptr) {
     add_runs(*report, diagnosis, model, train_corrections(diagnosis, train_data), train_data,

@@ -69,12 +69,13 @@ struct Diagnosis {
   std::vector<Weighed> weighed;  ///< what came into question in every round of the search
 };
 
+/// @param train, test  taken: their memory is free for the search
 /// @param train_names, test_names  the runs' arguments as given
 /// @param report  if given, receives what the report shows
 /// @throws ConfigurationError when a run lacks a column of the model or any measured value
-[[nodiscard]] Diagnosis diagnose(const ThermalModel& model, const std::vector<RunFile>& train,
+[[nodiscard]] Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
                                  const std::vector<std::string>& train_names,
-                                 const std::vector<RunFile>& test,
+                                 std::vector<RunFile> test,
                                  const std::vector<std::string>& test_names,
                                  ReportData* report = nullptr);
 

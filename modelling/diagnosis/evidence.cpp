@@ -10,6 +10,7 @@ namespace {
 
 constexpr double offset_sd_um = 1e4;
 constexpr double accepted_sd_um = 1e4;
+constexpr Eigen::Index measured_rows_min = 8;
 /// A noise that is below the least digit anybody measures would make every misfit significant.
 constexpr double noise_um_min = 1e-3;
 
@@ -53,7 +54,7 @@ Eigen::MatrixXd coefficient_columns_of(const MeasuredData& data, const StackedRo
                                        const Eigen::Array<bool, Eigen::Dynamic, 1>& present,
                                        double noise_um) {
   if (!(data.coefficient_sd > 0)) return Eigen::MatrixXd(rows.time_s.size(), 0);
-  Eigen::MatrixXd all(rows.time_s.size(), static_cast<Eigen::Index>(data.model.inputs.size()));
+  Panel all(rows.time_s.size(), static_cast<Eigen::Index>(data.model.inputs.size()));
   for (std::size_t input = 0; input < data.model.inputs.size(); ++input) {
     for (std::size_t i = 0; i < data.runs.size(); ++i) {
       const MeasuredRun& run = data.runs[i];
@@ -66,7 +67,8 @@ Eigen::MatrixXd coefficient_columns_of(const MeasuredData& data, const StackedRo
   all *= data.coefficient_sd;
   for (Eigen::Index row = 0; row < all.rows(); ++row)
     if (!present[row]) all.row(row).setZero();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(all.transpose() * all);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(
+      cross_products(all, all, 0, all.rows()));
   Eigen::Index seen = 0;
   for (const double square : parts.eigenvalues())
     seen += square > seen_min * noise_um * noise_um ? 1 : 0;
@@ -107,15 +109,7 @@ void Setting::reckon() {
   squares_ = all(0, 0) - common_residual_.squaredNorm();
   log_determinant_ = whitener_->log_determinant() - precision_.array().log().sum() +
                      2.0 * factor_.matrixLLT().diagonal().array().log().sum();
-}
-
-Setting::Equations Setting::equations(const Eigen::MatrixXd& columns) const {
-  return equations_of_groups({this}, columns, columns.cols()).front().front();
-}
-
-Eigen::VectorXd Setting::Equations::gains() const {
-  if (right.size() != 1) return square.ldlt().solve(right);
-  return Eigen::VectorXd::Constant(1, square(0, 0) > 0 ? right[0] / square(0, 0) : 0.0);
+  likelihood_ = twice_log_likelihood(squares_);
 }
 
 std::vector<std::vector<std::size_t>> Setting::alike(const std::vector<const Setting*>& settings) {
@@ -136,58 +130,36 @@ std::vector<std::vector<std::size_t>> Setting::alike(const std::vector<const Set
   return all;
 }
 
-std::vector<std::vector<Setting::Equations>> Setting::equations_of_groups(
+std::vector<EquationsTable> Setting::equations_of_groups(
     const std::vector<const Setting*>& settings, const Panel& columns, Eigen::Index width) {
-  std::vector<std::vector<Equations>> all(settings.size());
+  std::vector<EquationsTable> all(
+      settings.size(), EquationsTable(static_cast<std::size_t>(columns.cols() / width), width));
   for (const std::vector<std::size_t>& group : alike(settings)) {
     const Setting& most = *settings[group.front()];
+    const bool white_before = most.whitener_->changes_nothing();
     Panel whitened;
-    if (!most.whitener_->changes_nothing()) whitened = most.whitener_->apply(columns);
-    const Panel& white = whitened.size() > 0 ? whitened : columns;
+    Eigen::MatrixXd own;
+    if (!white_before) whitened = most.whitener_->apply(columns, own);
+    const Panel& white = white_before ? columns : whitened;
     const Eigen::MatrixXd products = cross_products(most.against_, white, 0, white.rows());
-    const Eigen::MatrixXd own = neighbour_products(white, width, 0, white.rows());
-    for (const std::size_t i : group) all[i] = settings[i]->without_common(products, own);
+    if (white_before || width > 1) own = neighbour_products(white, width, 0, white.rows());
+    for (const std::size_t i : group) settings[i]->without_common(products, own, 0, all[i]);
   }
   return all;
 }
 
-std::vector<std::vector<std::vector<Setting::Equations>>> Setting::equations_from_rows(
-    const std::vector<const Setting*>& settings, const Panel& whole,
-    const std::vector<Eigen::Index>& first_rows) {
-  std::vector<std::vector<std::vector<Equations>>> all(
-      settings.size(), std::vector<std::vector<Equations>>(first_rows.size()));
-  for (const std::vector<std::size_t>& group : alike(settings)) {
-    const Setting& most = *settings[group.front()];
-    const Panel against = most.whitener_->transposed(most.against_);
-    const Eigen::MatrixXd own = most.whitener_->squares_from_rows(whole, first_rows);
-    Eigen::MatrixXd products = Eigen::MatrixXd::Zero(against.cols(), whole.cols());
-    Eigen::Index end = whole.rows();
-    for (std::size_t row = first_rows.size(); row-- > 0;) {
-      products += cross_products(against, whole, first_rows[row], end);
-      end = first_rows[row];
-      for (const std::size_t i : group)
-        all[i][row] =
-            settings[i]->without_common(products, own.row(static_cast<Eigen::Index>(row)));
-    }
-  }
-  return all;
-}
-
-std::vector<Setting::Equations> Setting::without_common(const Eigen::MatrixXd& products,
-                                                        const Eigen::MatrixXd& own) const {
-  const Eigen::Index width = own.rows();
+void Setting::without_common(const Eigen::MatrixXd& products, const Eigen::MatrixXd& own,
+                             std::size_t first, EquationsTable& table) const {
   const Eigen::MatrixXd shared = factor_.matrixL().solve(products.middleRows(1, precision_.size()));
   const Eigen::VectorXd right = products.row(0).transpose() - shared.transpose() * common_residual_;
-  std::vector<Equations> all;
-  for (Eigen::Index first = 0; first < own.cols(); first += width) {
-    const auto beside = shared.middleCols(first, width);
-    Eigen::MatrixXd square(width, width);
-    for (Eigen::Index i = 0; i < width; ++i)
-      for (Eigen::Index j = i; j < width; ++j)
-        square(i, j) = square(j, i) = own(j - i, first + i) - beside.col(i).dot(beside.col(j));
-    all.push_back({std::move(square), right.segment(first, width)});
+  for (Eigen::Index at = 0; at < own.cols(); at += table.width(), ++first) {
+    const auto beside = shared.middleCols(at, table.width());
+    auto square = table.square(first);
+    for (Eigen::Index i = 0; i < table.width(); ++i)
+      for (Eigen::Index j = i; j < table.width(); ++j)
+        square(i, j) = square(j, i) = own(j - i, at + i) - beside.col(i).dot(beside.col(j));
+    table.right(first) = right.segment(at, table.width());
   }
-  return all;
 }
 
 double Setting::twice_log_likelihood(double squares) const {
@@ -214,6 +186,8 @@ OutputEvidence::OutputEvidence(const MeasuredData& data, const StackedRows& rows
         residual.array().isFinite().select(residual, 0.0);
     offsets_.block(block.begin, static_cast<Eigen::Index>(i), count, 1).setOnes();
   }
+  measured_ = present_.count() > measured_rows_min;
+  complete_ = present_.all();
   residual_ = measured_residual_;
   noise_um_ = noise_of(residual_, present_, rows.runs);
   if (output < data.least_noise_um.size())
@@ -313,12 +287,16 @@ void OutputEvidence::add_doubted_settings() {
   doubted_.find_likeliest();
 }
 
+void OutputEvidence::clear_missing(Panel& columns) const {
+  if (complete_) return;
+  for (Eigen::Index row = 0; row < columns.rows(); ++row)
+    if (!present_[row]) columns.row(row).setZero();
+}
+
 Panel columns_of(const Hypothesis& hypothesis, const Shapes& shapes,
                  const OutputEvidence& evidence) {
   Panel columns = hypothesis.columns(shapes, evidence.output());
-  if (evidence.complete()) return columns;
-  for (Eigen::Index row = 0; row < columns.rows(); ++row)
-    if (!evidence.present()[row]) columns.row(row).setZero();
+  evidence.clear_missing(columns);
   return columns;
 }
 

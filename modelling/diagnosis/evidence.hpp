@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "modelling/diagnosis/coloured_noise.hpp"
+#include "modelling/diagnosis/equations.hpp"
 #include "modelling/diagnosis/hypothesis.hpp"
 
 namespace thermocomp::diagnosis {
@@ -41,26 +42,29 @@ class Setting {
   /// @param precision  of each of them
   Setting(const Setting& other, const Eigen::MatrixXd& more, double precision);
 
-  /// Normal equations of columns, the common ones taken out. S is the sum of squares without them.
-  struct Equations {
-    Eigen::MatrixXd square;
-    Eigen::VectorXd right;
-    [[nodiscard]] Eigen::VectorXd gains() const;
-  };
-  [[nodiscard]] Equations equations(const Eigen::MatrixXd& columns) const;
-  /// The same for several groups of `width` columns each, side by side, under each of the settings.
-  [[nodiscard]] static std::vector<std::vector<Equations>> equations_of_groups(
+  /// Normal equations of groups of `width` columns side by side, the common ones taken out, under
+  /// each of the settings.
+  [[nodiscard]] static std::vector<EquationsTable> equations_of_groups(
       const std::vector<const Setting*>& settings, const Panel& columns, Eigen::Index width);
-  /// Of single columns that are those of `whole` from a row on and zero before, under each of the
-  /// settings: [setting][row][column].
-  [[nodiscard]] static std::vector<std::vector<std::vector<Equations>>> equations_from_rows(
-      const std::vector<const Setting*>& settings, const Panel& whole,
-      const std::vector<Eigen::Index>& first_rows);
+  /// Places of the settings that share a whitener, those with the most common columns first.
+  [[nodiscard]] static std::vector<std::vector<std::size_t>> alike(
+      const std::vector<const Setting*>& settings);
+  /// The equations from products with the whitened columns.
+  /// @param products  against' columns; more of them count for settings of more common columns
+  /// @param own  neighbour_products of the columns
+  /// @param first  place of the first group in `table`, which has their width
+  void without_common(const Eigen::MatrixXd& products, const Eigen::MatrixXd& own,
+                      std::size_t first, EquationsTable& table) const;
+  /// Of the residual, the common columns taken out.
   [[nodiscard]] double squares() const noexcept { return squares_; }
   [[nodiscard]] double log_determinant() const noexcept { return log_determinant_; }
   [[nodiscard]] double present_rows() const noexcept { return present_rows_; }
   /// 2 ln L for a sum of squares, constants left out.
   [[nodiscard]] double twice_log_likelihood(double squares) const;
+  /// What it gains when this is taken from the sum of squares.
+  [[nodiscard]] double gain(double taken) const {
+    return twice_log_likelihood(squares_ - taken) - likelihood_;
+  }
   [[nodiscard]] const Whitener& whitener() const noexcept { return *whitener_; }
   /// The residual and the common columns, whitened, shape (rows, 1 + m).
   [[nodiscard]] const Panel& against() const noexcept { return against_; }
@@ -68,13 +72,6 @@ class Setting {
 
  private:
   void reckon();
-  /// Places of the settings that share a whitener, those with the most common columns first.
-  [[nodiscard]] static std::vector<std::vector<std::size_t>> alike(
-      const std::vector<const Setting*>& settings);
-  /// @param products  against' columns; more of them count for settings of more common columns
-  /// @param own  neighbour_products of the columns
-  [[nodiscard]] std::vector<Equations> without_common(const Eigen::MatrixXd& products,
-                                                      const Eigen::MatrixXd& own) const;
 
   std::shared_ptr<const Whitener> whitener_;  ///< shared by settings that begin alike
   Panel against_;
@@ -83,6 +80,7 @@ class Setting {
   Eigen::VectorXd common_residual_;  ///< factor^-1 common' residual
   double squares_{0.0};
   double log_determinant_{0.0};
+  double likelihood_{0.0};  ///< 2 ln L of the residual as it is
   double present_rows_{0.0};
 };
 
@@ -102,7 +100,9 @@ class OutputEvidence {
   [[nodiscard]] const Column& residual() const noexcept { return residual_; }
   [[nodiscard]] const Eigen::Array<bool, Eigen::Dynamic, 1>& present() const { return present_; }
   /// Whether no row's value is missing.
-  [[nodiscard]] bool complete() const { return present_.all(); }
+  [[nodiscard]] bool complete() const noexcept { return complete_; }
+  /// Makes columns zero where the output has no value.
+  void clear_missing(Panel& columns) const;
   /// RMS of values over the stacked rows where the output has one, each run's mean taken off.
   [[nodiscard]] double centred_rms(const Column& values) const;
   /// Columns of the accepted explanations that are fitted anew each time, shape (rows, m): common
@@ -119,7 +119,7 @@ class OutputEvidence {
   [[nodiscard]] const Column& measured_residual() const noexcept { return measured_residual_; }
   /// The measured displacement over the stacked rows; 0 where missing.
   [[nodiscard]] Column measured(const MeasuredData& data) const;
-  [[nodiscard]] bool measured() const { return present_.count() > 8; }
+  [[nodiscard]] bool measured() const noexcept { return measured_; }
   [[nodiscard]] double noise_um() const noexcept { return noise_um_; }
   [[nodiscard]] std::size_t output() const noexcept { return output_; }
 
@@ -138,6 +138,8 @@ class OutputEvidence {
   const StackedRows& rows_;
   std::size_t output_;
   Eigen::Array<bool, Eigen::Dynamic, 1> present_;
+  bool measured_{false};  ///< in more rows than a handful
+  bool complete_{false};
   Column measured_residual_;  ///< measured - model; 0 where missing
   Column residual_;           ///< explanations without a gain subtracted
   Eigen::MatrixXd offsets_;

@@ -48,6 +48,14 @@ std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residu
 
 }  // namespace
 
+Residuals residuals(const MeasuredData& data, std::size_t output) {
+  Residuals all;
+  for (const MeasuredRun& run : data.runs)
+    all.by_run.emplace_back(
+        (run.measured_um[output] - run.model_um[output]).tail(run.rows() - run.begin));
+  return all;
+}
+
 Residuals residuals(const ThermalModel& model, const Corrections& corrections,
                     const MeasuredData& data, std::size_t output) {
   Residuals all;

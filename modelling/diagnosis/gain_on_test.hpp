@@ -22,7 +22,9 @@ struct Residuals {
   std::vector<Column> by_run;  ///< over the selected rows; NaN where nothing was measured
 };
 
-/// measured - model over the selected rows of every run, both from the run's first row on.
+/// measured - model over the selected rows of every run, both from the run's first row on: the
+/// data's own model, or another.
+[[nodiscard]] Residuals residuals(const MeasuredData& data, std::size_t output);
 [[nodiscard]] Residuals residuals(const ThermalModel& model, const Corrections& corrections,
                                   const MeasuredData& data, std::size_t output);
 [[nodiscard]] double root_mean_square(const Residuals& residuals);

@@ -59,6 +59,8 @@ class Catalogue {
   }
 
   std::vector<Hypothesis> all() {
+    const std::size_t inputs = data_.model.inputs.size();
+    found_.reserve(inputs * (inputs + 1) / 2 + 16 * inputs);  // most are exchanged channels
     for (std::size_t input = 0; input < data_.model.inputs.size(); ++input) add_input(input);
     for (std::size_t other = 0; other < data_.others.size(); ++other) add_other(other);
     for (std::size_t signal = 0; signal < data_.signals.size(); ++signal) add_signal(signal);
@@ -80,20 +82,25 @@ class Catalogue {
     return out;
   }
 
-  /// A column for each shape.
-  /// @param make  Panel(const MeasuredRun&, const std::vector<double>& first parameter of each
-  /// shape)
+  /// A column for each shape, made of whole runs.
+  /// @param make  void(const MeasuredRun&, const std::vector<double>& firsts, PanelPart into), with
+  ///        the first parameter of each shape
   template <class Make>
-  Panel stacked(const Shapes& shapes, Make make) const {
+  void write_stacked(const Shapes& shapes, PanelPart into, Make make) const {
     std::vector<double> firsts;
+    firsts.reserve(shapes.size());
     for (const Shape& shape : shapes) firsts.push_back(shape[0]);
-    Panel out(rows_.time_s.size(), std::ssize(shapes));
     for (std::size_t i = 0; i < data_.runs.size(); ++i) {
-      const Block& block = rows_.runs[i];
-      out.middleRows(block.begin, block.end - block.begin) =
-          make(data_.runs[i], firsts).bottomRows(block.end - block.begin);
+      const MeasuredRun& run = data_.runs[i];
+      PanelPart of_run = into.middleRows(rows_.runs[i].begin, run.rows() - run.begin);
+      if (run.begin == 0) {
+        make(run, firsts, of_run);
+        continue;
+      }
+      Panel whole(run.rows(), into.cols());
+      make(run, firsts, whole);
+      of_run = whole.bottomRows(of_run.rows());
     }
-    return out;
   }
 
   /// Zero outside of one run.
@@ -108,18 +115,17 @@ class Catalogue {
 
   /// For each shape what `make` gives from its first parameter on, a time of this run; else zero.
   template <class Make>
-  Panel since(std::size_t run, const Shapes& shapes, Make make) const {
+  void write_since(std::size_t run, const Shapes& shapes, PanelPart into, Make make) const {
     const Block& block = rows_.runs[run];
     const Column whole = make(data_.runs[run]);
-    Panel out = Panel::Zero(rows_.time_s.size(), std::ssize(shapes));
+    into.setZero();
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const double* const time_s = rows_.time_s.data();
       const Eigen::Index first =
           std::lower_bound(time_s + block.begin, time_s + block.end, shapes[i][0]) - time_s;
-      out.col(static_cast<Eigen::Index>(i)).segment(first, block.end - first) =
+      into.col(static_cast<Eigen::Index>(i)).segment(first, block.end - first) =
           whole.tail(block.end - first);
     }
-    return out;
   }
 
   [[nodiscard]] bool moves_anywhere(
@@ -136,14 +142,9 @@ class Catalogue {
   }
 
   Hypothesis& add(Hypothesis hypothesis) {
+    hypothesis.rows = rows_.time_s.size();
     found_.push_back(std::move(hypothesis));
     return found_.back();
-  }
-
-  Panel times_coefficient(const MeasuredRun& run, std::size_t output, std::size_t input,
-                          Panel columns_K) const {
-    columns_K.array().colwise() *= data_.coefficient(run, output, input).array();
-    return columns_K;
   }
 
   void add_input(std::size_t input);
@@ -177,14 +178,15 @@ void Catalogue::add_input(std::size_t input) {
     return run.calm_inputs_K[input];
   };
   if (!moves_anywhere(rise_K)) return;
-  add({"wrong_coefficient", name, Form::own_gains, {}, {"delta_um_per_K"}}).columns =
+  add({"wrong_coefficient", name, Form::own_gains, {}, {"delta_um_per_K"}}).write_columns =
       one_by_one([this, rise_K](const Shape&, std::size_t) { return stacked(rise_K); });
   Hypothesis& lag = add(
       {"thermal_lag", name, Form::own_gains, {lag_times(60.0, 4 * 3600.0, 20)}, {"gain_um_per_K"}});
-  lag.columns = [this, rise_K](const Shapes& shapes, std::size_t) {
-    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) -> Panel {
-      return lagged(run.time_s, rise_K(run), taus_s).colwise() - rise_K(run);
-    });
+  lag.write_columns = [this, rise_K](const Shapes& shapes, std::size_t, PanelPart into) {
+    write_stacked(shapes, into,
+                  [&](const MeasuredRun& run, const std::vector<double>& taus_s, PanelPart of_run) {
+                    lagged_less_values(run.time_s, rise_K(run), taus_s, of_run);
+                  });
   };
   if (data_.model.guideways.empty()) {
     lag.possible = [this, input](double gain, std::size_t output) {
@@ -202,15 +204,15 @@ void Catalogue::add_reading_errors(std::size_t input) {
   const std::string& name = data_.model.inputs[input];
   Hypothesis& slow = add({"slow_sensor", name, Form::no_gain, {lag_times(20.0, 3600.0, 16)}});
   slow.in_every_output = true;
-  slow.columns = [this, input](const Shapes& shapes, std::size_t output) {
-    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
-      std::vector<double> spans_s;
-      spans_s.reserve(taus_s.size());
-      for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
-      Panel ahead_K = slopes_per_s(run.time_s, run.inputs_K[input], spans_s);
-      ahead_K *= Eigen::Map<const Eigen::VectorXd>(taus_s.data(), ahead_K.cols()).asDiagonal();
-      return times_coefficient(run, output, input, std::move(ahead_K));
-    });
+  slow.write_columns = [this, input](const Shapes& shapes, std::size_t output, PanelPart into) {
+    write_stacked(shapes, into,
+                  [&](const MeasuredRun& run, const std::vector<double>& taus_s, PanelPart of_run) {
+                    std::vector<double> spans_s;
+                    spans_s.reserve(taus_s.size());
+                    for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
+                    slopes(run.time_s, run.inputs_K[input], spans_s,
+                           data_.coefficient(run, output, input), taus_s, of_run);
+                  });
   };
   double range_K = 0.0;
   for (const MeasuredRun& run : data_.runs) {
@@ -222,11 +224,13 @@ void Catalogue::add_reading_errors(std::size_t input) {
                           Form::no_gain,
                           {{"width_K", linear_grid(0.04 * range_K, 0.8 * range_K, 16)}}});
   play.in_every_output = true;
-  play.columns = [this, input](const Shapes& shapes, std::size_t output) {
-    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& widths_K) {
-      const Column& rise_K = run.calm_inputs_K[input];
-      return times_coefficient(run, output, input, played(rise_K, widths_K).colwise() - rise_K);
-    });
+  play.write_columns = [this, input](const Shapes& shapes, std::size_t output, PanelPart into) {
+    write_stacked(
+        shapes, into,
+        [&](const MeasuredRun& run, const std::vector<double>& widths_K, PanelPart of_run) {
+          played_less_values(run.calm_inputs_K[input], widths_K,
+                             data_.coefficient(run, output, input), of_run);
+        });
   };
 }
 
@@ -242,19 +246,23 @@ void Catalogue::add_swaps(std::size_t input) {
         const double weight = coefficients[input] - coefficients[other];
         return std::vector<ReadingShare>{{other, weight}, {input, -weight}};
       };
-    swap.columns = one_by_one([this, input, other](const Shape&, std::size_t output) {
-      return stacked([&](const MeasuredRun& run) -> Column {
-        const Column weight =
-            data_.coefficient(run, output, input) - data_.coefficient(run, output, other);
-        return weight.cwiseProduct(run.calm_inputs_K[other] - run.calm_inputs_K[input]);
-      });
-    });
+    swap.write_columns = [this, input, other](const Shapes&, std::size_t output, PanelPart into) {
+      for (std::size_t i = 0; i < data_.runs.size(); ++i) {
+        const MeasuredRun& run = data_.runs[i];
+        const Block& block = rows_.runs[i];
+        const Eigen::Index count = block.end - block.begin;
+        into.col(0).segment(block.begin, count) =
+            (data_.coefficient(run, output, input) - data_.coefficient(run, output, other))
+                .cwiseProduct(run.calm_inputs_K[other] - run.calm_inputs_K[input])
+                .tail(count);
+      }
+    };
   }
 }
 
 void Catalogue::add_square(const std::string& name,
                            const std::function<const Column&(const MeasuredRun&)>& rise_K) {
-  add({"nonlinear_expansion", name, Form::own_gains, {}, {"gain_um_per_K2"}}).columns =
+  add({"nonlinear_expansion", name, Form::own_gains, {}, {"gain_um_per_K2"}}).write_columns =
       one_by_one([this, rise_K](const Shape&, std::size_t) {
         return stacked(
             [&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
@@ -273,7 +281,7 @@ void Catalogue::add_positions(const std::string& name,
     Hypothesis& along =
         add({"position_dependence", subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}});
     along.handicap = special_case_handicap;  // without the position: a coefficient
-    along.columns = one_by_one([this, rise_K, signal](const Shape&, std::size_t) {
+    along.write_columns = one_by_one([this, rise_K, signal](const Shape&, std::size_t) {
       Eigen::MatrixXd both(rows_.time_s.size(), 2);
       both.col(0) = stacked([&](const MeasuredRun& run) -> Column {
         return run.signals[signal].cwiseProduct(rise_K(run));
@@ -292,11 +300,11 @@ void Catalogue::add_other(std::size_t other) {
   if (!moves_anywhere(rise_K)) return;
   ShapeParameter lag = lag_times(60.0, 6 * 3600.0, 20);
   lag.grid.insert(lag.grid.begin(), 0.0);
-  add({"missing_temperature", name, Form::own_gains, {lag}, {"gain_um_per_K"}}).columns =
-      [this, rise_K](const Shapes& shapes, std::size_t) {
-        return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
-          return lagged(run.time_s, rise_K(run), taus_s);
-        });
+  add({"missing_temperature", name, Form::own_gains, {lag}, {"gain_um_per_K"}}).write_columns =
+      [this, rise_K](const Shapes& shapes, std::size_t, PanelPart into) {
+        write_stacked(shapes, into,
+                      [&](const MeasuredRun& run, const std::vector<double>& taus_s,
+                          PanelPart of_run) { lagged(run.time_s, rise_K(run), taus_s, of_run); });
       };
   add_square(name, rise_K);
   add_positions(name, rise_K);
@@ -314,19 +322,19 @@ void Catalogue::add_signal(std::size_t signal) {
                           Form::own_gains,
                           {lag_times(120.0, 6 * 3600.0, 22), power},
                           {"gain_um_per_unit"}});
-  heat.columns = [this, values](const Shapes& shapes, std::size_t) {
-    return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& taus_s) {
-      const Column& u = values(run);
-      Panel heats = u.replicate(1, std::ssize(shapes));
-      for (std::size_t i = 0; i < shapes.size(); ++i)
-        if (shapes[i][1] > 1.5) heats.col(static_cast<Eigen::Index>(i)).array() *= u.array();
-      lag_each(run.time_s, taus_s, heats);
-      return heats;
-    });
+  heat.write_columns = [this, values](const Shapes& shapes, std::size_t, PanelPart into) {
+    write_stacked(shapes, into,
+                  [&](const MeasuredRun& run, const std::vector<double>& taus_s, PanelPart of_run) {
+                    const Column& u = values(run);
+                    const Column squared = u.array().square();
+                    for (std::size_t i = 0; i < shapes.size(); ++i)
+                      of_run.col(static_cast<Eigen::Index>(i)) = shapes[i][1] > 1.5 ? squared : u;
+                    lag_each(run.time_s, taus_s, of_run);
+                  });
   };
   const auto unit = unit_of(name).suffix;
   if (unit != "_rpm" && unit != "_mm_per_min" && !unit.empty()) return;
-  add({"speed_growth", name, Form::own_gains, {}, {"gain_um_per_unit2"}}).columns =
+  add({"speed_growth", name, Form::own_gains, {}, {"gain_um_per_unit2"}}).write_columns =
       one_by_one([this, values](const Shape&, std::size_t) {
         return stacked(
             [&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
@@ -347,28 +355,32 @@ void Catalogue::add_output(std::size_t output) {
                             Form::no_gain,
                             {{"width_um", linear_grid(0.03 * range_um, 0.7 * range_um, 20)}}});
     play.output = output;
-    play.columns = [this, model_um](const Shapes& shapes, std::size_t) {
-      return stacked(shapes,
-                     [&](const MeasuredRun& run, const std::vector<double>& widths_um) -> Panel {
-                       const Column calm_um = calm(run.time_s, model_um(run));
-                       return played(calm_um, widths_um).colwise() - calm_um;
-                     });
+    play.write_columns = [this, model_um](const Shapes& shapes, std::size_t, PanelPart into) {
+      write_stacked(
+          shapes, into,
+          [&](const MeasuredRun& run, const std::vector<double>& widths_um, PanelPart of_run) {
+            played_less_values(calm(run.time_s, model_um(run)), widths_um, Column::Ones(run.rows()),
+                               of_run);
+          });
     };
     std::vector<double> shifts = logarithmic_grid(std::max(5.0, 0.2 * step_s_), 3600.0, 14);
     for (std::size_t i = 0, count = shifts.size(); i < count; ++i)
       shifts.insert(shifts.begin(), -shifts[2 * i]);
     Hypothesis& shift = add({"time_shift", name, Form::no_gain, {{"shift_s", shifts}}});
     shift.output = output;
-    shift.columns = [this, model_um](const Shapes& shapes, std::size_t) {
-      return stacked(shapes, [&](const MeasuredRun& run, const std::vector<double>& shifts_s) {
-        // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
-        const Column smooth_um = smoothed(run.time_s, model_um(run), {2.0 * step_s_});
-        Panel moved_um(run.rows(), std::ssize(shapes));
-        for (std::size_t i = 0; i < shapes.size(); ++i)
-          moved_um.col(static_cast<Eigen::Index>(i)) =
-              shifted(run.time_s, smooth_um, shifts_s[i]) - smooth_um;
-        return moved_um;
-      });
+    shift.write_columns = [this, model_um](const Shapes& shapes, std::size_t, PanelPart into) {
+      write_stacked(
+          shapes, into,
+          [&](const MeasuredRun& run, const std::vector<double>& shifts_s, PanelPart of_run) {
+            // Interpolation averages two rows; both sides are smoothed, so that less noise is no
+            // gain.
+            Panel smooth(run.rows(), 1);
+            smoothed(run.time_s, model_um(run), {2.0 * step_s_}, smooth);
+            const Column smooth_um = smooth.col(0);
+            for (std::size_t i = 0; i < shapes.size(); ++i)
+              of_run.col(static_cast<Eigen::Index>(i)) =
+                  shifted(run.time_s, smooth_um, shifts_s[i]) - smooth_um;
+          });
     };
   }
   add_period(output);
@@ -393,23 +405,18 @@ void Catalogue::add_period(std::size_t output) {
                             {{"period_s", periods, true, false}},
                             gains});
   period.output = output;
-  period.columns = [this](const Shapes& shapes, std::size_t) {
+  period.write_columns = [this](const Shapes& shapes, std::size_t, PanelPart into) {
     std::vector<double> periods_s;
     for (const Shape& shape : shapes) periods_s.push_back(shape[0]);
-    const Eigen::Index width = 2 * std::ssize(data_.runs);
-    Panel all = Panel::Zero(rows_.time_s.size(), width * std::ssize(shapes));
+    const Eigen::Index apart = into.cols() / std::ssize(shapes);
+    if (data_.runs.size() > 1) into.setZero();
     for (std::size_t run = 0; run < data_.runs.size(); ++run) {
       const Block& block = rows_.runs[run];
       const Eigen::Index count = block.end - block.begin;
-      const Waves waves_of = waves(rows_.time_s.segment(block.begin, count), periods_s);
-      for (Eigen::Index row = 0; row < count; ++row)
-        for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
-          const Eigen::Index column = width * i + 2 * static_cast<Eigen::Index>(run);
-          all(block.begin + row, column) = waves_of.sines(row, i);
-          all(block.begin + row, column + 1) = waves_of.cosines(row, i);
-        }
+      const Eigen::Index first = 2 * static_cast<Eigen::Index>(run);
+      waves(rows_.time_s.segment(block.begin, count), periods_s, apart,
+            into.block(block.begin, first, count, into.cols() - first));
     }
-    return all;
   };
 }
 
@@ -439,14 +446,14 @@ void Catalogue::add_displacement_faults(std::size_t run, std::size_t output) {
                           {"step_um"},
                           output,
                           run});
-  step.columns = [this, run](const Shapes& shapes, std::size_t) {
-    return since(run, shapes,
-                 [](const MeasuredRun& of) -> Column { return Column::Ones(of.rows()); });
+  step.write_columns = [this, run](const Shapes& shapes, std::size_t, PanelPart into) {
+    write_since(run, shapes, into,
+                [](const MeasuredRun& of) -> Column { return Column::Ones(of.rows()); });
   };
   Hypothesis& drift =
       add({"displacement_drift", name, Form::own_gains, {}, {"rate_um_per_h"}, output, run});
   drift.clear_share = clear_share_of_drift;
-  drift.columns = one_by_one([this, run](const Shape&, std::size_t) {
+  drift.write_columns = one_by_one([this, run](const Shape&, std::size_t) {
     return in_run(run, [&](const MeasuredRun& of) -> Column {
       return (of.time_s.array() - of.time_s[of.begin]) / 3600.0;
     });
@@ -479,12 +486,13 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
     return -data_.coefficient(of, output, input);
   };
   Hypothesis& step = fault("sensor_step", "at_s", "step_K", 0.02, 64);
-  step.columns = [this, run, missing_um](const Shapes& shapes, std::size_t output) {
-    return since(run, shapes, [&](const MeasuredRun& of) { return missing_um(of, output); });
+  step.write_columns = [this, run, missing_um](const Shapes& shapes, std::size_t output,
+                                               PanelPart into) {
+    write_since(run, shapes, into, [&](const MeasuredRun& of) { return missing_um(of, output); });
   };
   share_columns(step, input);
   Hypothesis& drift = fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24);
-  drift.columns = one_by_one([this, run, missing_um](const Shape& shape, std::size_t output) {
+  drift.write_columns = one_by_one([this, run, missing_um](const Shape& shape, std::size_t output) {
     return in_run(run, [&](const MeasuredRun& of) -> Column {
       const Column growing_h = ((of.time_s.array() - shape[0]) / 3600.0).max(0.0);
       return missing_um(of, output).cwiseProduct(growing_h);
@@ -516,8 +524,9 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
       return missing_um(of, output).cwiseProduct(lost_K(of));
     };
   };
-  loose.columns = [this, run, whole](const Shapes& shapes, std::size_t output) {
-    return since(run, shapes, whole(output));
+  loose.write_columns = [this, run, whole](const Shapes& shapes, std::size_t output,
+                                           PanelPart into) {
+    write_since(run, shapes, into, whole(output));
   };
   loose.from_onset = [this, run, whole](std::size_t output) { return in_run(run, whole(output)); };
   loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
@@ -526,17 +535,22 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
 }  // namespace
 
 Shapes grid_of(const Hypothesis& hypothesis) {
-  Shapes points = {{}};
-  for (const ShapeParameter& parameter : hypothesis.shape) {
-    Shapes longer;
-    for (const auto& point : points)
-      for (const double value : parameter.grid) {
-        longer.push_back(point);
-        longer.back().push_back(value);
-      }
-    points = std::move(longer);
+  std::size_t points = 1;
+  for (const ShapeParameter& parameter : hypothesis.shape) points *= parameter.grid.size();
+  Shapes all;
+  all.reserve(points);
+  for (std::size_t i = 0; i < points; ++i) all.push_back(point_of_grid(hypothesis, i));
+  return all;
+}
+
+Shape point_of_grid(const Hypothesis& hypothesis, std::size_t index) {
+  Shape point(hypothesis.shape.size());
+  for (std::size_t i = point.size(); i-- > 0;) {
+    const std::vector<double>& grid = hypothesis.shape[i].grid;
+    point[i] = grid[index % grid.size()];
+    index /= grid.size();
   }
-  return points;
+  return point;
 }
 
 StackedRows stacked_rows(const MeasuredData& data) {
@@ -565,9 +579,9 @@ std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& 
   const auto catalogue = std::make_shared<Catalogue>(data, rows);
   std::vector<Hypothesis> all = catalogue->all();
   for (Hypothesis& hypothesis : all)
-    hypothesis.columns = [catalogue, columns = std::move(hypothesis.columns)](const Shapes& shapes,
-                                                                              std::size_t output) {
-      return columns(shapes, output);
+    hypothesis.write_columns = [catalogue, write = std::move(hypothesis.write_columns)](
+                                   const Shapes& shapes, std::size_t output, PanelPart into) {
+      write(shapes, output, into);
     };
   return all;
 }

@@ -1,7 +1,9 @@
 /// Hypotheses of what is wrong: a cause with a subject, and the displacement that it would explain.
 #pragma once
 
+#include <algorithm>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +12,7 @@
 
 #include "modelling/diagnosis/coloured_noise.hpp"
 #include "modelling/diagnosis/measured_runs.hpp"
+#include "modelling/diagnosis/panel.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -60,9 +63,10 @@ struct Hypothesis {
   /// so; 0: as others.
   double clear_share{0.0};
   bool in_every_output{false};  ///< an output without its share speaks against it
-  /// Columns for an output over the stacked rows, those of one shape after those of another, shape
-  /// (rows, shapes times gains or 1).
-  std::function<Panel(const Shapes& shapes, std::size_t output)> columns{};
+  /// Writes the columns for an output over the stacked rows, those of one shape after those of
+  /// another.
+  std::function<void(const Shapes& shapes, std::size_t output, PanelPart into)> write_columns{};
+  Eigen::Index rows{0};  ///< of all columns
   /// How the same columns come from others that many hypotheses share; both may be empty.
   /// Of the model's calm readings: how much of which for an output.
   std::function<std::vector<ReadingShare>(std::size_t output)> of_readings{};
@@ -75,23 +79,30 @@ struct Hypothesis {
   std::function<double(std::size_t output)> scale{};
   /// Whether a gain is physically possible; empty: all are.
   std::function<bool(double gain, std::size_t output)> possible{};
+
+  /// Columns for one shape: as many as gains, or one.
+  [[nodiscard]] Eigen::Index width() const { return std::max<Eigen::Index>(1, std::ssize(gains)); }
+  /// What write_columns writes, shape (rows, shapes times width).
+  [[nodiscard]] Panel columns(const Shapes& shapes, std::size_t of_output) const {
+    Panel all(rows, width() * std::ssize(shapes));
+    write_columns(shapes, of_output, all);
+    return all;
+  }
 };
 
 /// Every point of the grid of its shape; one without values where it has no shape.
 [[nodiscard]] Shapes grid_of(const Hypothesis& hypothesis);
+/// One of them.
+[[nodiscard]] Shape point_of_grid(const Hypothesis& hypothesis, std::size_t index);
 
 /// Columns that are made for one shape at a time.
 /// @param make  Eigen::MatrixXd(const Shape&, std::size_t output)
 template <class Make>
-[[nodiscard]] std::function<Panel(const Shapes&, std::size_t)> one_by_one(Make make) {
-  return [make](const Shapes& shapes, std::size_t output) {
-    Panel all;
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const Eigen::MatrixXd columns = make(shapes[i], output);
-      if (i == 0) all.resize(columns.rows(), columns.cols() * std::ssize(shapes));
-      all.middleCols(columns.cols() * static_cast<Eigen::Index>(i), columns.cols()) = columns;
-    }
-    return all;
+[[nodiscard]] std::function<void(const Shapes&, std::size_t, PanelPart)> one_by_one(Make make) {
+  return [make](const Shapes& shapes, std::size_t output, PanelPart into) {
+    const Eigen::Index width = into.cols() / std::ssize(shapes);
+    for (std::size_t i = 0; i < shapes.size(); ++i)
+      into.middleCols(width * static_cast<Eigen::Index>(i), width) = make(shapes[i], output);
   };
 }
 

@@ -58,27 +58,27 @@ struct Squares {
 using Left = std::array<Column, 4>;
 
 /// Squares in a block when each run's mean outside of it is taken off.
+/// @param left  0 in rows without a value
 Squares squares_in_block(const OutputEvidence& evidence, const Left& left, const StackedRows& rows,
                          const Block& block) {
   std::array<double, 4> sum{};
+  const Eigen::Index length = block.end - block.begin;
+  const auto present_in = [&](const Block& of) {
+    return evidence.complete() ? of.end - of.begin
+                               : evidence.present().segment(of.begin, of.end - of.begin).count();
+  };
   for (const Block& run : rows.runs) {
     if (block.begin < run.begin || block.begin >= run.end) continue;
     const bool alone = block.begin == run.begin && block.end == run.end;
-    double count = 0.0;
-    std::array<double, 4> mean_um{};
-    for (Eigen::Index row = run.begin; row < run.end; ++row) {
-      const bool inside = row >= block.begin && row < block.end;
-      if (!evidence.present()[row] || (inside && !alone)) continue;
-      for (std::size_t i = 0; i < left.size(); ++i) mean_um[i] += left[i][row];
-      count += 1.0;
-    }
-    if (!(count > 0)) continue;
-    for (Eigen::Index row = block.begin; row < block.end; ++row) {
-      if (!evidence.present()[row]) continue;
-      for (std::size_t i = 0; i < left.size(); ++i) {
-        const double value_um = left[i][row] - mean_um[i] / count;
-        sum[i] += value_um * value_um;
-      }
+    const Eigen::Index inside = present_in(block);
+    const Eigen::Index count = present_in(run) - (alone ? 0 : inside);
+    if (count == 0) continue;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      const auto of_block = left[i].segment(block.begin, length).array();
+      const double of_run = left[i].segment(run.begin, run.end - run.begin).sum();
+      const double mean_um = (of_run - (alone ? 0.0 : of_block.sum())) / static_cast<double>(count);
+      sum[i] += (of_block - mean_um).square().sum() -
+                static_cast<double>(length - inside) * mean_um * mean_um;
     }
   }
   return {sum[0], sum[1], sum[2], sum[3]};
@@ -211,7 +211,7 @@ std::vector<std::vector<LeftOut::Reduced>> LeftOut::reduced(const Setting& setti
 LeftOut::BlockFit LeftOut::fit(const Explanation& explanation,
                                const std::vector<std::size_t>& acting,
                                const std::vector<const Reduced*>& reduced) const {
-  BlockFit fit{0.0, {}, {}, {}};
+  BlockFit fit{0.0, {}, {}, 0};
   double square = 0.0;
   double right = 0.0;
   for (std::size_t i = 0; i < acting.size(); ++i) {
@@ -222,7 +222,9 @@ LeftOut::BlockFit LeftOut::fit(const Explanation& explanation,
   for (std::size_t i = 0; i < acting.size(); ++i) {
     const Reduced& of = *reduced[i];
     Eigen::VectorXd gains = Eigen::VectorXd::Ones(1);
-    if (explanation.hypothesis->form == Form::own_gains)
+    if (explanation.hypothesis->form == Form::own_gains && of.right.size() == 1)
+      gains[0] = of.square(0, 0) > 0 ? of.right[0] / of.square(0, 0) : 0.0;
+    else if (explanation.hypothesis->form == Form::own_gains)
       gains = of.square.ldlt().solve(of.right);
     else if (explanation.hypothesis->form == Form::shared_gain)
       gains *= square > 0 ? right / square : 0.0;
@@ -234,29 +236,30 @@ LeftOut::BlockFit LeftOut::fit(const Explanation& explanation,
   return fit;
 }
 
-std::vector<LeftOut::BlockFit> LeftOut::best_without_each(const Explanation& explanation,
-                                                          const std::vector<std::size_t>& acting) {
+LeftOut::BlockFits LeftOut::best_without_each(const Explanation& explanation,
+                                              const std::vector<std::size_t>& acting) {
   const Shapes shapes = shapes_of(explanation);
+  BlockFits best{std::vector<BlockFit>(rows_.blocks.size()), {}};
   std::vector<std::vector<std::vector<Reduced>>> all;
   for (const std::size_t output : acting) {
-    const Panel columns = columns_of(*explanation.hypothesis, shapes, outputs_[output]);
-    all.push_back(
-        reduced(*explanation.settings[output], columns, columns.cols() / std::ssize(shapes)));
+    best.columns.push_back(columns_of(*explanation.hypothesis, shapes, outputs_[output]));
+    all.push_back(reduced(*explanation.settings[output], best.columns.back(),
+                          explanation.hypothesis->width()));
   }
-  std::vector<BlockFit> best(rows_.blocks.size());
-  for (std::size_t block = 0; block < best.size(); ++block) {
+  for (std::size_t block = 0; block < best.fits.size(); ++block) {
+    BlockFit& least = best.fits[block];
     for (std::size_t shape = 0; shape < shapes.size(); ++shape) {
       std::vector<const Reduced*> of;
       of.reserve(all.size());
       for (const auto& of_output : all) of.push_back(&of_output[shape][block]);
       BlockFit fit = this->fit(explanation, acting, of);
-      if (!(fit.misfit < best[block].misfit)) continue;
-      for (std::size_t i = 0; i < acting.size(); ++i)
-        fit.common.emplace_back(common(*explanation.settings[acting[i]])[block].carried -
-                                of[i]->carried * fit.gains[i]);
-      fit.shape = shapes[shape];
-      best[block] = std::move(fit);
+      if (!(fit.misfit < least.misfit)) continue;
+      least = std::move(fit);
+      least.shape = shape;
     }
+    for (std::size_t i = 0; i < least.gains.size(); ++i)
+      least.common.emplace_back(common(*explanation.settings[acting[i]])[block].carried -
+                                all[i][least.shape][block].carried * least.gains[i]);
   }
   return best;
 }
@@ -290,16 +293,19 @@ LeftOutGain LeftOut::gain_on_left_out_blocks(const Explanation& explanation) {
   const std::vector<std::size_t> acting = acting_outputs(explanation);
   const std::size_t blocks = rows_.blocks.size();
   if (blocks < 2) return {};
-  const std::vector<BlockFit> best = best_without_each(explanation, acting);
+  const BlockFits best = best_without_each(explanation, acting);
+  const Eigen::Index width = explanation.hypothesis->width();
   std::vector<Squares> sums(acting.size());
   for (std::size_t i = 0; i < acting.size(); ++i) {
     const OutputEvidence& evidence = outputs_[acting[i]];
     const Common& without = common(evidence.setting());
     for (std::size_t block = 0; block < blocks; ++block) {
-      if (best[block].gains.empty()) continue;
+      const BlockFit& fit = best.fits[block];
+      if (fit.gains.empty()) continue;
       const Column explained =
-          columns_of(*explanation.hypothesis, best[block].shape, evidence) * best[block].gains[i];
-      const Left left = left_of(evidence, explained, best[block].common[i], without[block].carried);
+          best.columns[i].middleCols(width * static_cast<Eigen::Index>(fit.shape), width) *
+          fit.gains[i];
+      const Left left = left_of(evidence, explained, fit.common[i], without[block].carried);
       sums[i] += squares_in_block(evidence, left, rows_, rows_.blocks[block]);
     }
   }

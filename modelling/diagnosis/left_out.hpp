@@ -66,11 +66,15 @@ class LeftOut {
     double misfit{std::numeric_limits<double>::infinity()};
     std::vector<Eigen::VectorXd> gains;   ///< one an acting output
     std::vector<Eigen::VectorXd> common;  ///< of the common columns, beside the hypothesis
-    Shape shape;
+    std::size_t shape{0};                 ///< its place among those that were tried
+  };
+  struct BlockFits {
+    std::vector<BlockFit> fits;  ///< one a block
+    std::vector<Panel> columns;  ///< of all shapes that were tried, one an acting output
   };
   /// The best of the shapes when a block is left out.
-  [[nodiscard]] std::vector<BlockFit> best_without_each(const Explanation& explanation,
-                                                        const std::vector<std::size_t>& acting);
+  [[nodiscard]] BlockFits best_without_each(const Explanation& explanation,
+                                            const std::vector<std::size_t>& acting);
 
   [[nodiscard]] const Common& common(const Setting& setting);
   /// Of groups of `width` columns; of each as many as there are in Common.

@@ -24,16 +24,16 @@ double missing_share(const std::vector<double>& values) {
 
 /// The rows that are used: every needed column has a value there.
 std::vector<std::size_t> usable_rows(const RunFile& run, const std::vector<std::string>& needed) {
-  std::vector<const std::vector<double>*> columns;
-  columns.reserve(needed.size());
-  for (const std::string& name : needed) columns.push_back(&run.column(name));
-  std::vector<std::size_t> rows;
-  for (std::size_t row = 0; row < run.selected_end; ++row) {
-    if (std::all_of(columns.begin(), columns.end(),
-                    [row](const auto* column) { return std::isfinite((*column)[row]); })) {
-      rows.push_back(row);
-    }
+  std::vector<char> usable(run.selected_end, 1);
+  for (const std::string& name : needed) {
+    const std::vector<double>& column = run.column(name);
+    for (std::size_t row = 0; row < usable.size(); ++row)
+      usable[row] = static_cast<char>(usable[row] & static_cast<char>(std::isfinite(column[row])));
   }
+  std::vector<std::size_t> rows;
+  rows.reserve(usable.size());
+  for (std::size_t row = 0; row < usable.size(); ++row)
+    if (usable[row] != 0) rows.push_back(row);
   return rows;
 }
 
@@ -81,7 +81,10 @@ void take_displacements(const RunFile& file, const std::vector<std::size_t>& row
   }
 }
 
-MeasuredRun measured_run(const RunFile& file, const std::string& name, const MeasuredData& data) {
+enum class Purpose { search, comparison };
+
+MeasuredRun measured_run(const RunFile& file, const std::string& name, const MeasuredData& data,
+                         Purpose purpose) {
   std::vector<std::string> needed = data.model.temperature_columns();
   for (const std::string& signal : data.model.signal_columns()) needed.push_back(signal);
   const std::vector<std::size_t> rows = usable_rows(file, needed);
@@ -95,14 +98,14 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
     refuse("selection", "must have a row in which no input of the model is missing");
   run.time_s = taken(file.time_s(), rows);
   for (const std::string& input : data.model.inputs) {
-    const Column temps_degC = taken(file.column(input), rows);
-    run.inputs_degC.push_back(temps_degC);
+    Column temps_degC = taken(file.column(input), rows);
     run.inputs_K.emplace_back(temps_degC.array() - reference_of(data.model, file, input));
+    if (purpose == Purpose::search) run.inputs_degC.push_back(std::move(temps_degC));
   }
   for (const std::string& other : data.others) {
-    const Column temps_degC = taken(file.column(other), rows);
-    run.others_degC.push_back(temps_degC);
+    Column temps_degC = taken(file.column(other), rows);
     run.others_K.emplace_back(temps_degC.array() - reference_of(data.model, file, other));
+    if (purpose == Purpose::search) run.others_degC.push_back(std::move(temps_degC));
   }
   for (const std::string& signal : data.signals)
     run.signals.push_back(taken(file.column(signal), rows));
@@ -125,7 +128,8 @@ const Column* temperature_of(const MeasuredData& data, const MeasuredRun& run,
 
 }  // namespace
 
-SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFile>& runs) {
+SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFile>& runs,
+                             const std::vector<RunFile>& further) {
   SharedColumns columns;
   const std::vector<std::string> always = [&] {
     std::vector<std::string> names = model.temperature_columns();
@@ -134,9 +138,11 @@ SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFil
   }();
   for (const std::string& name : runs.front().columns) {
     if (name == "time_s" || contains(model.inputs, name) || is_output(name)) continue;
-    const bool everywhere = std::all_of(runs.begin(), runs.end(), [&](const RunFile& run) {
+    const auto has = [&name](const RunFile& run) {
       return run.find(name) && missing_share(run.column(name)) <= missing_share_max;
-    });
+    };
+    const bool everywhere = std::all_of(runs.begin(), runs.end(), has) &&
+                            std::all_of(further.begin(), further.end(), has);
     if (!everywhere && !contains(always, name)) continue;
     (is_temperature(name) ? columns.others : columns.signals).push_back(name);
   }
@@ -193,19 +199,26 @@ Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
 namespace {
 /// A matrix that was fitted or calculated is right to a few per cent.
 constexpr double coefficient_sd = 0.03;
+
+MeasuredData data_of(const ThermalModel& model, const std::vector<RunFile>& runs,
+                     const std::vector<std::string>& names, const SharedColumns& columns,
+                     Purpose purpose) {
+  MeasuredData data{model, columns.others, columns.signals, {}, {}, coefficient_sd};
+  data.runs.reserve(runs.size());
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    data.runs.push_back(measured_run(runs[i], names[i], data, purpose));
+  return data;
+}
 }  // namespace
 
 MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
                            const std::vector<std::string>& names, const SharedColumns& columns) {
-  MeasuredData data{model, columns.others, columns.signals, {}, {}, coefficient_sd};
-  for (std::size_t i = 0; i < runs.size(); ++i)
-    data.runs.push_back(measured_run(runs[i], names[i], data));
-  return data;
+  return data_of(model, runs, names, columns, Purpose::comparison);
 }
 
 MeasuredData training_data(const ThermalModel& model, const std::vector<RunFile>& runs,
                            const std::vector<std::string>& names, const SharedColumns& columns) {
-  MeasuredData data = measured_data(model, runs, names, columns);
+  MeasuredData data = data_of(model, runs, names, columns, Purpose::search);
   for (MeasuredRun& run : data.runs) {
     for (const Column& rise_K : run.inputs_K) run.calm_inputs_K.push_back(calm(run.time_s, rise_K));
     for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));

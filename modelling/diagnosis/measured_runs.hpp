@@ -21,11 +21,11 @@ struct MeasuredRun {
   Eigen::Index begin{0};         ///< first selected row
   std::vector<Column> inputs_K;  ///< rise over the reference, order of the model's inputs
   std::vector<Column> others_K;  ///< rise of MeasuredData::others
+  std::vector<Column> signals;   ///< order of MeasuredData::signals
+  // What the search alone needs; of training runs only.
   std::vector<Column> others_degC;
   std::vector<Column> inputs_degC;
-  std::vector<Column> signals;  ///< order of MeasuredData::signals
-  /// inputs_K and others_K without the noise of single values, as far as it can be seen; of
-  /// training runs only.
+  /// inputs_K and others_K without the noise of single values, as far as it can be seen.
   std::vector<Column> calm_inputs_K;
   std::vector<Column> calm_others_K;
   std::vector<Column> model_um;     ///< order of the outputs, relative to the output's first row
@@ -50,13 +50,14 @@ struct MeasuredData {
                                    std::size_t input) const;
 };
 
-/// Columns that every one of the runs has.
+/// Columns that every one of the runs and of the further ones has, in the order of the first run.
 struct SharedColumns {
   std::vector<std::string> others;
   std::vector<std::string> signals;
 };
 [[nodiscard]] SharedColumns shared_columns(const ThermalModel& model,
-                                           const std::vector<RunFile>& runs);
+                                           const std::vector<RunFile>& runs,
+                                           const std::vector<RunFile>& further = {});
 
 /// The model at every row of the run, in the estimator's own arithmetic; shape (outputs, rows).
 [[nodiscard]] std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
@@ -69,7 +70,7 @@ struct SharedColumns {
                                          const std::vector<RunFile>& runs,
                                          const std::vector<std::string>& names,
                                          const SharedColumns& columns);
-/// The same with calm readings, for the search.
+/// The same with what the search needs.
 [[nodiscard]] MeasuredData training_data(const ThermalModel& model,
                                          const std::vector<RunFile>& runs,
                                          const std::vector<std::string>& names,

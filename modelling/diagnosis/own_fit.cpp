@@ -16,6 +16,8 @@ constexpr double rows_an_input_min = 8.0;
 /// In place of none: what is fitted need not be independent.
 constexpr double no_ridge = 1e-10;
 constexpr double ridge_max = 1.0;
+/// What is sought around the best ridge stays below.
+constexpr double ridge_tried_max = 4.0;
 
 Eigen::MatrixXd rises_of(const MeasuredData& data, const StackedRows& rows) {
   Eigen::MatrixXd rises_K(rows.time_s.size(), static_cast<Eigen::Index>(data.model.inputs.size()));
@@ -54,7 +56,80 @@ void centre(Eigen::Ref<Eigen::VectorXd> column, const std::vector<Block>& runs,
   }
 }
 
+/// Mean square over the rows, of which there are `count`, less the square of the mean.
+double variance_of(const Eigen::Ref<const Eigen::VectorXd>& column, double count) {
+  const double mean = column.sum() / count;
+  return column.squaredNorm() / count - mean * mean;
+}
+
+/// Whether there is a ridge in [0, ridge_tried_max] with |a - ridge b| <= c + ridge d.
+bool some_ridge_keeps(double a, double b, double c, double d) {
+  double least = 0.0;
+  double most = ridge_tried_max;
+  for (const double sign : {1.0, -1.0}) {
+    const double from = sign * a - c;  // from <= ridge * slope
+    const double slope = sign * b + d;
+    if (slope > 0) least = std::max(least, from / slope);
+    if (slope < 0) most = std::min(most, from / slope);
+    if (slope == 0 && from > 0) return false;
+  }
+  return !(least > most);
+}
+
 }  // namespace
+
+/// Whether a fit of this way, with whatever ridge, may have given an output its coefficients k.
+/// With the rises D as they are fitted, S = D'D / rows, the residual r and g = D'r / rows, a fit
+/// with a ridge lies a from k where S a + ridge a = g - ridge k. In u'S times it
+///
+///   |u'S g - ridge u'S k| <= |a| (|S u| + ridge |u|),  |x| = sqrt(x'S x)
+///
+/// for every u. A small |a| is what difference() asks for; u = g shows what no ridge can do without
+/// S itself, which takes most of the time of recognising a fit.
+bool OwnFit::may_come_from(const Way& way, const Present& present, const Eigen::VectorXd& residual,
+                           const Eigen::Map<const Eigen::VectorXd>& coefficients) const {
+  const auto rows = static_cast<double>(present.count());
+  if (!(rows > rows_an_input_min * static_cast<double>(coefficients.size()))) return false;
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(rises_K_.cols());
+  for (Eigen::Index input = 0; way.standardised && input < rises_K_.cols(); ++input) {
+    const Eigen::VectorXd rise_K = present.select(rises_K_.col(input), 0.0);
+    const double variance = variance_of(rise_K, rows);
+    if (variance > 0) scale[input] = std::sqrt(variance);
+  }
+  const auto fitted = [&](const Eigen::VectorXd& column) {
+    Eigen::VectorXd used = present.select(column, 0.0);
+    if (way.offsets) centre(used, runs_, present);
+    return used;
+  };
+  const auto of_inputs = [&](const Eigen::VectorXd& x) {
+    return fitted(rises_K_ * x.cwiseQuotient(scale));
+  };
+  const auto with_inputs = [&](const Eigen::VectorXd& column) -> Eigen::VectorXd {
+    return (rises_K_.transpose() * column).cwiseQuotient(scale) / rows;
+  };
+  const Eigen::VectorXd left = fitted(residual);
+  const Eigen::VectorXd g = with_inputs(left);
+  const Eigen::VectorXd predicted = of_inputs(g);
+  const Eigen::VectorXd Sg = with_inputs(predicted);
+  const double apart_max = 1.01 * std::sqrt(difference_max * left.squaredNorm() / rows);
+  return some_ridge_keeps(Sg.dot(g), Sg.dot(coefficients.cwiseProduct(scale)),
+                          apart_max * of_inputs(Sg).norm() / std::sqrt(rows),
+                          apart_max * predicted.norm() / std::sqrt(rows));
+}
+
+bool OwnFit::may_be_recognised(const MeasuredData& data, const StackedRows& rows) const {
+  for (std::size_t output = 0; output < data.model.outputs.size(); ++output) {
+    const Eigen::VectorXd residual = residual_of(data, rows, output);
+    const Present present = residual.array().isFinite();
+    const Eigen::Map<const Eigen::VectorXd> coefficients(data.model.matrix_um_per_K[output].data(),
+                                                         rises_K_.cols());
+    for (const bool offsets : {false, true})
+      for (const bool standardised : {true, false})
+        if (may_come_from({offsets, standardised, 0.0}, present, residual, coefficients))
+          return true;
+  }
+  return false;
+}
 
 OwnFit::Design OwnFit::design_of(const StackedRows& rows, const Present& present,
                                  const Way& way) const {
@@ -63,8 +138,7 @@ OwnFit::Design OwnFit::design_of(const StackedRows& rows, const Present& present
   for (Eigen::Index input = 0; input < rises_K_.cols(); ++input) {
     auto column = design.fitted.col(input);
     column = present.select(column, 0.0);
-    const double mean_K = column.sum() / design.rows;
-    const double variance = column.squaredNorm() / design.rows - mean_K * mean_K;
+    const double variance = variance_of(column, design.rows);
     if (way.offsets) centre(column, rows.runs, present);
     if (!way.standardised || !(variance > 0)) continue;
     design.scale[input] = std::sqrt(variance);
@@ -142,6 +216,7 @@ std::optional<OwnFit> OwnFit::recognised(const MeasuredData& data, const Stacked
   OwnFit best;
   best.rises_K_ = rises_of(data, rows);
   best.runs_ = rows.runs;
+  if (!best.may_be_recognised(data, rows)) return std::nullopt;
   double least = std::numeric_limits<double>::infinity();
   for (const bool offsets : {false, true})
     for (const bool standardised : {true, false}) {

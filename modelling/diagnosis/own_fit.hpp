@@ -66,6 +66,10 @@ class OwnFit {
   };
 
   OwnFit() = default;
+  [[nodiscard]] bool may_come_from(const Way& way, const Present& present,
+                                   const Eigen::VectorXd& residual,
+                                   const Eigen::Map<const Eigen::VectorXd>& coefficients) const;
+  [[nodiscard]] bool may_be_recognised(const MeasuredData& data, const StackedRows& rows) const;
   [[nodiscard]] Design design_of(const StackedRows& rows, const Present& present,
                                  const Way& way) const;
   [[nodiscard]] std::vector<OfOutput> fits_of(const MeasuredData& data, const StackedRows& rows,

@@ -35,7 +35,8 @@ const char* phase_name(Phase phase) {
 std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
   Column mean_K = Column::Zero(run.rows());
   for (const Column& input : run.inputs_K) mean_K += input;
-  const Column slope = slopes_per_s(run.time_s, mean_K, {slope_smoothing_s});
+  Panel slope(run.rows(), 1);
+  slopes(run.time_s, mean_K, {slope_smoothing_s}, Column::Ones(run.rows()), {1.0}, slope);
   const double steepest = slope.cwiseAbs().maxCoeff();
   std::vector<Phase> phases;
   double changed_at_s = -1e300;
@@ -52,9 +53,9 @@ std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
     if (row < run.begin) continue;
     if (run.time_s[row] - changed_at_s < change_lasts_s)
       phases.push_back(Phase::change);
-    else if (slope[row] > slope_share_min * steepest)
+    else if (slope(row, 0) > slope_share_min * steepest)
       phases.push_back(Phase::heating);
-    else if (slope[row] < -slope_share_min * steepest)
+    else if (slope(row, 0) < -slope_share_min * steepest)
       phases.push_back(Phase::cooling);
     else
       phases.push_back(on ? Phase::steady : Phase::standstill);
@@ -114,7 +115,7 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel
     report.runs.push_back(std::move(added));
   }
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
-    const Residuals before = residuals(model, {}, data, output);
+    const Residuals before = residuals(data, output);
     const Residuals after = residuals(diagnosis.extended, corrections, data, output);
     for (std::size_t i = 0; i < data.runs.size(); ++i) {
       report.runs[first + i].before_um.push_back(before.by_run[i]);

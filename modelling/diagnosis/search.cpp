@@ -14,19 +14,18 @@ constexpr std::size_t shortlist_of_each = 20;
 /// Explanations are as good as each other when what they leave differs by less than this share.
 constexpr double tie_share = 0.1;
 
-/// @param equations  [setting][explanation]
+/// @param equations  one a setting
+/// @param place  of the explanation
 const Setting* likeliest_of(const std::vector<const Setting*>& settings,
-                            const std::vector<std::vector<Setting::Equations>>& equations,
-                            std::size_t place, const Explanation& explanation, std::size_t output) {
+                            const std::vector<EquationsTable>& equations, std::size_t place,
+                            const Explanation& explanation, std::size_t output) {
   const Setting* likeliest = settings.front();
   double best = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < settings.size(); ++i) {
-    const Setting::Equations& of = equations[i][place];
-    const Eigen::VectorXd gains =
-        explanation.hypothesis->form == Form::own_gains ? of.gains() : explanation.gains[output];
-    const double squares =
-        settings[i]->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
-    const double likelihood = settings[i]->twice_log_likelihood(squares);
+    const double taken = explanation.hypothesis->form == Form::own_gains
+                             ? equations[i].taken(place, equations[i].gains(place))
+                             : equations[i].taken(place, explanation.gains[output]);
+    const double likelihood = settings[i]->twice_log_likelihood(settings[i]->squares() - taken);
     if (!(likelihood > best)) continue;
     best = likelihood;
     likeliest = settings[i];

@@ -9,6 +9,7 @@
 
 #include "modelling/diagnosis/evidence.hpp"
 #include "modelling/diagnosis/sensor_witness.hpp"
+#include "modelling/diagnosis/settings_together.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -96,41 +97,62 @@ class Search {
   };
   using Settings = std::vector<const Setting*>;
 
-  /// Under each of the settings, of each shape, one an output.
-  using Equations = std::vector<std::vector<std::vector<Setting::Equations>>>;
-  /// Those of the grids of hypotheses that share their columns but for a factor, by pattern.
-  using Patterns = std::map<std::string, Equations>;
+  /// Under each of several settings, of each shape, of each output.
+  struct Equations {
+    EquationsTable table{};
+    std::size_t shapes{0};
+    std::size_t outputs{0};
+    [[nodiscard]] std::size_t place(std::size_t under, std::size_t shape,
+                                    std::size_t output) const {
+      return (under * shapes + shape) * outputs + output;
+    }
+  };
 
   using Group = std::vector<const Hypothesis*>;
+  /// A hypothesis and what it is weighed at.
+  struct Part {
+    const Hypothesis* hypothesis{nullptr};
+    Shapes shapes;
+  };
+  /// Under each of several settings of an output the equations of groups of `width` columns.
+  using Weigh =
+      std::function<std::vector<EquationsTable>(const Panel& columns, Eigen::Index width)>;
 
-  [[nodiscard]] std::vector<Equations> no_equations(std::size_t hypotheses, std::size_t shapes,
-                                                    std::size_t settings) const;
-  /// Of hypotheses with as many columns and the same output. Columns are made once for all
-  /// settings.
-  [[nodiscard]] std::vector<Equations> equations_of_each(
-      const Group& hypotheses, const Shapes& shapes, const std::vector<Settings>& settings) const;
-  [[nodiscard]] Equations equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
-                                               const std::vector<Settings>& settings) const;
+  [[nodiscard]] Equations no_equations(Eigen::Index width, std::size_t shapes,
+                                       std::size_t settings) const;
+  /// Of hypotheses of one width and output.
+  /// @param weigh  one an output
+  [[nodiscard]] std::vector<Equations> equations_of_each(const std::vector<Part>& parts,
+                                                         std::size_t settings,
+                                                         const std::vector<Weigh>& weigh) const;
   [[nodiscard]] std::vector<Equations> equations_of_readings(
       const Group& hypotheses, const std::vector<Settings>& settings) const;
   /// Of hypotheses of one cause and run, over their grid.
+  /// @param together  one an output
   [[nodiscard]] std::vector<Equations> equations_from_onset(
-      const Group& hypotheses, const std::vector<Settings>& settings) const;
-  [[nodiscard]] Equations equations_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
-                                            const std::vector<Settings>& settings,
-                                            Patterns& patterns) const;
+      const Group& hypotheses, std::size_t settings,
+      const std::vector<SettingsTogether>& together) const;
+  /// Those of a hypothesis whose columns are those of another but for a factor.
+  [[nodiscard]] Equations scaled(const Equations& equations, const Hypothesis& from,
+                                 const Hypothesis& to, std::size_t settings) const;
   /// One trial a shape.
   [[nodiscard]] std::vector<Trial> weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
                                              const Settings& settings) const;
   [[nodiscard]] Trial weigh(const Hypothesis& hypothesis, const std::vector<double>& shape,
                             const Settings& settings) const;
-  [[nodiscard]] Trial trial_of(const Hypothesis& hypothesis,
-                               const std::vector<Setting::Equations>& equations,
-                               const Settings& settings) const;
-  [[nodiscard]] std::vector<Explanation> best_of_grid(const Hypothesis& hypothesis,
-                                                      const Shapes& grid,
-                                                      const Equations& equations,
-                                                      const std::vector<Settings>& settings) const;
+  /// @param gains  one an output; null: they are not wanted
+  [[nodiscard]] double score_of(const Hypothesis& hypothesis, const Equations& equations,
+                                std::size_t under, std::size_t shape, const Settings& settings,
+                                std::vector<Eigen::VectorXd>* gains) const;
+  [[nodiscard]] double shared_gain(const Equations& equations, std::size_t under, std::size_t shape,
+                                   const Hypothesis& hypothesis, const Settings& settings) const;
+  /// The best point of the grid under each of the settings is added to those that it belongs to,
+  /// where it gains more than it costs.
+  void add_best_of_grid(const Hypothesis& hypothesis, const Equations& equations,
+                        const std::vector<Settings>& settings,
+                        std::vector<std::vector<Explanation>>& under_each) const;
+  /// With others of its pattern.
+  [[nodiscard]] bool shares_columns(const Hypothesis& hypothesis) const;
   /// Every hypothesis at the best point of its grid, under each of the settings.
   [[nodiscard]] std::vector<std::vector<Explanation>> profile(
       const std::vector<Settings>& settings) const;

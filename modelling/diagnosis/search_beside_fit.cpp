@@ -89,11 +89,12 @@ std::unique_ptr<SearchBesideFit::Group> SearchBesideFit::searched(
   for (const Hypothesis& acting : group->acting) {
     if (taken_by_fit(acting)) continue;
     Hypothesis& beside = left.emplace_back(acting);
-    beside.columns = one_by_one([&acting, fit = &*fit_, outputs](
-                                    const Shape& shape, std::size_t output) -> Eigen::MatrixXd {
-      const Eigen::MatrixXd columns = columns_of(acting, shape, output);
-      return columns - fit->predicted(absorbable(acting, columns), outputs[output]);
-    });
+    beside.write_columns =
+        one_by_one([&acting, fit = &*fit_, outputs](const Shape& shape,
+                                                    std::size_t output) -> Eigen::MatrixXd {
+          const Eigen::MatrixXd columns = columns_of(acting, shape, output);
+          return columns - fit->predicted(absorbable(acting, columns), outputs[output]);
+        });
     // The ways around a hypothesis' columns lead to what acts.
     beside.of_readings = {};
     beside.from_onset = {};

@@ -8,21 +8,36 @@ namespace {
 
 /// An output counts as acted on when its 2 ln L gains this much beyond the price of its gains.
 constexpr double output_gain_min = 6.0;
-constexpr std::size_t shapes_at_once = 16;
+/// As many as stay near the processor.
+constexpr Eigen::Index columns_at_once = 32;
 /// Columns of smaller factors are made for themselves.
 constexpr double scale_min = 1e-6;
 
-/// Columns of each shape of each hypothesis; all hypotheses have as many.
-Panel side_by_side(const std::vector<const Hypothesis*>& hypotheses, const Shapes& shapes,
-                   const OutputEvidence& evidence) {
-  if (hypotheses.size() == 1) return columns_of(*hypotheses.front(), shapes, evidence);
-  Panel all;
-  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    const Panel columns = columns_of(*hypotheses[i], shapes, evidence);
-    if (i == 0) all.resize(columns.rows(), columns.cols() * std::ssize(hypotheses));
-    all.middleCols(columns.cols() * static_cast<Eigen::Index>(i), columns.cols()) = columns;
-  }
-  return all;
+/// Shapes of a hypothesis whose columns lie in one panel.
+struct Piece {
+  std::size_t part{0};
+  std::size_t first{0};  ///< of its shapes
+  std::size_t count{0};
+};
+
+/// @param counts  shapes of each part
+/// @return for each panel its pieces
+std::vector<std::vector<Piece>> pieces_of(const std::vector<std::size_t>& counts,
+                                          std::size_t shapes_at_once) {
+  std::vector<std::vector<Piece>> panels;
+  std::size_t free = 0;
+  for (std::size_t part = 0; part < counts.size(); ++part)
+    for (std::size_t first = 0; first < counts[part];) {
+      if (free == 0) {
+        panels.emplace_back();
+        free = shapes_at_once;
+      }
+      const std::size_t count = std::min(free, counts[part] - first);
+      panels.back().push_back({part, first, count});
+      first += count;
+      free -= count;
+    }
+  return panels;
 }
 
 std::vector<const Setting*> of_output(const std::vector<std::vector<const Setting*>>& settings,
@@ -35,66 +50,73 @@ std::vector<const Setting*> of_output(const std::vector<std::vector<const Settin
 
 }  // namespace
 
-Search::Equations Search::equations_under_each(const Hypothesis& hypothesis, const Shapes& shapes,
-                                               const std::vector<Settings>& settings) const {
-  return std::move(equations_of_each({&hypothesis}, shapes, settings).front());
-}
-
-std::vector<Search::Equations> Search::equations_of_each(
-    const Group& hypotheses, const Shapes& shapes, const std::vector<Settings>& settings) const {
-  std::vector<Equations> equations =
-      no_equations(hypotheses.size(), shapes.size(), settings.size());
-  for (std::size_t first = 0; first < shapes.size(); first += shapes_at_once) {
-    const Shapes some(shapes.begin() + static_cast<std::ptrdiff_t>(first),
-                      shapes.begin() + static_cast<std::ptrdiff_t>(
-                                           std::min(first + shapes_at_once, shapes.size())));
-    for (const std::size_t output : measured_) {
-      if (!concerns(*hypotheses.front(), output)) continue;
-      const Panel columns = side_by_side(hypotheses, some, outputs_[output]);
-      const std::size_t groups = some.size() * hypotheses.size();
-      const Eigen::Index width = columns.cols() / static_cast<Eigen::Index>(groups);
-      auto all = Setting::equations_of_groups(of_output(settings, output), columns, width);
-      for (std::size_t under = 0; under < settings.size(); ++under)
-        for (std::size_t i = 0; i < groups; ++i)
-          equations[i / some.size()][under][first + i % some.size()][output] =
-              std::move(all[under][i]);
+std::vector<Search::Equations> Search::equations_of_each(const std::vector<Part>& parts,
+                                                         std::size_t settings,
+                                                         const std::vector<Weigh>& weigh) const {
+  const Eigen::Index width = parts.front().hypothesis->width();
+  std::vector<Equations> equations;
+  std::vector<std::size_t> counts;
+  for (const Part& part : parts) {
+    equations.push_back(no_equations(width, part.shapes.size(), settings));
+    counts.push_back(part.shapes.size());
+  }
+  const auto at_once = static_cast<std::size_t>(std::max<Eigen::Index>(1, columns_at_once / width));
+  for (const std::size_t output : measured_) {
+    if (!concerns(*parts.front().hypothesis, output)) continue;
+    for (const std::vector<Piece>& pieces : pieces_of(counts, at_once)) {
+      Eigen::Index groups = 0;
+      for (const Piece& piece : pieces) groups += static_cast<Eigen::Index>(piece.count);
+      Panel columns(rows_.time_s.size(), groups * width);
+      Eigen::Index at = 0;
+      for (const Piece& piece : pieces) {
+        const auto first =
+            parts[piece.part].shapes.begin() + static_cast<std::ptrdiff_t>(piece.first);
+        const Eigen::Index count = static_cast<Eigen::Index>(piece.count) * width;
+        parts[piece.part].hypothesis->write_columns(
+            {first, first + static_cast<std::ptrdiff_t>(piece.count)}, output,
+            columns.middleCols(at, count));
+        at += count;
+      }
+      outputs_[output].clear_missing(columns);
+      const std::vector<EquationsTable> tables = weigh[output](columns, width);
+      std::size_t group = 0;
+      for (const Piece& piece : pieces)
+        for (std::size_t i = 0; i < piece.count; ++i, ++group)
+          for (std::size_t under = 0; under < settings; ++under) {
+            Equations& of = equations[piece.part];
+            of.table.copy(tables[under], group, of.place(under, piece.first + i, output));
+          }
     }
   }
   return equations;
 }
 
-Search::Equations Search::equations_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
-                                            const std::vector<Settings>& settings,
-                                            Patterns& patterns) const {
-  const auto scaled = [&](Equations equations, bool inverse) {
-    for (auto& of_setting : equations)
-      for (auto& of_shape : of_setting)
-        for (const std::size_t output : measured_) {
-          const double scale = hypothesis.scale(output);
-          const double factor = inverse ? 1.0 / scale : scale;
-          of_shape[output].square *= factor * factor;
-          of_shape[output].right *= factor;
-        }
-    return equations;
-  };
-  const bool shares = !hypothesis.pattern.empty() &&
-                      std::all_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
-                        return std::abs(hypothesis.scale(output)) > scale_min;
-                      });
-  if (!shares) return equations_under_each(hypothesis, grid, settings);
-  const auto known = patterns.find(hypothesis.pattern);
-  if (known != patterns.end()) return scaled(known->second, false);
-  Equations equations = equations_under_each(hypothesis, grid, settings);
-  patterns.emplace(hypothesis.pattern, scaled(equations, true));
-  return equations;
+Search::Equations Search::scaled(const Equations& equations, const Hypothesis& from,
+                                 const Hypothesis& to, std::size_t settings) const {
+  Equations all = equations;
+  for (const std::size_t output : measured_) {
+    const double times = to.scale(output) / from.scale(output);
+    for (std::size_t under = 0; under < settings; ++under)
+      for (std::size_t shape = 0; shape < all.shapes; ++shape) {
+        const std::size_t place = all.place(under, shape, output);
+        all.table.copy(equations.table, place, place, times);
+      }
+  }
+  return all;
 }
 
 std::vector<Search::Trial> Search::weigh_all(const Hypothesis& hypothesis, const Shapes& shapes,
                                              const Settings& settings) const {
-  const Equations equations = equations_under_each(hypothesis, shapes, {settings});
-  std::vector<Trial> trials;
-  for (const auto& of_shape : equations.front())
-    trials.push_back(trial_of(hypothesis, of_shape, settings));
+  std::vector<Weigh> weigh(outputs_.size());
+  for (const std::size_t output : measured_)
+    weigh[output] = [of = settings[output]](const Panel& columns, Eigen::Index width) {
+      return Setting::equations_of_groups({of}, columns, width);
+    };
+  const Equations equations =
+      std::move(equations_of_each({{&hypothesis, shapes}}, 1, weigh).front());
+  std::vector<Trial> trials(shapes.size());
+  for (std::size_t shape = 0; shape < shapes.size(); ++shape)
+    trials[shape].score = score_of(hypothesis, equations, 0, shape, settings, &trials[shape].gains);
   return trials;
 }
 
@@ -103,114 +125,147 @@ Search::Trial Search::weigh(const Hypothesis& hypothesis, const std::vector<doub
   return weigh_all(hypothesis, {shape}, settings).front();
 }
 
-Search::Trial Search::trial_of(const Hypothesis& hypothesis,
-                               const std::vector<Setting::Equations>& equations,
-                               const Settings& settings) const {
-  Trial trial;
-  trial.gains.resize(outputs_.size());
+double Search::shared_gain(const Equations& equations, std::size_t under, std::size_t shape,
+                           const Hypothesis& hypothesis, const Settings& settings) const {
   double square = 0.0;
   double right = 0.0;
   for (const std::size_t output : measured_) {
-    if (equations[output].right.size() == 0) continue;
+    if (!concerns(hypothesis, output)) continue;
+    const std::size_t place = equations.place(under, shape, output);
     const double variance = settings[output]->squares();
-    square += equations[output].square(0, 0) / variance;
-    right += equations[output].right[0] / variance;
+    square += equations.table.square(place)(0, 0) / variance;
+    right += equations.table.right(place)[0] / variance;
   }
-  const double shared = square > 0 ? right / square : 0.0;
-  if (hypothesis.form == Form::shared_gain && hypothesis.possible &&
-      !hypothesis.possible(shared, 0))
-    return trial;
-  for (const std::size_t output : measured_) {
-    const Setting::Equations& of = equations[output];
-    if (of.right.size() == 0) continue;
-    Eigen::VectorXd gains = Eigen::VectorXd::Ones(1);
-    double gain_price = 0.0;
-    if (hypothesis.form == Form::own_gains) {
-      gains = of.gains();
-      if (!gains.allFinite()) continue;
-      if (hypothesis.possible && !hypothesis.possible(gains[0], output)) continue;
-      gain_price = static_cast<double>(gains.size()) * std::log(settings[output]->present_rows());
-    } else if (hypothesis.form == Form::shared_gain) {
-      gains *= shared;
-    }
-    const double squares =
-        settings[output]->squares() - 2.0 * gains.dot(of.right) + gains.dot(of.square * gains);
-    const double gain = settings[output]->twice_log_likelihood(squares) -
-                        settings[output]->twice_log_likelihood(settings[output]->squares()) -
-                        gain_price;
-    if (hypothesis.form == Form::own_gains && gain < output_gain_min) continue;
-    trial.score += gain;
-    trial.gains[output] = gains;
-  }
-  return trial;
+  return square > 0 ? right / square : 0.0;
 }
 
-std::vector<Explanation> Search::best_of_grid(const Hypothesis& hypothesis, const Shapes& grid,
-                                              const Equations& equations,
-                                              const std::vector<Settings>& settings) const {
-  std::vector<Explanation> bests;
-  for (std::size_t under = 0; under < settings.size(); ++under) {
-    Explanation best{&hypothesis, grid.front(),    std::vector<Eigen::VectorXd>(outputs_.size()),
-                     0.0,         settings[under], 0.0,
-                     0.0};
-    for (std::size_t i = 0; i < grid.size(); ++i) {
-      Trial trial = trial_of(hypothesis, equations[under][i], settings[under]);
-      if (!(trial.score > best.score)) continue;
-      best.score = trial.score;
-      best.shape = grid[i];
-      best.gains = std::move(trial.gains);
-    }
-    best.score -= price(hypothesis);
-    bests.push_back(std::move(best));
+double Search::score_of(const Hypothesis& hypothesis, const Equations& equations, std::size_t under,
+                        std::size_t shape, const Settings& settings,
+                        std::vector<Eigen::VectorXd>* gains) const {
+  if (gains != nullptr) gains->assign(outputs_.size(), Eigen::VectorXd());
+  double score = 0.0;
+  double single = 1.0;  // gain of a single column
+  if (hypothesis.form == Form::shared_gain) {
+    single = shared_gain(equations, under, shape, hypothesis, settings);
+    if (hypothesis.possible && !hypothesis.possible(single, 0)) return score;
   }
-  return bests;
+  const EquationsTable& table = equations.table;
+  for (const std::size_t output : measured_) {
+    if (!concerns(hypothesis, output)) continue;
+    const std::size_t place = equations.place(under, shape, output);
+    Eigen::VectorXd several;
+    double taken = 0.0;
+    if (table.width() > 1) {
+      several = table.gains(place);
+      if (!several.allFinite()) continue;
+      single = several[0];
+      taken = table.taken(place, several);
+    } else {
+      const double square = table.square(place)(0, 0);
+      const double right = table.right(place)[0];
+      if (hypothesis.form == Form::own_gains) single = square > 0 ? right / square : 0.0;
+      taken = single * (2.0 * right - square * single);
+    }
+    double gain = settings[output]->gain(taken);
+    if (hypothesis.form == Form::own_gains) {
+      if (!std::isfinite(single)) continue;
+      if (hypothesis.possible && !hypothesis.possible(single, output)) continue;
+      gain -= static_cast<double>(table.width()) * std::log(settings[output]->present_rows());
+      if (gain < output_gain_min) continue;
+    }
+    score += gain;
+    if (gains == nullptr) continue;
+    (*gains)[output] = table.width() > 1 ? several : Eigen::VectorXd::Constant(1, single);
+  }
+  return score;
+}
+
+void Search::add_best_of_grid(const Hypothesis& hypothesis, const Equations& equations,
+                              const std::vector<Settings>& settings,
+                              std::vector<std::vector<Explanation>>& under_each) const {
+  const double cost = price(hypothesis);
+  for (std::size_t under = 0; under < settings.size(); ++under) {
+    double best = 0.0;
+    std::size_t at = 0;
+    for (std::size_t shape = 0; shape < equations.shapes; ++shape) {
+      const double score = score_of(hypothesis, equations, under, shape, settings[under], nullptr);
+      if (!(score > best)) continue;
+      best = score;
+      at = shape;
+    }
+    if (!(best - cost > 0)) continue;
+    Explanation explanation{
+        &hypothesis, point_of_grid(hypothesis, at), {}, best - cost, settings[under], 0.0, 0.0};
+    static_cast<void>(
+        score_of(hypothesis, equations, under, at, settings[under], &explanation.gains));
+    under_each[under].push_back(std::move(explanation));
+  }
 }
 
 /// What follows from columns that many hypotheses share is weighed with these; of the others those
-/// with one shape many at once, the rest one grid after another.
+/// of one width and output many at once.
 std::vector<std::vector<Explanation>> Search::profile(const std::vector<Settings>& settings) const {
   std::vector<std::vector<Explanation>> under_each(settings.size());
-  const auto keep = [&](const Hypothesis& hypothesis, const Shapes& grid,
-                        const Equations& equations) {
-    std::vector<Explanation> bests = best_of_grid(hypothesis, grid, equations, settings);
-    for (std::size_t under = 0; under < settings.size(); ++under)
-      if (bests[under].score > 0) under_each[under].push_back(std::move(bests[under]));
-  };
+  std::vector<SettingsTogether> together(outputs_.size());
+  std::vector<Weigh> weigh(outputs_.size());
+  for (const std::size_t output : measured_) {
+    together[output] = SettingsTogether(of_output(settings, output));
+    weigh[output] = [&together, output](const Panel& columns, Eigen::Index width) {
+      return together[output].equations(columns, width);
+    };
+  }
   Group of_readings;
   std::map<std::pair<std::string, std::size_t>, Group> from_onset;
-  std::map<std::pair<std::size_t, std::optional<std::size_t>>, Group> lone;
-  Patterns patterns;
+  std::map<std::pair<Eigen::Index, std::optional<std::size_t>>, std::vector<Part>> alike;
+  std::map<std::string, Group> of_pattern;
   for (const Hypothesis& hypothesis : hypotheses_) {
-    if (hypothesis.of_readings)
+    if (hypothesis.of_readings) {
       of_readings.push_back(&hypothesis);
-    else if (hypothesis.from_onset)
-      from_onset[{hypothesis.cause, *hypothesis.run}].push_back(&hypothesis);
-    else if (hypothesis.shape.empty())
-      lone[{hypothesis.gains.size(), hypothesis.output}].push_back(&hypothesis);
-    else
-      keep(hypothesis, grid_of(hypothesis),
-           equations_of_grid(hypothesis, grid_of(hypothesis), settings, patterns));
-  }
-  const auto keep_all = [&](const Group& group, const Shapes& grid,
-                            const std::vector<Equations>& equations) {
-    for (std::size_t i = 0; i < group.size(); ++i) keep(*group[i], grid, equations[i]);
-  };
-  keep_all(of_readings, {{}}, equations_of_readings(of_readings, settings));
-  for (const auto& [alike, group] : from_onset)
-    keep_all(group, grid_of(*group.front()), equations_from_onset(group, settings));
-  for (const auto& [alike, group] : lone)
-    for (std::size_t first = 0; first < group.size(); first += shapes_at_once) {
-      const Group some(group.begin() + static_cast<std::ptrdiff_t>(first),
-                       group.begin() + static_cast<std::ptrdiff_t>(
-                                           std::min(first + shapes_at_once, group.size())));
-      keep_all(some, {{}}, equations_of_each(some, {{}}, settings));
+      continue;
     }
+    if (hypothesis.from_onset) {
+      from_onset[{hypothesis.cause, *hypothesis.run}].push_back(&hypothesis);
+      continue;
+    }
+    if (shares_columns(hypothesis)) {
+      Group& group = of_pattern[hypothesis.pattern];
+      group.push_back(&hypothesis);
+      if (group.size() > 1) continue;
+    }
+    alike[{hypothesis.width(), hypothesis.output}].push_back({&hypothesis, grid_of(hypothesis)});
+  }
+  for (const auto& [key, parts] : alike) {
+    const std::vector<Equations> equations = equations_of_each(parts, settings.size(), weigh);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const Hypothesis& first = *parts[i].hypothesis;
+      add_best_of_grid(first, equations[i], settings, under_each);
+      if (!shares_columns(first)) continue;
+      for (const Hypothesis* other : of_pattern[first.pattern])
+        if (other != &first)
+          add_best_of_grid(*other, scaled(equations[i], first, *other, settings.size()), settings,
+                           under_each);
+    }
+  }
+  const auto add_all = [&](const Group& group, const std::vector<Equations>& equations) {
+    for (std::size_t i = 0; i < group.size(); ++i)
+      add_best_of_grid(*group[i], equations[i], settings, under_each);
+  };
+  add_all(of_readings, equations_of_readings(of_readings, settings));
+  for (const auto& [key, group] : from_onset)
+    add_all(group, equations_from_onset(group, settings.size(), together));
   return under_each;
+}
+
+bool Search::shares_columns(const Hypothesis& hypothesis) const {
+  return !hypothesis.pattern.empty() &&
+         std::all_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
+           return std::abs(hypothesis.scale(output)) > scale_min;
+         });
 }
 
 std::vector<Search::Equations> Search::equations_of_readings(
     const Group& hypotheses, const std::vector<Settings>& settings) const {
-  std::vector<Equations> equations = no_equations(hypotheses.size(), 1, settings.size());
+  std::vector<Equations> equations(hypotheses.size(), no_equations(1, 1, settings.size()));
   if (hypotheses.empty()) return equations;
   for (const std::size_t output : measured_) {
     const auto all =
@@ -218,17 +273,19 @@ std::vector<Search::Equations> Search::equations_of_readings(
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
       const std::vector<ReadingShare> shares = hypotheses[i]->of_readings(output);
       for (std::size_t under = 0; under < settings.size(); ++under) {
-        const Setting::Equations& of = all[under].front();
+        const auto of_square = all[under].square(0);
+        const auto of_right = all[under].right(0);
         double square = 0.0;
         double right = 0.0;
         for (const ReadingShare& a : shares) {
           const auto row = static_cast<Eigen::Index>(a.input);
-          right += a.weight * of.right[row];
+          right += a.weight * of_right[row];
           for (const ReadingShare& b : shares)
-            square += a.weight * b.weight * of.square(row, static_cast<Eigen::Index>(b.input));
+            square += a.weight * b.weight * of_square(row, static_cast<Eigen::Index>(b.input));
         }
-        equations[i][under].front()[output] = {Eigen::MatrixXd::Constant(1, 1, square),
-                                               Eigen::VectorXd::Constant(1, right)};
+        const std::size_t place = equations[i].place(under, 0, output);
+        equations[i].table.square(place)(0, 0) = square;
+        equations[i].table.right(place)[0] = right;
       }
     }
   }
@@ -236,10 +293,10 @@ std::vector<Search::Equations> Search::equations_of_readings(
 }
 
 std::vector<Search::Equations> Search::equations_from_onset(
-    const Group& hypotheses, const std::vector<Settings>& settings) const {
+    const Group& hypotheses, std::size_t settings,
+    const std::vector<SettingsTogether>& together) const {
   const std::vector<double>& onsets_s = hypotheses.front()->shape.front().grid;
-  std::vector<Equations> equations =
-      no_equations(hypotheses.size(), onsets_s.size(), settings.size());
+  std::vector<Equations> equations(hypotheses.size(), no_equations(1, onsets_s.size(), settings));
   const Block& run = rows_.runs[*hypotheses.front()->run];
   const double* const time_s = rows_.time_s.data();
   std::vector<Eigen::Index> first_rows;
@@ -250,20 +307,19 @@ std::vector<Search::Equations> Search::equations_from_onset(
   for (const std::size_t output : measured_) {
     for (std::size_t i = 0; i < hypotheses.size(); ++i)
       whole.col(static_cast<Eigen::Index>(i)) = hypotheses[i]->from_onset(output);
-    auto all = Setting::equations_from_rows(of_output(settings, output), whole, first_rows);
+    const auto all = together[output].equations_from_rows(whole, first_rows);
     for (std::size_t i = 0; i < hypotheses.size(); ++i)
-      for (std::size_t under = 0; under < settings.size(); ++under)
+      for (std::size_t under = 0; under < settings; ++under)
         for (std::size_t onset = 0; onset < onsets_s.size(); ++onset)
-          equations[i][under][onset][output] = std::move(all[under][onset][i]);
+          equations[i].table.copy(all[under], onset * hypotheses.size() + i,
+                                  equations[i].place(under, onset, output));
   }
   return equations;
 }
 
-std::vector<Search::Equations> Search::no_equations(std::size_t hypotheses, std::size_t shapes,
-                                                    std::size_t settings) const {
-  using OfShapes = Equations::value_type;
-  return std::vector<Equations>(
-      hypotheses, Equations(settings, OfShapes(shapes, OfShapes::value_type(outputs_.size()))));
+Search::Equations Search::no_equations(Eigen::Index width, std::size_t shapes,
+                                       std::size_t settings) const {
+  return {EquationsTable(settings * shapes * outputs_.size(), width), shapes, outputs_.size()};
 }
 
 /// The likeliest noise without any hypothesis, and white noise where that is another.

@@ -121,12 +121,13 @@ void Search::measure_spread(std::vector<Finding>& findings) {
     for (const std::size_t output : measured_) {
       if (each.gains[output].size() == 0) continue;
       const Setting& setting = *each.settings[output];
-      const Setting::Equations of =
-          setting.equations(columns_of(*each.hypothesis, each.shape, outputs_[output]));
-      const double squares = setting.squares() - 2.0 * each.gains[output].dot(of.right) +
-                             each.gains[output].dot(of.square * each.gains[output]);
+      const Panel columns = columns_of(*each.hypothesis, Shapes{each.shape}, outputs_[output]);
+      const EquationsTable of =
+          Setting::equations_of_groups({&setting}, columns, columns.cols()).front();
+      const double squares = setting.squares() - of.taken(0, each.gains[output]);
       const double variance = std::max(0.0, squares) / setting.present_rows();
-      finding.gain_sd[output] = (variance * of.square.inverse().diagonal()).array().sqrt();
+      finding.gain_sd[output] =
+          (variance * Eigen::MatrixXd(of.square(0)).inverse().diagonal()).array().sqrt();
     }
   }
 }

@@ -1,24 +1,22 @@
 /// Tells on stderr that a search goes on.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
-#include <thread>
+#include <csignal>
 
 namespace thermocomp::diagnosis {
 
 /// While it lives: a line after two seconds and after every ten seconds more. A search over a few
-/// days of one machine is done before.
+/// days of one machine is done before. One at a time; it has the process' alarm (SIGALRM). A thread
+/// in its place would make every allocation of the search take a lock.
 class StillSearching {
  public:
   StillSearching();
+  ~StillSearching();
+  StillSearching(const StillSearching&) = delete;
+  StillSearching& operator=(const StillSearching&) = delete;
 
  private:
-  void tell(const std::stop_token& stop);
-
-  std::mutex mutex_;
-  std::condition_variable_any woken_;
-  std::jthread teller_;  ///< last: stopped and joined before the others go
+  struct sigaction before_ {};
 };
 
 }  // namespace thermocomp::diagnosis

@@ -235,7 +235,8 @@ std::vector<Hypothesis> NetworkHypotheses::all(const std::shared_ptr<NetworkHypo
   std::vector<Hypothesis> all;
   for (std::size_t i = 0; i < self->causes_.size(); ++i) {
     all.push_back(self->causes_[i].hypothesis);
-    all.back().columns = one_by_one([self, i](const Shape& shape, std::size_t output) {
+    all.back().rows = self->rows_.time_s.size();
+    all.back().write_columns = one_by_one([self, i](const Shape& shape, std::size_t output) {
       return self->columns(i, shape, output);
     });
   }

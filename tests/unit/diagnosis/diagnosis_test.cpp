@@ -374,6 +374,18 @@ TEST_CASE("missing values are left out, and a run without any is refused", "[dia
   CHECK_THROWS_AS(diagnose(one_input(), {train}, {"a"}, {test}, {"b"}), ConfigurationError);
 }
 
+TEST_CASE("an output that no run has a value of is left out", "[diagnosis]") {
+  ThermalModel model = one_input();
+  model.outputs.insert(model.outputs.begin(), "a_um");
+  model.matrix_um_per_K.insert(model.matrix_um_per_K.begin(), {3.0});
+  const auto hidden = [](double rpm, double, int) { return 4e-7 * rpm * rpm; };
+  const Diagnosis answer =
+      diagnose(model, {run_with(1, 600, hidden)}, {"a"}, {run_with(2, 400, hidden)}, {"b"});
+  REQUIRE(answer.findings.size() == 1);
+  CHECK(answer.findings[0].cause == "speed_growth");
+  CHECK(answer.findings[0].outputs == std::vector<std::string>{"z_um"});
+}
+
 TEST_CASE("what came into question stands in the JSON where it is asked for", "[diagnosis]") {
   const Diagnosis answer = diagnosis_of([](double rpm, double, int) { return 4e-7 * rpm * rpm; });
   CHECK(diagnosis_json(answer).find("\"weighed\"") == std::string::npos);

@@ -1,6 +1,7 @@
 // The filters of many time constants at once against the estimator's, which take a value at a time.
 #include "modelling/diagnosis/series.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -9,7 +10,9 @@
 #include "estimator/low_pass.hpp"
 #include "estimator/play.hpp"
 #include "modelling/diagnosis/coloured_noise.hpp"
+#include "modelling/diagnosis/evidence.hpp"
 #include "modelling/diagnosis/panel.hpp"
+#include "modelling/diagnosis/settings_together.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -46,38 +49,78 @@ Whitener with_gap_and_blocks(const Series& series) {
 
 TEST_CASE("lags of many time constants are those of the estimator", "[diagnosis]") {
   const Series series = uneven();
-  const std::vector<double> taus_s = {0.0, 5.0, 60.0, 333.0, 1e4};
-  const Panel all = lagged(series.time_s, series.values, taus_s);
-  REQUIRE(all.cols() == 5);
+  std::vector<double> taus_s = {0.0, 5.0, 60.0, 333.0, 1e4};
+  for (double tau_s = 20.0; taus_s.size() < 23; tau_s *= 1.4) taus_s.push_back(tau_s);
+  Panel all(series.values.size(), std::ssize(taus_s));
+  lagged(series.time_s, series.values, taus_s, all);
+  Panel less(all.rows(), all.cols());
+  lagged_less_values(series.time_s, series.values, taus_s, less);
+  Panel each = series.values.replicate(1, all.cols());
+  lag_each(series.time_s, taus_s, each);
   for (std::size_t i = 0; i < taus_s.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
     LowPass filter(taus_s[i]);
-    for (Eigen::Index row = 0; row < all.rows(); ++row)
-      REQUIRE(std::abs(all(row, static_cast<Eigen::Index>(i)) -
-                       filter.step(at(series.time_s[row]), series.values[row])) < 1e-9);
+    for (Eigen::Index row = 0; row < all.rows(); ++row) {
+      const double expected = filter.step(at(series.time_s[row]), series.values[row]);
+      REQUIRE(std::abs(all(row, column) - expected) < 1e-9);
+      REQUIRE(std::abs(less(row, column) - (expected - series.values[row])) < 1e-9);
+      REQUIRE(std::abs(each(row, column) - expected) < 1e-9);
+    }
   }
 }
 
 TEST_CASE("plays of many widths are those of the estimator", "[diagnosis]") {
   const Series series = uneven();
-  const std::vector<double> widths = {0.0, 0.5, 3.0, 100.0};
-  const Panel all = played(series.values, widths);
+  std::vector<double> widths = {0.0, 0.5, 3.0, 100.0};
+  while (widths.size() < 21) widths.push_back(1.2 * widths.back() / 7.0);
+  const Column factors = 0.01 * series.time_s;
+  Panel all(series.values.size(), std::ssize(widths));
+  played_less_values(series.values, widths, factors, all);
   for (std::size_t i = 0; i < widths.size(); ++i) {
     Play filter(widths[i]);
     for (Eigen::Index row = 0; row < all.rows(); ++row)
-      REQUIRE(all(row, static_cast<Eigen::Index>(i)) == filter.step(series.values[row]));
+      REQUIRE(std::abs(all(row, static_cast<Eigen::Index>(i)) -
+                       factors[row] * (filter.step(series.values[row]) - series.values[row])) <
+              1e-9);
+  }
+}
+
+TEST_CASE("slopes are central differences of what is smoothed to and fro", "[diagnosis]") {
+  const Series series = uneven();
+  std::vector<double> taus_s = {0.0, 30.0};
+  while (taus_s.size() < 21) taus_s.push_back(1.2 * taus_s.back());
+  const Column of_rows = 0.01 * series.time_s;
+  const std::vector<double>& of_columns = taus_s;
+  Panel smooth(series.values.size(), std::ssize(taus_s));
+  smoothed(series.time_s, series.values, taus_s, smooth);
+  Panel all(smooth.rows(), smooth.cols());
+  slopes(series.time_s, series.values, taus_s, of_rows, of_columns, all);
+  const Eigen::Index last = smooth.rows() - 1;
+  for (Eigen::Index row = 0; row <= last; ++row) {
+    const Eigen::Index low = std::max<Eigen::Index>(0, row - 1);
+    const Eigen::Index high = std::min(last, row + 1);
+    const double seconds = series.time_s[high] - series.time_s[low];
+    for (Eigen::Index column = 0; column < smooth.cols(); ++column)
+      REQUIRE(std::abs(all(row, column) -
+                       of_rows[row] * of_columns[static_cast<std::size_t>(column)] *
+                           (smooth(high, column) - smooth(low, column)) / seconds) < 1e-9);
   }
 }
 
 TEST_CASE("waves keep their phase over uneven rows", "[diagnosis]") {
   const Series series = uneven();
-  const std::vector<double> periods_s = {300.0, 3600.0};
-  const Waves all = waves(series.time_s, periods_s);
-  for (Eigen::Index i = 0; i < 2; ++i)
+  const std::size_t periods = GENERATE(2U, 16U, 19U);
+  const Eigen::Index apart = GENERATE(2, 6);
+  std::vector<double> periods_s = {300.0, 3600.0};
+  while (periods_s.size() < periods) periods_s.push_back(1.1 * periods_s.back());
+  Panel all(series.time_s.size(), apart * std::ssize(periods_s));
+  waves(series.time_s, periods_s, apart, all);
+  for (Eigen::Index i = 0; i < std::ssize(periods_s); ++i)
     for (Eigen::Index row = 0; row < series.time_s.size(); ++row) {
       const double phase =
           2.0 * 3.141592653589793 * series.time_s[row] / periods_s[static_cast<std::size_t>(i)];
-      REQUIRE(std::abs(all.sines(row, i) - std::sin(phase)) < 1e-9);
-      REQUIRE(std::abs(all.cosines(row, i) - std::cos(phase)) < 1e-9);
+      REQUIRE(std::abs(all(row, apart * i) - std::sin(phase)) < 1e-9);
+      REQUIRE(std::abs(all(row, apart * i + 1) - std::cos(phase)) < 1e-9);
     }
 }
 
@@ -88,22 +131,35 @@ TEST_CASE("a column is whitened alike alone and among any number of others", "[d
   for (const Eigen::Index count : {1, 3, 23, 32}) {
     Panel many = Panel::Random(series.time_s.size(), count);
     many.col(count - 1) = series.values;
-    CHECK(whitener.apply(many).col(count - 1) == alone);
+    Eigen::MatrixXd squares;
+    const Panel white = whitener.apply(many, squares);
+    CHECK((white.col(count - 1) - alone).norm() < 1e-12 * alone.norm());
+    CHECK((squares - white.colwise().squaredNorm()).norm() < 1e-12 * squares.norm());
+    const Whitener::Squares both = whitener.squares(many);
+    CHECK((squares - both.white).norm() < 1e-12 * squares.norm());
+    CHECK((both.plain - many.colwise().squaredNorm()).norm() < 1e-12 * both.plain.norm());
   }
 }
 
 TEST_CASE("products of panels are those of their columns", "[diagnosis]") {
-  const Panel a = Panel::Random(200, 5);
-  for (const Eigen::Index count : {1, 2, 21}) {
+  const Eigen::Index columns = GENERATE(1, 2, 5, 6, 13, 26);
+  const Panel a = Panel::Random(200, columns);
+  for (const Eigen::Index count : {1, 2, 3, 21, 47, 48}) {
     const Panel b = Panel::Random(200, count);
-    const Eigen::MatrixXd expected = a.middleRows(30, 150).transpose() * b.middleRows(30, 150);
-    CHECK((cross_products(a, b, 30, 180) - expected).norm() < 1e-12 * expected.norm());
+    for (const Eigen::Index end : {30, 31, 94, 180}) {
+      const Eigen::MatrixXd expected =
+          a.middleRows(30, end - 30).transpose() * b.middleRows(30, end - 30);
+      CHECK((cross_products(a, b, 30, end) - expected).norm() <= 1e-12 * expected.norm());
+    }
     const Eigen::MatrixXd own = b.middleRows(30, 150).transpose() * b.middleRows(30, 150);
-    const Eigen::MatrixXd neighbours = neighbour_products(b, 2, 30, 180);
-    for (Eigen::Index column = 0; column < count; ++column) {
-      CHECK(std::abs(neighbours(0, column) - own(column, column)) < 1e-10);
-      const double next = column + 1 < count ? own(column, column + 1) : 0.0;
-      CHECK(std::abs(neighbours(1, column) - next) < 1e-10);
+    for (const Eigen::Index width : {2, 21}) {
+      if (count < width) continue;
+      const Eigen::MatrixXd neighbours = neighbour_products(b, width, 30, 180);
+      for (Eigen::Index column = 0; column < count; ++column)
+        for (Eigen::Index apart = 0; apart < width; ++apart) {
+          const double product = column + apart < count ? own(column, column + apart) : 0.0;
+          CHECK(std::abs(neighbours(apart, column) - product) < 1e-10);
+        }
     }
   }
 }
@@ -131,6 +187,52 @@ TEST_CASE("columns that begin at a row have the squares of each whitened for its
     for (Eigen::Index column = 0; column < whole.cols(); ++column)
       CHECK(std::abs(squares(static_cast<Eigen::Index>(i), column) -
                      white.col(column).squaredNorm()) < 1e-10);
+  }
+}
+
+TEST_CASE("settings together give the equations of each", "[diagnosis]") {
+  const Series series = uneven();
+  const StackedRows rows{{{0, 300}}, {{0, 150}, {150, 300}}, series.time_s};
+  const bool complete = GENERATE(true, false);
+  Eigen::Array<bool, Eigen::Dynamic, 1> present(300);
+  for (Eigen::Index row = 0; row < 300; ++row) present[row] = complete || row < 40 || row > 46;
+  const auto cleared = [&](Panel panel) {
+    for (Eigen::Index row = 0; row < 300; ++row)
+      if (!present[row]) panel.row(row).setZero();
+    return panel;
+  };
+  const Column residual = cleared(Panel::Random(300, 1));
+  const Eigen::MatrixXd common = cleared(Panel::Ones(300, 1));
+  const Eigen::VectorXd precision = Eigen::VectorXd::Constant(1, 1e-6);
+  const Setting white({0.0, 1.0}, rows, present, residual, common, precision);
+  const Setting wandering({4.0, 3600.0}, rows, present, residual, common, precision);
+  const Setting longer(wandering, cleared(Panel::Random(300, 7)), 0.01);
+  const std::vector<const Setting*> settings = {&wandering, &white, &longer};
+  const SettingsTogether together(settings);
+  const auto same = [](const EquationsTable& a, std::size_t of_a, const EquationsTable& b,
+                       std::size_t of_b) {
+    const double size = b.square(of_b).norm() + b.right(of_b).norm();
+    return (a.square(of_a) - b.square(of_b)).norm() + (a.right(of_a) - b.right(of_b)).norm() <
+           1e-11 * size;
+  };
+  for (const Eigen::Index width : {1, 2}) {
+    const Panel columns = cleared(Panel::Random(300, 22));
+    const auto all = together.equations(columns, width);
+    const auto each = Setting::equations_of_groups(settings, columns, width);
+    for (std::size_t under = 0; under < settings.size(); ++under)
+      for (std::size_t group = 0; group < static_cast<std::size_t>(22 / width); ++group)
+        CHECK(same(all[under], group, each[under], group));
+  }
+  const Panel whole = cleared(Panel::Random(300, 3));
+  const std::vector<Eigen::Index> first_rows = {0, 43, 151, 290};
+  const auto all = together.equations_from_rows(whole, first_rows);
+  for (std::size_t i = 0; i < first_rows.size(); ++i) {
+    Panel begun = whole;
+    begun.topRows(first_rows[i]).setZero();
+    const auto each = Setting::equations_of_groups(settings, begun, 1);
+    for (std::size_t under = 0; under < settings.size(); ++under)
+      for (std::size_t column = 0; column < 3; ++column)
+        CHECK(same(all[under], 3 * i + column, each[under], column));
   }
 }
 
