@@ -12,8 +12,10 @@ Each is fitted to the residual of the base model and added to it, which helps al
 """
 
 import argparse
+import json
 import os
 import pathlib
+import subprocess
 import sys
 import tempfile
 
@@ -200,17 +202,23 @@ def table_of_cases(options):
             print(f"level{level}_{name}_median_test_rms {np.median(values):.3f} um")
 
 
-def table_of_spindle():
+def table_of_spindle(program):
     run = DATA / "spindle_46h" / "hours_00_32.csv"
     if not run.exists():
         print(f"no measured spindle: {run}", file=sys.stderr)
         return
-    model = tomllib.loads((run.parent / "static_model.toml").read_text())
+    model_file = run.parent / "static_model.toml"
+    model = tomllib.loads(model_file.read_text())
+    said = subprocess.run([program, "diagnose", "--model", model_file, "--train", f"{run}@:86760",
+                           "--test", f"{run}@86760:", "--json", "-"], capture_output=True,
+                          text=True, check=True).stdout
+    extended = json.loads(said)["extended"]
     columns = {n: c[::4] for n, c in read(run).items()}
     split = int(np.searchsorted(columns["time_s"], 86760.0))
     train, test = Run(columns, model, 0, split), Run(columns, model, split, None)
     for output in model["outputs"]:
         print(f"spindle_{output}_model {rms([test.residual(output)[split:]]):.3f} um")
+        print(f"spindle_{output}_diagnose {extended[output]['test_rms_um']:.3f} um")
         for name, method in METHODS.items():
             left = method([train], [test], output)[0][split:]
             print(f"spindle_{output}_{name} {rms([left]):.3f} um")
@@ -226,7 +234,7 @@ def main():
     options.program = str(pathlib.Path(options.program).resolve())
     with tempfile.TemporaryDirectory() as folder:
         options.keep = options.keep or folder
-        table_of_spindle()
+        table_of_spindle(options.program)
         table_of_cases(options)
 
 
