@@ -15,6 +15,7 @@ rootfs=$(realpath -- "${2:?the root file system}")
 files=$(realpath -- "${3:?the folder of files}")
 shift 3
 limit_s=${SERVICE_TEST_S:-300}
+vm=$(dirname -- "$(realpath -- "${BASH_SOURCE[0]}")")/../vm
 fail() {
   echo "run_in_systemd.sh: $*" >&2
   exit 125
@@ -99,10 +100,12 @@ boot_uml() {
     -o -name can-dev.ko -o -name vcan.ko \) -exec cp {} "$place/modules/" \; ||
     fail "the modules of user-mode-linux"
   [[ -w $memory_place ]] || memory_place=$work
-  TMPDIR=$memory_place timeout --foreground -k 5 "$limit_s" linux.uml mem=768M rootfstype=hostfs \
-    "rootflags=$root" rw con=null con0=null,fd:1 ssl=pts quiet loglevel=3 noreboot \
-    "uml_dir=$work" umid=guest systemd.show_status=0 init=/sbin/init \
-    < /dev/null > "$work/console" 2>&1
+  c++ -std=c++20 -O2 -shared -fPIC -o "$work/whole_registers.so" "$vm/whole_registers.cpp" ||
+    fail "whole_registers.cpp could not be built"
+  LD_PRELOAD=$work/whole_registers.so TMPDIR=$memory_place \
+    timeout --foreground -k 5 "$limit_s" linux.uml mem=768M rootfstype=hostfs "rootflags=$root" rw \
+    con=null con0=null,fd:1 ssl=pts quiet loglevel=3 noreboot "uml_dir=$work" umid=guest \
+    systemd.show_status=0 init=/sbin/init < /dev/null > "$work/console" 2>&1
 }
 
 status=0

@@ -50,6 +50,7 @@ if [ -n "$emulated" ]; then
   [ -s "$kernel/vmlinux" ] || fail "there is no $kernel/vmlinux (scripts/guest-kernel.sh makes it)"
 else
   need linux.uml user-mode-linux
+  need c++ g++
 fi
 
 # The kernel splits its command line at spaces.
@@ -83,7 +84,8 @@ boot_user_mode_linux() {
   needed_kB=$(($(numfmt --from=iec "$memory") / 1024))
   free_kB=$(df --output=avail /dev/shm 2> /dev/null | tail -n 1)
   [ "${free_kB:-0}" -gt "$needed_kB" ] || memory_place=$place
-  TMPDIR=$memory_place exec timeout -k 5 $((limit_s + 60)) linux.uml "mem=$memory" \
+  LD_PRELOAD=$run/whole_registers.so TMPDIR=$memory_place \
+    exec timeout -k 5 $((limit_s + 60)) linux.uml "mem=$memory" \
     rootfstype=hostfs rootflags=/ rw con=null con0=null,fd:1 quiet loglevel=3 noreboot \
     "uml_dir=$run" umid=vm "init=$run/init" "VM_RUN=$run"
 }
@@ -121,6 +123,9 @@ boot=boot_user_mode_linux
 if [ -n "$emulated" ]; then
   make_initramfs || fail "the initramfs could not be made (modules of $(cat "$kernel/version"))"
   boot=boot_qemu
+else
+  c++ -std=c++20 -O2 -shared -fPIC -o "$run/whole_registers.so" "$here/whole_registers.cpp" ||
+    fail "whole_registers.cpp could not be built"
 fi
 begin=$(date +%s.%N)
 # Not --foreground: the guest's processes are a group of their own, which ends as a whole.

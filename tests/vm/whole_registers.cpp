@@ -1,0 +1,48 @@
+/// Loaded before linux.uml, which keeps the first 2696 bytes of a process's vector registers:
+/// enough for AVX-512. Where the processor has tiles too (AMX), they are 11 kB, and the host's
+/// kernel hands out the first bytes of them but takes nothing less than all back: the guest dies
+/// before its first program. Here the host gets all: what the guest kept, and the rest as it is. No
+/// program of the guest has tiles, since nobody asks the host for them.
+#include <array>
+#include <cerrno>
+#include <cstdarg>
+#include <cstddef>
+#include <cstring>
+#include <dlfcn.h>
+#include <elf.h>
+
+#include <sys/ptrace.h>
+#include <sys/types.h>
+#include <sys/uio.h>
+
+namespace {
+
+using Ptrace = long (*)(__ptrace_request, ...);
+const auto ptrace_of_libc = reinterpret_cast<Ptrace>(dlsym(RTLD_NEXT, "ptrace"));
+
+// The guest's kernel has one thread, and small stacks.
+alignas(64) std::array<std::byte, std::size_t{64} * 1024> whole;
+
+long set_with_the_rest_as_it_is(pid_t process, void* set, const iovec& kept) {
+  iovec all{whole.data(), whole.size()};
+  const long got = ptrace_of_libc(PTRACE_GETREGSET, process, set, &all);
+  if (got != 0) return got;
+  std::memcpy(whole.data(), kept.iov_base, kept.iov_len);
+  return ptrace_of_libc(PTRACE_SETREGSET, process, set, &all);
+}
+
+}  // namespace
+
+extern "C" long ptrace(__ptrace_request request, ...) noexcept {
+  std::va_list more;
+  va_start(more, request);
+  const pid_t process = va_arg(more, pid_t);
+  void* const address = va_arg(more, void*);
+  void* const data = va_arg(more, void*);
+  va_end(more);
+  const long answer = ptrace_of_libc(request, process, address, data);
+  if (answer == 0 || errno != EFAULT || request != PTRACE_SETREGSET ||
+      address != reinterpret_cast<void*>(NT_X86_XSTATE))
+    return answer;
+  return set_with_the_rest_as_it_is(process, address, *static_cast<const iovec*>(data));
+}
