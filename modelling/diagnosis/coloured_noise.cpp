@@ -52,18 +52,11 @@ template <std::size_t lanes>
 
 THERMOCOMP_VECTORISED void whiten(const Factors& of, Eigen::Index columns, const double* from,
                                   double* to, double* squares, double* plain) {
-  Eigen::Index at = 0;
-  const auto place = [&] { return to == nullptr ? nullptr : to + at; };
-  for (; at + 16 <= columns; at += 16)
-    whiten_lanes<16>(of, columns, from + at, place(), squares + at, plain + at);
-  for (; at + 8 <= columns; at += 8)
-    whiten_lanes<8>(of, columns, from + at, place(), squares + at, plain + at);
-  for (; at + 4 <= columns; at += 4)
-    whiten_lanes<4>(of, columns, from + at, place(), squares + at, plain + at);
-  for (; at + 2 <= columns; at += 2)
-    whiten_lanes<2>(of, columns, from + at, place(), squares + at, plain + at);
-  for (; at < columns; ++at)
-    whiten_lanes<1>(of, columns, from + at, place(), squares + at, plain + at);
+  side_by_side<16>(
+      columns, [&](auto lanes, Eigen::Index at) __attribute__((always_inline)) {
+        whiten_lanes<lanes()>(of, columns, from + at, to == nullptr ? nullptr : to + at,
+                              squares + at, plain + at);
+      });
 }
 
 }  // namespace

@@ -323,12 +323,15 @@ void Catalogue::add_signal(std::size_t signal) {
                           {lag_times(120.0, 6 * 3600.0, 22), power},
                           {"gain_um_per_unit"}});
   heat.write_columns = [this, values](const Shapes& shapes, std::size_t, PanelPart into) {
+    Eigen::Array<bool, Eigen::Dynamic, 1> is_squared(into.cols());
+    for (std::size_t i = 0; i < shapes.size(); ++i)
+      is_squared[static_cast<Eigen::Index>(i)] = shapes[i][1] > 1.5;
     write_stacked(shapes, into,
                   [&](const MeasuredRun& run, const std::vector<double>& taus_s, PanelPart of_run) {
                     const Column& u = values(run);
-                    const Column squared = u.array().square();
-                    for (std::size_t i = 0; i < shapes.size(); ++i)
-                      of_run.col(static_cast<Eigen::Index>(i)) = shapes[i][1] > 1.5 ? squared : u;
+                    for (Eigen::Index row = 0; row < of_run.rows(); ++row)
+                      for (Eigen::Index i = 0; i < of_run.cols(); ++i)
+                        of_run(row, i) = is_squared[i] ? u[row] * u[row] : u[row];
                     lag_each(run.time_s, taus_s, of_run);
                   });
   };

@@ -23,10 +23,10 @@ template <std::size_t lanes>
 /// Products of the first `count` columns with those `apart` columns further.
 THERMOCOMP_VECTORISED void add_products(const double* from, Eigen::Index rows, Eigen::Index stride,
                                         Eigen::Index count, Eigen::Index apart, double* sums) {
-  Eigen::Index at = 0;
-  for (; at + 16 <= count; at += 16) add_lanes<16>(from + at, rows, stride, apart, sums + at);
-  for (; at + 4 <= count; at += 4) add_lanes<4>(from + at, rows, stride, apart, sums + at);
-  for (; at < count; ++at) add_lanes<1>(from + at, rows, stride, apart, sums + at);
+  side_by_side(
+      count, [&](auto lanes, Eigen::Index at) __attribute__((always_inline)) {
+        add_lanes<lanes()>(from + at, rows, stride, apart, sums + at);
+      });
 }
 
 /// Rows of which what is read more than once stays in the processor's nearest memory.

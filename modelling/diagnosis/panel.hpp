@@ -1,6 +1,9 @@
 /// Columns side by side, for what is done to many of them at once.
 #pragma once
 
+#include <cstddef>
+#include <type_traits>
+
 #include <Eigen/Core>
 
 /// Compiled for several instruction sets, of which the processor's best is taken at start. Not
@@ -21,6 +24,25 @@ using Panel = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMa
 
 /// Rows or columns of one, to be written.
 using PanelPart = Eigen::Ref<Panel, 0, Eigen::OuterStride<>>;
+
+/// Calls `with(lanes, at)` for all columns: for the `lanes` ones from `at` on, a constant that is a
+/// power of two. A recursion over rows waits for its own last result, however many columns run in
+/// it side by side.
+/// @tparam most  columns at once: what keeps much of each has no room for more in registers
+template <std::size_t most = 32, class With>
+[[gnu::always_inline]] inline void side_by_side(Eigen::Index columns, With with) {
+  Eigen::Index at = 0;
+  const auto as_many_as = [&](auto lanes) __attribute__((always_inline)) {
+    constexpr auto count = static_cast<Eigen::Index>(lanes());
+    for (; at + count <= columns; at += count) with(lanes, at);
+  };
+  if constexpr (most >= 32) as_many_as(std::integral_constant<std::size_t, 32>{});
+  as_many_as(std::integral_constant<std::size_t, 16>{});
+  as_many_as(std::integral_constant<std::size_t, 8>{});
+  as_many_as(std::integral_constant<std::size_t, 4>{});
+  as_many_as(std::integral_constant<std::size_t, 2>{});
+  as_many_as(std::integral_constant<std::size_t, 1>{});
+}
 
 /// a' b of the rows [begin, end), shape (a.cols(), b.cols()).
 [[nodiscard]] Eigen::MatrixXd cross_products(const Panel& a, const Panel& b, Eigen::Index begin,

@@ -21,6 +21,7 @@ struct Rows {
   double* first{nullptr};
   Eigen::Index stride{0};  ///< to the next row in time; negative: backwards
   Eigen::Index count{0};   ///< of those after the first
+  [[nodiscard]] Rows from(Eigen::Index column) const { return {first + column, stride, count}; }
 };
 
 /// LowPass of each column, in place.
@@ -43,11 +44,10 @@ template <std::size_t lanes>
 }
 
 THERMOCOMP_VECTORISED void low_pass(const double* shares, Rows rows, Eigen::Index columns) {
-  Eigen::Index at = 0;
-  const auto from = [&] { return Rows{rows.first + at, rows.stride, rows.count}; };
-  for (; at + 16 <= columns; at += 16) low_pass_lanes<16>(shares + at, from());
-  for (; at + 4 <= columns; at += 4) low_pass_lanes<4>(shares + at, from());
-  for (; at < columns; ++at) low_pass_lanes<1>(shares + at, from());
+  side_by_side(
+      columns, [&](auto lanes, Eigen::Index at) __attribute__((always_inline)) {
+        low_pass_lanes<lanes()>(shares + at, rows.from(at));
+      });
 }
 
 /// LowPass of one series in many columns.
@@ -80,14 +80,10 @@ template <std::size_t lanes>
 THERMOCOMP_VECTORISED void low_pass_of(const double* values, double less_values,
                                        const double* shares, double* states, Rows rows,
                                        Eigen::Index columns) {
-  Eigen::Index at = 0;
-  const auto from = [&] { return Rows{rows.first + at, rows.stride, rows.count}; };
-  for (; at + 16 <= columns; at += 16)
-    low_pass_of_lanes<16>(values, less_values, shares + at, states + at, from());
-  for (; at + 4 <= columns; at += 4)
-    low_pass_of_lanes<4>(values, less_values, shares + at, states + at, from());
-  for (; at < columns; ++at)
-    low_pass_of_lanes<1>(values, less_values, shares + at, states + at, from());
+  side_by_side(
+      columns, [&](auto lanes, Eigen::Index at) __attribute__((always_inline)) {
+        low_pass_of_lanes<lanes()>(values, less_values, shares + at, states + at, rows.from(at));
+      });
 }
 
 /// Calls `with(first, count, shares)` for stretches of rows of one step, first the row before.
@@ -162,13 +158,10 @@ template <std::size_t lanes>
 THERMOCOMP_VECTORISED void play(const double* values, const double* factors,
                                 const double* half_widths, double* row, Eigen::Index rows,
                                 Eigen::Index columns, Eigen::Index stride) {
-  Eigen::Index at = 0;
-  for (; at + 16 <= columns; at += 16)
-    play_lanes<16>(values, factors, half_widths + at, row + at, rows, stride);
-  for (; at + 4 <= columns; at += 4)
-    play_lanes<4>(values, factors, half_widths + at, row + at, rows, stride);
-  for (; at < columns; ++at)
-    play_lanes<1>(values, factors, half_widths + at, row + at, rows, stride);
+  side_by_side(
+      columns, [&](auto lanes, Eigen::Index at) __attribute__((always_inline)) {
+        play_lanes<lanes()>(values, factors, half_widths + at, row + at, rows, stride);
+      });
 }
 
 /// LowPass backwards over rows of columns that went forwards, from there to their central
@@ -209,17 +202,11 @@ template <std::size_t lanes>
 THERMOCOMP_VECTORISED void low_pass_slope(const double* shares, const double* of_rows,
                                           const double* of_columns, double* states,
                                           double* states_later, Rows rows, Eigen::Index columns) {
-  Eigen::Index at = 0;
-  const auto from = [&] { return Rows{rows.first + at, rows.stride, rows.count}; };
-  for (; at + 16 <= columns; at += 16)
-    low_pass_slope_lanes<16>(shares + at, of_rows, of_columns + at, states + at, states_later + at,
-                             from());
-  for (; at + 4 <= columns; at += 4)
-    low_pass_slope_lanes<4>(shares + at, of_rows, of_columns + at, states + at, states_later + at,
-                            from());
-  for (; at < columns; ++at)
-    low_pass_slope_lanes<1>(shares + at, of_rows, of_columns + at, states + at, states_later + at,
-                            from());
+  side_by_side(
+      columns, [&](auto lanes, Eigen::Index at) __attribute__((always_inline)) {
+        low_pass_slope_lanes<lanes()>(shares + at, of_rows, of_columns + at, states + at,
+                                      states_later + at, rows.from(at));
+      });
 }
 
 /// Sines and cosines of some periods.
