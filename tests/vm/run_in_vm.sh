@@ -9,7 +9,8 @@
 # open cannot be truncated). Any number can run at a time.
 #
 # The guest is User Mode Linux (package user-mode-linux): as fast as the host but for system calls,
-# one CPU; ASan and TSan programs abort in it. With --emulated it is Debian's kernel under QEMU
+# one CPU; ASan and TSan programs abort in it. Processors with AMX need whole_registers.cpp, which is
+# built with c++ for each boot and preloaded. With --emulated it is Debian's kernel under QEMU
 # (qemu-system-x86, busybox-static, scripts/guest-kernel.sh): it computes some five times slower,
 # runs whatever the host runs, and has two more CAN interfaces, can0 and can1, which are emulated
 # PCI cards on one bus.
