@@ -1,4 +1,4 @@
-# What every target of the project shares, and the two functions that make targets.
+# What every target of the project shares, and the functions that make targets.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -11,14 +11,17 @@ endif()
 find_program(CCACHE ccache)
 if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   # A copy of the tree finds what this one compiled, and the other way round: paths below the sources
-  # count relative to them, and the compiler speaks one language to all.
+  # count relative to them, and the compiler speaks one language to all. SLOPPINESS: what
+  # ccache wants before it caches anything that uses a precompiled header.
   set(CMAKE_CXX_COMPILER_LAUNCHER
     ${CMAKE_COMMAND} -E env --unset=LANG --unset=LC_ALL --unset=LC_CTYPE --unset=LC_MESSAGES
-    CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
+    CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1
+    CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime ${CCACHE})
 endif()
 
 set(THERMOCOMP_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 option(THERMOCOMP_COVERAGE "Instrument for gcovr" OFF)
+option(THERMOCOMP_PRECOMPILED "Read the headers of the libraries that all use from a precompiled file" ON)
 option(THERMOCOMP_FUZZ "Build the fuzz targets instead of the tests (clang with libFuzzer)" OFF)
 
 add_library(thermocomp_flags INTERFACE)
@@ -57,6 +60,42 @@ if(THERMOCOMP_COVERAGE)
   target_link_options(thermocomp_flags INTERFACE --coverage)
 endif()
 
+# Headers of the C++ library and of others, read once for all files instead of once a file: half of
+# the time of compiling. Never headers of ours, so that the rooms below still hold. A file must name
+# what it uses all the same: the preset debug and clang-tidy read the files without these.
+# GCC only: it alone builds what is tested and installed.
+set(THERMOCOMP_STD_HEADERS
+  <algorithm> <array> <atomic> <chrono> <cmath> <cstddef> <cstdint> <cstring> <filesystem>
+  <functional> <limits> <map> <memory> <optional> <set> <span> <stdexcept> <string> <string_view>
+  <utility> <variant> <vector>)
+
+# thermocomp_precompiled(NAME HEADERS header... [LINKS target...]): what thermocomp_use_precompiled
+# names.
+function(thermocomp_precompiled name)
+  if(NOT THERMOCOMP_PRECOMPILED OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    return()
+  endif()
+  cmake_parse_arguments(arg "" "" "HEADERS;LINKS" ${ARGN})
+  set(empty ${CMAKE_BINARY_DIR}/precompiled/${name}.cpp)
+  file(CONFIGURE OUTPUT ${empty} CONTENT "// Only here for the headers.\n")
+  add_library(${name} OBJECT ${empty})
+  target_link_libraries(${name} PRIVATE thermocomp_flags ${arg_LINKS})
+  target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache, here and below
+  target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
+endfunction()
+
+# thermocomp_use_precompiled(TARGET NAME). The options of TARGET must be those of NAME: GCC silently
+# goes on with the optimisation options that the header was made with. Where a file or a target has
+# options of its own, set its property SKIP_PRECOMPILE_HEADERS or DISABLE_PRECOMPILE_HEADERS.
+function(thermocomp_use_precompiled target name)
+  if(TARGET ${name})
+    target_precompile_headers(${target} REUSE_FROM ${name})
+    target_compile_options(${target} PRIVATE -fpch-preprocess)
+  endif()
+endfunction()
+
+thermocomp_precompiled(thermocomp_precompiled_std HEADERS ${THERMOCOMP_STD_HEADERS})
+
 # thermocomp_rooms(TARGET [VISIBILITY] FOLDER...): headers of FOLDER become visible as
 # "FOLDER/name.hpp" to TARGET and to whoever links it - and to nobody else. Each target gets an
 # include root of its own with links to its folders, so that including a header of a library that
@@ -78,12 +117,16 @@ function(thermocomp_rooms target visibility)
   target_include_directories(${target} ${visibility} ${root})
 endfunction()
 
-# thermocomp_library(NAME ROOMS folder... SOURCES file... LINKS target...)
+# thermocomp_library(NAME ROOMS folder... SOURCES file... LINKS target... [PRECOMPILED name])
 function(thermocomp_library name)
-  cmake_parse_arguments(arg "" "" "ROOMS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  cmake_parse_arguments(arg "" "PRECOMPILED" "ROOMS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC ${arg_LINKS} PRIVATE thermocomp_flags ${arg_PRIVATE_LINKS})
   thermocomp_rooms(${name} PUBLIC ${arg_ROOMS})
+  if(NOT arg_PRECOMPILED)
+    set(arg_PRECOMPILED thermocomp_precompiled_std)
+  endif()
+  thermocomp_use_precompiled(${name} ${arg_PRECOMPILED})
 endfunction()
 
 # thermocomp_program(NAME SOURCES file... LINKS target...)
@@ -91,6 +134,7 @@ function(thermocomp_program name)
   cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE thermocomp_flags ${arg_LINKS})
+  thermocomp_use_precompiled(${name} thermocomp_precompiled_std)
 endfunction()
 
 # thermocomp_test(NAME SOURCES file... LINKS target... [TIMEOUT s] [LABELS label...]
@@ -100,6 +144,7 @@ function(thermocomp_test name)
   cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE thermocomp_flags thermocomp_catch_main ${arg_LINKS})
+  thermocomp_use_precompiled(${name} thermocomp_precompiled_catch)
   add_test(NAME ${name} COMMAND ${name} ${arg_ARGUMENTS})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
