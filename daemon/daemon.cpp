@@ -304,7 +304,6 @@ void Daemon::Parts::look_at_health() {
 static void add_axis_state(const std::string& name, const AxisReport& axis,
                            PersistentState& state) {
   state.offset_um[name] = axis.offset_um;
-  if (std::isfinite(axis.held_um)) state.held_um[name] = axis.held_um;
   for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
     state.correction[std::string(name).append(".").append(key)] = value;
 }
@@ -319,12 +318,16 @@ PersistentState Daemon::Parts::persistent_state() {
     const InputReport& input = report.inputs[i];
     if (std::isfinite(input.reference_degC))
       state.reference_degC[columns[i]] = input.reference_degC;
+    if (std::isfinite(input.held_degC)) state.held_degC[columns[i]] = input.held_degC;
     if (input.good || input.estimated) state.temp_degC[columns[i]] = input.temp_degC;
   }
   const auto signal_columns = config.model.signal_columns();
-  for (std::size_t i = 0; i < signal_columns.size(); ++i)
-    if (std::isfinite(report.signals[i].reference))
-      state.reference_signals[signal_columns[i]] = report.signals[i].reference;
+  for (std::size_t i = 0; i < signal_columns.size(); ++i) {
+    const SignalReport& signal = report.signals[i];
+    if (std::isfinite(signal.reference))
+      state.reference_signals[signal_columns[i]] = signal.reference;
+    if (std::isfinite(signal.held)) state.held_signals[signal_columns[i]] = signal.held;
+  }
   for (std::size_t i = 0; i < report.axes.size(); ++i)
     add_axis_state(config.estimator.axes[i].name, report.axes[i], state);
   return state;
@@ -335,7 +338,8 @@ void Daemon::Parts::save_state(bool now) {
   const bool switched = state.enabled != saved.enabled ||
                         state.reference_degC != saved.reference_degC ||
                         state.reference_signals != saved.reference_signals ||
-                        state.held_um != saved.held_um || state.correction != saved.correction;
+                        state.held_degC != saved.held_degC ||
+                        state.held_signals != saved.held_signals || state.correction != saved.correction;
   if (!switched && !(now && state.offset_um != saved.offset_um)) return;
   next_offsets_saved = Clock::now() + offsets_saved_every;
   const std::string error = save_state_file(config.state_file, state);

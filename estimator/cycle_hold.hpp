@@ -1,42 +1,79 @@
-/// Correction once a machining cycle: between two cycle ends the displacement that is compensated
-/// stays what it was (JP7689460B2).
+/// Correction once a machining cycle: between two cycle ends the compensation goes by the state
+/// that the machine had at the last one (JP7689460B2; Teratani et al. 1995, eq. 33 to 38).
 #pragma once
 
 #include <cmath>
 #include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
 
+#include "estimator/displacement_model.hpp"
 #include "estimator/state_archive.hpp"
+#include "estimator/thermal_model.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
 
-/// One axis. What is added at a cycle end is the difference of two predictions; since the first one
-/// is added to the reference state, where it is 0, the sum is the newest prediction.
+/// What is held is a state, never a displacement: block temperatures, operating signals and the
+/// terms' past, one interval ahead where that is wanted:
+///   T_held = T_n + ahead (T_n - T_(n-1))
+/// The displacement is evaluated from them whenever it is asked for, at the axes' present positions
+/// (signals in mm) and with the gains of the moment. So a moving slide, a gain that a probing has
+/// corrected and a matrix that has been reloaded count at once, and none of them is extrapolated.
 class CycleHold {
  public:
-  /// @param ahead  share of the change since the last cycle end that is added beyond the newest
-  ///               prediction: 1 is a whole cycle ahead by linear extrapolation
-  explicit CycleHold(double ahead) : ahead_(ahead) {}
+  /// @param ahead  in [0, 1]; 1: a whole interval ahead by linear extrapolation
+  /// @throws InvalidValue when the model's shapes do not fit each other
+  CycleHold(const ThermalModel& model, double ahead);
 
-  void cycle_end(double predicted_um) noexcept {
-    const double change_um = std::isfinite(last_um_) ? predicted_um - last_um_ : 0.0;
-    held_um_ = predicted_um + ahead_ * change_um;
-    last_um_ = predicted_um;
+  /// A cycle has ended. Never allocates; O(outputs x inputs).
+  /// @param temps_degC  shape (temperature_columns)
+  /// @param signals     shape (signal_columns)
+  /// @param live        the same model, stepped to `now` with these values
+  void cycle_end(nanoseconds now, std::span<const double> temps_degC,
+                 std::span<const double> signals, DisplacementModel& live) noexcept;
+  /// A new reference has been taken: the machine is straight in this state, and there is no change
+  /// to go by yet.
+  void restart(nanoseconds now, std::span<const double> temps_degC,
+               std::span<const double> signals) noexcept;
+
+  /// Whether there is a state to go by: a cycle has ended, or one was restored.
+  [[nodiscard]] bool holds() const noexcept { return holds_; }
+  [[nodiscard]] std::span<const double> temps_degC() const noexcept { return held_degC_; }
+  /// NaN for a position: those are never held.
+  [[nodiscard]] double signal(std::size_t index) const noexcept {
+    return is_position_[index] ? not_a_number : held_signals_[index];
   }
-  /// A new reference: predictions count from another state, so there is no change to go by.
-  void restart() noexcept { last_um_ = not_a_number; }
-  [[nodiscard]] double held_um() const noexcept { return held_um_; }  ///< NaN before the first
-  void restore(double held_um) noexcept { held_um_ = held_um; }
-  void adopt(const CycleHold& previous) noexcept {
-    held_um_ = previous.held_um_;
-    last_um_ = previous.last_um_;
+  /// The model at the held state. @pre holds()
+  /// @param signals          now; only positions are taken from them
+  /// @param displacement_um  shape (outputs); overwritten
+  void displacement(std::span<const double> reference_degC, std::span<const double> signals,
+                    std::span<double> displacement_um) noexcept;
+
+  /// Before the first step: what was held before the restart, NaN where it is not known.
+  void restore(std::span<const double> temps_degC, std::span<const double> signals) noexcept;
+  /// After a reload; plans as of plan_names() and plan_terms().
+  void adopt(CycleHold& previous, const std::vector<int>& columns, const std::vector<int>& signals,
+             const std::vector<int>& terms) noexcept;
+  void visit_state(StateArchive& archive) {
+    archive(model_, holds_, at_, held_degC_, held_signals_, ended_, ended_at_, ended_degC_);
   }
-  void visit_state(StateArchive& archive) { archive(held_um_, last_um_); }
 
  private:
+  void hold(std::span<const double> signals) noexcept;
+
   double ahead_;
-  double held_um_{not_a_number};
-  double last_um_{not_a_number};
+  std::vector<bool> is_position_;  ///< of the signals
+  DisplacementModel model_;        ///< at the held state
+
+  bool holds_{false};
+  nanoseconds at_{};  ///< the moment of the held state; may lie ahead
+  std::vector<double> held_degC_;
+  std::vector<double> held_signals_;
+  bool ended_{false};  ///< there was a cycle end to count the next change from
+  nanoseconds ended_at_{};
+  std::vector<double> ended_degC_;
 };
 
 /// Counts cycle ends from commands and from a signal of the controller, and says when they are due.
@@ -61,9 +98,11 @@ class CycleEnds {
     return now;
   }
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
-  void adopt(const CycleEnds& previous) noexcept {
+  /// @param same_signal  of the other's configuration and of ours: an edge during the reload counts
+  void adopt(const CycleEnds& previous, bool same_signal) noexcept {
     count_ = previous.count_;
     due_ = previous.due_;
+    if (same_signal) last_ = previous.last_;
   }
   void visit_state(StateArchive& archive) { archive(count_, last_, due_); }
 

@@ -79,7 +79,8 @@ struct DisplacementModel::Parts {
   std::vector<Guideway> guideways;
   std::vector<TermSpec> term_specs;
   std::vector<std::unique_ptr<Term>> terms;
-  Vector rise_K;  ///< shape (columns); scratch
+  Vector rise_K;                  ///< shape (columns); scratch
+  std::vector<std::byte> states;  ///< of all terms; scratch
 
   void add_guideways(std::span<const double> signal_values, std::span<double> out) const noexcept {
     const auto rise = rise_K.head(inputs);
@@ -107,6 +108,9 @@ DisplacementModel::DisplacementModel(const ThermalModel& model)
   parts_->term_specs = model.terms;
   for (const TermSpec& spec : model.terms) parts_->terms.push_back(make_term(spec, model));
   parts_->rise_K = Vector::Zero(static_cast<Eigen::Index>(parts_->columns));
+  StateArchive counting;
+  visit_state(counting);
+  parts_->states.resize(counting.position_bytes());
 }
 
 DisplacementModel::~DisplacementModel() = default;
@@ -138,6 +142,13 @@ void DisplacementModel::step(nanoseconds now, std::span<const double> temps_degC
 
 void DisplacementModel::visit_state(StateArchive& archive) {
   for (auto& term : parts_->terms) term->visit_state(archive);
+}
+
+void DisplacementModel::copy_states(DisplacementModel& same) noexcept {
+  StateArchive save{std::span<std::byte>(parts_->states)};
+  same.visit_state(save);
+  StateArchive load{std::span<const std::byte>(parts_->states)};
+  visit_state(load);
 }
 
 std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) const {

@@ -36,6 +36,8 @@ class DisplacementModel {
             std::span<double> displacement_um) noexcept;
 
   void visit_state(StateArchive& archive);
+  /// Takes over the states of all terms. @pre made from the same model. Never allocates.
+  void copy_states(DisplacementModel& same) noexcept;
   /// Takes over the states of terms with the same kind, subject and parameters; plan[i] is the
   /// index of the other model's term for ours, or -1. See plan_terms().
   void adopt_terms(DisplacementModel& other, std::span<const int> plan) noexcept;

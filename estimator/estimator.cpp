@@ -32,6 +32,12 @@ ThermalModel estimating_model(const ThermalModel& model, const EstimatorConfig& 
   return seen;
 }
 
+/// What stands under the name, where it is a number.
+void take(const std::map<std::string, double>& from, const std::string& name, double& to) {
+  const auto found = from.find(name);
+  if (found != from.end() && std::isfinite(found->second)) to = found->second;
+}
+
 /// The longest that a working sensor may take until its first reading.
 nanoseconds settling_time(const EstimatorConfig& config) {
   double longest_s = 0.0;
@@ -54,6 +60,7 @@ struct Estimator::Parts {
   void decide_mode(nanoseconds now, bool data_good) noexcept;
   void step_axes(nanoseconds now, const ControllerState& controller) noexcept;
   [[nodiscard]] double target_um(std::size_t axis) const noexcept;
+  void hold_cycle(nanoseconds now) noexcept;
   void note_measured(std::size_t axis, double value_um) noexcept;
   void correct(nanoseconds now) noexcept;
   [[nodiscard]] double model_change_um(std::size_t axis) const noexcept {
@@ -67,6 +74,7 @@ struct Estimator::Parts {
   }
   void add(Reason reason) noexcept { reasons |= static_cast<std::uint32_t>(reason); }
   void take_new_reference() noexcept;
+  void restore_cycle_hold(const PersistentState& state);
   void visit_state(StateArchive& archive);
 
   EstimatorConfig config;
@@ -79,7 +87,7 @@ struct Estimator::Parts {
   DisplacementModel at_reference;  ///< the same model, only ever asked for the zero
   std::vector<AxisChannel> axes;
   std::vector<RunningCorrection> corrections;  ///< one an axis
-  std::vector<CycleHold> holds;                ///< one an axis
+  CycleHold cycle_hold;
   CycleEnds cycle_ends;
   std::vector<std::size_t> axis_output;    ///< axis -> output
   std::vector<std::size_t> model_signals;  ///< model's signal -> configured signal
@@ -99,6 +107,8 @@ struct Estimator::Parts {
   std::vector<double> reference_degC;
   std::vector<double> signal_values;      ///< of the model
   std::vector<double> model_um;           ///< of the outputs, as the model says
+  std::vector<double> held_model_um;      ///< the same at the state that the cycle hold holds
+  std::vector<double> held_um;            ///< one an axis: what is compensated until the cycle ends
   std::vector<double> reference_signals;  ///< of the model, when the reference was taken
   bool zero_known{false};
   std::vector<double> zero_um;  ///< of the outputs: the model at the reference state
@@ -134,6 +144,7 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
       gains(model),
       displacement(model),
       at_reference(model),
+      cycle_hold(model, config.compensation.cycle_ahead),
       cycle_ends(config.compensation.cycles_per_update,
                  config.compensation.cycle_end_signal.ends_with("_on")),
       controller_stale_after(std::chrono::duration_cast<nanoseconds>(
@@ -151,7 +162,6 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
     axis_output.push_back(
         index_of(model.outputs, axis.output, "axis.output", "is not an output of the model"));
     corrections.emplace_back(config.correction, model, axis_output.back());
-    holds.emplace_back(config.compensation.cycle_ahead);
   }
   for (const std::string& name : model.signal_columns())
     model_signals.push_back(
@@ -168,6 +178,8 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
   std::copy(model.reference_degC.begin(), model.reference_degC.end(), reference_degC.begin());
   signal_values.assign(model_signals.size(), not_a_number);
   model_um.assign(model.outputs.size(), not_a_number);
+  held_model_um.assign(model.outputs.size(), not_a_number);
+  held_um.assign(config.axes.size(), not_a_number);
   // A reference given as numbers means a machine at rest; a sampled one says that the machine is
   // straight now, whatever it is doing.
   reference_signals.assign(model_signals.size(), model.reference_degC.empty() ? not_a_number : 0.0);
@@ -331,13 +343,26 @@ double Estimator::Parts::target_um(std::size_t axis) const noexcept {
   if (mode == Mode::disabled || mode == Mode::ramping_to_zero) return 0.0;
   if (mode != Mode::compensating) return not_a_number;
   const bool by_cycles = config.compensation.update == UpdateRule::each_cycle;
-  return -config.axes[axis].sign * (by_cycles ? holds[axis].held_um() : predicted_um(axis));
+  return -config.axes[axis].sign * (by_cycles ? held_um[axis] : predicted_um(axis));
+}
+
+/// What the compensation goes by until the next cycle end, as of this step.
+void Estimator::Parts::hold_cycle(nanoseconds at) noexcept {
+  if (config.compensation.update != UpdateRule::each_cycle) return;
+  if (cycle_ends.take(predicted && mode == Mode::compensating))
+    cycle_hold.cycle_end(at, lost.temps_degC(), signal_values, displacement);
+  if (!predicted || !cycle_hold.holds()) return;
+  cycle_hold.displacement(reference_degC, signal_values, held_model_um);
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    rise_K[i] = cycle_hold.temps_degC()[i] - reference_degC[i];
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    held_um[i] = held_model_um[axis_output[i]] - zero_um[axis_output[i]] +
+                 corrections[i].correction_um(rise_K);
 }
 
 void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controller) noexcept {
   if (controller_online) cycle_ends.signal(signal(cycle_end_signal));
-  if (cycle_ends.take(predicted && mode == Mode::compensating))
-    for (std::size_t i = 0; i < axes.size(); ++i) holds[i].cycle_end(predicted_um(i));
+  hold_cycle(at);
   AxisInput input;
   input.now = at;
   input.dt_s = dt_s;
@@ -417,7 +442,7 @@ void Estimator::Parts::take_new_reference() noexcept {
   std::fill(reference_signals.begin(), reference_signals.end(), not_a_number);
   displacement.restart();
   for (RunningCorrection& correction : corrections) correction.restart();
-  for (CycleHold& hold_of_axis : holds) hold_of_axis.restart();
+  if (cycle_hold.holds()) cycle_hold.restart(now, blocks.temps_degC(), signal_values);
 }
 
 Report Estimator::make_report() const {
@@ -442,17 +467,19 @@ void Estimator::report(Report& out) const noexcept {
   out.cycle_ends = parts.cycle_ends.count();
   parts.blocks.report(out.sensors);
   for (std::size_t i = 0; i < parts.columns.size(); ++i)
-    out.inputs[i] = {parts.lost.temps_degC()[i], parts.reference_degC[i], parts.blocks.good(i),
-                     parts.lost.estimated(i), parts.lost.sd_K(i)};
+    out.inputs[i] = {parts.lost.temps_degC()[i], parts.reference_degC[i],
+                     parts.blocks.good(i),       parts.lost.estimated(i),
+                     parts.lost.sd_K(i),         parts.cycle_hold.temps_degC()[i]};
   for (std::size_t i = 0; i < parts.model_um.size(); ++i)
     out.displacement_um[i] = parts.model_um[i] - parts.zero_um[i];
   for (std::size_t i = 0; i < parts.signal_values.size(); ++i)
-    out.signals[i] = {parts.signal_values[i], parts.reference_signals[i]};
+    out.signals[i] = {parts.signal_values[i], parts.reference_signals[i],
+                      parts.cycle_hold.signal(i)};
   for (std::size_t i = 0; i < parts.axes.size(); ++i) {
     const AxisChannel& axis = parts.axes[i];
     AxisReport& line = out.axes[i];
     line.displacement_um = parts.predicted_um(i);
-    line.held_um = parts.holds[i].held_um();
+    line.held_um = parts.held_um[i];
     line.correction = parts.corrections[i].report();
     line.target_um = axis.target_um();
     line.offset_um = axis.offset_um();
@@ -471,11 +498,10 @@ void Estimator::Parts::visit_state(StateArchive& archive) {
   archive(blocks, lost, displacement);
   for (AxisChannel& axis : axes) archive(axis);
   for (RunningCorrection& correction : corrections) archive(correction);
-  for (CycleHold& hold_of_axis : holds) archive(hold_of_axis);
   archive(cycle, stepped, now, dt_s, all_signals, controller_online, reference_degC, signal_values,
           reference_signals, zero_known, model_um, zero_um, measured_um, offset_sd_um, uncertain,
-          predicted, ever_good, lost_since, enabled, stopping, mode, mode_since, reasons,
-          cycle_ends);
+          held_um, predicted, ever_good, lost_since, enabled, stopping, mode, mode_since, reasons,
+          cycle_hold, cycle_ends);
 }
 
 std::size_t Estimator::state_size_bytes() const noexcept {
@@ -508,11 +534,6 @@ std::map<std::string, double> Estimator::model_reference_degC() const {
 void Estimator::restore(const PersistentState& state) {
   Parts& parts = *parts_;
   parts.enabled = state.enabled;
-  const auto take = [](const std::map<std::string, double>& from, const std::string& name,
-                       double& to) {
-    const auto found = from.find(name);
-    if (found != from.end() && std::isfinite(found->second)) to = found->second;
-  };
   if (state.model_reference_degC == model_reference_degC()) {
     for (std::size_t i = 0; i < parts.columns.size(); ++i)
       take(state.reference_degC, parts.columns[i], parts.reference_degC[i]);
@@ -525,15 +546,24 @@ void Estimator::restore(const PersistentState& state) {
     take(state.temp_degC, parts.columns[i], temp_degC);
     parts.lost.restore(i, temp_degC);
   }
+  parts.restore_cycle_hold(state);
   for (std::size_t i = 0; i < parts.axes.size(); ++i) {
     double offset_um = 0.0;
     take(state.offset_um, parts.config.axes[i].name, offset_um);
     parts.axes[i].restore(offset_um);
-    double held_um = not_a_number;
-    take(state.held_um, parts.config.axes[i].name, held_um);
-    parts.holds[i].restore(held_um);
     parts.corrections[i].restore(state.correction, parts.config.axes[i].name);
   }
+}
+
+void Estimator::Parts::restore_cycle_hold(const PersistentState& state) {
+  std::vector<double> temps_degC(columns.size(), not_a_number);
+  std::vector<double> signals(signal_values.size(), not_a_number);
+  const auto signal_columns = thermal_model.signal_columns();
+  for (std::size_t i = 0; i < temps_degC.size(); ++i)
+    take(state.held_degC, columns[i], temps_degC[i]);
+  for (std::size_t i = 0; i < signals.size(); ++i)
+    take(state.held_signals, signal_columns[i], signals[i]);
+  cycle_hold.restore(temps_degC, signals);
 }
 
 void Estimator::plan_adoption(const Estimator& previous) {
@@ -573,7 +603,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
     parts.axes[i].adopt(other.axes[from]);
     parts.measured_um[i] = other.measured_um[from];
     parts.corrections[i].adopt(other.corrections[from]);
-    parts.holds[i].adopt(other.holds[from]);
+    parts.held_um[i] = other.held_um[from];
   }
   parts.cycle = other.cycle;
   parts.stepped = other.stepped;
@@ -586,7 +616,10 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.mode = other.mode;
   parts.mode_since = other.mode_since;
   parts.uncertain = other.uncertain;
-  parts.cycle_ends.adopt(other.cycle_ends);
+  parts.cycle_hold.adopt(previous.parts_->cycle_hold, parts.column_plan, parts.signal_plan,
+                         parts.term_plan);
+  parts.cycle_ends.adopt(other.cycle_ends, parts.config.compensation.cycle_end_signal ==
+                                               other.config.compensation.cycle_end_signal);
 }
 
 const EstimatorConfig& Estimator::config() const noexcept {

@@ -64,14 +64,16 @@ struct SensorReport {
 struct InputReport {  ///< a temperature column of the model
   double temp_degC{not_a_number};
   double reference_degC{not_a_number};
-  bool good{false};       ///< measured
-  bool estimated{false};  ///< lost, and temp_degC is an estimate from the others
-  double sd_K{0.0};       ///< standard deviation of the estimate
+  bool good{false};                ///< measured
+  bool estimated{false};           ///< lost, and temp_degC is an estimate from the others
+  double sd_K{0.0};                ///< standard deviation of the estimate
+  double held_degC{not_a_number};  ///< update = each_cycle: what is compensated by
 };
 
 struct SignalReport {  ///< an operating signal or position of the model
   double value{not_a_number};
   double reference{not_a_number};  ///< when the reference was taken
+  double held{not_a_number};       ///< update = each_cycle; never of a position
 };
 
 struct AxisReport {
@@ -88,7 +90,7 @@ struct AxisReport {
   bool proving{false};
   /// Standard deviation that estimated blocks give the offset; 0 where all are measured.
   double offset_sd_um{0.0};
-  double held_um{not_a_number};  ///< update = each_cycle: displacement of the last cycle end
+  double held_um{not_a_number};  ///< update = each_cycle: displacement at the held state
   CorrectionReport correction;
 };
 
@@ -119,7 +121,8 @@ struct PersistentState {
   std::map<std::string, double> reference_signals;  ///< operating signals then, by column
   std::map<std::string, double> offset_um;          ///< by axis, last sent
   std::map<std::string, double> temp_degC;          ///< in use then, by temperature column
-  std::map<std::string, double> held_um;            ///< AxisReport::held_um, by axis
+  std::map<std::string, double> held_degC;          ///< InputReport::held_degC, by column
+  std::map<std::string, double> held_signals;       ///< SignalReport::held, by column
   /// RunningCorrection::persistent(), "z.gain1" and so on.
   std::map<std::string, double> correction;
 };

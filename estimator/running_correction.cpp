@@ -80,19 +80,24 @@ RunningCorrection::RunningCorrection(const CorrectionConfig& config, const Therm
 void RunningCorrection::step(nanoseconds now, std::span<const double> rise_K,
                              bool may_change) noexcept {
   now_ = now;
-  for (std::size_t g = 0; g < groups_; ++g) {
-    double sum_um = 0.0;
-    for (std::size_t i = 0; i < inputs_[g].size(); ++i)
-      sum_um += matrix_um_per_K_[g][i] * rise_K[inputs_[g][i]];
-    contributions_um_[g] = sum_um;
-  }
+  contributions_um_ = contributions_um(rise_K);
   if (may_change) used_ = learned_;
 }
 
-double RunningCorrection::correction_of(const State& state) const noexcept {
+RunningCorrection::Contributions RunningCorrection::contributions_um(
+    std::span<const double> rise_K) const noexcept {
+  Contributions sums_um{};
+  for (std::size_t g = 0; g < groups_; ++g)
+    for (std::size_t i = 0; i < inputs_[g].size(); ++i)
+      sums_um[g] += matrix_um_per_K_[g][i] * rise_K[inputs_[g][i]];
+  return sums_um;
+}
+
+double RunningCorrection::correction_of(const State& state,
+                                        const Contributions& of_um) const noexcept {
   if (groups_ == 0) return 0.0;
   double sum_um = state[groups_];
-  for (std::size_t g = 0; g < groups_; ++g) sum_um += (state[g] - 1.0) * contributions_um_[g];
+  for (std::size_t g = 0; g < groups_; ++g) sum_um += (state[g] - 1.0) * of_um[g];
   return sum_um;
 }
 

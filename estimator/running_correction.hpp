@@ -55,6 +55,10 @@ class RunningCorrection {
   void step(nanoseconds now, std::span<const double> rise_K, bool may_change) noexcept;
   /// What the corrected displacement differs from the model's by [um].
   [[nodiscard]] double correction_um() const noexcept { return correction_of(used_); }
+  /// The same at another state of the machine.
+  [[nodiscard]] double correction_um(std::span<const double> rise_K) const noexcept {
+    return correction_of(used_, contributions_um(rise_K));
+  }
   /// @param displacement_um  measured, as it would be without any offset
   /// @param model_um         the model's at the same moment, without correction
   void measured(double displacement_um, double model_um) noexcept;
@@ -77,8 +81,13 @@ class RunningCorrection {
  private:
   static constexpr std::size_t states_max = correction_groups_max + 1;
   using State = std::array<double, states_max>;  ///< gains, then the bias
+  using Contributions = std::array<double, correction_groups_max>;
 
-  [[nodiscard]] double correction_of(const State& state) const noexcept;
+  [[nodiscard]] Contributions contributions_um(std::span<const double> rise_K) const noexcept;
+  [[nodiscard]] double correction_of(const State& state, const Contributions& of_um) const noexcept;
+  [[nodiscard]] double correction_of(const State& state) const noexcept {
+    return correction_of(state, contributions_um_);
+  }
   [[nodiscard]] State slopes() const noexcept;
   [[nodiscard]] double sd_um() const noexcept;
   [[nodiscard]] double hours_since_probing() const noexcept;
@@ -94,7 +103,7 @@ class RunningCorrection {
   State used_{};
   State learned_{};
   std::array<State, states_max> covariance_{};
-  std::array<double, correction_groups_max> contributions_um_{};
+  Contributions contributions_um_{};
   nanoseconds now_{};
   nanoseconds probed_at_{};
   double refused_error_um_{0.0};

@@ -56,7 +56,8 @@ std::string to_text(const PersistentState& state) {
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);
   file["temp_degC"] = numbers(state.temp_degC);
-  file["held_um"] = numbers(state.held_um);
+  file["held_degC"] = numbers(state.held_degC);
+  file["held_signals"] = numbers(state.held_signals);
   file["correction"] = numbers(state.correction);
   return file.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
@@ -81,7 +82,8 @@ PersistentState from_text(const std::string& text) {
   state.offset_um = numbers(file, "offset_um");
   // Files of earlier versions have none.
   if (file.contains("temp_degC")) state.temp_degC = numbers(file, "temp_degC");
-  if (file.contains("held_um")) state.held_um = numbers(file, "held_um");
+  if (file.contains("held_degC")) state.held_degC = numbers(file, "held_degC");
+  if (file.contains("held_signals")) state.held_signals = numbers(file, "held_signals");
   if (file.contains("correction")) state.correction = numbers(file, "correction");
   return state;
 }

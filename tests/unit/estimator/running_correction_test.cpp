@@ -7,7 +7,6 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
-#include "estimator/cycle_hold.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;
@@ -283,63 +282,4 @@ TEST_CASE("a reload keeps what probings taught", "[correction][estimator]") {
   machine.steps(20, {24.0, 32.0});
   CHECK(machine.report().axes[0].correction.gain[0] == gain);
   CHECK(machine.offset_um() == Approx(before));
-}
-
-TEST_CASE("each_cycle: the offset changes at cycle ends only", "[cycle_hold][estimator]") {
-  EstimatorConfig config = small_config();
-  config.compensation.update = UpdateRule::each_cycle;
-  Machine machine(config);
-  machine.step({20.0, 30.0});
-  machine.steps(10, {21.0, 31.0});
-  CHECK(machine.offset_um() == 0.0);
-  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
-  machine.steps(10, {21.0, 31.0});
-  CHECK(machine.offset_um() == -6.0);
-  machine.steps(10, {23.0, 31.0});
-  CHECK(machine.offset_um() == -6.0);
-  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
-  machine.steps(10, {23.0, 31.0});
-  CHECK(machine.offset_um() == -16.0);
-}
-
-TEST_CASE("a cycle end in a moment without data counts when the data are back",
-          "[cycle_hold][estimator]") {
-  EstimatorConfig config = small_config();
-  config.compensation.update = UpdateRule::each_cycle;
-  Machine machine(config);
-  machine.step({20.0, 30.0});
-  machine.steps(5, {21.0, lost});
-  machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
-  machine.steps(5, {21.0, lost});
-  CHECK(machine.offset_um() == 0.0);
-  machine.steps(5, {21.0, 31.0});
-  CHECK(machine.offset_um() == -6.0);
-}
-
-TEST_CASE("a coil that rises, a counter that changes, and every n-th of them end a cycle",
-          "[cycle_hold]") {
-  CycleEnds coil(1, true);
-  for (const double value : {1.0, 1.0, 0.0, not_a_number, 0.0}) coil.signal(value);
-  CHECK(coil.count() == 0);  // standing at 1 when the daemon starts ends nothing
-  coil.signal(1.0);
-  CHECK(coil.count() == 1);
-  CHECK(coil.take(false) == false);
-  CHECK(coil.take(true));
-  CHECK_FALSE(coil.take(true));
-  CycleEnds counter(3, false);
-  for (const double value : {7.0, 8.0, 8.0, 9.0}) counter.signal(value);
-  CHECK_FALSE(counter.take(true));
-  counter.command();
-  CHECK(counter.take(true));
-}
-
-TEST_CASE("one cycle ahead, the change since the last cycle end is added again", "[cycle_hold]") {
-  CycleHold hold(1.0);
-  hold.cycle_end(5.0);
-  CHECK(hold.held_um() == 5.0);
-  hold.cycle_end(8.0);
-  CHECK(hold.held_um() == 11.0);
-  hold.restart();
-  hold.cycle_end(0.0);
-  CHECK(hold.held_um() == 0.0);
 }
