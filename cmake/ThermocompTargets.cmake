@@ -138,16 +138,20 @@ function(thermocomp_program name)
 endfunction()
 
 # thermocomp_test(NAME SOURCES file... LINKS target... [TIMEOUT s] [LABELS label...]
-#                 [ARGUMENTS argument...])
-# One Catch2 program and one ctest entry; ARGUMENTS are Catch2's, to select tests.
+#                 [ARGUMENTS argument...] [SLOW])
+# One Catch2 program and one ctest entry; ARGUMENTS are Catch2's, to select tests. All but those that
+# are SLOW are a part of ./test.sh --quick.
 function(thermocomp_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
+  cmake_parse_arguments(arg "SLOW" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE thermocomp_flags thermocomp_catch_main ${arg_LINKS})
   thermocomp_use_precompiled(${name} thermocomp_precompiled_catch)
   add_test(NAME ${name} COMMAND ${name} ${arg_ARGUMENTS})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
+  endif()
+  if(NOT arg_SLOW)
+    list(APPEND arg_LABELS quick)
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()
