@@ -28,6 +28,7 @@ part "packages of PETSc" scripts/setup.sh petsc
 for preset in release asan-ubsan tsan debug coverage; do
   part "$preset" ./test.sh --preset "$preset"
 done
+part "includes" scripts/check_includes.py
 part "format" scripts/check-format.sh
 part "clang-tidy" scripts/check-tidy.sh
 part "fuzz" scripts/fuzz.sh --minutes 10

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "config/dbc_scanner.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 

@@ -5,18 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <stdexcept>
 #include <string>
 
 #include "config/daemon_config.hpp"
 #include "daemon/socket/rpc.hpp"
+#include "daemon/socket/socket_error.hpp"
 
 namespace thermocomp {
-
-class SocketError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 struct SocketStatistics {
   std::uint64_t clients{0};  ///< connected now

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "drivers/controllers/controller_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/thermal_model.hpp"
 #include "fault_schedule.hpp"
