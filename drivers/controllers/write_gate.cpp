@@ -14,7 +14,14 @@ WriteGate::WriteGate(nanoseconds period, const std::vector<double>& resolution_u
 }
 
 std::uint32_t WriteGate::synchronised() noexcept {
-  if (++epoch_ == 0) epoch_ = 1;  // 0 says "never connected"
+  if (link_is_new_) {
+    const std::uint32_t link = epoch_ % epochs_of_a_link;
+    // 0 says "never connected".
+    epoch_ += link + 1 == epochs_of_a_link ? 1 - link : 1;
+  } else {
+    epoch_ += epochs_of_a_link;
+  }
+  link_is_new_ = false;
   in_sync_ = true;
   last_sent_.reset();
   looks_ = 0;

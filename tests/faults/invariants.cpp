@@ -450,6 +450,13 @@ std::pair<double, double> Invariants::Sent::range_um(double with_um) const {
 void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   Sent& sent = sent_[axis];
   const double told_um = seen.told->applied_um[axis];
+  const bool latched = seen.report->axes[axis].latched;
+  demand(!latched || !seen.command->valid[axis], "unexplained_is_latched", seen.now,
+         [&] { return fmt::format("axis {}: driven although latched", axis); });
+  demand(latched || !sent.latched || sent.released, "unexplained_is_latched", seen.now,
+         [&] { return fmt::format("axis {}: nobody released it", axis); });
+  if (!latched) sent.released = false;
+  sent.latched = latched;
   if (!seen.told->online || sent.lately.empty() || !std::isfinite(told_um)) return;
   const auto [low_um, high_um] = sent.range_um(sent.um);
   const double slack_um = seen.shape->estimator.compensation.mismatch_um + 2.0 +
@@ -459,6 +466,10 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   if (unexplained && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
   sent.read_back_at = seen.told->taken_at;
   if (sent.unexplained < 5) return;
+  demand(latched, "unexplained_is_latched", seen.now, [&] {
+    return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told", axis,
+                       told_um);
+  });
   demand(!seen.command->valid[axis], "unexplained_is_latched", seen.now, [&] {
     return fmt::format("axis {}: driven at {:.4f} um although {:.4f} um is read back", axis,
                        seen.command->offset_um[axis], told_um);

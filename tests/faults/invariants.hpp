@@ -56,6 +56,8 @@ class Invariants {
   void reloaded(const MachineShape& shape);
   /// A probing of this axis reaches the estimator in the cycle to come.
   void probed(std::size_t axis) { ++probings_[axis]; }
+  /// The operator releases this axis in the cycle to come.
+  void released(std::size_t axis) { sent_[axis].released = true; }
   /// The operator takes a new reference in the cycle to come.
   void referenced() { referenced_ = true; }
   void restored(const PersistentState& saved, const Report& report, nanoseconds now);
@@ -130,7 +132,9 @@ class Invariants {
     std::uint64_t breaks{0};  ///< of the link, when it last began from what is applied
     std::deque<std::pair<nanoseconds, double>> lately;
     nanoseconds read_back_at{};
-    int unexplained{0};  ///< read-backs in a row
+    int unexplained{0};    ///< read-backs in a row
+    bool released{false};  ///< since it was latched
+    bool latched{false};   ///< in the cycle before
     [[nodiscard]] std::pair<double, double> range_um(double with_um) const;
   };
   std::array<Sent, axes_count> sent_{};
