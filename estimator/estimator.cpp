@@ -534,7 +534,7 @@ std::vector<std::string> Estimator::restore(const PersistentState& state) {
   std::vector<std::string> refused;
   for (std::size_t i = 0; i < parts.columns.size(); ++i) {
     const auto found = state.reference_degC.find(parts.columns[i]);
-    if (found == state.reference_degC.end()) continue;
+    if (found == state.reference_degC.end() || std::isnan(found->second)) continue;
     const TemperatureRange range(parts.config, parts.columns[i]);
     if (!range.holds(found->second))
       refused.push_back(refused_text("reference_degC." + parts.columns[i], found->second, range));

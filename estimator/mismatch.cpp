@@ -14,7 +14,11 @@ constexpr double apart_um = 0.2;
 /// Of a mismatch: how far off the older pairs may lie from what explains the newest.
 constexpr double share_of_mismatch = 0.35;
 /// Below so little sent a factor says nothing.
-constexpr double sent_um_min = 0.5;
+constexpr double sent_um_min = 0.2;
+/// What was sent must have changed by so much, and by so much of the mismatch, before a factor is
+/// no coincidence.
+constexpr double spread_um_min = 0.5;
+constexpr double spread_share_min = 0.2;
 
 /// Factors that people make: units, decimal places, radius and diameter.
 bool is_usual(double factor) noexcept {
@@ -116,7 +120,8 @@ Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
   // Negated comparisons would take NaN, the factor of next to nothing, for a good one.
   const bool factor_fits = std::isfinite(factor) && of_factor_um <= allowed_um;
   const bool constant_fits = of_constant_um <= allowed_um;
-  found.sure = spread_um(sent_um) > std::max(sent_um_min, 0.2 * std::abs(read_um - sent_um));
+  found.sure =
+      spread_um(sent_um) > std::max(spread_um_min, spread_share_min * std::abs(read_um - sent_um));
   const bool by_factor =
       factor_fits && (!constant_fits || is_usual(factor) || is_near(factor, -1.0) ||
                       (found.sure && of_factor_um < of_constant_um));

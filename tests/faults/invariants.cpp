@@ -374,7 +374,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   budget.at = move.at;
   const double change_um = std::abs(move.to_um - move.from_um);
   double allowed_um = budget.um + 2.0 * resolution_um_;
-  const bool lies = controller.lies(move.at);
+  // An operator may have released an axis on the word of a controller that has stopped lying since.
+  const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
   if (move.disturbed || lies) budget.disturbed_at = move.at;
   if (move.at - budget.disturbed_at < settling) {
     // What lies among the offsets sent of late cannot be told from obedience.
@@ -458,18 +459,32 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
   if (!latched) sent.released = false;
   sent.latched = latched;
   if (!seen.told->online || sent.lately.empty() || !std::isfinite(told_um)) return;
-  const auto [low_um, high_um] = sent.range_um(sent.um);
+  // What the cycle wants explains a read-back as well as what reached the controller: after a
+  // release or on a new link it starts from what is read back, and the write may be refused.
+  const double wanted_um = seen.command->offset_um[axis];
+  if (seen.command->valid[axis] &&
+      (sent.wanted.empty() || seen.now - sent.wanted.back().first > from_s(0.5)))
+    sent.wanted.emplace_back(seen.now, wanted_um);
+  while (!sent.wanted.empty() && sent.wanted.front().first < seen.now - from_s(window_s))
+    sent.wanted.pop_front();
+  auto [low_um, high_um] = sent.range_um(wanted_um);
+  for (const auto& [at, um] : sent.wanted) {
+    low_um = std::min(low_um, um);
+    high_um = std::max(high_um, um);
+  }
   const double slack_um = seen.shape->estimator.compensation.mismatch_um + 2.0 +
                           rate_um_per_s_[axis] * (link_period_s_ + 2.0 * period_s_);
   const bool unexplained = told_um < low_um - slack_um || told_um > high_um + slack_um;
-  if (!unexplained) sent.unexplained = 0;
-  if (unexplained && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
+  // What has been latched, or was before a release, counts from here.
+  if (!unexplained || latched) sent.unexplained = 0;
+  if (unexplained && !latched && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
   sent.read_back_at = seen.told->taken_at;
   if (sent.unexplained < 5) return;
-  demand(latched, "unexplained_is_latched", seen.now, [&] {
-    return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told", axis,
-                       told_um);
-  });
+  demand(latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound),
+         "unexplained_is_latched", seen.now, [&] {
+           return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told",
+                              axis, told_um);
+         });
   demand(!seen.command->valid[axis], "unexplained_is_latched", seen.now, [&] {
     return fmt::format("axis {}: driven at {:.4f} um although {:.4f} um is read back", axis,
                        seen.command->offset_um[axis], told_um);

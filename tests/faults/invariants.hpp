@@ -131,6 +131,7 @@ class Invariants {
     double credit_um{0.0};    ///< what it may still go at once
     std::uint64_t breaks{0};  ///< of the link, when it last began from what is applied
     std::deque<std::pair<nanoseconds, double>> lately;
+    std::deque<std::pair<nanoseconds, double>> wanted;  ///< by the cycle
     nanoseconds read_back_at{};
     int unexplained{0};    ///< read-backs in a row
     bool released{false};  ///< since it was latched
