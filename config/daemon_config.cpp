@@ -1,6 +1,8 @@
 #include "config/daemon_config.hpp"
 
+#include <algorithm>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include "config/model_file.hpp"
@@ -10,6 +12,7 @@
 #include "config/sections/estimator_sections.hpp"
 #include "config/sections/model_binding.hpp"
 #include "config/toml_reader.hpp"
+#include "estimator/temperature_range.hpp"
 
 namespace thermocomp {
 namespace {
@@ -149,6 +152,32 @@ struct ModelSource {
   std::optional<std::string> text;  ///< none: a problem already
 };
 
+/// The line on which a key of the file's own table stands; 0: none.
+int line_of(const std::string& text, const std::string& key) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number)
+    if (line.starts_with(key) && line.find('=') != std::string::npos) return number;
+  return 0;
+}
+
+/// Numbers that are no temperatures of this machine; the sensors that say so are the
+/// configuration's.
+void add_reference_problems(const ModelSource& source, const DaemonConfig& config,
+                            std::vector<Problem>& problems) {
+  const std::vector<double>& reference_degC = config.model.reference_degC;
+  for (std::size_t i = 0; i < std::min(reference_degC.size(), config.model.inputs.size()); ++i) {
+    const TemperatureRange range(config.estimator, config.model.inputs[i]);
+    if (range.holds(reference_degC[i])) continue;
+    std::string key("reference[");
+    key.append(std::to_string(i)).append("]");
+    std::ostringstream value;
+    value << reference_degC[i];
+    const auto line = line_of(*source.text, "reference");
+    problems.push_back({source.name, line, key, value.str(), range.rule()});
+  }
+}
+
 template <class FindModel>
 DaemonConfig build(const TomlDocument& document, const fs::path& folder, sections::Presets presets,
                    sections::DbcFiles dbc_files, sections::EdsFiles eds_files,
@@ -175,6 +204,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, section
       sections::check_binding(tables, config.estimator, config.model);
       sections::check_correction(root.table_or_empty("correction"), config.estimator.correction,
                                  config.model);
+      add_reference_problems(source, config, model_problems);
     }
   }
   std::vector<Problem> problems = document.all_problems();

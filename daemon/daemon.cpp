@@ -150,7 +150,14 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
     spdlog::warn("{}", loaded.warning);
     warnings.push_back(loaded.warning);
   }
-  brain->estimator.restore(loaded.state);
+  for (const std::string& refused : brain->estimator.restore(loaded.state)) {
+    const std::string warning = fmt::format(
+        "{}: {}; the compensation is switched off: thermocomp reference when the "
+        "machine is cold, then thermocomp enable",
+        config.state_file.string(), refused);
+    spdlog::error("{}", warning);
+    warnings.push_back(warning);
+  }
   saved = loaded.state;
   cycle = std::make_unique<Cycle>(grid, pointers(sources), *link, config.estimator.sensors.size(),
                                   std::move(brain));
@@ -357,7 +364,8 @@ void Daemon::Parts::command(const Command& asked) {
       "operator: {}{}", to_string(asked.kind),
       asked.kind == CommandKind::measured || asked.kind == CommandKind::prove
           ? fmt::format(" {} {} um", config.estimator.axes[asked.axis].name, asked.value_um)
-          : "");
+      : asked.kind == CommandKind::release ? " " + config.estimator.axes[asked.axis].name
+                                           : "");
   // Called done only when it would survive a power cut.
   save_state(true);
   const bool is_kept = asked.kind == CommandKind::enable || asked.kind == CommandKind::disable ||

@@ -29,6 +29,7 @@ class EventLog {
   void note_socket(const SocketStatistics& statistics);
 
  private:
+  void note_mismatches(const Report& report, const EstimatorConfig& config);
   void note_link(const std::string& what, bool connected, const std::string& error);
   void note_state(const std::string& what, bool connected, const std::string& state);
 
@@ -38,6 +39,7 @@ class EventLog {
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;
   std::vector<bool> estimated_;
+  std::vector<bool> latched_;
   bool uncertain_{false};
   std::map<std::string, bool> connected_;
   std::map<std::string, std::string> states_;  ///< of CAN interfaces

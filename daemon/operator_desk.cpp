@@ -84,6 +84,14 @@ json prove(const DeskActions& actions, const json& params) {
   return {{"done", true}};
 }
 
+json release(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const Command command{CommandKind::release, axis_index(view, params), 0.0};
+  refuse_unless(view.report.axes[command.axis].latched, "the axis has no latched mismatch");
+  actions.command(command);
+  return {{"done", true}};
+}
+
 json reload(const DeskActions& actions) {
   try {
     actions.reload();
@@ -112,6 +120,7 @@ void add_operator_methods(StatusServer& server, const DeskActions& actions) {
   add("reference", [actions](const json&) { return take_reference(actions); });
   add("measured", [actions](const json& params) { return note_measured(actions, params); });
   add("prove", [actions](const json& params) { return prove(actions, params); });
+  add("release", [actions](const json& params) { return release(actions, params); });
   add("reload", [actions](const json&) { return reload(actions); });
   server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
     refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");

@@ -8,6 +8,8 @@ namespace thermocomp::faults {
 namespace {
 
 constexpr double tiny_um = 1e-9;
+/// What was sent so long ago does not explain a read-back any more [s].
+constexpr double window_s = 10.0;
 constexpr double register_rounding_um = 0.1;
 /// The window of comparison, and the read-back and the command that are under way at its end.
 constexpr nanoseconds settling = std::chrono::seconds(8);
@@ -53,6 +55,7 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
 
 void Invariants::booted(nanoseconds now) {
   boot_ = now;
+  sent_ = {};
   last_ = now;
   last_compensating_ = now;
   first_ = true;
@@ -114,8 +117,12 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
                        SimulatedController& controller) {
   check_readings(seen);
   check_sensors_used(seen);
-  for (const Move& move : moves) check_move(seen, move, controller);
+  for (const Move& move : moves) {
+    check_move(seen, move, controller);
+    check_sent(seen, move);
+  }
   moves.clear();
+  for (std::size_t axis = 0; axis < axes_count; ++axis) check_unexplained(seen, axis);
   check_hold(seen);
   check_command(seen);
   check_recovery(seen, controller);
@@ -367,7 +374,9 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   budget.at = move.at;
   const double change_um = std::abs(move.to_um - move.from_um);
   double allowed_um = budget.um + 2.0 * resolution_um_;
-  if (move.disturbed) budget.disturbed_at = move.at;
+  // An operator may have released an axis on the word of a controller that has stopped lying since.
+  const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
+  if (move.disturbed || lies) budget.disturbed_at = move.at;
   if (move.at - budget.disturbed_at < settling) {
     // What lies among the offsets sent of late cannot be told from obedience.
     const auto end = budget.told_um.begin() +
@@ -376,7 +385,7 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
     allowed_um += 3.0 + 2.0 * resolution_um_ + (budget.count == 0 ? 0.0 : *high - *low);
   }
   const bool knowable = !move.disturbed || move.seen;
-  if (knowable && !controller.applies_other(move.at))
+  if (knowable && !lies)
     demand(change_um <= allowed_um, "slew_kept_at_controller", seen.now, [&] {
       return fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed",
                          move.axis, move.to_um, move.from_um, allowed_um);
@@ -388,6 +397,98 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
          "offset_within_bound", seen.now, [&] {
            return fmt::format("axis {}: the controller is told {:.4f} um", move.axis, move.to_um);
          });
+}
+
+/// Two values sent one after the other differ by no more than the slew allows, whatever was read
+/// back between them. A link that is new begins from what is applied: between zero and what was
+/// sent lately.
+void Invariants::check_sent(const CycleSeen& seen, const Move& move) {
+  Sent& sent = sent_[move.axis];
+  const double rate_um_per_s = rate_um_per_s_[move.axis];
+  const double elapsed_s = to_s(move.at - sent.at);
+  const double stall_s = std::max(5.0 * link_period_s_, 1.0) + 2.0 * period_s_;
+  const double stall_um = rate_um_per_s * stall_s;
+  const bool first = std::isnan(sent.um);
+  const double change_um = first ? 0.0 : std::abs(move.to_um - sent.um);
+  sent.credit_um = std::min(sent.credit_um + rate_um_per_s * elapsed_s,
+                            std::max(stall_um, rate_um_per_s * elapsed_s + stall_um));
+  const bool kept = change_um <= sent.credit_um + 2.0 * resolution_um_ + tiny_um;
+  if (kept || move.breaks == sent.breaks) {
+    demand(kept, "slew_kept_by_what_is_sent", seen.now, [&] {
+      return fmt::format("axis {}: {:.4f} um after {:.4f} um, {:.3f} s apart, {:.4f} allowed",
+                         move.axis, move.to_um, sent.um, elapsed_s, sent.credit_um);
+    });
+  } else {
+    const auto [low_um, high_um] = sent.range_um(0.0);
+    const double slack_um = 4.0 + stall_um + 2.0 * resolution_um_;
+    demand(move.to_um >= low_um - slack_um && move.to_um <= high_um + slack_um,
+           "slew_kept_by_what_is_sent", seen.now, [&] {
+             return fmt::format("axis {}: {:.4f} um after {:.4f} um on a new link", move.axis,
+                                move.to_um, sent.um);
+           });
+  }
+  if (first || !kept) {
+    sent.breaks = move.breaks;
+    sent.credit_um = stall_um;
+  }
+  sent.credit_um = std::max(0.0, sent.credit_um - std::max(0.0, change_um - resolution_um_));
+  sent.um = move.to_um;
+  sent.at = move.at;
+  sent.lately.emplace_back(move.at, move.to_um);
+  while (sent.lately.front().first < move.at - from_s(window_s)) sent.lately.pop_front();
+}
+
+std::pair<double, double> Invariants::Sent::range_um(double with_um) const {
+  std::pair range{with_um, with_um};
+  for (const auto& [at_time, value_um] : lately) {
+    range.first = std::min(range.first, value_um);
+    range.second = std::max(range.second, value_um);
+  }
+  return range;
+}
+
+/// Read-backs that nothing sent explains, one after the other: the axis is not driven.
+void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
+  Sent& sent = sent_[axis];
+  const double told_um = seen.told->applied_um[axis];
+  const bool latched = seen.report->axes[axis].latched;
+  demand(!latched || !seen.command->valid[axis], "unexplained_is_latched", seen.now,
+         [&] { return fmt::format("axis {}: driven although latched", axis); });
+  demand(latched || !sent.latched || sent.released, "unexplained_is_latched", seen.now,
+         [&] { return fmt::format("axis {}: nobody released it", axis); });
+  if (!latched) sent.released = false;
+  sent.latched = latched;
+  if (!seen.told->online || sent.lately.empty() || !std::isfinite(told_um)) return;
+  // What the cycle wants explains a read-back as well as what reached the controller: after a
+  // release or on a new link it starts from what is read back, and the write may be refused.
+  const double wanted_um = seen.command->offset_um[axis];
+  if (seen.command->valid[axis] &&
+      (sent.wanted.empty() || seen.now - sent.wanted.back().first > from_s(0.5)))
+    sent.wanted.emplace_back(seen.now, wanted_um);
+  while (!sent.wanted.empty() && sent.wanted.front().first < seen.now - from_s(window_s))
+    sent.wanted.pop_front();
+  auto [low_um, high_um] = sent.range_um(wanted_um);
+  for (const auto& [at, um] : sent.wanted) {
+    low_um = std::min(low_um, um);
+    high_um = std::max(high_um, um);
+  }
+  const double slack_um = seen.shape->estimator.compensation.mismatch_um + 2.0 +
+                          rate_um_per_s_[axis] * (link_period_s_ + 2.0 * period_s_);
+  const bool unexplained = told_um < low_um - slack_um || told_um > high_um + slack_um;
+  // What has been latched, or was before a release, counts from here.
+  if (!unexplained || latched) sent.unexplained = 0;
+  if (unexplained && !latched && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
+  sent.read_back_at = seen.told->taken_at;
+  if (sent.unexplained < 5) return;
+  demand(latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound),
+         "unexplained_is_latched", seen.now, [&] {
+           return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told",
+                              axis, told_um);
+         });
+  demand(!seen.command->valid[axis], "unexplained_is_latched", seen.now, [&] {
+    return fmt::format("axis {}: driven at {:.4f} um although {:.4f} um is read back", axis,
+                       seen.command->offset_um[axis], told_um);
+  });
 }
 
 }  // namespace thermocomp::faults

@@ -32,6 +32,7 @@ class Life {
         world_(options.seed, shape_, schedule_),
         chance_(options.seed, 5),
         probings_(options.seed, 6),
+        releases_(options.seed, 8),
         gains_{probings_.between(0.4, 2.0), probings_.between(0.4, 2.0)},
         judge_(shape_, schedule_, world_.thermocouples),
         end_(life_begin + nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)}) {
@@ -63,7 +64,8 @@ class Life {
     twin_ = disk_ ? nullptr : std::make_unique<RecordedTwin>(grid_);
     if (disk_) disk_->boot(grid_, world_.now);
     auto brain = make_brain();
-    brain->estimator.restore(saved_);
+    const auto refused = brain->estimator.restore(saved_);
+    judge_.demand(refused.empty(), "state_survives_restart", world_.now, "a reference was refused");
     report_ = brain->estimator.make_report();
     judge_.booted(world_.now);
     // The very first value becomes the reference; a later start has one already.
@@ -95,6 +97,7 @@ class Life {
   void step(std::uint64_t cycle) {
     say_faults();
     operate();
+    release();
     probe();
     reload();
     daemon_->cycle().step(cycle);
@@ -162,6 +165,20 @@ class Life {
     command.value_um = chance_.between(-8.0, 8.0);
     if (command.kind == CommandKind::measured) judge_.probed(command.axis);
     static_cast<void>(daemon_->cycle().send(command));
+  }
+
+  /// An operator who has looked into a mismatch releases the axis some time after all is well; now
+  /// and then one who has not does so at once.
+  void release() {
+    const Episode* episode = schedule_.episode_at(world_.now);
+    const bool well = episode == nullptr || world_.now < episode->begin;
+    for (std::size_t axis = 0; axis < axes_count; ++axis) {
+      if (!report_.axes[axis].latched || report_.axes[axis].releasing) continue;
+      if (!releases_.one_in(static_cast<std::uint64_t>((well ? 5.0 : 60.0) * options_.cycle_hz)))
+        continue;
+      const Command command{CommandKind::release, static_cast<std::uint32_t>(axis), 0.0};
+      if (daemon_->cycle().send(command)) judge_.released(axis);
+    }
   }
 
   [[nodiscard]] bool once_in(double period_s) {
@@ -330,6 +347,7 @@ class Life {
   World world_;
   Chance chance_;
   Chance probings_;
+  Chance releases_;
   std::array<double, 2> gains_;                 ///< of the machine, where the model's are 1
   std::array<double, axes_count> probed_um_{};  ///< measured last
   Invariants judge_;

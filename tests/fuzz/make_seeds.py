@@ -196,6 +196,7 @@ def socket_seeds():
     write("socket_request", "measured_wrong", request("measured", {}) + probing("3") +
           probing(1e308) + probing(None) + request("measured", {"axis": 0, "value_um": 1}))
     write("socket_request", "prove", request("prove", {"axis": "z", "value_um": 5}))
+    write("socket_request", "release", request("release", {"axis": "z"}))
     write("socket_request", "wrong_axis", request("prove", {"axis": "q", "value_um": 1e300}))
     write("socket_request", "subscribe", request("subscribe", {"methods": ["status"],
                                                                "period_s": 0.1}))
