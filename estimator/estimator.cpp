@@ -586,7 +586,8 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.mode = other.mode;
   parts.mode_since = other.mode_since;
   parts.uncertain = other.uncertain;
-  parts.cycle_ends.adopt(other.cycle_ends);
+  parts.cycle_ends.adopt(other.cycle_ends, parts.config.compensation.cycle_end_signal ==
+                                               other.config.compensation.cycle_end_signal);
 }
 
 const EstimatorConfig& Estimator::config() const noexcept {
