@@ -127,7 +127,7 @@ def main():
                 rounds.print_figures()
             finally:
                 lab.end()
-        failed = failed or bool(rounds.wrong) or rounds.gap_s > WATCHDOG_S / 2
+        failed = failed or bool(rounds.wrong) or rounds.gap_s > 0.75 * WATCHDOG_S
     return 1 if failed else 0
 
 

@@ -44,7 +44,7 @@ def test_many_reloads_at_1_hz_starve_neither_watchdog_nor_clients(lab, manager):
     reloads = daemon.log_text().count("reloaded: ")
     print(f"watchdog fed at least every {gap_s:.2f} s, {reloads} reloads, slowest of "
           f"{len(took_s)} answers {1000 * max(took_s):.1f} ms")
-    assert gap_s < WATCHDOG_S / 2
+    assert gap_s < 0.75 * WATCHDOG_S
     assert max(took_s) < 1.5
     assert 5 <= reloads <= 16
     eventually(lambda: len(manager.times_of("READY=1")) == 1 + len(manager.times_of("RELOADING=1")),

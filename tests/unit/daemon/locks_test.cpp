@@ -90,21 +90,22 @@ TEST_CASE("a file has one lock, whatever path leads to it", "[locks]") {
   std::filesystem::create_symlink(folder / "history.db", folder / "other.db");
   const FileLock lock(folder / "history.db");
   CHECK_FALSE(refusal([&] { FileLock second(folder / "link/history.db"); }).empty());
-  CHECK_FALSE(refusal([&] { FileLock second(folder / "link/../other.db"); }).empty());
+  CHECK_FALSE(refusal([&] { FileLock second(folder / "link/other.db"); }).empty());
   const FileLock another(folder / "state.json");
 }
 
 TEST_CASE("a lock ends with its process, in whatever way that ends", "[locks]") {
   const TempFolder folder;
+  const std::string ours = own_name();
   Child child([&] {
     new FileLock(folder / "history.db");
-    new NameLock(own_name());
+    new NameLock(ours);
   });
   CHECK_FALSE(refusal([&] { FileLock second(folder / "history.db"); }).empty());
-  CHECK_FALSE(refusal([&] { NameLock second(own_name()); }).empty());
+  CHECK_FALSE(refusal([&] { NameLock second(ours); }).empty());
   child.kill();
   const FileLock file(folder / "history.db");
-  const NameLock name(own_name());
+  const NameLock name(ours);
 }
 
 TEST_CASE("a lock that cannot be made is no lock that is held", "[locks]") {
