@@ -35,6 +35,7 @@ class ReloadRounds:
         self.answers_s = []
         self.reloads_s = []
         self.wrong = []
+        self.hung_up_at = 0
 
     def ask(self, number):
         """Each client asks; the first also switches off and on, and sees that it holds."""
@@ -60,7 +61,8 @@ class ReloadRounds:
         """Another gain each time; what is shown must be what was written."""
         self.machine.model.write_text(MODEL.replace("3.0,", f"{3.0 + 0.001 * (number % 7)},"))
         begun = time.monotonic()
-        if number % 5 == 4:
+        if len(self.reloads_s) % 5 == 4 and self.hung_up_at != len(self.reloads_s):
+            self.hung_up_at = len(self.reloads_s)
             for _ in range(3):
                 self.daemon.hang_up()
         try:
@@ -68,6 +70,7 @@ class ReloadRounds:
         except Refused as refusal:
             if "under way" not in str(refusal):
                 self.wrong.append(f"reload {number}: {refusal}")
+            time.sleep(0.2 / self.rate_hz)
             return
         self.reloads_s.append(time.monotonic() - begun)
         if self.daemon.status()["model"]["checksum"] != checksum:
