@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/history/replay.hpp"
+#include "daemon/history/replay_setup.hpp"
 #include "estimator/estimator.hpp"
 
 namespace thermocomp {

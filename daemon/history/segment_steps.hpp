@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "daemon/history/replay.hpp"
+#include "daemon/history/replay_setup.hpp"
 #include "daemon/history/segment_walk.hpp"
 #include "estimator/estimator.hpp"
 
