@@ -61,9 +61,11 @@ class CycleEnds {
     return now;
   }
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
-  void adopt(const CycleEnds& previous) noexcept {
+  /// @param same_signal  of the other's configuration and of ours: an edge during the reload counts
+  void adopt(const CycleEnds& previous, bool same_signal) noexcept {
     count_ = previous.count_;
     due_ = previous.due_;
+    if (same_signal) last_ = previous.last_;
   }
   void visit_state(StateArchive& archive) { archive(count_, last_, due_); }
 

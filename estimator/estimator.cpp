@@ -531,14 +531,8 @@ std::map<std::string, double> Estimator::model_reference_degC() const {
 
 std::vector<std::string> Estimator::restore(const PersistentState& state) {
   Parts& parts = *parts_;
-  std::vector<std::string> refused;
-  for (std::size_t i = 0; i < parts.columns.size(); ++i) {
-    const auto found = state.reference_degC.find(parts.columns[i]);
-    if (found == state.reference_degC.end() || std::isnan(found->second)) continue;
-    const TemperatureRange range(parts.config, parts.columns[i]);
-    if (!range.holds(found->second))
-      refused.push_back(refused_text("reference_degC." + parts.columns[i], found->second, range));
-  }
+  const std::vector<std::string> refused =
+      impossible_references(parts.config, parts.columns, state.reference_degC);
   parts.enabled = state.enabled && refused.empty();
   const auto take = [](const std::map<std::string, double>& from, const std::string& name,
                        double& to) {
@@ -619,7 +613,8 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.mode = other.mode;
   parts.mode_since = other.mode_since;
   parts.uncertain = other.uncertain;
-  parts.cycle_ends.adopt(other.cycle_ends);
+  parts.cycle_ends.adopt(other.cycle_ends, parts.config.compensation.cycle_end_signal ==
+                                               other.config.compensation.cycle_end_signal);
 }
 
 const EstimatorConfig& Estimator::config() const noexcept {

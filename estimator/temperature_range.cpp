@@ -50,9 +50,20 @@ std::string TemperatureRange::rule() const {
   return text.append("], what the screening of its sensors lets through");
 }
 
-std::string refused_text(const std::string& key, double temp_degC, const TemperatureRange& range) {
-  std::string text(key);
-  return text.append(" = ").append(to_text(temp_degC)).append(" ").append(range.rule());
+std::vector<std::string> impossible_references(
+    const EstimatorConfig& config, const std::vector<std::string>& columns,
+    const std::map<std::string, double>& reference_degC) {
+  std::vector<std::string> refused;
+  for (const std::string& column : columns) {
+    const auto found = reference_degC.find(column);
+    if (found == reference_degC.end() || std::isnan(found->second)) continue;
+    const TemperatureRange range(config, column);
+    if (range.holds(found->second)) continue;
+    std::string text("reference_degC.");
+    text.append(column).append(" = ").append(to_text(found->second));
+    refused.push_back(text.append(" ").append(range.rule()));
+  }
+  return refused;
 }
 
 void check_reference(const EstimatorConfig& config, const ThermalModel& model) {

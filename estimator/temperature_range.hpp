@@ -2,7 +2,9 @@
 /// sensors lets through. A reference outside was never taken at the machine.
 #pragma once
 
+#include <map>
 #include <string>
+#include <vector>
 
 #include "estimator/estimator_config.hpp"
 #include "estimator/thermal_model.hpp"
@@ -24,9 +26,11 @@ class TemperatureRange {
   double degC_max_{not_a_number};
 };
 
-/// "reference_degC.t1_degC = 1e+300 must be in ..."
-[[nodiscard]] std::string refused_text(const std::string& key, double temp_degC,
-                                       const TemperatureRange& range);
+/// Of references that were kept those that no sensor of their column may show, in words:
+/// "reference_degC.t1_degC = 1e+300 must be in ...".
+[[nodiscard]] std::vector<std::string> impossible_references(
+    const EstimatorConfig& config, const std::vector<std::string>& columns,
+    const std::map<std::string, double>& reference_degC);
 
 /// The numbers that the model file gives as reference. @throws InvalidValue with the key
 void check_reference(const EstimatorConfig& config, const ThermalModel& model);

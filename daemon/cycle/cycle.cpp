@@ -25,22 +25,6 @@ void sleep_until(nanoseconds wake) noexcept {
 
 }  // namespace
 
-bool CommandQueue::try_push(const Command& command) noexcept {
-  const std::uint64_t head = head_.load(std::memory_order_relaxed);
-  if (head - tail_.load(std::memory_order_acquire) == capacity) return false;
-  commands_[head % capacity] = command;
-  head_.store(head + 1, std::memory_order_release);
-  return true;
-}
-
-bool CommandQueue::try_pop(Command& command) noexcept {
-  const std::uint64_t tail = tail_.load(std::memory_order_relaxed);
-  if (tail == head_.load(std::memory_order_acquire)) return false;
-  command = commands_[tail % capacity];
-  tail_.store(tail + 1, std::memory_order_release);
-  return true;
-}
-
 Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
              std::size_t sensors, std::unique_ptr<CycleBrain> brain)
     : grid_(grid),
@@ -96,6 +80,8 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   // Given back only now, when the new one has something to report.
   if (retiring_ != nullptr)
     retired_.store(std::exchange(retiring_, nullptr), std::memory_order_release);
+  // Last, so that who sees a command done can see a change-over of the same step.
+  if (commanded) commands_done_.store(commands_.taken(), std::memory_order_release);
 }
 
 std::uint64_t Cycle::newest_due(nanoseconds now) const noexcept {
@@ -143,6 +129,10 @@ std::unique_ptr<CycleBrain> Cycle::take_retired() noexcept {
   std::unique_ptr<CycleBrain> retired(retired_.exchange(nullptr, std::memory_order_acquire));
   if (retired) observed_ = handed_over_;
   return retired;
+}
+
+std::unique_ptr<CycleBrain> Cycle::withdraw_brain() noexcept {
+  return std::unique_ptr<CycleBrain>(incoming_.exchange(nullptr, std::memory_order_acquire));
 }
 
 const Report& Cycle::report() noexcept {

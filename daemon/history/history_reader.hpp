@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "daemon/history/history_error.hpp"
-#include "daemon/history/record.hpp"
+#include "daemon/recording/grid.hpp"
+#include "daemon/recording/record.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

@@ -114,7 +114,21 @@ bool HistoryStore::open_if_closed(std::int64_t needed_token) {
   return needed_token == 0 || tokens_.count(needed_token) != 0;
 }
 
+/// Held until the end: also while the file is closed, moved aside or missing.
+void HistoryStore::lock() {
+  if (lock_) return;
+  try {
+    lock_ = std::make_unique<FileLock>(config_.file);
+  } catch (const LockHeld& held) {
+    throw HistoryError("history: " + std::string(held.what()) +
+                       "; history.file must name another, or that one must end first");
+  } catch (const LockImpossible& problem) {
+    throw DatabaseError(SQLITE_CANTOPEN, problem.what());
+  }
+}
+
 void HistoryStore::prepare() {
+  lock();
   database_ = std::make_unique<Database>(config_.file, DatabaseMode::read_write_create);
   const std::string name = config_.file.string();
   const std::int64_t application = database_->number("PRAGMA application_id");
@@ -237,12 +251,26 @@ void HistoryStore::insert(const SegmentRow& row, Tokens& tokens) {
   tokens[row.token] = sqlite3_last_insert_rowid(database_->handle());
 }
 
+/// As with segments: committed by a commit that was reported as failed. Never replaced, whatever is
+/// there.
+bool HistoryStore::is_known(std::int64_t segment, const ChunkRow& row) {
+  Statement known(*database_, "SELECT records FROM chunk WHERE segment = ? AND number = ?");
+  known.bind(segment).bind(row.number);
+  if (!known.step()) return false;
+  if (known.blob(0) != row.records)
+    throw HistoryError(config_.file.string() + ": chunk " + std::to_string(row.number) +
+                       " of segment " + std::to_string(segment) +
+                       " is there already with other records; does another program write it?");
+  return true;
+}
+
 void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
   const auto segment = tokens.find(row.segment_token);
   if (segment == tokens.end()) throw HistoryError("a chunk without its segment");
+  if (is_known(segment->second, row)) return;
   Statement chunk(*database_,
-                  "INSERT OR REPLACE INTO chunk (segment, number, through_cycle,"
-                  " wall_minus_grid_ns, count, records) VALUES (?, ?, ?, ?, ?, ?)");
+                  "INSERT INTO chunk (segment, number, through_cycle, wall_minus_grid_ns, count,"
+                  " records) VALUES (?, ?, ?, ?, ?, ?)");
   chunk.bind(segment->second).bind(row.number).bind(row.through_cycle);
   chunk.bind(row.wall_minus_grid_ns).bind(static_cast<std::int64_t>(row.count));
   chunk.bind(std::span<const std::byte>(row.records)).run();

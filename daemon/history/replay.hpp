@@ -11,19 +11,10 @@
 #include <vector>
 
 #include "daemon/history/history_reader.hpp"
+#include "daemon/history/replay_setup.hpp"
 #include "estimator/estimator_config.hpp"
-#include "estimator/thermal_model.hpp"
 
 namespace thermocomp {
-
-/// What the estimator of a segment is built from.
-struct ReplaySetup {
-  EstimatorConfig estimator;
-  ThermalModel model;
-};
-/// Texts -> configuration and model. The default parses them as the daemon does.
-using SetupParser = std::function<ReplaySetup(const SegmentSetup&)>;
-[[nodiscard]] ReplaySetup parse_setup(const SegmentSetup& setup);
 
 /// The offsets of one cycle at which the daemon noted its own.
 struct ReplayedOffsets {

@@ -1,7 +1,7 @@
 #include <utility>
 
 #include "config/daemon_config.hpp"
-#include "daemon/history/replay.hpp"
+#include "daemon/history/replay_setup.hpp"
 
 namespace thermocomp {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "daemon/history/history_reader.hpp"
-#include "daemon/history/replay.hpp"
+#include "daemon/history/replay_setup.hpp"
 
 namespace thermocomp {
 

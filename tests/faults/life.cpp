@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "estimator/checks.hpp"
+#include "estimator/persistent_state.hpp"
 #include "history_disk.hpp"
 #include "recorded_twin.hpp"
 #include "simulated_daemon.hpp"
@@ -272,28 +273,10 @@ class Life {
 
   /// As the daemon does: switches and references at once, offsets every 10 s.
   void save_state() {
-    bool now = world_.now >= next_save_ || report_.enabled != saved_.enabled;
-    for (std::size_t i = 0; i < report_.inputs.size() && !now; ++i) {
-      const double reference_degC = report_.inputs[i].reference_degC;
-      const auto found = saved_.reference_degC.find(shape_.model.inputs[i]);
-      now = std::isfinite(reference_degC) &&
-            (found == saved_.reference_degC.end() || found->second != reference_degC);
-    }
-    if (!now) return;
+    const PersistentState state = persistent_state(daemon_->cycle().brain().estimator, report_);
+    if (world_.now < next_save_ && !must_be_saved(state, saved_)) return;
     next_save_ = world_.now + saved_every;
-    saved_.enabled = report_.enabled;
-    saved_.model_reference_degC = daemon_->cycle().brain().estimator.model_reference_degC();
-    for (std::size_t i = 0; i < report_.inputs.size(); ++i)
-      if (std::isfinite(report_.inputs[i].reference_degC))
-        saved_.reference_degC[shape_.model.inputs[i]] = report_.inputs[i].reference_degC;
-    saved_.correction.clear();
-    for (std::size_t i = 0; i < axes_count; ++i) {
-      const std::string& name = shape_.estimator.axes[i].name;
-      saved_.offset_um[name] = report_.axes[i].offset_um;
-      if (std::isfinite(report_.axes[i].held_um)) saved_.held_um[name] = report_.axes[i].held_um;
-      for (const auto& [key, value] : RunningCorrection::persistent(report_.axes[i].correction))
-        saved_.correction[std::string(name).append(".").append(key)] = value;
-    }
+    saved_ = state;
   }
 
   [[nodiscard]] double life_s() const { return to_s(world_.now - life_begin); }

@@ -106,7 +106,7 @@ BUGS = [
     ("wall_clock_step_deletes_history", "daemon/history/history_store.cpp",
      "return now - *steady_since_ >= steady_min;",
      "return {P} || now - *steady_since_ >= steady_min;"),
-    ("signal_not_recorded", "daemon/history/cycle_recorder.cpp",
+    ("signal_not_recorded", "daemon/recording/cycle_recorder.cpp",
      "  push_values(cycle, RecordKind::signal, controller.signals, controller_.signals);\n",
      "  if (!{P} || cycle % 3 != 0)\n"
      "    push_values(cycle, RecordKind::signal, controller.signals, controller_.signals);\n"),

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/persistent_state.hpp"
+
 namespace thermocomp::property {
 namespace {
 
@@ -226,18 +228,7 @@ class World {
   /// The daemon comes back with what its state file held, perhaps of a while ago; its link is new.
   void restart() {
     ++outcome_.restarts;
-    PersistentState state;
-    state.enabled = report_.enabled;
-    const auto columns = model_.temperature_columns();
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      const InputReport& input = report_.inputs[i];
-      state.reference_degC[columns[i]] = input.reference_degC;
-      if (input.good || input.estimated) state.temp_degC[columns[i]] = input.temp_degC;
-    }
-    state.model_reference_degC = estimator_->model_reference_degC();
-    const auto signals = model_.signal_columns();
-    for (std::size_t i = 0; i < signals.size(); ++i)
-      state.reference_signals[signals[i]] = report_.signals[i].reference;
+    PersistentState state = persistent_state(*estimator_, report_);
     for (std::size_t i = 0; i < axes_count; ++i) {
       double offset_um = command_.offset_um[i];
       if (shape_.one_in(3)) offset_um = shape_.between(-1.0, 1.0) * 60.0;
