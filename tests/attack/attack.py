@@ -26,6 +26,7 @@ import traceback
 import attacks_daemon  # noqa: F401
 import attacks_files  # noqa: F401
 import attacks_link  # noqa: F401
+import attacks_linuxcnc  # noqa: F401
 import attacks_read_back  # noqa: F401
 import attacks_sensors  # noqa: F401
 import attacks_socket  # noqa: F401
@@ -42,7 +43,11 @@ def run_one(name, link, seed, programs, keep):
     """In a process of its own: one try, its result as the last line."""
     attack = ALL[name]
     result = None
-    rig = rig_module.Rig(programs, link, seed, **attack.choices)
+    if link == "linuxcnc":
+        from linuxcnc_rig import LinuxCncRig as Rig
+    else:
+        from rig import Rig
+    rig = Rig(programs, link, seed, **attack.choices)
     try:
         try:
             attack.run(rig)

@@ -255,7 +255,7 @@ def two_daemons_on_one_history(rig):
         return
     rig.machine.wants_um(-20.0)
     rig.wait_for_rows()
-    second = rig.another_daemon("two", history=rig.daemon.history, dry_run=True)
+    second = rig.another_daemon("two", unit=9, history=rig.daemon.history, dry_run=True)
     started = second.start(may_refuse=True)
     rig.must(not started, "a second daemon starts on the same history")
     if started:
@@ -273,7 +273,7 @@ def two_daemons_on_one_state_file(rig):
     if not rig.start(BEFORE_UM):
         return
     rig.daemon.operate("disable")
-    second = rig.another_daemon("two", dry_run=True)
+    second = rig.another_daemon("two", unit=9, dry_run=True)
     text = second.config.read_text().replace(str(second.state), str(rig.daemon.state))
     second.config.write_text(text)
     started = second.start(may_refuse=True)

@@ -72,7 +72,7 @@ def measured_without_end(rig):
     `step_um_max` with each, and nothing becomes infinite."""
     if not rig.start(BEFORE_UM):
         return
-    values = (1e308, -1e308, 1e300, 1e39, -1e17, 5e-324, 40.0)
+    values = (1e308, -1e308, 1e300, 1e39, -1e17)
     for _ in range(20):
         try:
             rig.daemon.call("measured", axis="z", value_um=rig.random.choice(values))

@@ -6,6 +6,10 @@ import threading
 import time
 
 
+# The same value after so long is the same request once more: its answer was late or lost.
+SENT_AGAIN_AFTER_S = 0.15
+
+
 @dataclasses.dataclass
 class Write:
     """A value that was written to the axis as valid."""
@@ -56,7 +60,8 @@ class Axis:
                 last = Writer(stood_um, told_at, told_at)
             self.writes.append(Write(now, last.since_s, last.value_um, value_um, writer,
                                      self.bound_um, self.rate_um_per_s))
-            self.writers[writer] = Writer(value_um, last.at_s, now)
+            again = value_um == last.value_um and now - last.at_s > SENT_AGAIN_AFTER_S
+            self.writers[writer] = Writer(value_um, last.since_s if again else last.at_s, now)
             if self.obeys:
                 self.position_um = value_um
 

@@ -4,6 +4,7 @@ a place where every answer can be spoiled before it goes out."""
 import contextlib
 import os
 import pty
+import queue
 import select
 import socket
 import struct
@@ -83,6 +84,30 @@ class Hold:
         self.close = close
 
 
+class Sender:
+    """Sends answers in order, with their pauses, while questions go on being taken."""
+
+    def __init__(self, send, close):
+        self.send = send
+        self.close = close
+        self.queue = queue.SimpleQueue()
+        threading.Thread(target=self.run, daemon=True).start()
+
+    def put(self, parts):
+        self.queue.put(parts)
+
+    def run(self):
+        with contextlib.suppress(OSError):
+            while (parts := self.queue.get()) is not None:
+                for part in parts:
+                    if not isinstance(part, Hold):
+                        self.send(part)
+                        continue
+                    time.sleep(part.seconds)
+                    if part.close:
+                        self.close()
+
+
 def as_it_is(_frame_of, _request, answer):
     return [answer]
 
@@ -139,6 +164,7 @@ class TcpSlave:
     def serve(self, link):
         with link, contextlib.suppress(OSError), link.makefile("rb") as stream:
             self.greet(link)
+            sender = Sender(link.sendall, lambda: link.shutdown(socket.SHUT_RDWR))
             while len(head := stream.read(7)) == 7:
                 transaction, _, length, unit = struct.unpack(">HHHB", head)
                 request = stream.read(max(0, length - 1))
@@ -148,20 +174,8 @@ class TcpSlave:
 
                 frame_of.transaction = transaction
                 answer = frame_of(self.registers.answer(request, unit))
-                if not send_parts(self.spoil(frame_of, request, answer), link.sendall):
-                    return
-
-
-def send_parts(parts, send):
-    """False: the link is to end."""
-    for part in parts:
-        if not isinstance(part, Hold):
-            send(part)
-            continue
-        time.sleep(part.seconds)
-        if part.close:
-            return False
-    return True
+                sender.put(self.spoil(frame_of, request, answer))
+            sender.put(None)
 
 
 def crc16(frame):
@@ -197,6 +211,7 @@ class RtuSlaves:
         self.device = os.ttyname(self.theirs)
         self.ending = False
         self.silent = False
+        self.sender = Sender(lambda data: os.write(self.mine, data), lambda: None)
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
 
@@ -213,6 +228,7 @@ class RtuSlaves:
     def close(self):
         self.ending = True
         self.thread.join(5)
+        self.sender.put(None)
         os.close(self.mine)
         os.close(self.theirs)
 
@@ -245,8 +261,4 @@ class RtuSlaves:
 
         frame_of.transaction = 0
         answer = frame_of(self.units[unit].answer(body[1:], unit))
-        with contextlib.suppress(OSError):
-            send_parts(self.spoil(frame_of, body[1:], answer), self.send)
-
-    def send(self, data):
-        os.write(self.mine, data)
+        self.sender.put(self.spoil(frame_of, body[1:], answer))
