@@ -16,6 +16,8 @@ BOUND_UM = 100.0
 # longer may a time have been than its samples say. At 40 um/s that is 8 um; a doubled or lost
 # offset is 30 um.
 CLOCK_S = 0.2
+# Of a drive in a servo period: 1 mm/s, with which the offset goes to zero before the axes are homed.
+DRIVE_STEP_UM = 1.01
 
 
 class LinuxCncRig:
@@ -91,8 +93,7 @@ class LinuxCncRig:
         for recording in self.recordings:
             for axis in range(recording.asked_um.shape[1]):
                 judge_axis(recording.asked_um[:, axis], recording.applied_um[:, axis], largest)
-            from recording import SMOOTH
-            if not SMOOTH[self.way].holds(recording):
+            if recording.largest_step_um() > DRIVE_STEP_UM:
                 self.broke(f"a drive steps by {recording.largest_step_um():.3f} um in 1 ms")
         if not self.recordings:
             self.broke("nothing was recorded")
@@ -118,6 +119,8 @@ def judge_axis(asked, applied, largest):
     changes = np.flatnonzero(np.diff(asked) != 0) + 1
     largest["value_um"] = max(largest["value_um"], float(np.max(np.abs(asked), initial=0.0)))
     for before, at in zip(changes, changes[1:]):
+        if 0.0 in (asked[at], asked[at - 1]):
+            continue  # the gate in HAL, which is shut while the machine is off or not homed
         step = min(abs(asked[at] - asked[at - 1]), abs(asked[at] - applied[at]))
         allowed = RATE_UM_PER_S * (0.001 * (at - before) + CLOCK_S)
         largest["writes"] += 1
