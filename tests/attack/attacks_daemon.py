@@ -9,8 +9,9 @@ import threading
 import time
 
 import watch
+from machine import RESOLUTION_UM
+from process import eventually
 from registry import attack
-from rig import RESOLUTION_UM, eventually
 
 BEFORE_UM = -3.0
 DAY_NS = 86_400_000_000_000

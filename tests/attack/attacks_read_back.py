@@ -5,8 +5,8 @@ import math
 import time
 
 import axis as lies
+from process import eventually
 from registry import attack
-from rig import eventually
 
 BUSES = ("tcp", "rtu", "can", "bridge")
 BEFORE_UM, WANTED_UM = -3.0, -24.0

@@ -5,8 +5,8 @@ import struct
 import time
 
 import watch
+from process import eventually
 from registry import attack
-from rig import eventually
 
 BEFORE_UM = -3.0
 LOOKED_AT_S = 4.0

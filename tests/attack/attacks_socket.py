@@ -104,7 +104,8 @@ def nonsense_lines(rig):
              b'{"jsonrpc":"2.0","id":1,"method":"status","params":{"a":' + b"[" * 30000 +
              b"]" * 30000 + b"}}\n", b"x" * 70000, b'{"a":' * 20000 + b"\n", b"\0" * 1000 + b"\n",
              b'{"jsonrpc":"2.0","id":"' + b"i" * 60000 + b'","method":"status"}\n',
-             b'{"jsonrpc":"2.0","id":1,"method":"measured","params":{"axis":"z","value_um":1e999}}\n',
+             b'{"jsonrpc":"2.0","id":1,"method":"measured",'
+             b'"params":{"axis":"z","value_um":1e999}}\n',
              b'{"jsonrpc":"2.0","id":1,"method":"prove","params":{"axis":["z"],"value_um":{}}}\n',
              b'{"jsonrpc":"2.0","id":1,"method":"controller_state","params":{"session":1}}\n',
              b'{"jsonrpc":"2.0","id":1,"method":"\\ud800"}\n', b"1e99999\n", b'"' * 3001 + b"\n"]

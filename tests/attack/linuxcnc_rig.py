@@ -16,7 +16,7 @@ BOUND_UM = 100.0
 # longer may a time have been than its samples say. At 40 um/s that is 8 um; a doubled or lost
 # offset is 30 um.
 CLOCK_S = 0.2
-# Of a drive in a servo period: 1 mm/s, with which the offset goes to zero before the axes are homed.
+# Of a drive in a servo period: 1 mm/s, with which the offset goes to zero before homing.
 DRIVE_STEP_UM = 1.01
 
 

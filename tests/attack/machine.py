@@ -1,10 +1,11 @@
-"""A machine that knows the daemon only by its buses: thermocouples that show what a test says, a
-controller that may lie, and the configuration that a commissioning engineer would write for them."""
+"""A machine that knows the daemon only by its buses: thermocouples that show what a test says, and
+a controller that may lie."""
 
 import math
 import pathlib
 import struct
 
+import configuration as text
 from axis import Axis
 from modbus_server import RtuSlaves, Registers, TcpSlave
 
@@ -19,155 +20,6 @@ LINKS = ("tcp", "rtu", "can", "bridge", "piezo")
 CURVE = ((0.0, -22.0), (25.0, -16.5), (50.0, -9.4), (75.0, -1.3), (100.0, 7.2), (125.0, 15.4),
          (150.0, 22.8))
 PIEZO_BOUND_UM = 20.0
-
-MODEL = """format = 1
-inputs = ["column_degC", "spindle_degC"]
-outputs = ["z_um"]
-reference = "first_sample"
-matrix_um_per_K = [[3.0, -1.5]]
-"""
-HEAD = """format = 1
-state_file = "{folder}/state.json"
-[loop]
-rate_hz = {rate_hz}
-[model]
-file = "{model}"
-"""
-SENSOR_TABLE = """[[device]]
-name = "module"
-bus = "cabinet"
-unit = 1
-period_s = 0.02
-table = "input"
-encoding = "{encoding}"
-scale = {scale}
-[[sensor]]
-name = "column"
-device = "module"
-address = 0
-[[sensor]]
-name = "spindle"
-device = "module"
-address = 2
-"""
-CAN_SENSORS = """[[bus]]
-name = "cabinet"
-kind = "can"
-interface = "vcan0"
-[[device]]
-name = "module"
-bus = "cabinet"
-id = 0x181
-length_bits = 16
-scale = 0.01
-[[sensor]]
-name = "column"
-device = "module"
-start_bit = 0
-[[sensor]]
-name = "spindle"
-device = "module"
-start_bit = 16
-"""
-REST = """[screening]
-temp_degC_min = -30.0
-temp_degC_max = 120.0
-stale_after_s = {stale_after_s}
-rate_allowance_K = 100.0
-[smoothing]
-form = "off"
-[[block]]
-name = "column"
-input = "column_degC"
-sensors = ["column"]
-[[block]]
-name = "spindle"
-input = "spindle_degC"
-sensors = ["spindle"]
-"""
-MODBUS_CONTROLLER = """[controller]
-name = "cnc"
-kind = "{kind}"
-unit = {unit}
-{place}timeout_ms = 200
-reconnect_s = 0.1
-period_s = 0.02
-valid_bits = {{ table = "holding", address = 2, encoding = "uint16" }}
-heartbeat = {{ table = "holding", address = 3, encoding = "uint16" }}
-[[axis]]
-name = "z"
-output = "z_um"
-offset_um_max = {bound}
-rate_um_per_s_max = {rate}
-offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
-applied = {{ table = "input", address = 10, encoding = "{shown_as}", scale = {shown_scale} }}
-"""
-CAN_CONTROLLER = """[controller]
-name = "cnc"
-kind = "can"
-interface = "vcan1"
-period_s = 0.02
-silent_after_s = 0.5
-reconnect_s = 0.1
-valid_bits = {{ id = 0x200, start_bit = 32, length_bits = 8 }}
-heartbeat = {{ id = 0x200, start_bit = 40, length_bits = 8 }}
-[[axis]]
-name = "z"
-output = "z_um"
-offset_um_max = {bound}
-rate_um_per_s_max = {rate}
-offset = {{ id = 0x200, start_bit = 0, length_bits = 32, scale = 0.001 }}
-applied = {{ id = 0x300, start_bit = 0, length_bits = 32, {can_float}scale = {shown_scale} }}
-"""
-BRIDGE = """[controller]
-name = "mill"
-kind = "linuxcnc"
-silent_after_s = 1.0
-[[axis]]
-name = "z"
-output = "z_um"
-offset_um_max = {bound}
-rate_um_per_s_max = {rate}
-"""
-DRY_RUN = """[controller]
-name = "none"
-kind = "dry_run"
-[[axis]]
-name = "z"
-output = "z_um"
-offset_um_max = {bound}
-rate_um_per_s_max = {rate}
-"""
-PIEZO = """[controller]
-name = "amplifier"
-kind = "piezo_tcp"
-unit = {unit}
-{place}timeout_ms = 200
-reconnect_s = 0.1
-period_s = 0.02
-[[axis]]
-name = "z"
-output = "z_um"
-offset_um_max = {bound}
-rate_um_per_s_max = {rate}
-offset = {{ table = "holding", address = 0, encoding = "uint16", scale = 0.01 }}
-applied = {{ table = "input", address = 10, encoding = "uint16", scale = 0.01 }}
-[axis.piezo]
-curve_V = {volts}
-curve_um = {um}
-settle_s = 0.1
-steady_s = 0.2
-"""
-TAIL = """[compensation]
-mismatch_um = 2.0
-mismatch_after_s = 1.0
-{compensation}[history]
-file = "{history}"
-commit_s = 0.2
-offsets_period_s = 0.02
-{more}[socket]
-path = "{socket}"
-"""
 
 
 def encoded(value, kind, scale):
@@ -205,8 +57,8 @@ class ModbusController:
 
     def show(self, function, address, count):
         if function == 4 and address <= APPLIED < address + count:
-            self.registers.put(4, APPLIED,
-                               encoded(self.axis.shown_um(self.registers.writer), self.shown_as, self.shown_scale))
+            shown_um = self.axis.shown_um(self.registers.writer)
+            self.registers.put(4, APPLIED, encoded(shown_um, self.shown_as, self.shown_scale))
 
     def written(self):
         if self.registers.words(3, VALID, 1)[0] & 1:
@@ -281,7 +133,7 @@ class Machine:
         self.thermocouples = Thermocouples(self.choices.get("encoding", "int32"))
         self.slaves = []
         getattr(self, "make_" + link)()
-        (self.folder / "model.toml").write_text(MODEL)
+        (self.folder / "model.toml").write_text(text.MODEL)
 
     def make_tcp(self):
         self.controller = ModbusController(self.axis, self.shown_as, self.shown_scale)
@@ -318,30 +170,31 @@ class Machine:
 
     def sensor_text(self):
         if self.link == "can":
-            return CAN_SENSORS
+            return text.CAN_SENSORS
         kind = "modbus_rtu" if self.link == "rtu" else "modbus_tcp"
         return (f'[[bus]]\nname = "cabinet"\nkind = "{kind}"\n{self.sensor_slave.place()}' +
-                SENSOR_TABLE.format(encoding=self.thermocouples.encoding,
+                text.SENSOR_TABLE.format(encoding=self.thermocouples.encoding,
                                     scale=self.thermocouples.scale))
 
     def controller_text(self, choices, dry_run):
         if dry_run:
-            return DRY_RUN.format(**choices)
+            return text.DRY_RUN.format(**choices)
         if self.link == "can":
-            return CAN_CONTROLLER.format(**choices)
+            return text.CAN_CONTROLLER.format(**choices)
         if self.link == "bridge":
-            return BRIDGE.format(**choices)
+            return text.BRIDGE.format(**choices)
         choices = choices | {"place": self.slave.place()}
         if self.link == "piezo":
-            return PIEZO.format(volts=[v for v, _ in CURVE], um=[um for _, um in CURVE], **choices)
-        return MODBUS_CONTROLLER.format(kind="modbus_" + self.link, **choices)
+            return text.PIEZO.format(volts=[volt for volt, _ in CURVE],
+                                     um=[um for _, um in CURVE], **choices)
+        return text.MODBUS_CONTROLLER.format(kind="modbus_" + self.link, **choices)
 
     def config(self, folder, socket, history=None, unit=1, dry_run=False, **other):
         """The text of a daemon's configuration whose files are in `folder`."""
         choices = self.choices | {"folder": folder, "socket": socket, "unit": unit,
                                   "history": history or folder / "history.db"} | other
-        return (HEAD.format(**choices) + self.sensor_text() + REST.format(**choices) +
-                self.controller_text(choices, dry_run) + TAIL.format(**choices))
+        return (text.HEAD.format(**choices) + self.sensor_text() + text.REST.format(**choices) +
+                self.controller_text(choices, dry_run) + text.TAIL.format(**choices))
 
     def wants_um(self, offset_um):
         """The column is so warm that this is the offset (with the reference of the start)."""

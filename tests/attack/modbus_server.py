@@ -1,5 +1,5 @@
-"""Modbus slaves in plain bytes, over TCP and over a pseudo-terminal: registers that a test sets, and
-a place where every answer can be spoiled before it goes out."""
+"""Modbus slaves in plain bytes, over TCP and over a pseudo-terminal: registers that a test sets,
+and a place where every answer can be spoiled before it goes out."""
 
 import contextlib
 import os
