@@ -149,6 +149,7 @@ def run_all(given):
     chooser = random.Random(given.seed)
     tries = wanted_tries(given)
     end = time.monotonic() + 60.0 * given.minutes
+    signal.signal(signal.SIGTERM, lambda *_: stopped_early(table))
     with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
         first = True
         while first or time.monotonic() < end:
@@ -164,6 +165,13 @@ def run_all(given):
                     table.add(*jobs[job], job.result())
             first = False
     return table.print()
+
+
+def stopped_early(table):
+    """Asked to end: what is known is told."""
+    table.print()
+    print("stopped before the end", flush=True)
+    os._exit(1)
 
 
 def run_try(name, link, seed, first, end, given):
