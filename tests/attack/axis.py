@@ -57,6 +57,8 @@ class Axis:
             last = self.writers.get(writer)
             if last is None:
                 told_at, stood_um = self.told.get(writer, (now, self.position_um))
+                if now < told_at:
+                    return  # was on its way when the controller began anew, which drops its queue
                 last = Writer(stood_um, told_at, told_at)
             self.writes.append(Write(now, last.since_s, last.value_um, value_um, writer,
                                      self.bound_um, self.rate_um_per_s))

@@ -89,7 +89,7 @@ class LinuxCncRig:
 
     def judge(self):
         """The asked-for offset may begin anew from what is applied; else it keeps slew and time."""
-        largest = {"step_um": 0.0, "allowed_um": 0.0, "beyond": 0, "value_um": 0.0, "writes": 0}
+        largest = {"step_um": 0.0, "allowed_um": 1e3, "beyond": 0, "value_um": 0.0, "writes": 0}
         for recording in self.recordings:
             for axis in range(recording.asked_um.shape[1]):
                 judge_axis(recording.asked_um[:, axis], recording.applied_um[:, axis], largest)
