@@ -2,6 +2,7 @@
 controller says of it, which need not be true."""
 
 import dataclasses
+import math
 import threading
 import time
 
@@ -48,7 +49,7 @@ class Axis:
         self.lied = False
         self.writes = []
         self.writers = {}
-        self.told = {}  # writer: (when it read where the axis stands, where) before its first write
+        self.told = {}  # before its first write; writer: (when it read first, what it read last)
         self.before_shown = lambda: None
 
     def written(self, value_um, writer=1, at_s=None):
@@ -70,10 +71,12 @@ class Axis:
     def shown_um(self, writer=1):
         with self.lock:
             self.before_shown()
-            if writer not in self.writers:
-                self.told.setdefault(writer, (time.monotonic(), self.position_um))
+            now = time.monotonic()
             self.lied = self.lied or self.lie is not None
-            return self.position_um if self.lie is None else self.lie(self, time.monotonic())
+            shown_um = self.position_um if self.lie is None else self.lie(self, now)
+            if writer not in self.writers and math.isfinite(shown_um):
+                self.told[writer] = (self.told.get(writer, (now,))[0], shown_um)
+            return shown_um
 
     def stands_at(self, position_um):
         """The controller has moved by itself, or whoever wrote before is gone: the next value is
