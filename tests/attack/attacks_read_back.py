@@ -69,7 +69,7 @@ def run_lie(rig, make, likely):
     rig.machine.wants_um(WANTED_UM)
     rig.axis.lie = rig.axis.lie or make(rig)
     began = time.monotonic()
-    if from_the_start and abs(rig.axis.lie(rig.axis, began)) > rig.axis.bound_um:
+    if from_the_start and likely and abs(rig.axis.lie(rig.axis, began)) > rig.axis.bound_um:
         must_not_drive(rig)
         rig.axis.lie = None
     elif likely and rig.machine.link != "piezo":
