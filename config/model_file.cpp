@@ -292,7 +292,7 @@ ThermalModel parse_model(const std::string& text, const std::string& name) {
 }
 
 ThermalModel load_model(const std::filesystem::path& path) {
-  return parse_model(read_text_file(path), path.string());
+  return parse_model(read_text_file(path, model_bytes_max), path.string());
 }
 
 }  // namespace thermocomp

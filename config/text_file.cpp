@@ -9,8 +9,6 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::uintmax_t file_bytes_max = std::uintmax_t{64} * 1024 * 1024;
-
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -28,17 +26,21 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string read_text_file(const std::filesystem::path& path) {
+std::string read_text_file(const std::filesystem::path& path, std::uintmax_t bytes_max) {
   const auto refuse = [&](const std::string& rule) {
     throw ConfigurationError({{path.string(), 0, "", "", rule}});
   };
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
+  if (error && error != std::errc::no_such_file_or_directory) {
+    refuse("cannot be read: " + error.message());
+  }
   if (!std::filesystem::exists(status)) refuse("no such file");
   if (!std::filesystem::is_regular_file(status)) refuse("must be a regular file");
   const auto size = std::filesystem::file_size(path, error);
   if (error) refuse("cannot be read: " + error.message());
-  if (size > file_bytes_max) refuse("must have at most 64 MB");
+  constexpr std::uintmax_t MB = std::uintmax_t{1024} * 1024;
+  if (size > bytes_max) refuse("must have at most " + std::to_string(bytes_max / MB) + " MB");
   std::ifstream file(path, std::ios::binary);
   if (!file) refuse(std::string("cannot be opened: ") + std::strerror(errno));
   std::string text(static_cast<std::size_t>(size), '\0');
