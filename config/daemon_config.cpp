@@ -3,6 +3,7 @@
 #include <optional>
 #include <utility>
 
+#include "config/file_limits.hpp"
 #include "config/model_file.hpp"
 #include "config/named_files.hpp"
 #include "config/sections/buses.hpp"

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "config/file_limits.hpp"
 #include "config/toml_reader.hpp"
 #include "config/units.hpp"
 

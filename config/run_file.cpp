@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <set>
 
+#include "config/file_limits.hpp"
 #include "config/number_text.hpp"
 #include "config/toml_reader.hpp"
 #include "config/units.hpp"

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "config/file_limits.hpp"
 #include "config/toml_reader.hpp"
 
 namespace thermocomp {
@@ -39,8 +40,8 @@ std::string read_text_file(const std::filesystem::path& path, std::uintmax_t byt
   if (!std::filesystem::is_regular_file(status)) refuse("must be a regular file");
   const auto size = std::filesystem::file_size(path, error);
   if (error) refuse("cannot be read: " + error.message());
-  constexpr std::uintmax_t MB = std::uintmax_t{1024} * 1024;
-  if (size > bytes_max) refuse("must have at most " + std::to_string(bytes_max / MB) + " MB");
+  if (size > bytes_max)
+    refuse("must have at most " + std::to_string(bytes_max / bytes_per_MB) + " MB");
   std::ifstream file(path, std::ios::binary);
   if (!file) refuse(std::string("cannot be opened: ") + std::strerror(errno));
   std::string text(static_cast<std::size_t>(size), '\0');
@@ -49,7 +50,13 @@ std::string read_text_file(const std::filesystem::path& path, std::uintmax_t byt
   return text;
 }
 
+std::string read_text_file(const std::filesystem::path& path) {
+  return read_text_file(path, file_bytes_max);
+}
+
 std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
+  constexpr std::size_t name_bytes_max = 100;  // the time grows with its length
+  if (name.size() > name_bytes_max) return {};
   std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
   std::string nearest;
   for (const std::string& candidate : known) {

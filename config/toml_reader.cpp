@@ -555,22 +555,47 @@ const std::string& TomlDocument::name() const noexcept {
   return state_->name;
 }
 
+namespace {
+
+/// A key that nobody asked for.
+struct UnknownKey {
+  const detail::TomlState::Opened* table;
+  const toml::key* key;
+  const toml::node* value;
+};
+
+Problem unknown_problem(const std::string& file, const UnknownKey& unknown, bool is_suggested) {
+  const std::string name(unknown.key->str());
+  std::string rule = "unknown key";
+  if (is_suggested) {
+    const auto& asked = unknown.table->asked;
+    const std::string meant = nearest_name(name, {asked.begin(), asked.end()});
+    if (!meant.empty()) rule += "; did you mean \"" + meant + "\"?";
+  }
+  const std::string& path = unknown.table->path;
+  return {file, line_of(unknown.key->source()), path.empty() ? name : path + "." + name,
+          shown(*unknown.value), rule};
+}
+
+}  // namespace
+
 std::vector<Problem> TomlDocument::all_problems() const {
-  std::vector<Problem> problems = state_->problems;
+  constexpr std::size_t suggestions_max = 100;  // as many as are told
+  std::vector<UnknownKey> unknown;
   for (const auto& [table, opened] : state_->opened) {
     if (opened.ignore_rest) continue;
-    const std::vector<std::string> known(opened.asked.begin(), opened.asked.end());
     for (const auto& [key, value] : *table) {
-      if (problems.size() >= kept_problems_max) return problems;
-      const std::string name(key.str());
-      if (opened.asked.contains(name)) continue;
-      const std::string meant = nearest_name(name, known);
-      const std::string rule =
-          meant.empty() ? "unknown key" : "unknown key; did you mean \"" + meant + "\"?";
-      problems.push_back({state_->name, line_of(key.source()),
-                          opened.path.empty() ? name : opened.path + "." + name, shown(value),
-                          rule});
+      if (!opened.asked.contains(key.str())) unknown.push_back({&opened, &key, &value});
     }
+  }
+  std::stable_sort(unknown.begin(), unknown.end(), [](const UnknownKey& a, const UnknownKey& b) {
+    return a.key->source().begin.line < b.key->source().begin.line;
+  });
+  std::vector<Problem> problems = state_->problems;
+  for (const UnknownKey& key : unknown) {
+    if (problems.size() >= kept_problems_max) break;
+    const auto place = static_cast<std::size_t>(&key - unknown.data());
+    problems.push_back(unknown_problem(state_->name, key, place < suggestions_max));
   }
   return problems;
 }

@@ -34,14 +34,6 @@
 
 namespace thermocomp {
 
-/// A configuration, a preset, what describes a machine, a structure, factors.
-inline constexpr std::uintmax_t file_bytes_max = std::uintmax_t{4} * 1024 * 1024;
-/// Models; tables of messages and objects (DBC, EDS), which others wrote.
-inline constexpr std::uintmax_t model_bytes_max = std::uintmax_t{16} * 1024 * 1024;
-inline constexpr std::uintmax_t bus_table_bytes_max = model_bytes_max;
-/// Run files.
-inline constexpr std::uintmax_t run_bytes_max = std::uintmax_t{64} * 1024 * 1024;
-
 /// Numbers a key may have; always finite.
 struct Range {
   double min{-std::numeric_limits<double>::max()};
@@ -215,10 +207,9 @@ class TomlDocument {
   std::shared_ptr<detail::TomlState> state_;
 };
 
-/// The text of a regular file.
-/// @throws ConfigurationError, before it is read where it has more than `bytes_max`
-[[nodiscard]] std::string read_text_file(const std::filesystem::path& path,
-                                         std::uintmax_t bytes_max = file_bytes_max);
+/// The text of a regular file of at most 4 MB (config/file_limits.hpp has the limits).
+/// @throws ConfigurationError
+[[nodiscard]] std::string read_text_file(const std::filesystem::path& path);
 
 /// Of `known` the name that is so near to `name` that it was probably meant; else empty.
 [[nodiscard]] std::string nearest_name(std::string_view name,

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <malloc.h>
 #include <poll.h>
 #include <thread>
 #include <unistd.h>
@@ -297,6 +298,7 @@ void Daemon::Parts::look_at_health() {
   controller_health = link->health();
   events.note_controller(controller_health);
   events.note_missed(cycle->timing().missed.load());
+  events.note_failed_sleeps(cycle->timing().failed_sleeps.load());
   events.note_socket(server->statistics());
   service.status(status_line(view()));
 }
@@ -391,6 +393,7 @@ void Daemon::Parts::reload() {
     spdlog::info("reloaded: model {} (SHA-256 {})", config.model_file.string(),
                  config.model_checksum);
   } catch (...) {
+    malloc_trim(0);  // what the refused files took; locked memory is never given back by itself
     service.ready(status_line(view()));
     throw;
   }

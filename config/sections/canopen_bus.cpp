@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "config/file_limits.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 
