@@ -140,6 +140,14 @@ void EventLog::note_missed(std::uint64_t missed) {
   missed_ = missed;
 }
 
+void EventLog::note_failed_sleeps(std::uint64_t failed) {
+  if (failed > failed_sleeps_) {
+    spdlog::error("clock_nanosleep failed {} times: the cycle waits by poll, a millisecond late",
+                  failed - failed_sleeps_);
+  }
+  failed_sleeps_ = failed;
+}
+
 void EventLog::note_socket(const SocketStatistics& statistics) {
   const auto now = std::chrono::steady_clock::now();
   if (now < socket_next_) return;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -118,6 +119,7 @@ CycleHandle::Tracked Operations::begin_reload() {
     brain->estimator.plan_adoption(cycle_.estimator());
     reload_ = {std::move(next), cycle_.replace(std::move(brain), Clock::now())};
   } catch (...) {
+    malloc_trim(0);  // what the refused files took; locked memory is never given back by itself
     parts_.service.ready(parts_.status_line());
     throw;
   }

@@ -101,6 +101,7 @@ void Supervisor::look_at_health() {
   controller_health_ = parts_.link.health();
   events_.note_controller(controller_health_);
   events_.note_missed(cycle().timing().missed.load());
+  events_.note_failed_sleeps(cycle().timing().failed_sleeps.load());
   events_.note_socket(parts_.server.statistics());
   parts_.service.status(status_line(view()));
 }

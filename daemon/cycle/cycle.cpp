@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <poll.h>
 #include <time.h>
 
 #include "estimator/checks.hpp"
@@ -15,12 +16,24 @@ nanoseconds now_on_clock() noexcept {
   return std::chrono::seconds(time.tv_sec) + nanoseconds(time.tv_nsec);
 }
 
-void sleep_until(nanoseconds wake) noexcept {
+/// By another system call, a millisecond or more at a time: a FIFO thread that spun instead would
+/// take the processor from everybody, and its cycles would run ahead of time.
+void wait_otherwise(nanoseconds wake) noexcept {
+  while (now_on_clock() < wake) poll(nullptr, 0, 1);
+}
+
+/// @return false when the system refused to sleep; it is `wake` all the same
+bool sleep_until(nanoseconds wake) noexcept {
   timespec time{};
   time.tv_sec = std::chrono::duration_cast<std::chrono::seconds>(wake).count();
   time.tv_nsec = (wake % std::chrono::seconds(1)).count();
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
+  int error = EINTR;
+  while (error == EINTR) {
+    error = clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
   }
+  if (error == 0) return true;
+  wait_otherwise(wake);
+  return false;
 }
 
 }  // namespace
@@ -48,7 +61,7 @@ void Cycle::run() noexcept {
   std::uint64_t cycle = begin(now_on_clock());
   while (!stop_.load(std::memory_order_relaxed)) {
     const nanoseconds wake = grid_.time_of(cycle);
-    sleep_until(wake);
+    if (!sleep_until(wake)) timing_.failed_sleeps.fetch_add(1, std::memory_order_relaxed);
     const nanoseconds start = now_on_clock();
     step(cycle);
     const nanoseconds end = now_on_clock();

@@ -34,6 +34,7 @@ struct CycleTiming {
   DurationHistogram work;      ///< from waking up to being done
   std::atomic<std::uint64_t> cycles{0};
   std::atomic<std::uint64_t> missed{0};
+  std::atomic<std::uint64_t> failed_sleeps{0};  ///< the system refused to sleep until a time
 };
 
 /// On the thread that calls run(): no allocation, no lock, no log call, no exception and no system

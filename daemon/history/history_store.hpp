@@ -10,6 +10,8 @@
 ///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more a
 ///   commit;
 ///            wall_minus_grid_ns: wall clock minus the grid's time when it was written
+/// segment and chunk have a checksum (row_checksum.hpp); files of earlier versions get the columns
+/// when they are opened for writing.
 #pragma once
 
 #include <cstddef>

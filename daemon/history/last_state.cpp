@@ -21,7 +21,13 @@ PersistentState state_after(const HistoryReader& reader, const SegmentInfo& segm
 
 void search(const HistoryReader& reader, const SetupParser& parser, RecordedState& found) {
   const std::vector<SegmentInfo>& segments = reader.segments();
-  found.has_run = !segments.empty();
+  found.has_run = !segments.empty() || !reader.damage().empty();
+  for (const HistoryDamage& damage : reader.damage()) {
+    // What the reader left out and may be of a later time than all it took; 0: the whole file.
+    if (!segments.empty() && damage.segment != 0 && damage.segment <= segments.back().id) continue;
+    found.is_newest = false;
+    found.problem = to_string(damage);
+  }
   for (auto segment = segments.rbegin(); segment != segments.rend() && !found.state; ++segment) {
     try {
       found.state = state_after(reader, *segment, parser);

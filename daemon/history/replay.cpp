@@ -92,9 +92,16 @@ std::uint64_t cycles_of(const SegmentInfo& segment) {
   return static_cast<std::uint64_t>(segment.last_cycle + 1) - segment.first_cycle;
 }
 
+using DamageSink = std::function<void(const HistoryDamage&)>;
+
 ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups,
-                         const OffsetSink& sink, const Progress& progress) {
+                         const OffsetSink& sink, const DamageSink& tell, const Progress& progress) {
   ReplaySummary summary;
+  const auto note = [&](const HistoryDamage& damage) {
+    if (tell) tell(damage);
+    summary.damage.push_back(damage);
+  };
+  for (const HistoryDamage& damage : reader.damage()) note(damage);
   const HistoryClock clock(reader);
   std::uint64_t total = 0;
   for (const SegmentInfo& segment : reader.segments()) total += cycles_of(segment);
@@ -107,9 +114,8 @@ ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups
         if (progress) progress(static_cast<double>(done + cycles) / static_cast<double>(total));
       });
     } catch (const std::exception& error) {
-      throw HistoryError(reader.file().string() + ": segment " + std::to_string(segment.id) +
-                         " (written by version " + segment.program_version +
-                         ") cannot be replayed: " + error.what());
+      note({segment.id, "(written by version " + segment.program_version +
+                            ") cannot be replayed: " + error.what()});
     }
     ++summary.segments;
     done += cycles_of(segment);
@@ -130,7 +136,7 @@ ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sin
                      const Progress& progress, const SetupParser& parser) {
   const HistoryReader reader(history);
   const ParsedSetups setups(reader, parser);
-  return replay_all(reader, setups, sink, progress);
+  return replay_all(reader, setups, sink, {}, progress);
 }
 
 ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& out,
@@ -160,7 +166,8 @@ ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& 
     out << text;
     text.clear();
   };
-  const ReplaySummary summary = replay_all(reader, setups, sink, progress);
+  const DamageSink tell = [&](const HistoryDamage& damage) { text += damage_line(damage); };
+  const ReplaySummary summary = replay_all(reader, setups, sink, tell, progress);
   out << text;
   return summary;
 }

@@ -54,6 +54,9 @@ std::uint64_t SegmentSteps::take_inputs(std::uint64_t cycle) {
         throw HistoryError("damaged: skipped cycles end before they begin");
       }
       const auto after = static_cast<std::uint64_t>(record_.time_ns) + 1;
+      if (record_.time_ns > segment_.last_cycle) {
+        throw HistoryError("damaged: skipped cycles end after the segment");
+      }
       next();
       return after;
     }
