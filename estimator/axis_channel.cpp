@@ -134,12 +134,12 @@ void AxisChannel::release() noexcept {
 }
 
 void AxisChannel::check_release(const AxisInput& input) noexcept {
-  if (check_.agrees(input.applied_um)) return end_latch();
   const double sent_um = limiter_.offset_um();
+  const bool mended = std::abs(input.applied_um - sent_um) <= same_read_back_um;
   const bool first = std::isnan(released_um_);
   const bool stands = std::abs(input.applied_um - released_um_) <= same_read_back_um;
-  if (out_of_bound_ || latched_mismatch_.explains(sent_um, input.applied_um) ||
-      !(first || stands)) {
+  if (out_of_bound_ || !(first || stands) ||
+      (!mended && latched_mismatch_.explains(sent_um, input.applied_um))) {
     releasing_ = false;
     return;
   }

@@ -37,10 +37,10 @@ class AxisChannel {
   /// driven, or beyond prove_um_max.
   void prove(double move_um) noexcept;
   void end_prove() noexcept { prove_phase_ = ProvePhase::none; }
-  /// An operator says that what caused a latched mismatch is mended. The next read-backs decide: in
-  /// agreement with what was sent last, the axis goes on from there; explained by the very factor,
-  /// sign or constant that was latched, it stays latched; else it starts from what is read back,
-  /// once two agree on it and the slew rate would have had the time to go there.
+  /// An operator says that what caused a latched mismatch is mended. The next read-backs decide:
+  /// explained by the very factor, sign or constant that was latched, or not two alike, it stays
+  /// latched; else the axis starts from what is read back, once the slew rate would have had the
+  /// time to go there from what was sent last.
   void release() noexcept;
 
   [[nodiscard]] double offset_um() const noexcept { return limiter_.offset_um(); }

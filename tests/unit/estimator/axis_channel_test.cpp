@@ -268,7 +268,7 @@ TEST_CASE("a release does not believe what is still as wrong as it was", "[axis]
   CHECK(bench.channel.offset_um() == sent_um);
   bench.input.applied_um = sent_um;  // the scale is mended
   bench.channel.release();
-  bench.step(-30.0);
+  bench.steps(2, -30.0);
   CHECK(bench.channel.driven());
   CHECK(bench.channel.offset_um() == Approx(sent_um - 0.2));
 }
