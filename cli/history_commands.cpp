@@ -1,15 +1,20 @@
 #include "cli/history_commands.hpp"
 
+#include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
 #include "cli/terminal.hpp"
 #include "config/daemon_config.hpp"
+#include "config/printable_text.hpp"
 #include "config/run_file.hpp"
+#include "daemon/history/history_check.hpp"
 #include "daemon/history/replay.hpp"
 #include "daemon/history/run_replay.hpp"
 
@@ -29,6 +34,18 @@ std::optional<HistoryTime> time_or_none(const std::string& text) {
   return parse_history_time(text);
 }
 
+/// @return the exit status
+int tell_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
+  constexpr std::size_t told_max = 20;
+  for (std::size_t i = 0; i < std::min(damage.size(), told_max); ++i) {
+    std::fprintf(stderr, "%s: %s\n", history.c_str(), printable_text(to_string(damage[i])).c_str());
+  }
+  if (damage.size() > told_max) {
+    std::fprintf(stderr, "%s: and %zu more\n", history.c_str(), damage.size() - told_max);
+  }
+  return damage.empty() ? exit_success : exit_no;
+}
+
 int run_export(const ExportOptions& options) {
   const auto from = time_or_none(options.from);
   const auto to = time_or_none(options.to);
@@ -39,7 +56,10 @@ int run_export(const ExportOptions& options) {
     summary = export_run(options.history, from, to, file.stream(),
                          [&progress](double fraction) { progress.update(fraction); });
   }
-  if (summary.rows == 0) throw Failure(options.history + ": nothing was recorded in that time");
+  if (summary.rows == 0) {
+    tell_damage(options.history, summary.damage);
+    throw Failure(options.history + ": nothing was recorded in that time");
+  }
   file.commit();
   std::fprintf(stderr, "%llu rows, %zu columns\n", static_cast<unsigned long long>(summary.rows),
                summary.columns.size());
@@ -47,7 +67,7 @@ int run_export(const ExportOptions& options) {
     std::fprintf(stderr, "%llu gap%s, each told by a comment line in the file\n",
                  static_cast<unsigned long long>(summary.gaps), summary.gaps == 1 ? "" : "s");
   }
-  return exit_success;
+  return tell_damage(options.history, summary.damage);
 }
 
 struct ReplayOptions {
@@ -64,6 +84,10 @@ int run_history_replay(const ReplayOptions& options) {
     summary = replay_to_csv(options.input, file.stream(),
                             [&progress](double fraction) { progress.update(fraction); });
   }
+  const int status = tell_damage(options.input, summary.damage);
+  if (summary.segments == 0 && status != exit_success) {
+    throw Failure(options.input + ": nothing of it can be replayed");
+  }
   file.commit();
   std::fprintf(
       stderr, "%llu segments (%llu after a gap), %llu cycles, %llu offsets compared, %llu differ\n",
@@ -72,7 +96,7 @@ int run_history_replay(const ReplayOptions& options) {
       static_cast<unsigned long long>(summary.cycles),
       static_cast<unsigned long long>(summary.compared),
       static_cast<unsigned long long>(summary.different));
-  if (summary.different == 0) return exit_success;
+  if (summary.different == 0) return status;
   std::fprintf(stderr, "first at %.3f s, cycle %llu; largest difference %g um\n",
                summary.first_different_time_s.value_or(0.0),
                static_cast<unsigned long long>(summary.first_different_cycle.value_or(0)),
@@ -93,11 +117,61 @@ int run_file_replay(const ReplayOptions& options) {
   return exit_success;
 }
 
+/// "2026-03-01T08:30:00Z"
+std::string utc_text(std::int64_t wall_ns) {
+  const std::time_t seconds = static_cast<std::time_t>(wall_ns / 1'000'000'000);
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  char text[40];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+int run_history_check(const std::string& history) {
+  HistoryCheck check;
+  {
+    Progress progress("check");
+    check = check_history(history, [&progress](double fraction) { progress.update(fraction); });
+  }
+  std::size_t sound = 0;
+  for (const SegmentCheck& part : check.segments) {
+    const SegmentInfo& segment = part.segment;
+    std::printf("segment %lld: run %lld, cycles %llu to %lld, from %s, %llu records: %s\n",
+                static_cast<long long>(segment.id), static_cast<long long>(segment.run),
+                static_cast<unsigned long long>(segment.first_cycle),
+                static_cast<long long>(segment.last_cycle), utc_text(segment.wall_ns).c_str(),
+                static_cast<unsigned long long>(part.records),
+                part.damage.empty() ? "sound" : "damaged");
+    for (const HistoryDamage& damage : part.damage) {
+      std::printf("  %s\n", printable_text(damage.why).c_str());
+    }
+    if (part.damage.empty()) ++sound;
+  }
+  for (const HistoryDamage& damage : check.damage) {
+    std::printf("%s: cannot be read\n", printable_text(to_string(damage)).c_str());
+  }
+  std::printf("%s: %zu of %zu segments sound\n", history.c_str(), sound,
+              check.segments.size() + check.damage.size());
+  return check.is_sound() ? exit_success : exit_no;
+}
+
+void add_history_check(CLI::App& app, Action& action) {
+  CLI::App* group = app.add_subcommand("history", "what a daemon recorded, as a file");
+  group->require_subcommand(1);
+  CLI::App* sub = group->add_subcommand(
+      "check",
+      "which segments of a history are sound; changes nothing. Exit status 1: some are not");
+  const auto history = std::make_shared<std::string>();
+  sub->add_option("HISTORY", *history, "history of thermocompd")->type_name("FILE")->required();
+  sub->callback([&action, history] { action = [history] { return run_history_check(*history); }; });
+}
+
 }  // namespace
 
 void add_history_commands(CLI::App& app, Action& action) {
   const auto export_options = std::make_shared<ExportOptions>();
-  CLI::App* sub = app.add_subcommand("export", "a daemon's history as a run file");
+  CLI::App* sub = app.add_subcommand(
+      "export", "a daemon's history as a run file; what is damaged is told by comment lines");
   sub->add_option("HISTORY", export_options->history, "history of thermocompd")
       ->type_name("FILE")
       ->required();
@@ -129,6 +203,7 @@ void add_history_commands(CLI::App& app, Action& action) {
                                             : run_file_replay(*replay_options);
     };
   });
+  add_history_check(app, action);
 }
 
 }  // namespace thermocomp::cli

@@ -13,7 +13,9 @@
 #include "cli/output_file.hpp"
 #include "cli/prediction.hpp"
 #include "cli/terminal.hpp"
+#include "config/file_limits.hpp"
 #include "config/model_file.hpp"
+#include "config/printable_text.hpp"
 #include "config/run_file.hpp"
 #include "config/toml_reader.hpp"
 #include "daemon/history/replay.hpp"
@@ -74,19 +76,24 @@ struct CovarianceOptions {
 /// A run file, or a daemon's history as one.
 RunFile load_record(const std::string& argument) {
   constexpr std::string_view sqlite = "SQLite format 3";
+  if (!std::filesystem::is_regular_file(argument)) return load_run(parse_selection(argument));
   std::string head(sqlite.size(), ' ');
   std::ifstream file(argument, std::ios::binary);
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   if (!file || head != sqlite) return load_run(parse_selection(argument));
   std::ostringstream text;
   Progress progress("reading " + argument);
-  static_cast<void>(export_run(argument, std::nullopt, std::nullopt, text,
-                               [&progress](double fraction) { progress.update(fraction); }));
+  const ExportSummary summary =
+      export_run(argument, std::nullopt, std::nullopt, text,
+                 [&progress](double fraction) { progress.update(fraction); });
+  for (const HistoryDamage& damage : summary.damage) {
+    std::fprintf(stderr, "%s: %s\n", argument.c_str(), printable_text(to_string(damage)).c_str());
+  }
   return parse_run(text.str(), argument);
 }
 
 int run_covariance(const CovarianceOptions& options) {
-  const std::string text = read_text_file(options.model);
+  const std::string text = read_text_file(options.model, model_bytes_max);
   ThermalModel model = parse_model(text, options.model);
   if (model.inputs.size() > covariance_inputs_max) {
     throw Failure(options.model + ": a covariance is for at most " +

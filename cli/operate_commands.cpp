@@ -68,6 +68,14 @@ int run_prove(const GlobalOptions& global, const AxisValue& given) {
   return exit_success;
 }
 
+int run_release(const GlobalOptions& global, const std::string& axis) {
+  ask_daemon(global.socket, "release", {{"axis", axis}});
+  std::cout << "axis " << axis
+            << ": its next read-backs are looked at; it is driven again unless they still say\n"
+               "what they said: see thermocomp status\n";
+  return exit_success;
+}
+
 using RunAxis = int (*)(const GlobalOptions&, const AxisValue&);
 
 void add_axis_command(CLI::App& app, const GlobalOptions& global, Action& action, const char* name,
@@ -96,6 +104,13 @@ void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& ac
   add_axis_command(app, global, action, "prove",
                    "moves one axis a few um and back, to confirm the sign with an indicator",
                    "by how much, in um", run_prove);
+  CLI::App* sub = app.add_subcommand(
+      "release", "drives an axis again after what made it apply something else was mended");
+  const auto axis = std::make_shared<std::string>();
+  sub->add_option("AXIS", *axis, "name of the axis in the configuration")->required();
+  sub->callback([&global, &action, axis] {
+    action = [&global, axis] { return run_release(global, *axis); };
+  });
 }
 
 }  // namespace thermocomp::cli

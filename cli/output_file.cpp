@@ -4,10 +4,12 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <fcntl.h>
 #include <iostream>
 #include <unistd.h>
 
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <system_error>
 
 #include "cli/command.hpp"
@@ -56,11 +58,35 @@ OutputFile::OutputFile(const std::string& destination)
   if (fs::is_directory(status)) throw cannot_write(name_, EISDIR);
   // A rename would put a plain file in the place of /dev/null or of a pipe.
   if (fs::exists(status) && !fs::is_regular_file(status)) {
+    refuse_what_hangs();
     file_.open(destination_);
     if (!file_) throw cannot_write(name_, errno);
     return;
   }
   open_temporary();
+}
+
+/// To open a pipe that nobody reads waits for ever; a serial port or a disk is no place for a file.
+void OutputFile::refuse_what_hangs() const {
+  const int descriptor = ::open(destination_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
+  if (descriptor < 0) {
+    if (errno == ENXIO) {
+      throw Failure("cannot write " + name_ + ": it is a pipe or socket that nobody reads");
+    }
+    throw cannot_write(name_, errno);
+  }
+  struct stat there {};
+  struct stat output {};
+  const bool is_known = ::fstat(descriptor, &there) == 0;
+  const bool is_output = ::fstat(STDOUT_FILENO, &output) == 0 && there.st_rdev == output.st_rdev;
+  ::close(descriptor);
+  constexpr unsigned memory_devices = 1;  // /dev/null, /dev/full
+  const bool is_device = S_ISCHR(there.st_mode) || S_ISBLK(there.st_mode);
+  const bool is_harmless =
+      S_ISCHR(there.st_mode) && (major(there.st_rdev) == memory_devices || is_output);
+  if (!is_known || (is_device && !is_harmless)) {
+    throw Failure("cannot write " + name_ + ": it is a device; -o takes a file, a pipe or -");
+  }
 }
 
 void OutputFile::open_temporary() {

@@ -9,7 +9,8 @@
 namespace thermocomp::cli {
 
 /// Writes beside the destination and renames on commit(); without commit() nothing is left, also
-/// when the program is interrupted. `-` is standard output; a device or pipe is written directly.
+/// when the program is interrupted. `-` is standard output; a pipe that is read, the terminal and
+/// /dev/null are written directly, other devices refused.
 /// One at a time in a program.
 class OutputFile {
  public:
@@ -23,6 +24,7 @@ class OutputFile {
   void commit();
 
  private:
+  void refuse_what_hangs() const;
   void open_temporary();
 
   std::string name_;                   ///< as given, for messages

@@ -7,7 +7,7 @@ namespace thermocomp::cli {
 
 namespace {
 
-constexpr std::array<ReasonText, 12> reasons{{
+constexpr std::array<ReasonText, 14> reasons{{
     {"operator_disabled", "switched off by an operator", "thermocomp enable"},
     {"controller_disabled", "switched off at the controller",
      "release the switch that the configuration names as disable_signal"},
@@ -30,6 +30,10 @@ constexpr std::array<ReasonText, 12> reasons{{
      "that axis is not driven; set the offset at the controller to zero and look for who set it"},
     {"block_estimated", "an input of the model has no good sensor left and is estimated",
      "compensation goes on; thermocomp sensors says which and why; mend the sensor"},
+    {"mismatch_latched", "what is read back cannot come from what is sent: that axis is not driven",
+     "see below what was sent and read; mend it, then: thermocomp release AXIS"},
+    {"no_target", "the model gives no finite displacement",
+     "check the reference (thermocomp reference) and the model file"},
 }};
 
 constexpr std::array<ReasonText, 12> faults{{

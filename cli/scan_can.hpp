@@ -6,9 +6,9 @@
 
 #include "cli/scan_modbus.hpp"
 #include "cli/scan_report.hpp"
+#include "drivers/can/can_config.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
 
 namespace thermocomp::cli {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 
 namespace thermocomp::cli {
 

@@ -7,7 +7,7 @@
 
 #include "cli/scan_hints.hpp"
 #include "cli/scan_report.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 
 namespace thermocomp::cli {
 

@@ -76,7 +76,12 @@ std::string axis_marks(const json& axis) {
   std::vector<std::string> marks;
   if (!flag_of(axis, "driven")) marks.emplace_back("not driven");
   if (!flag_of(axis, "synced")) marks.emplace_back("read-back unknown");
-  if (flag_of(axis, "mismatch")) marks.emplace_back("mismatch");
+  const json& mismatch = object_of(axis, "mismatch");
+  if (!mismatch.empty())
+    marks.emplace_back(flag_of(mismatch, "releasing") ? "mismatch, being released"
+                                                      : "mismatch latched");
+  else if (flag_of(axis, "disagrees"))
+    marks.emplace_back("read-back disagrees");
   if (flag_of(axis, "at_bound")) marks.emplace_back("at its bound");
   if (flag_of(axis, "proving")) marks.emplace_back("proving its sign");
   return marks.empty() ? "" : "  [" + joined(marks) + "]";
@@ -104,6 +109,10 @@ std::string axes_lines(const json& status) {
       values += ", measured " + with_unit(number_of(axis, "measured"), 2, unit);
     }
     result += line("Axis " + text_of(axis, "name"), values + axis_marks(axis));
+    if (const json& mismatch = object_of(axis, "mismatch"); !mismatch.empty())
+      result += line("", "sent " + with_unit(number_of(mismatch, "sent_um"), 2, unit) +
+                             ", read back " + with_unit(number_of(mismatch, "read_um"), 2, unit) +
+                             ": " + text_of(mismatch, "likely"));
     if (axis.contains("correction")) result += line("", correction_text(axis["correction"]));
   }
   return result;

@@ -21,7 +21,7 @@ endif()
 
 set(THERMOCOMP_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 option(THERMOCOMP_COVERAGE "Instrument for gcovr" OFF)
-option(THERMOCOMP_PRECOMPILED "Read the headers of the libraries that all use from a precompiled file" ON)
+option(THERMOCOMP_PRECOMPILED "Read headers that all use from a precompiled file" ON)
 option(THERMOCOMP_FUZZ "Build the fuzz targets instead of the tests (clang with libFuzzer)" OFF)
 
 add_library(thermocomp_flags INTERFACE)
@@ -60,8 +60,8 @@ if(THERMOCOMP_COVERAGE)
   target_link_options(thermocomp_flags INTERFACE --coverage)
 endif()
 
-# Headers of the C++ library and of others, read once for all files instead of once a file: half of
-# the time of compiling. Never headers of ours, so that the rooms below still hold. A file must name
+# Headers of the C++ library and of others, read once for all files instead of once a file: a quarter
+# of the time of compiling a test. Never headers of ours, so that the rooms below still hold. A file must name
 # what it uses all the same: the preset debug and clang-tidy read the files without these.
 # GCC only: it alone builds what is tested and installed.
 set(THERMOCOMP_STD_HEADERS
@@ -137,11 +137,22 @@ function(thermocomp_program name)
   thermocomp_use_precompiled(${name} thermocomp_precompiled_std)
 endfunction()
 
+# What a test takes of the places that ./test.sh gives ctest, two a CPU (property PROCESSORS): one
+# that computes a CPU's, one that mostly waits for devices and times half as much - but with
+# sanitizers it computes as well.
+set(THERMOCOMP_COMPUTES 2)
+set(THERMOCOMP_COMPUTES_ON_TWO 4)
+set(THERMOCOMP_WAITS 1)
+if(THERMOCOMP_SANITIZE)
+  set(THERMOCOMP_WAITS 2)
+endif()
+
 # thermocomp_test(NAME SOURCES file... LINKS target... [TIMEOUT s] [LABELS label...]
-#                 [ARGUMENTS argument...])
-# One Catch2 program and one ctest entry; ARGUMENTS are Catch2's, to select tests.
+#                 [ARGUMENTS argument...] [SLOW])
+# One Catch2 program and one ctest entry; ARGUMENTS are Catch2's, to select tests. All but those that
+# are SLOW are a part of ./test.sh --quick.
 function(thermocomp_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
+  cmake_parse_arguments(arg "SLOW" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE thermocomp_flags thermocomp_catch_main ${arg_LINKS})
   thermocomp_use_precompiled(${name} thermocomp_precompiled_catch)
@@ -149,5 +160,9 @@ function(thermocomp_test name)
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+  if(NOT arg_SLOW)
+    list(APPEND arg_LABELS quick)
+  endif()
+  set_tests_properties(${name} PROPERTIES
+    TIMEOUT ${arg_TIMEOUT} PROCESSORS ${THERMOCOMP_COMPUTES} LABELS "${arg_LABELS}")
 endfunction()

@@ -1,15 +1,20 @@
 #include "config/daemon_config.hpp"
 
+#include <algorithm>
 #include <optional>
+#include <sstream>
 #include <utility>
 
+#include "config/file_limits.hpp"
 #include "config/model_file.hpp"
+#include "config/named_files.hpp"
 #include "config/sections/buses.hpp"
 #include "config/sections/controller_section.hpp"
 #include "config/sections/correction_section.hpp"
 #include "config/sections/estimator_sections.hpp"
 #include "config/sections/model_binding.hpp"
 #include "config/toml_reader.hpp"
+#include "estimator/temperature_range.hpp"
 
 namespace thermocomp {
 namespace {
@@ -115,9 +120,6 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.loop = read_loop(root.table_or_empty("loop"));
   config.history = read_history(root.table_or_empty("history"), folder);
   config.socket = read_socket(root.table_or_empty("socket"), folder);
-  if (config.history.file == config.state_file) {
-    root.problem("state_file", "must not be the history's file");
-  }
 
   const std::vector<TomlTable> sensors = root.tables_required("sensor");
   sections::BindingTables tables{root, root.tables_required("block"), root.tables_required("axis")};
@@ -144,15 +146,63 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   return tables;
 }
 
+void check_files(const TomlTable& root, const DaemonConfig& config, const fs::path& folder) {
+  std::vector<NamedFile> files{{root, "", config.file},
+                               {root.table("model"), "file", config.model_file},
+                               {root, "state_file", config.state_file, FileUse::written, {".new"}}};
+  if (config.history.enabled) {
+    files.push_back({root.table_or_empty("history"),
+                     "file",
+                     config.history.file,
+                     FileUse::written,
+                     {"-wal", "-shm", "-journal"}});
+  }
+  files.push_back({root.table_or_empty("socket"), "path", config.socket.path, FileUse::socket, {}});
+  const auto add_read = [&](const TomlTable& table, const char* key) {
+    if (table.is_text(key)) files.push_back({table, key, folder / table.text(key)});
+  };
+  for (const TomlTable& bus : root.tables("bus")) add_read(bus, "dbc");
+  for (const TomlTable& device : root.tables("device")) add_read(device, "eds");
+  check_named_files(files);
+}
+
 struct ModelSource {
   std::string name;
   std::optional<std::string> text;  ///< none: a problem already
 };
 
+enum class Files { opened, only_named };
+
+/// The line on which a key of the file's own table stands; 0: none.
+int line_of(const std::string& text, const std::string& key) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number)
+    if (line.starts_with(key) && line.find('=') != std::string::npos) return number;
+  return 0;
+}
+
+/// Numbers that are no temperatures of this machine; the sensors that say so are the
+/// configuration's.
+void add_reference_problems(const ModelSource& source, const DaemonConfig& config,
+                            std::vector<Problem>& problems) {
+  const std::vector<double>& reference_degC = config.model.reference_degC;
+  for (std::size_t i = 0; i < std::min(reference_degC.size(), config.model.inputs.size()); ++i) {
+    const TemperatureRange range(config.estimator, config.model.inputs[i]);
+    if (range.holds(reference_degC[i])) continue;
+    std::string key("reference[");
+    key.append(std::to_string(i)).append("]");
+    std::ostringstream value;
+    value << reference_degC[i];
+    const auto line = line_of(*source.text, "reference");
+    problems.push_back({source.name, line, key, value.str(), range.rule()});
+  }
+}
+
 template <class FindModel>
-DaemonConfig build(const TomlDocument& document, const fs::path& folder, sections::Presets presets,
-                   sections::DbcFiles dbc_files, sections::EdsFiles eds_files,
-                   FindModel find_model) {
+DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files files,
+                   sections::Presets presets, sections::DbcFiles dbc_files,
+                   sections::EdsFiles eds_files, FindModel find_model) {
   DaemonConfig config;
   config.file = document.name();
   config.text = document.text();
@@ -162,6 +212,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, section
   if (!model_table.has("file")) model_table.problem("file", "must be given");
   const sections::BindingTables tables =
       read_daemon(root, folder, presets, dbc_files, eds_files, config);
+  if (files == Files::opened) check_files(root, config, folder);
 
   const ModelSource source = find_model(model_table, config.model_file);
   std::vector<Problem> model_problems;
@@ -175,6 +226,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, section
       sections::check_binding(tables, config.estimator, config.model);
       sections::check_correction(root.table_or_empty("correction"), config.estimator.correction,
                                  config.model);
+      add_reference_problems(source, config, model_problems);
     }
   }
   std::vector<Problem> problems = document.all_problems();
@@ -193,7 +245,7 @@ ModelSource read_model_file(const TomlTable& model_table, const fs::path& path) 
   ModelSource source{path.string(), std::nullopt};
   if (!model_table.is_text("file")) return source;
   try {
-    source.text = read_text_file(path);
+    source.text = read_text_file(path, model_bytes_max);
   } catch (const ConfigurationError& error) {
     model_table.problem("file", error.problems().front().rule + " (" + path.string() + ")");
   }
@@ -205,7 +257,7 @@ ModelSource read_model_file(const TomlTable& model_table, const fs::path& path) 
 DaemonConfig load_daemon_config(const fs::path& path) {
   const TomlDocument document = TomlDocument::from_file(path);
   const fs::path folder = fs::absolute(path).parent_path();
-  return build(document, folder, sections::Presets(sections::preset_folders(folder)),
+  return build(document, folder, Files::opened, sections::Presets(sections::preset_folders(folder)),
                sections::DbcFiles(folder), sections::EdsFiles(folder), read_model_file);
 }
 
@@ -213,8 +265,9 @@ DaemonConfig parse_daemon_config(const std::string& config_text, const std::stri
                                  const std::string& model_text, const std::string& model_name) {
   const TomlDocument document = TomlDocument::from_text(config_text, config_name);
   const fs::path folder = fs::path(config_name).parent_path();
-  return build(document, folder, sections::Presets({}), sections::DbcFiles(std::nullopt),
-               sections::EdsFiles(std::nullopt), [&](const TomlTable&, const fs::path&) {
+  return build(document, folder, Files::only_named, sections::Presets({}),
+               sections::DbcFiles(std::nullopt), sections::EdsFiles(std::nullopt),
+               [&](const TomlTable&, const fs::path&) {
                  return ModelSource{model_name, model_text};
                });
 }

@@ -6,10 +6,11 @@
 #include <vector>
 
 #include "config/problems.hpp"
+#include "drivers/can/can_config.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"
 #include "drivers/controllers/controller_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/thermal_model.hpp"
 

@@ -567,11 +567,4 @@ DbcReading read_dbc_text(std::string_view text, const std::string& name) {
   return DbcReader(text, name).read();
 }
 
-std::string printable(std::string_view bytes) {
-  std::string text(bytes);
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return text;
-}
-
 }  // namespace thermocomp

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "config/problems.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/can/can_config.hpp"
 
 namespace thermocomp {
 
@@ -51,8 +51,5 @@ struct DbcReading {
 
 /// @param name  stands for the file in problems
 [[nodiscard]] DbcReading read_dbc_text(std::string_view text, const std::string& name);
-
-/// Bytes with everything but printable ASCII replaced, for messages.
-[[nodiscard]] std::string printable(std::string_view bytes);
 
 }  // namespace thermocomp

@@ -1,11 +1,10 @@
 #include "config/dbc_scanner.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
 #include <system_error>
-
-#include "config/dbc_file.hpp"
 
 namespace thermocomp {
 namespace {
@@ -19,6 +18,13 @@ bool begins_word(char c) {
 }
 
 }  // namespace
+
+std::string printable(std::string_view bytes) {
+  std::string text(bytes);
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
+}
 
 void DbcScanner::skip_space() noexcept {
   while (at_ < text_.size()) {

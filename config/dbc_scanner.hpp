@@ -8,6 +8,9 @@
 
 namespace thermocomp {
 
+/// Bytes with everything but printable ASCII replaced, for messages.
+[[nodiscard]] std::string printable(std::string_view bytes);
+
 /// What ends the reading of a DBC file.
 struct DbcSyntaxError {
   int line{0};

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "config/file_limits.hpp"
 #include "config/toml_reader.hpp"
 #include "config/units.hpp"
 
@@ -292,7 +293,7 @@ ThermalModel parse_model(const std::string& text, const std::string& name) {
 }
 
 ThermalModel load_model(const std::filesystem::path& path) {
-  return parse_model(read_text_file(path), path.string());
+  return parse_model(read_text_file(path, model_bytes_max), path.string());
 }
 
 }  // namespace thermocomp

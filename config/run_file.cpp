@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <set>
 
+#include "config/file_limits.hpp"
 #include "config/number_text.hpp"
 #include "config/toml_reader.hpp"
 #include "config/units.hpp"
@@ -15,6 +16,9 @@ namespace thermocomp {
 namespace {
 
 constexpr std::size_t problems_max = 100;
+/// The greatest model has 512 inputs and 64 outputs; what searches among columns takes time with
+/// their square.
+constexpr std::size_t columns_max = 1024;
 
 std::string_view trimmed(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t'; };
@@ -131,6 +135,12 @@ class RunParser {
   }
 
   void read_header(std::string_view line) {
+    const auto count = static_cast<std::size_t>(std::count(line.begin(), line.end(), ',')) + 1;
+    if (count > columns_max) {
+      add(line_number_, "", std::to_string(count) + " columns",
+          "must be at most " + std::to_string(columns_max));
+      return;
+    }
     std::set<std::string> seen;
     std::string_view rest = line;
     std::string_view field;
@@ -294,7 +304,8 @@ RunFile parse_run(std::string_view text, const std::string& name, const RunSelec
 }
 
 RunFile load_run(const RunSelection& selection) {
-  return parse_run(read_text_file(selection.file), selection.file.string(), selection);
+  return parse_run(read_text_file(selection.file, run_bytes_max), selection.file.string(),
+                   selection);
 }
 
 std::string write_run(const RunFile& run) {

@@ -4,12 +4,11 @@
 #include <cstring>
 #include <fstream>
 
+#include "config/file_limits.hpp"
 #include "config/toml_reader.hpp"
 
 namespace thermocomp {
 namespace {
-
-constexpr std::uintmax_t file_bytes_max = std::uintmax_t{64} * 1024 * 1024;
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -28,17 +27,21 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string read_text_file(const std::filesystem::path& path) {
+std::string read_text_file(const std::filesystem::path& path, std::uintmax_t bytes_max) {
   const auto refuse = [&](const std::string& rule) {
     throw ConfigurationError({{path.string(), 0, "", "", rule}});
   };
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
+  if (error && error != std::errc::no_such_file_or_directory) {
+    refuse("cannot be read: " + error.message());
+  }
   if (!std::filesystem::exists(status)) refuse("no such file");
   if (!std::filesystem::is_regular_file(status)) refuse("must be a regular file");
   const auto size = std::filesystem::file_size(path, error);
   if (error) refuse("cannot be read: " + error.message());
-  if (size > file_bytes_max) refuse("must have at most 64 MB");
+  if (size > bytes_max)
+    refuse("must have at most " + std::to_string(bytes_max / bytes_per_MB) + " MB");
   std::ifstream file(path, std::ios::binary);
   if (!file) refuse(std::string("cannot be opened: ") + std::strerror(errno));
   std::string text(static_cast<std::size_t>(size), '\0');
@@ -47,7 +50,13 @@ std::string read_text_file(const std::filesystem::path& path) {
   return text;
 }
 
+std::string read_text_file(const std::filesystem::path& path) {
+  return read_text_file(path, file_bytes_max);
+}
+
 std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
+  constexpr std::size_t name_bytes_max = 100;  // the time grows with its length
+  if (name.size() > name_bytes_max) return {};
   std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
   std::string nearest;
   for (const std::string& candidate : known) {

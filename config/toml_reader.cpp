@@ -9,11 +9,15 @@
 #include <toml++/toml.h>
 
 #include "config/number_text.hpp"
+#include "config/printable_text.hpp"
+#include "config/toml_limits.hpp"
 
 namespace thermocomp {
 namespace {
 
 constexpr std::size_t shown_value_max = 60;
+/// Of these the first hundred are told; what comes after so many is not looked for.
+constexpr std::size_t kept_problems_max = 10'000;
 
 const toml::table* as_table(const void* node) {
   return static_cast<const toml::table*>(node);
@@ -94,6 +98,7 @@ struct TomlState {
   std::map<const toml::table*, Opened> opened;
 
   void add(int line, std::string key, std::string value, std::string_view rule) {
+    if (problems.size() >= kept_problems_max) return;
     problems.push_back({name, line, std::move(key), std::move(value), std::string(rule)});
   }
 };
@@ -296,8 +301,8 @@ std::string TomlTable::text(std::string_view key, std::string_view otherwise) co
     problem(key, "must be a string that is not empty");
     return std::string(otherwise);
   }
-  if (value->get().find('\0') != std::string::npos) {
-    problem(key, "must not hold a NUL character");
+  if (!is_printable(value->get())) {
+    problem(key, printable_rule);
     return std::string(otherwise);
   }
   return value->get();
@@ -409,11 +414,14 @@ std::vector<std::string> TomlTable::texts(std::string_view key,
   std::vector<std::string> values;
   for_each_element(key, false, "strings", [&](const void* element, std::size_t position) {
     const auto* value = as_node(element)->as_string();
+    const bool is_good = value != nullptr && is_printable(value->get());
     if (value == nullptr || value->get().empty()) {
       problem(key, shown(*as_node(element)),
               at_position(position, "must be a string that is not empty"));
+    } else if (!is_good) {
+      problem(key, shown(*as_node(element)), at_position(position, printable_rule));
     }
-    values.push_back(value == nullptr ? std::string() : value->get());
+    values.push_back(is_good ? value->get() : std::string());
   });
   return values;
 }
@@ -524,6 +532,9 @@ TomlDocument TomlDocument::from_text(std::string text, std::string name) {
   auto state = std::make_shared<detail::TomlState>();
   state->name = std::move(name);
   state->text = std::move(text);
+  if (const auto excess = toml_excess(state->text)) {
+    throw ConfigurationError({{state->name, excess->line, "", "", excess->rule}});
+  }
   try {
     state->root = toml::parse(std::string_view(state->text));
   } catch (const toml::parse_error& error) {
@@ -544,21 +555,47 @@ const std::string& TomlDocument::name() const noexcept {
   return state_->name;
 }
 
+namespace {
+
+/// A key that nobody asked for.
+struct UnknownKey {
+  const detail::TomlState::Opened* table;
+  const toml::key* key;
+  const toml::node* value;
+};
+
+Problem unknown_problem(const std::string& file, const UnknownKey& unknown, bool is_suggested) {
+  const std::string name(unknown.key->str());
+  std::string rule = "unknown key";
+  if (is_suggested) {
+    const auto& asked = unknown.table->asked;
+    const std::string meant = nearest_name(name, {asked.begin(), asked.end()});
+    if (!meant.empty()) rule += "; did you mean \"" + meant + "\"?";
+  }
+  const std::string& path = unknown.table->path;
+  return {file, line_of(unknown.key->source()), path.empty() ? name : path + "." + name,
+          shown(*unknown.value), rule};
+}
+
+}  // namespace
+
 std::vector<Problem> TomlDocument::all_problems() const {
-  std::vector<Problem> problems = state_->problems;
+  constexpr std::size_t suggestions_max = 100;  // as many as are told
+  std::vector<UnknownKey> unknown;
   for (const auto& [table, opened] : state_->opened) {
     if (opened.ignore_rest) continue;
-    const std::vector<std::string> known(opened.asked.begin(), opened.asked.end());
     for (const auto& [key, value] : *table) {
-      const std::string name(key.str());
-      if (opened.asked.contains(name)) continue;
-      const std::string meant = nearest_name(name, known);
-      const std::string rule =
-          meant.empty() ? "unknown key" : "unknown key; did you mean \"" + meant + "\"?";
-      problems.push_back({state_->name, line_of(key.source()),
-                          opened.path.empty() ? name : opened.path + "." + name, shown(value),
-                          rule});
+      if (!opened.asked.contains(key.str())) unknown.push_back({&opened, &key, &value});
     }
+  }
+  std::stable_sort(unknown.begin(), unknown.end(), [](const UnknownKey& a, const UnknownKey& b) {
+    return a.key->source().begin.line < b.key->source().begin.line;
+  });
+  std::vector<Problem> problems = state_->problems;
+  for (const UnknownKey& key : unknown) {
+    if (problems.size() >= kept_problems_max) break;
+    const auto place = static_cast<std::size_t>(&key - unknown.data());
+    problems.push_back(unknown_problem(state_->name, key, place < suggestions_max));
   }
   return problems;
 }

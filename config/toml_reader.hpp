@@ -207,7 +207,7 @@ class TomlDocument {
   std::shared_ptr<detail::TomlState> state_;
 };
 
-/// The text of a regular file of at most 64 MB.
+/// The text of a regular file of at most 4 MB (config/file_limits.hpp has the limits).
 /// @throws ConfigurationError
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "config/printable_text.hpp"
+
 namespace thermocomp {
 namespace {
 
@@ -56,10 +58,9 @@ bool is_operating(std::string_view column) {
 bool is_column_name(std::string_view name) {
   if (name.empty() || name.front() == ' ' || name.back() == ' ' || name.front() == '#')
     return false;
-  const auto bad = [](char c) {
-    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == ',' || c == '"' || c == '|';
-  };
-  return std::none_of(name.begin(), name.end(), bad);
+  constexpr std::size_t bytes_max = 200;
+  return name.size() <= bytes_max && name.find_first_of(",\"|") == std::string_view::npos &&
+         is_printable(name);
 }
 
 }  // namespace thermocomp

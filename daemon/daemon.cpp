@@ -1,57 +1,39 @@
 #include "daemon/daemon.hpp"
 
-#include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdlib>
-#include <cstring>
-#include <poll.h>
-#include <thread>
-#include <unistd.h>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
-#include <sys/signalfd.h>
 
 #include "config/daemon_config.hpp"
-#include "config/problems.hpp"
 #include "daemon/bridge_desk.hpp"
+#include "daemon/controller_lock.hpp"
 #include "daemon/cycle/cycle.hpp"
 #include "daemon/cycle/real_time_thread.hpp"
-#include "daemon/event_log.hpp"
+#include "daemon/locks/file_lock.hpp"
 #include "daemon/log_setup.hpp"
+#include "daemon/operations.hpp"
 #include "daemon/operator_desk.hpp"
-#include "daemon/service_manager.hpp"
-#include "daemon/state/state_file.hpp"
-#include "daemon/status_json.hpp"
+#include "daemon/start_state.hpp"
+#include "daemon/supervisor.hpp"
 #include "drivers/controllers/make_controller.hpp"
 #include "drivers/sensors/can_protocol_source.hpp"
 #include "drivers/sensors/can_source.hpp"
 #include "drivers/sensors/modbus_source.hpp"
+#include "estimator/checks.hpp"
 
 namespace thermocomp {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-using namespace std::chrono_literals;
-
-constexpr auto tick_period = 100ms;
-constexpr auto health_period = 1s;
-constexpr auto offsets_saved_every = 10s;
-/// Longest wait for the cycle to take a command or a new configuration; at 1 Hz it needs up to 2 s.
-constexpr auto cycle_answer_max = 5s;
-constexpr std::uint64_t cycles_until_ready = 3;
-/// Offsets at zero are sent, and read back, for so long before the links are closed.
-constexpr auto zero_settles = 500ms;
-constexpr auto stop_extended_by = 10s;
 /// At 1 Hz it ends within a second.
-constexpr auto cycle_ends_within = 3s;
+constexpr auto cycle_ends_within = std::chrono::seconds(3);
 
 Grid make_grid(const LoopConfig& loop) {
-  const auto now = std::chrono::duration_cast<nanoseconds>(Clock::now().time_since_epoch());
-  return {now, nanoseconds(std::llround(1e9 / loop.rate_hz))};
+  return {std::chrono::steady_clock::now().time_since_epoch(),
+          nanoseconds(std::llround(1e9 / loop.rate_hz))};
 }
 
 std::vector<std::unique_ptr<SensorSource>> make_sources(const DaemonConfig& config) {
@@ -72,15 +54,33 @@ std::vector<SensorSource*> pointers(const std::vector<std::unique_ptr<SensorSour
   return list;
 }
 
-int open_signals() {
-  sigset_t set;
-  sigemptyset(&set);
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, signal);
-  // Blocked before any thread is made: all of them inherit it, and main reads them from the file.
-  pthread_sigmask(SIG_BLOCK, &set, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
-  return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+std::unique_ptr<HistoryWriter> make_history(const HistoryConfig& config, const Grid& grid) {
+  if (!config.enabled) return nullptr;
+  return std::make_unique<HistoryWriter>(config, grid, THERMOCOMP_VERSION);
 }
+
+DaemonConfig load(const std::filesystem::path& file) {
+  DaemonConfig config = load_daemon_config(file);
+  set_log_level(config.log_level);
+  spdlog::info("thermocompd {}: configuration {}, model {} (SHA-256 {})", THERMOCOMP_VERSION,
+               config.file.string(), config.model_file.string(), config.model_checksum);
+  return config;
+}
+
+/// What this process alone may use while it runs; the history's lock is with its writer.
+struct Locks {
+  explicit Locks(const DaemonConfig& config) : controller(lock_controller(config.controller)) {
+    try {
+      state.emplace(config.state_file);
+    } catch (const LockImpossible& problem) {
+      warning = "state file: " + std::string(problem.what());
+    }
+  }
+  std::vector<NameLock> controller;
+  std::optional<FileLock> state;
+  std::string
+      warning;  ///< not empty: the state file's folder takes no file, so nobody else's either
+};
 
 }  // namespace
 
@@ -88,340 +88,94 @@ struct Daemon::Parts {
   explicit Parts(const std::filesystem::path& config_file);
 
   void start();
-  void wait_until_ready();
-  void supervise();
-  void ramp_to_zero();
   void stop() noexcept;
 
-  void turn(bool& stopping);
-  void tick();
-  void look_at_health();
-  void save_state(bool now);
-  [[nodiscard]] bool at_zero();
-  [[nodiscard]] PersistentState persistent_state();
-  void take_signals(bool& stopping);
-  void reload();
-  void command(const Command& command);
-  [[nodiscard]] StatusView view();
-  [[nodiscard]] std::unique_ptr<CycleBrain> make_brain(const DaemonConfig& next);
-
+  SignalFile signals;  ///< before any thread is made, so that all of them block these signals
   DaemonConfig config;
-  int signals;
-  ServiceManager service;
-  EventLog events;
-  std::vector<std::string> warnings;
+  StatusServer server;
+  Locks locks;
+  StartState start_state;
+  StateKeeper keeper;
   std::vector<std::unique_ptr<SensorSource>> sources;
   std::unique_ptr<ControllerLink> link;
   Grid grid;
   std::unique_ptr<HistoryWriter> history;
-  std::unique_ptr<Cycle> cycle;
-  std::unique_ptr<StatusServer> server;
+  Cycle cycle;
+  ServiceManager service;
+  Operations operations;
+  Supervisor supervisor;
   RealTimeThread thread;
 
-  Clock::time_point started{Clock::now()};
-  Clock::time_point next_tick{};
-  Clock::time_point next_health{};
-  Clock::time_point next_offsets_saved{};
-  std::uint64_t cycles_seen{0};
-  PersistentState saved;
-  std::string save_error;
-  std::vector<BusHealth> buses;
-  ControllerHealth controller_health;
-  bool real_time{false};
+ private:
+  [[nodiscard]] std::unique_ptr<CycleBrain> first_brain() const;
+  [[nodiscard]] DeskActions actions();
+  void warn(const std::string& warning);
 };
 
 Daemon::Parts::Parts(const std::filesystem::path& config_file)
-    : config(load_daemon_config(config_file)),
-      signals(open_signals()),
+    : config(load(config_file)),
+      server(config.socket),
+      locks(config),
+      start_state(find_start_state(config)),
+      keeper(config.state_file, start_state.state, start_state.is_on_disk,
+             start_state.reference_lost),
       sources(make_sources(config)),
       link(make_controller(config.controller)),
-      grid(make_grid(config.loop)) {
-  set_log_level(config.log_level);
-  spdlog::info("thermocompd {}: configuration {}, model {} (SHA-256 {})", THERMOCOMP_VERSION,
-               config.file.string(), config.model_file.string(), config.model_checksum);
-  if (config.history.enabled)
-    history = std::make_unique<HistoryWriter>(config.history, grid, THERMOCOMP_VERSION);
-  server = std::make_unique<StatusServer>(config.socket);
-  auto brain = make_brain(config);
-  PersistentState fallback;
-  fallback.enabled = config.estimator.compensation.enabled_at_first_start;
-  const LoadedState loaded = load_state_file(config.state_file, fallback);
-  if (!loaded.warning.empty()) {
-    spdlog::warn("{}", loaded.warning);
-    warnings.push_back(loaded.warning);
-  }
-  brain->estimator.restore(loaded.state);
-  saved = loaded.state;
-  cycle = std::make_unique<Cycle>(grid, pointers(sources), *link, config.estimator.sensors.size(),
-                                  std::move(brain));
-  DeskActions actions{[this] { return view(); },
-                      [this](const Command& asked) { command(asked); },
-                      [this] { reload(); },
-                      {}};
-  if (auto* bridge = dynamic_cast<BridgeController*>(link.get()))
-    actions.controller_state = [this, bridge](const nlohmann::json& params) {
-      return answer_bridge(*bridge, std::get<BridgeControllerConfig>(config.controller),
-                           cycle->report().mode, params);
-    };
-  add_operator_methods(*server, actions);
+      grid(make_grid(config.loop)),
+      history(make_history(config.history, grid)),
+      cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain()),
+      operations({config, cycle, keeper, service, history.get(),
+                  [this] { return status_line(supervisor.view()); }}),
+      supervisor(
+          {config, sources, *link, history.get(), keeper, server, signals, service, operations}) {
+  // A kill right now must not make this a first start.
+  keeper.save(start_state.state, std::chrono::steady_clock::now());
+  if (!locks.warning.empty()) supervisor.add_warning(locks.warning);
+  for (const std::string& warning : start_state.warnings) supervisor.add_warning(warning);
+  add_operator_methods(server, actions());
 }
 
-std::unique_ptr<CycleBrain> Daemon::Parts::make_brain(const DaemonConfig& next) {
-  auto brain = std::make_unique<CycleBrain>(Estimator(next.estimator, next.model));
-  if (history)
-    brain->recorder =
-        history->make_recorder({next.text, next.model_text, next.model_checksum}, brain->estimator);
+std::unique_ptr<CycleBrain> Daemon::Parts::first_brain() const {
+  auto brain = make_brain(config, history.get());
+  // What cannot be has been taken out by find_start_state().
+  THERMOCOMP_ENSURE(brain->estimator.restore(start_state.state).empty());
   return brain;
 }
 
+DeskActions Daemon::Parts::actions() {
+  DeskActions all{[this] { return supervisor.view(); },
+                  [this](const Command& asked) { return operations.command(asked); },
+                  [this] { return operations.reload(); },
+                  {}};
+  if (auto* bridge = dynamic_cast<BridgeController*>(link.get()))
+    all.controller_state = [this, bridge](const nlohmann::json& params) {
+      return answer_bridge(*bridge, std::get<BridgeControllerConfig>(config.controller),
+                           operations.cycle().report().mode, params);
+    };
+  return all;
+}
+
+void Daemon::Parts::warn(const std::string& warning) {
+  if (warning.empty()) return;
+  if (config.loop.real_time == RealTimeRule::require)
+    throw RealTimeError(warning + "; loop.real_time = \"require\" forbids to run like this");
+  supervisor.add_warning(warning);
+}
+
 void Daemon::Parts::start() {
-  const auto warn = [this](const std::string& warning) {
-    if (warning.empty()) return;
-    if (config.loop.real_time == RealTimeRule::require)
-      throw RealTimeError(warning + "; loop.real_time = \"require\" forbids to run like this");
-    spdlog::warn("{}", warning);
-    warnings.push_back(warning);
-  };
   if (history) history->start();
   for (const auto& source : sources) source->start();
   link->start();
   warn(lock_memory());
   const std::string no_fifo =
-      thread.start({config.loop.priority, config.loop.cpu}, [this] { cycle->run(); });
-  real_time = no_fifo.empty();
+      thread.start({config.loop.priority, config.loop.cpu}, [this] { cycle.run(); });
+  supervisor.set_real_time(no_fifo.empty());
   warn(no_fifo);
-}
-
-void Daemon::Parts::wait_until_ready() {
-  const auto until = Clock::now() + cycle_answer_max + grid.period * cycles_until_ready;
-  while (cycle->timing().cycles.load() < cycles_until_ready) {
-    if (Clock::now() > until) throw RealTimeError("the cycle does not run");
-    std::this_thread::sleep_for(1ms);
-  }
-  // What happened while threads and memory were being set up is not the cycle's record.
-  cycle->clear_timing();
-  look_at_health();
-  service.ready(status_line(view()));
-  spdlog::info("ready: {} Hz, {} sensors, {} axes, {}", config.loop.rate_hz,
-               config.estimator.sensors.size(), config.estimator.axes.size(),
-               real_time ? "real-time" : "ordinary schedule");
-}
-
-void Daemon::Parts::supervise() {
-  bool stopping = false;
-  while (!stopping) turn(stopping);
-  if (config.estimator.compensation.on_stop == StopPolicy::ramp_to_zero) ramp_to_zero();
-}
-
-void Daemon::Parts::turn(bool& stopping) {
-  pollfd files[] = {{signals, POLLIN, 0}, {server->fd(), POLLIN, 0}};
-  // Rounded up: a rest of a millisecond must be slept, not spun through.
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(next_tick - Clock::now()).count();
-  const int ready = poll(files, 2, static_cast<int>(std::clamp<std::int64_t>(left, 0, 100)));
-  if (ready < 0 && errno != EINTR)
-    throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
-  take_signals(stopping);
-  server->handle(0ms);
-  if (Clock::now() >= next_tick) tick();
-}
-
-void Daemon::Parts::ramp_to_zero() {
-  const double longest_s = config.estimator.compensation.stop_ramp_s_max;
-  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(seconds_d(longest_s));
-  service.stopping("taking the offsets to zero");
-  if (!cycle->send({CommandKind::stop, 0, 0.0})) {
-    spdlog::warn("too many commands wait for the cycle: the offsets stay");
-    return;
-  }
-  auto moved = Clock::now();
-  auto extended = Clock::time_point{};
-  bool again = false;  // who asks twice does not want to wait
-  while (!again && Clock::now() < end && Clock::now() - moved < zero_settles) {
-    if (Clock::now() - extended > 1s) {
-      service.extend_stop(stop_extended_by);
-      extended = Clock::now();
-    }
-    turn(again);
-    if (!at_zero()) moved = Clock::now();
-  }
-  if (at_zero())
-    spdlog::info("the offsets are at zero");
-  else
-    spdlog::warn("not all offsets are at zero: {}",
-                 again ? "asked to stop at once" : "stop_ramp_s_max is over");
-}
-
-bool Daemon::Parts::at_zero() {
-  const Report& report = cycle->report();
-  // Of what cannot be sent nothing is waited for.
-  if (has_reason(report.reasons, Reason::controller_offline)) return true;
-  const double tolerance_um = config.estimator.compensation.mismatch_um;
-  return std::all_of(report.axes.begin(), report.axes.end(), [=](const AxisReport& axis) {
-    // Negated: what is not read back (NaN) does not count.
-    return !axis.driven || (axis.offset_um == 0.0 && !(std::abs(axis.applied_um) > tolerance_um));
-  });
-}
-
-void Daemon::Parts::take_signals(bool& stopping) {
-  signalfd_siginfo info{};
-  while (read(signals, &info, sizeof info) == static_cast<ssize_t>(sizeof info)) {
-    if (info.ssi_signo != static_cast<std::uint32_t>(SIGHUP)) {
-      spdlog::info("stopping: {}", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
-      stopping = true;
-      continue;
-    }
-    try {
-      reload();
-    } catch (const std::exception& error) {
-      spdlog::error("reload refused, the running configuration stays:\n{}", error.what());
-    }
-  }
-}
-
-void Daemon::Parts::tick() {
-  next_tick = Clock::now() + tick_period;
-  const std::uint64_t cycles = cycle->timing().cycles.load(std::memory_order_acquire);
-  if (cycles != cycles_seen) service.alive();
-  cycles_seen = cycles;
-  events.note_report(cycle->report(), config.estimator);
-  events.note_estimates(cycle->report(), config.estimator, config.model.temperature_columns());
-  if (Clock::now() >= next_health) look_at_health();
-  save_state(Clock::now() >= next_offsets_saved);
-}
-
-void Daemon::Parts::look_at_health() {
-  next_health = Clock::now() + health_period;
-  buses.clear();
-  for (const auto& source : sources) buses.push_back(source->health());
-  for (const BusHealth& bus : buses) events.note_bus(bus);
-  controller_health = link->health();
-  events.note_controller(controller_health);
-  events.note_missed(cycle->timing().missed.load());
-  events.note_socket(server->statistics());
-  service.status(status_line(view()));
-}
-
-static void add_axis_state(const std::string& name, const AxisReport& axis,
-                           PersistentState& state) {
-  state.offset_um[name] = axis.offset_um;
-  for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
-    state.correction[std::string(name).append(".").append(key)] = value;
-}
-
-PersistentState Daemon::Parts::persistent_state() {
-  const Report& report = cycle->report();
-  PersistentState state;
-  state.enabled = report.enabled;
-  state.model_reference_degC = cycle->brain().estimator.model_reference_degC();
-  const auto columns = config.model.temperature_columns();
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const InputReport& input = report.inputs[i];
-    if (std::isfinite(input.reference_degC))
-      state.reference_degC[columns[i]] = input.reference_degC;
-    if (std::isfinite(input.held_degC)) state.held_degC[columns[i]] = input.held_degC;
-    if (input.good || input.estimated) state.temp_degC[columns[i]] = input.temp_degC;
-  }
-  const auto signal_columns = config.model.signal_columns();
-  for (std::size_t i = 0; i < signal_columns.size(); ++i) {
-    const SignalReport& signal = report.signals[i];
-    if (std::isfinite(signal.reference))
-      state.reference_signals[signal_columns[i]] = signal.reference;
-    if (std::isfinite(signal.held)) state.held_signals[signal_columns[i]] = signal.held;
-  }
-  for (std::size_t i = 0; i < report.axes.size(); ++i)
-    add_axis_state(config.estimator.axes[i].name, report.axes[i], state);
-  return state;
-}
-
-void Daemon::Parts::save_state(bool now) {
-  PersistentState state = persistent_state();
-  const bool switched = state.enabled != saved.enabled ||
-                        state.reference_degC != saved.reference_degC ||
-                        state.reference_signals != saved.reference_signals ||
-                        state.held_degC != saved.held_degC ||
-                        state.held_signals != saved.held_signals || state.correction != saved.correction;
-  if (!switched && !(now && state.offset_um != saved.offset_um)) return;
-  next_offsets_saved = Clock::now() + offsets_saved_every;
-  const std::string error = save_state_file(config.state_file, state);
-  if (!error.empty() && error != save_error) spdlog::error("{}", error);
-  save_error = error;
-  if (error.empty()) saved = std::move(state);
-}
-
-void Daemon::Parts::command(const Command& asked) {
-  const std::uint64_t before = cycle->timing().cycles.load(std::memory_order_acquire);
-  if (!cycle->send(asked)) throw RpcError(rpc::refused, "too many commands wait for the cycle");
-  // Taken at the next step; the one after that is certain to have published what it did.
-  const auto until = Clock::now() + cycle_answer_max;
-  while (cycle->timing().cycles.load(std::memory_order_acquire) < before + 2) {
-    if (Clock::now() > until) throw RpcError(rpc::internal_error, "the cycle does not answer");
-    std::this_thread::sleep_for(1ms);
-  }
-  spdlog::info(
-      "operator: {}{}", to_string(asked.kind),
-      asked.kind == CommandKind::measured || asked.kind == CommandKind::prove
-          ? fmt::format(" {} {} um", config.estimator.axes[asked.axis].name, asked.value_um)
-          : "");
-  // Called done only when it would survive a power cut.
-  save_state(true);
-  const bool is_kept = asked.kind == CommandKind::enable || asked.kind == CommandKind::disable ||
-                       asked.kind == CommandKind::reference;
-  if (is_kept && !save_error.empty())
-    throw RpcError(rpc::internal_error,
-                   "carried out, but not saved, so that a restart would undo it: " + save_error);
-}
-
-void Daemon::Parts::reload() {
-  service.reloading();
-  try {
-    DaemonConfig next = load_daemon_config(config.file);
-    const std::vector<std::string> fixed = restart_needed(config, next);
-    if (!fixed.empty()) {
-      std::string keys;
-      for (const std::string& key : fixed) keys += (keys.empty() ? "" : ", ") + key;
-      throw RpcError(rpc::refused, "a restart is needed for a change of: " + keys);
-    }
-    auto brain = make_brain(next);
-    brain->estimator.plan_adoption(cycle->brain().estimator);
-    cycle->hand_over(std::move(brain));
-    const auto until = Clock::now() + cycle_answer_max;
-    std::unique_ptr<CycleBrain> retired;
-    while (!(retired = cycle->take_retired())) {
-      if (Clock::now() > until) throw RpcError(rpc::internal_error, "the cycle does not answer");
-      std::this_thread::sleep_for(1ms);
-    }
-    config = std::move(next);
-    set_log_level(config.log_level);
-    spdlog::info("reloaded: model {} (SHA-256 {})", config.model_file.string(),
-                 config.model_checksum);
-  } catch (...) {
-    service.ready(status_line(view()));
-    throw;
-  }
-  service.ready(status_line(view()));
-}
-
-StatusView Daemon::Parts::view() {
-  std::vector<std::string> all = warnings;
-  if (!save_error.empty()) all.push_back(save_error);
-  const HistoryStatistics statistics = history ? history->statistics() : HistoryStatistics{};
-  if (history && !statistics.last_error.empty()) all.push_back(statistics.last_error);
-  return {config,
-          cycle->report(),
-          cycle->controller(),
-          cycle->timing(),
-          buses,
-          controller_health,
-          statistics,
-          std::move(all),
-          std::chrono::duration<double>(Clock::now() - started).count(),
-          real_time,
-          server->statistics()};
 }
 
 void Daemon::Parts::stop() noexcept {
   service.stopping("the controller keeps the last offsets");
-  cycle->stop();
+  cycle.stop();
   if (!thread.join_within(cycle_ends_within)) {
     // Nothing of it can be trusted, and it may stand in the midst of anything: what a kill would
     // leave is what is left, and the service manager need not wait for a time-out.
@@ -431,15 +185,15 @@ void Daemon::Parts::stop() noexcept {
   }
   link->stop();
   for (const auto& source : sources) source->stop();
-  if (CycleRecorder* recorder = cycle->brain().recorder.get())
-    recorder->finish(cycle->last_cycle(), cycle->last_offsets());
   try {
-    save_state(true);
+    operations.settle();
+    operations.save_state(true);
   } catch (const std::exception& error) {
     spdlog::error("state not saved: {}", error.what());
   }
+  if (CycleRecorder* recorder = cycle.brain().recorder.get())
+    recorder->finish(cycle.last_cycle(), cycle.last_offsets());
   if (history) history->stop();
-  close(signals);
 }
 
 Daemon::Daemon(const std::filesystem::path& config_file)
@@ -449,8 +203,8 @@ Daemon::~Daemon() = default;
 void Daemon::run() {
   try {
     parts_->start();
-    parts_->wait_until_ready();
-    parts_->supervise();
+    parts_->supervisor.wait_until_ready(parts_->cycle);
+    parts_->supervisor.run();
   } catch (...) {
     parts_->stop();
     throw;

@@ -57,6 +57,7 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config) 
     spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}",
                 to_string(report.mode), reason_names(reasons));
   }
+  note_mismatches(report, config);
   first_ = false;
   mode_ = report.mode;
   reasons_ = reasons;
@@ -76,6 +77,25 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config) 
       spdlog::warn("sensor {}: {} smoothed values in a row clipped", config.sensors[i].name,
                    sensor.clipped_in_a_row);
     clipping_[i] = clipping;
+  }
+}
+
+void EventLog::note_mismatches(const Report& report, const EstimatorConfig& config) {
+  latched_.resize(report.axes.size(), false);
+  for (std::size_t i = 0; i < report.axes.size(); ++i) {
+    const AxisReport& axis = report.axes[i];
+    if (axis.latched == latched_[i]) continue;
+    latched_[i] = axis.latched;
+    const Mismatch& mismatch = axis.latched_mismatch;
+    if (axis.latched)
+      spdlog::error(
+          "axis {}: sent {:.3f} um, read back {:.3f} um: {}; not driven until it is mended and "
+          "released (thermocomp release {})",
+          config.axes[i].name, mismatch.sent_um, mismatch.read_um, likely_text(mismatch),
+          config.axes[i].name);
+    else
+      spdlog::info("axis {}: released, goes on from {:.3f} um", config.axes[i].name,
+                   axis.offset_um);
   }
 }
 
@@ -118,6 +138,14 @@ void EventLog::note_controller(const ControllerHealth& controller) {
 void EventLog::note_missed(std::uint64_t missed) {
   if (missed > missed_) spdlog::warn("{} cycles missed", missed - missed_);
   missed_ = missed;
+}
+
+void EventLog::note_failed_sleeps(std::uint64_t failed) {
+  if (failed > failed_sleeps_) {
+    spdlog::error("clock_nanosleep failed {} times: the cycle waits by poll, a millisecond late",
+                  failed - failed_sleeps_);
+  }
+  failed_sleeps_ = failed;
 }
 
 void EventLog::note_socket(const SocketStatistics& statistics) {

@@ -24,11 +24,13 @@ class EventLog {
   void note_bus(const BusHealth& bus);
   void note_controller(const ControllerHealth& controller);
   void note_missed(std::uint64_t missed);
+  void note_failed_sleeps(std::uint64_t failed);
   /// Clients that were refused, cut off or missed notifications: at most one line a minute, since
   /// whoever can connect could otherwise fill the log.
   void note_socket(const SocketStatistics& statistics);
 
  private:
+  void note_mismatches(const Report& report, const EstimatorConfig& config);
   void note_link(const std::string& what, bool connected, const std::string& error);
   void note_state(const std::string& what, bool connected, const std::string& state);
 
@@ -38,10 +40,12 @@ class EventLog {
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;
   std::vector<bool> estimated_;
+  std::vector<bool> latched_;
   bool uncertain_{false};
   std::map<std::string, bool> connected_;
   std::map<std::string, std::string> states_;  ///< of CAN interfaces
   std::uint64_t missed_{0};
+  std::uint64_t failed_sleeps_{0};
   SocketStatistics socket_;
   std::chrono::steady_clock::time_point socket_next_{};
 };

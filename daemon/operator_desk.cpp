@@ -1,6 +1,8 @@
 #include "daemon/operator_desk.hpp"
 
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -47,28 +49,40 @@ void add_reads(StatusServer& server, const DeskActions& actions) {
   add("model", model_json);
 }
 
-json take_reference(const DeskActions& actions) {
+/// `result` once `pending` has one.
+RpcPending then(RpcPending pending, std::function<json()> result) {
+  return [pending = std::move(pending), result = std::move(result)]() -> std::optional<json> {
+    if (!pending()) return std::nullopt;
+    return result();
+  };
+}
+
+RpcPending take_reference(const DeskActions& actions) {
   const auto view = actions.view();
   const auto columns = view.config.model.temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)
     refuse_unless(view.report.inputs[i].good,
                   "no reference can be taken: " + columns[i] + " has no good sensor now");
-  actions.command({CommandKind::reference, 0, 0.0});
-  return {{"done", true}};
+  return actions.command({CommandKind::reference, 0, 0.0});
 }
 
-json note_measured(const DeskActions& actions, const json& params) {
+RpcPending note_measured(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
+  constexpr double most_um = 1000.0;  // no thermal displacement; a slip of the keyboard
+  refuse_unless(std::abs(command.value_um) <= most_um,
+                "measured: the value must be in [-1000, 1000] um");
   const double displacement_um = view.report.axes[command.axis].displacement_um;
-  actions.command(command);
-  // What remains at the tool is what the model did not foresee.
-  return {{"done", true},
-          {"measured_um", command.value_um},
-          {"predicted_um", std::isfinite(displacement_um) ? json(displacement_um) : json(nullptr)}};
+  return then(actions.command(command), [command, displacement_um] {
+    // What remains at the tool is what the model did not foresee.
+    return json{
+        {"done", true},
+        {"measured_um", command.value_um},
+        {"predicted_um", std::isfinite(displacement_um) ? json(displacement_um) : json(nullptr)}};
+  });
 }
 
-json prove(const DeskActions& actions, const json& params) {
+RpcPending prove(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::prove, axis_index(view, params), value_um(params)};
   const double most_um = view.config.estimator.compensation.prove_um_max;
@@ -80,31 +94,35 @@ json prove(const DeskActions& actions, const json& params) {
   refuse_unless(!axis.proving, "the axis is being proved already");
   refuse_unless(!has_reason(view.report.reasons, Reason::cutting),
                 "not while the controller says it is cutting");
-  actions.command(command);
-  return {{"done", true}};
+  return actions.command(command);
 }
 
-json reload(const DeskActions& actions) {
+RpcPending release(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const Command command{CommandKind::release, axis_index(view, params), 0.0};
+  refuse_unless(view.report.axes[command.axis].latched, "the axis has no latched mismatch");
+  return actions.command(command);
+}
+
+RpcPending reload(const DeskActions& actions) {
   try {
-    actions.reload();
+    return then(actions.reload(), [actions] {
+      return json{{"done", true}, {"checksum", actions.view().config.model_checksum}};
+    });
   } catch (const ConfigurationError& error) {
     throw RpcError(rpc::refused, error.what());
   }
-  return {{"done", true}, {"checksum", actions.view().config.model_checksum}};
 }
 
 }  // namespace
 
 void add_operator_methods(StatusServer& server, const DeskActions& actions) {
   add_reads(server, actions);
-  const auto add = [&](const char* name, std::function<json(const json&)> handler) {
-    server.add_method(name, AccessClass::operate, std::move(handler));
+  const auto add = [&](const char* name, RpcSlowHandler handler) {
+    server.add_slow_method(name, AccessClass::operate, std::move(handler));
   };
   const auto simple = [&](const char* name, CommandKind kind) {
-    add(name, [actions, kind](const json&) {
-      actions.command({kind, 0, 0.0});
-      return json{{"done", true}};
-    });
+    add(name, [actions, kind](const json&) { return actions.command({kind, 0, 0.0}); });
   };
   simple("enable", CommandKind::enable);
   simple("disable", CommandKind::disable);
@@ -112,6 +130,7 @@ void add_operator_methods(StatusServer& server, const DeskActions& actions) {
   add("reference", [actions](const json&) { return take_reference(actions); });
   add("measured", [actions](const json& params) { return note_measured(actions, params); });
   add("prove", [actions](const json& params) { return prove(actions, params); });
+  add("release", [actions](const json& params) { return release(actions, params); });
   add("reload", [actions](const json&) { return reload(actions); });
   server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
     refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");

@@ -15,10 +15,12 @@ namespace thermocomp {
 /// What the desk needs of the daemon behind it.
 struct DeskActions {
   std::function<StatusView()> view;
-  /// Gives the command to the cycle and waits until it has taken it. @throws RpcError
-  std::function<void(const Command&)> command;
+  /// Gives the command to the cycle; the result is there once it is carried out and would survive a
+  /// restart. @throws RpcError
+  std::function<RpcPending(const Command&)> command;
+  /// The result is there once the cycle runs with the new configuration.
   /// @throws ConfigurationError or RpcError with what is wrong; the running one then stays
-  std::function<void()> reload;
+  std::function<RpcPending()> reload;
   /// A bridge's report and its answer; empty where the controller is no bridge. @throws RpcError
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
 };

@@ -51,6 +51,16 @@ json correction(const StatusView& view, const CorrectionReport& report) {
           {"refused", report.refused}};
 }
 
+/// What an operator has to look into before a release; null where there is nothing.
+json mismatch(const AxisReport& axis) {
+  if (!axis.latched) return nullptr;
+  const Mismatch& latched = axis.latched_mismatch;
+  return {{"sent_um", number(latched.sent_um)},
+          {"read_um", number(latched.read_um)},
+          {"likely", likely_text(latched)},
+          {"releasing", axis.releasing}};
+}
+
 json axes(const StatusView& view) {
   json list = json::array();
   for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
@@ -65,7 +75,8 @@ json axes(const StatusView& view) {
                     {"measured", number(axis.measured_um)},
                     {"synced", axis.synced},
                     {"driven", axis.driven},
-                    {"mismatch", axis.mismatch},
+                    {"disagrees", axis.mismatch},
+                    {"mismatch", mismatch(axis)},
                     {"at_bound", axis.at_bound},
                     {"proving", axis.proving},
                     {"offset_sd", number(axis.offset_sd_um)},

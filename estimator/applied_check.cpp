@@ -25,10 +25,24 @@ void AppliedCheck::sent(nanoseconds now, double offset_um) noexcept {
   max_um_[newest_] = std::max(max_um_[newest_], offset_um);
 }
 
+double AppliedCheck::lowest_um() const noexcept {
+  return *std::min_element(min_um_.begin(), min_um_.end());
+}
+
+double AppliedCheck::highest_um() const noexcept {
+  return *std::max_element(max_um_.begin(), max_um_.end());
+}
+
+bool AppliedCheck::is_between(double applied_um, double low_um, double high_um) const noexcept {
+  return applied_um >= low_um - tolerance_um_ && applied_um <= high_um + tolerance_um_;
+}
+
 bool AppliedCheck::agrees(double applied_um) const noexcept {
-  const double low_um = *std::min_element(min_um_.begin(), min_um_.end()) - tolerance_um_;
-  const double high_um = *std::max_element(max_um_.begin(), max_um_.end()) + tolerance_um_;
-  return applied_um >= low_um && applied_um <= high_um;
+  return is_between(applied_um, lowest_um(), highest_um());
+}
+
+bool AppliedCheck::agrees_after_absence(double applied_um) const noexcept {
+  return is_between(applied_um, std::min(0.0, lowest_um()), std::max(0.0, highest_um()));
 }
 
 void AppliedCheck::adopt(const AppliedCheck& previous) noexcept {

@@ -18,12 +18,19 @@ class AppliedCheck {
   void restart(nanoseconds now, double offset_um) noexcept;
   void sent(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] bool agrees(double applied_um) const noexcept;
+  /// What a controller that was away may have become of itself: what was sent to it, nothing (0),
+  /// or anything between on its way back.
+  [[nodiscard]] bool agrees_after_absence(double applied_um) const noexcept;
   /// After a reload: what the other has sent counts as sent by this one.
   void adopt(const AppliedCheck& previous) noexcept;
 
   void visit_state(StateArchive& archive) { archive(min_um_, max_um_, newest_, slot_until_); }
 
  private:
+  [[nodiscard]] bool is_between(double applied_um, double low_um, double high_um) const noexcept;
+  [[nodiscard]] double lowest_um() const noexcept;
+  [[nodiscard]] double highest_um() const noexcept;
+
   // Old offsets leave in slots of a quarter window: cheap, and the window is kept to 25 %.
   static constexpr std::size_t slots = 5;
   double tolerance_um_;

@@ -9,12 +9,17 @@ namespace {
 /// What a read-back may lie outside our bound because registers are rounded.
 constexpr double register_rounding_um = 0.1;
 
-/// A link reads back before it writes: the exchange under way when an axis stops being driven may
-/// still write the old offset after its read-back, the one after it cannot.
-constexpr std::uint8_t read_backs_until_settled = 2;
+/// One unexplained read-back outweighs so many good ones; a second one within them latches.
+constexpr std::uint8_t suspicion_of_one = 16;
+
+/// Two read-backs after a release that are no further apart say the same.
+constexpr double same_read_back_um = 0.3;
 
 nanoseconds from_seconds(double seconds) {
   return std::chrono::duration_cast<nanoseconds>(seconds_d(seconds));
+}
+double to_seconds(nanoseconds time) {
+  return 1e-9 * static_cast<double>(time.count());
 }
 
 }  // namespace
@@ -30,11 +35,7 @@ AxisChannel::AxisChannel(const AxisConfig& config, const CompensationConfig& com
       trusted_um_(config.limiter.offset_um_max) {}
 
 void AxisChannel::step(const AxisInput& input) noexcept {
-  if (input.link_epoch != epoch_) {
-    epoch_ = input.link_epoch;
-    synced_ = false;
-    read_backs_awaited_ = 0;  // the new epoch's read-back is the first after all that was sent
-  }
+  if (input.link_epoch != epoch_) take_epoch(input.link_epoch);
   if (input.online) applied_um_ = input.applied_um;
   if (!synced_)
     synchronise(input);
@@ -44,10 +45,18 @@ void AxisChannel::step(const AxisInput& input) noexcept {
     prove_phase_ = ProvePhase::none;
     return;
   }
+  driven_once_ = true;
+  driven_at_ = input.now;
   target_um_ = input.target_um;
   if (proving()) target_um_ = prove_target_um(input.now);
   if (input.may_change) limiter_.step(target_um_, input.dt_s);
   check_.sent(input.now, limiter_.offset_um());
+}
+
+/// A pause of the same link changes nothing by itself: what is read back is compared as ever.
+void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
+  if (!is_same_link(epoch, epoch_)) synced_ = false;
+  epoch_ = epoch;
 }
 
 void AxisChannel::synchronise(const AxisInput& input) noexcept {
@@ -60,49 +69,96 @@ void AxisChannel::synchronise(const AxisInput& input) noexcept {
   }
   if (!std::isfinite(input.applied_um)) return;
   synced_ = true;
-  start_from_applied(input);
+  starting_ = true;
+  compare(input);
 }
 
 void AxisChannel::compare(const AxisInput& input) noexcept {
   if (!std::isfinite(input.applied_um)) return;
-  if (read_backs_awaited_ != 0) {
-    await_read_back(input);
-    return;
-  }
-  if (out_of_bound_) {
-    // The axis is not driven until the controller itself is back within the bound.
-    start_from_applied(input);
-    return;
-  }
-  if (check_.agrees(input.applied_um)) {
-    if (mismatch_ && input.now - agreed_since_ >= mismatch_after_) mismatch_ = false;
-    return;
-  }
-  // The controller applies something else (re-homed, rejected, overridden). Going on from there is
-  // the only way not to jump when it listens again - but from where it stands once all that was
-  // sent has arrived: what has just been read back may be from before the last write.
-  mismatch_ = true;
-  agreed_since_ = input.now;
-  read_backs_awaited_ = read_backs_until_settled;
+  const bool fresh = input.taken_at != read_back_at_;
   read_back_at_ = input.taken_at;
   out_of_bound_ = is_out_of_bound(input.applied_um);
+  if (latched_) {
+    starting_ = false;  // a release decides where to start
+    agreed_since_ = input.now;
+    if (releasing_ && fresh) check_release(input);
+  } else if (starting_) {
+    start_on_link(input, fresh);
+  } else if (check_.agrees(input.applied_um)) {
+    note_explained(input, fresh);
+  } else {
+    note_unexplained(input, fresh);
+  }
 }
 
-void AxisChannel::await_read_back(const AxisInput& input) noexcept {
+/// The axis is not driven until the controller itself is within the bound. A controller that was
+/// away may have lost its offset; one that comes back with another is not believed.
+void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
+  if (out_of_bound_) return;
+  if (driven_once_ && !check_.agrees_after_absence(input.applied_um))
+    return note_unexplained(input, fresh);
+  starting_ = false;
+  in_doubt_ = false;
+  start_from(input.now, std::clamp(input.applied_um, -trusted_um_, trusted_um_));
+}
+
+void AxisChannel::note_explained(const AxisInput& input, bool fresh) noexcept {
+  in_doubt_ = false;
+  if (mismatch_ && input.now - agreed_since_ >= mismatch_after_) mismatch_ = false;
+  if (!fresh) return;
+  if (suspicion_ > 0) --suspicion_;
+  if (driven_once_) pairs_.note(limiter_.offset_um(), input.applied_um);
+}
+
+void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept {
+  mismatch_ = true;
   agreed_since_ = input.now;
-  if (input.taken_at == read_back_at_) return;
-  read_back_at_ = input.taken_at;
-  if (--read_backs_awaited_ == 0) start_from_applied(input);
+  const bool counts = fresh || !in_doubt_;
+  in_doubt_ = true;
+  if (!counts) return;
+  if (suspicion_ == 0) {
+    suspicion_ = suspicion_of_one;
+    return;
+  }
+  latched_ = true;
+  releasing_ = false;
+  starting_ = false;
+  latched_mismatch_ = pairs_.judge(limiter_.offset_um(), input.applied_um);
+  pairs_.note(limiter_.offset_um(), input.applied_um);
+}
+
+void AxisChannel::release() noexcept {
+  if (!latched_) return;
+  releasing_ = true;
+  released_um_ = not_a_number;
+}
+
+void AxisChannel::check_release(const AxisInput& input) noexcept {
+  const double sent_um = limiter_.offset_um();
+  const bool mended = std::abs(input.applied_um - sent_um) <= same_read_back_um;
+  const bool first = std::isnan(released_um_);
+  const bool stands = std::abs(input.applied_um - released_um_) <= same_read_back_um;
+  if (out_of_bound_ || !(first || stands) ||
+      (!mended && latched_mismatch_.explains(sent_um, input.applied_um))) {
+    releasing_ = false;
+    return;
+  }
+  released_um_ = input.applied_um;
+  const double could_go_um = limiter_.rate_um_per_s() * to_seconds(input.now - driven_at_);
+  if (first || std::abs(input.applied_um - sent_um) > could_go_um) return;
+  end_latch();
+  start_from(input.now, std::clamp(input.applied_um, -trusted_um_, trusted_um_));
+}
+
+void AxisChannel::end_latch() noexcept {
+  latched_ = false;
+  releasing_ = false;
+  in_doubt_ = false;
+  suspicion_ = 0;
 }
 
 bool AxisChannel::is_out_of_bound(double applied_um) const noexcept {
   return !(std::abs(applied_um) <= trusted_um_ + register_rounding_um);
-}
-
-void AxisChannel::start_from_applied(const AxisInput& input) noexcept {
-  out_of_bound_ = is_out_of_bound(input.applied_um);
-  if (!out_of_bound_)
-    start_from(input.now, std::clamp(input.applied_um, -trusted_um_, trusted_um_));
 }
 
 void AxisChannel::start_from(nanoseconds now, double offset_um) noexcept {
@@ -145,11 +201,20 @@ void AxisChannel::adopt(const AxisChannel& previous) noexcept {
   applied_um_ = previous.applied_um_;
   epoch_ = previous.epoch_;
   synced_ = previous.synced_;
+  starting_ = previous.starting_;
+  driven_once_ = previous.driven_once_;
   out_of_bound_ = previous.out_of_bound_;
   mismatch_ = previous.mismatch_;
   agreed_since_ = previous.agreed_since_;
-  read_backs_awaited_ = previous.read_backs_awaited_;
+  in_doubt_ = previous.in_doubt_;
+  suspicion_ = previous.suspicion_;
+  latched_ = previous.latched_;
+  releasing_ = previous.releasing_;
+  released_um_ = previous.released_um_;
+  latched_mismatch_ = previous.latched_mismatch_;
+  pairs_ = previous.pairs_;
   read_back_at_ = previous.read_back_at_;
+  driven_at_ = previous.driven_at_;
   check_.adopt(previous.check_);
 }
 

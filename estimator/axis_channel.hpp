@@ -4,6 +4,7 @@
 #include "estimator/applied_check.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/limiter.hpp"
+#include "estimator/mismatch.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/types.hpp"
 
@@ -21,27 +22,41 @@ struct AxisInput {
   nanoseconds taken_at{};  ///< when applied_um was read back
 };
 
+/// A read-back is evidence, not a command. The offset starts from it in three cases only: at the
+/// first contact with a controller; on a new link, where it is what was sent, nothing, or between;
+/// and when an operator releases a mismatch. In all others the value sent stays the axis' own.
+///
+/// A read-back that nothing sent lately explains pauses the axis; a second one before so many good
+/// ones have followed latches the mismatch: the axis is not driven until release().
 class AxisChannel {
  public:
   AxisChannel(const AxisConfig& config, const CompensationConfig& compensation, bool reads_back);
 
   void step(const AxisInput& input) noexcept;
   /// Moves by `move_um` and back; the compensation of this axis waits meanwhile. Ignored unless
-  /// synced, or beyond prove_um_max.
+  /// driven, or beyond prove_um_max.
   void prove(double move_um) noexcept;
   void end_prove() noexcept { prove_phase_ = ProvePhase::none; }
+  /// An operator says that what caused a latched mismatch is mended. The next read-backs decide:
+  /// explained by the very factor, sign or constant that was latched, or not two alike, it stays
+  /// latched; else the axis starts from what is read back, once the slew rate would have had the
+  /// time to go there from what was sent last.
+  void release() noexcept;
 
   [[nodiscard]] double offset_um() const noexcept { return limiter_.offset_um(); }
   [[nodiscard]] double target_um() const noexcept { return target_um_; }
   /// As read back last; NaN where the controller does not tell.
   [[nodiscard]] double applied_um() const noexcept { return applied_um_; }
   [[nodiscard]] bool synced() const noexcept { return synced_; }
-  /// Whether the offset may be sent: synced, the controller's own value is believable, and nothing
-  /// that was sent before a disagreement can still be under way.
+  /// Whether the offset may be sent: synced, started, and nothing read back is unexplained.
   [[nodiscard]] bool driven() const noexcept {
-    return synced_ && !out_of_bound_ && read_backs_awaited_ == 0;
+    return synced_ && !starting_ && !in_doubt_ && !latched_;
   }
   [[nodiscard]] bool mismatch() const noexcept { return mismatch_; }
+  [[nodiscard]] bool latched() const noexcept { return latched_; }
+  [[nodiscard]] bool releasing() const noexcept { return releasing_; }
+  /// Of the newest latch.
+  [[nodiscard]] const Mismatch& latched_mismatch() const noexcept { return latched_mismatch_; }
   [[nodiscard]] bool out_of_bound() const noexcept { return out_of_bound_; }
   [[nodiscard]] bool at_bound() const noexcept { return limiter_.at_bound(); }
   [[nodiscard]] bool proving() const noexcept { return prove_phase_ != ProvePhase::none; }
@@ -52,19 +67,24 @@ class AxisChannel {
   void adopt(const AxisChannel& previous) noexcept;
 
   void visit_state(StateArchive& archive) {
-    archive(limiter_, check_, target_um_, applied_um_, epoch_, trusted_um_, synced_, out_of_bound_,
-            mismatch_, agreed_since_, read_backs_awaited_, read_back_at_, prove_phase_,
-            prove_from_um_, prove_move_um_, prove_until_);
+    archive(limiter_, check_, target_um_, applied_um_, epoch_, trusted_um_, synced_, starting_,
+            driven_once_, out_of_bound_, mismatch_, agreed_since_, in_doubt_, suspicion_, latched_,
+            releasing_, released_um_, latched_mismatch_, pairs_, read_back_at_, driven_at_,
+            prove_phase_, prove_from_um_, prove_move_um_, prove_until_);
   }
 
  private:
   enum class ProvePhase : std::uint8_t { none, out, wait, back };
 
+  void take_epoch(std::uint32_t epoch) noexcept;
   void synchronise(const AxisInput& input) noexcept;
   void compare(const AxisInput& input) noexcept;
-  void await_read_back(const AxisInput& input) noexcept;
+  void start_on_link(const AxisInput& input, bool fresh) noexcept;
+  void note_explained(const AxisInput& input, bool fresh) noexcept;
+  void note_unexplained(const AxisInput& input, bool fresh) noexcept;
+  void check_release(const AxisInput& input) noexcept;
+  void end_latch() noexcept;
   [[nodiscard]] bool is_out_of_bound(double applied_um) const noexcept;
-  void start_from_applied(const AxisInput& input) noexcept;
   void start_from(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] double prove_target_um(nanoseconds now) noexcept;
 
@@ -81,11 +101,20 @@ class AxisChannel {
   /// Largest |offset| that can come from us: the bound, or what an earlier bound allowed.
   double trusted_um_;
   bool synced_{false};
+  bool starting_{false};     ///< a new link's first believable read-back is waited for
+  bool driven_once_{false};  ///< by this program: what is applied is no longer anybody's
   bool out_of_bound_{false};
   bool mismatch_{false};
   nanoseconds agreed_since_{};
-  std::uint8_t read_backs_awaited_{0};  ///< before the axis starts from what is applied
-  nanoseconds read_back_at_{};          ///< the last one that was waited for
+  bool in_doubt_{false};  ///< the newest read-back is unexplained
+  std::uint8_t suspicion_{0};
+  bool latched_{false};
+  bool releasing_{false};
+  double released_um_{not_a_number};  ///< read back since release(), to be confirmed
+  Mismatch latched_mismatch_;
+  SentAndRead pairs_;
+  nanoseconds read_back_at_{};
+  nanoseconds driven_at_{};
   ProvePhase prove_phase_{ProvePhase::none};
   double prove_from_um_{0.0};
   double prove_move_um_{0.0};

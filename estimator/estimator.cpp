@@ -11,6 +11,7 @@
 #include "estimator/input_gains.hpp"
 #include "estimator/lost_blocks.hpp"
 #include "estimator/name_index.hpp"
+#include "estimator/temperature_range.hpp"
 
 namespace thermocomp {
 namespace {
@@ -56,6 +57,7 @@ struct Estimator::Parts {
   [[nodiscard]] bool estimate_lost(nanoseconds now) noexcept;
   [[nodiscard]] bool certain() noexcept;
   void take_references() noexcept;
+  [[nodiscard]] bool has_targets() const noexcept;
   void predict(nanoseconds now) noexcept;
   void decide_mode(nanoseconds now, bool data_good) noexcept;
   void step_axes(nanoseconds now, const ControllerState& controller) noexcept;
@@ -152,6 +154,7 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
       hold(std::chrono::duration_cast<nanoseconds>(seconds_d(config.compensation.hold_s))),
       enabled(config.compensation.enabled_at_first_start) {
   config.compensation.validate();
+  check_reference(config, model);
   require(config.axes.size() <= axes_max, "axis", static_cast<double>(config.axes.size()),
           "are too many axes");
   require(config.signals.size() <= signals_max, "controller.signal",
@@ -217,6 +220,10 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
   blocks_good = blocks_good || estimated;
   parts.predicted = blocks_good && signals_good && referenced;
   if (parts.predicted) parts.predict(now);
+  if (parts.predicted && !parts.has_targets()) {
+    parts.add(Reason::no_target);
+    parts.predicted = false;
+  }
   parts.decide_mode(now, parts.predicted);
   parts.step_axes(now, controller);
 
@@ -302,6 +309,13 @@ void Estimator::Parts::predict(nanoseconds at) noexcept {
   correct(at);
 }
 
+/// Inputs that are good and a model that is may still give no number together.
+bool Estimator::Parts::has_targets() const noexcept {
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    if (!std::isfinite(predicted_um(i))) return false;
+  return true;
+}
+
 void Estimator::Parts::correct(nanoseconds at) noexcept {
   for (std::size_t i = 0; i < columns.size(); ++i)
     rise_K[i] = lost.temps_degC()[i] - reference_degC[i];
@@ -385,9 +399,13 @@ void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controll
     input.applied_um = controller.applied_um[i];
     input.taken_at = controller.taken_at;
     input.target_um = clearing_waits ? not_a_number : target_um(i);
+    // Before the first cycle end there is nothing to go to: where it stands is the target.
+    if (mode == Mode::compensating && !std::isfinite(input.target_um))
+      input.target_um = axes[i].offset_um();
     axes[i].step(input);
     if (!axes[i].synced()) add(Reason::not_synced);
     if (axes[i].mismatch()) add(Reason::mismatch);
+    if (axes[i].latched()) add(Reason::mismatch_latched);
     if (axes[i].at_bound()) add(Reason::at_bound);
     if (axes[i].out_of_bound()) add(Reason::applied_out_of_bound);
   }
@@ -402,6 +420,9 @@ void Estimator::apply(const Command& command) noexcept {
     case CommandKind::disable:
       parts.enabled = false;
       for (AxisChannel& axis : parts.axes) axis.end_prove();
+      break;
+    case CommandKind::release:
+      if (command.axis < parts.axes.size()) parts.axes[command.axis].release();
       break;
     case CommandKind::reference:
       parts.take_new_reference();
@@ -488,6 +509,9 @@ void Estimator::report(Report& out) const noexcept {
     line.synced = axis.synced();
     line.driven = axis.driven();
     line.mismatch = axis.mismatch();
+    line.latched = axis.latched();
+    line.releasing = axis.releasing();
+    line.latched_mismatch = axis.latched_mismatch();
     line.at_bound = axis.at_bound();
     line.proving = axis.proving();
     line.offset_sd_um = parts.offset_sd_um[i];
@@ -531,10 +555,12 @@ std::map<std::string, double> Estimator::model_reference_degC() const {
   return numbers;
 }
 
-void Estimator::restore(const PersistentState& state) {
+std::vector<std::string> Estimator::restore(const PersistentState& state) {
   Parts& parts = *parts_;
-  parts.enabled = state.enabled;
-  if (state.model_reference_degC == model_reference_degC()) {
+  const std::vector<std::string> refused =
+      impossible_references(parts.config, parts.columns, state.reference_degC);
+  parts.enabled = state.enabled && refused.empty();
+  if (refused.empty() && state.model_reference_degC == model_reference_degC()) {
     for (std::size_t i = 0; i < parts.columns.size(); ++i)
       take(state.reference_degC, parts.columns[i], parts.reference_degC[i]);
     const auto signal_columns = parts.thermal_model.signal_columns();
@@ -553,14 +579,17 @@ void Estimator::restore(const PersistentState& state) {
     parts.axes[i].restore(offset_um);
     parts.corrections[i].restore(state.correction, parts.config.axes[i].name);
   }
+  return refused;
 }
 
 void Estimator::Parts::restore_cycle_hold(const PersistentState& state) {
   std::vector<double> temps_degC(columns.size(), not_a_number);
   std::vector<double> signals(signal_values.size(), not_a_number);
   const auto signal_columns = thermal_model.signal_columns();
-  for (std::size_t i = 0; i < temps_degC.size(); ++i)
+  for (std::size_t i = 0; i < temps_degC.size(); ++i) {
     take(state.held_degC, columns[i], temps_degC[i]);
+    if (!TemperatureRange(config, columns[i]).holds(temps_degC[i])) temps_degC[i] = not_a_number;
+  }
   for (std::size_t i = 0; i < signals.size(); ++i)
     take(state.held_signals, signal_columns[i], signals[i]);
   cycle_hold.restore(temps_degC, signals);

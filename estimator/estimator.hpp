@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "estimator/estimator_config.hpp"
+#include "estimator/mismatch.hpp"
 #include "estimator/running_correction.hpp"
 #include "estimator/thermal_model.hpp"
 #include "estimator/types.hpp"
@@ -41,9 +42,12 @@ enum class Reason : std::uint32_t {
   cutting = 1u << 8,     ///< hold_while_cutting holds the offset
   at_bound = 1u << 9,
   applied_out_of_bound = 1u << 10,  ///< read-back beyond any bound of ours: axis is not driven
-  block_estimated = 1u << 11        ///< a warning: compensating, with an estimate for a lost block
+  block_estimated = 1u << 11,       ///< a warning: compensating, with an estimate for a lost block
+  mismatch_latched =
+      1u << 12,         ///< read-backs that nothing sent explains: not driven until released
+  no_target = 1u << 13  ///< the model's answer is no finite number
 };
-inline constexpr std::size_t reasons_count = 12;
+inline constexpr std::size_t reasons_count = 14;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
 /// Of a set of reasons (Report::reasons), whether one is in it.
@@ -86,6 +90,9 @@ struct AxisReport {
   bool synced{false};
   bool driven{false};  ///< offset marked valid
   bool mismatch{false};
+  bool latched{false};        ///< the mismatch stays until an operator releases it
+  bool releasing{false};      ///< released, the read-backs are looked at
+  Mismatch latched_mismatch;  ///< of the newest latch
   bool at_bound{false};
   bool proving{false};
   /// Standard deviation that estimated blocks give the offset; 0 where all are measured.
@@ -157,7 +164,11 @@ class Estimator {
 
   /// The numbers of the model file's reference, as PersistentState keeps them.
   [[nodiscard]] std::map<std::string, double> model_reference_degC() const;
-  void restore(const PersistentState& state);  ///< before the first step; allocates
+  /// Before the first step; allocates. A reference outside of what the sensors of its column may
+  /// show (their screening) is not one that was ever taken: then no reference is, and the
+  /// compensation is switched off, because the next one would be that of a machine in any state.
+  /// @return what was refused, by key, value and rule; empty: nothing
+  std::vector<std::string> restore(const PersistentState& state);
   /// Bumpless reload: takes over offsets, switches, references, smoothing and lag states by name.
   /// plan_adoption() allocates and may run on any thread while `previous` is not being replaced;
   /// adopt() neither allocates nor throws.

@@ -22,6 +22,7 @@ class Limiter {
 
   [[nodiscard]] double offset_um() const noexcept { return offset_um_; }
   [[nodiscard]] double bound_um() const noexcept { return bound_um_; }
+  [[nodiscard]] double rate_um_per_s() const noexcept { return rate_um_per_s_; }
   /// Whether the last target lay outside the bound.
   [[nodiscard]] bool at_bound() const noexcept { return at_bound_; }
   void visit_state(StateArchive& archive) { archive(offset_um_, at_bound_); }

@@ -44,6 +44,10 @@ std::string_view to_string(Reason reason) noexcept {
       return "applied_out_of_bound";
     case Reason::block_estimated:
       return "block_estimated";
+    case Reason::mismatch_latched:
+      return "mismatch_latched";
+    case Reason::no_target:
+      return "no_target";
   }
   return "unknown";
 }

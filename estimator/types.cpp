@@ -54,6 +54,8 @@ std::string_view to_string(CommandKind kind) noexcept {
       return "prove";
     case CommandKind::stop:
       return "stop";
+    case CommandKind::release:
+      return "release";
   }
   return "unknown";
 }

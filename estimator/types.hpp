@@ -46,11 +46,21 @@ struct Reading {
   Fault fault{Fault::never_read};
 };
 
+/// An epoch of a link numbers in its low bits the link itself (connected, reconnected, offsets
+/// taken again) and above them the pauses of one and the same link: something was read back that
+/// nothing sent explains, a write was refused, or the cycle stood still.
+inline constexpr std::uint32_t epochs_of_a_link = 1u << 20;
+
+/// Whether two epochs are of one link, so that what was sent in one still counts in the other.
+[[nodiscard]] constexpr bool is_same_link(std::uint32_t a, std::uint32_t b) noexcept {
+  return a % epochs_of_a_link == b % epochs_of_a_link;
+}
+
 /// What the controller last told. Values it does not report are NaN.
 struct ControllerState {
   nanoseconds taken_at{};
-  /// Changes each time the link is (re)established or a write failed: what was sent before may no
-  /// longer be what is applied. 0: never connected.
+  /// Changes each time the link is (re)established or pauses: a command of another epoch was
+  /// computed without knowing what is applied now. 0: never connected.
   std::uint32_t link_epoch{0};
   bool online{false};
   std::array<double, axes_max> applied_um{};  ///< offset in effect, order of the axes [um]
@@ -71,7 +81,8 @@ struct OffsetCommand {
 };
 
 /// What an operator (or the CNC program) asks of the estimator, or the daemon that is about to end
-/// (`stop`: offsets to zero and nowhere else; the operator's switch stays as it is).
+/// (`stop`: offsets to zero and nowhere else; the operator's switch stays as it is). `release` ends
+/// a latched mismatch of an axis.
 enum class CommandKind : std::uint8_t {
   enable,
   disable,
@@ -79,14 +90,15 @@ enum class CommandKind : std::uint8_t {
   measured,
   cycle_end,
   prove,
-  stop
+  stop,
+  release
 };
-inline constexpr std::size_t command_kinds_count = 7;
+inline constexpr std::size_t command_kinds_count = 8;
 [[nodiscard]] std::string_view to_string(CommandKind kind) noexcept;
 
 struct Command {
   CommandKind kind{CommandKind::enable};
-  std::uint32_t axis{0};  ///< for `measured` and `prove`: index of the axis
+  std::uint32_t axis{0};  ///< for `measured`, `prove`, `release`: index of the axis
   double value_um{0.0};   ///< for `measured` and `prove` [um]
 };
 

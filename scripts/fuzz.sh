@@ -14,7 +14,8 @@ source scripts/common.sh
 usage() { sed -n 's/^# \{0,1\}//; 4,5p' "${BASH_SOURCE[0]}"; }
 
 runs=build/fuzz/runs
-readonly input_seconds_max=5     # one input may take so long
+readonly input_seconds_max=20    # one input may take so long, by the clock of a busy machine
+readonly structured_bytes_max=65536  # of an input whose mutator builds it
 readonly memory_MB_max=2048      # of the process, with the sanitizer's own
 readonly allocation_MB_max=512   # asked for at once
 mapfile -t known < <(sed -n 's/^fuzz_target(\([a-z0-9_]*\).*/\1/p' tests/fuzz/CMakeLists.txt)
@@ -76,6 +77,10 @@ run() {
   mkdir -p "$runs/$target/corpus" "$runs/$target/artifacts"
   rm -f "$runs/$target/artifacts"/*
   if [[ -f $words ]]; then options=("-dict=$words"); fi
+  # A mutator of the target's own makes deep and long inputs from the first one on.
+  if grep -q "^fuzz_target($target SOURCES [a-z]*_mutator.cpp" tests/fuzz/CMakeLists.txt; then
+    options+=(-max_len="$structured_bytes_max" -len_control=0)
+  fi
   "build/fuzz/bin/fuzz_$target" -max_total_time="$seconds" -timeout="$input_seconds_max" \
     -rss_limit_mb="$memory_MB_max" -malloc_limit_mb="$allocation_MB_max" -print_final_stats=1 \
     "${options[@]}" -artifact_prefix="$runs/$target/artifacts/" \

@@ -28,9 +28,16 @@ part "packages of PETSc" scripts/setup.sh petsc
 for preset in release asan-ubsan tsan debug coverage; do
   part "$preset" ./test.sh --preset "$preset"
 done
+part "includes" scripts/check_includes.py
 part "format" scripts/check-format.sh
 part "clang-tidy" scripts/check-tidy.sh
 part "fuzz" scripts/fuzz.sh --minutes 10
+bin=build/release/bin
+part "attacks" "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --jobs 4 --minutes 45
+part "attacks on CAN" tests/vm/run_with_can.sh --timeout 1500 env TMPDIR=/dev/shm \
+  "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --links can --minutes 15
+part "attacks on LinuxCNC" tests/attack/run_linuxcnc.sh \
+  "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED"
 for benchmark in $(bench/run.sh); do
   part "bench $benchmark" bench/run.sh "$benchmark"
 done

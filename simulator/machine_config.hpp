@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "drivers/can/can_config.hpp"
 #include "drivers/controllers/controller_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 #include "simulator/field_node_config.hpp"
 #include "simulator/plant_config.hpp"
 

@@ -9,9 +9,10 @@
 #include "config/sections/canopen_bus.hpp"
 #include "config/sections/presets.hpp"
 #include "config/toml_reader.hpp"
+#include "drivers/can/can_config.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 
 namespace thermocomp::sections {
 

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "config/dbc_scanner.hpp"
+#include "config/file_limits.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 
@@ -122,7 +124,7 @@ CanDatabase DbcFiles::read(const TomlTable& bus) {
   if (!folder_ || path.empty()) return database;
   const auto full = path.is_absolute() ? path : (*folder_ / path).lexically_normal();
   try {
-    DbcReading reading = read_dbc_text(read_text_file(full), full.string());
+    DbcReading reading = read_dbc_text(read_text_file(full, bus_table_bytes_max), full.string());
     if (reading.problems.empty()) {
       database.file = std::make_shared<const DbcFile>(std::move(reading.file));
     }

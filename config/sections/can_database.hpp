@@ -8,7 +8,7 @@
 
 #include "config/dbc_file.hpp"
 #include "config/toml_reader.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/can/can_config.hpp"
 
 namespace thermocomp::sections {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "config/toml_reader.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/can/can_config.hpp"
 
 namespace thermocomp::sections {
 

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "config/file_limits.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 
@@ -226,7 +227,7 @@ std::shared_ptr<const EdsFile> EdsFiles::read(const TomlTable& device) {
   if (const auto known = read_.find(path); known != read_.end()) return known->second;
   std::shared_ptr<const EdsFile>& file = read_[path];
   try {
-    EdsReading reading = read_eds_text(read_text_file(path), path.string());
+    EdsReading reading = read_eds_text(read_text_file(path, bus_table_bytes_max), path.string());
     problems_.insert(problems_.end(), reading.problems.begin(), reading.problems.end());
     if (reading.problems.empty()) file = std::make_shared<EdsFile>(std::move(reading.file));
   } catch (const ConfigurationError& error) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "config/toml_reader.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/sentinel.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp::sections {

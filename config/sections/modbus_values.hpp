@@ -3,7 +3,7 @@
 
 #include "config/toml_reader.hpp"
 #include "drivers/controllers/controller_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 
 namespace thermocomp::sections {
 

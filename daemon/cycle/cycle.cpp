@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <poll.h>
 #include <time.h>
 
 #include "estimator/checks.hpp"
@@ -15,31 +16,27 @@ nanoseconds now_on_clock() noexcept {
   return std::chrono::seconds(time.tv_sec) + nanoseconds(time.tv_nsec);
 }
 
-void sleep_until(nanoseconds wake) noexcept {
+/// By another system call, a millisecond or more at a time: a FIFO thread that spun instead would
+/// take the processor from everybody, and its cycles would run ahead of time.
+void wait_otherwise(nanoseconds wake) noexcept {
+  while (now_on_clock() < wake) poll(nullptr, 0, 1);
+}
+
+/// @return false when the system refused to sleep; it is `wake` all the same
+bool sleep_until(nanoseconds wake) noexcept {
   timespec time{};
   time.tv_sec = std::chrono::duration_cast<std::chrono::seconds>(wake).count();
   time.tv_nsec = (wake % std::chrono::seconds(1)).count();
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
+  int error = EINTR;
+  while (error == EINTR) {
+    error = clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
   }
+  if (error == 0) return true;
+  wait_otherwise(wake);
+  return false;
 }
 
 }  // namespace
-
-bool CommandQueue::try_push(const Command& command) noexcept {
-  const std::uint64_t head = head_.load(std::memory_order_relaxed);
-  if (head - tail_.load(std::memory_order_acquire) == capacity) return false;
-  commands_[head % capacity] = command;
-  head_.store(head + 1, std::memory_order_release);
-  return true;
-}
-
-bool CommandQueue::try_pop(Command& command) noexcept {
-  const std::uint64_t tail = tail_.load(std::memory_order_relaxed);
-  if (tail == head_.load(std::memory_order_acquire)) return false;
-  command = commands_[tail % capacity];
-  tail_.store(tail + 1, std::memory_order_release);
-  return true;
-}
 
 Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
              std::size_t sensors, std::unique_ptr<CycleBrain> brain)
@@ -64,7 +61,7 @@ void Cycle::run() noexcept {
   std::uint64_t cycle = begin(now_on_clock());
   while (!stop_.load(std::memory_order_relaxed)) {
     const nanoseconds wake = grid_.time_of(cycle);
-    sleep_until(wake);
+    if (!sleep_until(wake)) timing_.failed_sleeps.fetch_add(1, std::memory_order_relaxed);
     const nanoseconds start = now_on_clock();
     step(cycle);
     const nanoseconds end = now_on_clock();
@@ -96,6 +93,8 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   // Given back only now, when the new one has something to report.
   if (retiring_ != nullptr)
     retired_.store(std::exchange(retiring_, nullptr), std::memory_order_release);
+  // Last, so that who sees a command done can see a change-over of the same step.
+  if (commanded) commands_done_.store(commands_.taken(), std::memory_order_release);
 }
 
 std::uint64_t Cycle::newest_due(nanoseconds now) const noexcept {
@@ -143,6 +142,10 @@ std::unique_ptr<CycleBrain> Cycle::take_retired() noexcept {
   std::unique_ptr<CycleBrain> retired(retired_.exchange(nullptr, std::memory_order_acquire));
   if (retired) observed_ = handed_over_;
   return retired;
+}
+
+std::unique_ptr<CycleBrain> Cycle::withdraw_brain() noexcept {
+  return std::unique_ptr<CycleBrain>(incoming_.exchange(nullptr, std::memory_order_acquire));
 }
 
 const Report& Cycle::report() noexcept {

@@ -1,16 +1,17 @@
 /// The fixed-rate cycle: newest readings -> estimator -> offsets, on an absolute grid of time.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "daemon/cycle/command_queue.hpp"
 #include "daemon/cycle/duration_histogram.hpp"
-#include "daemon/history/cycle_recorder.hpp"
-#include "daemon/history/record.hpp"
+#include "daemon/recording/cycle_recorder.hpp"
+#include "daemon/recording/grid.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "drivers/wait_free_slot.hpp"
@@ -27,25 +28,13 @@ struct CycleBrain {
   WaitFreeSlot<Report> reports;             ///< cycle -> main
 };
 
-/// Commands of the operator on their way to the cycle. One producer, one consumer, wait-free.
-class CommandQueue {
- public:
-  [[nodiscard]] bool try_push(const Command& command) noexcept;
-  [[nodiscard]] bool try_pop(Command& command) noexcept;
-
- private:
-  static constexpr std::size_t capacity = 64;
-  std::array<Command, capacity> commands_{};
-  std::atomic<std::uint64_t> head_{0};
-  std::atomic<std::uint64_t> tail_{0};
-};
-
 /// Counters of the cycle; written by it, read by anyone.
 struct CycleTiming {
   DurationHistogram lateness;  ///< woken up after the grid's time
   DurationHistogram work;      ///< from waking up to being done
   std::atomic<std::uint64_t> cycles{0};
   std::atomic<std::uint64_t> missed{0};
+  std::atomic<std::uint64_t> failed_sleeps{0};  ///< the system refused to sleep until a time
 };
 
 /// On the thread that calls run(): no allocation, no lock, no log call, no exception and no system
@@ -69,15 +58,28 @@ class Cycle {
   [[nodiscard]] std::uint64_t next_after(std::uint64_t cycle, nanoseconds now) noexcept;
   void stop() noexcept { stop_.store(true, std::memory_order_relaxed); }
 
-  /// Main's side. @return false when 64 commands wait already
-  [[nodiscard]] bool send(const Command& command) noexcept { return commands_.try_push(command); }
-  /// Main's side: the cycle goes over to `next` at its next step. The brain it had until then can
-  /// be had by take_retired(). @pre the last one handed over has been taken back
+  // Main's side, which daemon/cycle/cycle_handle.hpp makes safe to use.
+
+  /// @return the command's number; none: 64 wait already
+  std::optional<std::uint64_t> send(const Command& command) noexcept {
+    return commands_.try_push(command);
+  }
+  /// @return whether the command with this number never reaches the cycle
+  [[nodiscard]] bool withdraw(std::uint64_t number) noexcept { return commands_.withdraw(number); }
+  /// All commands before this number were carried out (or withdrawn), and report() says what they
+  /// did; when a brain was handed over in the same step, once it has been taken back.
+  [[nodiscard]] std::uint64_t commands_done() const noexcept {
+    return commands_done_.load(std::memory_order_acquire);
+  }
+  /// The cycle goes over to `next` at its next step. The brain it had until then can be had by
+  /// take_retired(). @pre the last one handed over has been taken back or withdrawn
   void hand_over(std::unique_ptr<CycleBrain> next) noexcept;
   [[nodiscard]] std::unique_ptr<CycleBrain> take_retired() noexcept;
-  /// Main's side: the newest report of the brain in use, as of take_retired().
+  /// The brain that was handed over, which the cycle then never sees; none: it has it already.
+  [[nodiscard]] std::unique_ptr<CycleBrain> withdraw_brain() noexcept;
+  /// The newest report of the brain in use, as of take_retired().
   [[nodiscard]] const Report& report() noexcept;
-  /// Main's side: newest controller state seen by the cycle.
+  /// Newest controller state seen by the cycle.
   [[nodiscard]] const ControllerState& controller() noexcept;
 
   [[nodiscard]] const CycleTiming& timing() const noexcept { return timing_; }
@@ -102,6 +104,7 @@ class Cycle {
   CycleBrain* observed_;               ///< main's: whose reports it reads
   CycleBrain* handed_over_{nullptr};   ///< main's: whose they will be
   CommandQueue commands_;
+  std::atomic<std::uint64_t> commands_done_{0};
   std::atomic<CycleBrain*> incoming_{nullptr};
   std::atomic<CycleBrain*> retired_{nullptr};
   std::atomic<bool> stop_{false};

@@ -14,7 +14,8 @@
 #include <vector>
 
 #include "daemon/history/byte_codec.hpp"
-#include "daemon/history/record.hpp"
+#include "daemon/recording/record.hpp"
+#include "estimator/types.hpp"
 
 namespace thermocomp {
 

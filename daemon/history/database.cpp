@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include <system_error>
+
 namespace thermocomp {
 namespace {
 
@@ -23,6 +25,24 @@ std::string immutable_uri(const std::filesystem::path& file) {
   return uri + "?immutable=1";
 }
 
+/// The file behind all links, found by the system: SQLite follows them by itself with a frame of
+/// four kilobytes each, which a loop makes more than a thread's stack has.
+/// @throws DatabaseError
+std::filesystem::path followed(const std::filesystem::path& file) {
+  std::filesystem::path path = std::filesystem::absolute(file);
+  constexpr int links_max = 40;
+  std::error_code error;
+  for (int links = 0; std::filesystem::is_symlink(path, error); ++links) {
+    if (links == links_max) {
+      throw DatabaseError(SQLITE_CANTOPEN, file.string() + ": is a loop of links");
+    }
+    path = path.parent_path() / std::filesystem::read_symlink(path, error);
+  }
+  const std::filesystem::path real = std::filesystem::weakly_canonical(path, error);
+  if (error) throw DatabaseError(SQLITE_CANTOPEN, file.string() + ": " + error.message());
+  return real;
+}
+
 bool can_read(sqlite3* handle) {
   return sqlite3_exec(handle, "SELECT count(*) FROM sqlite_master", nullptr, nullptr, nullptr) ==
          SQLITE_OK;
@@ -32,15 +52,16 @@ bool can_read(sqlite3* handle) {
 
 Database::Database(const std::filesystem::path& file, DatabaseMode mode) : file_(file) {
   const bool read_only = mode == DatabaseMode::read_only;
+  const std::filesystem::path real = followed(file);
   const int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI |
                     (read_only ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-  int code = sqlite3_open_v2(file.c_str(), &handle_, flags, nullptr);
+  int code = sqlite3_open_v2(real.c_str(), &handle_, flags, nullptr);
   if (code == SQLITE_OK && read_only && !can_read(handle_) &&
       sqlite3_errcode(handle_) == SQLITE_CANTOPEN &&
-      !std::filesystem::exists(file.string() + "-wal")) {
+      !std::filesystem::exists(real.string() + "-wal")) {
     sqlite3_close(handle_);
     handle_ = nullptr;
-    code = sqlite3_open_v2(immutable_uri(file).c_str(), &handle_, flags, nullptr);
+    code = sqlite3_open_v2(immutable_uri(real).c_str(), &handle_, flags, nullptr);
   }
   if (code != SQLITE_OK) {
     const std::string message = file.string() + ": " + sqlite3_errstr(code);

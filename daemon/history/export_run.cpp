@@ -72,11 +72,13 @@ double block_value(const BlockConfig& block, const EstimatorConfig& config,
 
 class SegmentExport {
  public:
+  /// @param damage  what is found on the way
   SegmentExport(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup,
-                const SetupColumns& place)
+                const SetupColumns& place, std::vector<HistoryDamage>& damage)
       : segment_(segment),
         config_(setup.estimator),
         place_(place),
+        damage_(damage),
         cursor_(reader.records(segment)) {
     SegmentStart start = reader.start(segment);
     if (start.readings.size() != config_.sensors.size()) {
@@ -86,7 +88,7 @@ class SegmentExport {
     inputs_.controller = start.controller;
     measured_um_.fill(not_a_number);
     offset_um_.fill(not_a_number);
-    has_record_ = cursor_.next(record_);
+    advance();
   }
 
   /// Goes on to the next cycle whose offsets were noted. @return false when there is none
@@ -97,12 +99,11 @@ class SegmentExport {
         take_offsets();
         return true;
       }
-      if (record_.kind == RecordKind::command) {
-        take_command();
-      } else if (record_.kind != RecordKind::skipped) {
-        inputs_.apply(record_);
-      }
-      has_record_ = cursor_.next(record_);
+      take_input();
+      advance();
+    }
+    if (cursor_.wall_time_was_impossible()) {
+      note("a wall time cannot be (a clock set wrong?); what was recorded is taken");
     }
     return false;
   }
@@ -132,12 +133,49 @@ class SegmentExport {
   }
 
  private:
+  void note(const std::string& why) {
+    constexpr int told_max = 10;
+    if (++told_ <= told_max) damage_.push_back({segment_.id, why});
+    if (told_ == told_max + 1) damage_.push_back({segment_.id, "and more of the kind"});
+  }
+
+  /// The next record that can be read.
+  void advance() {
+    for (;;) {
+      try {
+        has_record_ = cursor_.next(record_);
+        return;
+      } catch (const HistoryError& error) {
+        note(error.what());
+        inputs_.forget();
+        offset_um_.fill(not_a_number);
+        has_record_ = cursor_.resume();
+        if (!has_record_) return;
+      }
+    }
+  }
+
+  void take_input() {
+    try {
+      if (record_.kind == RecordKind::command) {
+        take_command();
+      } else if (record_.kind != RecordKind::skipped) {
+        inputs_.apply(record_);
+      }
+    } catch (const HistoryError& error) {
+      note(error.what());
+    }
+  }
+
   void take_offsets() {
     const std::uint64_t cycle = record_.cycle;
     while (has_record_ && record_.kind == RecordKind::offset && record_.cycle == cycle) {
-      if (record_.index >= place_.offsets.size()) throw HistoryError("damaged: offset of no axis");
-      offset_um_[record_.index] = record_.value;
-      has_record_ = cursor_.next(record_);
+      if (record_.index < place_.offsets.size()) {
+        offset_um_[record_.index] = record_.value;
+      } else {
+        note("an offset of no axis");
+      }
+      advance();
     }
   }
   void take_command() {
@@ -150,6 +188,8 @@ class SegmentExport {
   const SegmentInfo& segment_;
   const EstimatorConfig& config_;
   const SetupColumns& place_;
+  std::vector<HistoryDamage>& damage_;
+  int told_{0};
   RecordCursor cursor_;
   InputsInForce inputs_;
   std::array<double, axes_max> offset_um_{};
@@ -173,15 +213,14 @@ std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const
   return text.data();
 }
 
-/// @throws HistoryError with file and segment for whatever `step` throws
-template <class Step>
-auto named(const HistoryReader& reader, const SegmentInfo& segment, Step step) {
-  try {
-    return step();
-  } catch (const std::exception& error) {
-    throw HistoryError(reader.file().string() + ": segment " + std::to_string(segment.id) +
-                       " cannot be exported: " + error.what());
-  }
+/// Whether all of the segment lies beside [from, to), as far as seconds tell.
+bool is_beside(const HistoryClock& clock, const SegmentInfo& segment,
+               const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to) {
+  const auto end = static_cast<std::uint64_t>(segment.last_cycle + 1);
+  const bool is_before_it =
+      from && from->seconds && clock.seconds_at(segment, end) < *from->seconds;
+  return is_before_it ||
+         (to && to->seconds && clock.seconds_at(segment, segment.first_cycle) >= *to->seconds);
 }
 
 bool is_before(double time_s, std::int64_t wall_ns, const HistoryTime& bound) {
@@ -268,54 +307,101 @@ HistoryTime parse_history_time(const std::string& text) {
   return time;
 }
 
+namespace {
+
+/// Writes rows as the segments give them, and between them comment lines of what is missing.
+class RunExport {
+ public:
+  RunExport(const HistoryReader& reader, const SetupParser& parser, std::ostream& out)
+      : reader_(reader), setups_(reader, parser), clock_(reader), out_(out) {
+    columns_.column("time_s");
+    for (const auto& [id, setup] : setups_.all()) {
+      places_[id] = columns_for(setup.estimator, columns_);
+    }
+    summary_.columns = columns_.names();
+    append_header(text_, columns_.names());
+    row_.resize(columns_.names().size());
+    summary_.damage = reader.damage();
+    tell_damage();
+  }
+
+  ExportSummary run(const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to,
+                    const Progress& progress) {
+    std::size_t done = 0;
+    for (const SegmentInfo& segment : reader_.segments()) {
+      if (!is_beside(clock_, segment, from, to)) take(segment, from, to);
+      ++done;
+      if (progress) {
+        progress(static_cast<double>(done) / static_cast<double>(reader_.segments().size()));
+      }
+    }
+    out_ << text_;
+    return std::move(summary_);
+  }
+
+ private:
+  void take(const SegmentInfo& segment, const std::optional<HistoryTime>& from,
+            const std::optional<HistoryTime>& to) {
+    try {
+      SegmentExport walk(reader_, segment, setups_.of(segment), places_.at(segment.setup),
+                         summary_.damage);
+      std::uint64_t cycle = 0;
+      while (walk.next(cycle)) {
+        tell_damage();
+        const double time_s = clock_.seconds_at(segment, cycle);
+        if (from && is_before(time_s, walk.wall_ns(cycle), *from)) continue;
+        if (to && !is_before(time_s, walk.wall_ns(cycle), *to)) continue;
+        write(segment, time_s, walk);
+      }
+    } catch (const std::exception& error) {
+      summary_.damage.push_back({segment.id, error.what()});
+    }
+    tell_damage();
+  }
+
+  void write(const SegmentInfo& segment, double time_s, SegmentExport& walk) {
+    if (!first_s_) first_s_ = time_s;
+    std::fill(row_.begin(), row_.end(), not_a_number);
+    walk.fill(row_);
+    row_[0] = time_s - *first_s_;
+    if (last_written_ != nullptr && last_written_ != &segment) {
+      const std::string gap = gap_line(clock_, *last_written_, segment, *first_s_);
+      text_ += gap;
+      if (!gap.empty()) ++summary_.gaps;
+    }
+    last_written_ = &segment;
+    append_row(text_, row_);
+    out_ << text_;
+    text_.clear();
+    ++summary_.rows;
+  }
+
+  void tell_damage() {
+    for (; told_ < summary_.damage.size(); ++told_) text_ += damage_line(summary_.damage[told_]);
+  }
+
+  const HistoryReader& reader_;
+  ParsedSetups setups_;
+  HistoryClock clock_;
+  std::ostream& out_;
+  RunColumns columns_;
+  std::map<std::int64_t, SetupColumns> places_;
+  ExportSummary summary_;
+  std::size_t told_{0};  ///< of its damage
+  std::string text_;
+  std::vector<double> row_;
+  std::optional<double> first_s_;
+  const SegmentInfo* last_written_{nullptr};
+};
+
+}  // namespace
+
 ExportSummary export_run(const std::filesystem::path& history,
                          const std::optional<HistoryTime>& from,
                          const std::optional<HistoryTime>& to, std::ostream& out,
                          const Progress& progress, const SetupParser& parser) {
   const HistoryReader reader(history);
-  const ParsedSetups setups(reader, parser);
-  const HistoryClock clock(reader);
-  RunColumns columns;
-  columns.column("time_s");
-  std::map<std::int64_t, SetupColumns> places;
-  for (const auto& [id, setup] : setups.all()) places[id] = columns_for(setup.estimator, columns);
-
-  ExportSummary summary{0, 0, columns.names()};
-  std::string text;
-  append_header(text, columns.names());
-  std::vector<double> row(columns.names().size());
-  std::optional<double> first_s;
-  const SegmentInfo* last_written = nullptr;
-  std::size_t segments_done = 0;
-  for (const SegmentInfo& segment : reader.segments()) {
-    SegmentExport walk = named(reader, segment, [&] {
-      return SegmentExport(reader, segment, setups.of(segment), places.at(segment.setup));
-    });
-    for (std::uint64_t cycle = 0; named(reader, segment, [&] { return walk.next(cycle); });) {
-      const double time_s = clock.seconds_at(segment, cycle);
-      if (from && is_before(time_s, walk.wall_ns(cycle), *from)) continue;
-      if (to && !is_before(time_s, walk.wall_ns(cycle), *to)) continue;
-      if (!first_s) first_s = time_s;
-      std::fill(row.begin(), row.end(), not_a_number);
-      walk.fill(row);
-      row[0] = time_s - *first_s;
-      if (last_written != nullptr && last_written != &segment) {
-        text = gap_line(clock, *last_written, segment, *first_s);
-        if (!text.empty()) ++summary.gaps;
-      }
-      last_written = &segment;
-      append_row(text, row);
-      out << text;
-      text.clear();
-      ++summary.rows;
-    }
-    ++segments_done;
-    if (progress) {
-      progress(static_cast<double>(segments_done) / static_cast<double>(reader.segments().size()));
-    }
-  }
-  out << text;
-  return summary;
+  return RunExport(reader, parser, out).run(from, to, progress);
 }
 
 }  // namespace thermocomp

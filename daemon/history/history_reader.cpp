@@ -1,11 +1,13 @@
 #include "daemon/history/history_reader.hpp"
 
-#include <cstdlib>
+#include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "daemon/history/chunk_codec.hpp"
 #include "daemon/history/database.hpp"
+#include "daemon/history/row_checksum.hpp"
+#include "daemon/history/sound_segments.hpp"
 
 namespace thermocomp {
 namespace {
@@ -17,28 +19,8 @@ SegmentReason reason_from(std::int64_t code) {
   return static_cast<SegmentReason>(code);
 }
 
-/// What no history can be: without these limits the arithmetic of times would overflow, and a
-/// replay would never end.
-constexpr std::int64_t grid_ns_max = std::int64_t{1} << 60;  ///< 36 years since the system started
-constexpr std::int64_t span_ns_max = std::int64_t{1} << 55;  ///< a year; segments last a week
-constexpr std::int64_t wall_ns_max = std::int64_t{1} << 62;  ///< in the year 2116
-constexpr std::int64_t period_ns_min = 100'000;
-constexpr std::int64_t period_ns_max = 3'600'000'000'000;
-
 void require(bool holds, const char* damage) {
   if (!holds) throw HistoryError(std::string("damaged: ") + damage);
-}
-
-void check_times(const SegmentInfo& segment) {
-  const std::int64_t period_ns = segment.grid.period.count();
-  const std::int64_t start_ns = segment.grid.start.count();
-  const auto first = static_cast<std::int64_t>(segment.first_cycle);
-  require(period_ns >= period_ns_min && period_ns <= period_ns_max, "a period that cannot be");
-  require(start_ns >= 0 && start_ns <= grid_ns_max, "the start of a grid that cannot be");
-  require(segment.wall_ns >= 0 && segment.wall_ns <= wall_ns_max, "a wall time that cannot be");
-  require(first >= 0 && first <= (grid_ns_max - start_ns) / period_ns, "a cycle that cannot be");
-  require(segment.last_cycle >= first - 1 && segment.last_cycle - first < span_ns_max / period_ns,
-          "a segment's last cycle cannot be");
 }
 
 SegmentInfo segment_from(const Statement& row) {
@@ -65,38 +47,101 @@ void check_is_history(Database& database) {
     throw HistoryError(name + ": is not a history of thermocomp");
   }
   const std::int64_t version = database.number("PRAGMA user_version");
+  if (version < 1) {
+    throw HistoryError(name + ": is of version " + std::to_string(version) +
+                       ", which no thermocomp wrote (damaged)");
+  }
   if (version > history_version) {
     throw HistoryError(name + ": is of version " + std::to_string(version) +
                        ", this program reads up to version " + std::to_string(history_version));
   }
 }
 
+constexpr const char* columns_of_segment =
+    "SELECT id, run, setup, reason, grid_start_ns, period_ns, first_cycle, last_cycle,"
+    " wall_ns, records, bytes, program_version FROM segment";
+
 }  // namespace
+
+std::string to_string(const HistoryDamage& damage) {
+  return damage.segment == 0 ? damage.why
+                             : "segment " + std::to_string(damage.segment) + ": " + damage.why;
+}
 
 struct HistoryReader::Parts {
   explicit Parts(const std::filesystem::path& path)
       : file(path), database(path, DatabaseMode::read_only) {}
+
+  void read(const char* order, std::vector<SegmentInfo>& found);
+  void limit_to_chunks(SegmentInfo& segment);
+  [[nodiscard]] bool knows(std::int64_t id, const std::vector<SegmentInfo>& found) const;
+
   std::filesystem::path file;
   mutable Database database;
+  bool has_checksums{false};
   std::vector<SegmentInfo> segments;
+  std::vector<HistoryDamage> damage;
 };
+
+bool HistoryReader::Parts::knows(std::int64_t id, const std::vector<SegmentInfo>& found) const {
+  return std::any_of(found.begin(), found.end(),
+                     [id](const SegmentInfo& segment) { return segment.id == id; }) ||
+         std::any_of(damage.begin(), damage.end(),
+                     [id](const HistoryDamage& part) { return part.segment == id; });
+}
+
+/// The rows in that order up to one that is known already. @throws DatabaseError
+void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& found) {
+  Statement rows(database, (std::string(columns_of_segment) + order).c_str());
+  while (rows.step()) {
+    const std::int64_t id = rows.number(0);
+    if (knows(id, found)) return;
+    try {
+      found.push_back(segment_from(rows));
+      limit_to_chunks(found.back());
+    } catch (const DatabaseError&) {
+      throw;
+    } catch (const HistoryError& error) {
+      damage.push_back({id, error.what()});
+    }
+  }
+}
+
+/// A last cycle that no chunk reaches would let a replay go on with old inputs for ever.
+void HistoryReader::Parts::limit_to_chunks(SegmentInfo& segment) {
+  const std::int64_t none = static_cast<std::int64_t>(segment.first_cycle) - 1;
+  if (segment.last_cycle == none) return;
+  Statement newest(database,
+                   "SELECT max(through_cycle) FROM"
+                   " (SELECT through_cycle FROM chunk WHERE segment = ? ORDER BY number DESC"
+                   " LIMIT 2)");
+  newest.bind(segment.id);
+  const std::int64_t through = newest.step() ? std::max(newest.number(0), none) : none;
+  if (through >= segment.last_cycle) return;
+  segment.last_cycle = through;
+  damage.push_back({segment.id, "its chunks end before its last cycle"});
+}
 
 HistoryReader::HistoryReader(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) throw HistoryError(file.string() + ": there is no such file");
   parts_ = std::make_unique<Parts>(file);
   check_is_history(parts_->database);
-  Statement rows(parts_->database,
-                 "SELECT id, run, setup, reason, grid_start_ns, period_ns, first_cycle, last_cycle,"
-                 " wall_ns, records, bytes, program_version FROM segment ORDER BY id");
-  while (rows.step()) {
+  parts_->has_checksums = has_checksum_columns(parts_->database);
+  std::vector<SegmentInfo> found;
+  try {
+    parts_->read(" ORDER BY id", found);
+  } catch (const DatabaseError& error) {
+    // A page of the table is damaged: what stands behind it is read from the other end.
+    parts_->damage.push_back({0, std::string("some segments cannot be read: ") + error.what()});
     try {
-      parts_->segments.push_back(segment_from(rows));
-    } catch (const DatabaseError&) {
-      throw;  // names the file
-    } catch (const HistoryError& error) {
-      throw HistoryError(file.string() + ": " + error.what());
+      parts_->read(" ORDER BY id DESC", found);
+    } catch (const DatabaseError&) {  // told already
     }
+    if (found.empty()) throw;
   }
+  std::sort(found.begin(), found.end(),
+            [](const SegmentInfo& a, const SegmentInfo& b) { return a.id < b.id; });
+  parts_->segments = sound_segments(std::move(found), parts_->damage);
 }
 
 HistoryReader::~HistoryReader() = default;
@@ -107,6 +152,9 @@ const std::filesystem::path& HistoryReader::file() const noexcept {
 }
 const std::vector<SegmentInfo>& HistoryReader::segments() const noexcept {
   return parts_->segments;
+}
+const std::vector<HistoryDamage>& HistoryReader::damage() const noexcept {
+  return parts_->damage;
 }
 
 SegmentSetup HistoryReader::setup(const SegmentInfo& segment) const {
@@ -121,6 +169,7 @@ SegmentSetup HistoryReader::setup(const SegmentInfo& segment) const {
 }
 
 SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
+  if (parts_->has_checksums) check_segment_row(parts_->database, segment.id);
   Statement row(parts_->database, "SELECT estimator_state, inputs FROM segment WHERE id = ?");
   row.bind(segment.id);
   if (!row.step()) {
@@ -135,36 +184,30 @@ SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
 }
 
 RecordCursor HistoryReader::records(const SegmentInfo& segment) const {
-  // Told before anything is replayed: a far cycle that a damaged record names would be reached
-  // first.
-  Statement newest(
-      parts_->database,
-      "SELECT through_cycle FROM chunk WHERE segment = ? ORDER BY number DESC LIMIT 1");
-  newest.bind(segment.id);
-  if (segment.last_cycle >= static_cast<std::int64_t>(segment.first_cycle) &&
-      !(newest.step() && newest.number(0) >= segment.last_cycle)) {
-    throw HistoryError(parts_->file.string() + ": the chunks of segment " +
-                       std::to_string(segment.id) +
-                       " end before its last cycle (damaged, or deleted meanwhile)");
-  }
   return RecordCursor(*this, segment);
 }
 
 struct RecordCursor::Parts {
-  Parts(Database& database_in, SegmentInfo segment_in)
-      : database(database_in), segment(std::move(segment_in)) {}
+  Parts(Database& database_in, SegmentInfo segment_in, bool has_checksums_in)
+      : database(database_in), segment(std::move(segment_in)), has_checksums(has_checksums_in) {}
+  void decode(std::vector<std::byte> bytes, std::uint64_t count);
+
   Database& database;
   SegmentInfo segment;
+  bool has_checksums;
   std::int64_t next_chunk{0};
   std::int64_t through{-1};  ///< last cycle that the chunks read so far hold whole
   std::int64_t wall_minus_grid_ns{0};
-  std::uint64_t newest_cycle{0};  ///< of the records so far
+  bool wall_was_impossible{false};
+  std::uint64_t newest_cycle{0};  ///< of the chunks so far
   bool has_offsets{false};        ///< the newest record is an offset of that cycle
-  std::optional<ChunkDecoder> chunk;
+  std::vector<Record> records;    ///< of the chunk
+  std::size_t given{0};           ///< of those
 };
 
 RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segment)
-    : parts_(std::make_unique<Parts>(reader.parts_->database, segment)) {
+    : parts_(
+          std::make_unique<Parts>(reader.parts_->database, segment, reader.parts_->has_checksums)) {
   parts_->wall_minus_grid_ns = segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
   parts_->through = static_cast<std::int64_t>(segment.first_cycle) - 1;
   parts_->newest_cycle = segment.first_cycle;
@@ -176,39 +219,94 @@ std::int64_t RecordCursor::wall_minus_grid_ns() const noexcept {
   return parts_->wall_minus_grid_ns;
 }
 
+bool RecordCursor::wall_time_was_impossible() const noexcept {
+  return parts_->wall_was_impossible;
+}
+
+/// All of it, before any of it is given out.
+void RecordCursor::Parts::decode(std::vector<std::byte> bytes, std::uint64_t count) {
+  if (count > bytes.size()) throw HistoryError("damaged: more records than bytes");
+  std::vector<Record> decoded;
+  decoded.reserve(count);
+  ChunkDecoder chunk(std::move(bytes), count);
+  std::uint64_t cycle = newest_cycle;
+  bool is_offset = has_offsets;
+  for (Record record; chunk.next(record); decoded.push_back(record)) {
+    // Within a cycle the offsets, which come out of its step, are the last.
+    const bool is_late = record.cycle == cycle && is_offset && record.kind != RecordKind::offset;
+    require(record.cycle >= cycle && !is_late, "records are out of order");
+    cycle = record.cycle;
+    is_offset = record.kind == RecordKind::offset;
+  }
+  newest_cycle = cycle;
+  has_offsets = is_offset;
+  records = std::move(decoded);
+  given = 0;
+}
+
+/// @return false when the segment's chunks are at their end
+bool RecordCursor::load_chunk() {
+  Parts& parts = *parts_;
+  // A statement of its own for each chunk: a read transaction that stays open would keep the
+  // daemon's write-ahead log from being taken back.
+  Statement row(parts.database, parts.has_checksums
+                                    ? "SELECT records, count, through_cycle, wall_minus_grid_ns,"
+                                      " checksum IS NULL, checksum FROM chunk"
+                                      " WHERE segment = ? AND number = ?"
+                                    : "SELECT records, count, through_cycle, wall_minus_grid_ns, 1"
+                                      " FROM chunk WHERE segment = ? AND number = ?");
+  row.bind(parts.segment.id).bind(parts.next_chunk);
+  const std::string chunk = "chunk " + std::to_string(parts.next_chunk);
+  if (!row.step()) {
+    if (parts.through >= parts.segment.last_cycle) return false;
+    throw HistoryError(chunk + " is missing (damaged, or deleted meanwhile)");
+  }
+  std::vector<std::byte> records = row.blob(0);
+  const ChunkNumbers numbers{parts.next_chunk, row.number(1), row.number(2), row.number(3)};
+  if (row.number(4) == 0 && row.number(5) != checksum_of(numbers, records)) {
+    throw HistoryError(chunk + " does not fit its checksum");
+  }
+  try {
+    parts.decode(std::move(records), static_cast<std::uint64_t>(numbers.count));
+  } catch (const HistoryError& error) {
+    throw HistoryError(chunk + ": " + error.what());
+  }
+  ++parts.next_chunk;
+  parts.through = numbers.through_cycle;
+  const std::int64_t begin_ns = parts.segment.grid.time_of(parts.segment.first_cycle).count();
+  const std::int64_t difference_ns = numbers.wall_minus_grid_ns;
+  if (difference_ns >= -grid_ns_max && difference_ns <= wall_ns_max - begin_ns) {
+    parts.wall_minus_grid_ns = difference_ns;
+  } else {
+    parts.wall_was_impossible = true;
+  }
+  return true;
+}
+
 bool RecordCursor::next(Record& out) {
   Parts& parts = *parts_;
-  for (;;) {
-    if (parts.chunk && parts.chunk->next(out)) {
-      // Within a cycle the offsets, which come out of its step, are the last.
-      const bool is_late =
-          out.cycle == parts.newest_cycle && parts.has_offsets && out.kind != RecordKind::offset;
-      require(out.cycle >= parts.newest_cycle && !is_late, "records are out of order");
-      parts.newest_cycle = out.cycle;
-      parts.has_offsets = out.kind == RecordKind::offset;
-      // What follows the last cycle was cut off before its cycle was whole.
-      return out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
-    }
-    parts.chunk.reset();
-    // A statement of its own for each chunk: a read transaction that stays open would keep the
-    // daemon's write-ahead log from being taken back.
+  while (parts.given == parts.records.size()) {
+    if (!load_chunk()) return false;
+  }
+  out = parts.records[parts.given++];
+  // What follows the last cycle was cut off before its cycle was whole.
+  return out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
+}
+
+bool RecordCursor::resume() {
+  Parts& parts = *parts_;
+  parts.records.clear();
+  parts.given = 0;
+  try {
     Statement row(parts.database,
-                  "SELECT records, count, through_cycle, wall_minus_grid_ns FROM chunk"
-                  " WHERE segment = ? AND number = ?");
+                  "SELECT number FROM chunk WHERE segment = ? AND number > ?"
+                  " ORDER BY number LIMIT 1");
     row.bind(parts.segment.id).bind(parts.next_chunk);
-    if (!row.step()) {
-      if (parts.through >= parts.segment.last_cycle) return false;
-      throw HistoryError(parts.database.file().string() + ": chunk " +
-                         std::to_string(parts.next_chunk) + " of segment " +
-                         std::to_string(parts.segment.id) +
-                         " is missing (damaged, or deleted meanwhile)");
-    }
-    ++parts.next_chunk;
-    parts.through = row.number(2);
-    parts.wall_minus_grid_ns = row.number(3);
-    require(std::abs(parts.wall_minus_grid_ns / 2) <= wall_ns_max / 2,
-            "a wall time that cannot be");
-    parts.chunk.emplace(row.blob(0), static_cast<std::uint64_t>(row.number(1)));
+    if (!row.step()) return false;
+    parts.next_chunk = row.number(0);
+    return true;
+  } catch (const DatabaseError&) {
+    return false;  // the index itself is damaged
   }
 }
 

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "daemon/history/history_error.hpp"
-#include "daemon/history/record.hpp"
+#include "daemon/recording/grid.hpp"
+#include "daemon/recording/record.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
@@ -28,6 +29,14 @@ struct SegmentInfo {
   std::uint64_t bytes{0};
   std::string program_version;
 };
+
+/// What of a history cannot be used, and why.
+struct HistoryDamage {
+  std::int64_t segment{0};  ///< 0: the file as a whole
+  std::string why;          ///< one line
+};
+/// "segment 3: chunk 7 is missing"
+[[nodiscard]] std::string to_string(const HistoryDamage& damage);
 
 struct SegmentSetup {
   std::string config_text;
@@ -50,27 +59,39 @@ class RecordCursor {
   RecordCursor(const HistoryReader& reader, const SegmentInfo& segment);
   ~RecordCursor();
   RecordCursor(RecordCursor&&) noexcept;
+  /// Nothing of a chunk that is not sound is given out: its checksum is looked at (histories of
+  /// earlier versions have none), and that all of it can be decoded.
   /// @return false after the last record of the segment's whole cycles
-  /// @throws HistoryError when the file is damaged or the segment was deleted meanwhile
+  /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted meanwhile
   bool next(Record& out);
+  /// After an error: goes on with the next chunk there is. What its records leave out is unknown.
+  /// @return false when there is none
+  bool resume();
+  /// Whether a chunk so far said a wall time that cannot be; the last good difference then counts.
+  [[nodiscard]] bool wall_time_was_impossible() const noexcept;
   /// Wall clock minus the grid's time, as noted with the record last returned [ns].
   [[nodiscard]] std::int64_t wall_minus_grid_ns() const noexcept;
 
  private:
   struct Parts;
+  bool load_chunk();
   std::unique_ptr<Parts> parts_;
 };
 
 class HistoryReader {
  public:
-  /// Opens for reading only and takes note of the segments there are now.
-  /// @throws HistoryError naming the file: missing, no history, of a newer version, damaged
+  /// Opens for reading only and takes note of the segments there are now. A segment that cannot be
+  /// (or overlaps the one in front of it) is left out and told by damage(); a wall time that cannot
+  /// be, of a clock that was set wrong, is replaced by what the segments beside it say.
+  /// @throws HistoryError naming the file: missing, no history, of no version that there is, or so
+  ///         damaged that there is nothing to be taken from it
   explicit HistoryReader(const std::filesystem::path& file);
   ~HistoryReader();
   HistoryReader(HistoryReader&&) noexcept;
 
   [[nodiscard]] const std::filesystem::path& file() const noexcept;
   [[nodiscard]] const std::vector<SegmentInfo>& segments() const noexcept;  ///< oldest first
+  [[nodiscard]] const std::vector<HistoryDamage>& damage() const noexcept;
   [[nodiscard]] SegmentSetup setup(const SegmentInfo& segment) const;
   [[nodiscard]] SegmentStart start(const SegmentInfo& segment) const;
   [[nodiscard]] RecordCursor records(const SegmentInfo& segment) const;

@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <system_error>
 
+#include "daemon/history/row_checksum.hpp"
+
 namespace thermocomp {
 namespace {
 
@@ -26,10 +28,11 @@ constexpr const char* tables =
     " period_ns INTEGER NOT NULL, first_cycle INTEGER NOT NULL, last_cycle INTEGER NOT NULL,"
     " wall_ns INTEGER NOT NULL, last_wall_ns INTEGER NOT NULL, records INTEGER NOT NULL,"
     " bytes INTEGER NOT NULL, program_version TEXT NOT NULL, inputs BLOB NOT NULL,"
-    " estimator_state BLOB NOT NULL);"
+    " estimator_state BLOB NOT NULL, checksum INTEGER);"
     "CREATE TABLE chunk (id INTEGER PRIMARY KEY, segment INTEGER NOT NULL,"
     " number INTEGER NOT NULL, through_cycle INTEGER NOT NULL,"
-    " wall_minus_grid_ns INTEGER NOT NULL, count INTEGER NOT NULL, records BLOB NOT NULL);"
+    " wall_minus_grid_ns INTEGER NOT NULL, count INTEGER NOT NULL, records BLOB NOT NULL,"
+    " checksum INTEGER);"
     "CREATE UNIQUE INDEX chunk_of_segment ON chunk (segment, number);"
     "INSERT INTO meta VALUES ('format', 'thermocomp history'), ('schema_version', '1');";
 
@@ -114,7 +117,21 @@ bool HistoryStore::open_if_closed(std::int64_t needed_token) {
   return needed_token == 0 || tokens_.count(needed_token) != 0;
 }
 
+/// Held until the end: also while the file is closed, moved aside or missing.
+void HistoryStore::lock() {
+  if (lock_) return;
+  try {
+    lock_ = std::make_unique<FileLock>(config_.file);
+  } catch (const LockHeld& held) {
+    throw HistoryError("history: " + std::string(held.what()) +
+                       "; history.file must name another, or that one must end first");
+  } catch (const LockImpossible& problem) {
+    throw DatabaseError(SQLITE_CANTOPEN, problem.what());
+  }
+}
+
 void HistoryStore::prepare() {
+  lock();
   database_ = std::make_unique<Database>(config_.file, DatabaseMode::read_write_create);
   const std::string name = config_.file.string();
   const std::int64_t application = database_->number("PRAGMA application_id");
@@ -122,6 +139,10 @@ void HistoryStore::prepare() {
   const bool is_empty = database_->number("SELECT count(*) FROM sqlite_master") == 0;
   if (!is_empty && application != history_application_id) {
     throw HistoryError(name + ": is a database of another program; history.file must name another");
+  }
+  if (!is_empty && version < 1) {
+    throw HistoryError(name + ": is a history of version " + std::to_string(version) +
+                       ", which no thermocomp wrote; move it away or name another file");
   }
   if (version > history_version) {
     throw HistoryError(name + ": is a history of version " + std::to_string(version) +
@@ -133,6 +154,7 @@ void HistoryStore::prepare() {
   database_->run(
       "PRAGMA journal_mode = WAL; PRAGMA journal_size_limit = 1048576;"
       "PRAGMA wal_autocheckpoint = 500");
+  if (!has_checksum_columns(*database_)) add_checksum_columns(*database_);
   if (run_ == 0) run_ = database_->number("SELECT max(run) FROM segment") + 1;
   struct stat status {};
   if (stat(config_.file.c_str(), &status) == 0) {
@@ -234,18 +256,39 @@ void HistoryStore::insert(const SegmentRow& row, Tokens& tokens) {
   statement.bind(std::string_view(row.program_version));
   statement.bind(std::span<const std::byte>(row.inputs));
   statement.bind(std::span<const std::byte>(row.estimator_state)).run();
-  tokens[row.token] = sqlite3_last_insert_rowid(database_->handle());
+  const std::int64_t id = sqlite3_last_insert_rowid(database_->handle());
+  tokens[row.token] = id;
+  Statement seal(*database_, "UPDATE segment SET checksum = ? WHERE id = ?");
+  seal.bind(segment_checksum(*database_, id)).bind(id).run();
+}
+
+/// As with segments: committed by a commit that was reported as failed. Never replaced, whatever is
+/// there.
+bool HistoryStore::is_known(std::int64_t segment, const ChunkRow& row) {
+  Statement known(*database_, "SELECT records FROM chunk WHERE segment = ? AND number = ?");
+  known.bind(segment).bind(row.number);
+  if (!known.step()) return false;
+  if (known.blob(0) != row.records)
+    throw HistoryError(config_.file.string() + ": chunk " + std::to_string(row.number) +
+                       " of segment " + std::to_string(segment) +
+                       " is there already with other records; does another program write it?");
+  return true;
 }
 
 void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
   const auto segment = tokens.find(row.segment_token);
   if (segment == tokens.end()) throw HistoryError("a chunk without its segment");
+  if (is_known(segment->second, row)) return;
   Statement chunk(*database_,
-                  "INSERT OR REPLACE INTO chunk (segment, number, through_cycle,"
-                  " wall_minus_grid_ns, count, records) VALUES (?, ?, ?, ?, ?, ?)");
+                  "INSERT INTO chunk (segment, number, through_cycle,"
+                  " wall_minus_grid_ns, count, records, checksum)"
+                  " VALUES (?, ?, ?, ?, ?, ?, ?)");
   chunk.bind(segment->second).bind(row.number).bind(row.through_cycle);
   chunk.bind(row.wall_minus_grid_ns).bind(static_cast<std::int64_t>(row.count));
-  chunk.bind(std::span<const std::byte>(row.records)).run();
+  chunk.bind(std::span<const std::byte>(row.records));
+  const ChunkNumbers numbers{row.number, static_cast<std::int64_t>(row.count), row.through_cycle,
+                             row.wall_minus_grid_ns};
+  chunk.bind(checksum_of(numbers, row.records)).run();
   Statement update(*database_,
                    "UPDATE segment SET last_cycle = ?, last_wall_ns = ?, records = records + ?,"
                    " bytes = bytes + ? WHERE id = ?");

@@ -10,6 +10,8 @@
 ///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more a
 ///   commit;
 ///            wall_minus_grid_ns: wall clock minus the grid's time when it was written
+/// segment and chunk have a checksum (row_checksum.hpp); files of earlier versions get the columns
+/// when they are opened for writing.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +29,9 @@
 #include "daemon/history/chunk_codec.hpp"
 #include "daemon/history/database.hpp"
 #include "daemon/history/history_writer.hpp"
-#include "daemon/history/record.hpp"
+#include "daemon/locks/file_lock.hpp"
+#include "daemon/recording/grid.hpp"
+#include "daemon/recording/record.hpp"
 
 namespace thermocomp {
 
@@ -78,7 +82,8 @@ class HistoryStore {
 
   /// @param needed_token  a segment that must be in the file already; 0: none
   /// @return false when that segment is not in the file: its rows have no place there
-  /// @throws DatabaseError; HistoryError when the file is not ours or of a newer version
+  /// @throws DatabaseError; HistoryError when the file is not ours or of a newer version, or
+  ///         another process writes it
   [[nodiscard]] bool open_if_closed(std::int64_t needed_token);
   void close() noexcept;
   /// Renames the file (and its log) to `<file>.damaged-<UTC>` and says so in the log.
@@ -98,11 +103,13 @@ class HistoryStore {
  private:
   using Tokens = std::map<std::int64_t, std::int64_t>;  ///< token -> segment.id
 
+  void lock();
   void prepare();
   void create();
   [[nodiscard]] bool is_same_file() const noexcept;
   void insert(const SegmentRow& row, Tokens& tokens);
   void insert(const ChunkRow& row, const Tokens& tokens);
+  [[nodiscard]] bool is_known(std::int64_t segment, const ChunkRow& row);
   [[nodiscard]] std::int64_t setup_id(const HistorySetup& setup);
   void delete_segment(std::int64_t id);
   [[nodiscard]] std::int64_t wall_now_ns() const { return clocks_.wall().count(); }
@@ -111,6 +118,7 @@ class HistoryStore {
 
   HistoryConfig config_;
   WriterClocks clocks_;
+  std::unique_ptr<FileLock> lock_;
   std::unique_ptr<Database> database_;
   dev_t device_{0};
   ino_t inode_{0};

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "config/daemon_config.hpp"
-#include "daemon/history/cycle_recorder.hpp"
-#include "daemon/history/record.hpp"
+#include "daemon/recording/cycle_recorder.hpp"
+#include "daemon/recording/grid.hpp"
 
 namespace thermocomp {
 
@@ -67,7 +67,8 @@ class HistoryWriter {
                                                              const Estimator& estimator);
   /// Opens the file and starts the thread. A damaged file is moved aside with a warning in the log;
   /// a disk that does not work is tried again for ever.
-  /// @throws HistoryError when the file is of a newer version or of another program
+  /// @throws HistoryError when the file is of a newer version or of another program, or another
+  ///         process writes it
   void start();
   /// What start() does before it starts the thread, and what the thread does every 50 ms: for who
   /// has a time of his own and no thread.

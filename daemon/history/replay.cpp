@@ -5,6 +5,7 @@
 #include <cmath>
 #include <ostream>
 
+#include "daemon/history/segment_steps.hpp"
 #include "daemon/history/segment_walk.hpp"
 #include "estimator/estimator.hpp"
 
@@ -26,100 +27,50 @@ class SegmentReplay {
   SegmentReplay(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup,
                 const HistoryClock& clock, const OffsetSink& sink, ReplaySummary& summary)
       : segment_(segment),
-        estimator_(setup.estimator, setup.model),
-        cursor_(reader.records(segment)),
+        steps_(reader, segment, setup),
         clock_(clock),
         sink_(sink),
-        summary_(summary) {
-    SegmentStart start = reader.start(segment);
-    estimator_.load_state(start.estimator_state);
-    Report report = estimator_.make_report();
-    estimator_.report(report);
-    if (segment.grid.time_of(segment.first_cycle) < report.now) {
-      throw HistoryError("damaged: the state at its start is of a later time");
-    }
-    if (start.readings.size() != estimator_.config().sensors.size()) {
-      throw HistoryError("damaged: the inputs at its start do not fit its configuration");
-    }
-    inputs_.readings = std::move(start.readings);
-    inputs_.controller = start.controller;
-    next();
-  }
+        summary_(summary) {}
 
   /// @param each  called now and then with the cycles done
   void run(const std::function<void(std::uint64_t)>& each) {
-    const auto end = static_cast<std::uint64_t>(segment_.last_cycle + 1);
-    std::uint64_t cycle = segment_.first_cycle;
-    while (cycle < end) {
-      const std::uint64_t first_stepped = take_inputs(cycle);
-      if (first_stepped != cycle) {
-        cycle = first_stepped;
-        continue;
-      }
-      estimator_.step(segment_.grid.time_of(cycle), inputs_.readings, inputs_.controller, command_);
+    while (steps_.step()) {
       ++summary_.cycles;
-      if (has_record_ && record_.cycle == cycle) take_offsets(cycle);
-      ++cycle;
-      if (cycle % progress_every == 0) each(cycle - segment_.first_cycle);
+      if (steps_.noted_offset() != nullptr) take_offsets(steps_.cycle());
+      const std::uint64_t next = steps_.cycle() + 1;
+      if (next % progress_every == 0) each(next - segment_.first_cycle);
     }
   }
 
  private:
-  void next() { has_record_ = cursor_.next(record_); }
-
-  /// Everything that reached the estimator before the step of `cycle`.
-  /// @return `cycle`, or the first cycle after those that were skipped
-  std::uint64_t take_inputs(std::uint64_t cycle) {
-    while (has_record_ && record_.cycle <= cycle && record_.kind != RecordKind::offset) {
-      if (record_.cycle < cycle) throw HistoryError("damaged: records are out of order");
-      if (record_.kind == RecordKind::skipped) {
-        if (record_.time_ns < static_cast<std::int64_t>(cycle)) {
-          throw HistoryError("damaged: skipped cycles end before they begin");
-        }
-        const auto after = static_cast<std::uint64_t>(record_.time_ns) + 1;
-        next();
-        return after;
-      }
-      if (record_.kind == RecordKind::command) {
-        if (record_.detail >= command_kinds_count) {
-          throw HistoryError("damaged: unknown command");
-        }
-        estimator_.apply({static_cast<CommandKind>(record_.detail), record_.index, record_.value});
-      } else {
-        inputs_.apply(record_);
-      }
-      next();
-    }
-    return cycle;
-  }
-
   void take_offsets(std::uint64_t cycle) {
     NotedOffsets noted;
-    const std::size_t axes = estimator_.config().axes.size();
-    while (has_record_ && record_.cycle == cycle && record_.kind == RecordKind::offset) {
-      if (record_.index >= axes) throw HistoryError("damaged: an offset of no axis");
-      noted.offset_um[record_.index] = record_.value;
-      noted.valid[record_.index] = record_.detail != 0;
-      noted.link_epoch = static_cast<std::uint32_t>(record_.time_ns);
-      noted.axes = record_.index + std::size_t{1};
-      next();
+    const EstimatorConfig& config = steps_.estimator().config();
+    while (const Record* record = steps_.noted_offset()) {
+      if (record->index >= config.axes.size()) throw HistoryError("damaged: an offset of no axis");
+      noted.offset_um[record->index] = record->value;
+      noted.valid[record->index] = record->detail != 0;
+      noted.link_epoch = static_cast<std::uint32_t>(record->time_ns);
+      noted.axes = record->index + std::size_t{1};
+      steps_.next();
     }
     compare(cycle, noted);
     if (!sink_) return;
-    sink_({clock_.seconds_at(segment_, cycle), cycle, &estimator_.config(),
-           std::span<const double>(command_.offset_um).first(noted.axes),
+    sink_({clock_.seconds_at(segment_, cycle), cycle, &config,
+           std::span<const double>(steps_.command().offset_um).first(noted.axes),
            std::span<const double>(noted.offset_um).first(noted.axes)});
   }
 
   void compare(std::uint64_t cycle, const NotedOffsets& noted) {
+    const OffsetCommand& command = steps_.command();
     for (std::size_t axis = 0; axis < noted.axes; ++axis) {
       ++summary_.compared;
-      if (same_bits(command_.offset_um[axis], noted.offset_um[axis]) &&
-          command_.valid[axis] == noted.valid[axis] && command_.link_epoch == noted.link_epoch) {
+      if (same_bits(command.offset_um[axis], noted.offset_um[axis]) &&
+          command.valid[axis] == noted.valid[axis] && command.link_epoch == noted.link_epoch) {
         continue;
       }
       ++summary_.different;
-      const double difference_um = std::abs(command_.offset_um[axis] - noted.offset_um[axis]);
+      const double difference_um = std::abs(command.offset_um[axis] - noted.offset_um[axis]);
       if (!(difference_um <= summary_.largest_difference_um)) {
         summary_.largest_difference_um = difference_um;
       }
@@ -131,24 +82,26 @@ class SegmentReplay {
   }
 
   const SegmentInfo& segment_;
-  Estimator estimator_;
-  RecordCursor cursor_;
+  SegmentSteps steps_;
   const HistoryClock& clock_;
   const OffsetSink& sink_;
   ReplaySummary& summary_;
-  InputsInForce inputs_;
-  OffsetCommand command_;
-  Record record_;
-  bool has_record_{false};
 };
 
 std::uint64_t cycles_of(const SegmentInfo& segment) {
   return static_cast<std::uint64_t>(segment.last_cycle + 1) - segment.first_cycle;
 }
 
+using DamageSink = std::function<void(const HistoryDamage&)>;
+
 ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups,
-                         const OffsetSink& sink, const Progress& progress) {
+                         const OffsetSink& sink, const DamageSink& tell, const Progress& progress) {
   ReplaySummary summary;
+  const auto note = [&](const HistoryDamage& damage) {
+    if (tell) tell(damage);
+    summary.damage.push_back(damage);
+  };
+  for (const HistoryDamage& damage : reader.damage()) note(damage);
   const HistoryClock clock(reader);
   std::uint64_t total = 0;
   for (const SegmentInfo& segment : reader.segments()) total += cycles_of(segment);
@@ -161,9 +114,8 @@ ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups
         if (progress) progress(static_cast<double>(done + cycles) / static_cast<double>(total));
       });
     } catch (const std::exception& error) {
-      throw HistoryError(reader.file().string() + ": segment " + std::to_string(segment.id) +
-                         " (written by version " + segment.program_version +
-                         ") cannot be replayed: " + error.what());
+      note({segment.id, "(written by version " + segment.program_version +
+                            ") cannot be replayed: " + error.what()});
     }
     ++summary.segments;
     done += cycles_of(segment);
@@ -184,7 +136,7 @@ ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sin
                      const Progress& progress, const SetupParser& parser) {
   const HistoryReader reader(history);
   const ParsedSetups setups(reader, parser);
-  return replay_all(reader, setups, sink, progress);
+  return replay_all(reader, setups, sink, {}, progress);
 }
 
 ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& out,
@@ -214,7 +166,8 @@ ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& 
     out << text;
     text.clear();
   };
-  const ReplaySummary summary = replay_all(reader, setups, sink, progress);
+  const DamageSink tell = [&](const HistoryDamage& damage) { text += damage_line(damage); };
+  const ReplaySummary summary = replay_all(reader, setups, sink, tell, progress);
   out << text;
   return summary;
 }

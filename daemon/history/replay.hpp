@@ -11,19 +11,10 @@
 #include <vector>
 
 #include "daemon/history/history_reader.hpp"
+#include "daemon/history/replay_setup.hpp"
 #include "estimator/estimator_config.hpp"
-#include "estimator/thermal_model.hpp"
 
 namespace thermocomp {
-
-/// What the estimator of a segment is built from.
-struct ReplaySetup {
-  EstimatorConfig estimator;
-  ThermalModel model;
-};
-/// Texts -> configuration and model. The default parses them as the daemon does.
-using SetupParser = std::function<ReplaySetup(const SegmentSetup&)>;
-[[nodiscard]] ReplaySetup parse_setup(const SegmentSetup& setup);
 
 /// The offsets of one cycle at which the daemon noted its own.
 struct ReplayedOffsets {
@@ -43,18 +34,21 @@ struct ReplaySummary {
   double largest_difference_um{0.0};
   std::optional<std::uint64_t> first_different_cycle;
   std::optional<double> first_different_time_s;
+  std::vector<HistoryDamage> damage;  ///< what could not be replayed
 };
 
 using OffsetSink = std::function<void(const ReplayedOffsets&)>;
 /// Called now and then with the fraction done, 0..1.
 using Progress = std::function<void(double)>;
 
-/// Runs every segment from its own start state over every cycle that was stepped.
-/// @throws HistoryError, and what the parser throws
+/// Runs every segment from its own start state over every cycle that was stepped. Where a segment
+/// is damaged its replay ends, and the next one begins.
+/// @throws HistoryError when nothing can be taken from the file
 ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sink,
                      const Progress& progress = {}, const SetupParser& parser = parse_setup);
 
-/// As a run file: time_s, then `<axis>_offset_um` and `<axis>_recorded_um` of every axis.
+/// As a run file, with a comment line where something is damaged: time_s, then `<axis>_offset_um`
+/// and `<axis>_recorded_um` of every axis.
 ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& out,
                             const Progress& progress = {}, const SetupParser& parser = parse_setup);
 
@@ -71,6 +65,7 @@ struct ExportSummary {
   std::uint64_t rows{0};
   std::uint64_t gaps{0};  ///< between rows of the file, each told by a comment line
   std::vector<std::string> columns;
+  std::vector<HistoryDamage> damage;  ///< what could not be taken, each told by a comment line
 };
 /// The column of a run file that holds a sensor's readings: `<sensor>_degC`.
 [[nodiscard]] std::string sensor_column(const std::string& sensor);
@@ -81,6 +76,10 @@ struct ExportSummary {
 /// controller's signals, `<axis>_offset_um`, `<axis>_applied_um` and, in the first row after an
 /// operator gave one, `<axis>_measured_um`. Where cycles are missing between two rows, because the
 /// daemon did not run or because it could not write and memory was full, a comment line says so.
+/// So it is with a chunk that is damaged: the rows behind it have what was recorded since, and a
+/// segment that cannot be read at all is left out. Segments outside of `from` and `to` are not
+/// read.
+/// @throws HistoryError when nothing can be taken from the file
 ExportSummary export_run(const std::filesystem::path& history,
                          const std::optional<HistoryTime>& from,
                          const std::optional<HistoryTime>& to, std::ostream& out,

@@ -1,7 +1,8 @@
+#include "daemon/history/replay_setup.hpp"
+
 #include <utility>
 
 #include "config/daemon_config.hpp"
-#include "daemon/history/replay.hpp"
 
 namespace thermocomp {
 

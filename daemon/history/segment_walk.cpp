@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "config/number_text.hpp"
+#include "config/printable_text.hpp"
 #include "daemon/history/chunk_codec.hpp"
+#include "estimator/checks.hpp"
 
 namespace thermocomp {
 
@@ -39,48 +41,46 @@ void InputsInForce::apply(const Record& record) {
   }
 }
 
-HistoryClock::HistoryClock(const HistoryReader& reader) {
-  try {
-    place(reader.segments());
-  } catch (const HistoryError& error) {
-    throw HistoryError(reader.file().string() + ": " + error.what());
-  }
+void InputsInForce::forget() {
+  for (Reading& reading : readings) reading = {};
+  controller.applied_um.fill(not_a_number);
+  controller.signals.fill(not_a_number);
 }
 
-void HistoryClock::place(const std::vector<SegmentInfo>& segments) {
-  constexpr std::int64_t end_ns_max = std::int64_t{1} << 62;  // no sum of two overflows
-  std::int64_t end_ns = 0;  // of the segments so far, in the history's time
-  for (const SegmentInfo& segment : segments) {
-    const std::int64_t begin_ns = segment.grid.time_of(segment.first_cycle).count();
-    if (grid_to_history_ns_.count(segment.run) == 0) {
-      const std::int64_t by_wall_ns = segment.wall_ns - segments.front().wall_ns;
-      grid_to_history_ns_[segment.run] = std::max(by_wall_ns, end_ns) - begin_ns;
-    }
-    if (begin_ns + grid_to_history_ns_[segment.run] < end_ns) {
-      throw HistoryError("damaged: segment " + std::to_string(segment.id) +
-                         " begins before the one in front of it ends");
-    }
-    const auto next_cycle = static_cast<std::uint64_t>(segment.last_cycle + 1);
-    end_ns = segment.grid.time_of(next_cycle).count() + grid_to_history_ns_[segment.run];
-    if (end_ns > end_ns_max) throw HistoryError("damaged: the times of its segments cannot be");
+HistoryClock::HistoryClock(const HistoryReader& reader) {
+  for (const SegmentInfo& segment : reader.segments()) {
+    const std::string why = places_.add(segment);
+    THERMOCOMP_ENSURE(why.empty());  // the reader has left out what has no place
   }
 }
 
 double HistoryClock::seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const {
   const std::int64_t time_ns =
-      segment.grid.time_of(cycle).count() + grid_to_history_ns_.at(segment.run);
+      segment.grid.time_of(cycle).count() + places_.grid_to_history_ns(segment.run);
   return static_cast<double>(time_ns) * 1e-9;
 }
 
 ParsedSetups::ParsedSetups(const HistoryReader& reader, const SetupParser& parser) {
   for (const SegmentInfo& segment : reader.segments()) {
-    if (setups_.count(segment.setup) != 0) continue;
-    setups_.emplace(segment.setup, parser(reader.setup(segment)));
+    if (setups_.count(segment.setup) != 0 || failures_.count(segment.setup) != 0) continue;
+    try {
+      setups_.emplace(segment.setup, parser(reader.setup(segment)));
+    } catch (const std::exception& error) {
+      failures_.emplace(segment.setup, error.what());
+    }
   }
 }
 
 const ReplaySetup& ParsedSetups::of(const SegmentInfo& segment) const {
+  const auto failure = failures_.find(segment.setup);
+  if (failure != failures_.end()) {
+    throw HistoryError("its configuration cannot be used: " + failure->second);
+  }
   return setups_.at(segment.setup);
+}
+
+std::string damage_line(const HistoryDamage& damage) {
+  return "# damaged: " + printable_text(to_string(damage)) + "\n";
 }
 
 std::size_t RunColumns::column(const std::string& name) {

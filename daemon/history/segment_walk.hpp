@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "daemon/history/history_reader.hpp"
-#include "daemon/history/replay.hpp"
+#include "daemon/history/replay_setup.hpp"
+#include "daemon/history/sound_segments.hpp"
 
 namespace thermocomp {
 
@@ -18,31 +20,37 @@ struct InputsInForce {
   /// Takes over a reading, link, applied or signal record.
   /// @throws HistoryError when its index cannot be
   void apply(const Record& record);
+  /// After records that are lost: nothing is known until it is told again.
+  void forget();
 };
 
 /// Seconds since the history's first cycle. Within a start of the daemon the grid counts; between
 /// two of them the wall clock does, but time never runs backwards.
 class HistoryClock {
  public:
-  /// @throws HistoryError when the segments' times cannot be those of one history
   explicit HistoryClock(const HistoryReader& reader);
   [[nodiscard]] double seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const;
 
  private:
-  void place(const std::vector<SegmentInfo>& segments);
-  std::map<std::int64_t, std::int64_t> grid_to_history_ns_;  ///< by run
+  HistoryPlaces places_;
 };
 
 /// The setups of all segments, each parsed once.
 class ParsedSetups {
  public:
+  /// What cannot be parsed is told by of().
   ParsedSetups(const HistoryReader& reader, const SetupParser& parser);
+  /// @throws HistoryError when the segment's configuration is missing or cannot be used
   [[nodiscard]] const ReplaySetup& of(const SegmentInfo& segment) const;
   [[nodiscard]] const std::map<std::int64_t, ReplaySetup>& all() const noexcept { return setups_; }
 
  private:
-  std::map<std::int64_t, ReplaySetup> setups_;  ///< by setup, that is in order of appearance
+  std::map<std::int64_t, ReplaySetup> setups_;    ///< by setup, that is in order of appearance
+  std::map<std::int64_t, std::string> failures_;  ///< of the others
 };
+
+/// A comment line of a run file.
+[[nodiscard]] std::string damage_line(const HistoryDamage& damage);
 
 /// Columns of a run file that is written row by row.
 class RunColumns {

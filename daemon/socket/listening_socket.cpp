@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <sys/un.h>
 
-#include "daemon/socket/status_server.hpp"
+#include "daemon/socket/socket_error.hpp"
 
 namespace thermocomp {
 namespace {

@@ -110,41 +110,60 @@ void parse_request(std::string_view line, Request& out) {
   out.params = std::move(*params);
 }
 
+/// @param result  asked once; none: not yet
+/// @return whether `answer` now holds it, or the error in its place
+bool reply(const Request& request, const RpcPending& result, Answer& answer) {
+  json message;
+  try {
+    std::optional<json> found = result();
+    if (!found) return false;
+    message = {{"jsonrpc", "2.0"}, {"id", request.id}, {"result", std::move(*found)}};
+  } catch (const RpcError& error) {
+    message = error_message(request.id, error.code(), error.what());
+  } catch (const json::exception& error) {
+    message = error_message(request.id, rpc::invalid_params, error.what());
+  } catch (const std::exception& error) {
+    message = error_message(request.id, rpc::internal_error, error.what());
+  }
+  answer.is_error = message.contains("error");
+  if (!request.is_notification) answer.text = to_line(message);
+  return true;
+}
+
 }  // namespace
 
 void RequestDesk::add_method(const std::string& name, AccessClass access, RpcHandler handler) {
-  methods_[name] = {access, std::move(handler)};
+  methods_[name] = {access, std::move(handler), {}};
+}
+
+void RequestDesk::add_slow_method(const std::string& name, AccessClass access,
+                                  RpcSlowHandler handler) {
+  methods_[name] = {access, {}, std::move(handler)};
 }
 
 Answer RequestDesk::answer(const PeerAccess& access, std::string_view line) const {
   Answer answer;
   Request request;
-  json reply;
-  try {
+  const auto result = [&]() -> std::optional<json> {
     parse_request(line, request);
-    json result;
     if (request.method == "subscribe") {
       answer.subscription = subscribe(access, request.params);
-      result = {{"methods", answer.subscription->methods},
-                {"period_s", std::chrono::duration<double>(answer.subscription->period).count()}};
-    } else {
-      result = call(access, request.method, request.params);
+      return json{{"methods", answer.subscription->methods},
+                  {"period_s", std::chrono::duration<double>(answer.subscription->period).count()}};
     }
-    reply = {{"jsonrpc", "2.0"}, {"id", request.id}, {"result", std::move(result)}};
-  } catch (const RpcError& error) {
-    reply = error_message(request.id, error.code(), error.what());
-  } catch (const json::exception& error) {
-    reply = error_message(request.id, rpc::invalid_params, error.what());
-  } catch (const std::exception& error) {
-    reply = error_message(request.id, rpc::internal_error, error.what());
-  }
-  answer.is_error = reply.contains("error");
-  if (!request.is_notification) answer.text = to_line(reply);
+    const Method& method = find(access, request.method);
+    if (!method.slow) return method.handler(request.params);
+    answer.later = [pending = method.slow(request.params), request](Answer& out) {
+      return reply(request, pending, out);
+    };
+    return std::nullopt;
+  };
+  reply(request, result, answer);
   return answer;
 }
 
-json RequestDesk::call(const PeerAccess& access, const std::string& name,
-                       const json& params) const {
+const RequestDesk::Method& RequestDesk::find(const PeerAccess& access,
+                                             const std::string& name) const {
   const auto method = methods_.find(name);
   if (method == methods_.end()) {
     // Whoever may do nothing is not told what there is.
@@ -158,7 +177,7 @@ json RequestDesk::call(const PeerAccess& access, const std::string& name,
                                                                 : config_.bridge_group;
     throw RpcError(rpc::not_permitted, name + ": only for root and members of " + group);
   }
-  return method->second.handler(params);
+  return method->second;
 }
 
 Subscription RequestDesk::subscribe(const PeerAccess& access, const json& params) const {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -24,6 +25,9 @@ struct Answer {
   std::string text;  ///< one line with its end; empty: none is due (the protocol's "notification")
   bool is_error{false};
   std::optional<Subscription> subscription;  ///< takes the place of the one before
+  /// Set: nothing else is there yet. Asked again and again; once it returns true, the answer that
+  /// it was given is whole.
+  std::function<bool(Answer&)> later{};
 };
 
 /// Not supported on purpose, and refused in words: batches (an array of requests; several lines do
@@ -40,6 +44,7 @@ class RequestDesk {
   explicit RequestDesk(const SocketConfig& config) : config_(config) {}
 
   void add_method(const std::string& name, AccessClass access, RpcHandler handler);
+  void add_slow_method(const std::string& name, AccessClass access, RpcSlowHandler handler);
   /// @param line  any bytes. Throws nothing of a client's making
   [[nodiscard]] Answer answer(const PeerAccess& access, std::string_view line) const;
   /// The line that tells a subscriber the result of a reading method.
@@ -49,11 +54,11 @@ class RequestDesk {
  private:
   struct Method {
     AccessClass access{AccessClass::read};
-    RpcHandler handler;
+    RpcHandler handler;  ///< one of the two
+    RpcSlowHandler slow;
   };
 
-  [[nodiscard]] nlohmann::json call(const PeerAccess& access, const std::string& method,
-                                    const nlohmann::json& params) const;
+  [[nodiscard]] const Method& find(const PeerAccess& access, const std::string& method) const;
   [[nodiscard]] Subscription subscribe(const PeerAccess& access,
                                        const nlohmann::json& params) const;
 

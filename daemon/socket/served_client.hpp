@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -34,7 +35,9 @@ struct ServedClient {
     return input.capacity_bytes() + output.capacity();
   }
   /// Nothing of it is under way: neither request nor answer nor subscription.
-  [[nodiscard]] bool is_idle() const noexcept { return !subscription && !queued && !owes(); }
+  [[nodiscard]] bool is_idle() const noexcept {
+    return !subscription && !queued && !owes() && !later;
+  }
 
   int fd;
   PeerAccess access;
@@ -52,6 +55,7 @@ struct ServedClient {
   std::uint32_t watched{0};
   std::size_t counted_bytes{0};  ///< of held_bytes(), as last added up
 
+  std::function<bool(Answer&)> later;  ///< Answer::later of its request that is under way
   std::optional<Subscription> subscription;
   Clock::time_point notified_next{};
   std::uint64_t missed{0};  ///< notifications since the last that was sent

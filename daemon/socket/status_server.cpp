@@ -32,6 +32,7 @@ constexpr ClientId first_client_id = 2;
 
 constexpr int accepted_a_turn = 64;
 constexpr auto time_outs_checked_every = std::chrono::milliseconds(250);
+constexpr auto answers_asked_every = std::chrono::milliseconds(1);
 constexpr auto groups_known_for = std::chrono::seconds(5);
 
 std::string seconds_text(Clock::duration duration) {
@@ -51,9 +52,10 @@ struct StatusServer::Parts {
   ClientId next_id{first_client_id};
   std::size_t strangers{0};
   TokenBucket all_tokens;
-  std::deque<ClientId> ready;  ///< have a whole request; each one's turn comes
-  Alarms resting;              ///< the same, but over their rate until then
-  Alarms subscribers;          ///< when they are to be told next
+  std::deque<ClientId> ready;     ///< have a whole request; each one's turn comes
+  std::vector<ClientId> waiting;  ///< their answer takes its time
+  Alarms resting;                 ///< the same, but over their rate until then
+  Alarms subscribers;             ///< when they are to be told next
   std::vector<ClientId> broken;
   AccessGroups groups;
   std::optional<Clock::time_point> groups_asked;
@@ -80,7 +82,9 @@ struct StatusServer::Parts {
   void on_client(ClientId id, std::uint32_t events);
   void arrange(ClientId id, ServedClient& client);
   void serve(Clock::time_point turn_end);
-  void answer_one(ClientId id, ServedClient& client, Clock::time_point now);
+  void answer_one(ClientId id, ServedClient& client);
+  void give(ClientId id, ServedClient& client, Answer&& answer);
+  void ask_waiting();
   void wake_rested(Clock::time_point now);
   void notify(Clock::time_point turn_end);
   void tell(ServedClient& client, std::map<std::string, std::string>& lines, Clock::time_point now);
@@ -231,6 +235,8 @@ void StatusServer::Parts::arrange(ClientId id, ServedClient& client) {
   std::uint32_t events = 0;
   if (client.owes()) {
     events = EPOLLOUT;
+  } else if (client.later) {
+    // Neither read from nor ended; what it has sent meanwhile comes after the answer.
   } else if (client.input.has_line()) {
     if (!client.queued) ready.push_back(id);
     client.queued = true;
@@ -259,30 +265,53 @@ void StatusServer::Parts::serve(Clock::time_point turn_end) {
       ++statistics.delayed;
     } else {
       client->queued = false;
-      answer_one(id, *client, now);
+      answer_one(id, *client);
     }
     if (Clock::now() >= turn_end) return;
   }
 }
 
-void StatusServer::Parts::answer_one(ClientId id, ServedClient& client, Clock::time_point now) {
+void StatusServer::Parts::answer_one(ClientId id, ServedClient& client) {
   std::string line;
   if (client.input.take(line) && !line.empty()) {
     ++statistics.requests;
     Answer answer = desk.answer(client.access, line);
-    now = Clock::now();
-    client.last_request = now;
-    client.line_begun = now;
-    if (answer.is_error) ++statistics.errors;
-    if (answer.subscription) {
-      client.subscription = std::move(answer.subscription);
-      client.notified_next = now;
-      subscribers.emplace(now, id);
+    const auto later = std::move(answer.later);
+    if (later && !later(answer)) {
+      client.later = later;
+      waiting.push_back(id);
+    } else {
+      give(id, client, std::move(answer));
     }
-    if (!client.access.any()) client.close_when_sent = true;
-    client.send(answer.text, now);
   }
   arrange(id, client);
+}
+
+void StatusServer::Parts::give(ClientId id, ServedClient& client, Answer&& answer) {
+  const Clock::time_point now = Clock::now();
+  client.last_request = now;
+  client.line_begun = now;
+  if (answer.is_error) ++statistics.errors;
+  if (answer.subscription) {
+    client.subscription = std::move(answer.subscription);
+    client.notified_next = now;
+    subscribers.emplace(now, id);
+  }
+  if (!client.access.any()) client.close_when_sent = true;
+  client.send(answer.text, now);
+}
+
+void StatusServer::Parts::ask_waiting() {
+  std::erase_if(waiting, [this](ClientId id) {
+    ServedClient* client = find(id);
+    if (client == nullptr) return true;
+    Answer answer;
+    if (!client->later(answer)) return false;
+    client->later = nullptr;
+    give(id, *client, std::move(answer));
+    arrange(id, *client);
+    return true;
+  });
 }
 
 void StatusServer::Parts::wake_rested(Clock::time_point now) {
@@ -337,7 +366,7 @@ void StatusServer::Parts::check_time_outs(Clock::time_point now) {
     if (client.broken) continue;
     if (client.owes() && now - client.last_taken > limits.unread_max) {
       cut_off(id, client, "nothing was read for " + seconds_text(limits.unread_max));
-    } else if (client.input.is_partial() && !client.queued && !client.owes() &&
+    } else if (client.input.is_partial() && !client.queued && !client.owes() && !client.later &&
                now - client.line_begun > limits.partial_line_max) {
       cut_off(id, client,
               "a request must be whole within " + seconds_text(limits.partial_line_max));
@@ -392,6 +421,7 @@ void StatusServer::Parts::set_timer() {
   std::optional<Clock::time_point> next;
   const auto wake_at = [&](Clock::time_point when) { next = next ? std::min(*next, when) : when; };
   if (!ready.empty()) wake_at(all_tokens.next(now));
+  if (!waiting.empty()) wake_at(now + answers_asked_every);
   if (!resting.empty()) wake_at(resting.begin()->first);
   if (!subscribers.empty()) wake_at(subscribers.begin()->first);
   if (!clients.empty()) wake_at(time_outs_checked_next);
@@ -416,6 +446,11 @@ void StatusServer::add_method(const std::string& name, AccessClass access, RpcHa
   parts_->desk.add_method(name, access, std::move(handler));
 }
 
+void StatusServer::add_slow_method(const std::string& name, AccessClass access,
+                                   RpcSlowHandler handler) {
+  parts_->desk.add_slow_method(name, access, std::move(handler));
+}
+
 int StatusServer::fd() const noexcept {
   return parts_->epoll_fd;
 }
@@ -433,6 +468,7 @@ void StatusServer::handle(std::chrono::milliseconds timeout) {
     is_listener = is_listener || event.data.u64 == listener_id;
     if (event.data.u64 >= first_client_id) parts.on_client(event.data.u64, event.events);
   }
+  parts.ask_waiting();
   parts.wake_rested(now);
   // Half of the turn each, so that neither questions nor subscriptions starve the other.
   parts.notify(now + parts.limits.turn_max / 2);

@@ -5,18 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <stdexcept>
 #include <string>
 
 #include "config/daemon_config.hpp"
 #include "daemon/socket/rpc.hpp"
+#include "daemon/socket/socket_error.hpp"
 
 namespace thermocomp {
-
-class SocketError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 struct SocketStatistics {
   std::uint64_t clients{0};  ///< connected now
@@ -75,6 +70,9 @@ class StatusServer {
   StatusServer& operator=(const StatusServer&) = delete;
 
   void add_method(const std::string& name, AccessClass access, RpcHandler handler);
+  /// While the result is waited for, everybody else is served; this client's next request is not
+  /// begun.
+  void add_slow_method(const std::string& name, AccessClass access, RpcSlowHandler handler);
   /// Readable when there is something to do: for the owner's epoll or poll.
   [[nodiscard]] int fd() const noexcept;
   /// Waits up to `timeout` for something to do and does it, or a part of it: what is left makes

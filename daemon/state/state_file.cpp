@@ -46,11 +46,12 @@ std::map<std::string, double> numbers(const json& file, const char* key) {
   return values;
 }
 
-std::string to_text(const PersistentState& state) {
+std::string to_text(const PersistentState& state, bool reference_lost) {
   json file;
   file["format"] = format;
   file["program"] = "thermocomp";
   file["enabled"] = state.enabled;
+  if (reference_lost) file["reference_lost"] = true;
   file["reference_degC"] = numbers(state.reference_degC);
   file["model_reference_degC"] = numbers(state.model_reference_degC);
   file["reference_signals"] = numbers(state.reference_signals);
@@ -62,7 +63,7 @@ std::string to_text(const PersistentState& state) {
   return file.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
-PersistentState from_text(const std::string& text) {
+PersistentState from_text(const std::string& text, bool& reference_lost) {
   const json file = json::parse(text);
   if (!file.is_object() || file.value("program", "") != "thermocomp") {
     throw std::runtime_error("is not a state file of thermocomp");
@@ -76,6 +77,7 @@ PersistentState from_text(const std::string& text) {
   }
   PersistentState state;
   state.enabled = file.at("enabled").get<bool>();
+  reference_lost = file.contains("reference_lost") && file["reference_lost"].get<bool>();
   state.reference_degC = numbers(file, "reference_degC");
   state.model_reference_degC = numbers(file, "model_reference_degC");
   state.reference_signals = numbers(file, "reference_signals");
@@ -148,25 +150,27 @@ LoadedState load_state_file(const std::filesystem::path& file,
     const auto status = std::filesystem::status(file, error);
     if (status.type() == std::filesystem::file_type::not_found) return loaded;
     if (error) throw std::runtime_error(error.message());
-    loaded.state = from_text(read_all(file));
+    loaded.state = from_text(read_all(file), loaded.reference_lost);
     loaded.found = true;
   } catch (const std::exception& error) {
+    loaded.damaged = true;
+    loaded.reference_lost = false;
     try {
       loaded.state = fallback;
       loaded.warning = "state file " + file.string() + " cannot be used: " + error.what() + "; " +
-                       move_aside(file) + "; references and switches start afresh";
+                       move_aside(file);
     } catch (const std::exception&) {
-      loaded.found = false;  // out of memory for a message: starting afresh is still right
+      loaded.found = false;  // out of memory for a message
     }
   }
   return loaded;
 }
 
-std::string save_state_file(const std::filesystem::path& file,
-                            const PersistentState& state) noexcept {
+std::string save_state_file(const std::filesystem::path& file, const PersistentState& state,
+                            bool reference_lost) noexcept {
   try {
     const std::string beside = file.string() + ".new";
-    write_flushed(beside, to_text(state));
+    write_flushed(beside, to_text(state, reference_lost));
     if (rename(beside.c_str(), file.c_str()) != 0) fail(file.string());
     const std::filesystem::path folder =
         file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");

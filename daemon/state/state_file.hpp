@@ -12,7 +12,10 @@ namespace thermocomp {
 struct LoadedState {
   PersistentState state;
   bool found{false};    ///< a good file was there; otherwise `state` is the caller's fallback
-  std::string warning;  ///< not empty: the file was there and could not be used (for the log)
+  bool damaged{false};  ///< something was there that could not be used
+  std::string warning;  ///< what, for the log; not empty where `damaged`, memory permitting
+  /// The reference in it was taken because the right one had been lost (see StateKeeper).
+  bool reference_lost{false};
 };
 
 /// Never throws: a damaged or foreign file is moved aside (`<file>.unusable`) and said in
@@ -24,6 +27,7 @@ struct LoadedState {
 /// Writes beside the file, flushes to the disk, renames over it, flushes the folder.
 /// @return empty, or what went wrong; the old file then still stands
 [[nodiscard]] std::string save_state_file(const std::filesystem::path& file,
-                                          const PersistentState& state) noexcept;
+                                          const PersistentState& state,
+                                          bool reference_lost = false) noexcept;
 
 }  // namespace thermocomp

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "drivers/can/can_socket.hpp"
-#include "drivers/sensors/sensor_source.hpp"
+#include "drivers/unit_health.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

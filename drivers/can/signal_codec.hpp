@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <span>
 
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/can/can_config.hpp"
 
 namespace thermocomp {
 

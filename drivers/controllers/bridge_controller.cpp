@@ -71,17 +71,16 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
   BridgeAnswer answer;
   if (commands_.fresh()) gate_.offered(commands_.front(), now);
   const bool moved = taking && taking_ && !gate_.explains(report.applied_um);
-  if (moved)
-    health_.last_error = "the controller applies what it was not sent: started anew from there";
-  if (silent || report.session != session_ || taking != taking_ || moved || !gate_.in_sync())
-    begin_epoch(report, answer);
+  if (moved) health_.last_error = "the controller applies what it was not sent";
+  if (silent || report.session != session_ || taking != taking_) gate_.lost();
+  if (moved || !gate_.in_sync()) begin_epoch(report, answer);
   session_ = report.session;
   taking_ = taking;
   publish(report, taking, now);
   answer.link_epoch = gate_.epoch();
   if (!taking) return answer;
   const SendVerdict verdict = gate_.verdict(now);
-  if (verdict == SendVerdict::resynchronise) gate_.lost();
+  if (verdict == SendVerdict::resynchronise) gate_.paused();
   if (verdict != SendVerdict::send) return answer;
   answer.offset_um = gate_.command().offset_um;
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
@@ -92,8 +91,8 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
 }
 
 void BridgeController::begin_epoch(const BridgeReport& report, BridgeAnswer& answer) {
-  gate_.synchronised(report.applied_um);
-  answer.anew = true;
+  const std::uint32_t before = gate_.epoch();
+  answer.anew = !is_same_link(gate_.synchronised(report.applied_um), before);
 }
 
 void BridgeController::publish(const BridgeReport& report, bool taking, nanoseconds now) {

@@ -33,15 +33,15 @@ struct BridgeReport {
 /// What it is answered.
 struct BridgeAnswer {
   std::uint32_t link_epoch{0};
-  bool anew{false};  ///< the epoch began with this report: offsets go on from what it says
+  bool anew{false};  ///< the link is new with this report: offsets go on from what it says
   std::array<double, axes_max> offset_um{};
   std::array<bool, axes_max> valid{};  ///< false: the bridge leaves this axis' offset as it is
 };
 
 /// Each report is an exchange of the rule in controller_link.hpp: what is applied is read back and
-/// published, and what may be sent is the answer. A new epoch begins with the first report, with
-/// one of another session, after a silence, with the first report that takes offsets again, and
-/// when an axis stands where nothing that was sent can have taken it.
+/// published, and what may be sent is the answer. A new link begins with the first report, with one
+/// of another session, after a silence, and with the first report that takes offsets again; a new
+/// epoch of the same link when an axis stands where nothing that was sent can have taken it.
 ///
 /// While the controller takes no offsets (off, not homed) it is online, its signals count, and
 /// nothing is known to be applied: the axes are not in step, and no offset is answered.

@@ -281,8 +281,8 @@ void CanController::note_bus_state() {
 }
 
 void CanController::synchronise() {
-  gate_.synchronised(state_.applied_um);
-  held_um_ = state_.applied_um;
+  const std::uint32_t before = gate_.epoch();
+  hold_what_is_applied(!is_same_link(gate_.synchronised(state_.applied_um), before));
   const nanoseconds now = monotonic_now();
   next_send_ = now + gate_.next_pause();
   publish(true, now);
@@ -292,10 +292,26 @@ void CanController::synchronise() {
   health_.connected = true;
 }
 
+/// What a frame carries of an axis that is not driven. A read-back is what was sent last, nothing,
+/// or between; any other is not to be sent back to where it came from, and then neither is known.
+void CanController::hold_what_is_applied(bool link_is_new) {
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
+    const double applied_um = state_.applied_um[axis];
+    double& held_um = held_um_[axis];
+    if (!link_is_new && !std::isnan(held_um)) continue;
+    const double slack_um =
+        WriteGate::unexplained_um + 2.0 * std::abs(config_.axes[axis].offset.scale);
+    const bool believed = std::isnan(held_um) || std::isnan(applied_um) ||
+                          (applied_um >= std::min(0.0, held_um) - slack_um &&
+                           applied_um <= std::max(0.0, held_um) + slack_um);
+    held_um = believed ? applied_um : not_a_number;
+  }
+}
+
 void CanController::send_command(nanoseconds now) {
   if (commands_.fresh()) gate_.offered(commands_.front(), now);
   const SendVerdict verdict = gate_.verdict(now);
-  if (verdict == SendVerdict::resynchronise) return lose();
+  if (verdict == SendVerdict::resynchronise) return lose(true);
   // Without frames of the controller nothing else would renew the published time.
   if (incoming_.empty() && gate_.in_sync()) publish(true, now);
   if (verdict == SendVerdict::nothing_to_send) return;
@@ -351,8 +367,11 @@ void CanController::publish(bool online, nanoseconds now) {
 }
 
 /// Everything has to come anew before the next epoch.
-void CanController::lose() {
-  gate_.lost();
+void CanController::lose(bool same_link) {
+  if (same_link)
+    gate_.paused();
+  else
+    gate_.lost();
   for (Incoming& frame : incoming_) frame.seen = false;
   publish(false, monotonic_now());
   const std::scoped_lock lock(health_mutex_);

@@ -20,10 +20,11 @@ namespace thermocomp {
 /// been missing for silent_after_s, the interface is down or bus-off, or a frame could not be sent.
 /// The published time is that of the oldest of these frames.
 ///
-/// An axis whose command is not valid keeps the value sent last (at first: what the controller
-/// applies); its valid bit is 0. A frame with an axis of which neither is known is not sent, unless
-/// the valid bits stand in the same frame. Valid bits and heartbeat are raw numbers: scale and
-/// offset are not used; the heartbeat starts anew when its bits are full.
+/// An axis whose command is not valid keeps the value sent last (at first, and on a new link where
+/// it can have come from that: what the controller applies); its valid bit is 0. A frame with an
+/// axis of which neither is known is not sent, unless the valid bits stand in the same frame. Valid
+/// bits and heartbeat are raw numbers: scale and offset are not used; the heartbeat starts anew
+/// when its bits are full.
 class CanController final : public ControllerLink {
  public:
   /// @throws InvalidValue for signals that cannot be or overlap
@@ -64,10 +65,11 @@ class CanController final : public ControllerLink {
   void note_bus_state();
   void tell_error();
   void synchronise();
+  void hold_what_is_applied(bool link_is_new);
   void send_command(nanoseconds now);
   bool compose_and_send(Outgoing& outgoing);
   void publish(bool online, nanoseconds now);
-  void lose();
+  void lose(bool same_link = false);
 
   const CanControllerConfig config_;
   std::vector<Outgoing> outgoing_;  ///< offsets first, then valid bits, then heartbeat

@@ -6,8 +6,9 @@
 #include <variant>
 #include <vector>
 
+#include "drivers/can/can_config.hpp"
 #include "drivers/controllers/piezo_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 
 namespace thermocomp {
 

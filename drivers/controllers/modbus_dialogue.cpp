@@ -18,6 +18,10 @@ NumberFormat raw_format(const ModbusValue& value) noexcept {
   return format;
 }
 
+/// Exceptions of a gateway about the controller behind it, which may be off.
+constexpr int gateway_path_unavailable = 10;
+constexpr int gateway_target_silent = 11;
+
 /// The first count that the register cannot hold exactly.
 std::uint64_t counts_of(Encoding encoding) noexcept {
   switch (encoding) {
@@ -168,11 +172,12 @@ bool ModbusDialogue::synchronise() {
       health_.last_error = connection_.last_error();
       return false;
     }
+    gate_.lost();
     const std::scoped_lock lock(health_mutex_);
     ++health_.connects;
   }
   if (!read_all()) {
-    lose();
+    lose(refused_);
     return false;
   }
   restart_piezos();
@@ -190,19 +195,21 @@ bool ModbusDialogue::synchronise() {
 void ModbusDialogue::exchange() {
   look_for_command();
   if (!read_all()) {
-    if (!ending_.load()) lose();
+    if (!ending_.load()) lose(refused_);
     return;
   }
   show_piezos();
   if (!gate_.explains(without_leaps_um())) {
     gate_.synchronised(without_leaps_um());
     const std::scoped_lock lock(health_mutex_);
-    health_.last_error = "the controller applies what it was not sent: started anew from there";
+    health_.last_error = "the controller applies what it was not sent";
   }
   publish(true);
   const SendVerdict verdict = gate_.verdict(connection_.now());
-  if (verdict == SendVerdict::resynchronise || (verdict == SendVerdict::send && !write_command()))
-    lose();
+  if (verdict == SendVerdict::resynchronise)
+    lose(true);
+  else if (verdict == SendVerdict::send && !write_command())
+    lose(refused_);
 }
 
 void ModbusDialogue::look_for_command() {
@@ -267,6 +274,9 @@ Exchange ModbusDialogue::with_retries(Request&& request) {
     }
     exchange = request();
   }
+  refused_ = exchange.outcome == ExchangeOutcome::exception &&
+             exchange.exception_code != gateway_path_unavailable &&
+             exchange.exception_code != gateway_target_silent;
   return exchange;
 }
 
@@ -352,8 +362,11 @@ void ModbusDialogue::publish(bool online) {
   states_.publish();
 }
 
-void ModbusDialogue::lose() {
-  gate_.lost();
+void ModbusDialogue::lose(bool same_link) {
+  if (same_link)
+    gate_.paused();
+  else
+    gate_.lost();
   publish(false);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = false;

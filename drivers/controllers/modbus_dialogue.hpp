@@ -22,8 +22,10 @@ namespace thermocomp {
 /// Each period: reads everything back and publishes it, then writes the newest command (offsets,
 /// then valid bits, then heartbeat, neighbours in one request) - unless an axis stands where
 /// nothing sent lately can have taken it: that begins a new epoch and nothing is written
-/// (WriteGate). A piezo leaps to every new offset by way of 0 V: whether it stands where it was
-/// told is left to its drive and to the estimator's comparison.
+/// (WriteGate); the link is still the same one. After a time-out or a lost connection it is
+/// another, after an exception or a pause of the cycle it is not. A piezo leaps to every new offset
+/// by way of 0 V: whether it stands where it was told is left to its drive and to the estimator's
+/// comparison.
 ///
 /// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
 /// heartbeat counts up with every command written and starts anew when its register is full. Valid
@@ -62,7 +64,7 @@ class ModbusDialogue {
   void show_piezos();
   [[nodiscard]] std::array<double, axes_max> without_leaps_um() const noexcept;
   void publish(bool online);
-  void lose();
+  void lose(bool same_link);
   /// Repeats `exchange` as the line's `retries` say. Notes why it failed in the end.
   template <class Request>
   Exchange with_retries(Request&& request);
@@ -82,6 +84,7 @@ class ModbusDialogue {
   WaitFreeSlot<OffsetCommand> commands_;
   nanoseconds next_exchange_at_;
   nanoseconds retry_at_;  ///< while not in sync
+  bool refused_{false};   ///< the controller itself answered the last exchange, with an exception
   std::atomic<bool> ending_{false};
   mutable std::mutex health_mutex_;
   ControllerHealth health_;

@@ -14,7 +14,14 @@ WriteGate::WriteGate(nanoseconds period, const std::vector<double>& resolution_u
 }
 
 std::uint32_t WriteGate::synchronised() noexcept {
-  if (++epoch_ == 0) epoch_ = 1;  // 0 says "never connected"
+  if (link_is_new_) {
+    const std::uint32_t link = epoch_ % epochs_of_a_link;
+    // 0 says "never connected".
+    epoch_ += link + 1 == epochs_of_a_link ? 1 - link : 1;
+  } else {
+    epoch_ += epochs_of_a_link;
+  }
+  link_is_new_ = false;
   in_sync_ = true;
   last_sent_.reset();
   looks_ = 0;
@@ -32,8 +39,13 @@ std::uint32_t WriteGate::synchronised(const std::array<double, axes_max>& applie
 void WriteGate::sent(nanoseconds now) noexcept {
   last_sent_ = now;
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
-    if (!command_.valid[axis] || !std::isfinite(command_.offset_um[axis])) continue;
     SentLately& lately = sent_[axis];
+    if (!command_.valid[axis] || !std::isfinite(command_.offset_um[axis])) {
+      // When it is driven again it may start from elsewhere: what was sent before says nothing
+      // then.
+      lately.count = 0;
+      continue;
+    }
     lately.offset_um[lately.count % SentLately::length] = command_.offset_um[axis];
     ++lately.count;
   }
@@ -50,12 +62,13 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     const double before_um = applied_um_[axis];
     const SentLately& lately = sent_[axis];
-    // Until something is sent it is where the epoch began that a command starts from.
-    if (lately.count != 0 || !std::isfinite(before_um)) applied_um_[axis] = applied_um[axis];
+    const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
+    // Until something is sent it is what was read before the command that a command starts from.
+    if (lately.count != 0 || !to_be_driven || !std::isfinite(before_um))
+      applied_um_[axis] = applied_um[axis];
     if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
     if (lately.count == 0) {
-      // Not driven yet in this epoch: about to be, from where it stood when the epoch began.
-      const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
+      // Not driven: about to be, from where it stood before.
       explained =
           explained && (!to_be_driven || std::abs(applied_um[axis] - before_um) <= slack_um_[axis]);
       continue;

@@ -35,14 +35,21 @@ class WriteGate {
   /// @param resolution_um  an axis' step of the read-back [um]; axes beyond it: 0
   explicit WriteGate(nanoseconds period, const std::vector<double>& resolution_um = {}) noexcept;
 
-  /// Everything has been read back: from here on commands of the new epoch may be sent.
+  /// Everything has been read back: from here on commands of the new epoch may be sent. The epoch
+  /// is of another link where it was lost() since the last one, else a pause of the same.
   /// @param applied_um  what was read back with it [um]; a controller that has left it before the
   ///                    first command is written is not explained either
   /// @return the new epoch, never 0
   std::uint32_t synchronised(const std::array<double, axes_max>& applied_um) noexcept;
   std::uint32_t synchronised() noexcept;  ///< nothing was read back
-  /// The link was lost or a write failed: nothing may be sent until synchronised().
-  void lost() noexcept { in_sync_ = false; }
+  /// The link was lost: nothing may be sent until synchronised(), and the controller may have
+  /// restarted meanwhile.
+  void lost() noexcept {
+    in_sync_ = false;
+    link_is_new_ = true;
+  }
+  /// The same of a link that is still the same one: what was sent still counts.
+  void paused() noexcept { in_sync_ = false; }
   [[nodiscard]] bool in_sync() const noexcept { return in_sync_; }
   /// The newest epoch; 0: never synchronised.
   [[nodiscard]] std::uint32_t epoch() const noexcept { return epoch_; }
@@ -70,6 +77,7 @@ class WriteGate {
   nanoseconds period_;
   nanoseconds stall_max_;
   bool in_sync_{false};
+  bool link_is_new_{true};
   std::uint32_t epoch_{0};
   OffsetCommand command_{};
   nanoseconds offered_at_{};

@@ -138,6 +138,8 @@ class ModbusConnection::Implementation {
   enum class Frame { ours, foreign, bad, lost };
 
   [[nodiscard]] bool tcp_frame_waits() const noexcept;
+  bool drain_stream() noexcept;
+  bool take_from_stream() noexcept;
   PortBytes take_tcp_frame(nanoseconds deadline) noexcept;
   bool send(int unit, const Pdu& request) noexcept;
   Frame receive(int unit, std::uint8_t function, std::size_t answer_bytes, const char*& detail);
@@ -162,6 +164,8 @@ class ModbusConnection::Implementation {
   std::array<std::uint8_t, frame_bytes_max> frame_{};
   std::array<std::uint8_t, 2 * frame_bytes_max> stream_{};  ///< TCP: received, not yet taken
   std::size_t received_{0};                                 ///< bytes of stream_
+  std::size_t unasked_{0};   ///< ... at its front that were there before the request was sent
+  bool was_unasked_{false};  ///< the frame taken last began with such
   std::span<const std::uint8_t> answer_;
 };
 
@@ -199,6 +203,7 @@ void ModbusConnection::Implementation::disconnect() noexcept {
   if (!connected_) return;
   connected_ = false;
   received_ = 0;
+  unasked_ = 0;
   port_->close();
 }
 
@@ -230,7 +235,8 @@ ModbusConnection::Implementation::Frame ModbusConnection::Implementation::classi
     detail = "the answer's header does not fit it";
     return Frame::bad;
   }
-  if (word_at(frame, 0) != transaction_) return Frame::foreign;  // late: of an earlier request
+  // Late: of an earlier request. Or early: who guesses the next number has answered nothing.
+  if (was_unasked_ || word_at(frame, 0) != transaction_) return Frame::foreign;
   if (frame[6] != static_cast<std::uint8_t>(unit)) {
     detail = "another unit answered";
     return Frame::bad;
@@ -243,19 +249,46 @@ bool ModbusConnection::Implementation::tcp_frame_waits() const noexcept {
   return received_ >= mbap_bytes && received_ >= word_at(std::span(stream_), 4) + std::size_t{6};
 }
 
+/// Takes a whole frame off the front of the stream, into frame_. @return whether there was one
+bool ModbusConnection::Implementation::take_from_stream() noexcept {
+  if (!tcp_frame_waits()) return false;
+  const std::size_t size = word_at(std::span(stream_), 4) + std::size_t{6};
+  if (size <= mbap_bytes || size > frame_.size()) return false;
+  std::copy_n(stream_.begin(), size, frame_.begin());
+  std::copy(stream_.begin() + static_cast<std::ptrdiff_t>(size),
+            stream_.begin() + static_cast<std::ptrdiff_t>(received_), stream_.begin());
+  received_ -= size;
+  was_unasked_ = unasked_ > 0;
+  unasked_ -= std::min(unasked_, size);
+  return true;
+}
+
+/// What came before the question is no answer to it: whole frames go, the beginning of one is
+/// remembered. @return false when the line is lost or the peer does not stop
+bool ModbusConnection::Implementation::drain_stream() noexcept {
+  constexpr int pieces_max = 64;
+  for (int piece = 0; piece < pieces_max; ++piece) {
+    while (take_from_stream()) {
+    }
+    const PortBytes came = port_->receive(std::span(stream_).subspan(received_), {});
+    if (came.kind == PortBytes::Kind::nothing) {
+      unasked_ = received_;
+      return true;
+    }
+    if (came.kind != PortBytes::Kind::bytes) return false;
+    received_ += came.size;
+    if (received_ == stream_.size() && !tcp_frame_waits()) return false;
+  }
+  return false;
+}
+
 /// The next frame of the stream into frame_, with what comes until `deadline`.
 PortBytes ModbusConnection::Implementation::take_tcp_frame(nanoseconds deadline) noexcept {
   while (true) {
     if (received_ >= mbap_bytes) {
       const std::size_t size = word_at(std::span(stream_), 4) + std::size_t{6};
       if (size <= mbap_bytes || size > frame_.size()) return {PortBytes::Kind::too_long};
-      if (received_ >= size) {
-        std::copy_n(stream_.begin(), size, frame_.begin());
-        std::copy(stream_.begin() + static_cast<std::ptrdiff_t>(size),
-                  stream_.begin() + static_cast<std::ptrdiff_t>(received_), stream_.begin());
-        received_ -= size;
-        return {PortBytes::Kind::bytes, size};
-      }
+      if (take_from_stream()) return {PortBytes::Kind::bytes, size};
     }
     const PortBytes came = port_->receive(std::span(stream_).subspan(received_), {});
     if (came.kind == PortBytes::Kind::bytes) {
@@ -365,7 +398,9 @@ Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request
     return exchange;
   }
   exchange.sent_at = port_->now();
-  if (send(unit, request)) {
+  if (!serial_ && !drain_stream()) {
+    exchange.detail = "the line was lost, or bytes come without end that answer nothing";
+  } else if (send(unit, request)) {
     exchange = await_answer(unit, request.bytes[0], answer_bytes, exchange);
   } else {
     exchange.detail = "the request could not be sent";

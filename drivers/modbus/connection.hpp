@@ -7,8 +7,8 @@
 #include <span>
 #include <string>
 
+#include "drivers/modbus/modbus_config.hpp"
 #include "drivers/modbus/port.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
 
 namespace thermocomp {
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 
 namespace thermocomp {
 

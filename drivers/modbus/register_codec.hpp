@@ -16,7 +16,7 @@
 #include <cstdint>
 #include <span>
 
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 
 namespace thermocomp {
 

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "drivers/can/can_config.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/sensors/can_interface_source.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
 
 namespace thermocomp {
 

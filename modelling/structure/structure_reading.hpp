@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "config/toml_reader.hpp"
-#include "modelling/structure/structure_file.hpp"
+#include "modelling/structure/structure_spec.hpp"
 
 namespace thermocomp::structure {
 

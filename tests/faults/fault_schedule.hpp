@@ -36,13 +36,21 @@ enum class FaultKind : std::uint8_t {
   controller_rehomed,
   controller_rejecting,
   controller_applies_other,
+  read_back_scaled,
+  read_back_negated,
+  read_back_shifted,
+  read_back_drifting,
+  read_back_jumped,
+  read_back_frozen,
+  controller_ignoring,
+  second_writer,
   wall_clock_stepped,
   cycle_overrun,
   model_reload,
   daemon_killed,
   history_disk_full
 };
-inline constexpr std::size_t fault_kinds = 25;
+inline constexpr std::size_t fault_kinds = 33;
 /// Unordered, a kind with itself (another subject or time) among them.
 inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 

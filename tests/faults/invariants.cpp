@@ -8,6 +8,8 @@ namespace thermocomp::faults {
 namespace {
 
 constexpr double tiny_um = 1e-9;
+/// What was sent so long ago does not explain a read-back any more [s].
+constexpr double window_s = 10.0;
 constexpr double register_rounding_um = 0.1;
 /// The window of comparison, and the read-back and the command that are under way at its end.
 constexpr nanoseconds settling = std::chrono::seconds(8);
@@ -53,6 +55,7 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
 
 void Invariants::booted(nanoseconds now) {
   boot_ = now;
+  sent_ = {};
   last_ = now;
   last_compensating_ = now;
   first_ = true;
@@ -66,8 +69,9 @@ void Invariants::booted(nanoseconds now) {
   for (Learned& learned : learned_) {
     learned.correction.gain.fill(1.0);
     learned.correction.gain_used.fill(1.0);
-    learned.held_um = not_a_number;
   }
+  held_degC_.clear();
+  ends_at_hold_ = 0;
 }
 
 void Invariants::reloaded(const MachineShape& shape) {
@@ -91,9 +95,12 @@ void Invariants::restored(const PersistentState& saved, const Report& report, na
       demand(found != learned.end() && found->second == value, "state_survives_restart", now,
              "correction " + key);
     }
-    const auto held = saved.held_um.find(name);
-    demand(held == saved.held_um.end() || held->second == report.axes[axis].held_um,
-           "state_survives_restart", now, "held displacement of axis " + name);
+  }
+  std::size_t column = 0;
+  for (const auto& held : saved.held_degC) {
+    demand(column < report.inputs.size() && report.inputs[column].held_degC == held.second,
+           "state_survives_restart", now, "held temperature of " + held.first);
+    ++column;
   }
   demand(report.enabled == saved.enabled, "state_survives_restart", now, "the operator's switch");
   std::size_t i = 0;
@@ -114,8 +121,12 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
                        SimulatedController& controller) {
   check_readings(seen);
   check_sensors_used(seen);
-  for (const Move& move : moves) check_move(seen, move, controller);
+  for (const Move& move : moves) {
+    check_move(seen, move, controller);
+    check_sent(seen, move);
+  }
   moves.clear();
+  for (std::size_t axis = 0; axis < axes_count; ++axis) check_unexplained(seen, axis);
   check_hold(seen);
   check_command(seen);
   check_recovery(seen, controller);
@@ -258,19 +269,21 @@ void Invariants::check_hold(const CycleSeen& seen) {
 void Invariants::note_learned(const Report& report) {
   for (std::size_t i = 0; i < axes_count; ++i) {
     learned_[i].correction = report.axes[i].correction;
-    learned_[i].held_um = report.axes[i].held_um;
     learned_[i].proving = report.axes[i].proving;
     learned_[i].predicted = report.mode == Mode::compensating;
   }
+  held_degC_.clear();
+  for (const InputReport& input : report.inputs) held_degC_.push_back(input.held_degC);
 }
 
 /// Probings and cycle ends.
 void Invariants::check_correction(const CycleSeen& seen) {
   const MachineShape& shape = *seen.shape;
   const Report& report = *seen.report;
+  check_cycle_hold(seen);
   for (std::size_t i = 0; i < axes_count; ++i) {
     if (shape.estimator.correction.form != CorrectionForm::off) check_learning(seen, i);
-    check_cycle_hold(seen, i);
+    check_held_displacement(seen, i);
     if (report.mode != Mode::compensating) continue;
     learned_[i].contribution_um = contributions_um(shape, report, i);
     const CorrectionReport& now = report.axes[i].correction;
@@ -317,26 +330,49 @@ void Invariants::check_learning(const CycleSeen& seen, std::size_t axis) {
          [&] { return fmt::format("axis {}: its gains change while cutting", axis); });
 }
 
-void Invariants::check_cycle_hold(const CycleSeen& seen, std::size_t axis) {
+void Invariants::check_cycle_hold(const CycleSeen& seen) {
+  const std::vector<InputReport>& inputs = seen.report->inputs;
+  bool same = held_degC_.size() == inputs.size();
+  for (std::size_t i = 0; same && i < inputs.size(); ++i)
+    same = inputs[i].held_degC == held_degC_[i] ||
+           (std::isnan(inputs[i].held_degC) && std::isnan(held_degC_[i]));
+  // A new reference is a new beginning.
+  const bool may_change = seen.report->cycle_ends > ends_at_hold_ || referenced_ || first_;
+  demand(same || may_change, "held_between_cycle_ends", seen.now,
+         [] { return std::string("the held temperatures change without a cycle end"); });
+  if (!same && !referenced_) ends_at_hold_ = seen.report->cycle_ends;
+}
+
+/// What is held are temperatures: the displacement is theirs, by the matrix and gains of now.
+void Invariants::check_held_displacement(const CycleSeen& seen, std::size_t axis) {
+  const MachineShape& shape = *seen.shape;
   const AxisReport& report = seen.report->axes[axis];
-  Learned& learned = learned_[axis];
-  const bool same = report.held_um == learned.held_um ||
-                    (std::isnan(report.held_um) && std::isnan(learned.held_um));
-  demand(same || seen.report->cycle_ends > learned.ends_at_hold, "held_between_cycle_ends",
-         seen.now, [&] {
-           return fmt::format("axis {}: from {:.4f} to {:.4f} um without a cycle end", axis,
-                              learned.held_um, report.held_um);
-         });
-  if (!same) learned.ends_at_hold = seen.report->cycle_ends;
-  const bool by_cycles = seen.shape->estimator.compensation.update == UpdateRule::each_cycle &&
-                         seen.report->mode == Mode::compensating && !report.proving &&
-                         !learned.proving && std::isfinite(report.held_um);
-  const double target_um = -seen.shape->estimator.axes[axis].sign * report.held_um;
-  if (by_cycles && report.driven)
-    demand(std::abs(report.target_um - target_um) < 1e-9, "held_between_cycle_ends", seen.now, [&] {
-      return fmt::format("axis {}: heads for {:.4f} um, {:.4f} was held", axis, report.target_um,
-                         target_um);
-    });
+  const bool by_cycles = shape.estimator.compensation.update == UpdateRule::each_cycle &&
+                         seen.report->mode == Mode::compensating && std::isfinite(report.held_um);
+  if (!by_cycles) return;
+  Report at_hold = *seen.report;
+  double held_um = 0.0;
+  for (std::size_t i = 0; i < at_hold.inputs.size(); ++i) {
+    InputReport& input = at_hold.inputs[i];
+    input.temp_degC = input.held_degC;
+    held_um += shape.model.matrix_um_per_K[axis][i] * (input.held_degC - input.reference_degC);
+  }
+  if (shape.estimator.correction.form != CorrectionForm::off) {
+    const std::array<double, 2> contribution_um = contributions_um(shape, at_hold, axis);
+    held_um += report.correction.bias_used_um;
+    for (std::size_t g = 0; g < 2; ++g)
+      held_um += (report.correction.gain_used[g] - 1.0) * contribution_um[g];
+  }
+  demand(std::abs(report.held_um - held_um) < 1e-6, "held_between_cycle_ends", seen.now, [&] {
+    return fmt::format("axis {}: {:.6f} um are held, its temperatures give {:.6f}", axis,
+                       report.held_um, held_um);
+  });
+  if (report.proving || learned_[axis].proving || !report.driven) return;
+  const double target_um = -shape.estimator.axes[axis].sign * report.held_um;
+  demand(std::abs(report.target_um - target_um) < 1e-9, "held_between_cycle_ends", seen.now, [&] {
+    return fmt::format("axis {}: heads for {:.4f} um, {:.4f} was held", axis, report.target_um,
+                       target_um);
+  });
 }
 
 void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& controller) {
@@ -367,7 +403,9 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   budget.at = move.at;
   const double change_um = std::abs(move.to_um - move.from_um);
   double allowed_um = budget.um + 2.0 * resolution_um_;
-  if (move.disturbed) budget.disturbed_at = move.at;
+  // An operator may have released an axis on the word of a controller that has stopped lying since.
+  const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
+  if (move.disturbed || lies) budget.disturbed_at = move.at;
   if (move.at - budget.disturbed_at < settling) {
     // What lies among the offsets sent of late cannot be told from obedience.
     const auto end = budget.told_um.begin() +
@@ -376,7 +414,7 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
     allowed_um += 3.0 + 2.0 * resolution_um_ + (budget.count == 0 ? 0.0 : *high - *low);
   }
   const bool knowable = !move.disturbed || move.seen;
-  if (knowable && !controller.applies_other(move.at))
+  if (knowable && !lies)
     demand(change_um <= allowed_um, "slew_kept_at_controller", seen.now, [&] {
       return fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed",
                          move.axis, move.to_um, move.from_um, allowed_um);
@@ -388,6 +426,98 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
          "offset_within_bound", seen.now, [&] {
            return fmt::format("axis {}: the controller is told {:.4f} um", move.axis, move.to_um);
          });
+}
+
+/// Two values sent one after the other differ by no more than the slew allows, whatever was read
+/// back between them. A link that is new begins from what is applied: between zero and what was
+/// sent lately.
+void Invariants::check_sent(const CycleSeen& seen, const Move& move) {
+  Sent& sent = sent_[move.axis];
+  const double rate_um_per_s = rate_um_per_s_[move.axis];
+  const double elapsed_s = to_s(move.at - sent.at);
+  const double stall_s = std::max(5.0 * link_period_s_, 1.0) + 2.0 * period_s_;
+  const double stall_um = rate_um_per_s * stall_s;
+  const bool first = std::isnan(sent.um);
+  const double change_um = first ? 0.0 : std::abs(move.to_um - sent.um);
+  sent.credit_um = std::min(sent.credit_um + rate_um_per_s * elapsed_s,
+                            std::max(stall_um, rate_um_per_s * elapsed_s + stall_um));
+  const bool kept = change_um <= sent.credit_um + 2.0 * resolution_um_ + tiny_um;
+  if (kept || move.breaks == sent.breaks) {
+    demand(kept, "slew_kept_by_what_is_sent", seen.now, [&] {
+      return fmt::format("axis {}: {:.4f} um after {:.4f} um, {:.3f} s apart, {:.4f} allowed",
+                         move.axis, move.to_um, sent.um, elapsed_s, sent.credit_um);
+    });
+  } else {
+    const auto [low_um, high_um] = sent.range_um(0.0);
+    const double slack_um = 4.0 + stall_um + 2.0 * resolution_um_;
+    demand(move.to_um >= low_um - slack_um && move.to_um <= high_um + slack_um,
+           "slew_kept_by_what_is_sent", seen.now, [&] {
+             return fmt::format("axis {}: {:.4f} um after {:.4f} um on a new link", move.axis,
+                                move.to_um, sent.um);
+           });
+  }
+  if (first || !kept) {
+    sent.breaks = move.breaks;
+    sent.credit_um = stall_um;
+  }
+  sent.credit_um = std::max(0.0, sent.credit_um - std::max(0.0, change_um - resolution_um_));
+  sent.um = move.to_um;
+  sent.at = move.at;
+  sent.lately.emplace_back(move.at, move.to_um);
+  while (sent.lately.front().first < move.at - from_s(window_s)) sent.lately.pop_front();
+}
+
+std::pair<double, double> Invariants::Sent::range_um(double with_um) const {
+  std::pair range{with_um, with_um};
+  for (const auto& [at_time, value_um] : lately) {
+    range.first = std::min(range.first, value_um);
+    range.second = std::max(range.second, value_um);
+  }
+  return range;
+}
+
+/// Read-backs that nothing sent explains, one after the other: the axis is not driven.
+void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
+  Sent& sent = sent_[axis];
+  const double told_um = seen.told->applied_um[axis];
+  const bool latched = seen.report->axes[axis].latched;
+  demand(!latched || !seen.command->valid[axis], "unexplained_is_latched", seen.now,
+         [&] { return fmt::format("axis {}: driven although latched", axis); });
+  demand(latched || !sent.latched || sent.released, "unexplained_is_latched", seen.now,
+         [&] { return fmt::format("axis {}: nobody released it", axis); });
+  if (!latched) sent.released = false;
+  sent.latched = latched;
+  if (!seen.told->online || sent.lately.empty() || !std::isfinite(told_um)) return;
+  // What the cycle wants explains a read-back as well as what reached the controller: after a
+  // release or on a new link it starts from what is read back, and the write may be refused.
+  const double wanted_um = seen.command->offset_um[axis];
+  if (seen.command->valid[axis] &&
+      (sent.wanted.empty() || seen.now - sent.wanted.back().first > from_s(0.5)))
+    sent.wanted.emplace_back(seen.now, wanted_um);
+  while (!sent.wanted.empty() && sent.wanted.front().first < seen.now - from_s(window_s))
+    sent.wanted.pop_front();
+  auto [low_um, high_um] = sent.range_um(wanted_um);
+  for (const auto& [at, um] : sent.wanted) {
+    low_um = std::min(low_um, um);
+    high_um = std::max(high_um, um);
+  }
+  const double slack_um = seen.shape->estimator.compensation.mismatch_um + 2.0 +
+                          rate_um_per_s_[axis] * (link_period_s_ + 2.0 * period_s_);
+  const bool unexplained = told_um < low_um - slack_um || told_um > high_um + slack_um;
+  // What has been latched, or was before a release, counts from here.
+  if (!unexplained || latched) sent.unexplained = 0;
+  if (unexplained && !latched && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
+  sent.read_back_at = seen.told->taken_at;
+  if (sent.unexplained < 5) return;
+  demand(latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound),
+         "unexplained_is_latched", seen.now, [&] {
+           return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told",
+                              axis, told_um);
+         });
+  demand(!seen.command->valid[axis], "unexplained_is_latched", seen.now, [&] {
+    return fmt::format("axis {}: driven at {:.4f} um although {:.4f} um is read back", axis,
+                       seen.command->offset_um[axis], told_um);
+  });
 }
 
 }  // namespace thermocomp::faults

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,13 +21,14 @@ struct Broken {
   std::string detail;
 };
 
-inline constexpr std::array<const char*, 17> invariant_names{
+inline constexpr std::array<const char*, 19> invariant_names{
     "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
     "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
     "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
     "recovered_in_time",         "state_survives_restart",       "replay_is_exact",
     "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
-    "nothing_learned_mid_cut",   "held_between_cycle_ends"};
+    "nothing_learned_mid_cut",   "held_between_cycle_ends",      "slew_kept_by_what_is_sent",
+    "unexplained_is_latched"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -54,6 +56,8 @@ class Invariants {
   void reloaded(const MachineShape& shape);
   /// A probing of this axis reaches the estimator in the cycle to come.
   void probed(std::size_t axis) { ++probings_[axis]; }
+  /// The operator releases this axis in the cycle to come.
+  void released(std::size_t axis) { sent_[axis].released = true; }
   /// The operator takes a new reference in the cycle to come.
   void referenced() { referenced_ = true; }
   void restored(const PersistentState& saved, const Report& report, nanoseconds now);
@@ -76,10 +80,13 @@ class Invariants {
   void check_hold(const CycleSeen& seen);
   void check_correction(const CycleSeen& seen);
   void check_learning(const CycleSeen& seen, std::size_t axis);
-  void check_cycle_hold(const CycleSeen& seen, std::size_t axis);
+  void check_cycle_hold(const CycleSeen& seen);
+  void check_held_displacement(const CycleSeen& seen, std::size_t axis);
   void note_learned(const Report& report);
   void check_recovery(const CycleSeen& seen, SimulatedController& controller);
   void check_move(const CycleSeen& seen, const Move& move, const SimulatedController& controller);
+  void check_sent(const CycleSeen& seen, const Move& move);
+  void check_unexplained(const CycleSeen& seen, std::size_t axis);
   [[nodiscard]] bool fresh(std::size_t sensor, nanoseconds now) const;
   [[nodiscard]] bool any_block_lost(nanoseconds now) const;
   [[nodiscard]] nanoseconds slack_of(std::size_t sensor) const { return slack_[sensor]; }
@@ -118,16 +125,33 @@ class Invariants {
   };
   std::array<Budget, axes_count> budgets_{};
 
+  /// What an axis was sent, seen at the controller, whatever it says that it applies.
+  struct Sent {
+    double um{not_a_number};
+    nanoseconds at{};
+    double credit_um{0.0};    ///< what it may still go at once
+    std::uint64_t breaks{0};  ///< of the link, when it last began from what is applied
+    std::deque<std::pair<nanoseconds, double>> lately;
+    std::deque<std::pair<nanoseconds, double>> wanted;  ///< by the cycle
+    nanoseconds read_back_at{};
+    int unexplained{0};    ///< read-backs in a row
+    bool released{false};  ///< since it was latched
+    bool latched{false};   ///< in the cycle before
+    [[nodiscard]] std::pair<double, double> range_um(double with_um) const;
+  };
+  std::array<Sent, axes_count> sent_{};
+
   /// What an axis had learned at the end of the cycle before.
   struct Learned {
     CorrectionReport correction;
     std::array<double, 2> contribution_um{};  ///< of the groups, when last predicted
-    double held_um{0.0};
     bool proving{false};
-    bool predicted{false};          ///< in that cycle: the contributions are its own
-    std::uint64_t ends_at_hold{0};  ///< cycle ends counted when it was taken
+    bool predicted{false};  ///< in that cycle: the contributions are its own
   };
   std::array<Learned, axes_count> learned_{};
+  /// Temperatures held since the last cycle end, and the cycle ends counted when they were taken.
+  std::vector<double> held_degC_;
+  std::uint64_t ends_at_hold_{0};
   std::array<std::size_t, axes_count> probings_{};
   bool referenced_{false};
 };

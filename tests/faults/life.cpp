@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "estimator/checks.hpp"
+#include "estimator/persistent_state.hpp"
 #include "history_disk.hpp"
 #include "recorded_twin.hpp"
 #include "simulated_daemon.hpp"
@@ -32,6 +33,7 @@ class Life {
         world_(options.seed, shape_, schedule_),
         chance_(options.seed, 5),
         probings_(options.seed, 6),
+        releases_(options.seed, 8),
         gains_{probings_.between(0.4, 2.0), probings_.between(0.4, 2.0)},
         judge_(shape_, schedule_, world_.thermocouples),
         end_(life_begin + nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)}) {
@@ -63,7 +65,8 @@ class Life {
     twin_ = disk_ ? nullptr : std::make_unique<RecordedTwin>(grid_);
     if (disk_) disk_->boot(grid_, world_.now);
     auto brain = make_brain();
-    brain->estimator.restore(saved_);
+    const auto refused = brain->estimator.restore(saved_);
+    judge_.demand(refused.empty(), "state_survives_restart", world_.now, "a reference was refused");
     report_ = brain->estimator.make_report();
     judge_.booted(world_.now);
     // The very first value becomes the reference; a later start has one already.
@@ -95,6 +98,7 @@ class Life {
   void step(std::uint64_t cycle) {
     say_faults();
     operate();
+    release();
     probe();
     reload();
     daemon_->cycle().step(cycle);
@@ -162,6 +166,20 @@ class Life {
     command.value_um = chance_.between(-8.0, 8.0);
     if (command.kind == CommandKind::measured) judge_.probed(command.axis);
     static_cast<void>(daemon_->cycle().send(command));
+  }
+
+  /// An operator who has looked into a mismatch releases the axis some time after all is well; now
+  /// and then one who has not does so at once.
+  void release() {
+    const Episode* episode = schedule_.episode_at(world_.now);
+    const bool well = episode == nullptr || world_.now < episode->begin;
+    for (std::size_t axis = 0; axis < axes_count; ++axis) {
+      if (!report_.axes[axis].latched || report_.axes[axis].releasing) continue;
+      if (!releases_.one_in(static_cast<std::uint64_t>((well ? 5.0 : 60.0) * options_.cycle_hz)))
+        continue;
+      const Command command{CommandKind::release, static_cast<std::uint32_t>(axis), 0.0};
+      if (daemon_->cycle().send(command)) judge_.released(axis);
+    }
   }
 
   [[nodiscard]] bool once_in(double period_s) {
@@ -255,28 +273,10 @@ class Life {
 
   /// As the daemon does: switches and references at once, offsets every 10 s.
   void save_state() {
-    bool now = world_.now >= next_save_ || report_.enabled != saved_.enabled;
-    for (std::size_t i = 0; i < report_.inputs.size() && !now; ++i) {
-      const double reference_degC = report_.inputs[i].reference_degC;
-      const auto found = saved_.reference_degC.find(shape_.model.inputs[i]);
-      now = std::isfinite(reference_degC) &&
-            (found == saved_.reference_degC.end() || found->second != reference_degC);
-    }
-    if (!now) return;
+    const PersistentState state = persistent_state(daemon_->cycle().brain().estimator, report_);
+    if (world_.now < next_save_ && !must_be_saved(state, saved_)) return;
     next_save_ = world_.now + saved_every;
-    saved_.enabled = report_.enabled;
-    saved_.model_reference_degC = daemon_->cycle().brain().estimator.model_reference_degC();
-    for (std::size_t i = 0; i < report_.inputs.size(); ++i)
-      if (std::isfinite(report_.inputs[i].reference_degC))
-        saved_.reference_degC[shape_.model.inputs[i]] = report_.inputs[i].reference_degC;
-    saved_.correction.clear();
-    for (std::size_t i = 0; i < axes_count; ++i) {
-      const std::string& name = shape_.estimator.axes[i].name;
-      saved_.offset_um[name] = report_.axes[i].offset_um;
-      if (std::isfinite(report_.axes[i].held_um)) saved_.held_um[name] = report_.axes[i].held_um;
-      for (const auto& [key, value] : RunningCorrection::persistent(report_.axes[i].correction))
-        saved_.correction[std::string(name).append(".").append(key)] = value;
-    }
+    saved_ = state;
   }
 
   [[nodiscard]] double life_s() const { return to_s(world_.now - life_begin); }
@@ -330,6 +330,7 @@ class Life {
   World world_;
   Chance chance_;
   Chance probings_;
+  Chance releases_;
   std::array<double, 2> gains_;                 ///< of the machine, where the model's are 1
   std::array<double, axes_count> probed_um_{};  ///< measured last
   Invariants judge_;

@@ -160,6 +160,48 @@ bool SimulatedController::switched_off(nanoseconds time) const noexcept {
   return scramble(seed_ * 31u + static_cast<std::uint64_t>(slot)) % 24 == 0;
 }
 
+bool SimulatedController::lies(nanoseconds time) const noexcept {
+  static constexpr std::array kinds{FaultKind::controller_applies_other,
+                                    FaultKind::read_back_scaled,
+                                    FaultKind::read_back_negated,
+                                    FaultKind::read_back_shifted,
+                                    FaultKind::read_back_drifting,
+                                    FaultKind::read_back_jumped,
+                                    FaultKind::read_back_frozen,
+                                    FaultKind::controller_ignoring,
+                                    FaultKind::second_writer};
+  return std::any_of(kinds.begin(), kinds.end(),
+                     [&](FaultKind kind) { return schedule_.find(kind, time) != nullptr; });
+}
+
+/// A fault of this kind of one axis, or of all.
+const FaultEvent* SimulatedController::lie(FaultKind kind, std::size_t axis,
+                                           nanoseconds time) const {
+  const FaultEvent* found = schedule_.find(kind, time);
+  return found != nullptr && (found->subject % 4 == 3 || found->subject % 4 == axis) ? found
+                                                                                     : nullptr;
+}
+
+/// What the controller says it applies.
+double SimulatedController::shown_um(std::size_t axis, nanoseconds time) {
+  double shown = applied_um_[axis];
+  if (const FaultEvent* scaled = lie(FaultKind::read_back_scaled, axis, time))
+    shown *= scaled->strength < 0.5 ? 2.0 : 0.5;
+  if (lie(FaultKind::read_back_negated, axis, time) != nullptr) shown = -shown;
+  if (const FaultEvent* shifted = lie(FaultKind::read_back_shifted, axis, time))
+    shown += (shifted->strength < 0.5 ? -1.0 : 1.0) * (3.0 + 20.0 * shifted->strength);
+  if (const FaultEvent* drift = lie(FaultKind::read_back_drifting, axis, time))
+    shown += (drift->strength - 0.5) * seconds_of(time - drift->begin);
+  if (const FaultEvent* jumped = lie(FaultKind::read_back_jumped, axis, time))
+    shown += jumped->strength < 0.5 ? -1000.0 : 1000.0;
+  if (const FaultEvent* frozen = lie(FaultKind::read_back_frozen, axis, time)) {
+    if (frozen_by_[axis] != frozen->number) frozen_um_[axis] = shown;
+    frozen_by_[axis] = frozen->number;
+    shown = frozen_um_[axis];
+  }
+  return shown;
+}
+
 void SimulatedController::disturb(std::size_t axis, double applied_um) {
   applied_um_[axis] = applied_um;
   disturbed_[axis] = true;
@@ -186,13 +228,16 @@ void SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
   advance(time);
   std::array<std::uint16_t, 8> image{};
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
+    if (const FaultEvent* other = lie(FaultKind::second_writer, axis, time))
+      disturb(axis, 60.0 * (other->strength - 0.5) + 0.02 * seconds_of(time - other->begin));
+    const double shown = shown_um(axis, time);
     if (floats_) {
-      const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(applied_um_[axis]));
+      const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(shown));
       image[2 * axis] = static_cast<std::uint16_t>(bits >> 16);
       image[2 * axis + 1] = static_cast<std::uint16_t>(bits & 0xFFFFu);
     } else {
-      image[axis] = static_cast<std::uint16_t>(
-          static_cast<std::int16_t>(std::lround(applied_um_[axis] * 10.0)));
+      image[axis] =
+          static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(shown * 10.0)));
     }
   }
   image[6] = says_cutting(time) ? 1 : 0;
@@ -219,11 +264,17 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
     if (floats_)
       told_um = static_cast<double>(
           std::bit_cast<float>(static_cast<std::uint32_t>(written_[at]) << 16 | written_[at + 1]));
-    moves_.push_back({axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis]});
+    moves_.push_back(
+        {axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis], breaks_});
+    if (lie(FaultKind::controller_ignoring, axis, time) != nullptr) {
+      disturb(axis, applied_um_[axis]);
+      continue;
+    }
     applied_um_[axis] = told_um;
     disturbed_[axis] = false;
     seen_[axis] = true;
-    if (applies_other(time)) disturb(axis, 0.6 * told_um + 4.0);
+    if (schedule_.find(FaultKind::controller_applies_other, time) != nullptr)
+      disturb(axis, 0.6 * told_um + 4.0);
   }
   return true;
 }

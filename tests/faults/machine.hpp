@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "drivers/controllers/controller_config.hpp"
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/modbus/modbus_config.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/thermal_model.hpp"
 #include "fault_schedule.hpp"
@@ -112,7 +112,8 @@ struct Move {
   double to_um{0.0};    ///< told
   /// The controller changed something by itself since our last accepted write.
   bool disturbed{false};
-  bool seen{false};  ///< ... and has told it since (a read-back was served)
+  bool seen{false};         ///< ... and has told it since (a read-back was served)
+  std::uint64_t breaks{0};  ///< of the link, until then
 };
 
 class SimulatedController {
@@ -125,9 +126,12 @@ class SimulatedController {
   bool write(std::size_t address, std::span<const std::uint16_t> words, nanoseconds time);
 
   [[nodiscard]] bool powered(nanoseconds time) const noexcept;
-  [[nodiscard]] bool applies_other(nanoseconds time) const noexcept {
-    return schedule_.find(FaultKind::controller_applies_other, time) != nullptr;
-  }
+  /// What it applies is not what it was told, or what it says is not what it applies.
+  [[nodiscard]] bool lies(nanoseconds time) const noexcept;
+  /// Something went wrong on the line, or it was connected anew: what comes after it may be another
+  /// controller, or the same one restarted.
+  void link_broke() noexcept { ++breaks_; }
+  [[nodiscard]] std::uint64_t link_breaks() const noexcept { return breaks_; }
   /// As it shows it: where the model corrects itself, wrong for two seconds now and then.
   [[nodiscard]] bool says_cutting(nanoseconds time) const noexcept;
   [[nodiscard]] bool switched_off(nanoseconds time) const noexcept;
@@ -138,6 +142,8 @@ class SimulatedController {
 
  private:
   void disturb(std::size_t axis, double applied_um);
+  [[nodiscard]] const FaultEvent* lie(FaultKind kind, std::size_t axis, nanoseconds time) const;
+  [[nodiscard]] double shown_um(std::size_t axis, nanoseconds time);
   [[nodiscard]] std::size_t words_an_offset() const noexcept { return floats_ ? 2 : 1; }
 
   std::uint64_t seed_;
@@ -145,6 +151,9 @@ class SimulatedController {
   bool floats_;
   bool on_{true};
   std::uint64_t last_rehoming_{0};
+  std::uint64_t breaks_{0};
+  std::array<std::uint64_t, axes_count> frozen_by_{};  ///< the fault that froze the read-back
+  std::array<double, axes_count> frozen_um_{};
   std::array<double, axes_count> applied_um_{};
   std::array<bool, axes_count> disturbed_{};
   std::array<bool, axes_count> seen_{};

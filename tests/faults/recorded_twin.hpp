@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "daemon/history/chunk_codec.hpp"
-#include "daemon/history/cycle_recorder.hpp"
-#include "daemon/history/record.hpp"
 #include "daemon/history/segment_walk.hpp"
+#include "daemon/recording/cycle_recorder.hpp"
+#include "daemon/recording/record.hpp"
 #include "estimator/estimator.hpp"
 
 namespace thermocomp::faults {

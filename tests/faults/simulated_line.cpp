@@ -91,13 +91,22 @@ bool SimulatedLine::up(nanoseconds time) const {
 }
 
 bool SimulatedLine::hit(FaultKind kind, std::uint64_t one_in) {
-  return schedule_.find(kind, clock_, line_, lines_count) != nullptr && chance_.one_in(one_in);
+  const bool is_hit =
+      schedule_.find(kind, clock_, line_, lines_count) != nullptr && chance_.one_in(one_in);
+  if (is_hit) end_.link_broke();
+  return is_hit;
+}
+
+bool SimulatedLine::gone() {
+  end_.link_broke();
+  return true;
 }
 
 bool SimulatedLine::open(std::string& why) {
   clock_ += milliseconds(1);
   frames_.clear();
   open_ = serial_ || up(clock_);
+  end_.link_broke();
   broken_ = false;
   mute_ = false;
   if (!open_) why = "connection refused";
@@ -117,9 +126,9 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
   if (!up(clock_)) {
     // A cable that is out says nothing; a peer that restarts says so.
     broken_ = !serial_ && chance_.one_in(2);
-    return true;
+    return gone();
   }
-  if (mute_ || hit(FaultKind::frames_lost, 3)) return true;
+  if (mute_ || hit(FaultKind::frames_lost, 3)) return gone();
   clock_ += microseconds(200);
   answer_.clear();
   end_.ask(bytes[head - 1], bytes.subspan(head), clock_, answer_);

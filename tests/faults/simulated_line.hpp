@@ -28,6 +28,7 @@ class LineEnd {
   /// @param answer  function and data, or left empty: no answer
   virtual void ask(int unit, std::span<const std::uint8_t> request, nanoseconds time,
                    std::vector<std::uint8_t>& answer) = 0;
+  virtual void link_broke() {}  ///< connected, or an exchange went wrong on the line
 };
 
 /// The units of one sensor bus.
@@ -52,6 +53,7 @@ class ControllerUnit final : public LineEnd {
   [[nodiscard]] bool powered(nanoseconds time) const override { return controller_.powered(time); }
   void ask(int unit, std::span<const std::uint8_t> request, nanoseconds time,
            std::vector<std::uint8_t>& answer) override;
+  void link_broke() override { controller_.link_broke(); }
 
  private:
   SimulatedController& controller_;
@@ -89,6 +91,7 @@ class SimulatedLine final : public ModbusPort {
   };
   [[nodiscard]] bool up(nanoseconds time) const;
   [[nodiscard]] bool hit(FaultKind kind, std::uint64_t one_in);
+  [[nodiscard]] bool gone();  ///< the answer will not come
   void deliver(Frame frame);
   void spoil(Frame& frame);
 

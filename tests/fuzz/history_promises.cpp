@@ -27,6 +27,7 @@ bool is_done(const std::filesystem::path& file, Use use) {
 }
 
 void check_run_file(const std::string& text) {
+  FUZZ_PROMISE(text.find('\x1b') == std::string::npos);
   try {
     static_cast<void>(parse_run(text, "run.csv"));
   } catch (const ConfigurationError& error) {

@@ -1,13 +1,17 @@
-/// A history that SQLite finds in order, with rows that no daemon wrote: edits of a good one.
+/// A history that SQLite finds in order, with rows that no daemon wrote: edits of a good one by
+/// SQL. Whatever else is damaged, a segment that nobody touched comes out whole.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
+#include <map>
 #include <string>
 #include <vector>
 
 #include <sqlite3.h>
 
 #include "daemon/history/chunk_codec.hpp"
+#include "daemon/history/history_check.hpp"
 #include "daemon/history/history_reader.hpp"
 #include "fuzz.hpp"
 #include "history_promises.hpp"
@@ -23,6 +27,35 @@ constexpr std::array segment_columns{
 constexpr std::array chunk_columns{"segment", "number", "through_cycle", "wall_minus_grid_ns",
                                    "count"};
 constexpr int edits_max = 8;
+/// Damage of whole rows, of types and of the file's own numbers.
+constexpr std::array statements{
+    "DELETE FROM chunk WHERE number = 0",
+    "DELETE FROM setup",
+    "DELETE FROM chunk WHERE rowid % 2 = 0",
+    "DELETE FROM segment WHERE id = 1",
+    "UPDATE chunk SET count = 'many' WHERE rowid = 3",
+    "UPDATE chunk SET records = NULL, count = NULL WHERE rowid = 3",
+    "UPDATE OR IGNORE chunk SET records = 'text' WHERE rowid = 3",
+    "UPDATE chunk SET checksum = NULL",
+    "UPDATE segment SET checksum = NULL",
+    "UPDATE chunk SET checksum = checksum + 1 WHERE rowid = 2",
+    "UPDATE segment SET wall_ns = 9000000000000000000 WHERE id = 2",
+    "UPDATE chunk SET wall_minus_grid_ns = 9000000000000000000",
+    "UPDATE segment SET last_cycle = last_cycle + 10 WHERE id = 1",
+    "UPDATE segment SET program_version = char(27) || '[2J' || char(8238)",
+    "UPDATE setup SET config_text = substr(config_text, 1, 100)",
+    "INSERT INTO segment SELECT id + 7, run, token, setup, reason, grid_start_ns, period_ns,"
+    " first_cycle, last_cycle, wall_ns, last_wall_ns, records, bytes, program_version, inputs,"
+    " estimator_state, checksum FROM segment",
+    "INSERT INTO chunk SELECT id + 90, segment, number + 50, through_cycle, wall_minus_grid_ns,"
+    " count, records, checksum FROM chunk",
+    "PRAGMA user_version = 0",
+    "PRAGMA user_version = -1",
+    "PRAGMA user_version = 2147483647",
+    "PRAGMA application_id = 0",
+    "DROP INDEX chunk_of_segment",
+    "ALTER TABLE chunk RENAME COLUMN checksum TO sum",
+    "ALTER TABLE segment RENAME COLUMN wall_ns TO wall"};
 
 /// Statements on the open copy. What fails (a key that is there already) changes nothing.
 class Editor {
@@ -155,17 +188,81 @@ void edit(Editor& editor, fuzz::ByteFeed& feed) {
       break;
     }
     case 6:
-      editor.run((row & 1) == 0 ? "DELETE FROM chunk WHERE number = 0" : "DELETE FROM setup");
+      editor.run(statements[row % statements.size()]);
       break;
   }
 }
 
-/// The texts stay as they are here: parsed once.
+/// The texts that the good one has are parsed once; others are refused as damaged ones are.
 ReplaySetup known_setup(const SegmentSetup& setup) {
   static const SegmentSetup known{fuzz::small_config_text(), fuzz::small_model_text(), ""};
   static const ReplaySetup parsed = parse_setup(known);
-  FUZZ_PROMISE(setup.config_text == known.config_text && setup.model_text == known.model_text);
-  return parsed;
+  if (setup.config_text == known.config_text && setup.model_text == known.model_text) return parsed;
+  return parse_setup(setup);
+}
+
+/// Every row of one segment, with its setup, as text.
+std::vector<std::string> segments_as_text(const std::filesystem::path& file) {
+  std::vector<std::string> found;
+  sqlite3* handle = nullptr;
+  sqlite3_stmt* rows = nullptr;
+  const char* sql =
+      "SELECT segment.id, quote(run) || quote(setup) || quote(reason) || quote(grid_start_ns)"
+      " || quote(period_ns) || quote(first_cycle) || quote(last_cycle) || quote(wall_ns)"
+      " || quote(inputs) || quote(estimator_state) || quote(segment.checksum)"
+      " || quote(config_text) || quote(model_text),"
+      " (SELECT group_concat(quote(number) || quote(through_cycle) || quote(count)"
+      " || quote(wall_minus_grid_ns) || quote(records) || quote(checksum))"
+      " FROM chunk WHERE chunk.segment = segment.id)"
+      " FROM segment JOIN setup ON setup.id = segment.setup ORDER BY segment.id";
+  if (sqlite3_open(file.c_str(), &handle) == SQLITE_OK &&
+      sqlite3_prepare_v2(handle, sql, -1, &rows, nullptr) == SQLITE_OK) {
+    while (sqlite3_step(rows) == SQLITE_ROW) {
+      const auto text = [&](int column) {
+        const unsigned char* bytes = sqlite3_column_text(rows, column);
+        return bytes == nullptr ? std::string() : reinterpret_cast<const char*>(bytes);
+      };
+      found.push_back(text(0) + ":" + text(1) + "/" + text(2));
+    }
+  }
+  sqlite3_finalize(rows);
+  sqlite3_close(handle);
+  return found;
+}
+
+/// A segment that nobody touched is sound to its last record, or it is told why it has no place.
+void check_untouched(const std::filesystem::path& file, const std::vector<std::uint8_t>& good) {
+  struct Before {
+    std::vector<std::string> texts;
+    std::map<std::int64_t, std::uint64_t> records;
+  };
+  static const Before before = [&] {
+    const fuzz::ScratchFile original("good.db");
+    original.write(good);
+    Before found{segments_as_text(original.path()), {}};
+    const HistoryCheck check = check_history(original.path(), {}, known_setup);
+    FUZZ_PROMISE(check.is_sound() && check.segments.size() == found.texts.size());
+    for (const SegmentCheck& part : check.segments) found.records[part.segment.id] = part.records;
+    return found;
+  }();
+  HistoryCheck check;
+  try {
+    check = check_history(file, {}, known_setup);
+  } catch (const HistoryError&) {
+    return;
+  }
+  for (const std::string& segment : segments_as_text(file)) {
+    if (std::count(before.texts.begin(), before.texts.end(), segment) == 0) continue;
+    const std::int64_t id = std::stoll(segment);
+    const auto part = std::find_if(check.segments.begin(), check.segments.end(),
+                                   [id](const SegmentCheck& of) { return of.segment.id == id; });
+    const bool is_told = std::any_of(check.damage.begin(), check.damage.end(),
+                                     [id](const HistoryDamage& of) { return of.segment == id; });
+    FUZZ_PROMISE(part != check.segments.end() || is_told);
+    if (part == check.segments.end()) continue;
+    FUZZ_PROMISE(part->damage.empty());
+    FUZZ_PROMISE(part->records == before.records.at(id));
+  }
 }
 
 /// A file may say that it holds hours of cycles, and replaying them takes its time: no fault of the
@@ -196,9 +293,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   if (takes_long(file.path())) return 0;
   const fuzz::HistoryUse use = fuzz::use_history(file.path(), known_setup);
+  check_untouched(file.path(), good);
   if (size == 0) {
     FUZZ_PROMISE(use.replayed && use.exported);
     FUZZ_PROMISE(use.summary.compared > 0 && use.summary.different == 0);
+    FUZZ_PROMISE(use.summary.damage.empty());
   }
   return 0;
 }

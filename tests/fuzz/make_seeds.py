@@ -196,6 +196,7 @@ def socket_seeds():
     write("socket_request", "measured_wrong", request("measured", {}) + probing("3") +
           probing(1e308) + probing(None) + request("measured", {"axis": 0, "value_um": 1}))
     write("socket_request", "prove", request("prove", {"axis": "z", "value_um": 5}))
+    write("socket_request", "release", request("release", {"axis": "z"}))
     write("socket_request", "wrong_axis", request("prove", {"axis": "q", "value_um": 1e300}))
     write("socket_request", "subscribe", request("subscribe", {"methods": ["status"],
                                                                "period_s": 0.1}))
@@ -249,7 +250,7 @@ def state_seeds():
     state = {"format": 1, "program": "thermocomp", "enabled": True,
              "reference_degC": {"bed_degC": 20.5, "spindle_degC": 21},
              "model_reference_degC": {"bed_degC": 20.0}, "reference_signals": {"spindle_rpm": 0},
-             "offset_um": {"z": -12.25}, "held_um": {"z": 11.5},
+             "offset_um": {"z": -12.25}, "held_degC": {"t1_degC": 24.5}, "held_signals": {"spindle_rpm": 1200.0},
              "correction": {"z.gain1": 1.125, "z.gain1_sd": 0.0625, "z.gain1_used": 1.0,
                             "z.bias_um": -0.5, "z.phase": 2}}
     write("state_file", "good", json.dumps(state, indent=2))

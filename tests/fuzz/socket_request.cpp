@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -43,8 +45,8 @@ class Desk {
     controller_.applied_um.fill(0.0);
     step();
     add_operator_methods(
-        server_, {[this] { return view(); }, [this](const Command& asked) { take(asked); },
-                  [] {
+        server_, {[this] { return view(); }, [this](const Command& asked) { return take(asked); },
+                  []() -> RpcPending {
                     throw ConfigurationError({{"config.toml", 3, "format", "2", "must be 1"}});
                   }});
   }
@@ -76,7 +78,8 @@ class Desk {
     return {config_, report_, controller_,         timing_, {}, {}, {}, {},
             1.0,     false,   server_.statistics()};
   }
-  void take(const Command& asked) {
+  /// Every other command is answered a round later.
+  RpcPending take(const Command& asked) {
     FUZZ_PROMISE(asked.axis < config_.estimator.axes.size());
     FUZZ_PROMISE(std::isfinite(asked.value_um));
     const double before_um = displacement_um(asked.axis);
@@ -91,6 +94,11 @@ class Desk {
     if (asked.kind != CommandKind::reference && std::isfinite(before_um))
       FUZZ_PROMISE(std::abs(displacement_um(asked.axis) - before_um) <=
                    correction.step_um_max + rise_um_a_step);
+    bool later = steps_ % 2 == 0;
+    return [later]() mutable -> std::optional<json> {
+      if (std::exchange(later, false)) return std::nullopt;
+      return json{{"done", true}};
+    };
   }
   /// One cycle, in which the machine warms by little.
   void step() {

@@ -1,5 +1,5 @@
-/// The state file: whatever stands there, the daemon starts - with the file's content, or afresh
-/// and with a warning that says which file and why; and what was read is written unchanged.
+/// The state file: whatever stands there, the daemon starts - with the file's content, or with a
+/// warning that says which file and why; and what was read is written unchanged.
 #include "daemon/state/state_file.hpp"
 
 #include <cmath>
@@ -18,7 +18,7 @@ bool same(const PersistentState& a, const PersistentState& b) {
   return a.enabled == b.enabled && a.reference_degC == b.reference_degC &&
          a.model_reference_degC == b.model_reference_degC &&
          a.reference_signals == b.reference_signals && a.offset_um == b.offset_um &&
-         a.held_um == b.held_um && a.correction == b.correction;
+         a.held_degC == b.held_degC && a.held_signals == b.held_signals && a.correction == b.correction;
 }
 
 }  // namespace
@@ -32,8 +32,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fallback.offset_um["z"] = 12.5;
   const LoadedState loaded = load_state_file(file.path(), fallback);
   FUZZ_PROMISE(loaded.found == loaded.warning.empty());
+  FUZZ_PROMISE(loaded.found != loaded.damaged);
   if (!loaded.found) {
-    FUZZ_PROMISE(same(loaded.state, fallback));
+    FUZZ_PROMISE(same(loaded.state, fallback) && !loaded.reference_lost);
     FUZZ_PROMISE(loaded.warning.find(file.path().string()) != std::string::npos);
     FUZZ_PROMISE(!std::filesystem::exists(file.path()));
     return 0;
@@ -42,10 +43,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   check_numbers(loaded.state.model_reference_degC);
   check_numbers(loaded.state.reference_signals);
   check_numbers(loaded.state.offset_um);
-  check_numbers(loaded.state.held_um);
+  check_numbers(loaded.state.held_degC);
+  check_numbers(loaded.state.held_signals);
   check_numbers(loaded.state.correction);
-  FUZZ_PROMISE(save_state_file(copy.path(), loaded.state).empty());
+  FUZZ_PROMISE(save_state_file(copy.path(), loaded.state, loaded.reference_lost).empty());
   const LoadedState again = load_state_file(copy.path(), fallback);
   FUZZ_PROMISE(again.found && same(again.state, loaded.state));
+  FUZZ_PROMISE(again.reference_lost == loaded.reference_lost);
   return 0;
 }

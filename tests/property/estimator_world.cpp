@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/persistent_state.hpp"
+
 namespace thermocomp::property {
 namespace {
 
@@ -226,18 +228,7 @@ class World {
   /// The daemon comes back with what its state file held, perhaps of a while ago; its link is new.
   void restart() {
     ++outcome_.restarts;
-    PersistentState state;
-    state.enabled = report_.enabled;
-    const auto columns = model_.temperature_columns();
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      const InputReport& input = report_.inputs[i];
-      state.reference_degC[columns[i]] = input.reference_degC;
-      if (input.good || input.estimated) state.temp_degC[columns[i]] = input.temp_degC;
-    }
-    state.model_reference_degC = estimator_->model_reference_degC();
-    const auto signals = model_.signal_columns();
-    for (std::size_t i = 0; i < signals.size(); ++i)
-      state.reference_signals[signals[i]] = report_.signals[i].reference;
+    PersistentState state = persistent_state(*estimator_, report_);
     for (std::size_t i = 0; i < axes_count; ++i) {
       double offset_um = command_.offset_um[i];
       if (shape_.one_in(3)) offset_um = shape_.between(-1.0, 1.0) * 60.0;
@@ -246,7 +237,7 @@ class World {
       before_um_[i] = std::abs(offset_um) <= offset_um_max_of_any_axis ? offset_um : 0.0;
     }
     estimator_ = std::make_unique<Estimator>(planted(config_), model_);
-    estimator_->restore(state);
+    demand("a state that was kept is taken", estimator_->restore(state).empty(), 0, 0);
     report_ = estimator_->make_report();
     estimator_stepped_ = false;
     dt_s_ = 0.0;
@@ -254,6 +245,12 @@ class World {
   }
 
   void operate() {
+    // Nobody else ends a latched mismatch; now and then before its cause has gone.
+    for (std::uint32_t axis = 0; axis < axes_count; ++axis)
+      if (report_.axes.size() > axis && report_.axes[axis].latched && operator_.one_in(8)) {
+        estimator_->apply({CommandKind::release, axis, 0.0});
+        released_[axis] = true;
+      }
     if (!operator_.one_in(15)) return;
     const std::array<double, 5> values{operator_.between(-10, 10), operator_.between(-200, 200),
                                        not_a_number, 1e300, 0.5};
@@ -435,15 +432,18 @@ class World {
     demand("offset is finite", std::isfinite(offset_um), offset_um, 0);
     demand("no axis beyond what any configuration allows",
            std::abs(offset_um) <= offset_um_max_of_any_axis, offset_um, offset_um_max_of_any_axis);
-    // The one leap that is none: the axis already stands where the controller says.
+    const bool may_start = state_.link_epoch != started_on_[axis] || released_[axis];
+    // The one leap that is none: the axis already stands where the controller says. A read-back is
+    // believed so far on a new link only, or when somebody has looked into it.
     if (!(std::abs(offset_um - before_um) <= step_um) ||
         !(std::abs(offset_um) <= std::max(bound_um, std::abs(before_um)))) {
       ++outcome_.resyncs;
       const double from_applied_um = std::abs(offset_um - state_.applied_um[axis]);
       demand("offset changes at the slew rate, or starts from the read-back",
-             state_.online && command_.valid[axis] &&
+             state_.online && command_.valid[axis] && may_start &&
                  from_applied_um <= step_um + register_rounding_um,
              offset_um - before_um, step_um);
+      note_started(axis);
       return;
     }
     const bool may_change = !config_.compensation.hold_while_cutting;
@@ -454,8 +454,19 @@ class World {
              offset_um, bound_um);
   }
 
+  void note_started(std::size_t axis) {
+    started_on_[axis] = state_.link_epoch;
+    released_[axis] = false;
+  }
+
   void check_valid(std::size_t axis) {
+    demand("a latched axis is not driven", !(command_.valid[axis] && report_.axes[axis].latched), 0,
+           0);
+    demand("a latched mismatch is told",
+           !report_.axes[axis].latched || has_reason(report_.reasons, Reason::mismatch_latched), 0,
+           0);
     if (!command_.valid[axis]) return;
+    note_started(axis);
     const double told_um = controller_.told_um[axis];
     demand("an axis whose position is not known is not driven",
            controller_.epoch > 0 && std::isfinite(told_um), told_um, 0);
@@ -544,6 +555,8 @@ class World {
   };
   std::vector<Sent> sent_;
   std::array<double, axes_count> before_um_{};
+  std::array<std::uint32_t, axes_count> started_on_{};  ///< link epoch
+  std::array<bool, axes_count> released_{};
   double window_s_{0.0};
   double tolerance_um_{0.0};
   Outcome outcome_;

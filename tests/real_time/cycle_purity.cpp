@@ -179,7 +179,7 @@ int main(int argc, char** argv) {
 
   // Main does its part meanwhile: commands, a reload, reading reports.
   std::this_thread::sleep_for(2s);
-  bool sent = cycle.send({CommandKind::disable, 0, 0.0});
+  bool sent = cycle.send({CommandKind::disable, 0, 0.0}).has_value();
   auto next = make_brain(3.0);
   next->estimator.plan_adoption(cycle.brain().estimator);
   cycle.hand_over(std::move(next));

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/can/can_config.hpp"
 
 namespace thermocomp {
 

@@ -16,7 +16,7 @@
 #include "drivers/can/canopen/emergency.hpp"
 #include "drivers/can/canopen/rate_watch.hpp"
 #include "drivers/can/canopen/sdo_client.hpp"
-#include "drivers/sensors/sensor_source.hpp"
+#include "drivers/unit_health.hpp"
 
 namespace thermocomp {
 

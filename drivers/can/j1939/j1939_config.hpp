@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/sensors/sensor_bus_config.hpp"
+#include "drivers/sentinel.hpp"
 
 namespace thermocomp {
 

@@ -53,6 +53,7 @@ class Daemon:
         self.socket = sockets / "status.sock"
         self.log = folder / (name + ".log")
         self.process = None
+        self.environment = {}  # besides the test's own
         self.write_config(config)
 
     def write_config(self, text):
@@ -66,7 +67,8 @@ class Daemon:
         with self.log.open("a") as log:
             self.process = subprocess.Popen([str(BIN / "thermocompd"), str(self.config)],
                                             stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                                            cwd=self.folder)
+                                            cwd=self.folder,
+                                            env={**os.environ, **self.environment})
         if wait:
             eventually(lambda: self.answers(), "the daemon is ready")
         return self

@@ -96,6 +96,7 @@ def test_an_amplifier_that_does_not_obey_is_seen_and_told_again(lab):
                "and what the amplifier shows")
     disobeyed = len(machine.amplifier.all_volts())
     machine.amplifier.obey()
+    assert daemon.cli("release", "z")[0] == 0
     machine.reaches(6.0)
     eventually(lambda: 0.0 in machine.amplifier.all_volts()[disobeyed:], "by way of 0 V")
     eventually(lambda: not daemon.axis()["mismatch"], "all is well again")

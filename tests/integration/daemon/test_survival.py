@@ -131,7 +131,7 @@ def test_a_controller_that_restarts_from_zero_is_brought_back_slowly(machine, la
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
-def test_a_controller_that_applies_something_else_is_noticed_and_followed(machine):
+def test_a_controller_that_applies_something_else_is_not_driven_until_released(machine):
     daemon = machine.start()
     machine.warm_by(12.0)
     daemon.wait_for_offset(12.0, 0.05)
@@ -141,9 +141,17 @@ def test_a_controller_that_applies_something_else_is_noticed_and_followed(machin
         machine.controller.written = lambda: None
         machine.controller.applied_nm = 0
         machine.controller.show_applied()
-    eventually(lambda: "mismatch" in daemon.status()["reasons"], "the mismatch is reported")
+    eventually(lambda: "mismatch_latched" in daemon.status()["reasons"], "the mismatch is latched")
+    mismatch = daemon.axis()["mismatch"]
+    assert abs(mismatch["sent_um"] - 12.0) < 0.1 and mismatch["read_um"] == 0.0
+    assert "another writer" in mismatch["likely"]
     with machine.controller.lock:
         del machine.controller.written
+    still = len(machine.controller.orders())
+    time.sleep(0.5)
+    # Nobody drives it: the controller would leap by 12 um.
+    assert all(abs(um) < 0.01 for _, um in machine.controller.orders()[still:])
+    assert daemon.cli("release", "z")[0] == 0
     eventually(lambda: abs(machine.controller.applied_um() - 12.0) < 0.01, "the offset is back")
     assert_slewed([(machine.controller.orders()[before][0], 0.0)] +
                   machine.controller.orders()[before:])

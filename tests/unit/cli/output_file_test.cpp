@@ -1,12 +1,15 @@
 #include "cli/output_file.hpp"
 
 #include <cstdlib>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <sys/stat.h>
 
 #include "cli/command.hpp"
 #include "cli/truth_file.hpp"
@@ -71,6 +74,27 @@ TEST_CASE("a device is written, not replaced", "[cli][output]") {
   file.stream() << "away";
   file.commit();
   CHECK(fs::is_character_file("/dev/null"));
+}
+
+TEST_CASE("a pipe that nobody reads is refused at once, one that is read is written",
+          "[cli][output]") {
+  const Folder folder;
+  const std::string pipe = (folder.path / "pipe").string();
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK_THROWS_WITH(OutputFile(pipe), Catch::Matchers::Contains("nobody reads"));
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  REQUIRE(reader >= 0);
+  OutputFile file(pipe);
+  file.stream() << "text";
+  file.commit();
+  char got[8] = {};
+  CHECK(::read(reader, got, sizeof got) == 4);
+  CHECK(std::string(got) == "text");
+  ::close(reader);
+}
+
+TEST_CASE("a device that is no place for a file is refused", "[cli][output]") {
+  CHECK_THROWS_WITH(OutputFile("/dev/ptmx"), Catch::Matchers::Contains("is a device"));
 }
 
 TEST_CASE("a full device and a missing folder are failures that name the file", "[cli][output]") {

@@ -31,7 +31,7 @@ json good_status() {
     "model": {"file": "m.toml", "checksum": "0123456789abcdef0123", "inputs": 1, "outputs": 1},
     "axes": [{"name": "z", "unit": "um", "displacement": -3.2, "target": 3.2, "offset": 3.1,
               "applied": null, "measured": null, "synced": true, "driven": true,
-              "mismatch": false, "at_bound": false, "proving": false}],
+              "disagrees": false, "mismatch": null, "at_bound": false, "proving": false}],
     "inputs": [{"name": "bed_degC", "temp_degC": 22.5, "reference_degC": 21.0, "good": true}],
     "sensors_bad": [], "buses": [], "warnings": [],
     "controller": {"name": "cnc", "kind": "modbus_tcp", "connected": true, "online": true,

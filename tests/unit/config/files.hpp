@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include <sys/stat.h>
 
 #include "config/daemon_config.hpp"
 #include "config/problems.hpp"
@@ -72,6 +73,20 @@ class ExampleFolder {
 
   void edit(const std::string& file, const std::string& from, const std::string& to) const {
     write(file, edited(text_of(path_ / file), from, to));
+  }
+  /// Puts these paths where the configuration names its history and its state, and beside them
+  /// links of all kinds.
+  void name_files(const std::string& history, const std::string& state) const {
+    namespace fs = std::filesystem;
+    edit(config_, "/var/lib/thermocomp/state.json", state);
+    edit(config_, "/var/lib/thermocomp/history.db", history);
+    fs::create_directory(path_ / "sub");
+    fs::create_symlink("small_machine_model.toml", path_ / "link_to_model");
+    fs::create_hard_link(path_ / "small_machine_model.toml", path_ / "hard_link_to_model");
+    fs::create_symlink("nothing", path_ / "link_to_nothing");
+    fs::create_symlink("loop_b", path_ / "loop_a");
+    fs::create_symlink("loop_a", path_ / "loop_b");
+    REQUIRE(::mkfifo((path_ / "pipe").c_str(), 0600) == 0);
   }
   [[nodiscard]] DaemonConfig load() const { return load_daemon_config(path_ / config_); }
   /// All problems, one a line, without the folder.

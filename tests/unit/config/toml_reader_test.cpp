@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "config/number_text.hpp"
+#include "config/printable_text.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;
@@ -138,4 +139,77 @@ TEST_CASE("a problem stays on its line whatever its names hold, and shows an emp
     CHECK(std::none_of(line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }));
   }
   CHECK(lines[1] == "a.toml:2: name = \"\": is no name");
+}
+
+TEST_CASE("what is nested too deep is refused with its line, before it is parsed",
+          "[config][toml]") {
+  const auto repeated = [](const std::string& part, int count) {
+    std::string text;
+    for (int i = 0; i < count; ++i) text += part;
+    return text;
+  };
+  const int count = GENERATE(17, 300, 50'000);
+  const std::vector<std::string> texts{
+      "a = 1\n[" + repeated("a.", count) + "z]\n",
+      "a = 1\n[[" + repeated("a.", count) + "z]]\n",
+      "a = 1\n" + repeated("\"a\" . ", count) + "z = 1\n",
+      "a = 1\nb = " + repeated("[", count) + repeated("]", count) + "\n",
+      "a = 1\nb = " + repeated("{ a = ", count) + "1" + repeated(" }", count) + "\n",
+      "a = '''\n'''#\n[b]\nc = { " + repeated("a.", count) + "z = 1 }\n"};
+  for (const std::string& text : texts) {
+    const auto problems = problems_of([&] {
+      static_cast<void>(document(text));
+      return 0;
+    });
+    REQUIRE(problems.size() == 1);
+    CHECK(problems.front().line >= 2);
+    CHECK_THAT(problems.front().rule, Catch::Contains("at most 16 deep"));
+  }
+}
+
+TEST_CASE("what is not nested is not counted as such", "[config][toml]") {
+  CHECK_NOTHROW(document(
+      "a = \"[[[[[[[[[[[[[[[[[[[[ a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r \\\" [\"\n# "
+      "[[[[[[[[[[[[[[[[[\n"
+      "b = [1.5, 2.5, 3.5, 1.5, 2.5, 3.5, 1.5, 2.5, 3.5, 1.5, 2.5, 3.5, 1.5, 2.5, 3.5, 1.5, 2.5]\n"
+      "c = \"\"\"\n[[[[[[[[[[[[[[[[[[\"\"\"\"\"\n"
+      "d = { a.b = 1, a.c = 2, e.f = 3, g.h = 4, i.j = 5, k.l = 6, m.n = 7, o.p = 8, q.r = 9 }\n"
+      "[[t.u]]\n[[t.u]]\n[t.v.w]\nx.y = [[1], [2], [3]]\n"));
+}
+
+TEST_CASE("too many keys and elements are refused before they are parsed", "[config][toml]") {
+  std::string keys;
+  for (int i = 0; i < 50'001; ++i) keys += "k" + std::to_string(i) + " = 1\n";
+  CHECK_THROWS_WITH(document(keys), Catch::Contains("a.toml:50001: must have at most 50000 keys"));
+  CHECK_THROWS_WITH(document("a = 1\nb = [" + std::string(1'100'000, ',') + "]\n"),
+                    Catch::Contains("at most 1000000 elements"));
+}
+
+TEST_CASE("of many problems a hundred are told and the rest is counted", "[config][toml]") {
+  std::string text;
+  for (int i = 0; i < 400; ++i) text += "unknown_" + std::to_string(i) + " = 1\n";
+  const auto lines = told(document(text));
+  REQUIRE(lines.size() == 101);
+  CHECK(lines.front().starts_with("a.toml:1: unknown_0 = 1"));
+  CHECK(lines.back() == "a.toml: and 300 more problems");
+}
+
+TEST_CASE("names that command a terminal are refused, and never told as they are",
+          "[config][toml]") {
+  const std::string odd = GENERATE(as<std::string>(), "\\u001b[2J", "\xE2\x80\xAE", "\\u2066",
+                                   "\\u0085", "\\u200b", "\\uFEFF");
+  const TomlDocument read =
+      document("a = \"x" + odd + "\"\nb = [\"y" + odd + "\"]\n\"k" + odd + "\" = 1\n");
+  CHECK(read.root().text("a").empty());
+  CHECK(read.root().texts("b") == std::vector<std::string>{""});
+  const auto lines = told(read);
+  CHECK(lines.size() == 3);
+  CHECK_THAT(lines.front(), Catch::Contains("a = ") && Catch::Contains("must be printable"));
+  for (const std::string& line : lines) CHECK(is_printable(line));
+}
+
+TEST_CASE("a key as long as the file does not make the error so long", "[config][toml]") {
+  const auto lines = told(document(std::string(100'000, 'k') + " = 1\n"));
+  REQUIRE(lines.size() == 1);
+  CHECK(lines.front().size() < 2000);
 }

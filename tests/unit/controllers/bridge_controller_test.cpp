@@ -97,9 +97,20 @@ TEST_CASE("nothing that was wanted before a re-homing is sent after it", "[contr
   bench.report();
   bench.told.applied_um[0] = 0.0;
   const BridgeAnswer answer = bench.report();
-  CHECK(answer.anew);
+  CHECK_FALSE(answer.anew);  // the bridge keeps what it asks for: it is the same link
   CHECK_FALSE(answer.valid[0]);
-  CHECK(bench.state().link_epoch == 2);
+  CHECK(bench.state().link_epoch == 1 + epochs_of_a_link);
+}
+
+TEST_CASE("a bridge that reads back twice what it was told never asks for it",
+          "[controllers][bridge]") {
+  Bench bench;
+  bench.report();
+  for (double offset_um = 5.0; offset_um < 9.0; offset_um += 0.2) {
+    bench.want(offset_um, -3.0);
+    CHECK_FALSE(bench.report().anew);
+    bench.told.applied_um[0] = 2.0 * offset_um;
+  }
 }
 
 TEST_CASE("a controller that takes no offsets is online, and not in step",

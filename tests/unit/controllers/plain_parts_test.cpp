@@ -58,6 +58,34 @@ TEST_CASE("only commands of the newest epoch may be sent", "[controllers]") {
   CHECK(gate.verdict(0s) == SendVerdict::send);
 }
 
+TEST_CASE("a pause of the same link is told from another link", "[controllers]") {
+  WriteGate gate(100ms);
+  const std::uint32_t first = gate.synchronised();
+  const std::uint32_t looked_again = gate.synchronised();
+  CHECK(looked_again != first);
+  CHECK(is_same_link(first, looked_again));
+  gate.paused();
+  CHECK_FALSE(gate.in_sync());
+  const std::uint32_t paused = gate.synchronised();
+  CHECK(paused != looked_again);
+  CHECK(is_same_link(first, paused));
+  gate.lost();
+  gate.paused();  // lost all the same
+  CHECK_FALSE(is_same_link(first, gate.synchronised()));
+}
+
+TEST_CASE("a link that is new for the millionth time still has an epoch of its own",
+          "[controllers]") {
+  WriteGate gate(100ms);
+  std::uint32_t before = 0;
+  for (std::uint32_t i = 0; i < 3 * epochs_of_a_link / 2; ++i) {
+    gate.lost();
+    const std::uint32_t epoch = gate.synchronised();
+    if (epoch == 0 || is_same_link(epoch, before)) FAIL("epoch " << epoch);
+    before = epoch;
+  }
+}
+
 TEST_CASE("a command not renewed for more than a second is not sent", "[controllers]") {
   WriteGate gate(100ms);
   gate.synchronised();

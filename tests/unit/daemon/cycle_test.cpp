@@ -3,18 +3,34 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <random>
 #include <thread>
+#include <time.h>
+#include <unistd.h>
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include <sys/syscall.h>
 
 #include "drivers/controllers/dry_run_controller.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
+
+namespace {
+
+std::atomic<bool> sleep_fails{false};
+
+}  // namespace
+
+/// Takes the place of the C library's, to fail as a filter of system calls would make it.
+extern "C" int clock_nanosleep(clockid_t clock, int flags, const timespec* time, timespec* left) {
+  if (sleep_fails) return EPERM;
+  return syscall(SYS_clock_nanosleep, clock, flags, time, left) == 0 ? 0 : errno;
+}
 
 namespace {
 
@@ -156,4 +172,18 @@ TEST_CASE("a handed over brain takes the place of the old one at once and bumple
   // The operator's switch and the reference are the machine's, not the configuration's.
   CHECK(running.cycle.report().mode == Mode::disabled);
   CHECK(running.cycle.report().inputs[0].reference_degC == 20.0);
+}
+
+TEST_CASE("a system that refuses to sleep is counted, and no cycle runs ahead of time", "[cycle]") {
+  RunningCycle running;
+  REQUIRE(running.eventually([&] { return running.source.seen > 3; }));
+  CHECK(running.cycle.timing().failed_sleeps == 0);
+  sleep_fails = true;
+  const auto began = std::chrono::steady_clock::now();
+  const int seen = running.source.seen;
+  running.eventually([&] { return running.source.seen >= seen + 20; });
+  const auto took = std::chrono::steady_clock::now() - began;
+  sleep_fails = false;
+  CHECK(took > 180ms);  // a cycle more may have been under way
+  CHECK(running.cycle.timing().failed_sleeps > 10);
 }

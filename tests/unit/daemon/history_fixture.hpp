@@ -76,6 +76,7 @@ class RecordedMachine {
   }
 
   HistoryWriter& writer() { return writer_; }
+  [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
   [[nodiscard]] std::uint64_t next_cycle() const { return next_cycle_; }
 
   void start() {

@@ -1,10 +1,11 @@
+#include "daemon/recording/record_ring.hpp"
+
 #include <random>
 #include <thread>
 
 #include <catch2/catch.hpp>
 
 #include "daemon/history/chunk_codec.hpp"
-#include "daemon/history/record.hpp"
 
 using namespace thermocomp;
 

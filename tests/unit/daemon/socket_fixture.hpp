@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <poll.h>
 #include <string>
 #include <thread>
@@ -43,6 +44,15 @@ class RunningServer {
     });
     server_->add_method("fails", AccessClass::read,
                         [](const json&) -> json { throw RpcError(rpc::refused, "not now"); });
+    // Takes until it is let go, and then fails where it was told to.
+    server_->add_slow_method("slow", AccessClass::operate, [this](const json& params) {
+      return [this, fails = params.contains("fails")]() -> std::optional<json> {
+        asked_.fetch_add(1);
+        if (!let_go_) return std::nullopt;
+        if (fails) throw RpcError(rpc::refused, "not now");
+        return json("late");
+      };
+    });
     thread_ = std::thread([this] {
       while (!stopping_) {
         server_->handle(milliseconds(20));
@@ -58,6 +68,9 @@ class RunningServer {
   RunningServer(const RunningServer&) = delete;
   RunningServer& operator=(const RunningServer&) = delete;
 
+  void let_go() { let_go_ = true; }
+  [[nodiscard]] int asked() const { return asked_; }
+
   [[nodiscard]] SocketStatistics statistics() const {
     const std::lock_guard lock(mutex_);
     return statistics_;
@@ -69,6 +82,8 @@ class RunningServer {
   SocketConfig config_;
   std::unique_ptr<StatusServer> server_;
   std::atomic<bool> stopping_{false};
+  std::atomic<bool> let_go_{false};  ///< the results of `slow` are there
+  std::atomic<int> asked_{0};        ///< whether they are
   std::thread thread_;
 };
 

@@ -19,7 +19,8 @@ PersistentState sample_state() {
   state.reference_signals = {{"spindle_rpm", 1.0 / 3.0}};
   state.offset_um = {{"z", -12.345678901234567}};
   state.temp_degC = {{"bed_degC", 21.7}};
-  state.held_um = {{"z", -4.25}};
+  state.held_degC = {{"t1_degC", 24.5}};
+  state.held_signals = {{"spindle_rpm", 1200.0}};
   state.correction = {{"z.gain1", 1.08}, {"z.gain1_sd", 0.04}};
   return state;
 }
@@ -39,7 +40,8 @@ TEST_CASE("a state comes back bit for bit", "[state]") {
   CHECK(loaded.state.reference_signals == state.reference_signals);
   CHECK(loaded.state.offset_um == state.offset_um);
   CHECK(loaded.state.temp_degC == state.temp_degC);
-  CHECK(loaded.state.held_um == state.held_um);
+  CHECK(loaded.state.held_degC == state.held_degC);
+  CHECK(loaded.state.held_signals == state.held_signals);
   CHECK(loaded.state.correction == state.correction);
 }
 

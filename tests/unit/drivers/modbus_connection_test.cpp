@@ -157,6 +157,45 @@ TEST_CASE("TCP: a late answer is not taken for the present one", "[connection][l
   CHECK(device.connections() == 1);
 }
 
+TEST_CASE("an answer that comes before its question is none", "[connection][early]") {
+  const bool rtu = GENERATE(false, true);
+  // Behind the first answer stands one to the question that will be next: unit 1, two registers.
+  Lines lines;
+  std::atomic<int> count{0};
+  lines.handle([&](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    if (count++ != 0) return reply;
+    const peer::Bytes forged = peer::registers_pdu(request.function, {4242, 4243});
+    if (rtu) {
+      for (const peer::Bytes& pdu : {reply.pdu, forged}) {
+        peer::Bytes frame{1};
+        frame.insert(frame.end(), pdu.begin(), pdu.end());
+        const std::uint16_t sum = peer::crc(frame);
+        frame.push_back(static_cast<std::uint8_t>(sum & 0xFF));
+        frame.push_back(static_cast<std::uint8_t>(sum >> 8));
+        reply.raw.insert(reply.raw.end(), frame.begin(), frame.end());
+      }
+    } else {
+      for (const std::uint8_t transaction : {std::uint8_t{1}, std::uint8_t{2}}) {
+        const peer::Bytes& pdu = transaction == 1 ? reply.pdu : forged;
+        const auto size = static_cast<std::uint8_t>(pdu.size() + 1);
+        const peer::Bytes head{0, transaction, 0, 0, 0, size, 1};
+        reply.raw.insert(reply.raw.end(), head.begin(), head.end());
+        reply.raw.insert(reply.raw.end(), pdu.begin(), pdu.end());
+      }
+    }
+    return reply;
+  });
+  ModbusConnection connection(lines.line(rtu));
+  REQUIRE(connection.connect());
+  Words words(2);
+  REQUIRE(read_inputs(connection, 1, 10, words).ok());
+  CHECK(words == Words{1010, 1011});
+  std::this_thread::sleep_for(50ms);
+  REQUIRE(read_inputs(connection, 1, 50, words).ok());
+  CHECK(words == Words{1050, 1051});
+}
+
 TEST_CASE("RTU: answers that are always late never land in another request", "[connection][late]") {
   const auto lateness = GENERATE(120ms, 400ms, 1300ms, 2500ms);
   CAPTURE(lateness.count());

@@ -226,6 +226,85 @@ TEST_CASE("measured and cycle end are remembered for the report and move nothing
   CHECK(machine.offset_um() == 0.0);
 }
 
+TEST_CASE("a kept reference that no sensor could show is refused with its key", "[estimator]") {
+  for (const double reference_degC : {1e300, -300.0, 200.1, -30.1}) {
+    PersistentState state;
+    state.reference_degC = {{"t1_degC", 20.0}, {"t2_degC", reference_degC}};
+    Machine machine;
+    const auto refused = machine.estimator.restore(state);
+    REQUIRE(refused.size() == 1);
+    CHECK(refused[0].find("reference_degC.t2_degC = ") == 0);
+    CHECK(refused[0].find("must be in [-30, 200]") != std::string::npos);
+    // A reference taken now would be that of a machine in any state: nothing is compensated.
+    machine.steps(5, {40.0, 50.0});
+    CHECK(machine.report().mode == Mode::disabled);
+    CHECK(machine.offset_um() == 0.0);
+    machine.estimator.apply({CommandKind::reference, 0, 0.0});
+    machine.estimator.apply({CommandKind::enable, 0, 0.0});
+    machine.steps(5, {41.0, 50.0});
+    CHECK(machine.report().mode == Mode::compensating);
+    CHECK(machine.offset_um() == Approx(-5.0));
+  }
+}
+
+TEST_CASE("a reference in the model that no sensor could show is refused", "[estimator]") {
+  for (const double reference_degC : {1e300, -300.0, 200.1}) {
+    ThermalModel model = small_model();
+    model.reference_degC = {20.0, reference_degC};
+    try {
+      const Estimator estimator(small_config(), model);
+      FAIL("taken");
+    } catch (const InvalidValue& error) {
+      CHECK(error.key() == "reference[1]");
+    }
+  }
+}
+
+TEST_CASE("a target that is no finite number holds the offset, with a reason", "[estimator]") {
+  ThermalModel model = small_model();
+  model.matrix_um_per_K = {{1e308, 1e308}};
+  Machine machine(small_config(), model);
+  machine.steps(3, {20.0, 30.0});
+  REQUIRE(machine.report().mode == Mode::compensating);
+  machine.steps(3, {21.0, 31.0});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::no_target));
+  CHECK(machine.offset_um() == 0.0);
+  machine.steps(3, {20.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK_FALSE(machine.says(Reason::no_target));
+}
+
+TEST_CASE("while compensating the target is a number, also before the first cycle end",
+          "[estimator]") {
+  EstimatorConfig config = small_config();
+  config.compensation.update = UpdateRule::each_cycle;
+  Machine machine(config);
+  machine.steps(3, {20.0, 30.0});
+  machine.steps(3, {25.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.report().axes[0].target_um == 0.0);
+}
+
+TEST_CASE("an operator releases an axis that was latched, and no other", "[estimator]") {
+  Machine machine;
+  machine.steps(3, {20.0, 30.0});
+  machine.steps(20, {24.0, 30.0});
+  REQUIRE(machine.offset_um() == Approx(-20.0));
+  machine.controller.applied_um[0] = 0.0;  // re-homed
+  machine.steps(2, {24.0, 30.0});
+  CHECK(machine.says(Reason::mismatch_latched));
+  CHECK(machine.report().axes[0].latched_mismatch.read_um == 0.0);
+  machine.steps(60, {24.0, 30.0});
+  CHECK_FALSE(machine.command.valid[0]);
+  machine.estimator.apply({CommandKind::release, 7, 0.0});
+  machine.estimator.apply({CommandKind::release, 0, 0.0});
+  machine.steps(20, {24.0, 30.0});
+  CHECK_FALSE(machine.says(Reason::mismatch_latched));
+  CHECK(machine.offset_um() == Approx(-20.0));
+  CHECK(machine.controller.applied_um[0] == Approx(-20.0));
+}
+
 TEST_CASE("a restart goes on with switch, reference and offset", "[estimator]") {
   Machine machine;
   PersistentState state;

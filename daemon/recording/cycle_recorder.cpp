@@ -1,4 +1,4 @@
-#include "daemon/history/cycle_recorder.hpp"
+#include "daemon/recording/cycle_recorder.hpp"
 
 #include <algorithm>
 

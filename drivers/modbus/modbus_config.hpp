@@ -1,4 +1,5 @@
-/// What the sensor drivers are built from: plain structures, filled by config/ or by a test.
+/// Modbus lines, and devices with temperatures on them: plain structures, filled by config/ or by a
+/// test.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "estimator/types.hpp"
+#include "drivers/sentinel.hpp"
 
 namespace thermocomp {
 
@@ -69,13 +70,6 @@ struct ModbusLine {
   bool operator==(const ModbusLine&) const = default;
 };
 
-/// A register value that is no temperature but a message of the device.
-struct Sentinel {
-  std::int64_t code{0};  ///< raw value before scale and offset (of the encoding's signedness)
-  Fault fault{Fault::open_circuit};
-  bool operator==(const Sentinel&) const = default;
-};
-
 /// A register or bit beside the value that says whether the value is good.
 struct ModbusStatus {
   ModbusTable table{ModbusTable::discrete_input};
@@ -124,80 +118,6 @@ struct ModbusBusConfig {
   ModbusLine line;
   std::vector<ModbusDeviceConfig> devices;
   bool operator==(const ModbusBusConfig&) const = default;
-};
-
-enum class ByteOrder { little_endian, big_endian };  ///< Intel, Motorola
-
-/// Bits of a CAN frame read as an unsigned number. `start_bit` counts as DBC files do: for
-/// little_endian the least significant bit, for big_endian the most significant bit, bit 0 = lowest
-/// of byte 0.
-struct CanField {
-  int start_bit{0};
-  int length_bits{8};  ///< 1..64
-  ByteOrder byte_order{ByteOrder::little_endian};
-  bool operator==(const CanField&) const = default;
-};
-
-/// A multiplexor: a number in the frame that says which of several contents the rest of it has.
-struct CanSelector {
-  /// Numbers from first to last, both included.
-  struct Pages {
-    std::uint64_t first{0};
-    std::uint64_t last{0};
-    bool operator==(const Pages&) const = default;
-  };
-  CanField field;
-  std::vector<Pages> pages;  ///< the signal is in the frame while the number is in one of them
-  bool operator==(const CanSelector&) const = default;
-};
-
-/// A number beside a value that says whether the value is good.
-struct CanStatus {
-  CanField field;
-  std::uint64_t mask{~std::uint64_t{0}};  ///< bits looked at
-  /// masked number -> fault (none: good); a number not listed and not 0 is device_error
-  std::vector<Sentinel> codes;
-  bool operator==(const CanStatus&) const = default;
-};
-
-/// Where a value stands in a CAN frame, with the numbering of CanField.
-struct CanSignal {
-  std::uint32_t id{0};
-  bool extended_id{false};
-  bool fd{false};  ///< the frame may have up to 64 bytes (CAN FD), else 8
-  int start_bit{0};
-  int length_bits{16};  ///< 1..64; a float has 32 or 64
-  ByteOrder byte_order{ByteOrder::little_endian};
-  bool is_signed{true};
-  bool is_float{false};
-  double scale{1.0};  ///< value = raw * scale + offset
-  double offset{0.0};
-  std::vector<Sentinel> sentinels;
-  std::vector<CanSelector> selectors{};  ///< all must agree; empty: it is in every frame
-  std::optional<CanStatus> status{};     ///< in the same frame
-  bool operator==(const CanSignal&) const = default;
-};
-
-struct CanChannel {
-  std::size_t sensor{0};  ///< index of the sensor in the configuration
-  CanSignal signal;
-  /// A counter or toggle in the same frame; while it stands still, so does the reading's time.
-  std::optional<CanField> counter{};
-  bool operator==(const CanChannel&) const = default;
-};
-
-struct CanDeviceConfig {
-  std::string name;
-  std::vector<CanChannel> channels;
-  bool operator==(const CanDeviceConfig&) const = default;
-};
-
-struct CanBusConfig {
-  std::string name;
-  std::string interface;    ///< "can0"
-  double reconnect_s{0.5};  ///< pause before the interface is tried again
-  std::vector<CanDeviceConfig> devices;
-  bool operator==(const CanBusConfig&) const = default;
 };
 
 }  // namespace thermocomp

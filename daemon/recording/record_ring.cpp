@@ -1,27 +1,9 @@
-#include "daemon/history/record.hpp"
+#include "daemon/recording/record_ring.hpp"
 
 #include <algorithm>
 #include <bit>
 
 namespace thermocomp {
-
-std::string_view to_string(SegmentReason reason) noexcept {
-  switch (reason) {
-    case SegmentReason::start:
-      return "start";
-    case SegmentReason::reload:
-      return "reload";
-    case SegmentReason::periodic:
-      return "periodic";
-    case SegmentReason::gap:
-      return "gap";
-  }
-  return "unknown";
-}
-
-bool same_bits(double a, double b) noexcept {
-  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-}
 
 RecordRing::RecordRing(std::size_t capacity)
     : mask_(std::bit_ceil(std::max<std::size_t>(capacity, 2)) - 1),

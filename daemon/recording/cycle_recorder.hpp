@@ -10,7 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "daemon/history/record.hpp"
+#include "daemon/recording/grid.hpp"
+#include "daemon/recording/record_ring.hpp"
 #include "estimator/estimator.hpp"
 #include "estimator/types.hpp"
 

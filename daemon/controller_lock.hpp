@@ -1,0 +1,23 @@
+/// Only one daemon of this machine writes to a controller.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "daemon/locks/name_lock.hpp"
+#include "drivers/controllers/controller_config.hpp"
+
+namespace thermocomp {
+
+/// What the configuration's controller is reached by, as names to lock:
+///   Modbus TCP   host, port and unit, as they are written
+///   Modbus RTU   the serial device, whatever its path
+///   CAN          the interface and the identifier of each frame that we send
+/// None for a dry run, and for a bridge: whoever calls the status socket of this daemon calls no
+/// other.
+[[nodiscard]] std::vector<std::string> controller_names(const ControllerConfig& config);
+
+/// @throws LockHeld, LockImpossible
+[[nodiscard]] std::vector<NameLock> lock_controller(const ControllerConfig& config);
+
+}  // namespace thermocomp

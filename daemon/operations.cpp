@@ -1,0 +1,190 @@
+#include "daemon/operations.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <malloc.h>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+
+#include "daemon/log_setup.hpp"
+#include "estimator/persistent_state.hpp"
+
+namespace thermocomp {
+namespace {
+
+using nlohmann::json;
+
+constexpr auto patience_s =
+    std::chrono::duration_cast<std::chrono::seconds>(CycleHandle::patience).count();
+
+bool is_kept(CommandKind kind) {
+  return kind == CommandKind::enable || kind == CommandKind::disable ||
+         kind == CommandKind::reference;
+}
+
+/// Of `asked`, for an operator. @return whether it is done
+bool is_done(Outcome outcome, const char* asked) {
+  switch (outcome) {
+    case Outcome::waiting:
+      return false;
+    case Outcome::done:
+      return true;
+    case Outcome::withdrawn:
+      throw RpcError(rpc::internal_error,
+                     fmt::format("the cycle does not answer: the {} was not taken within {} s and "
+                                 "is withdrawn, nothing has changed",
+                                 asked, patience_s));
+    case Outcome::overdue:
+      break;
+  }
+  throw RpcError(
+      rpc::internal_error,
+      fmt::format("the cycle does not answer: it has the {} in hand and does not finish; "
+                  "the status tells whether it still does",
+                  asked));
+}
+
+bool is_reference_whole(const Report& report) {
+  return std::all_of(report.inputs.begin(), report.inputs.end(), [](const InputReport& input) {
+    return input.good && std::isfinite(input.reference_degC);
+  });
+}
+
+}  // namespace
+
+std::unique_ptr<CycleBrain> make_brain(const DaemonConfig& config, HistoryWriter* history) {
+  auto brain = std::make_unique<CycleBrain>(Estimator(config.estimator, config.model));
+  if (history != nullptr)
+    brain->recorder = history->make_recorder(
+        {config.text, config.model_text, config.model_checksum}, brain->estimator);
+  return brain;
+}
+
+Operations::Operations(Parts parts)
+    : parts_(std::move(parts)),
+      cycle_(parts_.cycle, [this](const Command& done) { carried_out(done); }) {}
+
+RpcPending Operations::command(const Command& asked) {
+  if (names_axis(asked.kind) && cycle_.replacing())
+    throw RpcError(rpc::refused, "a reload is under way: ask again when it is done");
+  if (asked.kind == CommandKind::enable && parts_.keeper.is_reference_lost())
+    throw RpcError(rpc::refused,
+                   "the machine's reference is lost: give `thermocomp reference` first, when the "
+                   "machine is cold and even");
+  const CycleHandle::Tracked outcome = cycle_.send(asked, Clock::now());
+  if (!outcome) throw RpcError(rpc::refused, "too many commands wait for the cycle");
+  return [this, outcome, kind = asked.kind]() -> std::optional<json> {
+    poll();
+    if (!is_done(*outcome, "command")) return std::nullopt;
+    if (is_kept(kind) && !parts_.keeper.error().empty())
+      throw RpcError(
+          rpc::internal_error,
+          "carried out, but not saved, so that a restart would undo it: " + parts_.keeper.error());
+    return json{{"done", true}};
+  };
+}
+
+RpcPending Operations::reload() {
+  const CycleHandle::Tracked outcome = begin_reload();
+  return [this, outcome]() -> std::optional<json> {
+    poll();
+    if (!is_done(*outcome, "new configuration")) return std::nullopt;
+    return json{{"done", true}};
+  };
+}
+
+void Operations::hang_up() {
+  reload_again_ = reload_.has_value();
+  if (reload_again_) return;
+  try {
+    begin_reload();
+  } catch (const std::exception& error) {
+    spdlog::error("reload refused, the running configuration stays:\n{}", error.what());
+  }
+}
+
+CycleHandle::Tracked Operations::begin_reload() {
+  if (reload_) throw RpcError(rpc::refused, "a reload is under way: ask again when it is done");
+  parts_.service.reloading();
+  try {
+    DaemonConfig next = load_daemon_config(parts_.config.file);
+    const std::vector<std::string> fixed = restart_needed(parts_.config, next);
+    if (!fixed.empty())
+      throw RpcError(rpc::refused, fmt::format("a restart is needed for a change of: {}",
+                                               fmt::join(fixed, ", ")));
+    auto brain = make_brain(next, parts_.history);
+    brain->estimator.plan_adoption(cycle_.estimator());
+    reload_ = {std::move(next), cycle_.replace(std::move(brain), Clock::now())};
+  } catch (...) {
+    malloc_trim(0);  // what the refused files took; locked memory is never given back by itself
+    parts_.service.ready(parts_.status_line());
+    throw;
+  }
+  return reload_->outcome;
+}
+
+void Operations::poll() {
+  cycle_.poll(Clock::now());
+  finish_reload();
+}
+
+void Operations::settle() {
+  reload_again_ = false;
+  cycle_.settle();
+  finish_reload();
+}
+
+void Operations::finish_reload() {
+  if (!reload_ || *reload_->outcome == Outcome::waiting) return;
+  if (*reload_->outcome == Outcome::overdue) {
+    if (!std::exchange(reload_->is_overdue_told, true))
+      spdlog::error("reload: the cycle has the new configuration in hand and does not finish");
+    return;
+  }
+  if (*reload_->outcome == Outcome::done) {
+    parts_.config = std::move(reload_->next);
+    set_log_level(parts_.config.log_level);
+    spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
+                 parts_.config.model_checksum);
+  } else {
+    spdlog::error(
+        "reload: the cycle did not take the new configuration within {} s; the running "
+        "one stays",
+        patience_s);
+  }
+  reload_.reset();
+  parts_.service.ready(parts_.status_line());
+  if (std::exchange(reload_again_, false)) hang_up();
+}
+
+void Operations::carried_out(const Command& done) {
+  if (done.kind == CommandKind::stop) return;  // not an operator's
+  std::string axis;
+  if (names_axis(done.kind)) axis = " " + parts_.config.estimator.axes[done.axis].name;
+  if (done.kind == CommandKind::release)
+    spdlog::info("operator: release{}", axis);
+  else if (!axis.empty())
+    spdlog::info("operator: {}{} {} um", to_string(done.kind), axis, done.value_um);
+  else
+    spdlog::info("operator: {}", to_string(done.kind));
+  if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report()))
+    parts_.keeper.reference_taken();
+  // Called done only when it would survive a power cut.
+  save_state(true);
+}
+
+void Operations::save_state(bool at_once) {
+  const PersistentState state = persistent_state(cycle_.estimator(), cycle_.report());
+  if (at_once)
+    parts_.keeper.save(state, Clock::now());
+  else
+    parts_.keeper.note(state, Clock::now());
+  const std::string& error = parts_.keeper.error();
+  if (!error.empty() && error != save_error_told_) spdlog::error("{}", error);
+  save_error_told_ = error;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,78 @@
+/// What operators and SIGHUP ask for: commands and reloads on their way to the cycle and to the
+/// disk.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "config/daemon_config.hpp"
+#include "daemon/cycle/cycle_handle.hpp"
+#include "daemon/history/history_writer.hpp"
+#include "daemon/service_manager.hpp"
+#include "daemon/socket/rpc.hpp"
+#include "daemon/state/state_keeper.hpp"
+
+namespace thermocomp {
+
+/// Main's thread only; nothing waits. What an operator was told is what survives a restart: a
+/// command is called done only when it is on disk, and one that the cycle did not take in time
+/// never happens. Configuration, reports and state change together, in poll(), when the cycle has
+/// gone over to a new brain.
+class Operations {
+ public:
+  /// All of them outlive this.
+  struct Parts {
+    DaemonConfig& config;  ///< replaced by a reload
+    Cycle& cycle;
+    StateKeeper& keeper;
+    ServiceManager& service;
+    HistoryWriter* history;                    ///< none: no history
+    std::function<std::string()> status_line;  ///< for the service manager
+  };
+  explicit Operations(Parts parts);
+
+  /// @throws RpcError when it cannot even be begun
+  [[nodiscard]] RpcPending command(const Command& asked);
+  /// @throws ConfigurationError, or RpcError: a restart is needed, a reload is under way
+  [[nodiscard]] RpcPending reload();
+  /// The same for SIGHUP. While one is under way, one more follows it, however many are asked for.
+  void hang_up();
+
+  void poll();
+  /// Whether poll() has anything to look after.
+  [[nodiscard]] bool is_busy() const noexcept { return cycle_.is_busy(); }
+  /// After the cycle has ended.
+  void settle();
+
+  /// @param at_once  also what alone could wait
+  void save_state(bool at_once);
+
+  [[nodiscard]] CycleHandle& cycle() noexcept { return cycle_; }
+
+ private:
+  using Clock = CycleHandle::Clock;
+  struct Reload {
+    DaemonConfig next;
+    CycleHandle::Tracked outcome;
+    bool is_overdue_told{false};
+  };
+
+  CycleHandle::Tracked begin_reload();
+  void finish_reload();
+  void carried_out(const Command& done);
+
+  Parts parts_;
+  CycleHandle cycle_;
+  std::optional<Reload> reload_;
+  bool reload_again_{false};
+  std::string save_error_told_;
+};
+
+/// A brain for the configuration, with a recorder where there is a history.
+/// @throws InvalidValue
+[[nodiscard]] std::unique_ptr<CycleBrain> make_brain(const DaemonConfig& config,
+                                                     HistoryWriter* history);
+
+}  // namespace thermocomp

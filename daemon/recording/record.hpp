@@ -1,0 +1,47 @@
+/// What the cycle tells the history: records of fixed size.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace thermocomp {
+
+enum class RecordKind : std::uint8_t {
+  reading,       ///< index: sensor; value: temp [degC]; time: taken_at; detail: Fault
+  link,          ///< index: link epoch; time: taken_at; detail: online
+  applied,       ///< index: axis; value: applied offset [um]
+  signal,        ///< index: signal; value: in its unit
+  command,       ///< index: axis; value [um]; detail: CommandKind. Applied before that cycle's step
+  skipped,       ///< cycle: first cycle that was not stepped; time_ns: the last such cycle
+  offset,        ///< proof, after the step. index: axis; value [um]; time_ns: epoch; detail: valid
+  cycle_done,    ///< everything up to and with this cycle is in the ring
+  segment_begin  ///< cycle: first cycle to step from the snapshot; time_ns: the last cycle that was
+                 ///< recorded whole before it, or -1; value: unused; index: snapshot;
+                 ///< detail: SegmentReason; session: whose snapshot
+};
+inline constexpr std::size_t record_kinds_count = 9;
+
+/// Why a segment of the history begins.
+enum class SegmentReason : std::uint8_t {
+  start,     ///< the daemon started
+  reload,    ///< another configuration or model
+  periodic,  ///< `segment_h` is over, or the segment has become large
+  gap        ///< something before it was lost
+};
+[[nodiscard]] std::string_view to_string(SegmentReason reason) noexcept;
+
+struct Record {
+  std::uint64_t cycle{0};
+  std::int64_t time_ns{0};
+  double value{0.0};
+  std::uint32_t index{0};
+  RecordKind kind{RecordKind::cycle_done};
+  std::uint8_t detail{0};
+  std::uint16_t session{0};
+};
+static_assert(sizeof(Record) == 32);
+
+/// Equal to the last bit, so that NaN equals itself and -0 differs from 0.
+[[nodiscard]] bool same_bits(double a, double b) noexcept;
+
+}  // namespace thermocomp

@@ -1,0 +1,28 @@
+/// With which state the daemon starts, and what the operator must be told of it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/daemon_config.hpp"
+#include "estimator/estimator.hpp"
+
+namespace thermocomp {
+
+struct StartState {
+  PersistentState state;
+  bool is_on_disk{true};       ///< false: came from elsewhere than the file, and must be written
+  bool reference_lost{false};  ///< nobody knows the machine's reference: stay disabled
+  std::vector<std::string> warnings;
+};
+
+/// The state file's content. Where that is missing or cannot be used:
+///   no history, or an empty one   missing: the first start; unusable: disabled, reference lost
+///   newest segment sound          all from there
+///   only older ones sound         all from the newest of them, but disabled: what an operator did
+///                                 since is not known
+///   none sound                    disabled, reference lost
+/// A state file that is unusable is moved aside. May take some seconds (last_state.hpp).
+[[nodiscard]] StartState find_start_state(const DaemonConfig& config);
+
+}  // namespace thermocomp

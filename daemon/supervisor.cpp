@@ -1,0 +1,169 @@
+#include "daemon/supervisor.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <poll.h>
+#include <stdexcept>
+#include <thread>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/cycle/real_time_thread.hpp"
+
+namespace thermocomp {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto tick_period = 100ms;
+constexpr auto health_period = 1s;
+/// While a command or a reload is under way: at 1 kHz it takes a millisecond or two.
+constexpr auto busy_period = 1ms;
+constexpr auto ready_within = 5s;
+constexpr std::uint64_t cycles_until_ready = 3;
+/// Offsets at zero are sent, and read back, for so long before the links are closed.
+constexpr auto zero_settles = 500ms;
+constexpr auto stop_extended_by = 10s;
+
+}  // namespace
+
+void Supervisor::add_warning(const std::string& warning) {
+  spdlog::warn("{}", warning);
+  warnings_.push_back(warning);
+}
+
+void Supervisor::wait_until_ready(Cycle& running) {
+  const auto period = std::chrono::duration<double>(1.0 / parts_.config.loop.rate_hz);
+  const auto patience = ready_within + period * cycles_until_ready;
+  const auto begun = Clock::now();
+  while (running.timing().cycles.load() < cycles_until_ready) {
+    if (Clock::now() - begun > patience) throw RealTimeError("the cycle does not run");
+    std::this_thread::sleep_for(1ms);
+  }
+  // What happened while threads and memory were being set up is not the cycle's record.
+  running.clear_timing();
+  look_at_health();
+  parts_.service.ready(status_line(view()));
+  spdlog::info("ready: {} Hz, {} sensors, {} axes, {}", parts_.config.loop.rate_hz,
+               parts_.config.estimator.sensors.size(), parts_.config.estimator.axes.size(),
+               real_time_ ? "real-time" : "ordinary schedule");
+}
+
+void Supervisor::run() {
+  while (!turn()) {
+  }
+  if (parts_.config.estimator.compensation.on_stop == StopPolicy::ramp_to_zero) ramp_to_zero();
+}
+
+bool Supervisor::turn() {
+  pollfd files[] = {{parts_.signals.fd(), POLLIN, 0}, {parts_.server.fd(), POLLIN, 0}};
+  // Rounded up: a rest of a millisecond must be slept, not spun through.
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
+  const auto longest = parts_.operations.is_busy() ? busy_period : tick_period;
+  const auto timeout = std::clamp<std::chrono::milliseconds>(left, 0ms, longest);
+  const int ready = poll(files, 2, static_cast<int>(timeout.count()));
+  if (ready < 0 && errno != EINTR)
+    throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
+  const bool stopping = take_signals();
+  parts_.operations.poll();
+  parts_.server.handle(0ms);
+  if (Clock::now() >= next_tick_) tick();
+  return stopping;
+}
+
+bool Supervisor::take_signals() {
+  const SignalFile::Asked asked = parts_.signals.drain();
+  if (asked.stop != 0) spdlog::info("stopping: {}", asked.stop == SIGTERM ? "SIGTERM" : "SIGINT");
+  if (asked.reload && asked.stop == 0) parts_.operations.hang_up();
+  return asked.stop != 0;
+}
+
+void Supervisor::tick() {
+  next_tick_ = Clock::now() + tick_period;
+  const std::uint64_t cycles = cycle().timing().cycles.load(std::memory_order_acquire);
+  if (cycles != cycles_seen_) parts_.service.alive();
+  cycles_seen_ = cycles;
+  events_.note_report(cycle().report(), parts_.config.estimator);
+  events_.note_estimates(cycle().report(), parts_.config.estimator,
+                         parts_.config.model.temperature_columns());
+  if (Clock::now() >= next_health_) look_at_health();
+  parts_.operations.save_state(false);
+}
+
+void Supervisor::look_at_health() {
+  next_health_ = Clock::now() + health_period;
+  buses_.clear();
+  for (const auto& source : parts_.sources) buses_.push_back(source->health());
+  for (const BusHealth& bus : buses_) events_.note_bus(bus);
+  controller_health_ = parts_.link.health();
+  events_.note_controller(controller_health_);
+  events_.note_missed(cycle().timing().missed.load());
+  events_.note_failed_sleeps(cycle().timing().failed_sleeps.load());
+  events_.note_socket(parts_.server.statistics());
+  parts_.service.status(status_line(view()));
+}
+
+void Supervisor::ramp_to_zero() {
+  const double longest_s = parts_.config.estimator.compensation.stop_ramp_s_max;
+  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(seconds_d(longest_s));
+  parts_.service.stopping("taking the offsets to zero");
+  if (!cycle().send({CommandKind::stop, 0, 0.0}, Clock::now())) {
+    spdlog::warn("too many commands wait for the cycle: the offsets stay");
+    return;
+  }
+  auto moved = Clock::now();
+  auto extended = Clock::time_point{};
+  bool again = false;  // who asks twice does not want to wait
+  while (!again && Clock::now() < end && Clock::now() - moved < zero_settles) {
+    if (Clock::now() - extended > 1s) {
+      parts_.service.extend_stop(stop_extended_by);
+      extended = Clock::now();
+    }
+    again = turn();
+    if (!at_zero()) moved = Clock::now();
+  }
+  if (at_zero())
+    spdlog::info("the offsets are at zero");
+  else
+    spdlog::warn("not all offsets are at zero: {}",
+                 again ? "asked to stop at once" : "stop_ramp_s_max is over");
+}
+
+bool Supervisor::at_zero() {
+  const Report& report = cycle().report();
+  // Of what cannot be sent nothing is waited for.
+  if (has_reason(report.reasons, Reason::controller_offline)) return true;
+  const double tolerance_um = parts_.config.estimator.compensation.mismatch_um;
+  return std::all_of(report.axes.begin(), report.axes.end(), [=](const AxisReport& axis) {
+    // Negated: what is not read back (NaN) does not count.
+    return !axis.driven || (axis.offset_um == 0.0 && !(std::abs(axis.applied_um) > tolerance_um));
+  });
+}
+
+StatusView Supervisor::view() {
+  std::vector<std::string> all = warnings_;
+  if (parts_.keeper.is_reference_lost())
+    all.emplace_back(
+        "the machine's reference is lost, compensation stays off: when the machine is cold and "
+        "even, give `thermocomp reference`, then `thermocomp enable`");
+  if (!parts_.keeper.error().empty()) all.push_back(parts_.keeper.error());
+  const HistoryStatistics statistics =
+      parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
+  if (!statistics.last_error.empty()) all.push_back(statistics.last_error);
+  return {parts_.config,
+          cycle().report(),
+          cycle().controller(),
+          cycle().timing(),
+          buses_,
+          controller_health_,
+          statistics,
+          std::move(all),
+          std::chrono::duration<double>(Clock::now() - started_).count(),
+          real_time_,
+          parts_.server.statistics()};
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,74 @@
+/// Main's loop: signals, status socket, watchdog, health, saving.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/event_log.hpp"
+#include "daemon/operations.hpp"
+#include "daemon/service_manager.hpp"
+#include "daemon/signal_file.hpp"
+#include "daemon/socket/status_server.hpp"
+#include "daemon/status_json.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+
+namespace thermocomp {
+
+/// Nothing here waits longer than a tick, whatever is under way: the watchdog is fed as long as the
+/// cycle advances, and only then.
+class Supervisor {
+ public:
+  /// All of them outlive this.
+  struct Parts {
+    const DaemonConfig& config;
+    const std::vector<std::unique_ptr<SensorSource>>& sources;
+    const ControllerLink& link;
+    const HistoryWriter* history;  ///< none: no history
+    const StateKeeper& keeper;
+    StatusServer& server;
+    SignalFile& signals;
+    ServiceManager& service;
+    Operations& operations;
+  };
+  explicit Supervisor(const Parts& parts) : parts_(parts) {}
+
+  /// Shown with every status from now on.
+  void add_warning(const std::string& warning);
+  void set_real_time(bool real_time) noexcept { real_time_ = real_time; }
+
+  /// Once the cycle has advanced; tells the service manager. @throws RealTimeError if it does not
+  void wait_until_ready(Cycle& running);
+  /// Until a signal ends it; then, where so configured, takes the offsets to zero.
+  void run();
+
+  [[nodiscard]] StatusView view();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// @return whether the daemon was asked to stop
+  [[nodiscard]] bool turn();
+  [[nodiscard]] bool take_signals();
+  void tick();
+  void look_at_health();
+  void ramp_to_zero();
+  [[nodiscard]] bool at_zero();
+  [[nodiscard]] CycleHandle& cycle() noexcept { return parts_.operations.cycle(); }
+
+  Parts parts_;
+  EventLog events_;
+  std::vector<std::string> warnings_;
+  bool real_time_{false};
+  Clock::time_point started_{Clock::now()};
+  Clock::time_point next_tick_{};
+  Clock::time_point next_health_{};
+  std::uint64_t cycles_seen_{0};
+  std::vector<BusHealth> buses_;
+  ControllerHealth controller_health_;
+};
+
+}  // namespace thermocomp

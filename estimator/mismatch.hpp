@@ -1,0 +1,65 @@
+/// Why a controller may apply something else than it is sent, told from what was sent and read
+/// back.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "estimator/state_archive.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+enum class MismatchCause : std::uint8_t {
+  none,
+  factor,         ///< reads back a multiple of what is sent
+  opposite_sign,  ///< reads back its negative
+  constant,       ///< reads back more by the same amount each time
+  stands_still,   ///< reads back the same whatever is sent
+  changes_alone   ///< the read-back changes where what is sent does not
+};
+
+/// What a latched axis was sent and read back, and what that looks like.
+struct Mismatch {
+  double sent_um{not_a_number};
+  double read_um{not_a_number};
+  MismatchCause likely{MismatchCause::none};
+  double size{not_a_number};  ///< factor: times what is sent; constant: [um]
+  /// More than one value sent tells the same: a factor, sign or constant is no coincidence.
+  bool sure{false};
+
+  /// Whether the same factor, sign or constant still explains a pair.
+  [[nodiscard]] bool explains(double of_sent_um, double of_read_um) const noexcept;
+  void visit_state(StateArchive& archive) { archive(sent_um, read_um, likely, size, sure); }
+};
+
+/// "reads back twice what is sent: check scale"; empty where there is nothing to say. Allocates.
+[[nodiscard]] std::string likely_text(const Mismatch& mismatch);
+
+/// The last values sent, each with what was read back: only those that differ, so that a slow
+/// offset does not fill the memory with one and the same pair.
+class SentAndRead {
+ public:
+  void note(double sent_um, double read_um) noexcept;
+  /// The likeliest cause of a pair that does not agree. A factor or constant is taken from that
+  /// pair and must hold for the older ones too, the lag of a moving offset allowed for.
+  [[nodiscard]] Mismatch judge(double sent_um, double read_um) const noexcept;
+
+  void visit_state(StateArchive& archive) { archive(sent_um_, read_um_, count_); }
+
+ private:
+  static constexpr std::size_t length = 16;
+  [[nodiscard]] std::size_t kept() const noexcept { return count_ < length ? count_ : length; }
+  /// Largest |read - (factor sent + constant)| of the pairs kept.
+  [[nodiscard]] double worst_um(double factor, double constant_um) const noexcept;
+  [[nodiscard]] bool stands_still(double sent_um, double read_um) const noexcept;
+  [[nodiscard]] double spread_um(double sent_um) const noexcept;
+
+  std::array<double, length> sent_um_{};
+  std::array<double, length> read_um_{};
+  std::uint64_t count_{0};
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,203 @@
+#!/usr/bin/python3
+"""The structure as the #includes tell it: no circles, and floors that read downwards.
+
+    scripts/check_includes.py            circles, and whether the drawing is current; exit status 1
+                                         when there is a circle or a known one has changed
+    scripts/check_includes.py --write    draws the floors anew into docs/ARCHITECTURE.md
+    scripts/check_includes.py --sizes    the largest folders and files
+
+A unit is a header and its source (`limiter.hpp` and `limiter.cpp`). A circle is a set of units, or
+of folders, each of which leads to each other one. Those of scripts/known_circles.txt are still there:
+the list may shrink; a circle that is not in it, or that grew, is an error, and so is an entry that
+no longer holds.
+"""
+import argparse
+import collections
+import os
+import re
+import sys
+
+CODE = ("estimator", "drivers", "config", "daemon", "simulator", "cli", "linuxcnc", "modelling",
+        "docs", "bench", "tests")
+DRAWN = CODE[:8]  # what a user installs
+BEGIN, END = "<!-- floors: begin (scripts/check_includes.py --write) -->", "<!-- floors: end -->"
+INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
+
+
+def read_includes(root):
+    """{file: [file that it includes]}, paths from `root`; what is not in the tree is left out."""
+    texts = {}
+    for top in CODE:
+        for folder, _, names in os.walk(os.path.join(root, top)):
+            for name in names:
+                if name.endswith((".hpp", ".cpp")):
+                    path = os.path.join(folder, name)
+                    with open(path, encoding="utf-8") as text:
+                        texts[os.path.relpath(path, root)] = text.read()
+    includes = {}
+    for path, text in sorted(texts.items()):
+        beside = os.path.dirname(path)
+        found = []
+        for name in INCLUDE.findall(text):
+            for candidate in (name, os.path.normpath(os.path.join(beside, name))):
+                if candidate in texts:
+                    found.append(candidate)
+                    break
+        includes[path] = found
+    return includes
+
+
+def graph_of(includes, node_of):
+    """{node: {node that it includes: (file, included file)}}, without edges to itself."""
+    graph = {}
+    for path, found in includes.items():
+        node = graph.setdefault(node_of(path), {})
+        for other in found:
+            if node_of(other) != node_of(path):
+                node.setdefault(node_of(other), (path, other))
+    return graph
+
+
+def reached(graph, start):
+    """Every node that a way of one or more edges leads to from `start`."""
+    seen, waiting = set(), [start]
+    while waiting:
+        for other in graph.get(waiting.pop(), ()):
+            if other not in seen:
+                seen.add(other)
+                waiting.append(other)
+    return seen
+
+
+def circles(graph):
+    """Sets of nodes that lead to each other, as sorted lists."""
+    ways = {node: reached(graph, node) for node in graph}
+    found = {frozenset(other for other in ways[node] if node in ways[other])
+             for node in graph if node in ways[node]}
+    return sorted(sorted(circle) for circle in found)
+
+
+def read_known(path):
+    """The known circles: lines `unit NAME...` or `folder NAME...`; # begins a comment."""
+    known = {"unit": [], "folder": []}
+    if os.path.exists(path):
+        with open(path, encoding="utf-8") as text:
+            for line in text:
+                words = line.split("#")[0].split()
+                if words:
+                    known[words[0]].append(words[1:])
+    return known
+
+
+def check(kind, graph, known):
+    """Prints each circle that is not known, and each known one that has changed; returns how many."""
+    found = circles(graph)
+    wrong = 0
+    for circle in found:
+        if circle not in known:
+            wrong += 1
+            print(f"check_includes: {kind}s in a circle: {' '.join(circle)}")
+            for node in circle:
+                for other, (path, included) in sorted(graph[node].items()):
+                    if other in circle:
+                        print(f"  {path} includes {included}")
+    for circle in known:
+        if circle not in found:
+            wrong += 1
+            print(f"check_includes: no longer a circle of {kind}s, to be taken off the list of "
+                  f"known ones (or made smaller there): {' '.join(circle)}")
+    return wrong
+
+
+def floors(graph):
+    """The folders by floor, the lowest first: a folder stands above all that it includes. Folders
+    in a circle stand on one floor."""
+    together = {node: node for node in graph}
+    for circle in circles(graph):
+        together.update({node: circle[0] for node in circle})
+    below = collections.defaultdict(set)
+    for node, others in graph.items():
+        below[together[node]] |= {together[other] for other in others} - {together[node]}
+    height = {}
+
+    def height_of(node):
+        if node not in height:
+            height[node] = 1 + max((height_of(other) for other in below[node]), default=0)
+        return height[node]
+
+    found = collections.defaultdict(list)
+    for node in sorted(graph):
+        found[height_of(together[node])].append(node)
+    return [found[floor] for floor in sorted(found)]
+
+
+def drawing(includes):
+    """The floors as a table, the highest first."""
+    drawn = {path: [other for other in found if other.split("/")[0] in DRAWN]
+             for path, found in includes.items() if path.split("/")[0] in DRAWN}
+    graph = graph_of(drawn, os.path.dirname)
+    lines = ["| floor | folder | includes |", "|---|---|---|"]
+    stack = floors(graph)
+    for number in range(len(stack), 0, -1):
+        for node in stack[number - 1]:
+            lines.append(f"| {number} | `{node}` | {', '.join(sorted(graph[node])) or '-'} |")
+    return "\n".join(lines)
+
+
+def parts_of(path):
+    """What stands before the drawing in the document, the drawing, and what stands after it."""
+    with open(path, encoding="utf-8") as text:
+        document = text.read()
+    if document.count(BEGIN) != 1 or document.count(END) != 1:
+        sys.exit(f"check_includes: {path} must have each of these lines once: {BEGIN} {END}")
+    before, rest = document.split(BEGIN)
+    drawn, after = rest.split(END)
+    return before, drawn.strip("\n"), after
+
+
+def print_sizes(root, includes):
+    folders = collections.Counter(os.path.dirname(path) for path in includes)
+    lines = {}
+    for path in includes:
+        with open(os.path.join(root, path), encoding="utf-8") as text:
+            lines[path] = sum(1 for _ in text)
+    for folder, count in folders.most_common(5):
+        print(f"{folder}: {count} files")
+    for path, count in sorted(lines.items(), key=lambda item: -item[1])[:5]:
+        print(f"{path}: {count} lines")
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Circles of #includes, and the floors.")
+    parser.add_argument("--root", default=os.path.join(os.path.dirname(__file__), ".."))
+    parser.add_argument("--write", action="store_true", help="draw the floors anew")
+    parser.add_argument("--sizes", action="store_true", help="print the largest folders and files")
+    options = parser.parse_args()
+    includes = read_includes(options.root)
+    if options.sizes:
+        print_sizes(options.root, includes)
+        return 0
+
+    document = os.path.join(options.root, "docs", "ARCHITECTURE.md")
+    before, drawn, after = parts_of(document)
+    now = drawing(includes)
+    if options.write:
+        with open(document, "w", encoding="utf-8") as text:
+            text.write(f"{before}{BEGIN}\n{now}\n{END}{after}")
+        return 0
+
+    known = read_known(os.path.join(options.root, "scripts", "known_circles.txt"))
+    units = graph_of(includes, lambda path: os.path.splitext(path)[0])
+    folders = graph_of(includes, os.path.dirname)
+    wrong = check("unit", units, known["unit"]) + check("folder", folders, known["folder"])
+    if now != drawn:
+        wrong += 1
+        print("check_includes: the floors in docs/ARCHITECTURE.md are not those of the tree: "
+              "scripts/check_includes.py --write")
+    print(f"check_includes: {len(includes)} files, {len(folders)} folders, "
+          f"{len(known['unit']) + len(known['folder'])} known circles, {wrong} wrong")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,232 @@
+#!/usr/bin/python3
+"""Attacks the running daemon from outside: by configuration files, sockets and buses, without any
+knowledge of its code. docs/attacks.md tells what is attacked and what must hold.
+
+  attack.py [--bin DIR] [--seed N] [--links tcp,rtu,...] [--only TEXT]... [--minutes M] [--jobs N]
+  attack.py --list
+
+Prints the seed, a line a try as it ends, and at the end a table of the attacks. Exit status: 0
+nothing was broken, 1 something was, 2 bad use.
+"""
+
+import argparse
+import concurrent.futures
+import contextlib
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+import traceback
+
+import attacks_daemon  # noqa: F401
+import attacks_files  # noqa: F401
+import attacks_history  # noqa: F401
+import attacks_link  # noqa: F401
+import attacks_linuxcnc  # noqa: F401
+import attacks_read_back  # noqa: F401
+import attacks_sensors  # noqa: F401
+import attacks_socket  # noqa: F401
+import attacks_state  # noqa: F401
+import rig as rig_module
+from registry import ALL
+
+DEFAULT_BIN = os.environ.get("THERMOCOMP_BIN", "build/release/bin")
+HEAD = ("attack", "on", "tries", "step um", "may um", "|value|", "bound", "ended", "rows lost",
+        "of", "cmds lost", "unfed s", "wait s", "verdict")
+LAYOUT = "{:36} {:7} {:>5} {:>8} {:>7} {:>8} {:>6} {:>5} {:>9} {:>6} {:>9} {:>7} {:>6}  {}"
+
+
+def run_one(name, link, seed, programs, keep):
+    """In a process of its own: one try, its result as the last line."""
+    attack = ALL[name]
+    result = None
+    if link == "linuxcnc":
+        from linuxcnc_rig import LinuxCncRig as Rig
+    else:
+        from rig import Rig
+    rig = Rig(programs, link, seed, **attack.choices)
+    try:
+        try:
+            attack.run(rig)
+        except Exception:  # noqa: BLE001  whatever it was, the daemon is judged all the same
+            rig.broke("the attack itself failed: " + traceback.format_exc().splitlines()[-1])
+            traceback.print_exc()
+        result = rig.judge()
+    finally:
+        rig.close(keep)
+        if keep:
+            print(f"kept: {rig.folder}", file=sys.stderr)
+    rig_module.print_result(result)
+
+
+one_bus = threading.Lock()  # all tries on CAN have the same two interfaces
+
+
+def start_try(name, link, seed, given):
+    """The result of a try in a process of its own, with everything it started ended."""
+    command = [sys.executable, str(pathlib.Path(__file__)), "--one", name, "--links", link,
+               "--seed", str(seed), "--bin", given.bin] + (["--keep"] if given.keep else [])
+    limit_s = ALL[name].limit_s + 4 * rig_module.PATIENCE_S
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        out, said = process.communicate(timeout=limit_s)
+    except subprocess.TimeoutExpired:
+        out, said = "", f"not done after {limit_s:.0f} s"
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    lines = [line for line in out.splitlines() if line.startswith("RESULT ")]
+    if not lines:
+        tail = said.strip().splitlines()[-1:] or ["it said nothing"]
+        return failed_try("the attack itself failed: " + tail[0]), said
+    return json.loads(lines[-1][len("RESULT "):]), said
+
+
+def failed_try(why):
+    return {"step_um": 0.0, "allowed_um": 0.0, "beyond": 0, "value_um": 0.0, "writes": 0,
+            "tries": 1, "bound_um": 0.0, "ended": 0, "rows": 0, "rows_lost": 0,
+            "commands_lost": 0, "unfed_s": 0.0, "wait_s": 0.0, "broken": [why]}
+
+
+class Table:
+    def __init__(self):
+        self.rows = {}
+
+    def add(self, name, link, result):
+        row = self.rows.setdefault((name, link), result)
+        if row is result:
+            return
+        if result["step_um"] - result["allowed_um"] > row["step_um"] - row["allowed_um"]:
+            row["step_um"], row["allowed_um"] = result["step_um"], result["allowed_um"]
+        for key in ("value_um", "bound_um", "unfed_s", "wait_s"):
+            row[key] = max(row[key], result[key])
+        for key in ("tries", "beyond", "writes", "ended", "rows", "rows_lost", "commands_lost"):
+            row[key] += result[key]
+        row["broken"] += [what for what in result["broken"] if what not in row["broken"]]
+
+    def line(self, name, link, row):
+        return LAYOUT.format(
+            name, link, row["tries"], f"{row['step_um']:.3f}", f"{row['allowed_um']:.3f}",
+            f"{row['value_um']:.2f}", f"{row['bound_um']:g}", row["ended"], row["rows_lost"],
+            row["rows"], row["commands_lost"], f"{row['unfed_s']:.1f}", f"{row['wait_s']:.1f}",
+            "held" if not row["broken"] else "BROKEN: " + "; ".join(row["broken"]))
+
+    def print(self):
+        print("\n" + LAYOUT.format(*HEAD))
+        for (name, link), row in sorted(self.rows.items()):
+            print(self.line(name, link, row))
+        rows = self.rows.values()
+        broken = sum(bool(row["broken"]) for row in rows)
+        for text, count in (
+                ("attacks", len(self.rows)), ("tries", sum(row["tries"] for row in rows)),
+                ("writes", sum(row["writes"] for row in rows)),
+                ("writes_that_leap", sum(row["beyond"] for row in rows)),
+                ("processes_ended", sum(row["ended"] for row in rows)),
+                ("committed_rows_lost", sum(row["rows_lost"] for row in rows)),
+                ("commands_lost", sum(row["commands_lost"] for row in rows)),
+                ("attacks_broken", broken)):
+            print(text, count)
+        return broken
+
+
+def wanted_tries(given):
+    chosen = [(name, link) for name, attack in ALL.items() for link in attack.links
+              if link in given.links and
+              (not given.only or any(text in name for text in given.only))]
+    if not chosen:
+        sys.exit("attack.py: no attack is called so on these links (--list)")
+    return chosen
+
+
+def run_all(given):
+    table = Table()
+    chooser = random.Random(given.seed)
+    tries = wanted_tries(given)
+    end = time.monotonic() + 60.0 * given.minutes
+    signal.signal(signal.SIGTERM, lambda *_: stopped_early(table))
+    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+        first = True
+        while first or time.monotonic() < end:
+            # The long ones first, then in any order.
+            chooser.shuffle(tries)
+            tries.sort(key=lambda each: -ALL[each[0]].limit_s)
+            jobs = {}
+            for name, link in tries:
+                seed = given.seed if given.exact else chooser.randrange(1 << 30)
+                jobs[pool.submit(run_try, name, link, seed, first, end, given)] = (name, link)
+            for job in concurrent.futures.as_completed(jobs):
+                if job.result() is not None:
+                    table.add(*jobs[job], job.result())
+            first = False
+    return table.print()
+
+
+def stopped_early(table):
+    """Asked to end: what is known is told."""
+    table.print()
+    print("stopped before the end", flush=True)
+    os._exit(1)
+
+
+def run_try(name, link, seed, first, end, given):
+    """Every attack is tried once; after that, while there is time."""
+    if not first and time.monotonic() > end:
+        return None
+    with one_bus if link == "can" else contextlib.nullcontext():
+        began = time.monotonic()
+        result, said = start_try(name, link, seed, given)
+    verdict = "held" if not result["broken"] else "BROKEN: " + "; ".join(result["broken"])
+    print(f"{name} ({link}), seed {seed}, {time.monotonic() - began:.0f} s: {verdict}", flush=True)
+    if result["broken"]:
+        print(f"  again: {sys.argv[0]} --bin {given.bin} --links {link} --only '{name}' "
+              f"--exact --seed {seed}", flush=True)
+    if given.verbose:
+        print(said, flush=True)
+    return result
+
+
+def read_options():
+    options = argparse.ArgumentParser(description=__doc__,
+                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--bin", default=DEFAULT_BIN, help="folder of the programs")
+    options.add_argument("--seed", type=int, default=None, help="of all choices; default: drawn")
+    options.add_argument("--exact", action="store_true", help="each try has just this seed")
+    options.add_argument("--links", default="tcp,rtu,bridge,piezo")
+    options.add_argument("--only", action="append", help="attacks with this in their name")
+    options.add_argument("--minutes", type=float, default=0.0,
+                         help="each attack once, then again and again for so long")
+    options.add_argument("--jobs", type=int, default=max(2, os.cpu_count() or 2))
+    options.add_argument("--list", action="store_true")
+    options.add_argument("--keep", action="store_true", help="leaves the files of each try")
+    options.add_argument("--verbose", action="store_true", help="what each try said")
+    options.add_argument("--one", help=argparse.SUPPRESS)
+    given = options.parse_args()
+    given.links = given.links.split(",")
+    given.seed = random.SystemRandom().randrange(1 << 30) if given.seed is None else given.seed
+    return given
+
+
+def main():
+    given = read_options()
+    if given.list:
+        for name, attack in ALL.items():
+            print(f"{name:36} {','.join(attack.links)}")
+        return 0
+    if not (pathlib.Path(given.bin) / "thermocompd").exists():
+        print(f"attack.py: there is no {given.bin}/thermocompd", file=sys.stderr)
+        return 2
+    if given.one:
+        run_one(given.one, given.links[0], given.seed, given.bin, given.keep)
+        return 0
+    print(f"seed {given.seed}", flush=True)
+    return 1 if run_all(given) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

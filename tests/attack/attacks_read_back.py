@@ -1,0 +1,228 @@
+"""Controllers that tell what is not so: wrong scales and signs, second writers, re-homing."""
+
+import functools
+import math
+import time
+
+import axis as lies
+from process import eventually
+from registry import attack
+
+BUSES = ("tcp", "rtu", "can", "bridge")
+BEFORE_UM, WANTED_UM = -3.0, -24.0
+SEEN_WITHIN_S = 6.0
+LOOKED_AT_S = 3.0
+
+
+def latched(daemon):
+    status = daemon.status()
+    return "mismatch_latched" in status["reasons"] and not status["axes"][0]["driven"] and status
+
+
+def not_driven_from_now_on(rig, seconds=0.6):
+    began = time.monotonic() + 0.2
+    time.sleep(0.2 + seconds)
+    return not rig.axis.written_since(began)
+
+
+def must_latch(rig, likely):
+    """Two unexplained read-backs are enough: the axis is left alone and somebody is told why.
+    `likely`: words of which the reason must have one; empty: it must have any."""
+    status = eventually(lambda: latched(rig.daemon) or not rig.daemon.alive(), SEEN_WITHIN_S)
+    if not rig.must(status and status is not True, "a mismatch is not latched"):
+        return
+    rig.must(not_driven_from_now_on(rig), "driven although the mismatch is latched")
+    told = status["axes"][0].get("mismatch")
+    said = str(told.get("likely", "")) if isinstance(told, dict) else ""
+    rig.must(said and any(word in said for word in likely or [said]),
+             f'the likely reason is "{said}", with none of {", ".join(likely)} in it')
+    if isinstance(told, dict):
+        rig.must(None not in (told.get("sent_um"), told.get("read_um")),
+                 "what was sent and read is not told")
+
+
+def must_not_drive(rig):
+    """An axis that was found beyond its bound has never been driven."""
+    time.sleep(1.0)
+    status = rig.daemon.status()
+    rig.must(not rig.axis.writes and not status["axes"][0]["driven"] and status["reasons"],
+             "driven from beyond its bound")
+
+
+def release_is_needed(rig):
+    rig.axis.lie = None
+    rig.must(not_driven_from_now_on(rig), "driven again without an operator's release")
+
+
+def run_lie(rig, make, likely):
+    """A mistake of commissioning is there from the start; or it begins while the axis is on its
+    way: then nobody can tell a factor from something that is added."""
+    from_the_start = rig.random.random() < 0.5 and rig.machine.link != "piezo"
+    if from_the_start:
+        rig.axis.lie = make(rig)
+        if not rig.must(rig.daemon.start(), "the daemon does not start"):
+            return
+        if hasattr(rig.machine.slave, "report_to"):
+            rig.machine.slave.report_to(rig.daemon.socket)
+    elif not rig.start(BEFORE_UM):
+        return
+    rig.machine.wants_um(WANTED_UM)
+    rig.axis.lie = rig.axis.lie or make(rig)
+    began = time.monotonic()
+    if from_the_start and likely and abs(rig.axis.lie(rig.axis, began)) > rig.axis.bound_um:
+        must_not_drive(rig)
+        rig.axis.lie = None
+    elif likely and rig.machine.link != "piezo":
+        must_latch(rig, likely if from_the_start else ())
+        time.sleep(max(0.0, LOOKED_AT_S - (time.monotonic() - began)))
+        release_is_needed(rig)
+    else:
+        time.sleep(LOOKED_AT_S)
+        rig.axis.lie = None
+    rig.follows_again()
+
+
+LIES = {  # name: (how it is made, what the reason must name one of; None: need not be latched)
+    "reads back twice what is sent": (lambda rig: lies.factor(2.0), ("twice", "scale")),
+    "reads back half of what is sent": (lambda rig: lies.factor(0.5), ("half", "scale")),
+    "reads back the opposite sign": (lambda rig: lies.factor(-1.0), ("sign",)),
+    "reads back 3 um more": (lambda rig: lies.constant(3.0), ("constant",)),
+    "reads back millimetres": (lambda rig: lies.factor(0.001), ("scale",)),
+    "reads back a jump of 1 mm": (lambda rig: lies.constant(rig.random.choice((1000, -1000))),
+                                  ("constant", "writer")),
+    "reads back a drift": (lambda rig: lies.drift(rig.random.choice((3.0, -3.0, 0.5))), None),
+    "reads back what it was": (lambda rig: lies.frozen(rig.axis.position_um), None),
+    "jumps by 1 mm for a moment": (lambda rig: lies.jumps(1000.0, rig.random.randint(1, 6)), None),
+    "jumps by 4 um every other time": (lambda rig: lies.jumps(4.0, 1), None),
+    "reads back anything": (lambda rig: lies.anything(rig.random, 60.0), None),
+    "reads back what was a second ago": (lambda rig: lies.late(1.0), None),
+}
+for _name, (_make, _likely) in LIES.items():
+    attack(links=(*BUSES, "piezo"), name=_name)(
+        functools.partial(run_lie, make=_make, likely=_likely))
+
+
+@attack(links=BUSES)
+def takes_nothing(rig):
+    """Every write is answered as good, none is carried out."""
+    if not rig.start(BEFORE_UM):
+        return
+    rig.axis.obeys = False
+    rig.machine.wants_um(WANTED_UM)
+    rig.must(eventually(lambda: set(rig.daemon.status()["reasons"]) &
+                        {"mismatch", "mismatch_latched"}, 10.0), "no mismatch is told")
+    rig.axis.stands_at(rig.axis.position_um)
+    rig.axis.obeys = True
+    rig.follows_again()
+
+
+@attack(links=("tcp", "rtu", "can"), shown_as="float32", shown_scale=1.0)
+def reads_back_no_numbers(rig):
+    """NaN, infinities and the ends of a float32."""
+    if not rig.start(BEFORE_UM):
+        return
+    rig.machine.wants_um(WANTED_UM)
+    values = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-40, 0.0)
+    rig.axis.lie = lies.numbers(rig.random, values[:rig.random.randint(1, len(values))])
+    time.sleep(LOOKED_AT_S)
+    rig.axis.lie = None
+    rig.follows_again()
+
+
+@attack(links=("tcp", "rtu"))
+def two_daemons_on_one_controller(rig):
+    """Both are honest, and want different offsets: nobody may leap, somebody must be told."""
+    if not rig.start(BEFORE_UM):
+        return
+    second = rig.another_daemon("two", unit=2)
+    if rig.machine.link == "rtu":
+        rig.machine.slave.units[2] = rig.machine.controller.registers
+    rig.machine.thermocouples.show(20.0 + rig.random.choice((4.0, -4.0)))
+    second.start(may_refuse=True)
+    time.sleep(0.5)
+    rig.machine.wants_um(WANTED_UM)
+    told = eventually(lambda: any(
+        daemon.alive() and latched(daemon) for daemon in (rig.daemon, second)) or
+        not second.alive(), 8.0)
+    rig.must(told, "neither says that somebody else writes")
+    began = time.monotonic()
+    time.sleep(1.0)
+    writers = {write.writer for write in rig.axis.written_since(began)}
+    rig.must(len(writers) < 2, "both still drive the axis")
+    if second.alive():
+        rig.must(second.end(), "the second daemon does not end well")
+
+
+@attack(links=("tcp", "rtu", "can"))
+def another_writer_now_and_then(rig):
+    """A program of the controller's own sets the offset to something else at times."""
+    if not rig.start(BEFORE_UM):
+        return
+    rig.machine.wants_um(WANTED_UM)
+    end = time.monotonic() + LOOKED_AT_S
+    while time.monotonic() < end:
+        time.sleep(rig.random.uniform(0.05, 0.6))
+        with rig.axis.lock:
+            other = rig.axis.position_um
+            rig.axis.position_um = rig.random.uniform(-15.0, 15.0)
+        time.sleep(0.05)
+        with rig.axis.lock:
+            if rig.random.random() < 0.5:
+                rig.axis.position_um = other
+    rig.axis.stands_at(rig.axis.position_um)
+    rig.follows_again()
+
+
+@attack(links=("tcp", "rtu", "can"))
+def re_homes(rig):
+    """The controller forgets the offset between two readings, link and registers alive."""
+    if not rig.start(-6.0):
+        return
+    rig.machine.wants_um(WANTED_UM)
+    for _ in range(2):
+        time.sleep(rig.random.uniform(0.1, 0.5))
+        home_when_read(rig.axis)
+        time.sleep(1.0)
+        rig.release()
+    rig.follows_again()
+
+
+def home_when_read(axis):
+    """At the moment of a reading: what was under way before cannot be blamed on anybody."""
+    def home():
+        axis.before_shown = lambda: None
+        axis.stands_at(0.0)
+    axis.before_shown = home
+    eventually(lambda: axis.told, 5.0)
+
+
+@attack(links=("tcp", "rtu", "can"))
+def controller_restarts(rig):
+    """Switched off and on: registers 0, a new link."""
+    if not rig.start(-6.0):
+        return
+    rig.machine.wants_um(WANTED_UM)
+    for _ in range(2):
+        rig.machine.slave.stop()
+        time.sleep(rig.random.uniform(0.7, 1.2))
+        rig.machine.controller.restart()
+        rig.machine.slave.start()
+        time.sleep(1.0)
+    rig.follows_again()
+
+
+@attack(links=("tcp", "rtu"))
+def applied_cannot_be_read(rig):
+    """Without knowing where the axis stands nothing may be sent to it."""
+    registers = rig.machine.controller.registers
+    registers.refused = lambda function, *_: 2 if function == 4 else 0
+    if not rig.must(rig.daemon.start(), "the daemon does not start"):
+        return
+    rig.machine.wants_um(WANTED_UM)
+    time.sleep(2.0)
+    rig.must(not rig.axis.writes, "driven without ever having been read")
+    rig.must(rig.daemon.status()["mode"] != "compensating" or not rig.daemon.axis()["driven"],
+             "says that it compensates")
+    registers.refused = lambda function, *_: 0
+    rig.daemon.wait_for("compensating")
+    rig.follows_again()

@@ -1,0 +1,140 @@
+"""The axis at the controller's side: where it stands, who wrote what and when, and what the
+controller says of it, which need not be true."""
+
+import dataclasses
+import math
+import threading
+import time
+
+
+# The same value after so long is the same request once more: its answer was late or lost.
+SENT_AGAIN_AFTER_S = 0.15
+
+
+@dataclasses.dataclass
+class Write:
+    """A value that was written to the axis as valid."""
+    at_s: float  # CLOCK_MONOTONIC, before it was answered
+    since_s: float  # the value that it is compared with was not computed before
+    before_um: float
+    value_um: float
+    writer: int
+    bound_um: float = 0.0
+    rate_um_per_s: float = 0.0
+
+    @property
+    def step_um(self):
+        return abs(self.value_um - self.before_um)
+
+
+@dataclasses.dataclass
+class Writer:
+    """What one daemon has written last. Its next value is compared with `value_um`; that one was
+    computed after the answer to the write before it, at `since_s`."""
+    value_um: float
+    since_s: float
+    at_s: float
+
+
+class Axis:
+    """`shown_um()` is what is read back: where the axis stands, unless a lie was told to it."""
+
+    def __init__(self, bound_um, rate_um_per_s):
+        self.lock = threading.RLock()
+        self.bound_um = bound_um
+        self.rate_um_per_s = rate_um_per_s
+        self.position_um = 0.0
+        self.obeys = True
+        self.lie = None
+        self.lied = False
+        self.writes = []
+        self.writers = {}
+        self.told = {}  # before its first write; writer: (when it read first, what it read last)
+        self.before_shown = lambda: None
+
+    def written(self, value_um, writer=1, at_s=None):
+        now = time.monotonic() if at_s is None else at_s
+        with self.lock:
+            last = self.writers.get(writer)
+            if last is None:
+                told_at, stood_um = self.told.get(writer, (now, self.position_um))
+                if now < told_at:
+                    return  # was on its way when the controller began anew, which drops its queue
+                last = Writer(stood_um, told_at, told_at)
+            self.writes.append(Write(now, last.since_s, last.value_um, value_um, writer,
+                                     self.bound_um, self.rate_um_per_s))
+            again = value_um == last.value_um and now - last.at_s > SENT_AGAIN_AFTER_S
+            self.writers[writer] = Writer(value_um, last.since_s if again else last.at_s, now)
+            if self.obeys:
+                self.position_um = value_um
+
+    def shown_um(self, writer=1):
+        with self.lock:
+            self.before_shown()
+            now = time.monotonic()
+            self.lied = self.lied or self.lie is not None
+            shown_um = self.position_um if self.lie is None else self.lie(self, now)
+            if writer not in self.writers and math.isfinite(shown_um):
+                self.told[writer] = (self.told.get(writer, (now,))[0], shown_um)
+            return shown_um
+
+    def stands_at(self, position_um):
+        """The controller has moved by itself, or whoever wrote before is gone: the next value is
+        compared with where the axis stands then, from its next reading on."""
+        with self.lock:
+            self.position_um = position_um
+            self.begin_anew()
+
+    def begin_anew(self, writer=None):
+        with self.lock:
+            for each in (self.writers, self.told):
+                for one in [writer] if writer is not None else list(each):
+                    each.pop(one, None)
+
+    def written_since(self, at_s):
+        with self.lock:
+            return [write for write in self.writes if write.at_s > at_s]
+
+
+def factor(of):
+    return lambda axis, _now: of * axis.position_um
+
+
+def constant(of_um):
+    return lambda axis, _now: axis.position_um + of_um
+
+
+def drift(um_per_s):
+    begun = time.monotonic()
+    return lambda axis, now: axis.position_um + um_per_s * (now - begun)
+
+
+def frozen(at_um):
+    return lambda _axis, _now: at_um
+
+
+def jumps(by_um, readings):
+    """Wrong for so many readings, then true for as many."""
+    count = 0
+
+    def shown(axis, _now):
+        nonlocal count
+        count += 1
+        return axis.position_um + (by_um if count // readings % 2 == 0 else 0.0)
+    return shown
+
+
+def anything(random, most_um):
+    return lambda _axis, _now: random.uniform(-most_um, most_um)
+
+
+def late(by_s):
+    """True, but of some time ago."""
+    def shown(axis, now):
+        older = [write.value_um for write in axis.writes[-400:] if write.at_s <= now - by_s]
+        return older[-1] if older else 0.0
+    return shown
+
+
+def numbers(random, values):
+    return lambda _axis, _now: random.choice(values)

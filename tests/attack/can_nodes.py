@@ -1,0 +1,117 @@
+"""A controller and a node of thermocouples on CAN interfaces, by raw frames."""
+
+import contextlib
+import math
+import socket
+import struct
+import threading
+import time
+
+OFFSET, APPLIED, TEMPERATURES = 0x200, 0x300, 0x181
+PERIOD_S = 0.02
+SO_TIMESTAMPNS = 35
+
+
+def open_bus(interface):
+    bus = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    bus.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    bus.settimeout(PERIOD_S)
+    bus.bind((interface,))
+    return bus
+
+
+def receive(bus):
+    """A frame and the CLOCK_MONOTONIC at which the kernel got it."""
+    data, ancillary, _, _ = bus.recvmsg(16, 64)
+    for level, kind, stamp in ancillary:
+        if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS:
+            seconds, nanoseconds = struct.unpack("=2q", stamp[:16])
+            return data, seconds + 1e-9 * nanoseconds - (time.time() - time.monotonic())
+    return data, time.monotonic()
+
+
+def frame(identifier, data):
+    return struct.pack("=IB3x8s", identifier, len(data), data)
+
+
+class CanThermocouples:
+    encoding, scale = "int16", 0.01
+
+    def __init__(self, interface):
+        self.temps_degC = (20.0, 20.0)
+        self.data = None  # raw, where a test wants something else there
+        self.ending = threading.Event()
+        self.bus = open_bus(interface)
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def show(self, column_degC, spindle_degC=20.0):
+        self.temps_degC = (column_degC, spindle_degC)
+
+    def run(self):
+        while not self.ending.wait(PERIOD_S):
+            data = self.data or struct.pack("<2h", *(
+                max(-32768, min(32767, round(100 * temp))) for temp in self.temps_degC))
+            with contextlib.suppress(OSError):
+                self.bus.send(frame(TEMPERATURES, data))
+
+    def close(self):
+        self.ending.set()
+        self.thread.join(5)
+        self.bus.close()
+
+
+class CanController:
+    """Takes offset frames whose valid bit is set and shows what it applies after each, and at
+    least so often."""
+
+    def __init__(self, axis, interface, shown_as, shown_scale):
+        self.axis = axis
+        self.shown_as, self.shown_scale = shown_as, shown_scale
+        self.silent = False
+        self.ending = threading.Event()
+        self.bus = open_bus(interface)
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def stop(self):
+        self.silent = True
+
+    def start(self):
+        self.silent = False
+
+    def restart(self):
+        self.axis.stands_at(0.0)
+
+    def drop_links(self):
+        pass
+
+    def run(self):
+        shown_at = 0.0
+        while not self.ending.is_set():
+            with contextlib.suppress(OSError):
+                self.take(*receive(self.bus))
+            if not self.silent and time.monotonic() - shown_at >= PERIOD_S:
+                shown_at = time.monotonic()
+                with contextlib.suppress(OSError):
+                    self.bus.send(frame(APPLIED, self.applied()))
+
+    def take(self, received, at_s):
+        identifier, length = struct.unpack("=IB", received[:5])
+        if self.silent or identifier != OFFSET or length < 6:
+            return
+        counts, valid = struct.unpack("<iB", received[8:13])
+        if valid & 1:
+            self.axis.written(0.001 * counts, at_s=at_s)
+
+    def applied(self):
+        shown = self.axis.shown_um()
+        if self.shown_as == "float32":
+            return struct.pack("<f", shown / self.shown_scale)
+        counts = round(shown / self.shown_scale) if math.isfinite(shown) else 0
+        return struct.pack("<i", max(-2**31, min(2**31 - 1, counts)))
+
+    def close(self):
+        self.ending.set()
+        self.thread.join(5)
+        self.bus.close()

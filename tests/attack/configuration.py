@@ -1,0 +1,150 @@
+"""The configurations that a commissioning engineer would write for the machine of these attacks."""
+
+MODEL = """format = 1
+inputs = ["column_degC", "spindle_degC"]
+outputs = ["z_um"]
+reference = "first_sample"
+matrix_um_per_K = [[3.0, -1.5]]
+"""
+HEAD = """format = 1
+state_file = "{folder}/state.json"
+[loop]
+rate_hz = {rate_hz}
+[model]
+file = "{model}"
+"""
+SENSOR_TABLE = """[[device]]
+name = "module"
+bus = "cabinet"
+unit = 1
+period_s = 0.02
+table = "input"
+encoding = "{encoding}"
+scale = {scale}
+[[sensor]]
+name = "column"
+device = "module"
+address = 0
+[[sensor]]
+name = "spindle"
+device = "module"
+address = 2
+"""
+CAN_SENSORS = """[[bus]]
+name = "cabinet"
+kind = "can"
+interface = "vcan0"
+[[device]]
+name = "module"
+bus = "cabinet"
+id = 0x181
+length_bits = 16
+scale = 0.01
+[[sensor]]
+name = "column"
+device = "module"
+start_bit = 0
+[[sensor]]
+name = "spindle"
+device = "module"
+start_bit = 16
+"""
+REST = """[screening]
+temp_degC_min = -30.0
+temp_degC_max = 120.0
+stale_after_s = {stale_after_s}
+rate_allowance_K = 100.0
+[smoothing]
+form = "off"
+[[block]]
+name = "column"
+input = "column_degC"
+sensors = ["column"]
+[[block]]
+name = "spindle"
+input = "spindle_degC"
+sensors = ["spindle"]
+"""
+MODBUS_CONTROLLER = """[controller]
+name = "cnc"
+kind = "{kind}"
+unit = {unit}
+{place}timeout_ms = 200
+reconnect_s = 0.1
+period_s = 0.02
+valid_bits = {{ table = "holding", address = 2, encoding = "uint16" }}
+heartbeat = {{ table = "holding", address = 3, encoding = "uint16" }}
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = {bound}
+rate_um_per_s_max = {rate}
+offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
+applied = {{ table = "input", address = 10, encoding = "{shown_as}", scale = {shown_scale} }}
+"""
+CAN_CONTROLLER = """[controller]
+name = "cnc"
+kind = "can"
+interface = "vcan1"
+period_s = 0.02
+silent_after_s = 0.5
+reconnect_s = 0.1
+valid_bits = {{ id = 0x200, start_bit = 32, length_bits = 8 }}
+heartbeat = {{ id = 0x200, start_bit = 40, length_bits = 8 }}
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = {bound}
+rate_um_per_s_max = {rate}
+offset = {{ id = 0x200, start_bit = 0, length_bits = 32, scale = 0.001 }}
+applied = {{ id = 0x300, start_bit = 0, length_bits = 32, {can_float}scale = {shown_scale} }}
+"""
+BRIDGE = """[controller]
+name = "mill"
+kind = "linuxcnc"
+silent_after_s = 1.0
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = {bound}
+rate_um_per_s_max = {rate}
+"""
+DRY_RUN = """[controller]
+name = "none"
+kind = "dry_run"
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = {bound}
+rate_um_per_s_max = {rate}
+"""
+PIEZO = """[controller]
+name = "amplifier"
+kind = "piezo_tcp"
+unit = {unit}
+{place}timeout_ms = 200
+reconnect_s = 0.1
+period_s = 0.02
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = {bound}
+rate_um_per_s_max = {rate}
+offset = {{ table = "holding", address = 0, encoding = "uint16", scale = 0.01 }}
+applied = {{ table = "input", address = 10, encoding = "uint16", scale = 0.01 }}
+[axis.piezo]
+curve_V = {volts}
+curve_um = {um}
+settle_s = 0.1
+steady_s = 0.2
+"""
+TAIL = """[compensation]
+mismatch_um = 2.0
+mismatch_after_s = 1.0
+{compensation}[history]
+file = "{history}"
+commit_s = 0.2
+offsets_period_s = 0.02
+{more}[socket]
+path = "{socket}"
+"""

@@ -1,0 +1,167 @@
+"""A thermocompd under attack: its process, its files, its socket."""
+
+import contextlib
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import time
+
+import watch
+
+PATIENCE_S = float(os.environ.get("THERMOCOMP_PATIENCE_S", "30"))
+WATCHDOG_S = 5.0  # WatchdogSec of thermocompd.service
+
+
+def eventually(check, patience_s=PATIENCE_S):
+    """Polls until check() gives something true, and returns it; a false value if it never does."""
+    end = time.monotonic() + patience_s
+    while True:
+        value = check()
+        if value or time.monotonic() > end:
+            return value
+        time.sleep(0.02)
+
+
+class Daemon:
+    """A process of thermocompd with its files in `folder`."""
+
+    def __init__(self, rig, folder, socket, unit=1, **other):
+        self.rig = rig
+        self.folder = folder
+        folder.mkdir(exist_ok=True)
+        self.socket = socket
+        self.config = folder / "thermocompd.toml"
+        self.history = pathlib.Path(other.get("history", folder / "history.db"))
+        self.state = folder / "state.json"
+        self.log = folder / "thermocompd.log"
+        self.unit = unit
+        self.other = other
+        self.process = None
+        self.ends_expected = False
+        self.running = []  # [from, until or None] in which the watchdog must be fed
+        self.environment = {}
+        self.limit_as = None
+        self.write_config()
+
+    def write_config(self, **other):
+        self.other |= other
+        text = self.rig.machine.config(self.folder, self.socket, unit=self.unit, **self.other)
+        model = self.folder / "model.toml"
+        if not model.exists():
+            shutil.copy(self.rig.machine.folder / "model.toml", model)
+        self.config.write_text(text)
+        return text
+
+    def start(self, wait=True, may_refuse=False):
+        """`wait`: until it says that it is ready; False is returned when it ends before."""
+        self.rig.manager.ready.clear()
+        environment = os.environ | {"NOTIFY_SOCKET": str(self.rig.manager.path),
+                                    "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
+        environment |= self.environment
+        command = [str(self.rig.bin / "thermocompd"), str(self.config)]
+        if self.limit_as:
+            command = ["prlimit", f"--as={self.limit_as}", *command]
+        self.ends_expected = may_refuse
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log,
+                                            stderr=log, cwd=self.folder, env=environment)
+        if not wait:
+            return True
+        ready = eventually(lambda: self.rig.manager.ready.is_set() or not self.alive())
+        if not (ready and self.alive()):
+            if not self.alive() and self.process.returncode not in (1, 2):
+                self.ends_expected = False
+            return False
+        self.ends_expected = False
+        self.running.append([time.monotonic(), None])
+        return True
+
+    def alive(self):
+        return self.process is not None and self.process.poll() is None
+
+    def call(self, method, **params):
+        return watch.call(self.socket, method, **params)
+
+    def status(self):
+        """Of a daemon that answers; else an empty one."""
+        with contextlib.suppress(OSError, ValueError, watch.Refused):
+            return self.call("status")
+        return {"mode": "", "reasons": [], "axes": [{"driven": False}], "enabled": None,
+                "inputs": [], "warnings": []}
+
+    def axis(self):
+        return self.status()["axes"][0]
+
+    def wait_for(self, mode, patience_s=PATIENCE_S):
+        return eventually(lambda: self.status()["mode"] == mode or not self.alive(), patience_s) \
+            and self.alive()
+
+    def operate(self, method, **params):
+        """An operator's command; whether it was answered "done", which is noted."""
+        try:
+            done = self.call(method, **params).get("done", False)
+        except (OSError, ValueError, watch.Refused):
+            return False
+        if done and method in ("enable", "disable"):
+            self.rig.told_enabled = method == "enable"
+        if done and method == "reference":
+            self.rig.told_reference = self.references()
+        return done
+
+    def references(self):
+        return [each["reference_degC"] for each in self.status()["inputs"]]
+
+    def hang_up(self):
+        self.process.send_signal(signal.SIGHUP)
+
+    def stop_for(self, seconds):
+        """As if the whole machine stood still."""
+        self.pause_watch()
+        self.process.send_signal(signal.SIGSTOP)
+        time.sleep(seconds)
+        self.process.send_signal(signal.SIGCONT)
+        self.running.append([time.monotonic(), None])
+
+    def pause_watch(self):
+        if self.running and self.running[-1][1] is None:
+            self.running[-1][1] = time.monotonic()
+
+    def kill(self):
+        self.pause_watch()
+        self.ends_expected = True
+        self.process.kill()
+        self.process.wait()
+        self.rig.machine.axis.begin_anew(self.unit)
+
+    def end(self):
+        """As systemd would. False: it did not end with status 0 in time."""
+        self.pause_watch()
+        if not self.alive():
+            return False
+        self.ends_expected = True
+        self.process.send_signal(signal.SIGTERM)
+        try:
+            good = self.process.wait(PATIENCE_S) == 0
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            good = False
+        self.rig.machine.axis.begin_anew(self.unit)
+        return good
+
+    def memory_MB(self):
+        """Resident."""
+        for line in pathlib.Path(f"/proc/{self.process.pid}/status").read_text().splitlines():
+            if line.startswith("VmRSS:"):
+                return int(line.split()[1]) / 1024
+        return 0.0
+
+    def cpu_s(self):
+        """Processor time used."""
+        fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2]
+        return sum(map(int, fields.split()[11:13])) / os.sysconf("SC_CLK_TCK")
+
+    def log_text(self):
+        return self.log.read_text(errors="replace") if self.log.exists() else ""

@@ -1,0 +1,26 @@
+"""All attacks by name. An attack is a function that takes a Rig and does one try."""
+
+import dataclasses
+import typing
+
+ALL = {}
+
+
+@dataclasses.dataclass
+class Attack:
+    name: str
+    run: typing.Callable
+    links: tuple
+    choices: dict
+    limit_s: float
+    text: str
+
+
+def attack(links=("tcp",), limit_s=60.0, name=None, **choices):
+    """`choices`: of the Rig's machine. `limit_s`: a try that takes longer has failed."""
+    def note(run):
+        called = name or run.__name__.replace("_", " ")
+        assert called not in ALL, called
+        ALL[called] = Attack(called, run, links, choices, limit_s, (run.__doc__ or "").strip())
+        return run
+    return note

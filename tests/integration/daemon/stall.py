@@ -1,0 +1,21 @@
+"""A cycle that stands still while it is told to."""
+
+import os
+import time
+
+
+class Stall:
+    """While it lasts, the cycle of a daemon with this environment does not run. The daemon waits 5 s
+    for its cycle."""
+
+    def __init__(self, file):
+        self.file = file
+        self.environment = {"THERMOCOMP_STALL": str(file),
+                            "LD_PRELOAD": os.environ["THERMOCOMP_STALLED_CYCLE"]}
+
+    def __enter__(self):
+        self.file.touch()
+        time.sleep(0.1)
+
+    def __exit__(self, *_):
+        self.file.unlink()

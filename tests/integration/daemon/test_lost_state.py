@@ -1,0 +1,152 @@
+"""A state file that is gone or cannot be read is no first start where there was an earlier one: the
+warm machine is not taken for straight, and an operator's "off" stays."""
+
+import json
+import sqlite3
+
+import pytest
+
+from lab import Refused, eventually
+from plain_devices import Machine
+
+DAMAGE = {
+    "empty": lambda file: file.write_text(""),
+    "cut": lambda file: file.write_text(file.read_text()[:-20]),
+    "other_json": lambda file: file.write_text("[1, 2]"),
+    "newer_format": lambda file: file.write_text(file.read_text().replace('"format": 1',
+                                                                          '"format": 9')),
+    "binary": lambda file: file.write_bytes(bytes(range(256)) * 16),
+    "zeros": lambda file: file.write_bytes(bytes(len(file.read_text()))),
+    "bit": lambda file: file.write_bytes(bytes([file.read_bytes()[0] ^ 4]) +
+                                         file.read_bytes()[1:]),
+    "text_for_number": lambda file: file.write_text(file.read_text().replace("20.0", '"warm"')),
+    "huge": lambda file: file.write_bytes(b" " * (2 << 20)),
+    "folder": lambda file: (file.unlink(), file.mkdir()),
+    "missing": lambda file: file.unlink(),
+    "dangling_link": lambda file: (file.unlink(), file.symlink_to(file.parent / "nowhere")),
+}
+
+
+@pytest.fixture
+def machine(lab):
+    return Machine(lab)
+
+
+def without_history(machine):
+    own = machine.daemon.config.read_text()
+    begin = own.index("[history]")
+    machine.daemon.config.write_text(own[:begin] + "[history]\nenabled = false\n" +
+                                     own[own.index("[socket]"):])
+
+
+def references(daemon):
+    return [each["reference_degC"] for each in daemon.status()["inputs"]]
+
+
+def warnings(daemon):
+    return "\n".join(daemon.status()["warnings"])
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_reference_and_switch_come_from_the_history(machine, damage):
+    daemon = machine.start()
+    machine.warm_by(9.0)
+    daemon.wait_for_offset(9.0, 0.05)
+    daemon.committed()
+    daemon.kill()
+    DAMAGE[damage](daemon.state)
+    daemon.start()
+    assert references(daemon) == [20.0, 20.0]
+    daemon.wait_for_offset(9.0, 0.05)
+    assert "taken from the history" in warnings(daemon)
+    assert daemon.cli("disable")[0] == 0
+    daemon.end()
+    DAMAGE[damage](daemon.state)
+    daemon.start()
+    daemon.wait_for_mode("disabled")
+    assert references(daemon) == [20.0, 20.0]
+
+
+def test_a_commanded_reference_comes_from_the_history_too(machine):
+    daemon = machine.start()
+    machine.warm_by(9.0)
+    daemon.wait_for_offset(9.0, 0.05)
+    assert daemon.cli("reference")[0] == 0
+    daemon.end()
+    machine.warm_by(3.0)
+    DAMAGE["cut"](daemon.state)
+    daemon.start()
+    assert references(daemon) == [17.0, 20.0]
+
+
+@pytest.mark.parametrize("damage", [name for name in DAMAGE if name not in
+                                    ("missing", "dangling_link")])
+def test_without_a_history_it_stays_off_and_says_what_to_do(machine, damage):
+    without_history(machine)
+    daemon = machine.start()
+    machine.warm_by(9.0)
+    daemon.wait_for_offset(9.0, 0.05)
+    daemon.kill()
+    machine.controller.force_applied_um(0.0)
+    DAMAGE[damage](daemon.state)
+    # Also at every later start.
+    for _ in range(2):
+        daemon.start()
+        daemon.wait_for_mode("disabled")
+        assert "thermocomp reference" in warnings(daemon)
+        with pytest.raises(Refused, match="reference is lost"):
+            daemon.call("enable")
+        daemon.kill()
+    daemon.start()
+    machine.warm_by(0.0)
+    eventually(lambda: daemon.status()["inputs"][0]["temp_degC"] == 20.0, "it is cold")
+    assert daemon.cli("reference")[0] == 0
+    assert daemon.cli("enable")[0] == 0
+    assert "reference is lost" not in warnings(daemon)
+    daemon.kill()
+    daemon.start()
+    machine.warm_by(5.0)
+    daemon.wait_for_offset(5.0, 0.05)
+
+
+def test_an_older_sound_segment_gives_the_reference_but_not_the_switch(machine):
+    daemon = machine.start()
+    machine.warm_by(9.0)
+    daemon.wait_for_offset(9.0, 0.05)
+    assert daemon.cli("reload")[0] == 0
+    daemon.end()
+    with sqlite3.connect(daemon.history) as base:
+        newest, = base.execute("SELECT max(id) FROM segment").fetchone()
+        state, = base.execute("SELECT estimator_state FROM segment WHERE id = ?",
+                              (newest,)).fetchone()
+        damaged = bytes([state[0] ^ 1]) + state[1:]
+        base.execute("UPDATE segment SET estimator_state = ? WHERE id = ?", (damaged, newest))
+    DAMAGE["empty"](daemon.state)
+    daemon.start()
+    daemon.wait_for_mode("disabled")
+    assert references(daemon) == [20.0, 20.0]
+    assert f"segment {newest}" in warnings(daemon)
+    assert daemon.cli("enable")[0] == 0
+    daemon.wait_for_offset(9.0, 0.05)
+
+
+def test_a_history_without_a_sound_segment_keeps_it_off(machine):
+    daemon = machine.start()
+    daemon.end()
+    with sqlite3.connect(daemon.history) as base:
+        base.execute("UPDATE segment SET estimator_state = zeroblob(16)")
+    daemon.state.unlink()
+    daemon.start()
+    daemon.wait_for_mode("disabled")
+    assert "thermocomp reference" in warnings(daemon)
+    assert json.loads(daemon.state.read_text())["reference_lost"] is True
+
+
+def test_without_state_file_and_history_it_is_the_first_start(machine):
+    daemon = machine.start()
+    daemon.end()
+    daemon.state.unlink()
+    for file in daemon.folder.glob("history.db*"):
+        file.unlink()
+    daemon.start().wait_for_mode("compensating")
+    assert daemon.status()["warnings"] == [] or "history" not in warnings(daemon)

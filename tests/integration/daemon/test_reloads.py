@@ -1,0 +1,20 @@
+"""Many reloads beside clients; the long run of the same is `bench/run.sh reloads`."""
+
+import os
+
+import pytest
+
+from reload_rounds import ReloadRounds
+from service_manager import WATCHDOG_S
+
+ROUNDS = {1: 8, 100: 150, 1000: 150}
+SHARE = float(os.environ.get("THERMOCOMP_RELOAD_SHARE", "1"))
+
+
+@pytest.mark.parametrize("rate_hz", ROUNDS)
+def test_reloads_beside_clients_leave_nothing_undone(lab, rate_hz):
+    rounds = ReloadRounds(lab, rate_hz)
+    rounds.run(max(3, round(SHARE * ROUNDS[rate_hz])))
+    rounds.print_figures()
+    assert rounds.wrong == []
+    assert rounds.gap_s < 0.75 * WATCHDOG_S

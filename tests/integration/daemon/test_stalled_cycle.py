@@ -1,0 +1,139 @@
+"""A cycle that stands still for longer than anyone waits for it: whatever an operator was told then
+is what holds, now and after a restart."""
+
+import json
+import socket
+import threading
+import time
+
+import pytest
+
+from lab import Refused, assert_replays_exactly, eventually
+from plain_devices import MODEL, Machine, assert_slewed
+from stall import Stall
+
+@pytest.fixture
+def stall(lab):
+    return Stall(lab.folder / "stall")
+
+
+@pytest.fixture
+def machine(lab, stall):
+    machine = Machine(lab)
+    machine.daemon.environment = stall.environment
+    return machine
+
+
+def saved(daemon):
+    return json.loads(daemon.state.read_text())
+
+
+def asked(daemon, method):
+    """What the daemon answers: a result, or the words of its refusal."""
+    try:
+        return daemon.call(method)
+    except Refused as refusal:
+        return str(refusal)
+
+
+def test_a_reload_that_is_not_taken_in_time_never_happens(machine, stall, lab):
+    daemon = machine.start()
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    before = daemon.status()["model"]["checksum"]
+    machine.model.write_text(MODEL.replace("3.0,", "1.5,"))
+    with stall:
+        said = asked(daemon, "reload")
+        assert "does not answer" in said and "withdrawn" in said, said
+    # The old model still compensates, and is the one that is shown.
+    assert daemon.status()["model"]["checksum"] == before
+    machine.warm_by(9.0)
+    daemon.wait_for_offset(9.0, 0.05)
+    assert saved(daemon)["enabled"] is True
+    # What follows works as ever.
+    assert asked(daemon, "disable") == {"done": True}
+    assert daemon.status()["mode"] == "disabled" and saved(daemon)["enabled"] is False
+    assert asked(daemon, "enable") == {"done": True}
+    assert asked(daemon, "reload")["done"] is True
+    assert daemon.status()["model"]["checksum"] != before
+    daemon.wait_for_offset(4.5, 0.05)
+    assert_slewed(machine.controller.orders(), 7.0)
+    daemon.end()
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+
+
+def test_a_disable_after_a_late_reload_survives_a_restart(machine, stall):
+    daemon = machine.start()
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    with stall:
+        asked(daemon, "reload")
+    answer = asked(daemon, "disable")
+    eventually(lambda: machine.controller.applied_um() == 0.0 or answer != {"done": True},
+               "the offset is taken back")
+    was_disabled = daemon.status()["mode"] == "disabled"
+    daemon.kill()
+    daemon.start()
+    assert answer == {"done": True} and was_disabled
+    daemon.wait_for_mode("disabled")
+
+
+def test_a_command_that_is_not_taken_in_time_never_happens(machine, stall):
+    daemon = machine.start()
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    with stall:
+        said = asked(daemon, "disable")
+        assert "does not answer" in said and "withdrawn" in said, said
+    time.sleep(0.5)
+    assert daemon.status()["mode"] == "compensating" and saved(daemon)["enabled"] is True
+    daemon.wait_for_offset(6.0, 0.05)
+    daemon.kill()
+    daemon.start()
+    daemon.wait_for_mode("compensating")
+
+
+def test_a_command_that_is_taken_late_but_in_time_is_done(machine, stall):
+    daemon = machine.start()
+    answers = []
+    with stall:
+        waiting = threading.Thread(target=lambda: answers.append(asked(daemon, "disable")))
+        waiting.start()
+        time.sleep(1.0)
+        assert answers == []
+    waiting.join(10)
+    assert answers == [{"done": True}] and saved(daemon)["enabled"] is False
+
+
+def test_others_are_answered_while_somebody_waits_and_a_second_reload_is_refused(machine, stall):
+    daemon = machine.start()
+    answers = []
+    with stall:
+        waiting = threading.Thread(target=lambda: answers.append(asked(daemon, "reload")))
+        waiting.start()
+        time.sleep(0.3)
+        took_s = []
+        for _ in range(20):
+            begun = time.monotonic()
+            daemon.status()
+            took_s.append(time.monotonic() - begun)
+        print(f"slowest status beside a waiting reload: {1000 * max(took_s):.1f} ms")
+        assert max(took_s) < 1.0
+        assert "a reload is under way" in asked(daemon, "reload")
+        with pytest.raises(Refused, match="a reload is under way"):
+            daemon.call("measured", axis="z", value_um=1.0)
+        waiting.join(10)
+    assert len(answers) == 1 and "withdrawn" in answers[0]
+    assert asked(daemon, "reload")["done"] is True
+
+
+def test_a_client_that_goes_away_leaves_its_command_to_be_done_and_saved(machine, stall):
+    daemon = machine.start()
+    with stall:
+        with socket.socket(socket.AF_UNIX) as link:
+            link.connect(str(daemon.socket))
+            link.sendall(b'{"jsonrpc":"2.0","id":1,"method":"disable"}\n')
+            time.sleep(0.3)
+    daemon.wait_for_mode("disabled")
+    eventually(lambda: saved(daemon)["enabled"] is False, "it is on disk")
+    daemon.end()

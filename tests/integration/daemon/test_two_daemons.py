@@ -1,0 +1,96 @@
+"""Two real daemons that were given the same thing: the second is refused and says who has it."""
+
+import shutil
+
+import pytest
+
+from lab import assert_replays_exactly, count_rows
+from plain_devices import Machine
+
+
+@pytest.fixture
+def machine(lab):
+    return Machine(lab)
+
+
+@pytest.fixture
+def other(lab, tmp_path_factory):
+    """A second machine, with nothing in common with the first but its name."""
+    from lab import Lab
+    second = Lab(tmp_path_factory.mktemp("other"))
+    yield Machine(second)
+    second.end()
+
+
+def assert_refused(daemon, holder, *words):
+    daemon.start(wait=False)
+    assert daemon.process.wait(30) == 1
+    said = [line for line in daemon.log_text().splitlines() if line.startswith("thermocompd: ")]
+    assert len(said) == 1, daemon.log_text()
+    for word in (f"process {holder.process.pid}", str(holder.config), *words):
+        assert word in said[0], said
+
+
+def change(machine, *replacements):
+    text = machine.daemon.config.read_text()
+    for before, after in replacements:
+        assert str(before) in text
+        text = text.replace(str(before), str(after))
+    machine.daemon.config.write_text(text)
+
+
+def test_the_same_history_is_refused(machine, other, lab):
+    daemon = machine.start()
+    change(other, (other.daemon.history, daemon.history))
+    daemon.committed()
+    before = count_rows(daemon.history)
+    assert_refused(other.daemon, daemon, str(daemon.history))
+    assert daemon.status()["mode"] == "compensating"
+    daemon.committed()
+    assert all(now >= then for then, now in zip(before, count_rows(daemon.history)))
+    daemon.end()
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+
+
+def test_the_same_history_by_another_path_is_refused(machine, other):
+    daemon = machine.start()
+    link = other.daemon.folder / "elsewhere"
+    link.symlink_to(daemon.folder)
+    change(other, (other.daemon.history, link / daemon.history.name))
+    assert_refused(other.daemon, daemon)
+
+
+def test_the_same_state_file_is_refused(machine, other):
+    daemon = machine.start()
+    change(other, (other.daemon.state, daemon.state))
+    assert_refused(other.daemon, daemon, str(daemon.state))
+    assert daemon.status()["mode"] == "compensating"
+
+
+def test_the_same_controller_is_refused(machine, other):
+    daemon = machine.start()
+    change(other, (f"port = {other.controller.port}", f"port = {machine.controller.port}"))
+    seen = len(machine.controller.orders())
+    assert_refused(other.daemon, daemon, "controller", str(machine.controller.port))
+    assert len(machine.controller.orders()) >= seen
+
+
+def test_another_unit_behind_the_same_address_is_another_controller(machine, other):
+    machine.start()
+    change(other, (f"port = {other.controller.port}\nunit = 1",
+                   f"port = {machine.controller.port}\nunit = 2"))
+    other.daemon.start()
+
+
+def test_after_an_end_or_a_kill_the_next_may_have_it(machine, other):
+    daemon = machine.start()
+    for end in (daemon.kill, daemon.end):
+        end()
+        daemon.start().wait_for_mode("compensating")
+    daemon.kill()
+    shutil.copy(daemon.folder / "model.toml", other.daemon.folder)
+    change(other, (other.daemon.state, daemon.state), (other.daemon.history, daemon.history),
+           (f"port = {other.controller.port}", f"port = {machine.controller.port}"))
+    other.daemon.start().wait_for_mode("compensating")
+    other.daemon.end()
+    assert not list(daemon.folder.glob("*.lock"))

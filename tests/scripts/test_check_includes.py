@@ -1,0 +1,92 @@
+"""scripts/check_includes.py finds the circles that are planted, and only those."""
+import os
+import subprocess
+
+import pytest
+
+PROGRAM = os.path.join(os.path.dirname(__file__), "..", "..", "scripts", "check_includes.py")
+MARKS = "<!-- floors: begin (scripts/check_includes.py --write) -->\n<!-- floors: end -->\n"
+
+
+def run(root, *options):
+    return subprocess.run([PROGRAM, "--root", str(root), *options], capture_output=True, text=True,
+                          timeout=60, check=False)
+
+
+def write(root, path, *included):
+    file = root / path
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("".join(f'#include "{name}"\n' for name in included), encoding="utf-8")
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """Three folders that include downwards: daemon -> drivers -> estimator."""
+    write(tmp_path, "estimator/types.hpp")
+    write(tmp_path, "drivers/link.hpp", "estimator/types.hpp")
+    write(tmp_path, "drivers/link.cpp", "drivers/link.hpp")
+    write(tmp_path, "daemon/cycle.cpp", "drivers/link.hpp")
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "ARCHITECTURE.md").write_text(f"before\n{MARKS}after\n", encoding="utf-8")
+    (tmp_path / "scripts").mkdir()
+    assert run(tmp_path, "--write").returncode == 0
+    return tmp_path
+
+
+def test_a_tree_that_reads_downwards_passes(tree):
+    result = run(tree)
+    assert result.returncode == 0, result.stdout
+    assert "4 files, 3 folders, 0 known circles, 0 wrong" in result.stdout
+
+
+def test_the_floors_are_drawn_highest_first_and_the_rest_of_the_document_stays(tree):
+    text = (tree / "docs" / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    assert text.startswith("before\n") and text.endswith("after\n")
+    rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
+    assert rows == ["| 3 | `daemon` | drivers |", "| 2 | `drivers` | estimator |",
+                    "| 1 | `estimator` | - |"]
+
+
+def test_a_circle_of_two_files_of_one_folder_is_found_and_named(tree):
+    write(tree, "drivers/port.hpp", "drivers/link.hpp")
+    write(tree, "drivers/link.cpp", "drivers/link.hpp", "drivers/port.hpp")
+    result = run(tree)
+    assert result.returncode == 1
+    assert "units in a circle: drivers/link drivers/port" in result.stdout
+    assert "drivers/link.cpp includes drivers/port.hpp" in result.stdout
+    assert "folders in a circle" not in result.stdout
+
+
+def test_a_circle_of_folders_is_found_where_no_file_is_in_one(tree):
+    write(tree, "estimator/report.hpp", "drivers/names.hpp")
+    write(tree, "drivers/names.hpp")
+    result = run(tree)
+    assert result.returncode == 1
+    assert "folders in a circle: drivers estimator" in result.stdout
+    assert "units in a circle" not in result.stdout
+
+
+def test_a_known_circle_passes_until_it_grows_or_is_gone(tree):
+    known = tree / "scripts" / "known_circles.txt"
+    write(tree, "drivers/port.hpp", "link.hpp")  # beside it, as the compiler finds it
+    write(tree, "drivers/link.cpp", "drivers/link.hpp", "drivers/port.hpp")
+    known.write_text("# why\nunit drivers/link drivers/port\n", encoding="utf-8")
+    assert run(tree).returncode == 0
+
+    write(tree, "drivers/third.hpp", "drivers/link.hpp")
+    write(tree, "drivers/port.hpp", "drivers/third.hpp")
+    grown = run(tree)
+    assert grown.returncode == 1
+    assert "units in a circle: drivers/link drivers/port drivers/third" in grown.stdout
+
+    write(tree, "drivers/port.hpp")
+    gone = run(tree)
+    assert gone.returncode == 1
+    assert "no longer a circle of units" in gone.stdout and "drivers/port" in gone.stdout
+
+
+def test_a_drawing_that_is_not_current_is_found(tree):
+    write(tree, "config/units.hpp", "estimator/types.hpp")
+    result = run(tree)
+    assert result.returncode == 1
+    assert "the floors in docs/ARCHITECTURE.md are not those of the tree" in result.stdout

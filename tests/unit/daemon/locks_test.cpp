@@ -1,0 +1,156 @@
+// What one process may have alone: who is refused, what they are told, and when it is free again.
+#include <csignal>
+#include <fstream>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <sys/wait.h>
+
+#include "daemon/controller_lock.hpp"
+#include "daemon/locks/file_lock.hpp"
+#include "daemon/locks/name_lock.hpp"
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+
+namespace {
+
+std::string refusal(const std::function<void()>& take) {
+  try {
+    take();
+  } catch (const LockHeld& held) {
+    return held.what();
+  }
+  return {};
+}
+
+std::string this_process() {
+  return "process " + std::to_string(getpid());
+}
+
+/// A process that has made something and then only waits.
+class Child {
+ public:
+  explicit Child(const std::function<void()>& take) {
+    int ready[2];
+    REQUIRE(pipe(ready) == 0);
+    process_ = fork();
+    if (process_ == 0) {
+      take();
+      static_cast<void>(write(ready[1], "x", 1) == 1);
+      for (;;) pause();
+    }
+    close(ready[1]);
+    char byte = 0;
+    REQUIRE(read(ready[0], &byte, 1) == 1);
+    close(ready[0]);
+  }
+  ~Child() { kill(); }
+  void kill() {
+    if (process_ <= 0) return;
+    ::kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+    process_ = 0;
+  }
+
+ private:
+  pid_t process_{0};
+};
+
+std::string own_name() {
+  return "test " + std::to_string(getpid());
+}
+
+ModbusControllerConfig at(const std::string& host, int port, int unit) {
+  ModbusControllerConfig config;
+  config.line.link = ModbusTcp{host, port};
+  config.unit = unit;
+  return config;
+}
+
+}  // namespace
+
+TEST_CASE("a file that is locked is refused with who has it, until it is released", "[locks]") {
+  const TempFolder folder;
+  {
+    const FileLock lock(folder / "history.db");
+    const std::string said = refusal([&] { FileLock second(folder / "history.db"); });
+    CHECK(said.find((folder / "history.db").string()) != std::string::npos);
+    CHECK(said.find(this_process()) != std::string::npos);
+  }
+  CHECK_FALSE(std::filesystem::exists(folder / "history.db.lock"));
+  const FileLock again(folder / "history.db");
+}
+
+TEST_CASE("a file has one lock, whatever path leads to it", "[locks]") {
+  const TempFolder folder;
+  std::ofstream(folder / "history.db") << "x";
+  std::filesystem::create_symlink(folder.path(), folder / "link");
+  std::filesystem::create_symlink(folder / "history.db", folder / "other.db");
+  const FileLock lock(folder / "history.db");
+  CHECK_FALSE(refusal([&] { FileLock second(folder / "link/history.db"); }).empty());
+  CHECK_FALSE(refusal([&] { FileLock second(folder / "link/other.db"); }).empty());
+  const FileLock another(folder / "state.json");
+}
+
+TEST_CASE("a lock ends with its process, in whatever way that ends", "[locks]") {
+  const TempFolder folder;
+  const std::string ours = own_name();
+  Child child([&] {
+    new FileLock(folder / "history.db");
+    new NameLock(ours);
+  });
+  CHECK_FALSE(refusal([&] { FileLock second(folder / "history.db"); }).empty());
+  CHECK_FALSE(refusal([&] { NameLock second(ours); }).empty());
+  child.kill();
+  const FileLock file(folder / "history.db");
+  const NameLock name(ours);
+}
+
+TEST_CASE("a lock that cannot be made is no lock that is held", "[locks]") {
+  const TempFolder folder;
+  CHECK_THROWS_AS(FileLock(folder / "missing/history.db"), LockImpossible);
+  std::filesystem::create_directory(folder / "history.db.lock");
+  CHECK_THROWS_AS(FileLock(folder / "history.db"), LockImpossible);
+  // Nor is a link followed to a file that is not ours to lock.
+  std::ofstream(folder / "precious") << "x";
+  std::filesystem::create_symlink(folder / "precious", folder / "state.json.lock");
+  CHECK_THROWS_AS(FileLock(folder / "state.json"), LockImpossible);
+}
+
+TEST_CASE("a name that is held is refused with who has it", "[locks]") {
+  const std::string long_name = std::string(300, 'n') + own_name();
+  for (const std::string& name : {own_name(), long_name}) {
+    const NameLock lock(name);
+    CHECK(refusal([&] { NameLock second(name); }).find(this_process()) != std::string::npos);
+    const NameLock other(name + "2");
+  }
+}
+
+TEST_CASE("controllers are the same where the same registers or frames are written", "[locks]") {
+  const auto names = [](const ControllerConfig& config) { return controller_names(config); };
+  CHECK(names(at("CNC.local", 502, 1)) == names(at("cnc.local", 502, 1)));
+  CHECK(names(at("cnc.local", 502, 1)) != names(at("cnc.local", 502, 2)));
+  CHECK(names(at("cnc.local", 502, 1)) != names(at("cnc.local", 503, 1)));
+
+  ModbusControllerConfig serial;
+  serial.line.link = ModbusRtu{"/dev/null"};
+  ModbusControllerConfig same_device = serial;
+  same_device.line.link = ModbusRtu{"/dev/../dev/null", 19200};
+  CHECK(names(serial) == names(same_device));
+
+  CanControllerConfig can;
+  can.interface = "can0";
+  can.axes.resize(2);
+  can.axes[0].offset.id = can.axes[1].offset.id = 0x200;
+  CHECK(names(can).size() == 1);
+  can.axes[1].offset.id = 0x201;
+  CHECK(names(can).size() == 2);
+  CanControllerConfig other = can;
+  other.interface = "can1";
+  CHECK(names(can) != names(other));
+
+  CHECK(names(DryRunControllerConfig{}).empty());
+  CHECK(names(BridgeControllerConfig{}).empty());
+}

@@ -1,0 +1,110 @@
+// What an operator is told, beside what is on disk at that moment.
+#include "daemon/operations.hpp"
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/state/state_file.hpp"
+#include "drivers/controllers/dry_run_controller.hpp"
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+using namespace std::chrono_literals;
+
+namespace {
+
+class SteadySource final : public SensorSource {
+ public:
+  void start() override {}
+  void stop() noexcept override {}
+  [[nodiscard]] BusHealth health() const override { return {}; }
+  void newest(std::span<Reading> all) noexcept override {
+    for (Reading& reading : all) reading = {20.0, now, Fault::none};
+  }
+  nanoseconds now{};
+};
+
+DaemonConfig machine_config(const std::filesystem::path& folder) {
+  DaemonConfig config;
+  ReplaySetup setup = machine_setup(2.0);
+  config.estimator = std::move(setup.estimator);
+  config.model = std::move(setup.model);
+  for (SensorConfig& sensor : config.estimator.sensors) sensor.smoothing.form = SmoothingForm::off;
+  config.file = folder / "missing.toml";
+  config.state_file = folder / "state.json";
+  return config;
+}
+
+/// A daemon whose cycle steps when the test says so.
+struct Desk {
+  explicit Desk(bool reference_lost = false)
+      : keeper(config.state_file, {}, true, reference_lost), next(cycle.begin(grid.start)) {
+    step();
+  }
+  void step() {
+    source.now = grid.time_of(next);
+    cycle.step(next++);
+  }
+  [[nodiscard]] LoadedState on_disk() const { return load_state_file(config.state_file, {}); }
+  /// Asks, steps, and takes the answer.
+  nlohmann::json give(CommandKind kind) {
+    const RpcPending pending = operations.command({kind, 0, 0.0});
+    CHECK_FALSE(pending());
+    step();
+    return pending().value();
+  }
+
+  TempFolder folder;
+  DaemonConfig config = machine_config(folder.path());
+  SteadySource source;
+  DryRunController controller{{"none", 2}};
+  Grid grid{1h, 10ms};
+  StateKeeper keeper;
+  ServiceManager service;
+  Cycle cycle{grid, {&source}, controller, 3, make_brain(config, nullptr)};
+  std::uint64_t next;
+  Operations operations{{config, cycle, keeper, service, nullptr, [] { return std::string(); }}};
+};
+
+}  // namespace
+
+TEST_CASE("done means on disk", "[daemon]") {
+  Desk desk;
+  CHECK(desk.give(CommandKind::disable) == nlohmann::json{{"done", true}});
+  CHECK(desk.on_disk().found);
+  CHECK_FALSE(desk.on_disk().state.enabled);
+  CHECK(desk.give(CommandKind::enable) == nlohmann::json{{"done", true}});
+  CHECK(desk.on_disk().state.enabled);
+}
+
+TEST_CASE("a command that cannot be saved is not called done", "[daemon]") {
+  Desk desk;
+  std::filesystem::create_directory(desk.config.state_file.string() + ".new");
+  CHECK_THROWS_WITH(desk.give(CommandKind::disable), Catch::Contains("carried out, but not saved"));
+}
+
+TEST_CASE("while the reference is lost nothing is switched on before one is taken", "[daemon]") {
+  Desk desk(true);
+  CHECK_THROWS_WITH(desk.operations.command({CommandKind::enable, 0, 0.0}),
+                    Catch::Contains("thermocomp reference"));
+  CHECK(desk.give(CommandKind::reference) == nlohmann::json{{"done", true}});
+  CHECK_FALSE(desk.on_disk().reference_lost);
+  CHECK(desk.give(CommandKind::enable) == nlohmann::json{{"done", true}});
+}
+
+TEST_CASE("a reload that cannot be read leaves everything as it is", "[daemon]") {
+  Desk desk;
+  CHECK_THROWS(desk.operations.reload());
+  desk.operations.hang_up();  // the same, for the log
+  CHECK_FALSE(desk.operations.is_busy());
+  CHECK(desk.give(CommandKind::disable) == nlohmann::json{{"done", true}});
+}
+
+TEST_CASE("nobody has to ask for what was commanded to be saved", "[daemon]") {
+  Desk desk;
+  static_cast<void>(desk.operations.command({CommandKind::disable, 0, 0.0}));
+  desk.step();
+  desk.operations.poll();
+  CHECK_FALSE(desk.on_disk().state.enabled);
+}

@@ -1,0 +1,111 @@
+// With which state the daemon starts where its state file is gone or damaged.
+#include "daemon/start_state.hpp"
+
+#include <fstream>
+
+#include <catch2/catch.hpp>
+#include <sqlite3.h>
+
+#include "daemon/history/last_state.hpp"
+#include "daemon/state/state_file.hpp"
+#include "estimator/persistent_state.hpp"
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+
+namespace {
+
+DaemonConfig in_folder(const TempFolder& folder) {
+  DaemonConfig config;
+  config.state_file = folder / "state.json";
+  config.history.file = folder / "h.db";
+  return config;
+}
+
+/// The state that the machine had when the history ended.
+PersistentState record(const std::filesystem::path& file, unsigned seed, bool reloads) {
+  RecordedMachine machine(history_config(file), seed);
+  machine.start();
+  machine.run(5000);
+  if (reloads) {
+    machine.reload(3.0);
+    machine.run(2000);
+  }
+  machine.stop();
+  Report report = machine.estimator().make_report();
+  machine.estimator().report(report);
+  return persistent_state(machine.estimator(), report);
+}
+
+void damage_newest_segment(const std::filesystem::path& file) {
+  sqlite3* handle = nullptr;
+  REQUIRE(sqlite3_open(file.c_str(), &handle) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(handle,
+                       "UPDATE segment SET estimator_state = zeroblob(9) WHERE id ="
+                       " (SELECT max(id) FROM segment)",
+                       nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(handle);
+}
+
+}  // namespace
+
+TEST_CASE("the history ends with the state that the machine had", "[history]") {
+  const unsigned seed = GENERATE(range(0u, 8u));
+  const TempFolder folder;
+  const PersistentState state = record(folder / "h.db", seed, seed % 2 == 1);
+  const RecordedState recorded = last_recorded_state(folder / "h.db", parse_test_setup);
+  CHECK(recorded.has_run);
+  CHECK(recorded.is_newest);
+  REQUIRE(recorded.state);
+  CHECK_FALSE(must_be_saved(*recorded.state, state));
+  CHECK(recorded.state->offset_um == state.offset_um);
+}
+
+TEST_CASE("where the newest segment is damaged an older one is told as such", "[history]") {
+  const TempFolder folder;
+  static_cast<void>(record(folder / "h.db", 1, true));
+  damage_newest_segment(folder / "h.db");
+  const RecordedState recorded = last_recorded_state(folder / "h.db", parse_test_setup);
+  CHECK(recorded.state);
+  CHECK_FALSE(recorded.is_newest);
+  CHECK(recorded.problem.find("segment") == 0);
+}
+
+TEST_CASE("what was once a history is no first start, what never was is one", "[history]") {
+  const TempFolder folder;
+  CHECK_FALSE(last_recorded_state(folder / "h.db", parse_test_setup).has_run);
+  std::ofstream(folder / "h.db");
+  CHECK_FALSE(last_recorded_state(folder / "h.db", parse_test_setup).has_run);
+  std::ofstream(folder / "h.db") << "garbage, but once a history";
+  const RecordedState recorded = last_recorded_state(folder / "h.db", parse_test_setup);
+  CHECK(recorded.has_run);
+  CHECK_FALSE(recorded.state);
+}
+
+TEST_CASE("without state file and history it is the first start", "[state]") {
+  const TempFolder folder;
+  DaemonConfig config = in_folder(folder);
+  config.estimator.compensation.enabled_at_first_start = GENERATE(true, false);
+  const StartState start = find_start_state(config);
+  CHECK(start.state.enabled == config.estimator.compensation.enabled_at_first_start);
+  CHECK(start.warnings.empty());
+  CHECK_FALSE(start.reference_lost);
+}
+
+TEST_CASE("an unusable state file without a history keeps the machine off", "[state]") {
+  const TempFolder folder;
+  const DaemonConfig config = in_folder(folder);
+  std::ofstream(config.state_file) << "{";
+  StartState start = find_start_state(config);
+  CHECK_FALSE(start.state.enabled);
+  CHECK(start.reference_lost);
+  CHECK_FALSE(start.is_on_disk);
+  REQUIRE(start.warnings.size() == 1);
+  CHECK(start.warnings[0].find("cannot be used") != std::string::npos);
+  // And so does the file that is then written.
+  REQUIRE(save_state_file(config.state_file, start.state, start.reference_lost).empty());
+  start = find_start_state(config);
+  CHECK(start.reference_lost);
+  CHECK_FALSE(start.state.enabled);
+}

@@ -1,0 +1,87 @@
+// When the state is written, and what is known of it when it cannot be.
+#include "daemon/state/state_keeper.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "daemon/state/state_file.hpp"
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+using namespace std::chrono_literals;
+
+namespace {
+
+struct Kept {
+  TempFolder folder;
+  std::filesystem::path file = folder / "state.json";
+  StateKeeper::Clock::time_point now{1h};
+
+  [[nodiscard]] LoadedState on_disk() const { return load_state_file(file, {}); }
+};
+
+PersistentState with_offset(double offset_um) {
+  PersistentState state;
+  state.reference_degC = {{"bed_degC", 20.0}};
+  state.offset_um = {{"z", offset_um}};
+  return state;
+}
+
+}  // namespace
+
+TEST_CASE("offsets alone are written every ten seconds, a switch at once", "[state]") {
+  Kept kept;
+  StateKeeper keeper(kept.file, with_offset(1.0), true, false);
+  keeper.note(with_offset(1.0), kept.now);
+  CHECK_FALSE(kept.on_disk().found);
+  keeper.note(with_offset(2.0), kept.now);
+  CHECK(kept.on_disk().state.offset_um.at("z") == 2.0);
+  keeper.note(with_offset(3.0), kept.now + 9s);
+  CHECK(kept.on_disk().state.offset_um.at("z") == 2.0);
+  PersistentState off = with_offset(3.0);
+  off.enabled = false;
+  keeper.note(off, kept.now + 9s);
+  CHECK_FALSE(kept.on_disk().state.enabled);
+  off.offset_um["z"] = 4.0;
+  keeper.save(off, kept.now + 9s);
+  CHECK(kept.on_disk().state.offset_um.at("z") == 4.0);
+}
+
+TEST_CASE("a state that came from elsewhere is written even if nothing changes", "[state]") {
+  Kept kept;
+  StateKeeper keeper(kept.file, with_offset(1.0), false, false);
+  keeper.save(with_offset(1.0), kept.now);
+  CHECK(kept.on_disk().found);
+}
+
+TEST_CASE("what could not be written is tried again until it is", "[state]") {
+  Kept kept;
+  const std::filesystem::path in_the_way = kept.file.string() + ".new";
+  std::filesystem::create_directory(in_the_way);
+  StateKeeper keeper(kept.file, with_offset(1.0), true, false);
+  PersistentState off = with_offset(1.0);
+  off.enabled = false;
+  keeper.save(off, kept.now);
+  CHECK_FALSE(keeper.error().empty());
+  keeper.note(off, kept.now + 1s);
+  CHECK_FALSE(keeper.error().empty());
+  std::filesystem::remove(in_the_way);
+  keeper.note(off, kept.now + 2s);
+  CHECK(keeper.error().empty());
+  CHECK_FALSE(kept.on_disk().state.enabled);
+}
+
+TEST_CASE("a lost reference stays lost over restarts until one is taken", "[state]") {
+  Kept kept;
+  {
+    StateKeeper keeper(kept.file, with_offset(1.0), false, true);
+    keeper.save(with_offset(1.0), kept.now);
+  }
+  CHECK(kept.on_disk().reference_lost);
+  StateKeeper keeper(kept.file, kept.on_disk().state, true, kept.on_disk().reference_lost);
+  CHECK(keeper.is_reference_lost());
+  keeper.reference_taken();
+  keeper.save(with_offset(1.0), kept.now);
+  CHECK_FALSE(keeper.is_reference_lost());
+  CHECK_FALSE(kept.on_disk().reference_lost);
+}
