@@ -19,8 +19,8 @@
 #include "config/run_file.hpp"
 #include "config/toml_reader.hpp"
 #include "daemon/history/replay.hpp"
-#include "simulator/machine_file.hpp"
-#include "simulator/simulate.hpp"
+#include "simulator/files/machine_file.hpp"
+#include "simulator/plant/simulate.hpp"
 
 namespace thermocomp::cli {
 

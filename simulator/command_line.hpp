@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "simulator/session.hpp"
+#include "simulator/session/session.hpp"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the name is that of CLI11
 class App;

@@ -13,8 +13,8 @@
 #include <CLI/CLI.hpp>
 
 #include "simulator/command_line.hpp"
-#include "simulator/machine_file.hpp"
-#include "simulator/session.hpp"
+#include "simulator/files/machine_file.hpp"
+#include "simulator/session/session.hpp"
 
 namespace {
 

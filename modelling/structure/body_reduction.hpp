@@ -4,7 +4,7 @@
 
 #include "modelling/structure/heat_model.hpp"
 #include "modelling/structure/statics.hpp"
-#include "simulator/reduced_body.hpp"
+#include "simulator/plant/reduced_body.hpp"
 
 namespace thermocomp::structure {
 

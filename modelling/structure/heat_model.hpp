@@ -6,7 +6,7 @@
 
 #include "modelling/structure/conduction.hpp"
 #include "modelling/structure/structure_model.hpp"
-#include "simulator/reduced_body.hpp"
+#include "simulator/plant/reduced_body.hpp"
 
 namespace thermocomp::structure {
 

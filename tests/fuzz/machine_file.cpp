@@ -1,5 +1,5 @@
 /// The simulator's machine file: refused by name, or a machine whose body warms without surprises.
-#include "simulator/machine_file.hpp"
+#include "simulator/files/machine_file.hpp"
 
 #include <cmath>
 #include <string>

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "config/problems.hpp"
-#include "simulator/machine_file.hpp"
+#include "simulator/files/machine_file.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -5,7 +5,7 @@
 #include "config/model_file.hpp"
 #include "machines.hpp"
 #include "modelling/structure/body_reduction.hpp"
-#include "simulator/plant.hpp"
+#include "simulator/plant/plant.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::test;

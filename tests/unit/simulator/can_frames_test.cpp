@@ -5,8 +5,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "simulator/can_node.hpp"
-#include "simulator/can_places.hpp"
+#include "simulator/devices/can_node.hpp"
+#include "simulator/files/can_places.hpp"
 
 using namespace thermocomp;
 

@@ -6,8 +6,8 @@
 
 #include "drivers/can/canopen/canopen_line.hpp"
 #include "drivers/can/j1939/j1939_line.hpp"
-#include "simulator/canopen_slave.hpp"
-#include "simulator/j1939_sender.hpp"
+#include "simulator/devices/canopen_slave.hpp"
+#include "simulator/devices/j1939_sender.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -1,5 +1,5 @@
 // The machine file is read strictly, and the files that ship are right.
-#include "simulator/machine_file.hpp"
+#include "simulator/files/machine_file.hpp"
 
 #include <cmath>
 #include <cstdlib>
@@ -10,8 +10,8 @@
 #include <catch2/catch.hpp>
 
 #include "config/model_file.hpp"
-#include "simulator/plant.hpp"
-#include "simulator/simulate.hpp"
+#include "simulator/plant/plant.hpp"
+#include "simulator/plant/simulate.hpp"
 
 using namespace thermocomp;
 

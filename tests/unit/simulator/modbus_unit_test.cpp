@@ -1,5 +1,5 @@
 // A simulated unit's bytes, by the Modbus specification's own examples where it has some.
-#include "simulator/modbus_unit.hpp"
+#include "simulator/devices/modbus_unit.hpp"
 
 #include <cmath>
 #include <cstdint>
@@ -8,8 +8,8 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/modbus/register_codec.hpp"
-#include "simulator/modbus_frames.hpp"
-#include "simulator/seeded_noise.hpp"
+#include "simulator/devices/modbus_frames.hpp"
+#include "simulator/plant/seeded_noise.hpp"
 
 using namespace thermocomp;
 using Bytes = std::vector<std::uint8_t>;

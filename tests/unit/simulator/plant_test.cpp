@@ -1,14 +1,14 @@
 // The simulated body: heat goes where it should, and what is seen does not depend on who looks.
-#include "simulator/plant.hpp"
+#include "simulator/plant/plant.hpp"
 
 #include <cmath>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
-#include "simulator/machine_config.hpp"
-#include "simulator/simulate.hpp"
-#include "simulator/thermal_network.hpp"
+#include "simulator/plant/machine_config.hpp"
+#include "simulator/plant/simulate.hpp"
+#include "simulator/plant/thermal_network.hpp"
 
 using namespace thermocomp;
 

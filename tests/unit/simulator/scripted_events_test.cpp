@@ -1,11 +1,11 @@
 // The script of what goes wrong, and what the simulated controller does with offsets.
-#include "simulator/scripted_events.hpp"
+#include "simulator/plant/scripted_events.hpp"
 
 #include <cmath>
 
 #include <catch2/catch.hpp>
 
-#include "simulator/simulated_cnc.hpp"
+#include "simulator/devices/simulated_cnc.hpp"
 
 using namespace thermocomp;
 

@@ -1,0 +1,72 @@
+/// A simulated CANopen node: NMT, heartbeat, TPDO, SDO server, emergency messages. Pure.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "drivers/can/can_socket.hpp"
+#include "drivers/can/canopen/canopen_config.hpp"
+#include "simulator/plant/field_node_config.hpp"
+
+namespace thermocomp {
+
+class CanopenSlave {
+ public:
+  /// Switches it on: it is pre-operational after its boot-up message.
+  CanopenSlave(const SimulatedCanopenNode& config, nanoseconds now);
+
+  void take(const CanFrame& frame, nanoseconds now);
+  /// @param temps_degC  one a channel
+  void update(nanoseconds now, std::span<const double> temps_degC);
+  [[nodiscard]] std::optional<CanFrame> next_frame();
+
+ private:
+  using Key = std::pair<std::uint16_t, std::uint8_t>;
+  struct Shown {
+    std::optional<ChannelFault> fault;
+    std::optional<std::int64_t> code;
+  };
+
+  void boot(nanoseconds now);
+  void take_command(std::uint8_t command, nanoseconds now);
+  void take_request(std::span<const std::uint8_t> data);
+  void answer_read(ObjectAddress object);
+  void answer_write(ObjectAddress object, std::span<const std::uint8_t> data);
+  void answer_segment(bool toggle);
+  void abort(ObjectAddress object, std::uint32_t code);
+  void answer(std::uint8_t command, ObjectAddress object, std::uint64_t data);
+  /// A message of the node's own; `function` is the identifier without its number.
+  void put(std::uint32_t function, std::span<const std::uint8_t> data);
+  void send(std::uint32_t id, std::span<const std::uint8_t> data);
+  void show_value(std::size_t channel, double temp_degC, std::span<std::uint8_t> payload) const;
+  [[nodiscard]] Shown shown_of(std::size_t channel) const;
+  [[nodiscard]] std::optional<std::int64_t> status_of(std::size_t channel) const;
+  void measure(std::span<const double> temps_degC);
+  void tell_faults();
+  void send_values();
+  [[nodiscard]] bool is_now(const NodeEvent& event) const;
+  [[nodiscard]] bool happens(NodeEventKind kind) const;
+  /// The event that a channel shows now; nullptr: it measures.
+  [[nodiscard]] const NodeEvent* fault_of(std::size_t channel) const;
+  [[nodiscard]] std::uint64_t number_at(ObjectAddress object) const;
+
+  const SimulatedCanopenNode config_;
+  const nanoseconds switched_on_;
+  nanoseconds now_;
+  std::uint8_t state_{0};
+  std::map<Key, std::vector<std::uint8_t>> objects_;
+  std::vector<std::uint8_t> segments_;                        ///< left of a segmented read
+  std::vector<CanopenChannel> places_;                        ///< of the channels
+  std::map<std::uint32_t, std::vector<std::uint8_t>> tpdos_;  ///< by COB-ID
+  std::vector<std::uint8_t> emergencies_;  ///< told of each channel: 0, or byte 5 of the message
+  nanoseconds pdo_at_{};
+  nanoseconds heartbeat_at_{};
+  nanoseconds emergency_at_{};
+  bool synced_{false};
+  std::deque<CanFrame> frames_;
+};
+
+}  // namespace thermocomp

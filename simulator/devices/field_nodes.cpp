@@ -1,0 +1,122 @@
+#include "simulator/devices/field_nodes.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+namespace thermocomp {
+namespace {
+
+constexpr nanoseconds retry = std::chrono::milliseconds(200);
+
+template <class Channel>
+std::vector<std::size_t> find_columns(const std::vector<Channel>& channels, const std::string& user,
+                                      const std::vector<std::string>& columns,
+                                      const std::string& source) {
+  std::vector<std::size_t> found;
+  for (const Channel& channel : channels) {
+    const auto place = std::find(columns.begin(), columns.end(), channel.column);
+    if (place == columns.end()) {
+      std::string text = source;
+      text.append(": has no column ").append(channel.column).append(", which ");
+      text.append(user).append(" shows");
+      throw std::runtime_error(text);
+    }
+    found.push_back(static_cast<std::size_t>(place - columns.begin()));
+  }
+  return found;
+}
+
+}  // namespace
+
+/// One of the two, a socket, and where its values stand in a row.
+struct FieldNodes::Node {
+  Node(std::string node_name, std::string on, std::vector<std::size_t> shown)
+      : name(std::move(node_name)),
+        interface(std::move(on)),
+        columns(std::move(shown)),
+        temps_degC(columns.size()),
+        socket(interface, {}) {
+    for (const bool extended : {false, true}) socket.also_want({{0, extended}, 0});
+    socket.open();
+  }
+
+  void take(const CanFrame& frame, nanoseconds now) {
+    if (canopen) canopen->take(frame, now);
+    if (j1939) j1939->take(frame);
+  }
+  void update(nanoseconds now, std::span<const double> row) {
+    for (std::size_t i = 0; i < columns.size(); ++i) temps_degC[i] = row[columns[i]];
+    if (canopen) canopen->update(now, temps_degC);
+    if (j1939) j1939->update(now, temps_degC);
+  }
+  std::optional<CanFrame> next_frame() {
+    if (canopen) return canopen->next_frame();
+    return j1939 ? j1939->next_frame() : std::nullopt;
+  }
+
+  std::string name;
+  std::string interface;
+  std::vector<std::size_t> columns;
+  std::vector<double> temps_degC;
+  CanSocket socket;
+  bool measured{false};
+  nanoseconds tried_at{};
+  std::optional<SimulatedCanopenNode> as_canopen;
+  std::optional<SimulatedJ1939Node> as_j1939;
+  std::optional<CanopenSlave> canopen;
+  std::optional<J1939Sender> j1939;
+};
+
+FieldNodes::FieldNodes(const MachineConfig& config, const std::vector<std::string>& columns,
+                       const std::string& source) {
+  for (const SimulatedCanopenNode& node : config.canopen_nodes) {
+    const auto shown = find_columns(node.channels, node.name, columns, source);
+    nodes_.push_back(std::make_unique<Node>(node.name, node.interface, shown));
+    nodes_.back()->as_canopen = node;
+  }
+  for (const SimulatedJ1939Node& node : config.j1939_nodes) {
+    const auto shown = find_columns(node.channels, node.name, columns, source);
+    nodes_.push_back(std::make_unique<Node>(node.name, node.interface, shown));
+    nodes_.back()->as_j1939 = node;
+  }
+}
+
+FieldNodes::~FieldNodes() = default;
+
+void FieldNodes::switch_on(nanoseconds now) {
+  for (const auto& node : nodes_) {
+    if (node->as_canopen) node->canopen.emplace(*node->as_canopen, now);
+    if (node->as_j1939) node->j1939.emplace(*node->as_j1939, now);
+  }
+}
+
+std::vector<FieldNodes::Place> FieldNodes::places() const {
+  std::vector<Place> places;
+  for (const auto& node : nodes_) {
+    places.push_back(
+        {node->name, node->interface, node->socket.is_open() ? "" : node->socket.error()});
+  }
+  return places;
+}
+
+void FieldNodes::update(nanoseconds now, std::span<const double> row) {
+  for (const auto& node : nodes_) {
+    if (!node->socket.is_open() && now >= node->tried_at + retry) {
+      node->tried_at = now;
+      node->socket.open();
+    }
+    // Before its first look at the temperatures a node has none to answer with.
+    if (!std::exchange(node->measured, true)) node->update(now, row);
+    while (node->socket.is_open()) {
+      const auto frames = node->socket.receive();
+      for (const CanFrame& frame : frames) node->take(frame, now);
+      if (frames.size() < CanSocket::batch_max) break;
+    }
+    node->update(now, row);
+    while (const auto frame = node->next_frame()) node->socket.send(*frame);
+  }
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,40 @@
+/// The simulated CANopen and J1939 nodes on their interfaces.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/can/can_socket.hpp"
+#include "simulator/devices/canopen_slave.hpp"
+#include "simulator/devices/j1939_sender.hpp"
+#include "simulator/plant/machine_config.hpp"
+
+namespace thermocomp {
+
+class FieldNodes {
+ public:
+  /// @throws std::runtime_error for a column that is missing
+  FieldNodes(const MachineConfig& config, const std::vector<std::string>& columns,
+             const std::string& source);
+  ~FieldNodes();
+
+  /// Their lives, and with them the times of their events, begin.
+  void switch_on(nanoseconds now);
+  /// Where each node is, for the line that says that the simulator is ready.
+  struct Place {
+    std::string name;
+    std::string interface;
+    std::string unavailable;  ///< why its interface is not there; else empty
+  };
+  [[nodiscard]] std::vector<Place> places() const;
+  /// @param row  one value a column; nothing happens before switch_on()
+  void update(nanoseconds now, std::span<const double> row);
+
+ private:
+  struct Node;
+  std::vector<std::unique_ptr<Node>> nodes_;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,506 @@
+#include <algorithm>
+#include <map>
+
+#include "config/sections/presets.hpp"
+#include "drivers/modbus/register_codec.hpp"
+#include "estimator/checks.hpp"
+#include "simulator/files/can_places.hpp"
+#include "simulator/files/fault_codes.hpp"
+#include "simulator/files/machine_file_parts.hpp"
+#include "simulator/plant/scripted_events.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr double large = 1e9;
+
+const Names<ModbusTable> table_names{{"coil", ModbusTable::coil},
+                                     {"discrete_input", ModbusTable::discrete_input},
+                                     {"holding", ModbusTable::holding},
+                                     {"input", ModbusTable::input}};
+const Names<Encoding> encoding_names{
+    {"int16", Encoding::int16},   {"uint16", Encoding::uint16},   {"int32", Encoding::int32},
+    {"uint32", Encoding::uint32}, {"float32", Encoding::float32}, {"float64", Encoding::float64}};
+const Names<WordOrder> order_names{{"ABCD", WordOrder::abcd},
+                                   {"DCBA", WordOrder::dcba},
+                                   {"BADC", WordOrder::badc},
+                                   {"CDAB", WordOrder::cdab}};
+
+/// Which words of a unit's tables, or bits of a frame, are taken: two values must not share any.
+class Occupied {
+ public:
+  /// @return whether all of them were free; takes them
+  bool take(int unit, ModbusTable table, std::size_t address, std::size_t count,
+            std::uint16_t mask = 0xFFFF) {
+    return words_.take(unit, table, address, count, mask);
+  }
+  bool take(const CanSignal& signal) { return frames_.take(signal); }
+  bool take(const CanSignal& signal, const CanField& counter) {
+    return frames_.take(signal, counter);
+  }
+
+ private:
+  RegistersTaken words_;
+  FramesTaken frames_;
+};
+
+SimulatedBus read_link(const TomlTable& table, SimulatedBusKind kind) {
+  SimulatedBus bus;
+  bus.kind = kind;
+  switch (kind) {
+    case SimulatedBusKind::modbus_tcp:
+      bus.host = table.text("host", bus.host);
+      bus.port = table.integer("port", 0, 65535, 0);
+      break;
+    case SimulatedBusKind::modbus_rtu:
+      bus.device = table.text("device");
+      bus.baud = table.integer("baud", 300, 4'000'000, bus.baud);
+      bus.line_delay = table.flag("line_delay", false);
+      break;
+    case SimulatedBusKind::can:
+      bus.interface = table.text("interface");
+      return bus;
+  }
+  bus.turnaround_ms = table.number("turnaround_ms", Range::between(0.0, 10000.0), 0.0);
+  return bus;
+}
+
+const Names<SimulatedBusKind> bus_kind_names{{"modbus_tcp", SimulatedBusKind::modbus_tcp},
+                                             {"modbus_rtu", SimulatedBusKind::modbus_rtu},
+                                             {"can", SimulatedBusKind::can}};
+
+/// A value's place in registers; what the table leaves out comes from `defaults`.
+ModbusValue read_place(const TomlTable& table, const ModbusValue& defaults) {
+  ModbusValue value;
+  value.table = table.choice("table", table_names, defaults.table);
+  value.address = table.integer<std::uint16_t>("address", 0, 65535);
+  value.encoding = table.choice("encoding", encoding_names, defaults.encoding);
+  value.word_order = table.choice("word_order", order_names, defaults.word_order);
+  value.scale = table.number("scale", Range::between(-1e6, 1e6), defaults.scale);
+  if (value.scale == 0.0) table.problem("scale", "must not be 0");
+  const std::size_t words = words_of(value.table, value.encoding);
+  if (value.address + words > 65536) table.problem("address", "has its last register beyond 65535");
+  return value;
+}
+
+/// Codes of any encoding; whether a channel's own can express them is looked at there.
+FaultCodes read_codes(const TomlTable& table) {
+  return read_fault_codes(table, -4294967296LL, 4294967295LL);
+}
+
+/// What is gathered while the file is read.
+struct Draft {
+  MachineConfig& machine;
+  NameList buses;
+  NameList devices;
+  NameList channels;
+  std::vector<std::pair<std::size_t, std::size_t>> channel_places;  ///< device, channel in it
+  std::vector<std::string> columns;                                 ///< of the plant
+  std::map<std::size_t, Occupied> occupied;                         ///< by bus
+};
+
+/// The register keys that a device gives its channels as defaults.
+struct DeviceDefaults {
+  ModbusValue place;
+  double offset_degC{0.0};
+  FaultCodes codes;
+  int base_address{0};  ///< added to the addresses of all registers
+  TomlTable table;      ///< over its preset, if it has one
+  const sections::Preset* preset{nullptr};
+};
+
+void check_column(const Draft& state, const TomlTable& table, std::string_view key,
+                  const std::string& column) {
+  if (!state.machine.plant) return;  // a replayed file has its own columns
+  const auto& columns = state.columns;
+  if (std::find(columns.begin(), columns.end(), column) != columns.end()) return;
+  std::string rule = "must be a column of the plant";
+  const std::string near = nearest_name(column, columns);
+  if (!near.empty()) rule += "; did you mean \"" + near + "\"?";
+  table.problem(key, rule);
+}
+
+void take(Draft& state, std::size_t bus, int unit, const ModbusValue& value, const TomlTable& table,
+          std::uint16_t mask = 0xFFFF) {
+  if (!state.occupied[bus].take(unit, value.table, value.address,
+                                words_of(value.table, value.encoding), mask)) {
+    table.problem(table.has("channel") ? "channel" : "address",
+                  "shares a register with another value of this unit");
+  }
+}
+
+void take(Draft& state, std::size_t bus, const CanSignal& signal, const TomlTable& table) {
+  if (!state.occupied[bus].take(signal)) {
+    table.problem("start_bit", "shares a bit with another value of this frame");
+  }
+}
+
+/// The device over its preset, if it names one that can be read.
+DeviceDefaults find_preset(sections::Presets& presets, const TomlTable& own, bool can) {
+  DeviceDefaults defaults{{}, 0.0, {}, 0, own, presets.of_device(own)};
+  if (defaults.preset == nullptr) return defaults;
+  defaults.table = sections::Presets::over_preset(own, *defaults.preset, can ? "can" : "modbus");
+  return defaults;
+}
+
+DeviceDefaults read_device(Draft& state, const TomlTable& own, sections::Presets& presets) {
+  SimulatedDevice device;
+  device.name = state.devices.read(own);
+  device.bus = state.buses.index(own, "bus", "bus");
+  device.period_s = own.number("period_s", Range::between(0.001, 3600.0), device.period_s);
+  const bool can =
+      !state.machine.buses.empty() && state.machine.buses[device.bus].kind == SimulatedBusKind::can;
+  DeviceDefaults defaults = find_preset(presets, own, can);
+  const TomlTable& table = defaults.table;
+  defaults.place.table = ModbusTable::input;
+  if (!can) {
+    device.unit = table.integer("unit", 0, 255);
+    const bool used = std::any_of(
+        state.machine.devices.begin(), state.machine.devices.end(),
+        [&](const auto& other) { return other.bus == device.bus && other.unit == device.unit; });
+    if (used) table.problem("unit", "is used by another device of this bus");
+    defaults.place.table = table.choice("table", table_names, defaults.place.table);
+    defaults.place.encoding = table.choice("encoding", encoding_names, defaults.place.encoding);
+    defaults.place.word_order = table.choice("word_order", order_names, WordOrder::abcd);
+    defaults.place.scale = table.number("scale", Range::between(-1e6, 1e6), 1.0);
+    if (defaults.place.scale == 0.0) table.problem("scale", "must not be 0");
+    defaults.offset_degC = table.number("offset_degC", Range::between(-1e6, 1e6), 0.0);
+    defaults.codes = read_codes(table);
+    defaults.base_address = table.integer("base_address", 0, 65535, 0);
+    if (table.has("renewal")) {
+      const TomlTable renewal = table.table("renewal");
+      ModbusValue value;
+      value.table = renewal.choice("table", table_names, ModbusTable::input);
+      value.address = renewal.integer<std::uint16_t>("address", 0, 65535);
+      device.renewal = ModbusRenewal{value.table, value.address};
+      take(state, device.bus, device.unit, value, renewal);
+    }
+  }
+  state.machine.devices.push_back(device);
+  return defaults;
+}
+
+/// Adds the device's first register; what would pass the last one is a problem.
+std::uint16_t moved(const TomlTable& table, std::uint16_t address, int base_address) {
+  if (address + base_address <= 65535) return static_cast<std::uint16_t>(address + base_address);
+  table.problem("address", "would pass register 65535 with the device's base_address");
+  return address;
+}
+
+void check_codes(const TomlTable& table, const SimulatedChannel& channel) {
+  for (const auto& [fault, codes] : channel.codes) {
+    for (const std::int64_t code : codes) {
+      if (is_representable(code, channel.place.encoding)) continue;
+      table.problem("open_circuit_codes", std::to_string(code),
+                    "cannot be expressed in the channel's encoding");
+    }
+  }
+}
+
+void read_registers(Draft& state, const TomlTable& table, const DeviceDefaults& defaults,
+                    const SimulatedDevice& device, SimulatedChannel& channel) {
+  channel.place = read_place(table, defaults.place);
+  channel.place.address = moved(table, channel.place.address, defaults.base_address);
+  channel.offset_degC =
+      table.number("offset_degC", Range::between(-1e6, 1e6), defaults.offset_degC);
+  channel.codes = defaults.codes;
+  for (const auto& [fault, codes] : read_codes(table)) channel.codes[fault] = codes;
+  check_codes(table, channel);
+  take(state, device.bus, device.unit, channel.place, table);
+  if (!table.has("status")) return;
+  const TomlTable status = table.table("status");
+  channel.status = read_simulated_status(status);
+  ModbusValue word;
+  word.table = channel.status->table;
+  if (!is_bit_table(word.table)) {
+    channel.status->address = moved(status, channel.status->address, defaults.base_address);
+  }
+  word.address = channel.status->address;
+  take(state, device.bus, device.unit, word, status, channel.status->mask);
+}
+
+void read_channel(Draft& state, const TomlTable& own, const std::vector<DeviceDefaults>& defaults) {
+  SimulatedChannel channel;
+  channel.name = state.channels.read(own);
+  const std::size_t index = state.devices.index(own, "device", "device");
+  channel.column = own.text("column", channel.name + "_degC");
+  check_column(state, own, own.has("column") ? "column" : "name", channel.column);
+  if (state.machine.devices.empty()) return own.ignore_rest();
+  const sections::Preset* preset = defaults[index].preset;
+  const TomlTable table =
+      preset == nullptr ? own
+                        : sections::Presets::over_channel(own, defaults[index].table, *preset);
+  SimulatedDevice& device = state.machine.devices[index];
+  state.channel_places.emplace_back(index, device.channels.size());
+  if (state.machine.buses[device.bus].kind == SimulatedBusKind::can) {
+    const TomlTable full = preset == nullptr ? table : table.over(defaults[index].table);
+    channel.can = read_can(full, CanUse::temperature);
+    channel.codes = read_codes(full);
+    if (full.has("status")) channel.can_status = read_can_status_codes(full.table("status"));
+    take(state, device.bus, channel.can, table);
+    if (channel.can.status &&
+        !state.occupied[device.bus].take(channel.can, channel.can.status->field)) {
+      table.problem("status", "shares a bit with another value of this frame");
+    }
+    channel.counter = read_counter(table, channel.can);
+    if (channel.counter && !state.occupied[device.bus].take(channel.can, *channel.counter)) {
+      table.problem("counter", "shares a bit with another value of this frame");
+    }
+  } else {
+    read_registers(state, table, defaults[index], device, channel);
+  }
+  device.channels.push_back(channel);
+}
+
+/// Controllers: a value's place in registers or in frames.
+template <class Registers, class Frame>
+void read_value(Draft& state, const TomlTable& table, ModbusTable usual, std::size_t bus,
+                Registers& registers, Frame& frame, CanUse use = CanUse::signal) {
+  if (state.machine.controller->bus.kind == SimulatedBusKind::can) {
+    frame = read_can(table, use);
+    CanSignal signal = frame.value_or(CanSignal{});
+    take(state, bus, signal, table);
+    return;
+  }
+  ModbusValue defaults;
+  defaults.table = usual;
+  registers = read_place(table, defaults);
+  take(state, bus, state.machine.controller->unit, *registers, table);
+}
+
+void read_axis(Draft& state, const TomlTable& table, NameList& axes, std::size_t bus) {
+  SimulatedAxis axis;
+  axis.name = axes.read(table);
+  axis.output = table.text("output");
+  check_column(state, table, "output", axis.output);
+  const auto& others = state.machine.controller->axes;
+  if (std::any_of(others.begin(), others.end(),
+                  [&](const auto& other) { return other.output == axis.output; })) {
+    table.problem("output", "is used by another axis");
+  }
+  axis.sign = table.number("sign", Range::between(-1.0, 1.0), 1.0);
+  if (axis.sign != 1.0 && axis.sign != -1.0) table.problem("sign", "must be 1 or -1");
+  axis.offset_um_max = table.number("offset_um_max", Range::between(0.0, 1e6), 0.0);
+  axis.rate_um_per_s_max = table.number("rate_um_per_s_max", Range::between(0.0, 1e6), 0.0);
+  std::optional<ModbusValue> registers;
+  std::optional<CanSignal> frame;
+  read_value(state, table.table("offset"), ModbusTable::holding, bus, registers, frame);
+  axis.offset = registers.value_or(ModbusValue{});
+  axis.can_offset = frame.value_or(CanSignal{});
+  if (table.has("applied")) {
+    read_value(state, table.table("applied"), ModbusTable::input, bus, axis.applied,
+               axis.can_applied);
+  }
+  state.machine.controller->axes.push_back(axis);
+}
+
+void read_controller_signal(Draft& state, const TomlTable& table, NameList& names,
+                            std::size_t bus) {
+  SimulatedControllerSignal signal;
+  signal.name = names.read(table);
+  if (table.has("value")) signal.value = table.number("value", Range::between(-large, large));
+  if (!signal.value) check_column(state, table, "name", signal.name);
+  std::optional<ModbusValue> registers;
+  std::optional<CanSignal> frame;
+  read_value(state, table, ModbusTable::input, bus, registers, frame);
+  signal.place = registers.value_or(ModbusValue{});
+  signal.can = frame.value_or(CanSignal{});
+  state.machine.controller->signals.push_back(signal);
+}
+
+void read_controller(Draft& state, const TomlTable& root) {
+  const TomlTable table = root.table("controller");
+  state.machine.controller.emplace();
+  SimulatedController& controller = *state.machine.controller;
+  const auto kind = table.choice("kind", bus_kind_names);
+  controller.bus = read_link(table, kind);
+  controller.bus.name = state.buses.read(table);
+  const std::size_t bus = state.buses.names().size() - 1;
+  if (kind == SimulatedBusKind::can) {
+    controller.period_s =
+        table.number("period_s", Range::between(0.001, 3600.0), controller.period_s);
+  } else {
+    controller.unit = table.integer("unit", 0, 255, 1);
+  }
+  controller.tau_s = table.number("tau_s", Range::between(0.0, 1e6), 0.0);
+  controller.heartbeat_timeout_s =
+      table.number("heartbeat_timeout_s", Range::between(0.0, 1e6), controller.heartbeat_timeout_s);
+  if (table.has("valid_bits")) {
+    read_value(state, table.table("valid_bits"), ModbusTable::holding, bus, controller.valid_bits,
+               controller.can_valid_bits, CanUse::bits);
+  }
+  if (table.has("heartbeat")) {
+    read_value(state, table.table("heartbeat"), ModbusTable::holding, bus, controller.heartbeat,
+               controller.can_heartbeat, CanUse::bits);
+  }
+  NameList names;
+  for (const TomlTable& entry : table.tables("signal")) {
+    read_controller_signal(state, entry, names, bus);
+  }
+  NameList axes;
+  for (const TomlTable& entry : root.tables("axis")) read_axis(state, entry, axes, bus);
+  if (controller.axes.size() > axes_max) table.problem("axis", "must be at most 16");
+}
+
+void read_target(const Draft& state, const TomlTable& table, EventConfig& event) {
+  const std::string name = table.text("target");
+  const auto place = [&](const std::vector<std::string>& names) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    return found == names.end() ? std::optional<std::size_t>{}
+                                : std::optional(static_cast<std::size_t>(found - names.begin()));
+  };
+  if (const auto channel = place(state.channels.names())) {
+    event.target = TargetKind::channel;
+    if (*channel < state.channel_places.size()) {
+      std::tie(event.device, event.channel) = state.channel_places[*channel];
+    }
+  } else if (const auto device = place(state.devices.names())) {
+    event.target = TargetKind::device;
+    event.device = *device;
+  } else if (state.machine.controller && name == state.machine.controller->bus.name) {
+    event.target = TargetKind::controller;
+  } else if (const auto bus = place(state.buses.names())) {
+    event.target = TargetKind::bus;
+    event.bus = *bus;
+  } else {
+    table.problem("target", "must name a channel, a device, a bus or the controller");
+  }
+}
+
+/// Which sorts of target an event may have.
+bool fits(EventKind kind, TargetKind target, bool can) {
+  switch (kind) {
+    case EventKind::open_circuit:
+    case EventKind::short_circuit:
+    case EventKind::over_range:
+    case EventKind::under_range:
+    case EventKind::channel_error:
+    case EventKind::spike:
+    case EventKind::drift:
+      return target == TargetKind::channel;
+    case EventKind::freeze:
+      return target == TargetKind::channel || target == TargetKind::device;
+    case EventKind::drop:
+    case EventKind::reboot:
+      return target != TargetKind::channel;
+    case EventKind::delay:
+    case EventKind::garbage:
+    case EventKind::exception:
+      return target != TargetKind::channel && !can;
+    case EventKind::reject:
+    case EventKind::misapply:
+    case EventKind::rehome:
+      return target == TargetKind::controller;
+  }
+  return false;
+}
+
+bool on_can(const Draft& state, const EventConfig& event) {
+  const MachineConfig& machine = state.machine;
+  if (event.target == TargetKind::controller) {
+    return machine.controller->bus.kind == SimulatedBusKind::can;
+  }
+  const std::size_t bus = event.target == TargetKind::bus || machine.devices.empty()
+                              ? event.bus
+                              : machine.devices[event.device].bus;
+  return bus < machine.buses.size() && machine.buses[bus].kind == SimulatedBusKind::can;
+}
+
+/// A channel can only be made to show what its device has a code for; any can have an open circuit.
+void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& event) {
+  const auto fault = channel_fault(event.kind);
+  if (!fault || event.target != TargetKind::channel || state.machine.devices.empty()) return;
+  const auto& channels = state.machine.devices[event.device].channels;
+  if (event.channel >= channels.size()) return;  // refused already
+  const SimulatedChannel& channel = channels[event.channel];
+  const auto has = [&](const FaultCodes& codes) { return codes.contains(*fault); };
+  if (!has(channel.codes) && !(channel.status && has(channel.status->codes)) &&
+      !has(channel.can_status.codes) && *fault != ChannelFault::open_circuit) {
+    table.problem("kind", "the channel's device has no code for it");
+  }
+  if (!table.has("code")) return;
+  event.channel_code =
+      table.integer<std::int64_t>("code", -4294967296LL, std::int64_t{4294967295LL});
+  const auto lists = [&](const FaultCodes& codes) {
+    const auto found = codes.find(*fault);
+    return found != codes.end() && std::find(found->second.begin(), found->second.end(),
+                                             *event.channel_code) != found->second.end();
+  };
+  if (!lists(channel.codes) && !(channel.status && lists(channel.status->codes)) &&
+      !lists(channel.can_status.codes)) {
+    table.problem("code", "must be one that the channel's device has for it");
+  }
+}
+
+EventConfig read_event(const Draft& state, const TomlTable& table) {
+  EventConfig event;
+  event.kind = table.choice<EventKind>("kind", {{"open_circuit", EventKind::open_circuit},
+                                                {"short_circuit", EventKind::short_circuit},
+                                                {"over_range", EventKind::over_range},
+                                                {"under_range", EventKind::under_range},
+                                                {"channel_error", EventKind::channel_error},
+                                                {"freeze", EventKind::freeze},
+                                                {"spike", EventKind::spike},
+                                                {"drift", EventKind::drift},
+                                                {"drop", EventKind::drop},
+                                                {"delay", EventKind::delay},
+                                                {"garbage", EventKind::garbage},
+                                                {"exception", EventKind::exception},
+                                                {"reboot", EventKind::reboot},
+                                                {"reject", EventKind::reject},
+                                                {"misapply", EventKind::misapply},
+                                                {"rehome", EventKind::rehome}});
+  event.at_s = table.number("at_s", Range::between(0.0, large));
+  read_target(state, table, event);
+  if (event.kind != EventKind::rehome) {
+    event.duration_s = table.number("duration_s", Range::above(0.0, large));
+  }
+  if (event.kind == EventKind::spike) {
+    event.change_K = table.number("change_K", Range::between(-1e4, 1e4));
+  }
+  if (event.kind == EventKind::misapply) {
+    event.change_um = table.number("change_um", Range::between(-1e4, 1e4));
+  }
+  if (event.kind == EventKind::drift) {
+    event.rate_K_per_h = table.number("rate_K_per_h", Range::between(-1e6, 1e6));
+  }
+  if (event.kind == EventKind::delay) {
+    event.delay_ms = table.number("delay_ms", Range::above(0.0, 1e6));
+  }
+  read_channel_code(state, table, event);
+  if (event.kind == EventKind::exception) event.code = table.integer("code", 1, 255, 6);
+  if (!fits(event.kind, event.target, on_can(state, event))) {
+    table.problem("kind", "cannot happen to such a target");
+  }
+  return event;
+}
+
+}  // namespace
+
+void read_devices(const TomlTable& root, sections::Presets& presets, MachineConfig& machine) {
+  Draft state{machine, {}, {}, {}, {}, {}, {}};
+  if (machine.plant) state.columns = plant_columns(*machine.plant);
+  for (const TomlTable& table : root.tables("bus")) {
+    SimulatedBus bus = read_link(table, table.choice("kind", bus_kind_names));
+    bus.name = state.buses.read(table);
+    machine.buses.push_back(bus);
+  }
+  std::vector<DeviceDefaults> defaults;
+  for (const TomlTable& table : root.tables("device")) {
+    defaults.push_back(read_device(state, table, presets));
+  }
+  if (machine.buses.empty()) {
+    machine.devices.clear();  // each was refused already: it names no bus
+  }
+  for (const TomlTable& table : root.tables("channel")) read_channel(state, table, defaults);
+  if (root.has("controller")) {
+    read_controller(state, root);
+  } else if (root.has("axis")) {
+    root.problem("axis", "needs a [controller]");
+  }
+  for (const TomlTable& table : root.tables("event")) {
+    machine.events.push_back(read_event(state, table));
+  }
+}
+
+}  // namespace thermocomp

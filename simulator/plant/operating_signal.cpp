@@ -1,0 +1,57 @@
+#include "simulator/plant/operating_signal.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimator/checks.hpp"
+#include "simulator/plant/seeded_noise.hpp"
+
+namespace thermocomp {
+
+OperatingSignal::OperatingSignal(const SignalConfig& config, std::uint64_t seed,
+                                 std::uint64_t stream)
+    : config_(config), seed_(seed), stream_(stream) {
+  const bool from_list = config.kind == SignalKind::steps || config.kind == SignalKind::random;
+  THERMOCOMP_ENSURE(!from_list || !config.values.empty());
+  THERMOCOMP_ENSURE(config.kind != SignalKind::steps ||
+                    config.times_s.size() == config.values.size());
+  THERMOCOMP_ENSURE(config.kind != SignalKind::random || config.dwell_s_min > 0.0);
+}
+
+double OperatingSignal::value(double time_s, double watched) {
+  switch (config_.kind) {
+    case SignalKind::steps:
+      return step_value(time_s);
+    case SignalKind::random:
+      return random_value(time_s);
+    case SignalKind::sine:
+      return config_.centre +
+             config_.amplitude * std::sin(2.0 * std::numbers::pi * time_s / config_.period_s);
+    case SignalKind::while_above:
+      return watched > config_.above ? 1.0 : 0.0;
+  }
+  return 0.0;
+}
+
+double OperatingSignal::step_value(double time_s) const {
+  const double t = config_.repeat_s > 0.0 ? std::fmod(time_s, config_.repeat_s) : time_s;
+  const auto next = std::upper_bound(config_.times_s.begin(), config_.times_s.end(), t);
+  const auto index = std::max<std::ptrdiff_t>(1, next - config_.times_s.begin()) - 1;
+  return config_.values[static_cast<std::size_t>(index)];
+}
+
+double OperatingSignal::random_value(double time_s) {
+  while (changes_s_.empty() || changes_s_.back() <= time_s) {
+    const double from = changes_s_.empty() ? 0.0 : changes_s_.back();
+    const double u = seeded_uniform(seed_, stream_, 2 * changes_s_.size());
+    changes_s_.push_back(from + config_.dwell_s_min +
+                         u * (config_.dwell_s_max - config_.dwell_s_min));
+  }
+  const auto piece = static_cast<std::uint64_t>(
+      std::upper_bound(changes_s_.begin(), changes_s_.end(), time_s) - changes_s_.begin());
+  const std::uint64_t bits = seeded_bits(seed_, stream_, 2 * piece + 1);
+  return config_.values[bits % config_.values.size()];
+}
+
+}  // namespace thermocomp

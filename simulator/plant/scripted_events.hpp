@@ -1,0 +1,48 @@
+/// What the script of events does to channels, units and controller at a plant time. Pure.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "simulator/plant/machine_config.hpp"
+
+namespace thermocomp {
+
+struct ChannelEffect {
+  std::optional<ChannelFault> fault;
+  std::optional<std::int64_t> code;  ///< none: the first that the device has for the fault
+  bool frozen{false};
+  double added_K{0.0};
+};
+
+/// What befalls a bus, a device or the controller.
+struct UnitEffect {
+  bool silent{false};  ///< drop
+  bool down{false};    ///< reboot
+  bool garbage{false};
+  bool frozen{false};
+  double delay_ms{0.0};
+  std::optional<int> exception;
+};
+
+struct ControllerEffect {
+  bool rejects{false};
+  double misapplied_um{0.0};
+  std::size_t rehomings{0};  ///< so many times until now
+};
+
+struct Effects {
+  std::vector<std::vector<ChannelEffect>> channels;  ///< (devices, channels of the device)
+  std::vector<UnitEffect> devices;
+  std::vector<UnitEffect> buses;
+  UnitEffect controller_unit;
+  ControllerEffect controller;
+};
+
+/// The fault of a channel that an event of this kind is; none for all other kinds.
+[[nodiscard]] std::optional<ChannelFault> channel_fault(EventKind kind);
+
+/// An event is in force from at_s until before at_s + duration_s.
+[[nodiscard]] Effects effects_at(const MachineConfig& machine, double plant_time_s);
+
+}  // namespace thermocomp

@@ -1,0 +1,19 @@
+/// A simulated machine's run, as columns of a run file.
+#pragma once
+
+#include <cstdint>
+
+#include "config/run_file.hpp"
+#include "simulator/plant/machine_config.hpp"
+
+namespace thermocomp {
+
+/// Columns: time_s, operating signals and positions, thermocouples (*_degC, as measured),
+/// displacements (*_um, as an indicator with the output's noise_um would show them).
+/// One sample every machine.pitch_s of plant time from 0 up to and including `duration_s`.
+/// The same machine and seed give the same run, bit for bit. Events are not applied: they belong
+/// to the devices.
+/// @pre machine.plant is there, duration_s >= 0 (checked)
+[[nodiscard]] RunFile simulate(const MachineConfig& machine, double duration_s, std::uint64_t seed);
+
+}  // namespace thermocomp
