@@ -63,11 +63,6 @@ constexpr const char* columns_of_segment =
 
 }  // namespace
 
-std::string to_string(const HistoryDamage& damage) {
-  return damage.segment == 0 ? damage.why
-                             : "segment " + std::to_string(damage.segment) + ": " + damage.why;
-}
-
 struct HistoryReader::Parts {
   explicit Parts(const std::filesystem::path& path)
       : file(path), database(path, DatabaseMode::read_only) {}

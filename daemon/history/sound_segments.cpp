@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/history/history_error.hpp"
+
 namespace thermocomp {
 namespace {
 
@@ -59,6 +61,11 @@ std::int64_t likely_wall_ns(const std::vector<SegmentInfo>& segments, std::size_
 }
 
 }  // namespace
+
+std::string to_string(const HistoryDamage& damage) {
+  return damage.segment == 0 ? damage.why
+                             : "segment " + std::to_string(damage.segment) + ": " + damage.why;
+}
 
 void check_times(const SegmentInfo& segment) {
   const std::int64_t period_ns = segment.grid.period.count();

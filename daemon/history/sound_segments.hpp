@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/history/history_reader.hpp"
+#include "daemon/history/segment_info.hpp"
 
 namespace thermocomp {
 
