@@ -64,6 +64,7 @@ def run_lie(rig, make, likely):
             return
         if hasattr(rig.machine.slave, "report_to"):
             rig.machine.slave.report_to(rig.daemon.socket)
+        rig.must(eventually(lambda: None not in rig.daemon.references()), "no reference is taken")
     elif not rig.start(BEFORE_UM):
         return
     rig.machine.wants_um(WANTED_UM)
@@ -218,6 +219,7 @@ def applied_cannot_be_read(rig):
     registers.refused = lambda function, *_: 2 if function == 4 else 0
     if not rig.must(rig.daemon.start(), "the daemon does not start"):
         return
+    rig.must(eventually(lambda: None not in rig.daemon.references()), "no reference is taken")
     rig.machine.wants_um(WANTED_UM)
     time.sleep(2.0)
     rig.must(not rig.axis.writes, "driven without ever having been read")
