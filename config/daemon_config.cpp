@@ -212,7 +212,11 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
   if (!model_table.has("file")) model_table.problem("file", "must be given");
   const sections::BindingTables tables =
       read_daemon(root, folder, presets, dbc_files, eds_files, config);
-  if (files == Files::opened) check_files(root, config, folder);
+  if (files == Files::opened) {
+    check_files(root, config, folder);
+  } else if (config.history.file == config.state_file) {
+    root.problem("state_file", "must not be the history's file");
+  }
 
   const ModelSource source = find_model(model_table, config.model_file);
   std::vector<Problem> model_problems;

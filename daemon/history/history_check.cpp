@@ -21,12 +21,36 @@ bool is_good(SegmentCheck& check, Look look) {
   }
 }
 
-void check_records(const HistoryReader& reader, SegmentCheck& check) {
+void require(bool holds, const char* why) {
+  if (!holds) throw HistoryError(why);
+}
+
+/// What a record says must be possible for the configuration.
+void check_record(const Record& record, const EstimatorConfig& config, InputsInForce& inputs) {
+  switch (record.kind) {
+    case RecordKind::offset:
+      return require(record.index < config.axes.size(), "an offset of no axis");
+    case RecordKind::command:
+      return require(record.detail < command_kinds_count, "an unknown command");
+    case RecordKind::skipped:
+      return require(record.time_ns >= static_cast<std::int64_t>(record.cycle),
+                     "skipped cycles end before they begin");
+    default:
+      return inputs.apply(record);
+  }
+}
+
+void check_records(const HistoryReader& reader, const EstimatorConfig& config,
+                   SegmentCheck& check) {
   RecordCursor cursor = reader.records(check.segment);
+  InputsInForce inputs;
+  inputs.readings.resize(config.sensors.size());
   Record record;
   for (bool goes_on = true; goes_on;) {
     const bool is_sound = is_good(check, [&] {
-      while (cursor.next(record)) ++check.records;
+      for (; cursor.next(record); ++check.records) {
+        is_good(check, [&] { check_record(record, config, inputs); });
+      }
     });
     goes_on = !is_sound && cursor.resume();
   }
@@ -35,13 +59,10 @@ void check_records(const HistoryReader& reader, SegmentCheck& check) {
   }
 }
 
-void check_start(const HistoryReader& reader, const ParsedSetups& setups, SegmentCheck& check) {
-  is_good(check, [&] {
-    const std::size_t sensors = setups.of(check.segment).estimator.sensors.size();
-    if (reader.start(check.segment).readings.size() != sensors) {
-      throw HistoryError("the inputs at its start do not fit its configuration");
-    }
-  });
+void check_start(const HistoryReader& reader, const EstimatorConfig& config, SegmentCheck& check) {
+  if (reader.start(check.segment).readings.size() != config.sensors.size()) {
+    throw HistoryError("the inputs at its start do not fit its configuration");
+  }
 }
 
 }  // namespace
@@ -61,8 +82,12 @@ HistoryCheck check_history(const std::filesystem::path& history, const Progress&
     for (const HistoryDamage& damage : reader.damage()) {
       if (damage.segment == segment.id) check.damage.push_back(damage);
     }
-    check_start(reader, setups, check);
-    check_records(reader, check);
+    // Without its configuration nothing of a segment can be judged.
+    is_good(check, [&] {
+      const EstimatorConfig& config = setups.of(segment).estimator;
+      is_good(check, [&] { check_start(reader, config, check); });
+      check_records(reader, config, check);
+    });
     result.segments.push_back(std::move(check));
     if (progress) {
       progress(static_cast<double>(result.segments.size()) /

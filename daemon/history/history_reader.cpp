@@ -4,6 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include <system_error>
+
 #include "daemon/history/chunk_codec.hpp"
 #include "daemon/history/database.hpp"
 #include "daemon/history/row_checksum.hpp"
@@ -118,7 +120,11 @@ void HistoryReader::Parts::limit_to_chunks(SegmentInfo& segment) {
 }
 
 HistoryReader::HistoryReader(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file)) throw HistoryError(file.string() + ": there is no such file");
+  std::error_code failed;
+  if (!std::filesystem::exists(file, failed)) {
+    throw HistoryError(file.string() + ": " +
+                       (failed ? failed.message() : std::string("there is no such file")));
+  }
   parts_ = std::make_unique<Parts>(file);
   check_is_history(parts_->database);
   parts_->has_checksums = has_checksum_columns(parts_->database);

@@ -113,11 +113,11 @@ ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups
       replayed.run([&](std::uint64_t cycles) {
         if (progress) progress(static_cast<double>(done + cycles) / static_cast<double>(total));
       });
+      ++summary.segments;
     } catch (const std::exception& error) {
       note({segment.id, "(written by version " + segment.program_version +
                             ") cannot be replayed: " + error.what()});
     }
-    ++summary.segments;
     done += cycles_of(segment);
   }
   if (progress) progress(1.0);
