@@ -12,6 +12,10 @@ constexpr double register_rounding_um = 0.1;
 /// One unexplained read-back outweighs so many good ones; a second one within them latches.
 constexpr std::uint8_t suspicion_of_one = 16;
 
+/// The one that comes with a new epoch, the one before its first command is written, and the one
+/// that shows that it was.
+constexpr std::uint8_t read_backs_until_written = 3;
+
 /// Two read-backs after a release that are no further apart say the same.
 constexpr double same_read_back_um = 0.3;
 
@@ -36,7 +40,7 @@ AxisChannel::AxisChannel(const AxisConfig& config, const CompensationConfig& com
 
 void AxisChannel::step(const AxisInput& input) noexcept {
   if (input.link_epoch != epoch_) take_epoch(input.link_epoch);
-  if (input.online) applied_um_ = input.applied_um;
+  if (input.online) note_read_back(input);
   if (!synced_)
     synchronise(input);
   else if (input.online && reads_back_)
@@ -49,14 +53,25 @@ void AxisChannel::step(const AxisInput& input) noexcept {
   driven_at_ = input.now;
   target_um_ = input.target_um;
   if (proving()) target_um_ = prove_target_um(input.now);
-  if (input.may_change) limiter_.step(target_um_, input.dt_s);
+  if (input.may_change && stands_for_ == 0) limiter_.step(target_um_, input.dt_s);
   check_.sent(input.now, limiter_.offset_um());
 }
 
-/// A pause of the same link changes nothing by itself: what is read back is compared as ever.
+/// A pause of the same link changes nothing by itself: what is read back is compared as ever. But
+/// what was sent last may not have been written (a controller that refuses it pauses the link each
+/// time), so the offset does not go on before a command of the new epoch has been.
 void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
-  if (!is_same_link(epoch, epoch_)) synced_ = false;
+  if (is_same_link(epoch, epoch_))
+    stands_for_ = read_backs_until_written;
+  else
+    synced_ = false;
   epoch_ = epoch;
+}
+
+void AxisChannel::note_read_back(const AxisInput& input) noexcept {
+  applied_um_ = input.applied_um;
+  if (stands_for_ > 0 && input.taken_at != seen_at_) --stands_for_;
+  seen_at_ = input.taken_at;
 }
 
 void AxisChannel::synchronise(const AxisInput& input) noexcept {
@@ -214,6 +229,8 @@ void AxisChannel::adopt(const AxisChannel& previous) noexcept {
   latched_mismatch_ = previous.latched_mismatch_;
   pairs_ = previous.pairs_;
   read_back_at_ = previous.read_back_at_;
+  stands_for_ = previous.stands_for_;
+  seen_at_ = previous.seen_at_;
   driven_at_ = previous.driven_at_;
   check_.adopt(previous.check_);
 }

@@ -69,14 +69,15 @@ class AxisChannel {
   void visit_state(StateArchive& archive) {
     archive(limiter_, check_, target_um_, applied_um_, epoch_, trusted_um_, synced_, starting_,
             driven_once_, out_of_bound_, mismatch_, agreed_since_, in_doubt_, suspicion_, latched_,
-            releasing_, released_um_, latched_mismatch_, pairs_, read_back_at_, driven_at_,
-            prove_phase_, prove_from_um_, prove_move_um_, prove_until_);
+            releasing_, released_um_, latched_mismatch_, pairs_, stands_for_, seen_at_,
+            read_back_at_, driven_at_, prove_phase_, prove_from_um_, prove_move_um_, prove_until_);
   }
 
  private:
   enum class ProvePhase : std::uint8_t { none, out, wait, back };
 
   void take_epoch(std::uint32_t epoch) noexcept;
+  void note_read_back(const AxisInput& input) noexcept;
   void synchronise(const AxisInput& input) noexcept;
   void compare(const AxisInput& input) noexcept;
   void start_on_link(const AxisInput& input, bool fresh) noexcept;
@@ -108,6 +109,10 @@ class AxisChannel {
   nanoseconds agreed_since_{};
   bool in_doubt_{false};  ///< the newest read-back is unexplained
   std::uint8_t suspicion_{0};
+  /// After a pause of the link: read-backs until a command of the new epoch has surely been
+  /// written.
+  std::uint8_t stands_for_{0};
+  nanoseconds seen_at_{};  ///< of the newest read-back, also of one without offsets
   bool latched_{false};
   bool releasing_{false};
   double released_um_{not_a_number};  ///< read back since release(), to be confirmed

@@ -460,7 +460,8 @@ void Invariants::check_sent(const CycleSeen& seen, const Move& move) {
     sent.breaks = move.breaks;
     sent.credit_um = stall_um;
   }
-  sent.credit_um = std::max(0.0, sent.credit_um - std::max(0.0, change_um - resolution_um_));
+  if (kept)
+    sent.credit_um = std::max(0.0, sent.credit_um - std::max(0.0, change_um - resolution_um_));
   sent.um = move.to_um;
   sent.at = move.at;
   sent.lately.emplace_back(move.at, move.to_um);
@@ -505,15 +506,15 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
                           rate_um_per_s_[axis] * (link_period_s_ + 2.0 * period_s_);
   const bool unexplained = told_um < low_um - slack_um || told_um > high_um + slack_um;
   // What has been latched, or was before a release, counts from here.
-  if (!unexplained || latched) sent.unexplained = 0;
-  if (unexplained && !latched && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
+  const bool told = latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound);
+  if (!unexplained || told) sent.unexplained = 0;
+  if (unexplained && !told && seen.told->taken_at != sent.read_back_at) ++sent.unexplained;
   sent.read_back_at = seen.told->taken_at;
   if (sent.unexplained < 5) return;
-  demand(latched || has_reason(seen.report->reasons, Reason::applied_out_of_bound),
-         "unexplained_is_latched", seen.now, [&] {
-           return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told",
-                              axis, told_um);
-         });
+  demand(told, "unexplained_is_latched", seen.now, [&] {
+    return fmt::format("axis {}: {:.4f} um is read back time and again, and nobody is told", axis,
+                       told_um);
+  });
   demand(!seen.command->valid[axis], "unexplained_is_latched", seen.now, [&] {
     return fmt::format("axis {}: driven at {:.4f} um although {:.4f} um is read back", axis,
                        seen.command->offset_um[axis], told_um);

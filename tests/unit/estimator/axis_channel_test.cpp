@@ -190,9 +190,23 @@ TEST_CASE("a pause of the same link changes nothing that is sent", "[axis]") {
   bench.input.link_epoch += epochs_of_a_link;
   bench.obeys = false;
   bench.input.applied_um = 9.1;  // within what counts as agreement
-  bench.step(12.0);
+  bench.steps(2, 12.0);
   CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 10.0);  // until a command of the new epoch has been written
+  bench.step(12.0);
   CHECK(bench.channel.offset_um() == Approx(10.2));
+}
+
+TEST_CASE("a controller that refuses what it is sent finds no pent-up offset later", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  for (int i = 0; i < 100; ++i) {
+    bench.input.link_epoch += epochs_of_a_link;
+    bench.steps(2, 40.0);
+  }
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == 10.0);
 }
 
 TEST_CASE("a new link that shows neither what was sent nor less of it is not believed", "[axis]") {
