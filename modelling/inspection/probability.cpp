@@ -13,11 +13,11 @@ struct Worth {
   double steepness;
 };
 constexpr std::array<Worth, 8> worths{{
-    {"spikes", 0.8, 6},
-    {"outliers", 0.8, 6},
+    {"spikes", 1.15, 8},
+    {"outliers", 1.15, 8},
     {"sensor_step", 8.0, 6},
     {"sensor_drift", 10.0, 6},
-    {"sensor_loose", 12.0, 6},
+    {"sensor_loose", 22.0, 6},
     {"sensor_swap", 2.0, 4},
     {"stuck", 2.0, 3},
     {"displacement_step", 10.0, 6},

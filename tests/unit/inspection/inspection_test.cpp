@@ -86,11 +86,11 @@ TEST_CASE("a reading that jumps is named with its time and size, and its neighbo
         Approx(run.column("t3_degC")[500] - 2.0).margin(0.1));
 }
 
-TEST_CASE("a reading that creeps is named with its size", "[inspection]") {
+TEST_CASE("the likeliest creep is that of the reading that creeps", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 0; row < rows; ++row)
     column(run, "t4_degC")[row] += 4.0 * static_cast<double>(row) / static_cast<double>(rows);
-  const Inspection inspection = inspect({run});
+  const Inspection inspection = inspect({run}, 0.0);
   INFO(inspection_text(inspection));
   const Finding* finding = find(inspection, "sensor_drift");
   REQUIRE(finding != nullptr);
