@@ -208,8 +208,9 @@ std::string finding_html(const std::vector<RunFile>& runs, const Inspection& ins
                          const Finding& finding) {
   const RunFile& run = runs[finding.run];
   std::string html = "<h3><span class=\"bar\"><i style=\"width:" + pixel(90 * finding.probability) +
-                     "px\"></i></span>" + pixel(100 * finding.probability) + " %</h3><p>" +
-                     xml_text(finding.text) + " <small>(" + xml_text(run.name) + ")</small></p>\n";
+                     "px\"></i></span>" + std::to_string(std::lround(100 * finding.probability)) +
+                     " %</h3><p>" + xml_text(finding.text) + " <small>(" + xml_text(run.name) +
+                     ")</small></p>\n";
   if (!run.find(finding.column)) return html;
   const double first_s = run.time_s().front();
   const double last_s = run.time_s().back() + 1e-6;

@@ -35,12 +35,11 @@ std::string sentence(const Finding& finding, const RunFile& run) {
   const std::string& kind = finding.kind;
   const std::string count = std::to_string(finding.times_s.size());
   if (kind == "spikes")
-    return finding.column + " leaps away and back " + count + " times, by up to " + size +
+    return finding.column + " leaps away and back (" + count + "), by up to " + size +
            ": look at its plug and its shield; these values should be left out.";
   if (kind == "outliers")
-    return count + " values of " + finding.column +
-           " stand apart from their neighbours, by up to " + size +
-           ": a probing that went wrong, or chips; they should be left out.";
+    return finding.column + " has values apart from their neighbours (" + count + "), by up to " +
+           size + ": a probing that went wrong, or chips; they should be left out.";
   if (kind == "sensor_step")
     return finding.column + " jumps by " + size + (finding.size > 0 ? " upwards" : " downwards") +
            " after " + at +
