@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::string_view separators = ";\t,";
 constexpr std::size_t rows_judged = 100;
+constexpr std::size_t columns_max = 1024;  // as of our own form
 
 bool is_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
@@ -168,6 +169,11 @@ class TableReader {
     };
     if (std::all_of(fields.begin(), fields.end(), is_value)) {
       problems_.add(line.number, "", line.text, "must be the header row, names of columns");
+      return false;
+    }
+    if (fields.size() > columns_max) {
+      problems_.add(line.number, "columns", std::to_string(fields.size()),
+                    "must be at most " + std::to_string(columns_max));
       return false;
     }
     for (const std::string_view field : fields) table_.header.emplace_back(field);
