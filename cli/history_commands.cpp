@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
+#include "cli/run_loader.hpp"
 #include "cli/terminal.hpp"
 #include "config/daemon_config.hpp"
 #include "config/printable_text.hpp"
@@ -73,6 +74,7 @@ int run_export(const ExportOptions& options) {
 struct ReplayOptions {
   std::string input;  ///< history, or run file where config is given
   std::string config;
+  std::string columns;
   std::string output;
 };
 
@@ -106,7 +108,7 @@ int run_history_replay(const ReplayOptions& options) {
 
 int run_file_replay(const ReplayOptions& options) {
   const DaemonConfig config = load_daemon_config(options.config);
-  const RunFile run = load_run(parse_selection(options.input));
+  const RunFile run = RunLoader(options.columns).load(options.input);
   OutputFile file(options.output);
   const RunReplaySummary summary = replay_run_file(config, run, file.stream());
   file.commit();
@@ -191,6 +193,7 @@ void add_history_commands(CLI::App& app, Action& action) {
   sub->add_option("--config", replay_options->config,
                   "configuration of thermocompd; the input is then a run file")
       ->type_name("FILE");
+  sub->add_option("--columns", replay_options->columns, columns_help)->type_name("FILE");
   sub->add_option("INPUT", replay_options->input, "history of thermocompd, or RUN.csv[@T0:T1]")
       ->type_name("FILE")
       ->required();

@@ -12,6 +12,7 @@
 #include "cli/covariance_fit.hpp"
 #include "cli/output_file.hpp"
 #include "cli/prediction.hpp"
+#include "cli/run_loader.hpp"
 #include "cli/terminal.hpp"
 #include "config/file_limits.hpp"
 #include "config/model_file.hpp"
@@ -29,12 +30,13 @@ namespace {
 struct PredictOptions {
   std::string model;
   std::string run;
+  std::string columns;
   std::string output;
 };
 
 int run_predict(const PredictOptions& options) {
   const ThermalModel model = load_model(options.model);
-  const RunFile run = load_run(parse_selection(options.run));
+  const RunFile run = RunLoader(options.columns).load(options.run);
   const Prediction prediction = predict(model, run);
   if (prediction.time_s.empty()) {
     throw Failure(options.run + ": no row has all inputs of the model and a measured output");
@@ -70,17 +72,18 @@ int run_simulate(const SimulateOptions& options) {
 struct CovarianceOptions {
   std::string model;
   std::vector<std::string> records;
+  std::string columns;
   std::string output;
 };
 
 /// A run file, or a daemon's history as one.
-RunFile load_record(const std::string& argument) {
+RunFile load_record(const std::string& argument, RunLoader& loader) {
   constexpr std::string_view sqlite = "SQLite format 3";
   if (!std::filesystem::is_regular_file(argument)) return load_run(parse_selection(argument));
   std::string head(sqlite.size(), ' ');
   std::ifstream file(argument, std::ios::binary);
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  if (!file || head != sqlite) return load_run(parse_selection(argument));
+  if (!file || head != sqlite) return loader.load(argument);
   std::ostringstream text;
   Progress progress("reading " + argument);
   const ExportSummary summary =
@@ -100,7 +103,8 @@ int run_covariance(const CovarianceOptions& options) {
                   std::to_string(covariance_inputs_max) + " inputs");
   }
   std::vector<RunFile> runs;
-  for (const std::string& record : options.records) runs.push_back(load_record(record));
+  RunLoader loader(options.columns);
+  for (const std::string& record : options.records) runs.push_back(load_record(record, loader));
   const CovarianceFit fit = fit_covariance(runs, model.inputs);
   model.covariance_K2 = fit.matrix_K2;
   model.covariance_growth = fit.growth;
@@ -124,6 +128,7 @@ void add_covariance_command(CLI::App& app, Action& action) {
   sub->add_option("RECORD", options->records, "run files, RUN.csv[@T0:T1], or histories")
       ->type_name("FILE")
       ->required();
+  sub->add_option("--columns", options->columns, columns_help)->type_name("FILE");
   sub->add_option("-o,--output", options->output,
                   "the model file with its table [covariance]; may be the same file; - is standard "
                   "output")
@@ -141,6 +146,7 @@ void add_model_commands(CLI::App& app, Action& action) {
   sub->add_option("RUN", predict_options->run, "run file, RUN.csv or RUN.csv@T0:T1")
       ->type_name("FILE")
       ->required();
+  sub->add_option("--columns", predict_options->columns, columns_help)->type_name("FILE");
   sub->add_option("-o,--output", predict_options->output, "CSV file; - is standard output")
       ->type_name("FILE")
       ->required();

@@ -24,11 +24,12 @@ struct ModellingCommand {
   const char* name;
   const char* help;
 };
-constexpr std::array<ModellingCommand, 7> commands{{
+constexpr std::array<ModellingCommand, 8> commands{{
     {"structure", "block matrix of a structure, by finite elements"},
     {"place", "sensor positions of a structure"},
     {"tiebar", "the two coefficients of a gate-shaped machine with a tie bar"},
     {"plan", "test plan from factors and levels"},
+    {"inspect", "what is wrong with recordings themselves, and what they can tell at all"},
     {"group", "similarity groups of measured temperatures"},
     {"fit", "sensor choice and model from measured runs"},
     {"diagnose", "what a model gets wrong in measured runs, and why"},

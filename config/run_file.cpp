@@ -9,6 +9,8 @@
 
 #include "config/file_limits.hpp"
 #include "config/number_text.hpp"
+#include "config/run_forms/field_text.hpp"
+#include "config/run_forms/foreign_run.hpp"
 #include "config/toml_reader.hpp"
 #include "config/units.hpp"
 
@@ -19,26 +21,6 @@ constexpr std::size_t problems_max = 100;
 /// The greatest model has 512 inputs and 64 outputs; what searches among columns takes time with
 /// their square.
 constexpr std::size_t columns_max = 1024;
-
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-bool is_missing(std::string_view field) {
-  return field.empty() || field == "nan" || field == "NaN" || field == "NAN";
-}
-
-/// @return nullopt unless all of `field` is one finite decimal number
-std::optional<double> finite_number(std::string_view field) {
-  if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc{} || end != field.data() + field.size()) return std::nullopt;
-  return std::isfinite(value) ? std::optional(value) : std::nullopt;
-}
 
 /// A number of digits and at most one point within them, so few that the digits and the power of
 /// ten are exact in a double: their quotient is then what std::from_chars gives, in a third of the
@@ -71,22 +53,9 @@ std::size_t plain_number(std::string_view text, double& value) {
   return static_cast<std::size_t>(at - text.data());
 }
 
-/// Takes the part before the next separator off `rest`; false when nothing is left.
-bool take(std::string_view& rest, char separator, std::string_view& part) {
-  if (rest.data() == nullptr) return false;
-  const auto end = rest.find(separator);
-  part = rest.substr(0, end);
-  rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
-  return true;
-}
-
 class RunParser {
  public:
-  RunParser(std::string_view text, const std::string& name) : rest_(text) {
-    run_.name = name;
-    constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-    if (rest_.starts_with(byte_order_mark)) rest_.remove_prefix(byte_order_mark.size());
-  }
+  RunParser(std::string_view text, const std::string& name) : rest_(text) { run_.name = name; }
 
   RunFile parse() {
     std::string_view line;
@@ -121,7 +90,7 @@ class RunParser {
   bool next_line(std::string_view& line) {
     while (!rest_.empty()) {
       ++line_number_;
-      take(rest_, '\n', line);
+      static_cast<void>(take(rest_, '\n', line));
       if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
       if (!line.starts_with('#')) return true;
     }
@@ -197,7 +166,7 @@ class RunParser {
     std::string_view rest = line;
     std::string_view field;
     for (std::size_t i = 0; i < run_.columns.size(); ++i) {
-      take(rest, ',', field);
+      static_cast<void>(take(rest, ',', field));
       run_.values[i].push_back(value_of(trimmed(field), run_.columns[i]));
     }
     check_time();
@@ -291,21 +260,67 @@ std::optional<std::size_t> RunFile::find(std::string_view column_name) const {
 const std::vector<double>& RunFile::column(std::string_view column_name) const {
   const auto index = find(column_name);
   if (!index) {
-    throw ConfigurationError(
-        {{this->name, 0, std::string(column_name), "(missing)", "must be one of the columns"}});
+    std::string rule = "must be one of the columns";
+    const auto stem = column_name.rfind('_');
+    const std::string position = std::string(column_name.substr(0, stem)) + "_mm";
+    if (is_output(column_name) && find(position))
+      rule += "; there is " + position + ", a position, which --columns can make a displacement";
+    throw ConfigurationError({{this->name, 0, std::string(column_name), "(missing)", rule}});
   }
   return values[*index];
 }
 
-RunFile parse_run(std::string_view text, const std::string& name, const RunSelection& selection) {
-  RunFile run = RunParser(text, name).parse();
+namespace {
+
+/// The first line that is neither comment nor empty.
+std::string_view header_of(std::string_view text) {
+  std::string_view line;
+  while (take(text, '\n', line)) {
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    if (!line.starts_with('#') && !trimmed(line).empty()) return line;
+  }
+  return {};
+}
+
+bool names_a_column(const ColumnMap& map, std::string_view header) {
+  std::string_view field;
+  while (take(header, ',', field)) {
+    const std::string name(trimmed(field));
+    if (map.columns.contains(name) ||
+        std::find(map.ignored.begin(), map.ignored.end(), name) != map.ignored.end() ||
+        std::find(map.time.begin(), map.time.end(), name) != map.time.end())
+      return true;
+  }
+  return false;
+}
+
+std::string_view without_mark(std::string_view text, const std::string& name) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    throw ConfigurationError(
+        {{name, 0, "", "",
+          "is UTF-16: make it UTF-8 by  iconv -f UTF-16 -t UTF-8 FILE > NEW.csv"}});
+  }
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  return text;
+}
+
+}  // namespace
+
+RunFile parse_run(std::string_view text, const std::string& name, const RunSelection& selection,
+                  const ColumnMap* map) {
+  text = without_mark(text, name);
+  const std::string_view header = header_of(text);
+  const bool own = (is_own_form(header) && (map == nullptr || !names_a_column(*map, header))) ||
+                   header.empty() || finite_number(trimmed(header.substr(0, header.find(','))));
+  RunFile run = own ? RunParser(text, name).parse() : read_foreign_run(text, name, map);
   select(run, selection);
   return run;
 }
 
-RunFile load_run(const RunSelection& selection) {
+RunFile load_run(const RunSelection& selection, const ColumnMap* map) {
   return parse_run(read_text_file(selection.file, run_bytes_max), selection.file.string(),
-                   selection);
+                   selection, map);
 }
 
 std::string write_run(const RunFile& run) {

@@ -1,5 +1,6 @@
 /// Run files: measured or simulated data, CSV with one header row; the unit is in the column's name
-/// (config/units.hpp). An empty field or `nan` is a missing value. One file is one run.
+/// (config/units.hpp). An empty field or `nan` is a missing value. One file is one run. That is the
+/// form that programs write; what people have (run_forms/foreign_run.hpp) is read too.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +14,8 @@
 #include "config/problems.hpp"
 
 namespace thermocomp {
+
+struct ColumnMap;
 
 /// `FILE@T0:T1`: the rows with `from_s <= time_s < to_s`.
 struct RunSelection {
@@ -33,6 +36,8 @@ struct RunFile {
   std::vector<std::vector<double>> values;  ///< shape (columns, rows); NaN: missing
   std::size_t selected_begin{0};
   std::size_t selected_end{0};
+  /// How a file of another form was taken, a line each; empty: it has our own form.
+  std::vector<std::string> understood;
 
   [[nodiscard]] std::size_t rows() const noexcept { return values.empty() ? 0 : values[0].size(); }
   [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
@@ -42,11 +47,13 @@ struct RunFile {
 };
 
 /// At least one row; time_s present and strictly increasing. A selection without rows is refused.
+/// @param map  what a person said about files of other forms; nullptr: nothing. A file of our own
+///             form of which it names no column is read without it.
 /// @throws ConfigurationError with every problem (the first 100), each with line, column and rule
-[[nodiscard]] RunFile load_run(const RunSelection& selection);
+[[nodiscard]] RunFile load_run(const RunSelection& selection, const ColumnMap* map = nullptr);
 /// @param name stands for the file in problems; `selection.file` is not looked at
 [[nodiscard]] RunFile parse_run(std::string_view text, const std::string& name,
-                                const RunSelection& selection = {});
+                                const RunSelection& selection = {}, const ColumnMap* map = nullptr);
 
 /// All rows as a run file, every number bit for bit; missing values are empty fields.
 [[nodiscard]] std::string write_run(const RunFile& run);

@@ -9,6 +9,7 @@
 #include "modelling/identification/fit_command.hpp"
 #include "modelling/identification/group_command.hpp"
 #include "modelling/identification/tiebar_command.hpp"
+#include "modelling/inspection/inspect_command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/placement/place_command.hpp"
 #include "modelling/structure/structure_command.hpp"
@@ -52,9 +53,10 @@ void name_files(CLI::App& app) {
 void declare_modelling_command_line(CLI::App& app, std::function<int()>& action) {
   app.name("thermocomp-modelling");
   app.description("What leads to a model, and what a model gets wrong");
-  app.footer("Exit status: 0 success, 2 bad use or bad input.");
+  app.footer("Exit status: 0 success, 1 inspect found something, 2 bad use or bad input.");
   app.require_subcommand(1);
   diagnosis::add_diagnose_command(app, action);
+  inspection::add_inspect_command(app, action);
   add_structure(app, action);
   experiments::add_plan_command(app, action);
   identification::add_group_command(app, action);

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
+#include "cli/run_loader.hpp"
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
@@ -29,17 +30,11 @@ struct Options {
   std::string thermal;
   std::vector<std::string> train;
   std::vector<std::string> test;
+  std::string columns;
   std::string folder;
   std::string json;
   bool weighed{false};
 };
-
-std::vector<RunFile> load_runs(const std::vector<std::string>& arguments) {
-  std::vector<RunFile> runs;
-  runs.reserve(arguments.size());
-  for (const std::string& argument : arguments) runs.push_back(load_run(parse_selection(argument)));
-  return runs;
-}
 
 void write(const std::string& destination, const std::string& text) {
   cli::OutputFile file(destination);
@@ -81,8 +76,9 @@ void print_weighed(const Diagnosis& diagnosis) {
 }
 
 Diagnosis diagnosis_of(const Options& options, ReportData* report) {
-  std::vector<RunFile> train = load_runs(options.train);
-  std::vector<RunFile> test = load_runs(options.test);
+  cli::RunLoader loader(options.columns);
+  std::vector<RunFile> train = loader.load(options.train);
+  std::vector<RunFile> test = loader.load(options.test);
   const StillSearching still_searching;
   if (!options.thermal.empty())
     return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
@@ -134,6 +130,7 @@ void add_diagnose_command(CLI::App& app, std::function<int()>& action) {
       ->add_option("--train", options->train, "runs from which causes are found: RUN.csv[@T0:T1]")
       ->required();
   command->add_option("--test", options->test, "runs on which the gain is measured")->required();
+  command->add_option("--columns", options->columns, cli::columns_help);
   command->add_option("--out", options->folder,
                       "folder for the report and the extended model or corrected machine");
   command->add_option("--json", options->json, "file for the answer as JSON; - is the output");

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
+#include "cli/run_loader.hpp"
 #include "config/model_file.hpp"
 #include "modelling/identification/fit.hpp"
 
@@ -18,6 +19,7 @@ constexpr std::size_t terms_of_any_equation = 8;
 
 struct Options {
   std::vector<std::string> runs;
+  std::string columns;
   TestOptions tests;
   std::string terms{"3..5"};
   bool free_choice{false};
@@ -60,9 +62,7 @@ int run(const Options& options) {
   fit_options.threshold = options.threshold;
   fit_options.lags = options.lags;
   fit_options.sensor_error_K = options.sensor_error_K;
-  std::vector<RunFile> runs;
-  for (const std::string& argument : options.runs)
-    runs.push_back(load_run(parse_selection(argument)));
+  const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
   const MeasuredTests tests = measured_tests(runs, options.tests);
   const Fit fit = fit_equation(tests, fit_options);
   write(options.model, write_model(model_of(tests, fit)));
@@ -80,6 +80,7 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
   CLI::App* sub = app.add_subcommand("fit", "sensor choice and model from measured runs");
   sub->add_option("RUN.csv", options->runs, "runs, each one test: RUN.csv[@T0:T1]")->required();
+  sub->add_option("--columns", options->columns, cli::columns_help);
   sub->add_option("--outputs", options->tests.outputs, "what is to be predicted: z_um[,...]")
       ->required()
       ->delimiter(',')

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/output_file.hpp"
+#include "cli/run_loader.hpp"
 #include "modelling/identification/similarity.hpp"
 #include "modelling/identification/svg.hpp"
 
@@ -16,6 +17,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> runs;
+  std::string columns;
   std::vector<std::string> places;
   double threshold{-1.0};  ///< negative: chosen
   bool as_published{false};
@@ -110,9 +112,7 @@ std::string picture_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
 }
 
 int run(const Options& options) {
-  std::vector<RunFile> runs;
-  for (const std::string& argument : options.runs)
-    runs.push_back(load_run(parse_selection(argument)));
+  const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
   const MeasuredTests tests = measured_tests(runs, {options.places, {}, 1});
   const Eigen::MatrixXd s = similarity(tests, !options.as_published);
   Grouping grouping;
@@ -141,6 +141,7 @@ void add_group_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
   CLI::App* sub = app.add_subcommand("group", "similarity groups of measured temperatures");
   sub->add_option("RUN.csv", options->runs, "runs, each one test: RUN.csv[@T0:T1]")->required();
+  sub->add_option("--columns", options->columns, cli::columns_help);
   sub->add_option("--places", options->places, "temperatures to look at; else all of them")
       ->delimiter(',')
       ->type_name("NAME");

@@ -308,7 +308,10 @@ class ReplaySession : public Session {
 
 void run_session(const MachineConfig& machine, const SessionOptions& options) {
   if (!options.replay.empty()) {
-    ReplaySession(machine, options, load_run({options.replay})).run();
+    RunFile run = load_run({options.replay});
+    for (const std::string& line : run.understood)
+      std::fprintf(stderr, "%s: %s\n", run.name.c_str(), line.c_str());
+    ReplaySession(machine, options, std::move(run)).run();
   } else if (machine.plant) {
     PlantSession(machine, options).run();
   } else {

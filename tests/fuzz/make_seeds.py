@@ -167,6 +167,15 @@ def run_seeds():
     write("run_file", "comment_selection.csv", "#r@1:\ntime_s,a b_K\n0,1\n1,2\n")
     write("run_file", "many_problems.csv", "time_s,a_K,b\n" + "x,inf,\"y\"\n" * 120)
     write("run_file", "one_column.csv", "time_s\n-1e308\n0\n1e-320\n1e308\n")
+    write("run_file", "german.csv", "\ufeffZeit;T1 [°C];z (µm)\r\n2026-03-01T08:30:00;20,51;0\r\n"
+          "2026-03-01T08:30:15;20,6;1,25\r\n;;\r\n")
+    write("run_file", "days.csv", "Date,T1 [C],z (mm)\n45992.5,20.5,0.001\n45992.51,20.6,0.0125\n")
+    write("run_file", "date_and_clock.csv", "Datum\tUhrzeit\tT [°F]\n31.03.2026\t23:59:50\t68.5\n"
+          "01.04.2026\t00:00:05\t69\n")
+    write("run_file", "quoted.csv", 'sep=,\n"Timestamp","T, top [°C]",\n'
+          '3/14/2026 11:59:30 AM,"20,5",\n3/14/2026 12:00:30 PM,"20,6",\n')
+    write("run_file", "units_below.csv", "time;T1;n\ns;°C;rpm\n0;20,5;0\n0,5;NA;1.000\n")
+    write("run_file", "unclear.csv", "Time;z;p [bar]\n03/04/2026 08:00;1,234;-\n")
     write("run_file", "wide.csv", ",".join(["time_s"] + [f"t{i}_degC" for i in range(40)]) + "\n" +
           ",".join("0" * 41) + "\n")
 
@@ -473,7 +482,10 @@ def dictionaries():
     dictionary("eds_file", {"[7130sub1]", "[7130]", "[7130Name]", "ParameterName=", "ObjectType=0x8",
                             "DataType=0x0003", "CompactSubObj=", "0xFE", "; ", "\r\n"})
     dictionary("run_file", {"time_s", "_degC", "_um", ",", "nan", "inf", "1e308", "1e-320", "\r\n",
-                            "# ", "@", ":", "-0"})
+                            "# ", "@", ":", "-0", ";", "\t", "Zeit", "Time [s]", "Date",
+                            " [°C]", " (mm)", " [µm]", "\xb0", "08:30:00", "2026-03-01T08:30:00Z",
+                            "03/04/2026", "31.03.2026 23:59:50", "1,234", "1.234,5", "20,5",
+                            "45992.5", "sep=;", '"', "NA", " PM", "\xef\xbb\xbf"})
     dictionary("socket_request", {'{"jsonrpc":"2.0","id":1,"method":"', '"params":{', "}\n", "\xff",
                                   "\r\n", "1e999", "null", '\\ud800'} |
                literals("daemon/operator_desk.cpp", "daemon/socket/*.cpp"))

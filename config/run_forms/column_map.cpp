@@ -1,0 +1,67 @@
+#include "config/run_forms/column_map.hpp"
+
+#include "config/run_forms/spelled_unit.hpp"
+#include "config/toml_reader.hpp"
+#include "config/units.hpp"
+
+namespace thermocomp {
+namespace {
+
+void read_column(const TomlTable& table, const std::string& key, ColumnMap& map) {
+  MappedColumn column;
+  if (table.is_text(key)) {
+    column.name = table.text(key);
+  } else {
+    const TomlTable entry = table.table(key);
+    if (!entry) return;
+    column.name = entry.text("name");
+    column.unit = entry.text("unit", "");
+    if (!column.unit.empty() && spelled_unit(column.unit) == nullptr)
+      entry.problem("unit", "is no unit that is known here; docs/run_files.md lists them");
+  }
+  if (!is_column_name(column.name)) table.problem(key, column.name, column_name_rule);
+  if (column.name == "time_s") table.problem(key, "is said by the key time, not here");
+  map.columns.emplace(key, column);
+}
+
+}  // namespace
+
+ColumnMap parse_column_map(const std::string& text, const std::string& name) {
+  const TomlDocument document = TomlDocument::from_text(text, name);
+  const TomlTable root = document.root();
+  ColumnMap map;
+  map.file = name;
+  if (root.has("separator"))
+    map.separator = root.choice<char>("separator", {{",", ','}, {";", ';'}, {"tab", '\t'}});
+  if (root.has("decimal")) map.decimal = root.choice<char>("decimal", {{".", '.'}, {",", ','}});
+  if (root.has("thousands"))
+    map.thousands = root.choice<char>("thousands", {{".", '.'}, {",", ','}, {"'", '\''}});
+  if (map.thousands && map.decimal == map.thousands)
+    root.problem("thousands", "must not be the decimal sign too");
+  map.header_line = root.integer("header_line", 1, 100000, 0);
+  map.date_order = root.choice<DateOrder>("date_order",
+                                          {{"day.month.year", DateOrder::day_month_year},
+                                           {"month.day.year", DateOrder::month_day_year}},
+                                          DateOrder::unknown);
+  if (root.is_text("time"))
+    map.time = {root.text("time")};
+  else
+    map.time = root.texts("time", {});
+  if (map.time.size() > 2) root.problem("time", "must be one column, or date and clock time");
+  const Names<std::string> units{{"ms", "ms"},   {"s", "s"},         {"min", "min"},    {"h", "h"},
+                                 {"day", "day"}, {"hh:mm", "hh:mm"}, {"mm:ss", "mm:ss"}};
+  map.time_unit = root.choice<std::string>("time_unit", units, "");
+  map.ignored = root.texts("ignore", {});
+  const TomlTable columns = root.table_or_empty("columns");
+  if (columns) {
+    for (const std::string& key : columns.keys()) read_column(columns, key, map);
+  }
+  document.finish();
+  return map;
+}
+
+ColumnMap load_column_map(const std::filesystem::path& path) {
+  return parse_column_map(read_text_file(path), path.string());
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,53 @@
+#include "config/run_forms/field_text.hpp"
+
+#include <charconv>
+#include <cmath>
+
+namespace thermocomp {
+
+std::string_view trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+bool is_missing(std::string_view field) {
+  return field.empty() || field == "nan" || field == "NaN" || field == "NAN";
+}
+
+std::optional<double> finite_number(std::string_view field) {
+  if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (error != std::errc{} || end != field.data() + field.size()) return std::nullopt;
+  return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+bool take(std::string_view& rest, char separator, std::string_view& part) {
+  if (rest.data() == nullptr) return false;
+  const auto end = rest.find(separator);
+  part = rest.substr(0, end);
+  rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
+  return true;
+}
+
+std::string shortened(std::string_view text) {
+  constexpr std::size_t shown_max = 40;
+  if (text.size() <= shown_max) return std::string(text);
+  std::size_t end = shown_max;
+  const auto within_letter = [&] { return (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80; };
+  while (end > 0 && within_letter()) --end;
+  return std::string(text.substr(0, end)) + " ...";
+}
+
+std::string toml_text(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '\\' || c == '"') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,135 @@
+#include "config/run_forms/number_form.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace thermocomp {
+namespace {
+
+enum class Shows {
+  nothing,
+  comma,           ///< the comma is the decimal sign: 20,5
+  point,           ///< the point is
+  comma_or_group,  ///< 1,234
+  point_or_group,  ///< 1.234
+  groups           ///< 1,234.5 or 1.234.567
+};
+
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+/// Digits in front and, where there is none behind, three digits after each `sign`.
+bool is_grouped(std::string_view text, char sign) {
+  std::string_view part;
+  bool first = true;
+  while (take(text, sign, part)) {
+    const bool digits = std::all_of(part.begin(), part.end(), is_digit);
+    if (!digits || part.empty() || part.size() > 3 || (!first && part.size() != 3)) return false;
+    first = false;
+  }
+  return true;
+}
+
+Shows shown_by(std::string_view field) {
+  if (!field.empty() && (field.front() == '-' || field.front() == '+')) field.remove_prefix(1);
+  const auto exponent = field.find_first_of("eE");
+  const std::string_view digits = field.substr(0, exponent);
+  const auto sign = digits.find_first_of(".,");
+  if (sign == std::string_view::npos ||
+      digits.find_first_not_of("0123456789.,") != std::string_view::npos)
+    return Shows::nothing;
+  const char first = digits[sign];
+  const auto last = digits.find_last_of(".,");
+  if (last == sign) {
+    const bool unclear = exponent == std::string_view::npos && digits.front() != '0' &&
+                         is_grouped(digits, first) && sign > 0;
+    if (first == ',') return unclear ? Shows::comma_or_group : Shows::comma;
+    return unclear ? Shows::point_or_group : Shows::point;
+  }
+  const bool mixed = digits[last] != first;
+  const std::string_view whole = mixed ? digits.substr(0, last) : digits;
+  return is_grouped(whole, first) ? Shows::groups : Shows::nothing;
+}
+
+struct Seen {
+  int line{0};
+  std::string_view field;
+  explicit operator bool() const noexcept { return line > 0; }
+};
+
+std::array<Seen, 6> seen_in(const TextTable& table) {
+  std::array<Seen, 6> seen;
+  for (std::size_t i = 0; i < table.fields.size(); ++i) {
+    Seen& first = seen[static_cast<std::size_t>(shown_by(table.fields[i]))];
+    if (!first) first = {table.lines[i / table.columns()], table.fields[i]};
+  }
+  return seen;
+}
+
+}  // namespace
+
+NumberForm number_form(const TextTable& table, const ColumnMap* map, ProblemList& problems) {
+  NumberForm form;
+  if (map != nullptr && map->thousands) {
+    form.thousands = *map->thousands;
+    form.decimal = form.thousands == '.' ? ',' : '.';
+  }
+  if (map != nullptr && map->decimal) form.decimal = *map->decimal;
+  if (map != nullptr && (map->decimal || map->thousands)) return form;
+  const auto seen = seen_in(table);
+  const auto of = [&](Shows what) { return seen[static_cast<std::size_t>(what)]; };
+  const auto ask = [&](Seen where, const std::string& rule) {
+    problems.add(where.line, "", where.field, rule);
+  };
+  const Seen comma = of(Shows::comma);
+  // Between fields a comma is no decimal sign, so a lone point is one.
+  const Seen point =
+      of(Shows::point) || table.separator != ',' ? of(Shows::point) : of(Shows::point_or_group);
+  const Seen unclear_comma = of(Shows::comma_or_group);
+  const Seen unclear_point = table.separator == ',' ? Seen{} : of(Shows::point_or_group);
+  if (of(Shows::groups)) {
+    ask(of(Shows::groups),
+        "has groups of thousands: write thousands = \",\" (or \".\") in the file of --columns");
+  } else if (comma && point) {
+    ask(comma, "has a decimal comma, and line " + std::to_string(point.line) + " has " +
+                   shortened(point.field) + ": there must be one decimal sign in a file");
+  } else if ((comma && unclear_point) || (point && unclear_comma)) {
+    ask(comma ? unclear_point : unclear_comma,
+        "may have a group of thousands, as line " + std::to_string((comma ? comma : point).line) +
+            " has " + shortened((comma ? comma : point).field) + ": write thousands = \"" +
+            (comma ? "." : ",") + "\" in the file of --columns if it is one");
+  } else if (!comma && !point && unclear_comma && unclear_point) {
+    ask(unclear_comma, "and " + std::string(unclear_point.field) +
+                           ": write decimal = \",\" or decimal = \".\" in the file of --columns");
+  } else if (!comma && !point && (unclear_comma || unclear_point)) {
+    const Seen& unclear = unclear_comma ? unclear_comma : unclear_point;
+    const std::string sign = unclear_comma ? "," : ".";
+    ask(unclear, "may be a decimal or thousands: write decimal = \"" + sign +
+                     "\" or thousands = \"" + sign + "\" in the file of --columns");
+  } else if (comma) {
+    form.decimal = ',';
+  }
+  return form;
+}
+
+std::optional<double> number_of(std::string_view field, const NumberForm& form) {
+  std::array<char, 64> digits{};
+  if (field.size() >= digits.size()) return finite_number(field);
+  if (form.thousands != '\0' && field.find(form.thousands) != std::string_view::npos) {
+    std::string_view whole = field.substr(0, field.find(form.decimal));
+    if (!whole.empty() && (whole.front() == '-' || whole.front() == '+')) whole.remove_prefix(1);
+    if (!is_grouped(whole, form.thousands)) return std::nullopt;
+  }
+  std::size_t size = 0;
+  bool in_fraction = false;
+  for (const char c : field) {
+    if (c == form.thousands && c != '\0' && !in_fraction) continue;
+    if (c == form.decimal) in_fraction = true;
+    if (c == '.' && form.decimal != '.') return std::nullopt;
+    digits[size++] = c == form.decimal ? '.' : c;
+  }
+  return finite_number({digits.data(), size});
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,25 @@
+/// Numbers with a decimal point or comma, and which of them a table has.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "config/run_forms/text_table.hpp"
+
+namespace thermocomp {
+
+struct NumberForm {
+  char decimal{'.'};
+  char thousands{'\0'};  ///< none
+};
+
+/// What the fields of the table show. 1,234 alone may be 1.234 or 1234 and decides nothing; a table
+/// that has nothing else is a problem, with the line to write.
+/// @param map  may be nullptr
+[[nodiscard]] NumberForm number_form(const TextTable& table, const ColumnMap* map,
+                                     ProblemList& problems);
+
+/// @return nullopt unless all of `field` is one finite number of that form
+[[nodiscard]] std::optional<double> number_of(std::string_view field, const NumberForm& form);
+
+}  // namespace thermocomp

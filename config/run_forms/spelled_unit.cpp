@@ -1,0 +1,174 @@
+#include "config/run_forms/spelled_unit.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "config/run_forms/field_text.hpp"
+#include "config/units.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr double kelvin_of_0_degC = 273.15;
+constexpr double urad_of_arcsecond = 4.84813681109536;  // pi / 648000 rad
+constexpr double fahrenheit_step = 5.0 / 9.0;
+
+constexpr auto units = std::to_array<SpelledUnit>({
+    {"degC", "temperature", 1, 0, "_degC"},
+    {"°C", "temperature", 1, 0, "_degC"},
+    {"ºC", "temperature", 1, 0, "_degC"},
+    {"℃", "temperature", 1, 0, "_degC"},
+    {"deg C", "temperature", 1, 0, "_degC", true},
+    {"Grad C", "temperature", 1, 0, "_degC", true},
+    {"C", "temperature", 1, 0, "_degC", true},
+    {"Celsius", "temperature", 1, 0, "_degC"},
+    {"celsius", "temperature", 1, 0, "_degC"},
+    {"K", "temperature", 1, -kelvin_of_0_degC, "_K", true},
+    {"Kelvin", "temperature", 1, -kelvin_of_0_degC, "_K"},
+    {"kelvin", "temperature", 1, -kelvin_of_0_degC, "_K"},
+    {"degF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
+    {"°F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
+    {"ºF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
+    {"F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC", true},
+    {"um", "length", 1, 0, "_um"},
+    {"µm", "length", 1, 0, "_um"},
+    {"μm", "length", 1, 0, "_um"},
+    {"micron", "length", 1, 0, "_um"},
+    {"microns", "length", 1, 0, "_um"},
+    {"nm", "length", 1e-3, 0, "_um"},
+    {"mm", "length", 1e3, 0, "_mm"},
+    {"cm", "length", 1e4, 0, "_mm", true},
+    {"m", "length", 1e6, 0, "_mm", true},
+    {"in", "length", 25400, 0, "_mm", true},
+    {"inch", "length", 25400, 0, "_mm"},
+    {"urad", "angle", 1, 0, "_urad"},
+    {"µrad", "angle", 1, 0, "_urad"},
+    {"μrad", "angle", 1, 0, "_urad"},
+    {"um/m", "angle", 1, 0, "_urad"},
+    {"µm/m", "angle", 1, 0, "_urad"},
+    {"μm/m", "angle", 1, 0, "_urad"},
+    {"mrad", "angle", 1e3, 0, "_urad"},
+    {"arcsec", "angle", urad_of_arcsecond, 0, "_urad"},
+    {"rpm", "speed", 1, 0, "_rpm"},
+    {"RPM", "speed", 1, 0, "_rpm"},
+    {"1/min", "speed", 1, 0, "_rpm"},
+    {"min-1", "speed", 1, 0, "_rpm"},
+    {"min^-1", "speed", 1, 0, "_rpm"},
+    {"U/min", "speed", 1, 0, "_rpm"},
+    {"r/min", "speed", 1, 0, "_rpm"},
+    {"rev/min", "speed", 1, 0, "_rpm"},
+    {"mm/min", "feed", 1, 0, "_mm_per_min"},
+    {"mm_per_min", "feed", 1, 0, "_mm_per_min"},
+    {"m/min", "feed", 1e3, 0, "_mm_per_min"},
+    {"mm/s", "feed", 60, 0, "_mm_per_min"},
+    {"A", "current", 1, 0, "_A", true},
+    {"mA", "current", 1e-3, 0, "_A", true},
+    {"W", "power", 1, 0, "_W", true},
+    {"kW", "power", 1e3, 0, "_W"},
+    {"V", "voltage", 1, 0, "_V", true},
+    {"mV", "voltage", 1e-3, 0, "_V", true},
+    {"%", "share", 1, 0, "_percent"},
+    {"percent", "share", 1, 0, "_percent"},
+    {"on", "switch", 1, 0, "_on", true},
+    {"0/1", "switch", 1, 0, "_on"},
+    {"on/off", "switch", 1, 0, "_on"},
+    {"-", "none", 1, 0, "", true},
+    {"1", "none", 1, 0, "", true},
+    {"us", "time", 1e-6, 0, "_s", true},
+    {"µs", "time", 1e-6, 0, "_s", true},
+    {"ms", "time", 1e-3, 0, "_s", true},
+    {"s", "time", 1, 0, "_s", true},
+    {"sec", "time", 1, 0, "_s", true},
+    {"seconds", "time", 1, 0, "_s", true},
+    {"min", "time", 60, 0, "_s", true},
+    {"minutes", "time", 60, 0, "_s", true},
+    {"h", "time", 3600, 0, "_s", true},
+    {"hours", "time", 3600, 0, "_s", true},
+    {"d", "time", 86400, 0, "_s", true},
+    {"day", "time", 86400, 0, "_s", true},
+    {"days", "time", 86400, 0, "_s", true},
+});
+
+/// "T1 [°C]": the part in the brackets at the end.
+bool split_brackets(std::string_view header, SpelledName& name) {
+  for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
+    if (!header.ends_with(close)) continue;
+    const auto begin = header.rfind(open);
+    if (begin == std::string_view::npos) continue;
+    name.base = trimmed(header.substr(0, begin));
+    name.unit = trimmed(header.substr(begin + 1, header.size() - begin - 2));
+    name.known = spelled_unit(name.unit);
+    return true;
+  }
+  return false;
+}
+
+/// "Temp °C", "I / A", "t in s": the unit after the last blank.
+bool split_blank(std::string_view header, SpelledName& name) {
+  const auto blank = header.rfind(' ');
+  if (blank == std::string_view::npos) return false;
+  const SpelledUnit* unit = spelled_unit(header.substr(blank + 1));
+  std::string_view base = trimmed(header.substr(0, blank));
+  bool told = false;
+  for (const std::string_view before : {" /", " in"}) {
+    if (!base.ends_with(before)) continue;
+    base = trimmed(base.substr(0, base.size() - before.size()));
+    told = true;
+    break;
+  }
+  if (unit == nullptr || (unit->only_in_brackets && !told)) return false;
+  name = {std::string(base), std::string(unit->spelling), unit};
+  return true;
+}
+
+/// "T1°C", "z/µm": letters that are in no name but in a unit.
+bool split_letters(std::string_view header, SpelledName& name) {
+  for (const std::string_view unit : {"°C", "ºC", "℃", "°F", "ºF", "µm", "μm"}) {
+    if (!header.ends_with(unit)) continue;
+    std::string_view base = header.substr(0, header.size() - unit.size());
+    while (!base.empty() && (base.back() == '/' || base.back() == '_')) base.remove_suffix(1);
+    name = {std::string(trimmed(base)), std::string(unit), spelled_unit(unit)};
+    return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+const SpelledUnit* spelled_unit(std::string_view unit) {
+  const auto* const found = std::find_if(
+      units.begin(), units.end(), [&](const SpelledUnit& each) { return each.spelling == unit; });
+  return found == units.end() ? nullptr : &*found;
+}
+
+SpelledName spelled_name(std::string_view header) {
+  header = trimmed(header);
+  SpelledName name;
+  if (split_brackets(header, name) || split_blank(header, name) || split_letters(header, name))
+    return name;
+  return {std::string(header), "", nullptr};
+}
+
+std::optional<UnitConversion> conversion(const SpelledUnit& from, std::string_view column) {
+  const std::string_view suffix = unit_of(column).suffix;
+  if (suffix.empty()) return UnitConversion{};
+  if (suffix == from.suffix && from.factor == 1.0) return UnitConversion{};
+  const auto* const to = std::find_if(units.begin(), units.end(), [&](const SpelledUnit& each) {
+    return each.spelling == suffix.substr(1);
+  });
+  if (to == units.end() || to->dimension != from.dimension) return std::nullopt;
+  if (to->factor == from.factor && to->offset == from.offset) return UnitConversion{};
+  return UnitConversion{from.factor / to->factor, (from.offset - to->offset) / to->factor};
+}
+
+std::string plain_name(std::string_view base) {
+  std::string name;
+  for (const char c : trimmed(base)) {
+    const bool joins =
+        static_cast<unsigned char>(c) <= 0x20 || c == 0x7f || c == ',' || c == '"' || c == '|';
+    name += joins ? '_' : c;
+  }
+  return name;
+}
+
+}  // namespace thermocomp

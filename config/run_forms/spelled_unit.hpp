@@ -1,0 +1,47 @@
+/// Units as people write them in a header: "T1 [°C]", "z (mm)", "Temp °C", "I / A".
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace thermocomp {
+
+/// A unit in somebody's spelling. A number of it becomes `factor * number + offset` in the base
+/// unit of its dimension (degC, um, urad, s, ...).
+struct SpelledUnit {
+  std::string_view spelling;   ///< "°F"
+  std::string_view dimension;  ///< "temperature"
+  double factor{1.0};
+  double offset{0.0};
+  std::string_view suffix;       ///< of ours that is nearest, "_degC"; empty: a signal without unit
+  bool only_in_brackets{false};  ///< too short to be taken for a unit elsewhere
+};
+
+/// A header's name in its parts.
+struct SpelledName {
+  std::string base;  ///< "T1"
+  std::string unit;  ///< "°C" as written; empty: there is none
+  /// nullptr: the name has no unit, or brackets around something that is none
+  const SpelledUnit* known{nullptr};
+};
+[[nodiscard]] SpelledName spelled_name(std::string_view header);
+
+/// @return nullptr when it is none
+[[nodiscard]] const SpelledUnit* spelled_unit(std::string_view unit);
+
+/// ours = factor * theirs + offset.
+struct UnitConversion {
+  double factor{1.0};
+  double offset{0.0};
+  [[nodiscard]] bool is_identity() const { return factor == 1.0 && offset == 0.0; }
+};
+/// From a spelled unit to that of a column's name of ours.
+/// @return nullopt when they are of different dimensions
+[[nodiscard]] std::optional<UnitConversion> conversion(const SpelledUnit& from,
+                                                       std::string_view column);
+
+/// `base` as a column's name of ours: blanks, commas, quotes and bars as `_`.
+[[nodiscard]] std::string plain_name(std::string_view base);
+
+}  // namespace thermocomp

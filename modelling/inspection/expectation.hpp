@@ -1,0 +1,66 @@
+/// What a reading should be, from all others and its own past, and the evidence that it is not:
+/// change points in the remainder, whitened by its own measured colour.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace thermocomp::inspection {
+
+/// y = X b + an offset a run + n, n_t = rho n_(t-1) + white, with priors b_i ~ N(0, prior_i^2):
+/// ridge regression on whitened rows, rho from the remainder. A fault's shape f is judged by
+/// f'Mr / (sigma sqrt(f'Mf)) with M the projection that takes out what the regression could take
+/// of it; so what the neighbours can imitate is no evidence.
+class Expectation {
+ public:
+  /// @param y       shape (rows)
+  /// @param x       shape (rows, columns)
+  /// @param prior   shape (columns): standard deviation of each coefficient
+  /// @param begins  first row of each run, and the end
+  Expectation(const Eigen::VectorXd& y, const Eigen::MatrixXd& x, const Eigen::VectorXd& prior,
+              const std::vector<Eigen::Index>& begins);
+
+  struct Evidence {
+    double z{0.0};     ///< in standard deviations
+    double size{0.0};  ///< in units of y per unit of the shape
+  };
+  /// A step at each row of a run, all of them together in O(rows columns). Shape (rows of the run).
+  [[nodiscard]] std::vector<Evidence> steps(std::size_t run) const;
+  /// A shape given on a run's rows (zero elsewhere). `coloured`: the remainder's slow part, which
+  /// the whitening did not take, counts too (batch means).
+  [[nodiscard]] Evidence shape(std::size_t run, const Eigen::VectorXd& shape, bool coloured) const;
+  /// Two shapes together.
+  struct PairEvidence {
+    double z_both{0.0};    ///< root of the gain in 2 ln L of both
+    double z_second{0.0};  ///< ... of the second beside the first
+    double size_first{0.0};
+    double size_second{0.0};
+  };
+  [[nodiscard]] PairEvidence two_shapes(std::size_t run, const Eigen::VectorXd& first,
+                                        const Eigen::VectorXd& second) const;
+
+  [[nodiscard]] const Eigen::VectorXd& expected() const noexcept { return expected_; }
+  [[nodiscard]] const Eigen::VectorXd& remainder() const noexcept { return remainder_; }
+  [[nodiscard]] const Eigen::VectorXd& coefficients() const noexcept { return coefficients_; }
+  [[nodiscard]] double rho() const noexcept { return rho_; }
+  [[nodiscard]] double sigma() const noexcept { return sigma_; }  ///< of the white part
+
+ private:
+  [[nodiscard]] Eigen::MatrixXd whitened(const Eigen::MatrixXd& columns) const;
+  void solve(const Eigen::VectorXd& y, const Eigen::MatrixXd& x, const Eigen::VectorXd& prior);
+  void estimate_rho();
+  [[nodiscard]] Eigen::VectorXd whitened_shape(std::size_t run, const Eigen::VectorXd& shape) const;
+  [[nodiscard]] double slow_share(std::size_t run, const Eigen::VectorXd& rest) const;
+
+  std::vector<Eigen::Index> begins_;
+  double rho_{0.0};
+  double sigma_{1.0};
+  Eigen::VectorXd coefficients_;
+  Eigen::VectorXd expected_;
+  Eigen::VectorXd remainder_;
+  Eigen::VectorXd innovations_;  ///< whitened remainder
+  Eigen::MatrixXd basis_;        ///< shape (rows, columns + runs): Q of the regression
+};
+
+}  // namespace thermocomp::inspection

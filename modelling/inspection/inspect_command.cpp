@@ -1,0 +1,64 @@
+#include "modelling/inspection/inspect_command.hpp"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/output_file.hpp"
+#include "cli/run_loader.hpp"
+#include "cli/terminal.hpp"
+#include "modelling/inspection/inspection.hpp"
+
+namespace thermocomp::inspection {
+namespace {
+
+constexpr double likelier_than_not = 0.5;
+
+struct Options {
+  std::vector<std::string> runs;
+  std::string columns;
+  std::string json;
+  std::string report;
+  bool all{false};
+};
+
+void write(const std::string& destination, const std::string& text) {
+  cli::OutputFile file(destination);
+  file.stream() << text;
+  file.commit();
+}
+
+int run(const Options& options) {
+  const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
+  Inspection inspection;
+  {
+    cli::Progress progress("inspecting");
+    inspection = inspect(runs, options.all ? 0.0 : likelier_than_not,
+                         [&progress](double fraction) { progress.update(fraction); });
+  }
+  if (!options.json.empty()) write(options.json, inspection_json(inspection));
+  if (!options.report.empty()) write(options.report, inspection_html(runs, inspection));
+  if (options.json != "-" && options.report != "-") write("-", inspection_text(inspection));
+  for (const Finding& finding : inspection.findings)
+    if (finding.probability >= likelier_than_not) return 1;
+  return 0;
+}
+
+}  // namespace
+
+void add_inspect_command(CLI::App& app, std::function<int()>& action) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* sub = app.add_subcommand(
+      "inspect", "what is wrong with recordings themselves, and what they can tell at all");
+  sub->add_option("RUN.csv", options->runs, "runs: RUN.csv[@T0:T1]")->required();
+  sub->add_option("--columns", options->columns, cli::columns_help);
+  sub->add_option("--json", options->json, "file for the answer as JSON; - is the output");
+  sub->add_option("--report", options->report, "page with pictures (HTML); - is the output");
+  sub->add_flag("--all", options->all, "also tell what is less likely than not");
+  sub->footer("Exit status: 0 nothing found, 1 something, 2 bad use or bad input.");
+  sub->callback([options, &action] { action = [options] { return run(*options); }; });
+}
+
+}  // namespace thermocomp::inspection

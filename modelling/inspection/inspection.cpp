@@ -1,0 +1,66 @@
+#include "modelling/inspection/inspection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "modelling/inspection/checks.hpp"
+
+namespace thermocomp::inspection {
+namespace {
+
+constexpr Eigen::Index rows_of_all_runs_max = 4000;
+constexpr Eigen::Index rows_of_a_run_max = 1000;
+
+/// A straight line in place of what is stuck, so that the others are not held against it.
+void bridge(RunFile& run, const Finding& stuck) {
+  const std::vector<double>& time_s = run.time_s();
+  std::vector<double>& values = run.values[*run.find(stuck.column)];
+  const auto row = [&](double at_s) {
+    return static_cast<std::size_t>(std::lower_bound(time_s.begin(), time_s.end(), at_s) -
+                                    time_s.begin());
+  };
+  const std::size_t begin = row(stuck.at_s);
+  const std::size_t end = std::min(row(stuck.until_s) + 1, run.rows() - 1);
+  if (begin >= end || !std::isfinite(values[begin]) || !std::isfinite(values[end])) return;
+  const double slope = (values[end] - values[begin]) / (time_s[end] - time_s[begin]);
+  for (std::size_t i = begin + 1; i < end; ++i)
+    values[i] = values[begin] + slope * (time_s[i] - time_s[begin]);
+}
+
+}  // namespace
+
+Inspection inspect(const std::vector<RunFile>& runs, double told_min,
+                   const std::function<void(double)>& progress) {
+  Inspection inspection;
+  Suspicions suspicions;
+  std::vector<RunFile> calm = runs;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    inspection.runs.push_back(sampling_of(runs[i]));
+    check_clock(runs[i], i, inspection.runs.back(), suspicions);
+    check_spikes(calm[i], i, suspicions);
+  }
+  check_values(runs, suspicions);
+  for (const Suspicion& each : suspicions)
+    if (each.finding.kind == "stuck") bridge(calm[each.finding.run], each.finding);
+  const Recording recording = make_recording(
+      calm, std::min(rows_of_a_run_max,
+                     std::max<Eigen::Index>(
+                         100, rows_of_all_runs_max / static_cast<Eigen::Index>(runs.size()))));
+  inspection.groups = groups_of(recording);
+  judge_excitation(recording, inspection);
+  check_exchanged(recording, suspicions);
+  check_changes(recording, calm, suspicions, progress);
+  for (Suspicion& each : suspicions) {
+    each.finding.score = each.score;
+    each.finding.probability = probability_of(each.finding.kind, each.score);
+    if (each.finding.probability < told_min) continue;
+    describe(each.finding, runs);
+    inspection.findings.push_back(std::move(each.finding));
+  }
+  std::stable_sort(
+      inspection.findings.begin(), inspection.findings.end(),
+      [](const Finding& a, const Finding& b) { return a.probability > b.probability; });
+  return inspection;
+}
+
+}  // namespace thermocomp::inspection

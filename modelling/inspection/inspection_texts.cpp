@@ -1,0 +1,84 @@
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "modelling/inspection/inspection.hpp"
+
+namespace thermocomp::inspection {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Four digits: more would be none.
+double rounded(double value) {
+  if (!(std::abs(value) > 0) || !std::isfinite(value)) return value;
+  const double scale = std::pow(10.0, 3.0 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * scale) / scale;
+}
+
+Json json_of(const Finding& finding, const Inspection& inspection) {
+  Json json;
+  json["kind"] = finding.kind;
+  json["column"] = finding.column.empty() ? Json(nullptr) : Json(finding.column);
+  if (!finding.other.empty()) json["other"] = finding.other;
+  json["run"] = inspection.runs[finding.run].file;
+  json["at_s"] = finding.at_s;
+  json["until_s"] = finding.until_s;
+  json["size"] = rounded(finding.size);
+  json["unit"] = finding.unit;
+  json["probability"] = std::round(1000.0 * finding.probability) / 1000.0;
+  json["score"] = rounded(finding.score);
+  json["text"] = finding.text;
+  if (!finding.times_s.empty()) json["times_s"] = finding.times_s;
+  return json;
+}
+
+}  // namespace
+
+std::string inspection_json(const Inspection& inspection) {
+  Json json;
+  json["runs"] = Json::array();
+  for (const RunSampling& run : inspection.runs) {
+    Json gaps = Json::array();
+    for (const auto& [from_s, to_s] : run.gaps) gaps.push_back({from_s, to_s});
+    json["runs"].push_back(
+        {{"file", run.file}, {"rows", run.rows}, {"step_s", run.step_s}, {"gaps", gaps}});
+  }
+  json["groups"] = inspection.groups;
+  json["excited"] = Json::object();
+  for (const auto& [name, excited] : inspection.excited) json["excited"][name] = excited;
+  json["experiments"] = inspection.experiments;
+  json["findings"] = Json::array();
+  for (const Finding& finding : inspection.findings)
+    json["findings"].push_back(json_of(finding, inspection));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string inspection_text(const Inspection& inspection) {
+  std::string text;
+  char line[160];
+  for (const RunSampling& run : inspection.runs) {
+    std::snprintf(line, sizeof line, ": %zu rows, one each %.4g s, %zu gaps\n", run.rows,
+                  run.step_s, run.gaps.size());
+    text += run.file + line;
+  }
+  text += "\n";
+  if (inspection.findings.empty())
+    text += "Nothing is wrong with these recordings that they show.\n";
+  for (const Finding& finding : inspection.findings) {
+    std::snprintf(line, sizeof line, "%3.0f %%  ", 100 * finding.probability);
+    text += line + inspection.runs[finding.run].file + ": " + finding.text + "\n";
+  }
+  text += "\nPlaces that move alike:\n";
+  for (const auto& group : inspection.groups) {
+    text += " ";
+    for (const std::string& name : group) text += " " + name;
+    text += "\n";
+  }
+  if (!inspection.experiments.empty()) text += "\nWhat would tell more:\n";
+  for (const std::string& experiment : inspection.experiments) text += "  " + experiment + "\n";
+  return text;
+}
+
+}  // namespace thermocomp::inspection

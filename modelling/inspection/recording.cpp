@@ -1,0 +1,122 @@
+#include "modelling/inspection/recording.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "config/units.hpp"
+
+namespace thermocomp::inspection {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::size_t output_rows_min = 20;
+
+std::size_t values_of(const std::vector<double>& column) {
+  return static_cast<std::size_t>(
+      std::count_if(column.begin(), column.end(), [](double v) { return std::isfinite(v); }));
+}
+
+bool is_usable(const std::vector<RunFile>& runs, const std::string& name) {
+  return std::all_of(runs.begin(), runs.end(), [&](const RunFile& run) {
+    if (!run.find(name)) return false;
+    const std::size_t count = values_of(run.column(name));
+    return is_output(name) ? count >= std::min(output_rows_min, run.rows())
+                           : 2 * count >= run.rows();
+  });
+}
+
+/// A column that stands still from row to row in four of five rows is set or very coarse: it acts
+/// like a signal, and what it should be cannot be told from neighbours.
+bool is_held(const std::vector<RunFile>& runs, const std::string& name) {
+  std::size_t still = 0;
+  std::size_t steps = 0;
+  for (const RunFile& run : runs) {
+    const std::vector<double>& values = run.column(name);
+    for (std::size_t row = 1; row < values.size(); ++row, ++steps)
+      if (values[row] == values[row - 1]) ++still;
+  }
+  return 5 * still >= 4 * steps;
+}
+
+/// Mean of the values that are there; NaN without any.
+double mean_of(const std::vector<double>& column, std::size_t begin, std::size_t end) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t row = begin; row < end; ++row) {
+    if (!std::isfinite(column[row])) continue;
+    sum += column[row];
+    count += 1.0;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Missing values at the start take the first that is there.
+void hold(Eigen::Ref<Eigen::VectorXd> column) {
+  double held = std::numeric_limits<double>::quiet_NaN();
+  for (Index row = 0; row < column.size() && !std::isfinite(held); ++row) held = column[row];
+  if (!std::isfinite(held)) held = 0.0;
+  for (double& value : column) value = held = std::isfinite(value) ? value : held;
+}
+
+}  // namespace
+
+Recording make_recording(const std::vector<RunFile>& runs, Index rows_max) {
+  Recording recording;
+  for (const std::string& name : runs.front().columns) {
+    if (name == "time_s" || !is_usable(runs, name)) continue;
+    (is_temperature(name) && !is_held(runs, name) ? recording.temps
+     : is_output(name)                            ? recording.outputs
+                                                  : recording.signals)
+        .push_back(name);
+  }
+  std::vector<std::size_t> strides;
+  Index rows = 0;
+  for (const RunFile& run : runs) {
+    const std::size_t stride =
+        (run.rows() + static_cast<std::size_t>(rows_max) - 1) / static_cast<std::size_t>(rows_max);
+    recording.begins.push_back(rows);
+    strides.push_back(std::max<std::size_t>(1, stride));
+    rows += static_cast<Index>((run.rows() + strides.back() - 1) / strides.back());
+  }
+  recording.begins.push_back(rows);
+  recording.time_s.resize(rows);
+  const auto fill = [&](const std::string& name, Eigen::Ref<Eigen::VectorXd> column, bool held) {
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+      const std::vector<double>& from = runs[r].column(name);
+      const Index begin = recording.begins[r];
+      const Index count = recording.begins[r + 1] - begin;
+      for (Index row = 0; row < count; ++row) {
+        const std::size_t at = static_cast<std::size_t>(row) * strides[r];
+        column[begin + row] = mean_of(from, at, std::min(at + strides[r], from.size()));
+      }
+      if (held) hold(column.segment(begin, count));
+    }
+  };
+  const auto fill_all = [&](const std::vector<std::string>& names, Eigen::MatrixXd& matrix,
+                            bool held) {
+    matrix.resize(rows, static_cast<Index>(names.size()));
+    for (std::size_t i = 0; i < names.size(); ++i)
+      fill(names[i], matrix.col(static_cast<Index>(i)), held);
+  };
+  fill("time_s", recording.time_s, false);
+  fill_all(recording.temps, recording.temps_K, true);
+  fill_all(recording.signals, recording.values, true);
+  fill_all(recording.outputs, recording.outputs_um, false);
+  return recording;
+}
+
+Eigen::MatrixXd low_pass(const Recording& recording, const Eigen::MatrixXd& columns, double tau_s) {
+  Eigen::MatrixXd passed = columns;
+  for (std::size_t r = 0; r < recording.runs(); ++r) {
+    for (Index row = recording.begins[r] + 1; row < recording.begins[r + 1]; ++row) {
+      const double step_s = recording.time_s[row] - recording.time_s[row - 1];
+      const double share = 1.0 - std::exp(-step_s / tau_s);
+      passed.row(row) = (1.0 - share) * passed.row(row - 1) + share * columns.row(row);
+    }
+  }
+  return passed;
+}
+
+}  // namespace thermocomp::inspection

@@ -1,0 +1,36 @@
+/// All runs as matrices on a coarser grid, on which readings are held against each other.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "config/run_file.hpp"
+
+namespace thermocomp::inspection {
+
+/// Rows of all runs one after another. A missing temperature or signal is that of the row before;
+/// a missing displacement is NaN.
+struct Recording {
+  std::vector<std::string> temps;
+  std::vector<std::string> signals;
+  std::vector<std::string> outputs;
+  Eigen::VectorXd time_s;
+  Eigen::MatrixXd temps_K;           ///< shape (rows, temps)
+  Eigen::MatrixXd values;            ///< shape (rows, signals)
+  Eigen::MatrixXd outputs_um;        ///< shape (rows, outputs)
+  std::vector<Eigen::Index> begins;  ///< of each run, and the end
+
+  [[nodiscard]] std::size_t runs() const noexcept { return begins.size() - 1; }
+};
+
+/// Columns that all runs have, and that have values in at least half of each run's rows
+/// (displacements: in 20 rows). Means of so many rows that each run has at most `rows_max`.
+[[nodiscard]] Recording make_recording(const std::vector<RunFile>& runs, Eigen::Index rows_max);
+
+/// First-order low pass of each column, started at each run's first row.
+[[nodiscard]] Eigen::MatrixXd low_pass(const Recording& recording, const Eigen::MatrixXd& columns,
+                                       double tau_s);
+
+}  // namespace thermocomp::inspection

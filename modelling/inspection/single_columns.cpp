@@ -1,0 +1,211 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "config/units.hpp"
+#include "modelling/inspection/checks.hpp"
+#include "modelling/inspection/robust.hpp"
+
+namespace thermocomp::inspection {
+namespace {
+
+constexpr std::size_t half_window = 3;
+// What a value may leap in a row for other reasons: the tolerance of a thermocouple, a probing's.
+constexpr double leap_K_min = 0.5;
+constexpr double leap_um_min = 1.0;
+constexpr double leap_deviations_min = 8.0;
+constexpr double coarse_K_min = 0.2;  // half of it is 0.1 K, about 1 um on a machine
+constexpr double coarse_um_min = 1.0;
+constexpr std::size_t stuck_rows_min = 10;
+constexpr double others_moved_K_min = 1.0;
+constexpr std::size_t copy_values_min = 20;  // different ones; fewer agree by chance
+
+double median_around(const std::vector<double>& column, std::size_t row) {
+  // As many on both sides, so that a slope is no leap.
+  const std::size_t half = std::min({half_window, row, column.size() - 1 - row});
+  return median({column.begin() + static_cast<std::ptrdiff_t>(row - half),
+                 column.begin() + static_cast<std::ptrdiff_t>(row + half + 1)});
+}
+
+Suspicion suspicion(const std::string& kind, const std::string& column, std::size_t run,
+                    double at_s, double until_s, double size, double score) {
+  Suspicion made;
+  made.finding.kind = kind;
+  made.finding.column = column;
+  made.finding.run = run;
+  made.finding.at_s = at_s;
+  made.finding.until_s = until_s;
+  made.finding.size = size;
+  made.finding.unit = unit_of(column).symbol == "degC" ? "K" : std::string(unit_of(column).symbol);
+  made.score = score;
+  return made;
+}
+
+/// Whether another temperature leaps the same way in that row: then the place does, not the sensor.
+bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double leap) {
+  for (std::size_t i = 0; i < run.columns.size(); ++i) {
+    if (i == column || !is_temperature(run.columns[i])) continue;
+    const double other = run.values[i][row] - median_around(run.values[i], row);
+    if (other / leap > 0.3) return true;
+  }
+  return false;
+}
+
+void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
+  std::vector<double>& values = run.values[column];
+  const bool output = is_output(run.columns[column]);
+  std::vector<double> around(values.size());
+  Eigen::VectorXd leaps(static_cast<Eigen::Index>(values.size()));
+  for (std::size_t row = 0; row < values.size(); ++row) {
+    around[row] = median_around(values, row);
+    leaps[static_cast<Eigen::Index>(row)] = values[row] - around[row];
+  }
+  double deviation = robust_deviation(leaps);
+  // Where most rows hold still, those that move say how far it moves.
+  if (!(deviation > 0)) {
+    std::vector<double> moving;
+    for (const double leap : leaps)
+      if (std::isfinite(leap) && leap != 0) moving.push_back(std::abs(leap));
+    if (moving.size() > values.size() / 50) deviation = median(std::move(moving));
+  }
+  const double least = std::max(leap_deviations_min * deviation, output ? leap_um_min : leap_K_min);
+  Suspicion made =
+      suspicion(output ? "outliers" : "spikes", run.columns[column], index, 0, 0, 0, 0);
+  std::vector<std::size_t> leapt;
+  for (std::size_t row = 1; row + 1 < values.size(); ++row) {
+    const double leap = leaps[static_cast<Eigen::Index>(row)];
+    if (!(std::abs(leap) > least) || others_leap(run, column, row, leap)) continue;
+    made.finding.times_s.push_back(run.time_s()[row]);
+    if (std::abs(leap) > std::abs(made.finding.size)) made.finding.size = leap;
+    leapt.push_back(row);
+  }
+  if (made.finding.times_s.empty()) return;
+  for (const std::size_t row : leapt) values[row] = around[row];
+  made.finding.at_s = made.finding.times_s.front();
+  made.finding.until_s = made.finding.times_s.back();
+  made.score = std::abs(made.finding.size) / std::max(least, 1e-12);
+  found.push_back(made);
+}
+
+/// Rows of one and the same value.
+struct Stretch {
+  std::size_t begin{0};
+  std::size_t end{0};
+  [[nodiscard]] std::size_t rows() const noexcept { return end - begin; }
+};
+
+std::pair<Stretch, std::size_t> longest_still(const std::vector<double>& values) {
+  Stretch longest;
+  std::size_t second = 1;
+  for (std::size_t begin = 0; begin < values.size();) {
+    std::size_t end = begin + 1;
+    while (end < values.size() && values[end] == values[begin]) ++end;
+    if (end - begin > longest.rows()) {
+      second = std::max(second, longest.rows());
+      longest = {begin, end};
+    } else {
+      second = std::max(second, end - begin);
+    }
+    begin = end;
+  }
+  return {longest, second};
+}
+
+double range_of(const std::vector<double>& values, Stretch rows) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (std::size_t row = rows.begin; row < rows.end; ++row) {
+    if (!std::isfinite(values[row])) continue;
+    low = std::min(low, values[row]);
+    high = std::max(high, values[row]);
+  }
+  return high > low ? high - low : 0.0;
+}
+
+void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
+  const auto [longest, second] = longest_still(run.values[column]);
+  if (longest.rows() < stuck_rows_min) return;
+  std::vector<double> others;
+  for (std::size_t i = 0; i < run.columns.size(); ++i)
+    if (i != column && is_temperature(run.columns[i]))
+      others.push_back(range_of(run.values[i], longest));
+  const double moved = others.empty() ? 0.0 : median(others);
+  if (!(moved > others_moved_K_min)) return;
+  const bool throughout = longest.rows() == run.rows();
+  const double longer = static_cast<double>(longest.rows()) / static_cast<double>(second);
+  const double score = throughout ? moved : std::min(longer, 5.0 * moved);
+  if (!throughout && longer < 3.0) return;
+  found.push_back(suspicion("stuck", run.columns[column], index, run.time_s()[longest.begin],
+                            run.time_s()[longest.end - 1], moved, score));
+}
+
+void check_coarse(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
+  const std::vector<double>& values = run.values[column];
+  std::vector<double> steps;
+  for (std::size_t row = 1; row < values.size(); ++row) {
+    const double step = std::abs(values[row] - values[row - 1]);
+    if (std::isfinite(step) && step > 0) steps.push_back(step);
+  }
+  if (steps.size() < 5) return;
+  const double least = *std::min_element(steps.begin(), steps.end());
+  const bool output = is_output(run.columns[column]);
+  if (least < (output ? coarse_um_min : coarse_K_min)) return;
+  const auto on_grid = std::count_if(steps.begin(), steps.end(), [&](double step) {
+    return std::abs(step / least - std::round(step / least)) < 0.05;
+  });
+  const double range = range_of(values, {0, values.size()});
+  if (on_grid < static_cast<std::ptrdiff_t>(steps.size()) || least < 0.02 * range) return;
+  found.push_back(suspicion("coarse", run.columns[column], index, run.time_s().front(),
+                            run.time_s().back(), least, 10.0));
+}
+
+void check_copies(const RunFile& run, std::size_t index, Suspicions& found) {
+  for (std::size_t a = 0; a < run.columns.size(); ++a) {
+    if (!is_temperature(run.columns[a])) continue;
+    std::vector<double> different = run.values[a];
+    std::erase_if(different, [](double value) { return !std::isfinite(value); });
+    std::sort(different.begin(), different.end());
+    const auto count = std::unique(different.begin(), different.end()) - different.begin();
+    if (count < static_cast<std::ptrdiff_t>(copy_values_min)) continue;
+    const double range = different.empty() ? 0.0 : range_of(run.values[a], {0, run.rows()});
+    for (std::size_t b = a + 1; b < run.columns.size(); ++b) {
+      if (!is_temperature(run.columns[b])) continue;
+      std::size_t same = 0;
+      std::size_t both = 0;
+      for (std::size_t row = 0; row < run.rows(); ++row) {
+        const double apart = run.values[a][row] - run.values[b][row];
+        if (!std::isfinite(apart)) continue;
+        ++both;
+        if (std::abs(apart) <= 1e-6 * range) ++same;
+      }
+      if (both < copy_values_min || 20 * same < 19 * both) continue;
+      Suspicion made = suspicion("copy", run.columns[b], index, run.time_s().front(),
+                                 run.time_s().back(), 0.0, 10.0);
+      made.finding.other = run.columns[a];
+      made.finding.unit = std::string("K");
+      found.push_back(made);
+    }
+  }
+}
+
+}  // namespace
+
+void check_spikes(RunFile& run, std::size_t index, Suspicions& found) {
+  for (std::size_t column = 0; column < run.columns.size(); ++column)
+    if (is_temperature(run.columns[column]) || is_output(run.columns[column]))
+      check_leaps(run, index, column, found);
+}
+
+void check_values(const std::vector<RunFile>& runs, Suspicions& found) {
+  for (std::size_t index = 0; index < runs.size(); ++index) {
+    const RunFile& run = runs[index];
+    for (std::size_t column = 0; column < run.columns.size(); ++column) {
+      const bool reading = is_temperature(run.columns[column]);
+      if (reading) check_stuck(run, index, column, found);
+      if (reading || is_output(run.columns[column])) check_coarse(run, index, column, found);
+    }
+    check_copies(run, index, found);
+  }
+}
+
+}  // namespace thermocomp::inspection

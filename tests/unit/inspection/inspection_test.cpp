@@ -1,0 +1,163 @@
+// A machine of six places that warm from two sources: what is planted into one reading is found,
+// and nothing on the machine as it is.
+#include "modelling/inspection/inspection.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <catch2/catch.hpp>
+
+using namespace thermocomp;
+using namespace thermocomp::inspection;
+
+namespace {
+
+constexpr std::size_t rows = 700;
+
+/// Twelve hours, a row a minute; speed in three levels, a room that wanders.
+RunFile recording(unsigned seed = 1) {
+  RunFile run;
+  run.name = "run.csv";
+  run.columns = {"time_s",  "spindle_rpm", "t1_degC", "t2_degC", "t3_degC",
+                 "t4_degC", "t5_degC",     "t6_degC", "z_um"};
+  run.values.assign(run.columns.size(), {});
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  double spindle = 0.0;
+  double body = 0.0;
+  double room = 20.0;
+  for (std::size_t row = 0; row < rows; ++row) {
+    const double rpm = 1500.0 * static_cast<double>((row / 110) % 3);
+    spindle += (rpm / 250.0 - spindle) / 25.0;
+    body += (spindle - body) / 90.0;
+    room += noise(random);
+    const double shares[6][2] = {{1, 0}, {0.8, 0.2}, {0.5, 0.5}, {0.1, 0.9}, {0, 1}, {0.3, 0.4}};
+    run.values[0].push_back(60.0 * static_cast<double>(row));
+    run.values[1].push_back(rpm);
+    for (std::size_t i = 0; i < 6; ++i)
+      run.values[2 + i].push_back(room + shares[i][0] * spindle + shares[i][1] * body +
+                                  noise(random));
+    run.values[8].push_back(4.0 * spindle + 6.0 * body + 10.0 * noise(random));
+  }
+  run.selected_end = rows;
+  return run;
+}
+
+std::vector<double>& column(RunFile& run, const std::string& name) {
+  return run.values[*run.find(name)];
+}
+
+const Finding* find(const Inspection& inspection, const std::string& kind) {
+  const auto found = std::find_if(inspection.findings.begin(), inspection.findings.end(),
+                                  [&](const Finding& each) { return each.kind == kind; });
+  return found == inspection.findings.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+TEST_CASE("nothing is found in a recording that is as it should be", "[inspection]") {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    const Inspection inspection = inspect({recording(seed)});
+    INFO(inspection_text(inspection));
+    CHECK(inspection.findings.empty());
+    CHECK(inspection.runs.front().step_s == 60.0);
+    CHECK(inspection.runs.front().gaps.empty());
+    REQUIRE(inspection.excited.size() == 1);
+    CHECK(inspection.excited.front().second);
+  }
+}
+
+TEST_CASE("a reading that jumps is named with its time and size, and its neighbours are not",
+          "[inspection]") {
+  RunFile run = recording();
+  for (std::size_t row = 400; row < rows; ++row) column(run, "t3_degC")[row] += 2.0;
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  REQUIRE(inspection.findings.size() == 1);
+  const Finding& finding = inspection.findings.front();
+  CHECK(finding.kind == "sensor_step");
+  CHECK(finding.column == "t3_degC");
+  CHECK(finding.at_s == Approx(24000.0).margin(60.0));
+  CHECK(finding.size == Approx(2.0).margin(0.1));
+  const Cleaned clean = cleaned({run}, inspection);
+  CHECK(clean.notes.size() == 1);
+  CHECK(clean.runs.front().column("t3_degC")[500] ==
+        Approx(run.column("t3_degC")[500] - 2.0).margin(0.1));
+}
+
+TEST_CASE("the likeliest creep is that of the reading that creeps", "[inspection]") {
+  RunFile run = recording();
+  for (std::size_t row = 0; row < rows; ++row)
+    column(run, "t4_degC")[row] += 4.0 * static_cast<double>(row) / static_cast<double>(rows);
+  const Inspection inspection = inspect({run}, 0.0);
+  INFO(inspection_text(inspection));
+  const Finding* finding = find(inspection, "sensor_drift");
+  REQUIRE(finding != nullptr);
+  CHECK(finding->column == "t4_degC");
+  CHECK(finding->size == Approx(4.0).margin(1.0));
+}
+
+TEST_CASE("spikes are found one by one, and replaced", "[inspection]") {
+  RunFile run = recording();
+  for (const std::size_t row : {50U, 300U, 640U}) column(run, "t2_degC")[row] -= 3.0;
+  const Inspection inspection = inspect({run});
+  const Finding* finding = find(inspection, "spikes");
+  REQUIRE(finding != nullptr);
+  CHECK(finding->column == "t2_degC");
+  CHECK(finding->times_s == std::vector<double>{3000, 18000, 38400});
+  const Cleaned clean = cleaned({run}, inspection);
+  CHECK(clean.runs.front().column("t2_degC")[300] ==
+        Approx(run.column("t2_degC")[299]).margin(0.3));
+}
+
+TEST_CASE("what stands still, is coarse or is another's reading is said", "[inspection]") {
+  RunFile run = recording();
+  for (std::size_t row = 330; row < 430; ++row)
+    column(run, "t1_degC")[row] = column(run, "t1_degC")[330];
+  for (double& value : column(run, "t6_degC")) value = 0.5 * std::round(2.0 * value);
+  column(run, "t5_degC") = column(run, "t4_degC");
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  REQUIRE(find(inspection, "stuck") != nullptr);
+  CHECK(find(inspection, "stuck")->column == "t1_degC");
+  REQUIRE(find(inspection, "coarse") != nullptr);
+  CHECK(find(inspection, "coarse")->size == Approx(0.5));
+  REQUIRE(find(inspection, "copy") != nullptr);
+  CHECK(find(inspection, "copy")->column == "t5_degC");
+  CHECK(find(inspection, "copy")->other == "t4_degC");
+}
+
+TEST_CASE("a gap and a clock that was put forward are told apart", "[inspection]") {
+  RunFile run = recording();
+  RunFile gap = run;
+  for (std::vector<double>& values : gap.values)
+    values.erase(values.begin() + 200, values.begin() + 260);
+  gap.selected_end = gap.rows();
+  REQUIRE(find(inspect({gap}), "gap") != nullptr);
+  CHECK(find(inspect({gap}), "clock") == nullptr);
+  for (std::size_t row = 250; row < rows; ++row) column(run, "time_s")[row] += 3600.0;
+  const Inspection inspection = inspect({run});
+  REQUIRE(find(inspection, "clock") != nullptr);
+  CHECK(find(inspection, "clock")->at_s == 249 * 60.0);
+}
+
+TEST_CASE("a signal that never changed cannot be told of, and an experiment is proposed",
+          "[inspection]") {
+  RunFile run = recording();
+  std::fill(column(run, "spindle_rpm").begin(), column(run, "spindle_rpm").end(), 1000.0);
+  const Inspection inspection = inspect({run});
+  REQUIRE(inspection.excited.size() == 1);
+  CHECK_FALSE(inspection.excited.front().second);
+  REQUIRE_FALSE(inspection.experiments.empty());
+  CHECK(inspection.experiments.front().find("spindle_rpm never changed") == 0);
+}
+
+TEST_CASE("the page shows each finding with its picture", "[inspection]") {
+  RunFile run = recording();
+  for (std::size_t row = 400; row < rows; ++row) column(run, "t3_degC")[row] += 2.0;
+  const Inspection inspection = inspect({run});
+  const std::string page = inspection_html({run}, inspection);
+  CHECK(page.find("t3_degC jumps by 2") != std::string::npos);
+  CHECK(page.find("<svg") != std::string::npos);
+}
