@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "config/run_file.hpp"
+#include "config/run_data.hpp"
 #include "config/run_forms/column_map.hpp"
 
 namespace thermocomp {

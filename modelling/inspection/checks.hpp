@@ -5,7 +5,8 @@
 #include <functional>
 #include <vector>
 
-#include "modelling/inspection/inspection.hpp"
+#include "config/run_file.hpp"
+#include "modelling/inspection/finding.hpp"
 #include "modelling/inspection/recording.hpp"
 
 namespace thermocomp::inspection {

@@ -1,0 +1,30 @@
+/// What a run file holds, whatever its form was.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace thermocomp {
+
+/// A whole run, column by column. References and the states of lags start at row 0, whatever is
+/// selected; results are for the rows [selected_begin, selected_end).
+struct RunFile {
+  std::string name;                         ///< the file, for messages
+  std::vector<std::string> columns;         ///< order of the header, time_s among them
+  std::vector<std::vector<double>> values;  ///< shape (columns, rows); NaN: missing
+  std::size_t selected_begin{0};
+  std::size_t selected_end{0};
+  /// How a file of another form was taken, a line each; empty: it has our own form.
+  std::vector<std::string> understood;
+
+  [[nodiscard]] std::size_t rows() const noexcept { return values.empty() ? 0 : values[0].size(); }
+  [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
+  /// @throws ConfigurationError naming the file when there is no such column
+  [[nodiscard]] const std::vector<double>& column(std::string_view name) const;
+  [[nodiscard]] const std::vector<double>& time_s() const { return column("time_s"); }
+};
+
+}  // namespace thermocomp
