@@ -7,7 +7,7 @@ namespace thermocomp::cli {
 
 namespace {
 
-constexpr std::array<ReasonText, 12> reasons{{
+constexpr std::array<ReasonText, 13> reasons{{
     {"operator_disabled", "switched off by an operator", "thermocomp enable"},
     {"controller_disabled", "switched off at the controller",
      "release the switch that the configuration names as disable_signal"},
@@ -30,6 +30,8 @@ constexpr std::array<ReasonText, 12> reasons{{
      "that axis is not driven; set the offset at the controller to zero and look for who set it"},
     {"block_estimated", "an input of the model has no good sensor left and is estimated",
      "compensation goes on; thermocomp sensors says which and why; mend the sensor"},
+    {"outside_domain", "the machine is outside of what its model was made from",
+     "the offset may be wrong: measure, and make the model anew with a run of such a day"},
 }};
 
 constexpr std::array<ReasonText, 12> faults{{

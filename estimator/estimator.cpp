@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "estimator/axis_channel.hpp"
 #include "estimator/block_bank.hpp"
@@ -10,7 +11,10 @@
 #include "estimator/displacement_model.hpp"
 #include "estimator/input_gains.hpp"
 #include "estimator/lost_blocks.hpp"
+#include "estimator/model_domain.hpp"
 #include "estimator/name_index.hpp"
+#include "estimator/outside_share.hpp"
+#include "estimator/probed_error.hpp"
 
 namespace thermocomp {
 namespace {
@@ -60,7 +64,16 @@ struct Estimator::Parts {
     return model_um[axis_output[axis]] - zero_um[axis_output[axis]];
   }
   [[nodiscard]] double predicted_um(std::size_t axis) const noexcept {
-    return model_change_um(axis) + corrections[axis].correction_um();
+    return believed_share() * model_change_um(axis) + corrections[axis].correction_um();
+  }
+  [[nodiscard]] bool outside() const noexcept { return domain && domain->outside(); }
+  /// What was learned by probing stays believed; the model is what left its domain.
+  [[nodiscard]] double believed_share() const noexcept {
+    const bool shrinks = config.compensation.outside_domain == OutsidePolicy::shrink;
+    return shrinks && domain ? domain->believed_share() : 1.0;
+  }
+  [[nodiscard]] bool held_outside() const noexcept {
+    return config.compensation.outside_domain == OutsidePolicy::hold && outside();
   }
   [[nodiscard]] double signal(int index) const noexcept {
     return index == no_signal ? not_a_number : all_signals[static_cast<std::size_t>(index)];
@@ -76,7 +89,10 @@ struct Estimator::Parts {
   LostBlocks lost;
   InputGains gains;
   DisplacementModel displacement;
-  DisplacementModel at_reference;  ///< the same model, only ever asked for the zero
+  DisplacementModel at_reference;     ///< the same model, only ever asked for the zero
+  std::optional<ModelDomain> domain;  ///< of a model that says what it was made from
+  OutsideShare outside_share;
+  std::vector<ProbedError> probed;  ///< one an axis
   std::vector<AxisChannel> axes;
   std::vector<RunningCorrection> corrections;  ///< one an axis
   std::vector<CycleHold> holds;                ///< one an axis
@@ -123,6 +139,7 @@ struct Estimator::Parts {
   std::vector<int> axis_plan;
   std::vector<int> term_plan;
   bool keep_reference{false};
+  bool keep_domain{false};
 };
 
 Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalModel& model)
@@ -141,6 +158,7 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
       hold(std::chrono::duration_cast<nanoseconds>(seconds_d(config.compensation.hold_s))),
       enabled(config.compensation.enabled_at_first_start) {
   config.compensation.validate();
+  if (model.made_from) domain.emplace(model);
   require(config.axes.size() <= axes_max, "axis", static_cast<double>(config.axes.size()),
           "are too many axes");
   require(config.signals.size() <= signals_max, "controller.signal",
@@ -152,6 +170,7 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
         index_of(model.outputs, axis.output, "axis.output", "is not an output of the model"));
     corrections.emplace_back(config.correction, model, axis_output.back());
     holds.emplace_back(config.compensation.cycle_ahead);
+    probed.emplace_back();
   }
   for (const std::string& name : model.signal_columns())
     model_signals.push_back(
@@ -205,6 +224,8 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
   blocks_good = blocks_good || estimated;
   parts.predicted = blocks_good && signals_good && referenced;
   if (parts.predicted) parts.predict(now);
+  if (parts.outside()) parts.add(Reason::outside_domain);
+  if (parts.domain && parts.predicted) parts.outside_share.step(now, parts.outside());
   parts.decide_mode(now, parts.predicted);
   parts.step_axes(now, controller);
 
@@ -287,6 +308,7 @@ void Estimator::Parts::predict(nanoseconds at) noexcept {
     zero_known = true;
   }
   displacement.step(at, lost.temps_degC(), reference_degC, signal_values, model_um);
+  if (domain) domain->step(at, lost.temps_degC(), reference_degC, signal_values);
   correct(at);
 }
 
@@ -329,14 +351,14 @@ void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
 
 double Estimator::Parts::target_um(std::size_t axis) const noexcept {
   if (mode == Mode::disabled || mode == Mode::ramping_to_zero) return 0.0;
-  if (mode != Mode::compensating) return not_a_number;
+  if (mode != Mode::compensating || held_outside()) return not_a_number;
   const bool by_cycles = config.compensation.update == UpdateRule::each_cycle;
   return -config.axes[axis].sign * (by_cycles ? holds[axis].held_um() : predicted_um(axis));
 }
 
 void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controller) noexcept {
   if (controller_online) cycle_ends.signal(signal(cycle_end_signal));
-  if (cycle_ends.take(predicted && mode == Mode::compensating))
+  if (cycle_ends.take(predicted && mode == Mode::compensating && !held_outside()))
     for (std::size_t i = 0; i < axes.size(); ++i) holds[i].cycle_end(predicted_um(i));
   AxisInput input;
   input.now = at;
@@ -406,6 +428,7 @@ void Estimator::Parts::note_measured(std::size_t axis, double value_um) noexcept
     total_um -=
         config.axes[axis].sign * (std::isfinite(applied_um) ? applied_um : axes[axis].offset_um());
   }
+  probed[axis].take(total_um - model_change_um(axis));
   corrections[axis].measured(total_um, model_change_um(axis));
 }
 
@@ -416,6 +439,7 @@ void Estimator::Parts::take_new_reference() noexcept {
   for (std::size_t i = 0; i < columns.size(); ++i) reference_degC[i] = blocks.temps_degC()[i];
   std::fill(reference_signals.begin(), reference_signals.end(), not_a_number);
   displacement.restart();
+  if (domain) domain->restart();
   for (RunningCorrection& correction : corrections) correction.restart();
   for (CycleHold& hold_of_axis : holds) hold_of_axis.restart();
 }
@@ -464,7 +488,13 @@ void Estimator::report(Report& out) const noexcept {
     line.at_bound = axis.at_bound();
     line.proving = axis.proving();
     line.offset_sd_um = parts.offset_sd_um[i];
+    line.claimed_sd_um = parts.domain ? parts.domain->sd_um(parts.axis_output[i]) : not_a_number;
+    line.probed_rms_um = parts.probed[i].rms_um();
   }
+  out.domain.known = parts.domain.has_value();
+  out.domain.outside = parts.outside();
+  out.domain.distance = parts.domain ? parts.domain->distance() : not_a_number;
+  out.domain.outside_share_24h = parts.outside_share.share();
 }
 
 void Estimator::Parts::visit_state(StateArchive& archive) {
@@ -472,6 +502,9 @@ void Estimator::Parts::visit_state(StateArchive& archive) {
   for (AxisChannel& axis : axes) archive(axis);
   for (RunningCorrection& correction : corrections) archive(correction);
   for (CycleHold& hold_of_axis : holds) archive(hold_of_axis);
+  for (ProbedError& error : probed) archive(error);
+  if (domain) archive(*domain);
+  archive(outside_share);
   archive(cycle, stepped, now, dt_s, all_signals, controller_online, reference_degC, signal_values,
           reference_signals, zero_known, model_um, zero_um, measured_um, offset_sd_um, uncertain,
           predicted, ever_good, lost_since, enabled, stopping, mode, mode_since, reasons,
@@ -551,6 +584,7 @@ void Estimator::plan_adoption(const Estimator& previous) {
       plan_names(parts.thermal_model.signal_columns(), other.thermal_model.signal_columns());
   parts.axis_plan = plan_names(axis_names(parts.config), axis_names(other.config));
   parts.term_plan = parts.displacement.plan_terms(other.displacement);
+  parts.keep_domain = parts.domain && other.domain && parts.domain->alike(*other.domain);
   // Numbers newly written into the model file are meant; otherwise the machine's state stays.
   parts.keep_reference = parts.thermal_model.reference_degC == other.thermal_model.reference_degC;
 }
@@ -561,6 +595,8 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.blocks.adopt(other.blocks);
   parts.lost.adopt(other.lost);
   parts.displacement.adopt_terms(previous.parts_->displacement, parts.term_plan);
+  if (parts.keep_domain) parts.domain->adopt(*other.domain);
+  parts.outside_share = other.outside_share;
   if (parts.keep_reference) {
     take_by_plan(parts.column_plan, other.reference_degC, parts.reference_degC);
     take_by_plan(parts.signal_plan, other.reference_signals, parts.reference_signals);
@@ -574,6 +610,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
     parts.measured_um[i] = other.measured_um[from];
     parts.corrections[i].adopt(other.corrections[from]);
     parts.holds[i].adopt(other.holds[from]);
+    parts.probed[i] = other.probed[from];
   }
   parts.cycle = other.cycle;
   parts.stepped = other.stepped;

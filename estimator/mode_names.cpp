@@ -44,6 +44,8 @@ std::string_view to_string(Reason reason) noexcept {
       return "applied_out_of_bound";
     case Reason::block_estimated:
       return "block_estimated";
+    case Reason::outside_domain:
+      return "outside_domain";
   }
   return "unknown";
 }
