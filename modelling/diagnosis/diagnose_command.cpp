@@ -13,6 +13,7 @@
 #include "cli/output_file.hpp"
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
+#include "config/run_overlap.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/large_pages.hpp"
 #include "modelling/diagnosis/report_data.hpp"
@@ -83,6 +84,7 @@ void print_weighed(const Diagnosis& diagnosis) {
 Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   std::vector<RunFile> train = load_runs(options.train);
   std::vector<RunFile> test = load_runs(options.test);
+  refuse_overlap(train, test);
   const StillSearching still_searching;
   if (!options.thermal.empty())
     return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
