@@ -47,6 +47,7 @@ int run_predict(const PredictOptions& options) {
   for (const PredictedOutput& output : prediction.outputs) {
     std::fprintf(stderr, "%s %.3f %.3f\n", output.name.c_str(), output.rms_um, output.peak_um);
   }
+  if (model.made_from) std::fprintf(stderr, "outside %.3f\n", outside_share(prediction));
   return exit_success;
 }
 

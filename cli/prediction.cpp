@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 #include "config/problems.hpp"
 #include "config/units.hpp"
 #include "estimator/displacement_model.hpp"
+#include "estimator/model_domain.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp::cli {
@@ -65,8 +67,14 @@ nanoseconds time_of(double time_s) {
   return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
 }
 
-// The model at every row of the file, NaN where an input is missing; shape (outputs, rows).
-std::vector<Column> model_rows(const ThermalModel& model, const RunFile& run) {
+// The model at every row of the file, NaN where an input is missing.
+struct ModelRows {
+  std::vector<Column> displacement_um;  ///< shape (outputs, rows)
+  std::vector<Column> sd_um;            ///< the same; empty without [made_from]
+  Column outside;                       ///< one a row
+};
+
+ModelRows model_rows(const ThermalModel& model, const RunFile& run) {
   std::vector<Problem> problems;
   const std::vector<std::string> names = model.temperature_columns();
   const Columns temperatures = columns_of(run, names, problems);
@@ -80,13 +88,22 @@ std::vector<Column> model_rows(const ThermalModel& model, const RunFile& run) {
   Column temps_degC(temperatures.size());
   Column signal_values(signals.size());
   Column displacement_um(model.outputs.size());
-  std::vector<Column> rows(model.outputs.size(), Column(run.rows(), not_a_number));
+  std::optional<ModelDomain> domain;
+  if (model.made_from) domain.emplace(model);
+  const std::vector<Column> empty(model.outputs.size(), Column(run.rows(), not_a_number));
+  ModelRows rows{empty, domain ? empty : std::vector<Column>{}, {}};
+  if (domain) rows.outside.assign(run.rows(), not_a_number);
   const Column& time_s = run.time_s();
   for (std::size_t row = 0; row < run.rows(); ++row) {
     if (!row_of(temperatures, row, temps_degC) || !row_of(signals, row, signal_values)) continue;
     displacement_model.step(time_of(time_s[row]), temps_degC, reference_degC, signal_values,
                             displacement_um);
-    for (std::size_t i = 0; i < rows.size(); ++i) rows[i][row] = displacement_um[i];
+    for (std::size_t i = 0; i < displacement_um.size(); ++i)
+      rows.displacement_um[i][row] = displacement_um[i];
+    if (!domain) continue;
+    domain->step(time_of(time_s[row]), temps_degC, reference_degC, signal_values);
+    rows.outside[row] = domain->outside() ? 1.0 : 0.0;
+    for (std::size_t i = 0; i < rows.sd_um.size(); ++i) rows.sd_um[i][row] = domain->sd_um(i);
   }
   return rows;
 }
@@ -129,7 +146,8 @@ void measure_residual(PredictedOutput& output) {
 }  // namespace
 
 Prediction predict(const ThermalModel& model, const RunFile& run) {
-  const std::vector<Column> predicted = model_rows(model, run);
+  const ModelRows all = model_rows(model, run);
+  const std::vector<Column>& predicted = all.displacement_um;
   Columns measured;
   for (const std::string& output : model.outputs) {
     const auto index = run.find(output);
@@ -141,7 +159,10 @@ Prediction predict(const ThermalModel& model, const RunFile& run) {
   for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
     if (row_counts(predicted, measured, row)) rows.push_back(row);
   }
-  for (const std::size_t row : rows) result.time_s.push_back(run.time_s()[row]);
+  for (const std::size_t row : rows) {
+    result.time_s.push_back(run.time_s()[row]);
+    if (!all.outside.empty()) result.outside.push_back(all.outside[row]);
+  }
   for (std::size_t i = 0; i < model.outputs.size(); ++i) {
     PredictedOutput output;
     output.name = model.outputs[i];
@@ -154,10 +175,18 @@ Prediction predict(const ThermalModel& model, const RunFile& run) {
                                        ? (*measured[i])[row] - (*measured[i])[start]
                                        : not_a_number);
     }
+    for (const std::size_t row : rows)
+      if (!all.sd_um.empty()) output.sd_um.push_back(all.sd_um[i][row]);
     measure_residual(output);
     result.outputs.push_back(std::move(output));
   }
   return result;
+}
+
+double outside_share(const Prediction& prediction) {
+  double sum = 0.0;
+  for (const double each : prediction.outside) sum += each;
+  return prediction.outside.empty() ? 0.0 : sum / static_cast<double>(prediction.outside.size());
 }
 
 RunFile as_run_file(const Prediction& prediction) {
@@ -182,6 +211,13 @@ RunFile as_run_file(const Prediction& prediction) {
     file.values.push_back(output.measured_um);
     file.columns.push_back(column_name("residual"));
     file.values.push_back(std::move(residual_um));
+    if (output.sd_um.empty()) continue;
+    file.columns.push_back(column_name("sd"));
+    file.values.push_back(output.sd_um);
+  }
+  if (!prediction.outside.empty()) {
+    file.columns.emplace_back("outside");
+    file.values.push_back(prediction.outside);
   }
   file.selected_end = prediction.time_s.size();
   return file;

@@ -17,12 +17,15 @@ struct PredictedOutput {
   std::vector<double> measured_um;   ///< measured(t) - measured(t0); NaN: missing
   double rms_um{0.0};                ///< of measured - predicted, mean not removed; NaN: none
   double peak_um{0.0};               ///< largest |measured - predicted|; NaN: none
+  std::vector<double> sd_um;         ///< of predicted_um, as the model claims; empty: it does not
 };
 
 /// Rows of the selection that have a prediction: those in which no input of the model is missing
 /// and, where the run file has any measured output, not all of them are.
 struct Prediction {
   std::vector<double> time_s;
+  std::vector<double>
+      outside;  ///< 1 where the machine is not as the model was made; empty: unknown
   std::vector<PredictedOutput> outputs;  ///< order of the model
 };
 
@@ -32,7 +35,11 @@ struct Prediction {
 /// @throws ConfigurationError when the run file lacks a column of the model or has no value in it
 [[nodiscard]] Prediction predict(const ThermalModel& model, const RunFile& run);
 
-/// The columns of the answer: time_s and, for each output, predicted, measured and residual.
+/// Share of the rows that are outside of the model's domain.
+[[nodiscard]] double outside_share(const Prediction& prediction);
+
+/// The columns of the answer: time_s and, for each output, predicted, measured and residual; where
+/// the model says what it was made from, `outside` and the standard deviation of each output.
 [[nodiscard]] RunFile as_run_file(const Prediction& prediction);
 
 }  // namespace thermocomp::cli

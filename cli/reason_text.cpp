@@ -7,7 +7,7 @@ namespace thermocomp::cli {
 
 namespace {
 
-constexpr std::array<ReasonText, 14> reasons{{
+constexpr std::array<ReasonText, 15> reasons{{
     {"operator_disabled", "switched off by an operator", "thermocomp enable"},
     {"controller_disabled", "switched off at the controller",
      "release the switch that the configuration names as disable_signal"},
@@ -34,6 +34,8 @@ constexpr std::array<ReasonText, 14> reasons{{
      "see below what was sent and read; mend it, then: thermocomp release AXIS"},
     {"no_target", "the model gives no finite displacement",
      "check the reference (thermocomp reference) and the model file"},
+    {"outside_domain", "the machine is outside of what its model was made from",
+     "the offset may be wrong: measure, and make the model anew with a run of such a day"},
 }};
 
 constexpr std::array<ReasonText, 12> faults{{

@@ -254,8 +254,12 @@ std::string buses_line(const json& status) {
 
 std::string model_line(const json& status) {
   const json& model = object_of(status, "model");
-  return line("Model", text_of(model, "file") + " (SHA-256 " +
-                           text_of(model, "checksum").substr(0, 16) + ")");
+  const std::string file = line("Model", text_of(model, "file") + " (SHA-256 " +
+                                             text_of(model, "checksum").substr(0, 16) + ")");
+  if (!flag_of(model, "outside")) return file;
+  return file + line("Domain", "outside of what the model was made from, " +
+                                   fixed(100.0 * number_of(model, "outside_share_24h"), 0) +
+                                   " % of the last 24 h");
 }
 
 std::string cycle_line(const json& status) {

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "config/file_limits.hpp"
+#include "config/made_from.hpp"
 #include "config/toml_reader.hpp"
 #include "config/units.hpp"
 
@@ -178,7 +179,82 @@ void read_parameter(const TomlTable& table, const TermParameter& parameter,
   }
 }
 
+void read_bank_subjects(const TomlTable& table, LagBankSpec& bank) {
+  bank.subjects = table.texts("subjects");
+  if (bank.subjects.empty() && table.has("subjects")) {
+    table.problem("subjects", "must name at least one column");
+  }
+  if (bank.subjects.size() > bank_subjects_max) {
+    table.problem("subjects", std::to_string(bank.subjects.size()) + " names",
+                  "must be at most " + std::to_string(bank_subjects_max));
+  }
+  for (const std::string& name : bank.subjects) {
+    if (name.empty()) continue;  // a problem already
+    if (!is_column_name(name)) table.problem("subjects", name, column_name_rule);
+    if (!is_temperature(name) && !is_operating(name)) {
+      table.problem("subjects", name, "must be a temperature, an operating signal or a position");
+    }
+  }
+  bank.powers = table.numbers("powers", Range::between(1, 2), {});
+  if (table.has("powers") && bank.powers.size() != bank.subjects.size()) {
+    table.problem("powers", std::to_string(bank.powers.size()) + " values",
+                  "must have one value a subject (" + std::to_string(bank.subjects.size()) + ")");
+  }
+  std::set<std::pair<std::string, double>> seen;
+  for (std::size_t i = 0; i < bank.subjects.size(); ++i) {
+    const double power = i < bank.powers.size() ? bank.powers[i] : 1.0;
+    if (power != 1.0 && power != 2.0) table.problem("powers", "must be 1 or 2 each");
+    if (!seen.insert({bank.subjects[i], power}).second) {
+      table.problem("subjects", bank.subjects[i], "is named twice with the same power");
+    }
+  }
+}
+
+void read_bank_taus(const TomlTable& table, LagBankSpec& bank) {
+  bank.taus_s = table.numbers("tau_s", Range::between(0, term_tau_s_max));
+  if (bank.taus_s.empty() && table.has("tau_s")) {
+    table.problem("tau_s", "must have at least one time constant");
+  }
+  if (bank.taus_s.size() > bank_taus_max) {
+    table.problem("tau_s", std::to_string(bank.taus_s.size()) + " values",
+                  "must be at most " + std::to_string(bank_taus_max));
+  }
+  if (std::adjacent_find(bank.taus_s.begin(), bank.taus_s.end(), std::greater_equal<>()) !=
+      bank.taus_s.end()) {
+    table.problem("tau_s", "must be strictly increasing");
+  }
+}
+
+void read_bank_gains(const TomlTable& table, const ThermalModel& model, LagBankSpec& bank) {
+  const TomlTable gains = table.table("gain_um_per_unit");
+  const std::vector<std::string> named = gains.keys();
+  if (gains && named.empty()) table.problem("gain_um_per_unit", "must name at least one output");
+  for (const std::string& output : named) {
+    if (!contains(model.outputs, output)) {
+      gains.problem(output, "must be one of the outputs: " + listed(model.outputs));
+      continue;
+    }
+    const Rows rows = gains.matrix(output, bank.subjects.size(), bank.taus_s.size());
+    for (const std::vector<double>& row : rows) {
+      for (const double gain : row) {
+        if (!(std::abs(gain) <= term_gain_max)) gains.problem(output, "must be in [-1e6, 1e6]");
+      }
+    }
+    bank.gain_um_per_unit[output] = rows;
+  }
+}
+
+TermSpec read_bank(const TomlTable& table, const ThermalModel& model) {
+  TermSpec term;
+  term.kind = table.text("kind");
+  read_bank_subjects(table, term.bank);
+  read_bank_taus(table, term.bank);
+  read_bank_gains(table, model, term.bank);
+  return term;
+}
+
 TermSpec read_term(const TomlTable& table, const ThermalModel& model) {
+  if (table.is_text("kind") && table.text("kind") == "lag_bank") return read_bank(table, model);
   TermSpec term;
   term.kind = table.text("kind");
   term.subject = table.text("subject");
@@ -269,6 +345,7 @@ bool read_model(const TomlDocument& document, ThermalModel& model) {
     model.terms.push_back(read_term(term, model));
   }
   read_covariance(root, model);
+  if (root.has("made_from")) model.made_from = read_made_from(root.table("made_from"), model);
   return true;
 }
 

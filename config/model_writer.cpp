@@ -1,60 +1,13 @@
 #include <algorithm>
-#include <cctype>
 #include <string>
 
+#include "config/made_from.hpp"
 #include "config/model_file.hpp"
-#include "config/number_text.hpp"
+#include "config/toml_text.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
 namespace {
-
-/// A TOML basic string.
-std::string toml_string(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      result += '\\';
-      result += c;
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      constexpr std::string_view digits = "0123456789ABCDEF";
-      const auto code = static_cast<unsigned char>(c);
-      result.append("\\u00") += digits[code >> 4u];
-      result += digits[code & 15u];
-    } else {
-      result += c;
-    }
-  }
-  return result + '"';
-}
-
-std::string key(std::string_view name) {
-  const auto bare = [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-';
-  };
-  return !name.empty() && std::all_of(name.begin(), name.end(), bare) ? std::string(name)
-                                                                      : toml_string(name);
-}
-
-/// A TOML float: unlike JSON's it needs a point or an exponent to be one.
-std::string number(double value) {
-  std::string text = number_text(value);
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
-}
-
-template <class Values, class Show>
-std::string list(const Values& values, Show show) {
-  std::string text = "[";
-  for (const auto& value : values) text.append(text.size() == 1 ? "" : ", ").append(show(value));
-  return text + "]";
-}
-
-std::string rows(const std::vector<std::vector<double>>& values) {
-  std::string text = "[\n";
-  for (const auto& row : values) text.append("  ").append(list(row, number)).append(",\n");
-  return text + "]\n";
-}
 
 std::string shared_value(const TermSpec& term, const std::string& name, double value) {
   const TermKind* kind = find_term_kind(term.kind, term.subject);
@@ -64,33 +17,50 @@ std::string shared_value(const TermSpec& term, const std::string& name, double v
       return std::to_string(static_cast<long long>(value));
     }
   }
-  return number(value);
+  return toml_number(value);
+}
+
+std::string bank_text(const LagBankSpec& bank) {
+  std::string text = "\n[[term]]\nkind = \"lag_bank\"\nsubjects = ";
+  text.append(toml_list(bank.subjects, toml_string));
+  if (!bank.powers.empty()) text.append("\npowers = ").append(toml_list(bank.powers, toml_number));
+  text.append("\ntau_s = ").append(toml_list(bank.taus_s, toml_number)).append("\n");
+  for (const auto& [output, gains] : bank.gain_um_per_unit) {
+    text.append("gain_um_per_unit.")
+        .append(toml_key(output))
+        .append(" = ")
+        .append(toml_rows(gains));
+  }
+  return text;
 }
 
 std::string term_text(const TermSpec& term) {
+  if (term.kind == "lag_bank") return bank_text(term.bank);
   std::string text = "\n[[term]]\nkind = " + toml_string(term.kind);
   text.append("\nsubject = ").append(toml_string(term.subject)).append("\n");
   for (const auto& [name, value] : term.shared) {
-    text.append(key(name)).append(" = ").append(shared_value(term, name, value)).append("\n");
+    text.append(toml_key(name)).append(" = ").append(shared_value(term, name, value)).append("\n");
   }
   for (const auto& [name, outputs] : term.per_output) {
     const auto entry = [](const auto& output) {
-      return key(output.first) + " = " + number(output.second);
+      return toml_key(output.first) + " = " + toml_number(output.second);
     };
-    std::string table = list(outputs, entry);
+    std::string table = toml_list(outputs, entry);
     table.front() = '{';
     table.back() = '}';
-    text.append(key(name)).append(" = ").append(table).append("\n");
+    text.append(toml_key(name)).append(" = ").append(table).append("\n");
   }
   return text;
 }
 
 std::string guideway_text(const GuidewaySpec& guideway) {
   std::string text =
-      "\n[guideway." + key(guideway.name) + "]\naxis = " + toml_string(guideway.axis);
-  text.append("\npositions_mm = ").append(list(guideway.positions_mm, number)).append("\n");
+      "\n[guideway." + toml_key(guideway.name) + "]\naxis = " + toml_string(guideway.axis);
+  text.append("\npositions_mm = ")
+      .append(toml_list(guideway.positions_mm, toml_number))
+      .append("\n");
   for (const auto& [output, values] : guideway.rows_um_per_K) {
-    text.append("rows_um_per_K.").append(key(output)).append(" = ").append(rows(values));
+    text.append("rows_um_per_K.").append(toml_key(output)).append(" = ").append(toml_rows(values));
   }
   return text;
 }
@@ -100,12 +70,13 @@ std::string guideway_text(const GuidewaySpec& guideway) {
 std::string write_covariance(const ThermalModel& model) {
   const CovarianceGrowth& growth = model.covariance_growth;
   const CovarianceGrowth plain;
-  std::string text = "[covariance]\nmatrix_K2 = " + rows(model.covariance_K2);
+  std::string text = "[covariance]\nmatrix_K2 = " + toml_rows(model.covariance_K2);
   const auto add = [&text](const char* name, double value, double otherwise) {
-    if (value != otherwise) text.append(name).append(" = ").append(number(value)).append("\n");
+    if (value != otherwise) text.append(name).append(" = ").append(toml_number(value)).append("\n");
   };
   const auto add_list = [&text](const char* name, const std::vector<double>& values) {
-    if (!values.empty()) text.append(name).append(" = ").append(list(values, number)).append("\n");
+    if (!values.empty())
+      text.append(name).append(" = ").append(toml_list(values, toml_number)).append("\n");
   };
   add("noise_K", growth.noise_K, plain.noise_K);
   add_list("drift_factor", growth.drift_factor);
@@ -116,14 +87,17 @@ std::string write_covariance(const ThermalModel& model) {
 }
 
 std::string write_model(const ThermalModel& model) {
-  std::string text = "format = 1\ninputs = " + list(model.inputs, toml_string);
-  text.append("\noutputs = ").append(list(model.outputs, toml_string)).append("\nreference = ");
+  std::string text = "format = 1\ninputs = " + toml_list(model.inputs, toml_string);
+  text.append("\noutputs = ")
+      .append(toml_list(model.outputs, toml_string))
+      .append("\nreference = ");
   text += model.reference_degC.empty() ? toml_string("first_sample")
-                                       : list(model.reference_degC, number);
-  text.append("\nmatrix_um_per_K = ").append(rows(model.matrix_um_per_K));
+                                       : toml_list(model.reference_degC, toml_number);
+  text.append("\nmatrix_um_per_K = ").append(toml_rows(model.matrix_um_per_K));
   for (const GuidewaySpec& guideway : model.guideways) text += guideway_text(guideway);
   for (const TermSpec& term : model.terms) text += term_text(term);
   if (!model.covariance_K2.empty()) text.append("\n").append(write_covariance(model));
+  if (model.made_from) text.append("\n").append(write_made_from(model));
   return text;
 }
 

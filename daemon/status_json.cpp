@@ -193,9 +193,18 @@ json socket(const SocketStatistics& statistics) {
           {"buffered_bytes", statistics.buffered_bytes}};
 }
 
+/// A figure of each axis by its name; null: not known.
+json of_axes(const StatusView& view, double AxisReport::*figure) {
+  json told = json::object();
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i)
+    told[view.config.estimator.axes[i].name] = number(view.report.axes[i].*figure);
+  return told;
+}
+
 }  // namespace
 
 json status_json(const StatusView& view) {
+  const DomainReport& domain = view.report.domain;
   json bad = json::array();
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i)
     if (view.report.sensors[i].fault != Fault::none)
@@ -212,7 +221,11 @@ json status_json(const StatusView& view) {
            {{"file", view.config.model_file.string()},
             {"checksum", view.config.model_checksum},
             {"inputs", view.config.model.inputs.size()},
-            {"outputs", view.config.model.outputs.size()}}},
+            {"outputs", view.config.model.outputs.size()},
+            {"outside", domain.known ? json(domain.outside) : json(nullptr)},
+            {"outside_share_24h", domain.known ? number(domain.outside_share_24h) : json(nullptr)},
+            {"claimed_sd_um", of_axes(view, &AxisReport::claimed_sd_um)},
+            {"probed_rms_um", of_axes(view, &AxisReport::probed_rms_um)}}},
           {"axes", axes(view)},
           {"inputs", inputs(view)},
           {"sensors_bad", bad},
@@ -264,11 +277,20 @@ json timing_json(const StatusView& view) {
 
 json model_json(const StatusView& view) {
   json terms = json::array();
-  for (const TermSpec& term : view.config.model.terms)
+  for (const TermSpec& term : view.config.model.terms) {
+    if (term.kind == "lag_bank") {
+      terms.push_back({{"kind", term.kind},
+                       {"subjects", term.bank.subjects},
+                       {"powers", term.bank.powers},
+                       {"tau_s", term.bank.taus_s},
+                       {"gain_um_per_unit", term.bank.gain_um_per_unit}});
+      continue;
+    }
     terms.push_back({{"kind", term.kind},
                      {"subject", term.subject},
                      {"shared", term.shared},
                      {"per_output", term.per_output}});
+  }
   return {{"file", view.config.model_file.string()},
           {"checksum", view.config.model_checksum},
           {"inputs", view.config.model.inputs},

@@ -1,7 +1,6 @@
 #include "estimator/displacement_model.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <Eigen/Core>
@@ -68,6 +67,10 @@ Guideway guideway_from(const GuidewaySpec& spec, const ThermalModel& model) {
   return guideway;
 }
 
+bool same_states(const LagBankSpec& a, const LagBankSpec& b) {
+  return a.subjects == b.subjects && a.powers == b.powers && a.taus_s == b.taus_s;
+}
+
 }  // namespace
 
 struct DisplacementModel::Parts {
@@ -79,8 +82,9 @@ struct DisplacementModel::Parts {
   std::vector<Guideway> guideways;
   std::vector<TermSpec> term_specs;
   std::vector<std::unique_ptr<Term>> terms;
-  Vector rise_K;                  ///< shape (columns); scratch
-  std::vector<std::byte> states;  ///< of all terms; scratch
+  Vector rise_K;                      ///< shape (columns); scratch
+  std::vector<std::byte> states;      ///< of all terms; scratch
+  std::vector<std::byte> term_state;  ///< as large as any term's; scratch
 
   void add_guideways(std::span<const double> signal_values, std::span<double> out) const noexcept {
     const auto rise = rise_K.head(inputs);
@@ -111,6 +115,11 @@ DisplacementModel::DisplacementModel(const ThermalModel& model)
   StateArchive counting;
   visit_state(counting);
   parts_->states.resize(counting.position_bytes());
+  for (auto& term : parts_->terms) {
+    StateArchive count;
+    term->visit_state(count);
+    parts_->term_state.resize(std::max(parts_->term_state.size(), count.position_bytes()));
+  }
 }
 
 DisplacementModel::~DisplacementModel() = default;
@@ -157,7 +166,8 @@ std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) c
     const auto& theirs = other.parts_->term_specs;
     const auto same = std::find_if(theirs.begin(), theirs.end(), [&](const TermSpec& each) {
       // Gains do not live in the state, so a term with new gains keeps its past.
-      return each.kind == ours.kind && each.subject == ours.subject && each.shared == ours.shared;
+      return each.kind == ours.kind && each.subject == ours.subject && each.shared == ours.shared &&
+             same_states(each.bank, ours.bank);
     });
     plan.push_back(same == theirs.end() ? -1 : static_cast<int>(same - theirs.begin()));
   }
@@ -165,7 +175,7 @@ std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) c
 }
 
 void DisplacementModel::adopt_terms(DisplacementModel& other, std::span<const int> plan) noexcept {
-  std::array<std::byte, 256> state{};
+  std::vector<std::byte>& state = parts_->term_state;  // a planned term's is as large as ours
   for (std::size_t i = 0; i < plan.size(); ++i) {
     if (plan[i] < 0) continue;
     StateArchive save{std::span<std::byte>(state)};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "estimator/axis_channel.hpp"
 #include "estimator/block_bank.hpp"
@@ -10,7 +11,10 @@
 #include "estimator/displacement_model.hpp"
 #include "estimator/input_gains.hpp"
 #include "estimator/lost_blocks.hpp"
+#include "estimator/model_domain.hpp"
 #include "estimator/name_index.hpp"
+#include "estimator/outside_share.hpp"
+#include "estimator/probed_error.hpp"
 #include "estimator/temperature_range.hpp"
 
 namespace thermocomp {
@@ -63,13 +67,23 @@ struct Estimator::Parts {
   void step_axes(nanoseconds now, const ControllerState& controller) noexcept;
   [[nodiscard]] double target_um(std::size_t axis) const noexcept;
   void hold_cycle(nanoseconds now) noexcept;
+  void take_cycle_end(nanoseconds now) noexcept;
   void note_measured(std::size_t axis, double value_um) noexcept;
   void correct(nanoseconds now) noexcept;
   [[nodiscard]] double model_change_um(std::size_t axis) const noexcept {
     return model_um[axis_output[axis]] - zero_um[axis_output[axis]];
   }
   [[nodiscard]] double predicted_um(std::size_t axis) const noexcept {
-    return model_change_um(axis) + corrections[axis].correction_um();
+    return believed_share() * model_change_um(axis) + corrections[axis].correction_um();
+  }
+  [[nodiscard]] bool outside() const noexcept { return domain && domain->outside(); }
+  /// What was learned by probing stays believed; the model is what left its domain.
+  [[nodiscard]] double believed_share() const noexcept {
+    const bool shrinks = config.compensation.outside_domain == OutsidePolicy::shrink;
+    return shrinks && domain ? domain->believed_share() : 1.0;
+  }
+  [[nodiscard]] bool held_outside() const noexcept {
+    return config.compensation.outside_domain == OutsidePolicy::hold && outside();
   }
   [[nodiscard]] double signal(int index) const noexcept {
     return index == no_signal ? not_a_number : all_signals[static_cast<std::size_t>(index)];
@@ -86,7 +100,10 @@ struct Estimator::Parts {
   LostBlocks lost;
   InputGains gains;
   DisplacementModel displacement;
-  DisplacementModel at_reference;  ///< the same model, only ever asked for the zero
+  DisplacementModel at_reference;     ///< the same model, only ever asked for the zero
+  std::optional<ModelDomain> domain;  ///< of a model that says what it was made from
+  OutsideShare outside_share;
+  std::vector<ProbedError> probed;  ///< one an axis
   std::vector<AxisChannel> axes;
   std::vector<RunningCorrection> corrections;  ///< one an axis
   CycleHold cycle_hold;
@@ -110,6 +127,7 @@ struct Estimator::Parts {
   std::vector<double> signal_values;      ///< of the model
   std::vector<double> model_um;           ///< of the outputs, as the model says
   std::vector<double> held_model_um;      ///< the same at the state that the cycle hold holds
+  double held_share{not_a_number};        ///< of the model that was believed when the cycle ended
   std::vector<double> held_um;            ///< one an axis: what is compensated until the cycle ends
   std::vector<double> reference_signals;  ///< of the model, when the reference was taken
   bool zero_known{false};
@@ -135,6 +153,7 @@ struct Estimator::Parts {
   std::vector<int> axis_plan;
   std::vector<int> term_plan;
   bool keep_reference{false};
+  bool keep_domain{false};
 };
 
 Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalModel& model)
@@ -155,6 +174,7 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
       enabled(config.compensation.enabled_at_first_start) {
   config.compensation.validate();
   check_reference(config, model);
+  if (model.made_from) domain.emplace(model);
   require(config.axes.size() <= axes_max, "axis", static_cast<double>(config.axes.size()),
           "are too many axes");
   require(config.signals.size() <= signals_max, "controller.signal",
@@ -165,6 +185,7 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
     axis_output.push_back(
         index_of(model.outputs, axis.output, "axis.output", "is not an output of the model"));
     corrections.emplace_back(config.correction, model, axis_output.back());
+    probed.emplace_back();
   }
   for (const std::string& name : model.signal_columns())
     model_signals.push_back(
@@ -224,6 +245,8 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
     parts.add(Reason::no_target);
     parts.predicted = false;
   }
+  if (parts.outside()) parts.add(Reason::outside_domain);
+  if (parts.domain && parts.predicted) parts.outside_share.step(now, parts.outside());
   parts.decide_mode(now, parts.predicted);
   parts.step_axes(now, controller);
 
@@ -306,6 +329,7 @@ void Estimator::Parts::predict(nanoseconds at) noexcept {
     zero_known = true;
   }
   displacement.step(at, lost.temps_degC(), reference_degC, signal_values, model_um);
+  if (domain) domain->step(at, lost.temps_degC(), reference_degC, signal_values);
   correct(at);
 }
 
@@ -355,7 +379,7 @@ void Estimator::Parts::decide_mode(nanoseconds at, bool data_good) noexcept {
 
 double Estimator::Parts::target_um(std::size_t axis) const noexcept {
   if (mode == Mode::disabled || mode == Mode::ramping_to_zero) return 0.0;
-  if (mode != Mode::compensating) return not_a_number;
+  if (mode != Mode::compensating || held_outside()) return not_a_number;
   const bool by_cycles = config.compensation.update == UpdateRule::each_cycle;
   return -config.axes[axis].sign * (by_cycles ? held_um[axis] : predicted_um(axis));
 }
@@ -363,15 +387,22 @@ double Estimator::Parts::target_um(std::size_t axis) const noexcept {
 /// What the compensation goes by until the next cycle end, as of this step.
 void Estimator::Parts::hold_cycle(nanoseconds at) noexcept {
   if (config.compensation.update != UpdateRule::each_cycle) return;
-  if (cycle_ends.take(predicted && mode == Mode::compensating))
-    cycle_hold.cycle_end(at, lost.temps_degC(), signal_values, displacement);
+  if (cycle_ends.take(predicted && mode == Mode::compensating && !held_outside()))
+    take_cycle_end(at);
   if (!predicted || !cycle_hold.holds()) return;
   cycle_hold.displacement(reference_degC, signal_values, held_model_um);
   for (std::size_t i = 0; i < columns.size(); ++i)
     rise_K[i] = cycle_hold.temps_degC()[i] - reference_degC[i];
+  // Held like the temperatures; after a restart it is not known any more.
+  const double share = std::isfinite(held_share) ? held_share : believed_share();
   for (std::size_t i = 0; i < axes.size(); ++i)
-    held_um[i] = held_model_um[axis_output[i]] - zero_um[axis_output[i]] +
+    held_um[i] = share * (held_model_um[axis_output[i]] - zero_um[axis_output[i]]) +
                  corrections[i].correction_um(rise_K);
+}
+
+void Estimator::Parts::take_cycle_end(nanoseconds at) noexcept {
+  cycle_hold.cycle_end(at, lost.temps_degC(), signal_values, displacement);
+  held_share = believed_share();
 }
 
 void Estimator::Parts::step_axes(nanoseconds at, const ControllerState& controller) noexcept {
@@ -452,6 +483,7 @@ void Estimator::Parts::note_measured(std::size_t axis, double value_um) noexcept
     total_um -=
         config.axes[axis].sign * (std::isfinite(applied_um) ? applied_um : axes[axis].offset_um());
   }
+  probed[axis].take(total_um - model_change_um(axis));
   corrections[axis].measured(total_um, model_change_um(axis));
 }
 
@@ -462,6 +494,7 @@ void Estimator::Parts::take_new_reference() noexcept {
   for (std::size_t i = 0; i < columns.size(); ++i) reference_degC[i] = blocks.temps_degC()[i];
   std::fill(reference_signals.begin(), reference_signals.end(), not_a_number);
   displacement.restart();
+  if (domain) domain->restart();
   for (RunningCorrection& correction : corrections) correction.restart();
   if (cycle_hold.holds()) cycle_hold.restart(now, blocks.temps_degC(), signal_values);
 }
@@ -515,17 +548,26 @@ void Estimator::report(Report& out) const noexcept {
     line.at_bound = axis.at_bound();
     line.proving = axis.proving();
     line.offset_sd_um = parts.offset_sd_um[i];
+    line.claimed_sd_um = parts.domain ? parts.domain->sd_um(parts.axis_output[i]) : not_a_number;
+    line.probed_rms_um = parts.probed[i].rms_um();
   }
+  out.domain.known = parts.domain.has_value();
+  out.domain.outside = parts.outside();
+  out.domain.distance = parts.domain ? parts.domain->distance() : not_a_number;
+  out.domain.outside_share_24h = parts.outside_share.share();
 }
 
 void Estimator::Parts::visit_state(StateArchive& archive) {
   archive(blocks, lost, displacement);
   for (AxisChannel& axis : axes) archive(axis);
   for (RunningCorrection& correction : corrections) archive(correction);
+  for (ProbedError& error : probed) archive(error);
+  if (domain) archive(*domain);
+  archive(outside_share);
   archive(cycle, stepped, now, dt_s, all_signals, controller_online, reference_degC, signal_values,
           reference_signals, zero_known, model_um, zero_um, measured_um, offset_sd_um, uncertain,
-          held_um, predicted, ever_good, lost_since, enabled, stopping, mode, mode_since, reasons,
-          cycle_hold, cycle_ends);
+          held_share, held_um, predicted, ever_good, lost_since, enabled, stopping, mode,
+          mode_since, reasons, cycle_hold, cycle_ends);
 }
 
 std::size_t Estimator::state_size_bytes() const noexcept {
@@ -610,6 +652,7 @@ void Estimator::plan_adoption(const Estimator& previous) {
       plan_names(parts.thermal_model.signal_columns(), other.thermal_model.signal_columns());
   parts.axis_plan = plan_names(axis_names(parts.config), axis_names(other.config));
   parts.term_plan = parts.displacement.plan_terms(other.displacement);
+  parts.keep_domain = parts.domain && other.domain && parts.domain->alike(*other.domain);
   // Numbers newly written into the model file are meant; otherwise the machine's state stays.
   parts.keep_reference = parts.thermal_model.reference_degC == other.thermal_model.reference_degC;
 }
@@ -620,6 +663,8 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.blocks.adopt(other.blocks);
   parts.lost.adopt(other.lost);
   parts.displacement.adopt_terms(previous.parts_->displacement, parts.term_plan);
+  if (parts.keep_domain) parts.domain->adopt(*other.domain);
+  parts.outside_share = other.outside_share;
   if (parts.keep_reference) {
     take_by_plan(parts.column_plan, other.reference_degC, parts.reference_degC);
     take_by_plan(parts.signal_plan, other.reference_signals, parts.reference_signals);
@@ -633,6 +678,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
     parts.measured_um[i] = other.measured_um[from];
     parts.corrections[i].adopt(other.corrections[from]);
     parts.held_um[i] = other.held_um[from];
+    parts.probed[i] = other.probed[from];
   }
   parts.cycle = other.cycle;
   parts.stepped = other.stepped;
@@ -645,6 +691,7 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   parts.mode = other.mode;
   parts.mode_since = other.mode_since;
   parts.uncertain = other.uncertain;
+  parts.held_share = other.held_share;
   parts.cycle_hold.adopt(previous.parts_->cycle_hold, parts.column_plan, parts.signal_plan,
                          parts.term_plan);
   parts.cycle_ends.adopt(other.cycle_ends, parts.config.compensation.cycle_end_signal ==

@@ -44,10 +44,11 @@ enum class Reason : std::uint32_t {
   applied_out_of_bound = 1u << 10,  ///< read-back beyond any bound of ours: axis is not driven
   block_estimated = 1u << 11,       ///< a warning: compensating, with an estimate for a lost block
   mismatch_latched =
-      1u << 12,         ///< read-backs that nothing sent explains: not driven until released
-  no_target = 1u << 13  ///< the model's answer is no finite number
+      1u << 12,              ///< read-backs that nothing sent explains: not driven until released
+  no_target = 1u << 13,      ///< the model's answer is no finite number
+  outside_domain = 1u << 14  ///< the machine is where its model was never made or judged
 };
-inline constexpr std::size_t reasons_count = 14;
+inline constexpr std::size_t reasons_count = 15;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
 /// Of a set of reasons (Report::reasons), whether one is in it.
@@ -98,7 +99,19 @@ struct AxisReport {
   /// Standard deviation that estimated blocks give the offset; 0 where all are measured.
   double offset_sd_um{0.0};
   double held_um{not_a_number};  ///< update = each_cycle: displacement at the held state
+  /// What the model says of itself here, standard deviation [um]; NaN: it says nothing.
+  double claimed_sd_um{not_a_number};
+  /// RMS of probed displacement minus the model's, without the running correction; NaN: none yet.
+  double probed_rms_um{not_a_number};
   CorrectionReport correction;
+};
+
+/// Where the machine is beside what its model was made from.
+struct DomainReport {
+  bool known{false};  ///< the model says what it was made from
+  bool outside{false};
+  double distance{not_a_number};  ///< ModelDomain::distance()
+  double outside_share_24h{0.0};  ///< of the last day
 };
 
 /// All that an operator or the history may want to know after a step. Made once by
@@ -116,6 +129,7 @@ struct Report {
   std::vector<SignalReport> signals;    ///< order of ThermalModel::signal_columns()
   std::vector<double> displacement_um;  ///< order of ThermalModel::outputs, since the reference
   std::vector<AxisReport> axes;
+  DomainReport domain;
 };
 
 /// What survives a restart by name (the state file).

@@ -74,6 +74,13 @@ struct AxisConfig {
 enum class LossPolicy { hold, ramp_to_zero };
 enum class StopPolicy { hold, ramp_to_zero };
 
+/// What becomes of the offset where the machine is outside of what its model was made from.
+enum class OutsidePolicy {
+  warn,   ///< it follows the model; status and history say so
+  hold,   ///< it stays
+  shrink  ///< it follows the part of the displacement that is still believed
+};
+
 enum class UpdateRule {
   continuous,  ///< the offset follows the model
   each_cycle   ///< the offset changes at the end of a machining cycle
@@ -98,6 +105,7 @@ struct CompensationConfig {
   /// A block without a good sensor is estimated where the model has a covariance.
   bool estimate_lost_blocks{true};
   double offset_sd_um_max{5.0};  ///< of any axis; beyond, an estimate does not serve: hold
+  OutsidePolicy outside_domain{OutsidePolicy::warn};  ///< of a model with [made_from]
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
   void validate() const;  ///< @throws InvalidValue

@@ -25,6 +25,26 @@ InputGains::InputGains(const ThermalModel& model)
   for (const TermSpec& term : model.terms) add_term(model, term);
 }
 
+void InputGains::add_bank(const ThermalModel& model, const LagBankSpec& bank) {
+  const auto columns = model.temperature_columns();
+  for (std::size_t i = 0; i < bank.subjects.size(); ++i) {
+    const bool squared = !bank.powers.empty() && bank.powers[i] > 1.5;
+    if (!is_temperature_name(bank.subjects[i]) || squared) continue;
+    BankShare share{index_of(columns, bank.subjects[i], "term.subjects", "is not a temperature"),
+                    {}};
+    for (const std::string& output : model.outputs) {
+      std::vector<double>& reached = share.reached.emplace_back();
+      const auto gains = bank.gain_um_per_unit.find(output);
+      double sum = 0.0;
+      for (std::size_t j = 0; j < bank.taus_s.size(); ++j) {
+        if (gains != bank.gain_um_per_unit.end()) sum += gains->second[i][j];
+        reached.push_back(sum);
+      }
+    }
+    banks_.push_back(std::move(share));
+  }
+}
+
 void InputGains::add_term(const ThermalModel& model, const TermSpec& term) {
   struct Known {
     Form form;
@@ -40,6 +60,7 @@ void InputGains::add_term(const ThermalModel& model, const TermSpec& term) {
       {"position_dependence", {Form::position, "gain_um_per_K_mm"}},
       {"sensor_swap", {Form::swap, ""}},
   };
+  if (term.kind == "lag_bank") add_bank(model, term.bank);
   const auto entry = known.find(term.kind);
   if (entry == known.end()) return;
   const auto columns = model.temperature_columns();
@@ -94,6 +115,13 @@ void InputGains::of_output(std::size_t output, std::span<const double> rise_K,
     if (share.form != Form::late) continue;
     const double at_once = total - share.gains[output];
     if (std::abs(at_once) > std::abs(total)) total = at_once;
+  }
+  for (const BankShare& share : banks_) {
+    double& total = gain_um_per_K[share.column];
+    double largest = total;
+    for (const double reached : share.reached[output])
+      if (std::abs(total + reached) > std::abs(largest)) largest = total + reached;
+    total = largest;
   }
   for (const Share& share : shares_)
     if (share.form == Form::swap)

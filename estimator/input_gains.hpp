@@ -34,17 +34,24 @@ class InputGains {
     double p0_mm;               ///< position
     std::vector<double> gains;  ///< one an output
   };
+  /// A temperature of a bank: what its rise has done once each of its lags in turn is over.
+  struct BankShare {
+    std::size_t column;
+    std::vector<std::vector<double>> reached;  ///< shape (outputs, time constants)
+  };
   struct Rows {
     std::size_t signal;
     std::vector<double> positions_mm;
     std::vector<std::vector<std::vector<double>>> um_per_K;  ///< output -> position -> input
   };
   void add_term(const ThermalModel& model, const TermSpec& term);
+  void add_bank(const ThermalModel& model, const LagBankSpec& bank);
 
   std::size_t columns_;
   std::vector<std::vector<double>> matrix_um_per_K_;
   std::vector<Rows> guideways_;
   std::vector<Share> shares_;
+  std::vector<BankShare> banks_;
 };
 
 }  // namespace thermocomp

@@ -48,6 +48,8 @@ std::string_view to_string(Reason reason) noexcept {
       return "mismatch_latched";
     case Reason::no_target:
       return "no_target";
+    case Reason::outside_domain:
+      return "outside_domain";
   }
   return "unknown";
 }

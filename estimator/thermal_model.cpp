@@ -15,6 +15,8 @@ void add_once(std::vector<std::string>& names, const std::string& name) {
 void add_columns(std::vector<std::string>& names, const TermSpec& term, bool temperatures) {
   const TermKind* kind = find_term_kind(term.kind, term.subject);
   if (kind == nullptr || kind->subject == TermSubject::output) return;
+  for (const std::string& column : term.bank.subjects)
+    if (is_temperature_name(column) == temperatures) add_once(names, column);
   const SubjectColumns columns = subject_columns(term.subject);
   for (const std::string& column : {columns.first, columns.second}) {
     if (column.empty()) continue;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,13 +11,34 @@
 
 namespace thermocomp {
 
+// Largest magnitudes believed; one place, so that all kinds of terms agree.
+inline constexpr double term_gain_max = 1e6;
+inline constexpr double term_tau_s_max = 1e6;
+inline constexpr double term_tau_s_min = 1e-3;
+/// Columns and time constants of a bank of lags: what a cycle may cost.
+inline constexpr std::size_t bank_subjects_max = 256;
+inline constexpr std::size_t bank_taus_max = 16;
+
+/// What a `lag_bank` has beside other terms: low passes of several columns at several time
+/// constants, a gain for each.
+struct LagBankSpec {
+  std::vector<std::string> subjects;  ///< temperatures (their rise), signals or positions
+  std::vector<double> powers;         ///< of each subject, 1 or 2; empty: all 1
+  std::vector<double> taus_s;         ///< ascending; 0: the value itself
+  /// output -> gains, shape (subjects, time constants) [um per unit of the subject to its power]
+  std::map<std::string, std::vector<std::vector<double>>> gain_um_per_unit;
+
+  bool operator==(const LagBankSpec& other) const = default;
+};
+
 /// One `[[term]]` of the model file: an extension of the static matrix by a named cause.
 struct TermSpec {
   std::string kind;                      ///< a registered cause, see term_kinds()
   std::string subject;                   ///< full column name, or two of them: "a|b", a < b
   std::map<std::string, double> shared;  ///< e.g. tau_s
   std::map<std::string, std::map<std::string, double>>
-      per_output;  ///< e.g. gain_um_per_K -> output
+      per_output;      ///< e.g. gain_um_per_K -> output
+  LagBankSpec bank{};  ///< of a lag_bank, which has no subject of its own
 };
 
 /// `[guideway.NAME]`: rows of the matrix at positions along an axis. Between two positions the row
@@ -46,6 +68,40 @@ struct CovarianceGrowth {
   void validate(std::size_t inputs) const;  ///< @throws InvalidValue
 };
 
+/// `[made_from]`: the rows that a model was made from and what it left there, so that it can be
+/// said how far a prediction may be believed.
+struct MadeFrom {
+  /// Of one output, in its own unit.
+  struct Output {
+    double remainder_rms_um{0.0};  ///< of the rows that it was fitted to
+    double noise_um{0.0};          ///< share of the remainder that differs from row to row
+    double noise_time_s{0.0};      ///< time in which the rest falls to 1/e of its correlation
+    double left_out_rms_um{0.0};   ///< on what was left out
+    double no_model_rms_um{0.0};   ///< there without a model
+    double freedom{1.0};           ///< rows that the correlated ones are worth
+
+    bool operator==(const Output& other) const = default;
+  };
+  std::vector<std::string> runs;  ///< as given
+  double rows{0.0};
+  double hours{0.0};
+  bool within_one_run{false};        ///< judged on blocks of the only run
+  std::vector<std::string> columns;  ///< temperatures and signals that the model reads
+  std::vector<double> low;           ///< one a column, as recorded (degC, not rise)
+  std::vector<double> high;
+  /// The domain: levels of the temperatures, then rises and signals after each low pass, 0 among
+  /// them; see ModelDomain.
+  std::vector<double> taus_s;
+  std::vector<double> mean;                     ///< one a feature
+  std::vector<std::vector<double>> covariance;  ///< shape (features, features)
+  double distance_max{0.0};                     ///< beyond it a row is outside
+  std::map<std::string, Output> outputs;
+
+  bool operator==(const MadeFrom& other) const = default;
+};
+inline constexpr std::size_t domain_features_max = 256;
+inline constexpr std::size_t domain_taus_max = 8;
+
 /// delta = P (T - T_ref) + guideway rows + terms. Shapes: matrix (outputs, inputs).
 struct ThermalModel {
   std::vector<std::string> inputs;   ///< temperature columns, e.g. "t1_degC"
@@ -58,6 +114,7 @@ struct ThermalModel {
   /// Covariance of the inputs [K^2], shape (inputs, inputs), or empty.
   std::vector<std::vector<double>> covariance_K2;
   CovarianceGrowth covariance_growth;
+  std::optional<MadeFrom> made_from;
 
   /// Inputs, then every further temperature that a term names, in order of first use.
   [[nodiscard]] std::vector<std::string> temperature_columns() const;
@@ -81,6 +138,7 @@ enum class TermSubject {
   output,                    ///< an output of the model
   two_model_temperatures,    ///< "a|b", both inputs
   temperature_and_position,  ///< "a|b", any temperature and a position, in lexical order
+  several,                   ///< no one subject: LagBankSpec names them
 };
 struct TermKind {
   std::string name;

@@ -39,3 +39,6 @@ packages_test=(
   # The Debian packages, and the booted systemd that they are tested in.
   debhelper lintian mmdebstrap systemd-container man-db groff-base
 )
+
+# Peers of bench/run.sh measured; not part of the tests, being large.
+packages_bench=("${packages_test[@]}" python3-sklearn)

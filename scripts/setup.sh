@@ -56,8 +56,9 @@ main() {
     petsc) wanted=("${packages_petsc[@]}") ;;
     demo) wanted=("${packages_demo[@]}") ;;
     test) wanted=("${packages_test[@]}") ;;
+    bench) wanted=("${packages_bench[@]}") ;;
     *)
-      echo "usage: setup.sh build|modelling|petsc|demo|test" >&2
+      echo "usage: setup.sh build|modelling|petsc|demo|test|bench" >&2
       exit 2
       ;;
   esac

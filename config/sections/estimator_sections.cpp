@@ -187,6 +187,11 @@ CompensationConfig read_compensation(const TomlTable& table,
   config.on_stop = table.choice<StopPolicy>(
       "on_stop", {{"hold", StopPolicy::hold}, {"ramp_to_zero", StopPolicy::ramp_to_zero}},
       config.on_stop);
+  config.outside_domain = table.choice<OutsidePolicy>("outside_domain",
+                                                      {{"warn", OutsidePolicy::warn},
+                                                       {"hold", OutsidePolicy::hold},
+                                                       {"shrink", OutsidePolicy::shrink}},
+                                                      config.outside_domain);
   config.enabled_at_first_start =
       table.flag("enabled_at_first_start", config.enabled_at_first_start);
   config.estimate_lost_blocks = table.flag("estimate_lost_blocks", config.estimate_lost_blocks);

@@ -48,6 +48,9 @@ struct TermContext {
   /// Values of a per-output parameter in the order of the model's outputs, 0 where not given.
   std::function<std::vector<double>(std::string_view name)> per_output;
   std::function<double(std::string_view name)> shared;
+  /// Of a lag_bank: index of each subject among temperature_columns() or signal_columns().
+  std::vector<std::size_t> bank_columns{};
+  std::vector<double> bank_gains{};  ///< shape (outputs, time constants, subjects)
 };
 
 /// A kind of term and how it is made. To add one: a file with its registration, and its line in
@@ -62,11 +65,6 @@ struct TermRegistration {
 /// @throws InvalidValue when the specification does not fit the model
 [[nodiscard]] std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model);
 
-// Largest magnitudes believed; one place, so that all kinds agree.
-inline constexpr double term_gain_max = 1e6;
-inline constexpr double term_tau_s_max = 1e6;
-inline constexpr double term_tau_s_min = 1e-3;
-
 TermRegistration thermal_lag_registration();
 TermRegistration missing_heat_source_registration();
 TermRegistration missing_temperature_registration();
@@ -78,5 +76,6 @@ TermRegistration position_dependence_registration();
 TermRegistration output_hysteresis_registration();
 TermRegistration temperature_hysteresis_registration();
 TermRegistration sensor_swap_registration();
+TermRegistration lag_bank_registration();
 
 }  // namespace thermocomp

@@ -39,11 +39,47 @@ SubjectIndices subject_indices(const TermSpec& spec, TermSubject subject,
       return {index_of(temperatures, place, subject_key, "must be a temperature and a position"),
               index_of(signals, position, subject_key, "must be a temperature and a position")};
     }
+    case TermSubject::several:
+      return {};
     case TermSubject::other_temperature:
     case TermSubject::any_temperature:
       break;
   }
   return {index_of(temperatures, columns.first, subject_key, "must be a temperature")};
+}
+
+std::vector<std::size_t> bank_columns(const LagBankSpec& bank, const ThermalModel& model) {
+  const auto temperatures = model.temperature_columns();
+  const auto signals = model.signal_columns();
+  std::vector<std::size_t> columns;
+  for (const std::string& subject : bank.subjects)
+    columns.push_back(index_of(is_temperature_name(subject) ? temperatures : signals, subject,
+                               "term.subjects", "must be a temperature or an operating signal"));
+  return columns;
+}
+
+/// Shape (outputs, time constants, subjects), 0 where none are given.
+/// @throws InvalidValue when a shape does not fit
+std::vector<double> bank_gains(const LagBankSpec& bank, const ThermalModel& model) {
+  const std::size_t subjects = bank.subjects.size();
+  const std::size_t taus = bank.taus_s.size();
+  const auto size = [](const auto& list) { return static_cast<double>(list.size()); };
+  require(bank.powers.empty() || bank.powers.size() == subjects, "term.powers", size(bank.powers),
+          "must have one value a subject");
+  std::vector<double> gains(model.outputs.size() * subjects * taus, 0.0);
+  for (const auto& [output, table] : bank.gain_um_per_unit) {
+    const std::size_t begin =
+        subjects * taus *
+        index_of(model.outputs, output, "term.gain_um_per_unit", "is not an output of the model");
+    require(table.size() == subjects, "term.gain_um_per_unit", size(table),
+            "must have one row a subject");
+    for (std::size_t i = 0; i < subjects; ++i) {
+      require(table[i].size() == taus, "term.gain_um_per_unit", size(table[i]),
+              "must have one value a time constant");
+      for (std::size_t j = 0; j < taus; ++j) gains[begin + j * subjects + i] = table[i][j];
+    }
+  }
+  return gains;
 }
 
 }  // namespace
@@ -55,7 +91,7 @@ const std::vector<TermRegistration>& term_registrations() {
       slow_sensor_registration(),         wrong_coefficient_registration(),
       nonlinear_expansion_registration(), position_dependence_registration(),
       output_hysteresis_registration(),   temperature_hysteresis_registration(),
-      sensor_swap_registration(),
+      sensor_swap_registration(),         lag_bank_registration(),
   };
   return registrations;
 }
@@ -105,7 +141,8 @@ std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model)
     return values;
   };
   const SubjectIndices subject = subject_indices(spec, kind->subject, model);
-  return registration.make({spec, subject.first, subject.second, per_output, shared});
+  return registration.make({spec, subject.first, subject.second, per_output, shared,
+                            bank_columns(spec.bank, model), bank_gains(spec.bank, model)});
 }
 
 }  // namespace thermocomp

@@ -14,6 +14,7 @@
 #include "cli/run_loader.hpp"
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
+#include "config/run_overlap.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/large_pages.hpp"
 #include "modelling/diagnosis/report_data.hpp"
@@ -79,6 +80,7 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   cli::RunLoader loader(options.columns);
   std::vector<RunFile> train = loader.load(options.train);
   std::vector<RunFile> test = loader.load(options.test);
+  refuse_overlap(train, test);
   const StillSearching still_searching;
   if (!options.thermal.empty())
     return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,

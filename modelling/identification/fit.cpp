@@ -17,7 +17,6 @@ constexpr double combinations_max = 2e9;
 constexpr double as_good_as = 1.02;       // fewer terms win within this
 constexpr double condition_max = 1000.0;  // beyond, coefficients balance each other
 constexpr double sensor_error_K_of_one_run = 0.1;
-constexpr std::size_t kept_for_lags = 3000;
 
 /// Two-sided 95 % points of Student's t; beyond thirty degrees the normal's.
 double student_95(std::size_t freedom) {
@@ -38,9 +37,11 @@ struct Stacked {
 Stacked stack(const MeasuredTests& tests, const std::vector<FitColumn>& columns) {
   Stacked stacked;
   const auto count = static_cast<Eigen::Index>(columns.size());
-  stacked.x.resize(tests.rows(), count);
-  stacked.y.resize(tests.rows(), static_cast<Eigen::Index>(tests.outputs.size()));
   Eigen::Index row = 0;
+  for (const Fold& fold : tests.folds) row += fold.end - fold.begin;
+  stacked.x.resize(row, count);
+  stacked.y.resize(row, static_cast<Eigen::Index>(tests.outputs.size()));
+  row = 0;
   stacked.begin.push_back(0);
   std::vector<Eigen::MatrixXd> whole;
   for (const TestRun& run : tests.runs) {
@@ -213,7 +214,7 @@ SubsetOptions subset_options(const MeasuredTests& tests, const FitOptions& optio
   SubsetOptions subset;
   subset.terms_min = std::min(options.terms_min, tests.places.size());
   subset.terms_max = std::min(options.terms_max, tests.places.size());
-  subset.kept = options.lags ? kept_for_lags : 20;
+  subset.kept = options.lags ? options.kept_for_lags : 20;
   if (options.choice == Choice::free) return subset;
   subset.group_of.resize(tests.places.size());
   for (std::size_t group = 0; group < grouping.groups.size(); ++group)
@@ -247,10 +248,31 @@ std::vector<std::size_t> choose_columns(const ColumnPool& pool, const FitOptions
   return found->columns;
 }
 
-}  // namespace
+bool found_any(const SubsetSearch& search) {
+  return std::any_of(search.best.begin(), search.best.end(),
+                     [](const auto& subsets) { return !subsets.empty(); });
+}
 
-Fit fit_equation(const MeasuredTests& tests, const FitOptions& options) {
-  Fit fit;
+SubsetSearch search_relaxing(const NormalEquations& equations, SubsetOptions subset, bool relaxes,
+                             Fit& fit) {
+  SubsetSearch search = search_subsets(equations, subset);
+  if (!relaxes || found_any(search)) return search;
+  subset.terms_min = 1;
+  search = search_subsets(equations, subset);
+  fit.warnings.emplace_back("the groups of places allow fewer terms than asked for");
+  if (found_any(search)) return search;
+  subset.group_of.clear();
+  fit.warnings.emplace_back("the groups of places allow no combination: any places were tried");
+  return search_subsets(equations, subset);
+}
+
+/// What the columns of an equation are chosen from, and the choice.
+struct Chosen {
+  ColumnPool pool;
+  std::vector<std::size_t> columns;
+};
+
+Chosen choose(const MeasuredTests& tests, const FitOptions& options, Fit& fit) {
   const Eigen::MatrixXd s = similarity(tests, true);
   fit.grouping = options.threshold >= 0 ? group_places(s, options.threshold)
                                         : group_places(s, noise_floor(tests));
@@ -260,17 +282,33 @@ Fit fit_equation(const MeasuredTests& tests, const FitOptions& options) {
   const double sensor_error_K = options.sensor_error_K >= 0 ? options.sensor_error_K
                                 : tests.runs.size() > 1     ? 0.0
                                                             : sensor_error_K_of_one_run;
-  SubsetSearch search = search_subsets(normal_equations(tests, sensor_error_K), subset);
+  SubsetSearch search =
+      search_relaxing(normal_equations(tests, sensor_error_K), subset, options.relaxes, fit);
   fit.ranking = std::move(search.best);
   fit.judged = search.judged;
-  const ColumnPool pool(tests, options.lags ? 12 : 0, sensor_error_K);
-  const std::vector<std::size_t> columns = choose_columns(pool, options, fit);
-  for (const std::size_t column : columns) {
-    fit.columns.push_back(pool.columns()[column]);
-    if (column < pool.places()) fit.places.push_back(column);
+  Chosen chosen{ColumnPool(tests, options.lags ? 12 : 0, sensor_error_K), {}};
+  chosen.columns = choose_columns(chosen.pool, options, fit);
+  for (const std::size_t column : chosen.columns) {
+    fit.columns.push_back(chosen.pool.columns()[column]);
+    if (column < chosen.pool.places()) fit.places.push_back(column);
   }
+  return chosen;
+}
+
+}  // namespace
+
+Equation chosen_equation(const MeasuredTests& tests, const FitOptions& options) {
+  Fit fit;
+  static_cast<void>(choose(tests, options, fit));
+  const Stacked data = stack(tests, fit.columns);
+  return {fit.columns, solve(data.x, data.y)};
+}
+
+Fit fit_equation(const MeasuredTests& tests, const FitOptions& options) {
+  Fit fit;
+  const Chosen chosen = choose(tests, options, fit);
   judge_outputs(tests, stack(tests, fit.columns), fit);
-  judge_losses(tests, pool, columns, fit);
+  judge_losses(tests, chosen.pool, chosen.columns, fit);
   warn(tests, fit);
   return fit;
 }

@@ -29,6 +29,9 @@ struct FitOptions {
   /// of whose stretches share one.
   double sensor_error_K{-1.0};
   double lag_gain_min{0.05};  ///< share of the left-out sum of squares that a lag must take away
+  /// Where groups allow nothing: fewer terms, then any places, each with a warning.
+  bool relaxes{false};
+  std::size_t kept_for_lags{3000};  ///< combinations of each number of terms that get lags
 };
 
 /// What the equation says and does for one output.
@@ -65,6 +68,14 @@ struct Fit {
   std::uint64_t judged{0};
   std::vector<std::string> warnings;  ///< worse than no model on a test, nearly singular, ...
 };
+
+/// The columns of the best equation alone, and its coefficients; shape (columns, outputs).
+struct Equation {
+  std::vector<FitColumn> columns;
+  Eigen::MatrixXd coefficients;
+};
+/// As fit_equation(), without judging it.
+[[nodiscard]] Equation chosen_equation(const MeasuredTests& tests, const FitOptions& options);
 
 /// Every allowed combination; the best by left-out tests (and the hot half of an only run), with
 /// what wrong readings would add; of two that are as good (2 %) the one

@@ -1,21 +1,26 @@
 #include "modelling/identification/fit_command.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
 #include "cli/run_loader.hpp"
+#include "cli/terminal.hpp"
 #include "config/model_file.hpp"
+#include "modelling/identification/families.hpp"
 #include "modelling/identification/fit.hpp"
 
 namespace thermocomp::identification {
 namespace {
 
 constexpr std::size_t terms_of_any_equation = 8;
+constexpr std::size_t blocks_of_one_run = 8;
 
 struct Options {
   std::vector<std::string> runs;
@@ -26,9 +31,16 @@ struct Options {
   bool lags{false};
   double threshold{-1.0};
   double sensor_error_K{-1.0};  ///< negative: left out
+  std::string family;
   std::string model;
   std::string report;
   bool json{false};
+
+  /// Whether anything was asked for that only an equation of few sensors has.
+  [[nodiscard]] bool few_asked_for() const {
+    return terms_given || free_choice || lags || threshold >= 0 || sensor_error_K >= 0;
+  }
+  bool terms_given{false};
 };
 
 /// "3..5" or "4".
@@ -55,6 +67,32 @@ void write(const std::string& destination, const std::string& text) {
   file.commit();
 }
 
+/// One equation of few sensors, as JP7689460B2 has it.
+int run_few(const Options& options, const MeasuredTests& tests, const FitOptions& fit_options) {
+  const Fit fit = fit_equation(tests, fit_options);
+  write(options.model, write_model(model_of(tests, fit)));
+  if (!options.report.empty()) write(options.report, fit_html(tests, fit));
+  // A model on the output is not to be mixed with anything.
+  if (options.model == "-") return 0;
+  write("-", options.json ? fit_json(tests, fit) : fit_text(tests, fit));
+  return 0;
+}
+
+int run_families(const Options& options, const MeasuredTests& tests,
+                 const FitOptions& fit_options) {
+  std::optional<Family> forced;
+  if (!options.family.empty()) forced = family_of(options.family);
+  std::optional<cli::Progress> progress("comparing models");
+  const FamiliesFit fit =
+      fit_families(tests, fit_options, forced, [&](double share) { progress->update(share); });
+  progress.reset();
+  write(options.model, write_model(fit.model));
+  if (!options.report.empty()) write(options.report, families_html(tests, fit));
+  if (options.model == "-") return 0;
+  write("-", options.json ? families_json(tests, fit) : families_text(tests, fit));
+  return 0;
+}
+
 int run(const Options& options) {
   FitOptions fit_options;
   read_terms(options.terms, fit_options);
@@ -63,15 +101,15 @@ int run(const Options& options) {
   fit_options.lags = options.lags;
   fit_options.sensor_error_K = options.sensor_error_K;
   const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
-  const MeasuredTests tests = measured_tests(runs, options.tests);
-  const Fit fit = fit_equation(tests, fit_options);
-  write(options.model, write_model(model_of(tests, fit)));
-  if (!options.report.empty()) write(options.report, fit_html(tests, fit));
+  TestOptions test_options = options.tests;
+  const bool few = options.few_asked_for() && options.family.empty();
+  if (!few) {
+    test_options.signals = true;
+    test_options.folds_of_one_run = std::max(test_options.folds_of_one_run, blocks_of_one_run);
+  }
+  const MeasuredTests tests = measured_tests(runs, test_options);
   for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
-  // A model on the output is not to be mixed with anything.
-  if (options.model == "-") return 0;
-  write("-", options.json ? fit_json(tests, fit) : fit_text(tests, fit));
-  return 0;
+  return few ? run_few(options, tests, fit_options) : run_families(options, tests, fit_options);
 }
 
 }  // namespace
@@ -86,8 +124,15 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
       ->delimiter(',')
       ->type_name("NAME");
   sub->add_option("-o", options->model, "model file for the daemon; - is the output")->required();
-  sub->add_option("--terms", options->terms, "how many places: a number or a range in 1..8")
-      ->type_name("N..M");
+  sub->add_option(
+         "--family", options->family,
+         "none, static_few, lagged_few, physical or lag_bank; else the simplest within one "
+         "standard error of the best")
+      ->check(CLI::IsMember({"none", "static_few", "lagged_few", "physical", "lag_bank"}));
+  const CLI::Option* terms =
+      sub->add_option("--terms", options->terms,
+                      "few sensors only, how many: a number or a range in 1..8")
+          ->type_name("N..M");
   sub->add_option("--places", options->tests.places, "temperatures to choose from; else all")
       ->delimiter(',')
       ->type_name("NAME");
@@ -106,7 +151,10 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
       ->check(CLI::Range(2, 100));
   sub->add_option("--report", options->report, "page with curves and the choice (HTML)");
   sub->add_flag("--json", options->json, "the answer for a program");
-  sub->callback([options, &action] { action = [options] { return run(*options); }; });
+  sub->callback([options, terms, &action] {
+    options->terms_given = terms->count() > 0;
+    action = [options] { return run(*options); };
+  });
 }
 
 }  // namespace thermocomp::identification

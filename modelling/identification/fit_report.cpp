@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/number_text.hpp"
+#include "modelling/identification/families.hpp"
 #include "modelling/identification/fit.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/identification/svg.hpp"
@@ -83,6 +84,19 @@ std::string groups_map(const MeasuredTests& tests, const Fit& fit) {
     map.group_sizes.push_back(group.size());
   }
   return svg_of(map);
+}
+
+/// The text, the curves of each output and the map of the places.
+std::string page(const MeasuredTests& tests, const Fit& fit, const std::string& said) {
+  std::string text(
+      "<!DOCTYPE html>\n<html><head><meta charset=\"utf-8\"><title>thermocomp fit</title></head>\n"
+      "<body style=\"font-family:sans-serif;max-width:1000px\">\n<h1>Sensors and equation</h1>\n"
+      "<pre>");
+  text.append(xml_text(said)).append("</pre>\n");
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o)
+    text += curves(tests, fit, static_cast<Eigen::Index>(o));
+  text += groups_map(tests, fit);
+  return text.append("</body></html>\n");
 }
 
 }  // namespace
@@ -166,15 +180,15 @@ std::string fit_json(const MeasuredTests& tests, const Fit& fit) {
 }
 
 std::string fit_html(const MeasuredTests& tests, const Fit& fit) {
-  std::string text(
-      "<!DOCTYPE html>\n<html><head><meta charset=\"utf-8\"><title>thermocomp fit</title></head>\n"
-      "<body style=\"font-family:sans-serif;max-width:1000px\">\n<h1>Sensors and equation</h1>\n"
-      "<pre>");
-  text.append(xml_text(fit_text(tests, fit))).append("</pre>\n");
-  for (std::size_t o = 0; o < tests.outputs.size(); ++o)
-    text += curves(tests, fit, static_cast<Eigen::Index>(o));
-  text += groups_map(tests, fit);
-  return text.append("</body></html>\n");
+  return page(tests, fit, fit_text(tests, fit));
+}
+
+std::string families_html(const MeasuredTests& tests, const FamiliesFit& fit) {
+  Fit shown = fit.few.value_or(Fit{});
+  shown.left_out_um = fit.chosen_result().left_out_um;
+  if (shown.grouping.groups.empty())
+    shown.grouping = group_places(similarity(tests, true), noise_floor(tests));
+  return page(tests, shown, families_text(tests, fit));
 }
 
 }  // namespace thermocomp::identification

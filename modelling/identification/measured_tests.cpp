@@ -1,9 +1,12 @@
 #include "modelling/identification/measured_tests.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "config/number_text.hpp"
+#include "config/run_overlap.hpp"
 #include "config/units.hpp"
 
 namespace thermocomp::identification {
@@ -28,6 +31,61 @@ bool in_all(const std::vector<RunFile>& runs, const std::string& column) {
                      [&](const RunFile& run) { return run.find(column).has_value(); });
 }
 
+constexpr double spike_K_min = 10.0;
+constexpr double usual_steps = 30.0;
+constexpr std::size_t near = 5;
+
+/// Whether the value stands off its neighbours by more than the limit: in the middle of five, off
+/// their median; at an end, where a true course goes on to one side, by three times what the other
+/// four span besides.
+bool is_spike(const std::vector<double>& values, std::size_t row, double limit_K) {
+  const std::size_t begin = std::min(row < 2 ? 0 : row - 2, values.size() - near);
+  std::array<double, near> five{};
+  std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(begin), near, five.begin());
+  if (std::any_of(five.begin(), five.end(), [](double each) { return std::isnan(each); }))
+    return false;
+  const std::size_t at = row - begin;
+  if (at != 2) {
+    std::swap(five[at], five[near - 1]);
+    const auto [least, most] = std::minmax_element(five.begin(), five.end() - 1);
+    limit_K += 3.0 * (*most - *least);
+    return values[row] < *least - limit_K || values[row] > *most + limit_K;
+  }
+  std::nth_element(five.begin(), five.begin() + 2, five.end());
+  return std::abs(values[row] - five[2]) > limit_K;
+}
+
+/// 10 K, or 30 of the reading's usual steps where these are more; NaN: it has none.
+double spike_limit_K(const std::vector<double>& values) {
+  std::vector<double> steps_K;
+  for (std::size_t row = 1; row < values.size(); ++row)
+    if (std::isfinite(values[row] - values[row - 1]))
+      steps_K.push_back(std::abs(values[row] - values[row - 1]));
+  if (steps_K.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = steps_K.begin() + static_cast<std::ptrdiff_t>(steps_K.size() / 2);
+  std::nth_element(steps_K.begin(), middle, steps_K.end());
+  return std::max(spike_K_min, usual_steps * *middle);
+}
+
+/// Readings that no structure can show become missing values.
+void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
+  for (std::size_t i = 0; i < run.columns.size() && run.rows() >= near; ++i) {
+    if (!is_temperature(run.columns[i])) continue;
+    const std::vector<double> read = run.values[i];
+    const double limit_K = spike_limit_K(read);
+    std::size_t spikes = 0;
+    for (std::size_t row = 0; row < read.size(); ++row) {
+      if (!is_spike(read, row, limit_K)) continue;
+      run.values[i][row] = std::numeric_limits<double>::quiet_NaN();
+      ++spikes;
+    }
+    if (spikes > 0)
+      notes.push_back(run.name + ": " + run.columns[i] + ": " + std::to_string(spikes) +
+                      (spikes == 1 ? " reading is" : " readings are") +
+                      " left out: off its neighbours by more than " + number_text(limit_K) + " K");
+  }
+}
+
 /// Temperatures that all runs have, apart from those that hold too little.
 std::vector<std::string> usable_places(const std::vector<RunFile>& runs,
                                        std::vector<std::string>& notes) {
@@ -50,8 +108,35 @@ std::vector<std::string> usable_places(const std::vector<RunFile>& runs,
   return places;
 }
 
+/// Operating signals and positions without a gap, of all runs, that vary in some.
+std::vector<std::string> usable_signals(const std::vector<RunFile>& runs,
+                                        std::vector<std::string>& notes) {
+  std::vector<std::string> signals;
+  for (const std::string& column : runs.front().columns) {
+    if (!is_operating(column) || column == "time_s") continue;
+    if (!in_all(runs, column)) {
+      notes.push_back(std::string(column).append(" is left out: not every run has it"));
+      continue;
+    }
+    const bool whole = std::all_of(runs.begin(), runs.end(), [&](const RunFile& run) {
+      return share_present(run, run.column(column)) == 1.0;
+    });
+    if (!whole) {
+      notes.push_back(std::string(column).append(" is left out: values are missing"));
+      continue;
+    }
+    const double first = runs.front().column(column).front();
+    const bool varies = std::any_of(runs.begin(), runs.end(), [&](const RunFile& run) {
+      const std::vector<double>& values = run.column(column);
+      return std::any_of(values.begin(), values.end(), [&](double each) { return each != first; });
+    });
+    if (varies) signals.push_back(column);
+  }
+  return signals;
+}
+
 TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
-                 const std::vector<std::string>& outputs) {
+                 const std::vector<std::string>& outputs, const std::vector<std::string>& signals) {
   std::vector<const std::vector<double>*> columns;
   columns.reserve(places.size() + outputs.size());
   for (const auto& name : places) columns.push_back(&run.column(name));
@@ -74,6 +159,15 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   test.time_s.resize(count);
   test.places_K.resize(count, static_cast<Eigen::Index>(places.size()));
   test.outputs_um.resize(count, static_cast<Eigen::Index>(outputs.size()));
+  test.signals.resize(count, static_cast<Eigen::Index>(signals.size()));
+  test.reference_degC.resize(static_cast<Eigen::Index>(places.size()));
+  for (std::size_t j = 0; j < places.size(); ++j)
+    test.reference_degC[static_cast<Eigen::Index>(j)] = (*columns[j])[rows.front()];
+  for (std::size_t j = 0; j < signals.size(); ++j) {
+    const std::vector<double>& values = run.column(signals[j]);
+    for (Eigen::Index i = 0; i < count; ++i)
+      test.signals(i, static_cast<Eigen::Index>(j)) = values[rows[static_cast<std::size_t>(i)]];
+  }
   for (Eigen::Index i = 0; i < count; ++i) {
     const std::size_t row = rows[static_cast<std::size_t>(i)];
     test.time_s[i] = run.time_s()[row];
@@ -107,7 +201,10 @@ void leave_out_still_places(MeasuredTests& tests) {
     }
   }
   if (kept.size() == tests.places.size()) return;
-  for (TestRun& run : tests.runs) run.places_K = run.places_K(Eigen::all, kept).eval();
+  for (TestRun& run : tests.runs) {
+    run.places_K = run.places_K(Eigen::all, kept).eval();
+    run.reference_degC = run.reference_degC(kept).eval();
+  }
   tests.places = names;
 }
 
@@ -157,15 +254,20 @@ std::string MeasuredTests::fold_name(std::size_t fold) const {
   return text;
 }
 
-MeasuredTests measured_tests(const std::vector<RunFile>& runs, const TestOptions& options) {
+MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOptions& options) {
   MeasuredTests tests;
+  refuse_overlap(given);
+  std::vector<RunFile> runs = given;
+  for (RunFile& run : runs) leave_out_spikes(run, tests.notes);
   for (const std::string& name : options.places)
     if (!is_temperature(name)) refuse("", name, "must be a temperature (*_degC, *_K)");
   for (const std::string& name : options.outputs)
     if (!is_output(name)) refuse("", name, "must be a displacement (*_um) or a tilt (*_urad)");
   tests.places = options.places.empty() ? usable_places(runs, tests.notes) : options.places;
   tests.outputs = options.outputs;
-  for (const RunFile& run : runs) tests.runs.push_back(make_run(run, tests.places, tests.outputs));
+  if (options.signals) tests.signals = usable_signals(runs, tests.notes);
+  for (const RunFile& run : runs)
+    tests.runs.push_back(make_run(run, tests.places, tests.outputs, tests.signals));
   leave_out_still_places(tests);
   if (tests.places.empty()) refuse(runs.front().name, "", "has no temperature that can be used");
   tests.folds = make_folds(tests.runs, options.folds_of_one_run);

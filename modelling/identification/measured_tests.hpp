@@ -16,9 +16,11 @@ namespace thermocomp::identification {
 struct TestRun {
   std::string name;
   Eigen::VectorXd time_s;
-  Eigen::MatrixXd places_K;    ///< shape (rows, places): rise over the reference
-  Eigen::MatrixXd outputs_um;  ///< shape (rows, outputs): change since the reference
-  Eigen::Index begin{0};       ///< first selected row
+  Eigen::MatrixXd places_K;           ///< shape (rows, places): rise over the reference
+  Eigen::MatrixXd outputs_um;         ///< shape (rows, outputs): change since the reference
+  Eigen::MatrixXd signals;            ///< shape (rows, signals), as recorded
+  Eigen::RowVectorXd reference_degC;  ///< of the places
+  Eigen::Index begin{0};              ///< first selected row
 };
 
 /// What is left out as one: a whole run, or a stretch of the only run.
@@ -38,6 +40,7 @@ struct HotHalf {
 struct MeasuredTests {
   std::vector<std::string> places;
   std::vector<std::string> outputs;
+  std::vector<std::string> signals;  ///< that all runs have and that vary
   std::vector<TestRun> runs;
   std::vector<Fold> folds;
   HotHalf hot;
@@ -51,6 +54,7 @@ struct TestOptions {
   std::vector<std::string> places;   ///< empty: every temperature that all runs have
   std::vector<std::string> outputs;  ///< may be empty
   std::size_t folds_of_one_run{6};
+  bool signals{false};  ///< operating signals too
 };
 
 /// A place that no run has a value of, or that moves in none, is left out with a note.

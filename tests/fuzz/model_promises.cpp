@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <optional>
 #include <vector>
 
 #include "estimator/displacement_model.hpp"
+#include "estimator/model_domain.hpp"
 #include "fuzz.hpp"
 
 namespace thermocomp::fuzz {
@@ -36,6 +38,7 @@ void check_same(const ThermalModel& a, const ThermalModel& b) {
   FUZZ_PROMISE(same(a.covariance_growth.scatter_time_s, b.covariance_growth.scatter_time_s));
   FUZZ_PROMISE(same(a.covariance_growth.drift_factor, b.covariance_growth.drift_factor));
   FUZZ_PROMISE(same(a.covariance_growth.scatter_factor, b.covariance_growth.scatter_factor));
+  FUZZ_PROMISE(a.made_from == b.made_from);
   FUZZ_PROMISE(a.guideways.size() == b.guideways.size());
   for (std::size_t i = 0; i < a.guideways.size(); ++i) {
     FUZZ_PROMISE(a.guideways[i].name == b.guideways[i].name);
@@ -49,11 +52,14 @@ void check_same(const ThermalModel& a, const ThermalModel& b) {
     FUZZ_PROMISE(a.terms[i].subject == b.terms[i].subject);
     FUZZ_PROMISE(a.terms[i].shared == b.terms[i].shared);
     FUZZ_PROMISE(a.terms[i].per_output == b.terms[i].per_output);
+    FUZZ_PROMISE(a.terms[i].bank == b.terms[i].bank);
   }
 }
 
 void check_steps(const ThermalModel& model) {
   DisplacementModel displacement(model);
+  std::optional<ModelDomain> domain;
+  if (model.made_from) domain.emplace(model);
   const std::vector<double> reference(model.temperature_columns().size(), 20.0);
   std::vector<double> temps(reference);
   std::vector<double> signals(model.signal_columns().size(), 0.0);
@@ -63,6 +69,7 @@ void check_steps(const ThermalModel& model) {
     std::fill(temps.begin(), temps.end(), temp_degC);
     std::fill(signals.begin(), signals.end(), 1e3 * temp_degC);
     displacement.step(now, temps, reference, signals, result);
+    if (domain) domain->step(now, temps, reference, signals);
     now += std::chrono::milliseconds(10);
   }
   FUZZ_PROMISE(displacement.plan_terms(displacement).size() == model.terms.size());

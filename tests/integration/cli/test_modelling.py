@@ -75,6 +75,44 @@ def test_fit_finds_the_equation_and_its_model_predicts(tmp_path):
     assert predicted.returncode == 0 and float(predicted.stderr.split()[1]) < 0.6
 
 
+def test_fit_without_options_compares_families_and_says_where_its_model_holds(tmp_path):
+    files = write_tests(tmp_path)
+    model = tmp_path / "model.toml"
+    answer = run("fit", *files, "--outputs", "z_um", "-o", model, "--json")
+    assert answer.returncode == 0, answer.stderr
+    said = json.loads(answer.stdout)
+    assert [each["family"] for each in said["families"]] == [
+        "none", "static_few", "lagged_few", "physical", "lag_bank"]
+    assert sum(each["chosen"] for each in said["families"]) == 1
+    assert said["families"][3]["left_out_rms_um"] is None  # no signal is there
+    assert said["left_out_rms_um"]["z_um"] < 1.0
+    out = tmp_path / "out.csv"
+    predicted = run("predict", "--model", model, files[0], "-o", out)
+    assert predicted.returncode == 0
+    assert predicted.stderr.splitlines()[-1] == "outside 0.000"
+    header = out.read_text().splitlines()[0].split(",")
+    assert header == ["time_s", "z_predicted_um", "z_measured_um", "z_residual_um", "z_sd_um",
+                      "outside"]
+    cold = tmp_path / "cold.csv"
+    with files[0].open() as file:
+        rows = list(csv.reader(file))
+    with cold.open("w", newline="") as file:
+        csv.writer(file).writerows([rows[0]] + [
+            [row[0]] + [float(value) - 15 for value in row[1:4]] + [row[4]] for row in rows[1:]])
+    predicted = run("predict", "--model", model, cold, "-o", out)
+    assert predicted.stderr.splitlines()[-1] == "outside 1.000"
+
+
+def test_one_run_is_said_to_judge_itself_and_the_same_rows_twice_are_refused(tmp_path):
+    files = write_tests(tmp_path, 1)
+    model = tmp_path / "model.toml"
+    answer = run("fit", files[0], "--outputs", "z_um", "-o", model)
+    assert answer.returncode == 0, answer.stderr
+    assert "judged within one run: not valid for other days" in answer.stdout
+    answer = run("fit", files[0], f"{files[0]}@0:6000", "--outputs", "z_um", "-o", model)
+    assert answer.returncode == 2 and "given twice" in answer.stderr
+
+
 def test_tiebar_gives_both_coefficients(tmp_path):
     answer = run("tiebar", EXAMPLES / "gate_machine.toml", "--json", "--ratio", "0.2",
                  "--curves", tmp_path / "curves.svg")

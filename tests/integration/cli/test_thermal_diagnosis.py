@@ -239,8 +239,8 @@ def test_the_corrected_machine_file_gives_what_was_measured(tmp_path, changed, k
 def test_a_machine_file_is_not_written_over(tmp_path):
     model = lumped_machine(tmp_path / "model")
     text = (model / "machine.toml").read_text()
-    run_file = measured(lumped_machine(tmp_path / "truth"))[1]
-    answer = run("diagnose", "--thermal", model / "machine.toml", "--train", run_file, "--test",
-                 run_file, "--out", model)
+    runs = measured(lumped_machine(tmp_path / "truth"))
+    answer = run("diagnose", "--thermal", model / "machine.toml", "--train", runs[1], "--test",
+                 runs[0], "--out", model)
     assert answer.returncode == 2 and "would write over" in answer.stderr
     assert (model / "machine.toml").read_text() == text

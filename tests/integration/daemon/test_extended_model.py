@@ -67,6 +67,22 @@ def extended_model(folder):
     return path
 
 
+def as_bank(path):
+    """The same model with its terms as one bank of lags, and a temperature in it that adds
+    nothing at first and later takes part of its own displacement back."""
+    text = path.read_text()
+    model = tomllib.loads(text)
+    term, = model["term"]
+    lines = [text[:text.index("[[term]]")], "[[term]]", 'kind = "lag_bank"',
+             f'subjects = ["spindle_rpm", "{model["inputs"][0]}"]',
+             f"powers = [{term['power']}, 1]", f"tau_s = [0.0, {term['tau_s']!r}]"]
+    for output, gain in term["gain_um_per_unit"].items():
+        lines.append(f"gain_um_per_unit.{output} = [[0.0, {gain!r}], [0.1, -0.1]]")
+    bank = path.with_name("bank.toml")
+    bank.write_text("\n".join(lines) + "\n")
+    return bank
+
+
 def late_um(times_s, rpm_max):
     """What cycles may make of it that a busy machine left out: the daemon's lag begins to follow a
     new speed in the cycle after it, the prediction's at the row before."""
@@ -84,8 +100,11 @@ def last_row_came(temps, times_s):
     return changes[after_rows[0] if after_rows else -1]
 
 
-def test_the_offsets_of_an_extended_model_are_its_prediction(lab):
+@pytest.mark.parametrize("bank", (False, True))
+def test_the_offsets_of_an_extended_model_are_its_prediction(lab, bank):
     model = extended_model(lab.folder)
+    if bank:
+        model = as_bank(model)
     bus = spindle.modbus_bus("modbus_tcp", "ABCD",
                              ('host = "127.0.0.1"\nport = 0',
                               'host = "127.0.0.1"\nport = @sensors@'),

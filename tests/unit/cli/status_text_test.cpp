@@ -50,6 +50,14 @@ TEST_CASE("the status says at one glance that and how much is compensated", "[cl
   CHECK_THAT(text, !Contains("\033"));
 }
 
+TEST_CASE("a machine outside of what its model was made from is told so", "[cli][status]") {
+  json status = good_status();
+  CHECK_THAT(status_text(status, false), !Contains("Domain"));
+  status["model"]["outside"] = true;
+  status["model"]["outside_share_24h"] = 0.25;
+  CHECK_THAT(status_text(status, false), Contains("25 % of the last 24 h"));
+}
+
 TEST_CASE("every reason of the estimator is explained with what to do", "[cli][status]") {
   for (std::size_t bit = 0; bit < thermocomp::reasons_count; ++bit) {
     const auto name = thermocomp::to_string(static_cast<thermocomp::Reason>(1u << bit));

@@ -7,6 +7,7 @@
 
 #include "estimator/checks.hpp"
 #include "estimator/estimator_config.hpp"
+#include "estimator/input_gains.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
@@ -218,4 +219,122 @@ TEST_CASE("a model whose shapes or names do not fit is refused", "[displacement]
     model.terms = {
         {"thermal_lag", "t9_degC", {{"tau_s", 1.0}}, {{"gain_um_per_K", {{"z_um", 1.0}}}}}};
   });
+}
+
+namespace {
+
+/// One temperature at two time scales and the square of a speed, beside the matrix.
+ThermalModel with_bank() {
+  ThermalModel model = two_by_two();
+  TermSpec term;
+  term.kind = "lag_bank";
+  term.bank.subjects = {"t1_degC", "spindle_rpm"};
+  term.bank.powers = {1.0, 2.0};
+  term.bank.taus_s = {0.0, 100.0};
+  term.bank.gain_um_per_unit["z_um"] = {{0.0, 1.5}, {2e-6, 0.0}};
+  model.terms = {term};
+  return model;
+}
+
+}  // namespace
+
+TEST_CASE("a bank of lags adds each subject's low passes with their gains", "[displacement]") {
+  DisplacementModel model(with_bank());
+  const Vector reference{0.0, 0.0};
+  CHECK(displacement(model, 1s, {0.0, 0.0}, reference, {0.0}, 2) == Vector{0.0, 0.0});
+  const Vector later = displacement(model, 101s, {4.0, 0.0}, reference, {1000.0}, 2);
+  CHECK(later[0] == Approx(20.0));
+  // -2 * 4, the lag after one time constant, and 2e-6 * 1000^2 at once.
+  CHECK(later[1] == Approx(-8.0 + 1.5 * 4.0 * (1.0 - std::exp(-1.0)) + 2.0));
+}
+
+TEST_CASE("a bank of lags says what thermal_lag and missing_heat_source say", "[displacement]") {
+  ThermalModel plain = two_by_two();
+  plain.terms = {
+      {"thermal_lag", "t2_degC", {{"tau_s", 700.0}}, {{"gain_um_per_K", {{"x_um", 3.0}}}}},
+      {"missing_heat_source",
+       "spindle_rpm",
+       {{"tau_s", 700.0}, {"power", 1.0}},
+       {{"gain_um_per_unit", {{"x_um", 1e-3}}}}}};
+  ThermalModel bank = two_by_two();
+  TermSpec term;
+  term.kind = "lag_bank";
+  term.bank.subjects = {"t2_degC", "spindle_rpm"};
+  term.bank.taus_s = {0.0, 700.0};
+  term.bank.gain_um_per_unit["x_um"] = {{-3.0, 3.0}, {0.0, 1e-3}};
+  bank.terms = {term};
+  DisplacementModel one(plain);
+  DisplacementModel other(bank);
+  for (int i = 0; i < 200; ++i) {
+    const nanoseconds now = std::chrono::seconds(i * (1 + i % 7));
+    if (i > 0 && now <= std::chrono::seconds((i - 1) * (1 + (i - 1) % 7))) continue;
+    const Vector temps{20.0 + 0.1 * i, 20.0 + std::sin(0.1 * i)};
+    const Vector signals{i % 50 < 20 ? 3000.0 : 0.0};
+    const double first = displacement(one, now, temps, {20.0, 20.0}, signals, 2)[0];
+    CHECK(displacement(other, now, temps, {20.0, 20.0}, signals, 2)[0] == Approx(first));
+  }
+}
+
+TEST_CASE("a bank keeps its past over a reload with other gains, and loses it with other lags",
+          "[displacement]") {
+  const Vector reference{0.0, 0.0};
+  DisplacementModel old_model(with_bank());
+  static_cast<void>(displacement(old_model, 1s, {0.0, 0.0}, reference, {0.0}, 2));
+  static_cast<void>(displacement(old_model, 51s, {4.0, 0.0}, reference, {0.0}, 2));
+
+  ThermalModel spec = with_bank();
+  spec.terms[0].bank.gain_um_per_unit["z_um"] = {{0.0, 3.0}, {0.0, 0.0}};
+  DisplacementModel other_gains(spec);
+  const std::vector<int> plan = other_gains.plan_terms(old_model);
+  CHECK(plan == std::vector<int>{0});
+  other_gains.adopt_terms(old_model, plan);
+  const Vector after = displacement(other_gains, 101s, {4.0, 0.0}, reference, {0.0}, 2);
+  CHECK(after[1] == Approx(-8.0 + 3.0 * 4.0 * (1.0 - std::exp(-1.0))));
+
+  spec.terms[0].bank.taus_s = {0.0, 101.0};
+  CHECK(DisplacementModel(spec).plan_terms(old_model) == std::vector<int>{-1});
+}
+
+TEST_CASE("a large bank's state is saved, loaded and adopted whole", "[displacement]") {
+  ThermalModel spec = two_by_two();
+  TermSpec term;
+  term.kind = "lag_bank";
+  for (int i = 0; i < 60; ++i)
+    term.bank.subjects.push_back(std::string("s").append(std::to_string(i)).append("_on"));
+  term.bank.taus_s = {10.0, 100.0, 1000.0};
+  term.bank.gain_um_per_unit["x_um"].assign(60, {1.0, 2.0, 3.0});
+  spec.terms = {term};
+  DisplacementModel one(spec);
+  DisplacementModel other(spec);
+  const Vector zero{0.0, 0.0};
+  for (int i = 0; i < 20; ++i)
+    static_cast<void>(displacement(one, std::chrono::seconds(i), zero, zero, Vector(60, i % 3), 2));
+  other.adopt_terms(one, other.plan_terms(one));
+  CHECK(displacement(one, 25s, zero, zero, Vector(60, 1.0), 2) ==
+        displacement(other, 25s, zero, zero, Vector(60, 1.0), 2));
+}
+
+TEST_CASE("a bank whose shapes or names do not fit is refused", "[displacement]") {
+  ThermalModel spec = with_bank();
+  spec.terms[0].bank.gain_um_per_unit["z_um"].pop_back();
+  CHECK_THROWS_AS(DisplacementModel(spec), InvalidValue);
+  spec = with_bank();
+  spec.terms[0].bank.powers = {1.0};
+  CHECK_THROWS_AS(DisplacementModel(spec), InvalidValue);
+  spec = with_bank();
+  spec.terms[0].bank.gain_um_per_unit["q_um"] = spec.terms[0].bank.gain_um_per_unit["z_um"];
+  CHECK_THROWS_AS(DisplacementModel(spec), InvalidValue);
+}
+
+TEST_CASE("the certainty of an offset counts the largest that a bank may still do",
+          "[displacement]") {
+  ThermalModel spec = with_bank();  // z: -2 at once, then -0.5
+  InputGains gains(spec);
+  Vector slope(2);
+  gains.of_output(1, Vector{1.0, 1.0}, Vector{0.0}, slope);
+  CHECK(slope == Vector{-2.0, 3.0});
+  spec.terms[0].bank.gain_um_per_unit["z_um"] = {{1.0, 9.0}, {0.0, 0.0}};
+  InputGains more(spec);  // -2, then -1, then 8
+  more.of_output(1, Vector{1.0, 1.0}, Vector{0.0}, slope);
+  CHECK(slope == Vector{8.0, 3.0});
 }

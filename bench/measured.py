@@ -1,0 +1,127 @@
+"""Test RMS on measured machines: what people fit, and `thermocomp fit` without further options.
+
+    measured.py PROGRAM [--data FOLDER] [--splits TEXT] [--peers NAME,...]
+
+The last lines: each split's RMS by method (mean over its outputs), then ours over the best peer of
+the split: the median, the largest; and rows that are worse than no model without being called
+outside.
+"""
+
+import argparse
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["OMP_NUM_THREADS"] = "1"
+
+# ruff: noqa: E402
+import numpy as np
+
+import measured_data as data
+import measured_peers as peers
+
+SOURCE = pathlib.Path(__file__).resolve().parents[1]
+
+
+def rms(values):
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def arguments(runs, folder, prefix):
+    """Runs of one file are written once."""
+    paths, given = {}, []
+    for run in runs:
+        key = id(run.columns["time_s"])
+        if key not in paths:
+            paths[key] = folder / f"{prefix}{len(paths)}_{run.name}.csv"
+            data.write(run, paths[key])
+        given.append(data.selection(run, paths[key]))
+    return given
+
+
+def ours(program, split, folder):
+    """Left-over rows and flags of `outside`, each output behind the other's."""
+    folder.mkdir()
+    model = folder / "model.toml"
+    start = time.monotonic()
+    said = subprocess.run(
+        [program, "fit", *arguments(split.train, folder, "train"), "--outputs",
+         ",".join(split.outputs), "-o", model], capture_output=True, text=True, check=False)
+    if said.returncode != 0:
+        raise SystemExit(f"{split.name}: fit: {said.stderr}")
+    print(said.stdout + said.stderr, file=sys.stderr)
+    left = {name: [] for name in split.outputs}
+    moved = {name: [] for name in split.outputs}
+    outside = []
+    for run in arguments(split.test, folder, "test"):
+        out = folder / "predicted.csv"
+        subprocess.run([program, "predict", "--model", model, run, "-o", out], check=True,
+                       capture_output=True)
+        columns = data.read(out)
+        outside.append(columns["outside"])
+        for name in split.outputs:
+            stem, unit = name.rsplit("_", 1)
+            left[name].append(columns[f"{stem}_residual_{unit}"])
+            moved[name].append(columns[f"{stem}_measured_{unit}"])
+    return ([np.concatenate(left[name]) for name in split.outputs],
+            [np.concatenate(moved[name]) for name in split.outputs],
+            np.concatenate(outside) > 0.5, time.monotonic() - start)
+
+
+def judge(program, split, names, folder):
+    """RMS of each method, mean over outputs; and of ours where it is not called outside."""
+    figures = {}
+    for name in names:
+        figures[name] = float(np.mean([rms(left) for left in peers.PEERS[name](split)]))
+        print(f"{split.name} {name} {figures[name]:.3f}", file=sys.stderr, flush=True)
+    left, moved, outside, seconds = ours(program, split, folder)
+    figures["fit"] = float(np.mean([rms(each) for each in left]))
+    inside = ~outside
+    figures["inside"] = float(np.mean([rms(e[inside]) for e in left])) if inside.any() else 0.0
+    figures["none_inside"] = (float(np.mean([rms(e[inside]) for e in moved]))
+                              if inside.any() else 0.0)
+    figures["outside_share"] = float(outside.mean())
+    figures["seconds"] = seconds
+    return figures
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("--data", default=os.environ.get(
+        "THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"), type=pathlib.Path)
+    parser.add_argument("--splits", default="")
+    parser.add_argument("--peers", default=",".join(peers.PEERS))
+    options = parser.parse_args()
+    if not options.data.is_dir():
+        print(f"no measured data in {options.data} (THERMOCOMP_DATA): nothing to measure")
+        return 77
+    names = options.peers.split(",")
+    ratios, lines, worse = [], [], 0
+    with tempfile.TemporaryDirectory() as folder:
+        for split in data.all_splits(options.data):
+            if options.splits not in split.name:
+                continue
+            figures = judge(options.program, split, names, pathlib.Path(folder) / split.name)
+            best = min(figures[name] for name in names)
+            ratios.append(figures["fit"] / best)
+            worse += figures["inside"] > figures["none_inside"]
+            for name in [*names, "fit"]:
+                lines.append(f"{split.name}_{name} {figures[name]:.3f} um")
+            lines.append(f"{split.name}_fit_over_best_peer {ratios[-1]:.3f} ratio")
+            lines.append(f"{split.name}_outside {figures['outside_share']:.3f} share")
+            lines.append(f"{split.name}_fit_inside {figures['inside']:.3f} um")
+            lines.append(f"{split.name}_fit_seconds {figures['seconds']:.1f} s")
+    print("\n".join(lines))
+    print(f"fit_over_best_peer_median {np.median(ratios):.3f} ratio")
+    print(f"fit_over_best_peer_largest {max(ratios):.3f} ratio")
+    print(f"splits_worse_than_none_inside {worse} splits")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,63 @@
+/// Every temperature and signal at several low passes, with penalties: what to fit where nobody
+/// knows which few sensors matter.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "modelling/identification/measured_tests.hpp"
+
+namespace thermocomp::identification {
+
+/// Columns of a bank: each subject to its power, at each time constant; subjects within a time
+/// constant side by side.
+struct BankColumns {
+  std::vector<std::string> subjects;  ///< temperatures (rises), then signals, then their squares
+  std::vector<double> powers;
+  std::vector<double> taus_s;  ///< 0 first
+  [[nodiscard]] std::size_t size() const noexcept { return subjects.size() * taus_s.size(); }
+};
+
+/// Time constants by a ratio of three from 5 min up to a sixth of the longest run, at least twice
+/// the step; as many as leave no more than 600 columns. A signal that is only ever 0 or 1 has no
+/// square.
+[[nodiscard]] BankColumns bank_columns(const MeasuredTests& tests);
+
+/// The columns over all rows of a run, less their values at its first row; shape (rows, columns).
+[[nodiscard]] Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
+                                      const BankColumns& columns);
+
+/// X'X and X'Y of every fold, columns scaled to a standard deviation of 1.
+class BankEquations {
+ public:
+  BankEquations(const MeasuredTests& tests, const BankColumns& columns);
+
+  /// Gains [um per unit], shape (columns, outputs), from all folds but `left_out` (none: past the
+  /// last). Half of them from ridge regression, half from L1 regression, in each an average over
+  /// penalties: one that leaves e^2 on folds left out inside counts as e^-8. On measured machines
+  /// neither kind is better than the other, and their mean is seldom worse than the better one.
+  [[nodiscard]] Eigen::MatrixXd fit(std::size_t left_out) const;
+
+  [[nodiscard]] const std::vector<Eigen::MatrixXd>& rows() const noexcept { return rows_; }
+
+ private:
+  struct Sums {
+    Eigen::MatrixXd xx;
+    Eigen::MatrixXd xy;
+    Eigen::VectorXd yy;
+    double rows{0.0};
+  };
+  [[nodiscard]] Sums sums_without(std::size_t left_out, std::size_t also) const;
+  [[nodiscard]] std::vector<Eigen::MatrixXd> paths(const Sums& sums) const;
+
+  std::vector<Sums> pieces_;       ///< of the folds
+  std::vector<std::size_t> fold_;  ///< of each piece
+  std::vector<std::size_t> part_;  ///< of each piece: which are left out together inside
+  std::size_t parts_{0};
+  Eigen::VectorXd scale_;
+  std::vector<Eigen::MatrixXd> rows_;  ///< one a run
+};
+
+}  // namespace thermocomp::identification

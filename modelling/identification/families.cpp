@@ -1,0 +1,311 @@
+#include "modelling/identification/families.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "modelling/identification/bank_fit.hpp"
+#include "modelling/identification/heat_fit.hpp"
+#include "modelling/identification/made_from_tests.hpp"
+
+namespace thermocomp::identification {
+namespace {
+
+constexpr std::size_t kept_for_lags = 200;
+constexpr Eigen::Index stretches_of_only_run = 6;
+
+std::size_t index_of_family(Family family) {
+  return static_cast<std::size_t>(family);
+}
+
+Eigen::Index rows_of(const MeasuredTests& tests) {
+  Eigen::Index rows = 0;
+  for (const Fold& fold : tests.folds) rows += fold.end - fold.begin;
+  return rows;
+}
+
+/// All but one fold, as what a family may see when that one judges it.
+MeasuredTests without(const MeasuredTests& tests, std::size_t fold) {
+  MeasuredTests rest = tests;
+  const Fold out = tests.folds[fold];
+  rest.folds.erase(rest.folds.begin() + static_cast<std::ptrdiff_t>(fold));
+  std::erase_if(rest.hot.rows, [&](Eigen::Index row) { return row >= out.begin && row < out.end; });
+  if (rest.folds.size() > 1) return rest;
+  // A choice judged on one fold would be judged on what it was fitted to: stretches of it instead.
+  const Fold only = rest.folds.front();
+  rest.folds.clear();
+  const Eigen::Index rows = only.end - only.begin;
+  for (Eigen::Index i = 0; i < stretches_of_only_run; ++i)
+    rest.folds.push_back({only.run, only.begin + rows * i / stretches_of_only_run,
+                          only.begin + rows * (i + 1) / stretches_of_only_run});
+  return rest;
+}
+
+FitOptions options_of(Family family, const MeasuredTests& tests, FitOptions options) {
+  options.lags = family != Family::static_few;
+  options.relaxes = true;
+  options.kept_for_lags = kept_for_lags;
+  // Every combination of five of so many is more than a minute's work.
+  if (tests.places.size() > 24) options.terms_max = std::min<std::size_t>(options.terms_max, 4);
+  if (tests.places.size() > 40) options.terms_max = std::min<std::size_t>(options.terms_max, 3);
+  return options;
+}
+
+HeatEquation few_of(Family family, const MeasuredTests& tests, const FitOptions& options) {
+  const Equation equation = chosen_equation(tests, options_of(family, tests, options));
+  if (family == Family::physical) return add_heats(tests, equation);
+  return {equation.columns, {}, equation.coefficients};
+}
+
+Eigen::MatrixXd predicted(const TestRun& run, const HeatEquation& equation) {
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(run.time_s.size(), equation.coefficients.cols());
+  Eigen::Index row = 0;
+  for (const FitColumn& column : equation.columns)
+    sum += column_of(run, column) * equation.coefficients.row(row++);
+  for (const HeatColumn& heat : equation.heats)
+    sum += column_of(run, heat) * equation.coefficients.row(row++);
+  return sum;
+}
+
+/// Fills in what follows from left_out_um.
+void judge(const MeasuredTests& tests, FamilyResult& result) {
+  const std::size_t outputs = tests.outputs.size();
+  Eigen::VectorXd whole = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(outputs));
+  Eigen::VectorXd left = whole;
+  result.fold_um.assign(outputs, {});
+  std::vector<Eigen::VectorXd> of_folds;
+  Eigen::Index row = 0;
+  for (const Fold& fold : tests.folds) {
+    const Eigen::Index rows = fold.end - fold.begin;
+    const auto y = tests.runs[fold.run].outputs_um.middleRows(fold.begin, rows);
+    const Eigen::VectorXd squares =
+        (y - result.left_out_um.middleRows(row, rows)).colwise().squaredNorm().transpose();
+    whole += y.colwise().squaredNorm().transpose();
+    left += squares;
+    of_folds.push_back(squares);
+    for (std::size_t o = 0; o < outputs; ++o)
+      result.fold_um[o].push_back(
+          std::sqrt(squares[static_cast<Eigen::Index>(o)] / static_cast<double>(rows)));
+    row += rows;
+  }
+  for (std::size_t o = 0; o < outputs; ++o)
+    result.left_out_rms_um.push_back(
+        std::sqrt(left[static_cast<Eigen::Index>(o)] / static_cast<double>(row)));
+  for (const Eigen::VectorXd& squares : of_folds)
+    result.scores.push_back((squares.array() / whole.array().max(1e-30)).sum() /
+                            static_cast<double>(outputs));
+  result.answers = true;
+}
+
+FamilyResult judge_few(Family family, const MeasuredTests& tests, const FitOptions& options,
+                       const std::function<void()>& done) {
+  FamilyResult result;
+  result.family = family;
+  if (family == Family::physical && tests.signals.empty()) {
+    result.why_not = "no operating signal varies";
+    return result;
+  }
+  try {
+    result.left_out_um =
+        Eigen::MatrixXd::Zero(rows_of(tests), static_cast<Eigen::Index>(tests.outputs.size()));
+    Eigen::Index row = 0;
+    for (std::size_t f = 0; f < tests.folds.size(); ++f) {
+      const HeatEquation equation = few_of(family, without(tests, f), options);
+      const Fold& fold = tests.folds[f];
+      const Eigen::Index rows = fold.end - fold.begin;
+      result.left_out_um.middleRows(row, rows) =
+          predicted(tests.runs[fold.run], equation).middleRows(fold.begin, rows);
+      row += rows;
+      done();
+    }
+    judge(tests, result);
+  } catch (const std::runtime_error& error) {
+    result.why_not = error.what();
+  }
+  return result;
+}
+
+FamilyResult judge_bank(const MeasuredTests& tests, const BankEquations& bank,
+                        const std::function<void()>& done) {
+  FamilyResult result;
+  result.family = Family::lag_bank;
+  result.left_out_um =
+      Eigen::MatrixXd::Zero(rows_of(tests), static_cast<Eigen::Index>(tests.outputs.size()));
+  Eigen::Index row = 0;
+  for (std::size_t f = 0; f < tests.folds.size(); ++f) {
+    const Fold& fold = tests.folds[f];
+    const Eigen::Index rows = fold.end - fold.begin;
+    result.left_out_um.middleRows(row, rows) =
+        bank.rows()[fold.run].middleRows(fold.begin, rows) * bank.fit(f);
+    row += rows;
+    done();
+  }
+  judge(tests, result);
+  return result;
+}
+
+Family simplest_as_good(const std::vector<FamilyResult>& results) {
+  const auto total = [](const FamilyResult& result) {
+    return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
+  };
+  const FamilyResult* best = &results[0];
+  for (const FamilyResult& result : results)
+    if (result.answers && total(result) < total(*best)) best = &result;
+  const auto folds = static_cast<double>(best->scores.size());
+  for (const FamilyResult& result : results) {
+    if (!result.answers) continue;
+    const double mean = (total(result) - total(*best)) / folds;
+    double squares = 0.0;
+    for (std::size_t f = 0; f < result.scores.size(); ++f)
+      squares += std::pow(result.scores[f] - best->scores[f] - mean, 2.0);
+    const double error = folds > 1 ? std::sqrt(squares / (folds * (folds - 1.0))) : 0.0;
+    if (mean <= error) return result.family;
+  }
+  return best->family;
+}
+
+ThermalModel no_model(const MeasuredTests& tests) {
+  ThermalModel model;
+  model.inputs = {tests.places.front()};
+  model.outputs = tests.outputs;
+  model.matrix_um_per_K.assign(tests.outputs.size(), {0.0});
+  return model;
+}
+
+ThermalModel few_model(const MeasuredTests& tests, const HeatEquation& equation) {
+  Fit fit;
+  fit.columns = equation.columns;
+  for (const FitColumn& column : equation.columns)
+    if (!(column.tau_s > 0)) fit.places.push_back(column.place);
+  for (Eigen::Index o = 0; o < equation.coefficients.cols(); ++o)
+    fit.outputs.emplace_back().coefficients = equation.coefficients.col(o);
+  ThermalModel model = model_of(tests, fit);
+  auto row = static_cast<Eigen::Index>(equation.columns.size());
+  for (const HeatColumn& heat : equation.heats) {
+    TermSpec term;
+    term.kind = "missing_heat_source";
+    term.subject = tests.signals[heat.signal];
+    term.shared["tau_s"] = heat.tau_s;
+    term.shared["power"] = heat.power;
+    for (std::size_t o = 0; o < tests.outputs.size(); ++o)
+      term.per_output["gain_um_per_unit"][tests.outputs[o]] =
+          equation.coefficients(row, static_cast<Eigen::Index>(o));
+    model.terms.push_back(std::move(term));
+    ++row;
+  }
+  return model;
+}
+
+/// What acts at once is the matrix's, the rest one term.
+ThermalModel bank_model(const MeasuredTests& tests, const BankColumns& columns,
+                        const Eigen::MatrixXd& gains) {
+  ThermalModel model;
+  model.inputs = tests.places;
+  model.outputs = tests.outputs;
+  const std::size_t places = tests.places.size();
+  const std::size_t subjects = columns.subjects.size();
+  TermSpec term;
+  term.kind = "lag_bank";
+  term.bank.subjects = columns.subjects;
+  term.bank.powers = columns.powers;
+  term.bank.taus_s = columns.taus_s;
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+    const auto column = gains.col(static_cast<Eigen::Index>(o));
+    auto& row = model.matrix_um_per_K.emplace_back();
+    for (std::size_t i = 0; i < places; ++i) row.push_back(column[static_cast<Eigen::Index>(i)]);
+    auto& table = term.bank.gain_um_per_unit[tests.outputs[o]];
+    for (std::size_t i = 0; i < subjects; ++i) {
+      auto& of_subject = table.emplace_back();
+      for (std::size_t j = 0; j < columns.taus_s.size(); ++j)
+        of_subject.push_back(
+            i < places && j == 0 ? 0.0 : column[static_cast<Eigen::Index>(j * subjects + i)]);
+    }
+  }
+  model.terms.push_back(std::move(term));
+  return model;
+}
+
+void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
+  if (tests.runs.size() < 2)
+    fit.warnings.emplace_back(
+        "judged within one run: not valid for other days. Next: a run of another day with another "
+        "course of speeds or loads; fit both, and each judges the other");
+  const FamilyResult& chosen = fit.chosen_result();
+  const FamilyResult& none = fit.results[index_of_family(Family::none)];
+  if (fit.chosen == Family::none) {
+    fit.warnings.emplace_back("no model is better than none on what was left out: its matrix is 0");
+    return;
+  }
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o)
+    for (std::size_t f = 0; f < tests.folds.size(); ++f)
+      if (!(chosen.fold_um[o][f] < none.fold_um[o][f]))
+        fit.warnings.push_back(tests.outputs[o] + ": on " + tests.fold_name(f) +
+                               ", left out, it does worse than no model at all");
+}
+
+}  // namespace
+
+std::string_view to_string(Family family) noexcept {
+  switch (family) {
+    case Family::none:
+      return "none";
+    case Family::static_few:
+      return "static_few";
+    case Family::lagged_few:
+      return "lagged_few";
+    case Family::physical:
+      return "physical";
+    case Family::lag_bank:
+      return "lag_bank";
+  }
+  return "unknown";
+}
+
+std::optional<Family> family_of(std::string_view name) {
+  for (const Family family : all_families)
+    if (to_string(family) == name) return family;
+  return std::nullopt;
+}
+
+const FamilyResult& FamiliesFit::chosen_result() const {
+  return results[index_of_family(chosen)];
+}
+
+FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
+                         std::optional<Family> forced,
+                         const std::function<void(double)>& progress) {
+  FamiliesFit fit;
+  const double steps = 4.0 * static_cast<double>(tests.folds.size());
+  double step = 0.0;
+  const auto done = [&] { progress(++step / steps); };
+  FamilyResult& none = fit.results.emplace_back();
+  none.left_out_um =
+      Eigen::MatrixXd::Zero(rows_of(tests), static_cast<Eigen::Index>(tests.outputs.size()));
+  judge(tests, none);
+  for (const Family family : {Family::static_few, Family::lagged_few, Family::physical})
+    fit.results.push_back(judge_few(family, tests, options, done));
+  const BankColumns columns = bank_columns(tests);
+  const BankEquations bank(tests, columns);
+  fit.results.push_back(judge_bank(tests, bank, done));
+  fit.chosen = forced.value_or(simplest_as_good(fit.results));
+  if (!fit.chosen_result().answers)
+    throw std::runtime_error(std::string(to_string(fit.chosen)) + ": " +
+                             fit.chosen_result().why_not);
+  if (fit.chosen == Family::none)
+    fit.model = no_model(tests);
+  else if (fit.chosen == Family::lag_bank)
+    fit.model = bank_model(tests, columns, bank.fit(tests.folds.size()));
+  else
+    fit.model = few_model(tests, few_of(fit.chosen, tests, options));
+  if (fit.chosen == Family::static_few || fit.chosen == Family::lagged_few) {
+    fit.few = fit_equation(tests, options_of(fit.chosen, tests, options));
+    fit.model = model_of(tests, *fit.few);
+  }
+  fit.model.made_from = made_from_tests(tests, fit);
+  add_warnings(tests, fit);
+  return fit;
+}
+
+}  // namespace thermocomp::identification

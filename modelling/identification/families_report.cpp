@@ -1,0 +1,85 @@
+#include <algorithm>
+#include <numeric>
+
+#include <nlohmann/json.hpp>
+
+#include "modelling/identification/families.hpp"
+#include "modelling/identification/printed.hpp"
+
+namespace thermocomp::identification {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double score_of(const FamilyResult& result) {
+  return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
+}
+
+std::string line_of(const FamilyResult& result, bool chosen) {
+  std::string text =
+      printed("  %c %-11s", chosen ? '*' : ' ', std::string(to_string(result.family)).c_str());
+  if (!result.answers) return text.append(" no answer: ").append(result.why_not).append("\n");
+  for (const double rms_um : result.left_out_rms_um) text += printed(" %10.3f", rms_um);
+  return text + printed("   %5.1f %%\n", 100.0 * score_of(result));
+}
+
+}  // namespace
+
+std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
+  const bool one_run = tests.runs.size() < 2;
+  std::string text = printed(
+      "%zu temperatures, %zu operating signals, %zu %s; left out one at a "
+      "time, everything chosen anew, RMS in um:\n",
+      tests.places.size(), tests.signals.size(), tests.folds.size(),
+      one_run ? "blocks of one run" : "runs");
+  text += printed("    %-11s", "family");
+  for (const std::string& output : tests.outputs) text += printed(" %10s", output.c_str());
+  text += "   of none's squares\n";
+  for (const FamilyResult& result : fit.results)
+    text += line_of(result, result.family == fit.chosen);
+  text += printed("chosen: %s, the simplest within one standard error of the best\n",
+                  std::string(to_string(fit.chosen)).c_str());
+  if (one_run) text += "judged within one run: not valid for other days\n";
+  if (fit.few) {
+    text += fit_text(tests, *fit.few);
+  } else if (fit.chosen != Family::none) {
+    const MadeFrom& made_from = *fit.model.made_from;
+    for (const auto& [name, output] : made_from.outputs)
+      text += printed("%s: RMS left out %.3f um%s, fitted %.3f, without a model %.3f\n",
+                      name.c_str(), output.left_out_rms_um, one_run ? " (within this run)" : "",
+                      output.remainder_rms_um, output.no_model_rms_um);
+  }
+  for (const std::string& warning : fit.warnings)
+    text.append("warning: ").append(warning).append("\n");
+  return text;
+}
+
+std::string families_json(const MeasuredTests& tests, const FamiliesFit& fit) {
+  Json json;
+  if (fit.few) json = Json::parse(fit_json(tests, *fit.few));
+  json["inputs"] = fit.chosen == Family::none ? std::vector<std::string>{} : fit.model.inputs;
+  json["family"] = to_string(fit.chosen);
+  json["judged_within_one_run"] = tests.runs.size() < 2;
+  const FamilyResult& chosen = fit.chosen_result();
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+    json["left_out_rms_um"][tests.outputs[o]] = chosen.left_out_rms_um[o];
+    json["no_model_rms_um"][tests.outputs[o]] = fit.results.front().left_out_rms_um[o];
+  }
+  json["families"] = Json::array();
+  for (const FamilyResult& result : fit.results) {
+    Json each = {{"family", to_string(result.family)}, {"chosen", result.family == fit.chosen}};
+    if (!result.answers) {
+      each["left_out_rms_um"] = nullptr;
+      each["why_not"] = result.why_not;
+    }
+    for (std::size_t o = 0; o < tests.outputs.size() && result.answers; ++o)
+      each["left_out_rms_um"][tests.outputs[o]] = result.left_out_rms_um[o];
+    json["families"].push_back(each);
+  }
+  if (!json.contains("warnings")) json["warnings"] = Json::array();
+  for (const std::string& warning : fit.warnings) json["warnings"].push_back(warning);
+  json["notes"] = tests.notes;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace thermocomp::identification

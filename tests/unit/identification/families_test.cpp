@@ -1,0 +1,195 @@
+#include "modelling/identification/families.hpp"
+
+#include <cmath>
+#include <random>
+
+#include <catch2/catch.hpp>
+
+#include "config/model_file.hpp"
+#include "estimator/model_domain.hpp"
+#include "modelling/identification/bank_fit.hpp"
+#include "synthetic_places.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::identification;
+
+namespace {
+
+constexpr std::size_t hours = 6;
+
+/// Two temperatures and a speed; the displacement is what `moved` makes of them, with noise.
+template <class Moved>
+RunFile machine_run(const std::string& name, std::uint64_t seed, Moved moved) {
+  std::mt19937_64 engine(seed);
+  RunFile run;
+  run.name = name;
+  run.columns = {"time_s", "t1_degC", "t2_degC", "spindle_rpm", "z_um"};
+  run.values.resize(5);
+  double quick = 0.0;
+  double slow = 0.0;
+  double late = 0.0;
+  for (std::size_t minute = 0; minute < 60 * hours; ++minute) {
+    const double rpm = (minute + 37 * seed) % 110 < 70 ? 2000.0 + 500.0 * double(seed % 4) : 0.0;
+    quick += (rpm / 400.0 - quick) / 15.0;
+    slow += (0.5 * quick - slow) / 60.0;
+    late += (quick - late) / 40.0;
+    run.values[0].push_back(60.0 * double(minute));
+    run.values[1].push_back(21.0 + quick + 0.02 * gaussian(engine));
+    run.values[2].push_back(20.0 + slow + 0.02 * gaussian(engine));
+    run.values[3].push_back(rpm);
+    run.values[4].push_back(moved(quick, slow, late, rpm) + 0.2 * gaussian(engine));
+  }
+  run.selected_end = run.values[0].size();
+  return run;
+}
+
+template <class Moved>
+MeasuredTests machine_tests(std::size_t runs, Moved moved) {
+  std::vector<RunFile> files;
+  for (std::size_t i = 0; i < runs; ++i)
+    files.push_back(machine_run(std::string("run").append(std::to_string(i)), i + 1, moved));
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.folds_of_one_run = 8;
+  options.signals = true;
+  return measured_tests(files, options);
+}
+
+FamiliesFit fitted(const MeasuredTests& tests, std::optional<Family> forced = std::nullopt) {
+  return fit_families(tests, {}, forced, [](double) {});
+}
+
+const FamilyResult& result_of(const FamiliesFit& fit, Family family) {
+  return fit.results[static_cast<std::size_t>(family)];
+}
+
+}  // namespace
+
+TEST_CASE("a machine of two static places gets the simplest model that says it", "[families]") {
+  const MeasuredTests tests = machine_tests(
+      4, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
+  const FamiliesFit fit = fitted(tests);
+  CHECK(fit.chosen == Family::static_few);
+  CHECK(fit.chosen_result().left_out_rms_um[0] < 0.6);
+  CHECK(fit.few.has_value());
+}
+
+TEST_CASE("displacement that follows late is not left to a static model", "[families]") {
+  const MeasuredTests tests = machine_tests(
+      4, [](double, double, double late, double rpm) { return 6.0 * late + 4e-3 * rpm; });
+  const FamiliesFit fit = fitted(tests);
+  CHECK(fit.chosen >= Family::lagged_few);
+  CHECK(fit.chosen_result().left_out_rms_um[0] <
+        0.6 * result_of(fit, Family::static_few).left_out_rms_um[0]);
+}
+
+TEST_CASE("displacement that nothing recorded says gets no model", "[families]") {
+  std::mt19937_64 engine(5);
+  const MeasuredTests tests =
+      machine_tests(4, [&](double, double, double, double) { return 3.0 * gaussian(engine); });
+  const FamiliesFit fit = fitted(tests);
+  CHECK(fit.chosen == Family::none);
+  CHECK(fit.model.matrix_um_per_K[0][0] == 0.0);
+  CHECK(families_text(tests, fit).find("no model is better than none") != std::string::npos);
+}
+
+TEST_CASE("one temperature is enough for an answer", "[families]") {
+  RunFile run = machine_run("one", 3, [](double quick, double, double, double) { return quick; });
+  run.columns = {"time_s", "t1_degC", "spindle_rpm", "z_um"};
+  run.values.erase(run.values.begin() + 2);
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.folds_of_one_run = 8;
+  const FamiliesFit fit = fitted(measured_tests({run}, options));
+  CHECK(fit.chosen != Family::none);
+  CHECK(result_of(fit, Family::physical).answers == false);
+  CHECK(fit.model.made_from->within_one_run);
+}
+
+TEST_CASE("a model judged within one run says so", "[families]") {
+  const MeasuredTests tests = machine_tests(
+      1, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
+  const FamiliesFit fit = fitted(tests);
+  const std::string said = families_text(tests, fit);
+  CHECK(said.find("judged within one run: not valid for other days") != std::string::npos);
+  CHECK(said.find("Next: a run of another day") != std::string::npos);
+}
+
+TEST_CASE("a bank of lags is written, read and predicts what was judged", "[families]") {
+  const MeasuredTests tests = machine_tests(
+      3, [](double, double, double late, double rpm) { return 6.0 * late + 4e-3 * rpm; });
+  const FamiliesFit fit = fitted(tests, Family::lag_bank);
+  REQUIRE(fit.model.terms.size() == 1);
+  CHECK(fit.model.terms[0].kind == "lag_bank");
+  const ThermalModel back = parse_model(write_model(fit.model), "written");
+  CHECK(back.made_from == fit.model.made_from);
+  CHECK(back.terms[0].bank == fit.model.terms[0].bank);
+  // The remainder in [made_from] is the daemon's own model's, so it is small where the fit's is.
+  const MadeFrom::Output& output = back.made_from->outputs.at("z_um");
+  CHECK(output.remainder_rms_um < 0.5);
+  CHECK(output.left_out_rms_um < 0.8);
+  CHECK(output.no_model_rms_um > 5.0);
+}
+
+TEST_CASE("the rows that a model was made from are inside its domain, a hotter day is not",
+          "[families]") {
+  const MeasuredTests tests = machine_tests(
+      3, [](double quick, double slow, double, double) { return 5.0 * quick - 3.0 * slow; });
+  const ThermalModel model = fitted(tests).model;
+  ModelDomain domain(model);
+  const std::size_t inputs = model.temperature_columns().size();
+  const std::vector<double> signals(model.signal_columns().size(), 0.0);
+  std::vector<double> temps(inputs);
+  std::vector<double> reference(inputs);
+  const auto look = [&](double warmer_K) {
+    domain.restart();
+    bool outside = false;
+    const TestRun& run = tests.runs[0];
+    for (Eigen::Index row = 0; row < run.time_s.size(); ++row) {
+      for (std::size_t i = 0; i < inputs; ++i) {
+        const auto place = std::find(tests.places.begin(), tests.places.end(), model.inputs[i]);
+        const auto at = place - tests.places.begin();
+        reference[i] = run.reference_degC[at] + warmer_K;
+        temps[i] = reference[i] + run.places_K(row, at);
+      }
+      domain.step(std::chrono::seconds(static_cast<long>(run.time_s[row])), temps, reference,
+                  signals);
+      outside = outside || domain.outside();
+    }
+    return outside;
+  };
+  CHECK_FALSE(look(0.0));
+  CHECK(look(15.0));
+}
+
+TEST_CASE("three readings of 3276.7 degC are left out with a word", "[families]") {
+  RunFile run =
+      machine_run("spikes", 3, [](double quick, double, double, double) { return quick; });
+  for (const std::size_t row : {50u, 140u, 200u}) run.values[1][row] = 3276.7;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  const MeasuredTests tests = measured_tests({run}, options);
+  REQUIRE_FALSE(tests.notes.empty());
+  CHECK(tests.notes[0].find("t1_degC: 3 readings are left out") != std::string::npos);
+  CHECK(tests.runs[0].places_K.maxCoeff() < 50.0);
+}
+
+TEST_CASE("the same rows twice are refused", "[families]") {
+  const RunFile run =
+      machine_run("run", 3, [](double quick, double, double, double) { return quick; });
+  TestOptions options;
+  options.outputs = {"z_um"};
+  CHECK_THROWS_AS(measured_tests({run, run}, options), ConfigurationError);
+}
+
+TEST_CASE("the bank's columns are the low passes of what was recorded, from 0", "[families]") {
+  const MeasuredTests tests =
+      machine_tests(1, [](double quick, double, double, double) { return quick; });
+  const BankColumns columns = bank_columns(tests);
+  CHECK(columns.subjects ==
+        std::vector<std::string>{"t1_degC", "t2_degC", "spindle_rpm", "spindle_rpm"});
+  CHECK(columns.taus_s == std::vector<double>{0.0, 300.0, 900.0, 2700.0});
+  const Eigen::MatrixXd bank = bank_of(tests.runs[0], tests, columns);
+  CHECK(bank.row(0).norm() == 0.0);
+  CHECK(bank.col(0).isApprox(tests.runs[0].places_K.col(0)));
+}
