@@ -4,11 +4,12 @@ and counts what it says.
 
 measured_campaign.py PROGRAM [--cases N] [--untouched N] [--machines spindle,printer,cell,mirror]
                      [--bases ridge,few,lags] [--causes A,B] [--sizes 1.5,3] [--seed S] [--jobs 2]
-                     [--show] [--json FILE]
+                     [--show] [--json FILE] [--weighed]
 
 PROGRAM is thermocomp-modelling. Data: $THERMOCOMP_DATA, else shared/data beside the source. The
 base model is fitted to the untouched rows of the whole set, so that what it leaves is the machine's
-own. --show prints every answer that was not right; --json keeps all of them.
+own. --show prints every answer that was not right; --json keeps all of them, with --weighed
+for calibrate_posterior.py.
 """
 
 import os
@@ -88,9 +89,11 @@ def write(folder, machine, model):
 
 
 def diagnosed(program, machine, model):
+    """@param program  with its options"""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        command = [program, "diagnose", *write(folder, machine, model), "--json", "answer.json"]
+        command = [program[0], "diagnose", *write(folder, machine, model), *program[1:], "--json",
+                   "answer.json"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if done.returncode != 0:
             raise RuntimeError(" ".join(command) + ": " + done.stderr)
@@ -246,8 +249,11 @@ def arguments():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--show", action="store_true")
     parser.add_argument("--json")
+    parser.add_argument("--weighed", action="store_true")
     options = parser.parse_args()
-    options.program = str(pathlib.Path(options.program).resolve())
+    options.program = [str(pathlib.Path(options.program).resolve())]
+    if options.weighed:
+        options.program.append("--weighed")
     return options
 
 
@@ -263,7 +269,8 @@ def main():
                 impossible += 1
                 continue
             fine = count.add(task, truth, answer)
-            kept.append(dict(task=task[1:], truth=truth, answer=answer))
+            kept.append(dict(machine=task[2], base=task[3], size=task[5], seed=task[1],
+                             truth=truth, answer=answer))
             if options.show and not fine:
                 print("  %s %s %s %s x%g: %s -> %s" % (
                     task[1], *task[2:4], truth and truth["cause"], task[5],
