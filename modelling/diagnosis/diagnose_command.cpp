@@ -1,5 +1,6 @@
 #include "modelling/diagnosis/diagnose_command.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -49,6 +50,14 @@ void print(const Diagnosis& diagnosis) {
     std::printf("%s of %s", finding.cause.c_str(), finding.subject.c_str());
     if (finding.run) std::printf(" in %s", finding.run->c_str());
     std::printf(": %s\n", finding.evidence.c_str());
+    if (std::isfinite(finding.probability))
+      std::printf("  probability %.2f; %s, %.2f\n", finding.probability, finding.family.c_str(),
+                  finding.family_probability);
+    if (finding.group.size() > 1) {
+      std::printf("  cannot be told apart:");
+      for (const std::string& place : finding.group) std::printf(" %s", place.c_str());
+      std::printf("\n");
+    }
     for (const Parameter& parameter : finding.parameters)
       for (const auto& [output, value] : parameter.values)
         std::printf("  %s%s%s = %.6g\n", parameter.name.c_str(), output.empty() ? "" : " ",
@@ -63,6 +72,16 @@ void print(const Diagnosis& diagnosis) {
       std::printf("  or: %s of %s (support %.2g)\n", other.cause.c_str(), other.subject.c_str(),
                   other.relative_support);
   }
+  if (diagnosis.findings.empty())
+    for (const auto& [family, probability] : diagnosis.families)
+      std::printf("weighed: %s, probability %.2f\n", family.c_str(), probability);
+  for (const auto& [output, figures] : diagnosis.outputs)
+    if (figures.headroom)
+      std::printf(
+          "%s: left by the model: noise %.0f %%, named %.0f %%, predictable %.0f %%, not "
+          "in this recording %.0f %%\n",
+          output.c_str(), 100 * figures.headroom->noise, 100 * figures.headroom->named,
+          100 * figures.headroom->predictable, 100 * figures.headroom->not_recorded);
   for (const auto& [output, figures] : diagnosis.outputs)
     std::printf("%s: RMS train %.3f, test %.3f, extended %.3f; unexplained %.0f %%\n",
                 output.c_str(), figures.train_rms_um, figures.test_rms_um,

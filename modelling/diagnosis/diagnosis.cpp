@@ -120,6 +120,10 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   const Corrections corrections =
       extend(diagnosis, result.findings, fitted ? &beside_fit : nullptr, train_data, test_data);
   diagnosis.verdict = verdict_of(result);
+  diagnosis.families = result.families;
+  for (NamedFinding& finding : diagnosis.findings)
+    finding.group = group_of(search.groups(), finding.subject);
+  const std::vector<Headroom> headroom = search.headrooms(result);
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
     const Residuals base = residuals(test_data, output);
     const Residuals extended = residuals(diagnosis.extended, corrections, test_data, output);
@@ -128,7 +132,8 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
                                                 peak(base),
                                                 root_mean_square(extended),
                                                 peak(extended),
-                                                result.unexplained_share[output]};
+                                                result.unexplained_share[output],
+                                                headroom[output]};
   }
   if (report != nullptr) {
     add_runs(*report, diagnosis, model, train_corrections(diagnosis, train_data), train_data,

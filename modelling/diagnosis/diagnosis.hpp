@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "modelling/diagnosis/headroom.hpp"
 #include "modelling/diagnosis/search.hpp"
 
 namespace thermocomp::diagnosis {
@@ -46,6 +47,10 @@ struct NamedFinding {
   std::vector<Alternative> alternatives;
   /// By output; empty where no test run has it or no prediction can carry it.
   std::map<std::string, TestGain> test;
+  double probability{not_a_number};  ///< of the cause with any place of the group
+  std::string family{};
+  double family_probability{not_a_number};
+  std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
 };
 
 struct OutputFigures {
@@ -55,6 +60,7 @@ struct OutputFigures {
   double extended_test_rms_um{0.0};
   double extended_test_peak_um{0.0};
   double unexplained_fraction{0.0};
+  std::optional<Headroom> headroom{};
 };
 
 struct ReportData;
@@ -67,6 +73,8 @@ struct Diagnosis {
   std::map<std::string, OutputFigures> outputs;
   ThermalModel extended;
   std::vector<Weighed> weighed;  ///< what came into question in every round of the search
+  /// Probability of each family, whether it is named or not; empty where nothing was weighed so.
+  std::map<std::string, double> families{};
 };
 
 /// @param train, test  taken: their memory is free for the search

@@ -61,6 +61,10 @@ Json finding_json(const NamedFinding& finding, const std::string& unit) {
                     {"ci95", interval(gain.ci95)}};
   return {{"cause", finding.cause},
           {"subject", finding.subject},
+          {"probability", number(finding.probability)},
+          {"family", finding.family},
+          {"family_probability", number(finding.family_probability)},
+          {"group", finding.group},
           {"outputs", finding.outputs},
           {"parameters", parameters},
           {"parameters_ci95", ci95},
@@ -98,6 +102,13 @@ std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
                         {test_peak, number(figures.extended_test_peak_um)}};
     unexplained[output] = number(figures.unexplained_fraction);
   }
+  Json headroom = Json::object();
+  for (const auto& [output, figures] : diagnosis.outputs)
+    if (figures.headroom)
+      headroom[output] = {{"noise", number(figures.headroom->noise)},
+                          {"named", number(figures.headroom->named)},
+                          {"predictable", number(figures.headroom->predictable)},
+                          {"not_recorded", number(figures.headroom->not_recorded)}};
   Json findings = Json::array();
   for (const NamedFinding& finding : diagnosis.findings)
     findings.push_back(finding_json(finding, unit));
@@ -106,6 +117,8 @@ std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
                  {"findings", findings},
                  {"extended", extended},
                  {"unexplained_fraction", unexplained}};
+  if (!headroom.empty()) answer["headroom"] = headroom;
+  if (!diagnosis.families.empty()) answer["families"] = diagnosis.families;
   if (weighed) answer["weighed"] = weighed_json(diagnosis);
   return answer.dump(2) + "\n";
 }

@@ -25,6 +25,9 @@ struct Explanation {
   std::vector<const Setting*> settings;  ///< one an output: under which it is likeliest
   double left_out_gain{0.0};  ///< share of the RMS that it takes from rows it was not fitted to
   double log_left{0.0};       ///< ln of what it leaves of their RMS, summed over all outputs
+  /// Of its cause with any place of its subject's group, once it is chosen.
+  double probability{0.0};
+  double family_probability{0.0};
 };
 
 /// One output's residual over the stacked rows under one noise shape, whitened, with everything

@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include "config/units.hpp"
+#include "modelling/diagnosis/false_reading.hpp"
+#include "modelling/diagnosis/place_groups.hpp"
 #include "modelling/diagnosis/series.hpp"
 
 namespace thermocomp::diagnosis {
@@ -52,7 +54,8 @@ bool moves(const Column& column) {
 /// Writes the catalogue for one set of data.
 class Catalogue {
  public:
-  Catalogue(const MeasuredData& data, const StackedRows& rows) : data_(data), rows_(rows) {
+  Catalogue(const MeasuredData& data, const StackedRows& rows)
+      : data_(data), rows_(rows), groups_(place_groups(data)) {
     step_s_ = median_step_s(data);
     for (const MeasuredRun& run : data.runs)
       length_s_ = std::max(length_s_, run.time_s[run.rows() - 1] - run.time_s[run.begin]);
@@ -128,6 +131,52 @@ class Catalogue {
     }
   }
 
+  /// What the model misses of a reading in one run that reads too high by an error [K].
+  /// @param error  of the run and the shape's first parameter, over all rows of the run
+  template <class Error>
+  void write_false_reading(std::size_t run, std::size_t input, std::size_t output,
+                           const Shapes& shapes, PanelPart into, Error error) const {
+    const MeasuredRun& of = data_.runs[run];
+    Panel errors_K(of.rows(), std::ssize(shapes));
+    for (std::size_t i = 0; i < shapes.size(); ++i)
+      errors_K.col(static_cast<Eigen::Index>(i)) = error(of, shapes[i][0]);
+    answer_to_errors(data_, of, output, input, errors_K);
+    const Block& block = rows_.runs[run];
+    into.setZero();
+    into.middleRows(block.begin, block.end - block.begin) =
+        -errors_K.bottomRows(block.end - block.begin);
+  }
+
+  /// Of a reading that is late, in every run: it misses tau times its slope.
+  void write_slow_reading(std::size_t input, const Shapes& shapes, std::size_t output,
+                          PanelPart into) const {
+    write_stacked(shapes, into,
+                  [&](const MeasuredRun& run, const std::vector<double>& taus_s, PanelPart of_run) {
+                    std::vector<double> spans_s;
+                    spans_s.reserve(taus_s.size());
+                    for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
+                    Panel missed_K(run.rows(), std::ssize(taus_s));
+                    slopes(run.time_s, run.inputs_K[input], spans_s, Column::Ones(run.rows()),
+                           taus_s, missed_K);
+                    answer_to_errors(data_, run, output, input, missed_K);
+                    of_run = missed_K;
+                  });
+  }
+
+  void write_exchanged(std::size_t input, std::size_t other, std::size_t output,
+                       PanelPart into) const {
+    for (std::size_t i = 0; i < data_.runs.size(); ++i) {
+      const MeasuredRun& run = data_.runs[i];
+      const Block& block = rows_.runs[i];
+      Panel of_input = run.calm_inputs_K[other] - run.calm_inputs_K[input];
+      Panel of_other = -of_input;
+      answer_to_errors(data_, run, output, input, of_input);
+      answer_to_errors(data_, run, output, other, of_other);
+      into.middleRows(block.begin, block.end - block.begin) =
+          (of_input + of_other).bottomRows(block.end - block.begin);
+    }
+  }
+
   [[nodiscard]] bool moves_anywhere(
       const std::function<const Column&(const MeasuredRun&)>& of) const {
     return std::any_of(data_.runs.begin(), data_.runs.end(), [&](const MeasuredRun& run) {
@@ -167,6 +216,7 @@ class Catalogue {
 
   const MeasuredData& data_;
   const StackedRows rows_;
+  const PlaceGroups groups_;
   double step_s_{1.0};
   double length_s_{0.0};
   std::vector<Hypothesis> found_;
@@ -189,9 +239,14 @@ void Catalogue::add_input(std::size_t input) {
                   });
   };
   if (data_.model.guideways.empty()) {
-    lag.possible = [this, input](double gain, std::size_t output) {
-      const double share = gain / data_.model.matrix_um_per_K[output][input];
-      return share > 0.0 && share <= 1.1;
+    // Of places that move alike a fit settles the sum, hardly each coefficient.
+    std::vector<bool> alike;
+    for (const std::string& other : data_.model.inputs)
+      alike.push_back(same_places(groups_, name, other));
+    lag.possible = [this, input, alike](double gain, std::size_t output) {
+      const double own = gain / data_.model.matrix_um_per_K[output][input];
+      const double of_group = gain / coefficient_of_group(data_.model, output, alike);
+      return (own > 0.0 && own <= 1.1) || (of_group > 0.0 && of_group <= 1.1);
     };
   }
   add_square(name, rise_K);
@@ -204,16 +259,23 @@ void Catalogue::add_reading_errors(std::size_t input) {
   const std::string& name = data_.model.inputs[input];
   Hypothesis& slow = add({"slow_sensor", name, Form::no_gain, {lag_times(20.0, 3600.0, 16)}});
   slow.in_every_output = true;
-  slow.write_columns = [this, input](const Shapes& shapes, std::size_t output, PanelPart into) {
-    write_stacked(shapes, into,
-                  [&](const MeasuredRun& run, const std::vector<double>& taus_s, PanelPart of_run) {
-                    std::vector<double> spans_s;
-                    spans_s.reserve(taus_s.size());
-                    for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
-                    slopes(run.time_s, run.inputs_K[input], spans_s,
-                           data_.coefficient(run, output, input), taus_s, of_run);
-                  });
-  };
+  if (has_terms_of(data_.model, input)) {
+    slow.write_columns = [this, input](const Shapes& shapes, std::size_t output, PanelPart into) {
+      write_slow_reading(input, shapes, output, into);
+    };
+  } else {
+    slow.write_columns = [this, input](const Shapes& shapes, std::size_t output, PanelPart into) {
+      write_stacked(
+          shapes, into,
+          [&](const MeasuredRun& run, const std::vector<double>& taus_s, PanelPart of_run) {
+            std::vector<double> spans_s;
+            spans_s.reserve(taus_s.size());
+            for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
+            slopes(run.time_s, run.inputs_K[input], spans_s, data_.coefficient(run, output, input),
+                   taus_s, of_run);
+          });
+    };
+  }
   double range_K = 0.0;
   for (const MeasuredRun& run : data_.runs) {
     const Column& rise_K = run.inputs_K[input];
@@ -240,12 +302,19 @@ void Catalogue::add_swaps(std::size_t input) {
     if (!(names[input] < names[other])) continue;
     Hypothesis& swap = add({"sensor_swap", names[input] + "|" + names[other], Form::no_gain});
     swap.in_every_output = true;
-    if (data_.model.guideways.empty())
+    const bool linear_terms = has_terms_of(data_.model, input) || has_terms_of(data_.model, other);
+    if (data_.model.guideways.empty() && !linear_terms)
       swap.of_readings = [this, input, other](std::size_t output) {
         const auto& coefficients = data_.model.matrix_um_per_K[output];
         const double weight = coefficients[input] - coefficients[other];
         return std::vector<ReadingShare>{{other, weight}, {input, -weight}};
       };
+    if (linear_terms) {
+      swap.write_columns = [this, input, other](const Shapes&, std::size_t output, PanelPart into) {
+        write_exchanged(input, other, output, into);
+      };
+      continue;
+    }
     swap.write_columns = [this, input, other](const Shapes&, std::size_t output, PanelPart into) {
       for (std::size_t i = 0; i < data_.runs.size(); ++i) {
         const MeasuredRun& run = data_.runs[i];
@@ -465,7 +534,8 @@ void Catalogue::add_displacement_faults(std::size_t run, std::size_t output) {
 
 /// A fault that is alike at every sensor of a run acts through the sensor's coefficient alone.
 void Catalogue::share_columns(Hypothesis& fault, std::size_t input) const {
-  if (!data_.model.guideways.empty()) return;  // the coefficient changes from row to row
+  // With guideways the coefficient changes from row to row, terms answer late.
+  if (!data_.model.guideways.empty() || has_terms_of(data_.model, input)) return;
   fault.pattern = fault.cause + std::to_string(*fault.run);
   fault.scale = [this, input](std::size_t output) {
     return -data_.model.matrix_um_per_K[output][input];
@@ -494,6 +564,15 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
     write_since(run, shapes, into, [&](const MeasuredRun& of) { return missing_um(of, output); });
   };
   share_columns(step, input);
+  const bool linear_terms = has_terms_of(data_.model, input);
+  const auto since = [](const MeasuredRun& of, double at_s) -> Column {
+    return (of.time_s.array() >= at_s).cast<double>();
+  };
+  if (linear_terms)
+    step.write_columns = [this, run, input, since](const Shapes& shapes, std::size_t output,
+                                                   PanelPart into) {
+      write_false_reading(run, input, output, shapes, into, since);
+    };
   Hypothesis& drift = fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24);
   drift.write_columns = one_by_one([this, run, missing_um](const Shape& shape, std::size_t output) {
     return in_run(run, [&](const MeasuredRun& of) -> Column {
@@ -502,6 +581,14 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
     });
   });
   share_columns(drift, input);
+  if (linear_terms)
+    drift.write_columns = [this, run, input](const Shapes& shapes, std::size_t output,
+                                             PanelPart into) {
+      write_false_reading(run, input, output, shapes, into,
+                          [](const MeasuredRun& of, double start_s) -> Column {
+                            return ((of.time_s.array() - start_s) / 3600.0).max(0.0);
+                          });
+    };
   // reading = room + gain (T - room): the reading misses (1 / gain - 1) (reading - room).
   const auto named_room = [](const std::string& column_name) {
     return column_name.find("room") != std::string::npos ||
@@ -531,7 +618,18 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
                                            PanelPart into) {
     write_since(run, shapes, into, whole(output));
   };
-  loose.from_onset = [this, run, whole](std::size_t output) { return in_run(run, whole(output)); };
+  if (linear_terms)
+    loose.write_columns = [this, run, input, since, lost_K](const Shapes& shapes,
+                                                            std::size_t output, PanelPart into) {
+      write_false_reading(run, input, output, shapes, into,
+                          [&](const MeasuredRun& of, double at_s) -> Column {
+                            return since(of, at_s).cwiseProduct(lost_K(of));
+                          });
+    };
+  else
+    loose.from_onset = [this, run, whole](std::size_t output) {
+      return in_run(run, whole(output));
+    };
   loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
 }
 

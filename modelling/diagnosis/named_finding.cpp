@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "modelling/diagnosis/posterior.hpp"
+
 namespace thermocomp::diagnosis {
 namespace {
 
@@ -12,12 +14,20 @@ namespace {
 constexpr double independent_share = 0.1;
 constexpr double support_shown_min = 0.001;
 constexpr std::size_t alternatives_max = 4;
+constexpr double probability_floor = 0.5;
+
+/// Of another explanation beside the one that was chosen: by their probabilities where they have
+/// any.
+double support_of(const Explanation& other, const Explanation& chosen) {
+  if (chosen.probability > 0 && other.probability > 0)
+    return other.probability / chosen.probability;
+  return std::exp(-0.5 * independent_share * (chosen.score - other.score));
+}
 
 std::vector<Alternative> alternatives_of(const Finding& finding) {
   std::vector<Alternative> all;
   for (const Explanation& other : finding.alternatives) {
-    const double support =
-        std::exp(-0.5 * independent_share * (finding.explanation.score - other.score));
+    const double support = support_of(other, finding.explanation);
     if (support < support_shown_min || all.size() >= alternatives_max) break;
     const Hypothesis& of = *other.hypothesis;
     const bool known = std::any_of(all.begin(), all.end(), [&](const Alternative& each) {
@@ -51,6 +61,10 @@ NamedFinding named_finding(const Finding& finding, const MeasuredData& data,
   if (each.hypothesis->run) name.run = data.runs[*each.hypothesis->run].name;
   name.evidence = evidence_text(finding);
   name.alternatives = alternatives_of(finding);
+  name.family = family_of(name.cause);
+  // What passed gates in place of probabilities is likelier than not.
+  name.probability = std::max(probability_floor, each.probability);
+  name.family_probability = std::max(name.probability, each.family_probability);
   return name;
 }
 

@@ -80,9 +80,42 @@ std::string gains_table(const Diagnosis& diagnosis) {
   return html + "</table>\n";
 }
 
+std::string percent(double share) {
+  return fixed(100.0 * share, 0) + " %";
+}
+
+/// How far the model could get with what was recorded.
+std::string headroom_table(const Diagnosis& diagnosis) {
+  std::string rows;
+  for (const auto& [output, of] : diagnosis.outputs)
+    if (of.headroom)
+      rows += row({output, percent(of.headroom->noise), percent(of.headroom->named),
+                   percent(of.headroom->predictable), percent(of.headroom->not_recorded)});
+  if (rows.empty()) return "";
+  return "<h2>What the model leaves is made of</h2><table>" +
+         row({"output", "noise of a single value", "named below", "predictable, without a name",
+              "in nothing that was recorded"},
+             "th") +
+         rows + "</table>\n";
+}
+
+std::string probability_text(const NamedFinding& finding) {
+  if (!std::isfinite(finding.probability)) return "";
+  std::string text = " Probability " + fixed(finding.probability);
+  if (finding.group.size() > 1) {
+    text += " that it is this or a place that moves alike (";
+    for (std::size_t i = 1; i < finding.group.size(); ++i)
+      text += (i > 1 ? ", " : "") + finding.group[i];
+    text += ")";
+  }
+  return text + ", " + fixed(finding.family_probability) + " that it is of this kind (" +
+         finding.family + ").";
+}
+
 std::string finding_html(const NamedFinding& finding, std::size_t number) {
   std::string html = "<h3>" + std::to_string(number) + ". " + xml_text(finding.cause) + " of " +
                      xml_text(finding.subject) + "</h3><p>" + xml_text(sentence_of(finding)) +
+                     xml_text(probability_text(finding)) +
                      "</p><p>Evidence: " + xml_text(finding.evidence) +
                      ".</p><p><b>What to do.</b> " + xml_text(what_to_do(finding)) + "</p>\n";
   if (!finding.test.empty()) {
@@ -193,7 +226,7 @@ std::string report_html(const Diagnosis& diagnosis, const ReportData& report) {
   html += "<h1>What the model gets wrong</h1><p>" + verdict_text(diagnosis) + "</p>\n";
   std::size_t number = 0;
   for (const NamedFinding& finding : diagnosis.findings) html += finding_html(finding, ++number);
-  html += gains_table(diagnosis);
+  html += gains_table(diagnosis) + headroom_table(diagnosis);
   html +=
       "<p>RMS and peak in " +
       std::string(diagnosis.unit == "um" ? "um (urad for tilts)" : diagnosis.unit) +

@@ -43,6 +43,7 @@ Search::Search(const MeasuredData& data, const Thresholds& thresholds,
     : data_(data),
       thresholds_(thresholds),
       rows_(stacked_rows(data)),
+      groups_(place_groups(data)),
       witness_(data_, rows_),
       hypotheses_(std::move(hypotheses)),
       accepted_(std::move(accepted)) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "modelling/diagnosis/evidence.hpp"
+#include "modelling/diagnosis/place_groups.hpp"
 #include "modelling/diagnosis/sensor_witness.hpp"
 #include "modelling/diagnosis/settings_together.hpp"
 
@@ -44,6 +45,11 @@ struct Thresholds {
   bool one_unit{false};
   /// Where one finding after another leaves a doubt, two are sought together.
   bool in_pairs{true};
+  /// What is likelier than everything else together is named, in place of the shares and scores
+  /// that make a first finding clear: calibrated for displacement beside a model that was fitted
+  /// elsewhere, not for temperatures nor for what an own fit leaves.
+  bool by_probability{true};
+  double probability_min{0.5};
 };
 
 struct Finding {
@@ -70,10 +76,13 @@ struct SearchResult {
   std::vector<double> unexplained_share;
   /// Structure is left that is large against noise and motion, and nothing carries it.
   bool unexplained{false};
+  /// Probability of each family for the first finding; what is missing to 1 is "nothing".
+  std::map<std::string, double> families{};
   std::vector<Weighed> weighed;  ///< the best few of every round
 };
 
 class LeftOut;
+struct Headroom;
 
 /// Seeks causes in the training rows.
 class Search {
@@ -87,6 +96,9 @@ class Search {
   Search(const MeasuredData& data, const Thresholds& thresholds, std::vector<Hypothesis> hypotheses,
          Accepted accepted);
   [[nodiscard]] SearchResult run();
+  /// What could be predicted of an output's remainder beyond what these findings carry.
+  [[nodiscard]] std::vector<Headroom> headrooms(const SearchResult& result) const;
+  [[nodiscard]] const PlaceGroups& groups() const noexcept { return groups_; }
   /// The explanations under consideration for the next finding, best first.
   [[nodiscard]] std::vector<Explanation> ranked();
 
@@ -187,10 +199,14 @@ class Search {
     std::vector<Weighed> weighed{};
     double log_left{0.0};  ///< of all together, over all outputs, their price added
     double score{0.0};     ///< 2 ln L with all of them, their price taken off
+    std::map<std::string, double> families{};  ///< of the first round
   };
   /// Adds findings for as long as they are earned.
   /// @param candidates  for the round `from_round`, where that is the first
   void follow(Path& path, std::vector<Explanation> candidates, std::size_t from_round);
+  void put_likeliest_first(std::vector<Explanation>& candidates, Path& path) const;
+  [[nodiscard]] bool may_be_named(const Explanation& explanation, bool first) const;
+  [[nodiscard]] bool named(const Path& path) const;
   [[nodiscard]] bool in_doubt(const Path& path) const;
   void reconsider(Path& path, const std::vector<Explanation>& firsts);
   [[nodiscard]] std::vector<Path> pairs(const std::vector<Explanation>& firsts);
@@ -203,6 +219,10 @@ class Search {
                                           std::size_t chosen);
   void refit(std::vector<Finding>& findings);
   void measure_spread(std::vector<Finding>& findings);
+  [[nodiscard]] double widening(const Setting& setting, const Panel& columns,
+                                const Eigen::VectorXd& gains) const;
+  /// Mean time from row to row [s].
+  [[nodiscard]] double row_step_s() const;
   [[nodiscard]] double shape_sd(const Explanation& explanation, std::size_t parameter) const;
   [[nodiscard]] double carried_share(const std::vector<Finding>& findings,
                                      std::size_t output) const;
@@ -217,6 +237,7 @@ class Search {
   const MeasuredData& data_;
   Thresholds thresholds_;
   StackedRows rows_;
+  PlaceGroups groups_;
   Panel readings_;  ///< the model's calm readings over the stacked rows
   SensorWitness witness_;
   std::vector<Hypothesis> hypotheses_;

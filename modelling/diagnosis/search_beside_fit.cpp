@@ -77,6 +77,7 @@ SearchBesideFit::SearchBesideFit(const MeasuredData& data, const Thresholds& thr
       fit_(OwnFit::recognised(data, rows_)) {
   thresholds_.left_out_gain_min = left_out_gain_min;
   thresholds_.in_pairs = false;
+  thresholds_.by_probability = false;
 }
 
 std::unique_ptr<SearchBesideFit::Group> SearchBesideFit::searched(

@@ -72,6 +72,16 @@ bool Search::convincing(const std::vector<Finding>& findings) const {
   return 1.0 - left >= thresholds_.together_share && score >= thresholds_.clear_score;
 }
 
+bool Search::may_be_named(const Explanation& explanation, bool first) const {
+  if (!thresholds_.by_probability) return earned(explanation, first);
+  return explanation.probability >= thresholds_.probability_min &&
+         (first ? matters(explanation, first) : earned(explanation, first));
+}
+
+bool Search::named(const Path& path) const {
+  return thresholds_.by_probability ? !path.findings.empty() : convincing(path.findings);
+}
+
 bool Search::structure_left() const {
   return std::any_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
     const OutputEvidence& evidence = outputs_[output];

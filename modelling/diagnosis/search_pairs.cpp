@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 
 #include "modelling/diagnosis/left_out.hpp"
+#include "modelling/diagnosis/posterior.hpp"
 #include "modelling/diagnosis/search.hpp"
 
 namespace thermocomp::diagnosis {
@@ -58,20 +59,10 @@ bool less_left(const auto& a, const auto& b) {
 
 }  // namespace
 
-/// Whether a path of findings could be a wrong one: it is not one clear finding that leaves too
-/// little for another.
+/// Whether a path of findings could be a wrong one. On measured machines a pair in the place of one
+/// finding, or of none, was hardly ever right.
 bool Search::in_doubt(const Path& path) const {
-  if (!thresholds_.in_pairs) return false;
-  if (!convincing(path.findings)) return structure_left();
-  if (path.findings.size() > 1) return true;
-  return std::any_of(measured_.begin(), measured_.end(), [&](std::size_t output) {
-    const OutputEvidence& evidence = outputs_[output];
-    const double noise_um = evidence.noise_um();
-    const double before_um = evidence.centred_rms(evidence.measured_residual());
-    const double structure = std::max(0.0, before_um * before_um - noise_um * noise_um);
-    return structure * (1.0 - carried_share(path.findings, output)) >
-           std::pow(thresholds_.later_share_min * before_um, 2);
-  });
+  return thresholds_.in_pairs && path.findings.size() > 1;
 }
 
 /// What all findings of a path leave of rows left out, and their common likelihood. Each finding
@@ -107,6 +98,9 @@ bool Search::each_earned(std::vector<Finding>& findings) {
     LeftOut left_out(rows_, outputs_);
     measure_left_out(each, left_out);
     if (!earned(each, false)) return false;
+    if (!thresholds_.by_probability) continue;
+    each.probability = each.family_probability = posterior({each}).of.front();
+    if (!(each.probability >= thresholds_.probability_min)) return false;
   }
   std::sort(findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
     return less_left(a.explanation, b.explanation);
@@ -160,16 +154,16 @@ void Search::reconsider(Path& path, const std::vector<Explanation>& firsts) {
     follow(longer, {}, 3);
     if (longer.findings.size() > 2 && stands(longer)) paths.push_back(std::move(longer));
   }
-  const bool named = convincing(path.findings);
-  if (named) measure(path);
+  const bool is_named = named(path);
+  if (is_named) measure(path);
   const bool single = path.findings.size() == 1;
   std::erase_if(paths, [&](const Path& each) {
-    if (named && same_causes(each.findings, path.findings)) return true;
-    if (!named) return each.log_left > std::log(1.0 - plain_share);
+    if (is_named && same_causes(each.findings, path.findings)) return true;
+    if (!is_named) return each.log_left > std::log(1.0 - plain_share);
     return single &&
            (each.log_left > path.log_left || each.score < path.score + thresholds_.score_min);
   });
-  if (named && !single) paths.push_back(path);
+  if (is_named && !single) paths.push_back(path);
   if (paths.empty()) return;
   const double least =
       std::min_element(paths.begin(), paths.end(), less_left<Path, Path>)->log_left;

@@ -2,10 +2,11 @@
 """Hides effects by seed, lets the tool look at the files alone, and counts what it says.
 
 campaign.py PROGRAM [--cases N] [--null N] [--outside N] [--double N] [--levels 1,2,3]
-            [--seed S] [--jobs 2] [--keep FOLDER] [--show]
+            [--seed S] [--jobs 2] [--keep FOLDER] [--show] [--answers FILE]
 
 PROGRAM is thermocomp-modelling. Counts are for each level. --keep leaves the files in FOLDER and
-uses those that are there already; --show prints every answer that was not right.
+uses those that are there already; --show prints every answer that was not right; --answers keeps
+those to single effects and to untouched machines for calibrate_posterior.py.
 """
 
 import os
@@ -71,7 +72,7 @@ def examined(task, make, model=("--model", "model.toml")):
 
 
 def examine(task):
-    return examined(task, hidden.make)
+    return examined(task, hidden.make, ("--model", "model.toml", "--weighed"))
 
 
 def tasks_of(options, level, catalogue):
@@ -182,15 +183,29 @@ def print_confusion(confusion):
         print("  %-22s -> %s" % (cause, ", ".join("%s %d" % (first, n) for n, first in row)))
 
 
-def counted(tasks, examine, levels, show, unit, jobs=2):
-    """@return a Count for each level"""
+def kept_answer(task, truth, answer):
+    """As measured_campaign.py keeps it; None where none or several effects outside were hidden."""
+    if task[2] not in ("single", "null"):
+        return None
+    hidden_one = truth["hidden"][0] if truth["hidden"] else None
+    return dict(machine="simulated level %d" % task[3], base="simulated", size="simulated",
+                seed=task[4], truth=hidden_one, answer=answer)
+
+
+def counted(tasks, examine, levels, show, unit, jobs=2, answers=None):
+    """@param answers  a file that receives the answers
+    @return a Count for each level"""
+    kept = []
     counts = {level: Count(level, show, unit) for level in levels}
     with multiprocessing.Pool(jobs) as pool:
         for done, (task, truth, answer) in enumerate(pool.imap(examine, tasks), 1):
             counts[task[3]].add(task, truth, answer)
+            kept.append(kept_answer(task, truth, answer))
             progress(done, len(tasks))
     for count in counts.values():
         count.report()
+    if answers:
+        pathlib.Path(answers).write_text(json.dumps([k for k in kept if k]))
     return counts
 
 
@@ -207,13 +222,15 @@ def long_campaign(text, examine, catalogue, numbers, unit="um"):
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", help="folder that keeps the files")
     parser.add_argument("--show", action="store_true")
+    parser.add_argument("--answers", help="file that receives what was said and weighed")
     options = parser.parse_args()
     options.program = str(pathlib.Path(options.program).resolve())
     if options.keep:
         options.keep = str(pathlib.Path(options.keep).resolve())
     levels = [int(level) for level in options.levels.split(",")]
     tasks = [task for level in levels for task in tasks_of(options, level, catalogue)]
-    counted(tasks, examine, levels, options.show, unit, options.jobs)
+    counted(tasks, examine, levels, options.show, unit, options.jobs,
+            options.answers)
 
 
 def short_campaign(program, examine, level, causes, nulls, wrong_max, unit="um"):

@@ -121,6 +121,7 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   Thresholds thresholds;
   thresholds.one_unit = true;
   thresholds.in_pairs = false;
+  thresholds.by_probability = false;
   thresholds.motion_share_min = motion_share_min;
   Search search(train_data, thresholds, NetworkHypotheses::all(catalogue),
                 [&](const std::vector<Explanation>& found) { catalogue->accept(found); });
@@ -135,6 +136,7 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   HeatNetwork network = plant.network;
   for (const Finding& finding : result.findings) {
     NamedFinding name = named_finding(finding, train_data, catalogue->parameters_of(finding));
+    name.probability = name.family_probability = not_a_number;  // not calibrated here
     catalogue->apply(finding, network);
     const std::vector<Residuals> after = residuals_of(network, test_runs);
     for (std::size_t sensor = 0; sensor < base.size() && !name.run; ++sensor) {

@@ -338,10 +338,15 @@ TEST_CASE("a cause is named although errors of all coefficients could take most 
   CHECK(effect.findings[0].subject == "spindle_rpm");
 }
 
-TEST_CASE("a small cause that errors of all coefficients take is left to them", "[diagnosis]") {
+TEST_CASE("a small cause beside errors of all coefficients is left to them or named as it is",
+          "[diagnosis]") {
   Readings machine = six_readings({0.989, 0.993, 1.001, 0.982, 1.002, 0.992});
   machine.heat_um = 3.0;
-  CHECK(diagnosis_of_machine(machine).verdict == "none");
+  const Diagnosis answer = diagnosis_of_machine(machine);
+  for (const NamedFinding& finding : answer.findings) {
+    CHECK(finding.cause == "missing_heat_source");
+    CHECK(finding.subject == "spindle_rpm");
+  }
 }
 
 TEST_CASE("nothing is said where there is nothing", "[diagnosis]") {
@@ -400,6 +405,7 @@ TEST_CASE("the answer as JSON has the parts that others read", "[diagnosis]") {
   for (const char* key :
        {"\"verdict\": \"effect\"", "\"baseline\"", "\"train_rms_um\"", "\"findings\"",
         "\"parameters_ci95\"", "\"alternatives\"", "\"test_rms_um\"", "\"reduction\"",
-        "\"extended\"", "\"unexplained_fraction\""})
+        "\"extended\"", "\"unexplained_fraction\"", "\"probability\"", "\"family\": \"heat\"",
+        "\"family_probability\"", "\"group\"", "\"headroom\"", "\"not_recorded\"", "\"families\""})
     CHECK_THAT(json, Catch::Contains(key));
 }

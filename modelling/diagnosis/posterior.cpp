@@ -1,0 +1,104 @@
+#include "modelling/diagnosis/posterior.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace thermocomp::diagnosis {
+namespace {
+
+/// What was right among further explanations was right by chance.
+constexpr std::size_t weighed_max = 12;
+/// A likelihood that is larger by this factor again says as much as before: rows are correlated.
+constexpr double score_scale = 20.0;
+constexpr double left_min = -0.5;
+constexpr double left_max = 3.0;
+
+// calibrate_posterior.py prints what follows.
+constexpr double weight_of_left_out = 4.47;
+constexpr double weight_of_likelihood = 0.65;
+constexpr double weight_of_first_place = 0.96;
+constexpr double weight_of_place = 0.37;
+constexpr double utility_of_none = 4.37;
+
+struct Cause {
+  std::string family;
+  double prior{0.0};  ///< in ln
+};
+
+const std::map<std::string, Cause>& causes() {
+  static const std::map<std::string, Cause> all = {
+      {"displacement_drift", {"datum", 0.29}},
+      {"displacement_step", {"datum", 0.12}},
+      {"hysteresis", {"structure", 0.15}},
+      {"missing_heat_source", {"heat", -0.12}},
+      {"missing_temperature", {"structure", -0.06}},
+      {"nonlinear_expansion", {"structure", -0.08}},
+      {"periodic_disturbance", {"datum", -0.05}},
+      {"position_dependence", {"structure", -0.73}},
+      {"sensor_drift", {"sensor", -0.72}},
+      {"sensor_loose", {"sensor", -0.46}},
+      {"sensor_step", {"sensor", -0.17}},
+      {"sensor_swap", {"sensor", 0.91}},
+      {"slow_sensor", {"structure", 1.62}},
+      {"speed_growth", {"heat", 0.56}},
+      {"thermal_lag", {"structure", -0.74}},
+      {"time_shift", {"datum", -0.84}},
+      {"wrong_coefficient", {"structure", 0.31}},
+      // Of the thermal layer, which has no probabilities.
+      {"wrong_film_coefficient", {"structure", 0.0}},
+      {"wrong_conductance", {"structure", 0.0}},
+      {"wrong_heat_capacity", {"structure", 0.0}},
+      {"wrong_ambient", {"structure", 0.0}},
+      {"wrong_heat_source", {"heat", 0.0}},
+  };
+  return all;
+}
+
+double utility(const Explanation& explanation, std::size_t place) {
+  const double likelihood =
+      std::copysign(std::log1p(std::abs(explanation.score) / score_scale), explanation.score);
+  return weight_of_left_out * std::clamp(-explanation.log_left, left_min, left_max) +
+         weight_of_likelihood * likelihood + (place == 0 ? weight_of_first_place : 0.0) -
+         weight_of_place * std::log1p(static_cast<double>(place)) +
+         causes().at(explanation.hypothesis->cause).prior;
+}
+
+}  // namespace
+
+const std::string& family_of(const std::string& cause) {
+  return causes().at(cause).family;
+}
+
+Posterior posterior(const std::vector<Explanation>& explanations) {
+  const std::size_t weighed = std::min(weighed_max, explanations.size());
+  std::vector<double> utilities;
+  for (std::size_t i = 0; i < weighed; ++i) utilities.push_back(utility(explanations[i], i));
+  double most = utility_of_none;
+  for (const double each : utilities) most = std::max(most, each);
+  double sum = std::exp(utility_of_none - most);
+  for (const double each : utilities) sum += std::exp(each - most);
+  Posterior all;
+  all.none = std::exp(utility_of_none - most) / sum;
+  all.of.assign(explanations.size(), 0.0);
+  for (const char* family : {"structure", "heat", "datum", "sensor"}) all.families[family] = 0.0;
+  for (std::size_t i = 0; i < weighed; ++i) {
+    all.of[i] = std::exp(utilities[i] - most) / sum;
+    all.families[family_of(explanations[i].hypothesis->cause)] += all.of[i];
+  }
+  return all;
+}
+
+double probability_of_group(const std::vector<Explanation>& explanations,
+                            const Posterior& posterior, const PlaceGroups& groups,
+                            std::size_t index) {
+  const Hypothesis& of = *explanations[index].hypothesis;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < explanations.size(); ++i) {
+    const Hypothesis& other = *explanations[i].hypothesis;
+    if (other.cause == of.cause && same_places(groups, of.subject, other.subject))
+      sum += posterior.of[i];
+  }
+  return sum;
+}
+
+}  // namespace thermocomp::diagnosis

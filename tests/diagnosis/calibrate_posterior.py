@@ -1,0 +1,139 @@
+#!/usr/bin/python3
+"""Weights of the posterior of a diagnosis: those under which what was planted is likeliest.
+
+calibrate_posterior.py ANSWERS.json...     written by
+    measured_campaign.py PROGRAM --weighed --json ANSWERS.json
+    campaign.py PROGRAM --answers ANSWERS.json
+
+Prints the figures for modelling/diagnosis/posterior.cpp, and how well they do on the cases they
+come from and on machines that were left out of the fit one after the other.
+"""
+
+import collections
+import json
+import pathlib
+import sys
+
+import numpy as np
+
+import campaign
+import measured_campaign
+from measured_plants import FAMILIES
+
+WEIGHED = 12  # explanations of the first round that count
+PRICE = 2.0   # precision of the causes' priors
+SCORE_SCALE = 20.0
+CAUSES = sorted(FAMILIES)
+SHARED = 4    # weights that all causes share
+STEPS = 3000
+
+
+def cases_of(paths):
+    """One dictionary a case: machine, size, features (the last row: nothing), which of them are
+    right, families."""
+    cases = []
+    for path in paths:
+        for kept in json.loads(pathlib.Path(path).read_text()):
+            truth, right = kept["truth"], measured_campaign.right
+            if truth is not None and "groups" not in truth:
+                right = campaign.same
+            weighed = [w for w in kept["answer"]["weighed"] if w["round"] == 1][:WEIGHED]
+            hits = [bool(truth) and right(w, truth) for w in weighed]
+            cases.append(dict(machine=kept["machine"], size=kept["size"], truth=truth,
+                              features=features(weighed), hits=np.array(hits + [not any(hits)]),
+                              families=[FAMILIES[w["cause"]] for w in weighed]))
+    return cases
+
+
+def features(weighed):
+    rows = np.zeros((len(weighed) + 1, SHARED + len(CAUSES) + 1))
+    for place, each in enumerate(weighed):
+        score = each["score"]
+        rows[place, :SHARED] = (np.clip(-each["log_left"], -0.5, 3.0),
+                                np.sign(score) * np.log1p(abs(score) / SCORE_SCALE),
+                                place == 0, -np.log1p(place))
+        rows[place, SHARED + CAUSES.index(each["cause"])] = 1.0
+    rows[-1, -1] = 1.0
+    return rows
+
+
+def probabilities(case, weights):
+    utility = case["features"] @ weights
+    odds = np.exp(utility - utility.max())
+    return odds / odds.sum()
+
+
+def fitted(cases):
+    """By steepest descent with the step length of Barzilai and Borwein, halved while it leads up."""
+    def loss(weights):
+        of_causes = np.zeros_like(weights)
+        of_causes[SHARED:-1] = weights[SHARED:-1]
+        value, slope = 0.5 * PRICE * of_causes @ of_causes, PRICE * of_causes
+        for case in cases:
+            stated = probabilities(case, weights)
+            right = stated @ case["hits"]
+            value -= np.log(right)
+            slope = slope - case["features"].T @ (stated * case["hits"] / right - stated)
+        return value, slope
+    weights = np.zeros(SHARED + len(CAUSES) + 1)
+    value, slope = loss(weights)
+    length = 1e-3
+    for _ in range(STEPS):
+        trial, (trial_value, trial_slope) = weights, (np.inf, slope)
+        while not trial_value <= value and length > 1e-12:
+            trial = weights - length * slope
+            trial_value, trial_slope = loss(trial)
+            length *= 0.5
+        moved, turned = trial - weights, trial_slope - slope
+        weights, value, slope = trial, trial_value, trial_slope
+        if moved @ moved < 1e-14 * (1.0 + weights @ weights):
+            break
+        length = abs(moved @ moved / (moved @ turned)) if moved @ turned else 1e-3
+    return weights
+
+
+def judged(cases, weights_of):
+    """@param weights_of  the weights for a machine"""
+    count = collections.Counter()
+    stated = []
+    for case in cases:
+        all_of = probabilities(case, weights_of(case["machine"]))
+        of = all_of[:-1]
+        best = int(np.argmax(of)) if len(of) else None
+        hit = best is not None and bool(case["hits"][best])
+        share = float(of[case["hits"][:-1]].sum()) if hit else float(of.max(initial=0.0))
+        if share >= 0.5:
+            stated.append((share, hit and case["truth"] is not None))
+        key = case["size"] if case["truth"] else "untouched"
+        count[key, "all"] += 1
+        count[key, "named"] += share >= 0.5
+        count[key, "above 0.8"] += share > measured_campaign.STATED
+        if case["truth"]:
+            count[key, "right"] += hit and share >= 0.5
+            families = collections.Counter()
+            for probability, family in zip(of, case["families"]):
+                families[family] += probability
+            count[key, "family"] += families[FAMILIES[case["truth"]["cause"]]] >= 0.5
+    for key in sorted({key for key, _ in count}, key=str):
+        print("  %-10s" % key, ", ".join("%s %d" % (what, n) for (k, what), n in count.items()
+                                         if k == key))
+    measured_campaign.print_reliability("names", stated)
+
+
+def main():
+    cases = cases_of(sys.argv[1:])
+    weights = fitted(cases)
+    print("left_out %.2f likelihood %.2f first_place %.2f place %.2f none %.2f" % (
+        *weights[:SHARED], weights[-1]))
+    for cause, prior in zip(CAUSES, weights[SHARED:-1]):
+        print("  %-22s %.2f" % (cause, prior))
+    print("cases it comes from")
+    judged(cases, lambda _: weights)
+    machines = sorted({case["machine"] for case in cases})
+    without = {m: fitted([c for c in cases if c["machine"] != m]) for m in machines}
+    print("each machine with the weights of the others")
+    judged(cases, lambda machine: without[machine])
+
+
+if __name__ == "__main__":
+    main()

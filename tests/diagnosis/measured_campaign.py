@@ -1,0 +1,286 @@
+#!/usr/bin/python3
+"""Plants one effect in what real machines measured, lets the tool look at files and model alone,
+and counts what it says.
+
+measured_campaign.py PROGRAM [--cases N] [--untouched N] [--machines spindle,printer,cell,mirror]
+                     [--bases ridge,few,lags] [--causes A,B] [--sizes 1.5,3] [--seed S] [--jobs 2]
+                     [--show] [--json FILE] [--weighed]
+
+PROGRAM is thermocomp-modelling. Data: $THERMOCOMP_DATA, else shared/data beside the source. The
+base model is fitted to the untouched rows of the whole set, so that what it leaves is the machine's
+own. --show prints every answer that was not right; --json keeps all of them, with --weighed
+for calibrate_posterior.py.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the jobs are the threads
+
+# ruff: noqa: E402
+import argparse
+import collections
+import json
+import multiprocessing
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+import measured_machines
+from measured_plants import CAUSES, FAMILIES, Impossible, Planted
+
+ATTEMPTS = 12
+STATED = 0.8  # a name with more than this probability on untouched data is an invention
+
+
+def machine_of(name, random):
+    return measured_machines.MACHINES[name](random)
+
+
+def spared(machine, cause, random):
+    """A place that the model may not have."""
+    if cause != "missing_temperature" and random.uniform() < 0.7:
+        return ()
+    if len(machine.temperatures) < 2:
+        return ()
+    return (str(random.choice(machine.temperatures)),)
+
+
+def planted_case(seed, machines, base, cause, times):
+    """A machine that cannot carry the cause gives way to another one.
+    @return the machine with the effect in it and the truth
+    @throws Impossible when no attempt can carry it"""
+    for attempt in range(ATTEMPTS):
+        random = np.random.default_rng([seed, attempt])
+        machine = machine_of(str(random.choice(machines)), random)
+        model = measured_machines.base_model(machine, base, spared(machine, cause, random))
+        try:
+            return Planted(machine, model, cause, times, random)
+        except Impossible:
+            continue
+    raise Impossible
+
+
+def untouched_case(seed, machines, base):
+    random = np.random.default_rng([seed, 0])
+    machine = machine_of(str(random.choice(machines)), random)
+    return machine, measured_machines.base_model(machine, base, spared(machine, None, random))
+
+
+def write(folder, machine, model):
+    """@return arguments of the program"""
+    model.write(folder / "model.toml")
+    train, test = [], []
+    for number, (run, rows) in enumerate(zip(machine.runs, machine.train)):
+        name = "run%d.csv" % number
+        np.savetxt(folder / name, np.stack(list(run.values()), axis=1), fmt="%.8g", delimiter=",",
+                   header=",".join(run), comments="")
+        time_s = run["time_s"]
+        if rows.stop == len(time_s):
+            train.append(name)
+        elif rows.stop:
+            train.append("%s@:%g" % (name, time_s[rows.stop]))
+            test.append("%s@%g:" % (name, time_s[rows.stop]))
+        else:
+            test.append(name)
+    return ["--model", "model.toml", "--train", *train, "--test", *test]
+
+
+def diagnosed(program, machine, model):
+    """@param program  with its options"""
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        command = [program[0], "diagnose", *write(folder, machine, model), *program[1:], "--json",
+                   "answer.json"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(" ".join(command) + ": " + done.stderr)
+        return json.loads((folder / "answer.json").read_text())
+
+
+def examine(task):
+    """@return the task, the truth (None: untouched or not to be planted), the answer"""
+    program, seed, machines, base, cause, times = task
+    named = lambda machine: (program, seed, machine.name, base, cause, times)
+    if cause is None:
+        machine, model = untouched_case(seed, machines, base)
+        return named(machine), None, diagnosed(program, machine, model)
+    try:
+        case = planted_case(seed, machines, base, cause, times)
+    except Impossible:
+        return task, None, None
+    places = case.truth["subject"].split("|")
+    groups = [sorted(case.machine.group(p)) if p.endswith("_degC") else [p] for p in places]
+    answer = diagnosed(program, case.machine, case.model)
+    return named(case.machine), dict(case.truth, groups=groups), answer
+
+
+def subject_right(subject, truth):
+    places = subject.split("|")
+    if len(places) != len(truth["groups"]):
+        return False
+    return any(all(p in g for p, g in zip(places, order))
+               for order in (truth["groups"], truth["groups"][::-1]))
+
+
+def right(finding, truth):
+    return finding["cause"] == truth["cause"] and subject_right(finding["subject"], truth)
+
+
+def covered(finding, truth):
+    """For every shared parameter with an interval whether it holds the planted value."""
+    out = []
+    for name, value in truth["parameters"].items():
+        interval = finding.get("parameters_ci95", {}).get(name)
+        if isinstance(value, float) and isinstance(interval, list) and name != "run":
+            out.append(interval[0] <= value <= interval[1])
+        elif isinstance(value, dict) and isinstance(interval, dict):
+            out += [interval[o][0] <= v <= interval[o][1] for o, v in value.items()
+                    if o in interval]
+    return out
+
+
+class Count:
+    def __init__(self):
+        self.total = collections.Counter()
+        self.right = collections.Counter()
+        self.family = collections.Counter()
+        self.confusion = collections.Counter()
+        self.stated = []  # (probability, right) of every name
+        self.stated_family = []
+        self.covers = []
+        self.untouched, self.invented, self.named_untouched = 0, 0, 0
+
+    def add(self, task, truth, answer):
+        _, _, machine, base, cause, times = task
+        found = answer["findings"]
+        if cause is None:
+            self.untouched += 1
+            self.named_untouched += bool(found)
+            self.invented += any(f.get("probability", 1.0) > STATED for f in found)
+            self.stated += [(f["probability"], False) for f in found if "probability" in f]
+            return not found
+        hit = bool(found) and right(found[0], truth)
+        family = bool(found) and FAMILIES.get(found[0]["cause"]) == truth["family"]
+        if not found and answer.get("families"):
+            weighed = answer["families"]
+            likeliest = max(weighed, key=lambda f: weighed[f])
+            family = likeliest == truth["family"] and weighed[likeliest] >= 0.5
+        for key in ((times, "all"), (times, machine), (times, base), (times, truth["cause"])):
+            self.total[key] += 1
+            self.right[key] += hit
+            self.family[key] += family
+        said = found[0]["cause"] if found else answer["verdict"]
+        self.confusion[(truth["cause"], said + (" (subject)" if said == truth["cause"] and not hit
+                                                else ""))] += 1
+        for finding in found:
+            if "probability" in finding:
+                self.stated.append((finding["probability"], right(finding, truth)))
+                self.stated_family.append((finding["family_probability"],
+                                           finding["family"] == truth["family"]))
+        if hit:
+            self.covers += covered(found[0], truth)
+        return hit
+
+    def report(self):
+        for key in sorted(self.total, key=str):
+            count = self.total[key]
+            print("size %-4g %-22s cause and subject %3d of %3d (%3.0f %%), family %3.0f %%" % (
+                key[0], key[1], self.right[key], count, 100.0 * self.right[key] / count,
+                100.0 * self.family[key] / count))
+        if self.untouched:
+            print("untouched: %d of %d named, %d above probability %g" % (
+                self.named_untouched, self.untouched, self.invented, STATED))
+        for text, stated in (("names", self.stated), ("families", self.stated_family)):
+            print_reliability(text, stated)
+        if self.covers:
+            print("intervals (95 %%) hold %.0f %% of %d planted values" % (
+                100.0 * np.mean(self.covers), len(self.covers)))
+        for cause in sorted({truth for truth, _ in self.confusion}):
+            row = sorted(((n, first) for (truth, first), n in self.confusion.items()
+                          if truth == cause), reverse=True)
+            print("  %-22s -> %s" % (cause, ", ".join("%s %d" % (f, n) for n, f in row)))
+
+
+def print_reliability(text, stated):
+    for low in np.arange(0.0, 1.0, 0.1):
+        inside = [(p, r) for p, r in stated if low <= p < low + 0.1 or (p == 1.0 and low > 0.85)]
+        if inside:
+            print("  %s stated %.2f: %.2f right (%d)" % (
+                text, np.mean([p for p, _ in inside]), np.mean([r for _, r in inside]),
+                len(inside)))
+
+
+def tasks_of(options):
+    machines, bases = options.machines.split(","), options.bases.split(",")
+    causes, sizes = options.causes.split(","), options.sizes.split(",")
+    tasks = []
+    for i in range(options.cases):
+        # One draw a case: no two of the cycles can fall in step.
+        random = np.random.default_rng([options.seed, i])
+        tasks.append((options.program, 100000 * options.seed + i, machines,
+                      str(random.choice(bases)), causes[i % len(causes)],
+                      float(sizes[(i // len(causes)) % len(sizes)])))
+    for i in range(options.untouched):
+        random = np.random.default_rng([options.seed, 50000 + i])
+        tasks.append((options.program, 100000 * options.seed + 50000 + i,
+                      machines, str(random.choice(bases)), None, 0.0))
+    return tasks
+
+
+def said(answer):
+    found = answer["findings"]
+    return ", ".join("%s(%s) %.2f" % (f["cause"], f["subject"], f.get("probability", np.nan))
+                     for f in found) or answer["verdict"]
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("program")
+    parser.add_argument("--cases", type=int, default=408)
+    parser.add_argument("--untouched", type=int, default=100)
+    parser.add_argument("--machines", default="spindle,spindle,spindle,printer,printer,cell,mirror")
+    parser.add_argument("--bases", default="ridge,few,lags")
+    parser.add_argument("--causes", default=",".join(CAUSES))
+    parser.add_argument("--sizes", default="1.5,3")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--show", action="store_true")
+    parser.add_argument("--json")
+    parser.add_argument("--weighed", action="store_true")
+    options = parser.parse_args()
+    options.program = [str(pathlib.Path(options.program).resolve())]
+    if options.weighed:
+        options.program.append("--weighed")
+    return options
+
+
+def main():
+    options = arguments()
+    if not measured_machines.DATA.is_dir():
+        print("measured campaign: no data at %s" % measured_machines.DATA)
+        return 0
+    count, kept, impossible = Count(), [], 0
+    with multiprocessing.Pool(options.jobs) as pool:
+        for task, truth, answer in pool.imap(examine, tasks_of(options)):
+            if answer is None:
+                impossible += 1
+                continue
+            fine = count.add(task, truth, answer)
+            kept.append(dict(machine=task[2], base=task[3], size=task[5], seed=task[1],
+                             truth=truth, answer=answer))
+            if options.show and not fine:
+                print("  %s %s %s %s x%g: %s -> %s" % (
+                    task[1], *task[2:4], truth and truth["cause"], task[5],
+                    truth and truth["subject"], said(answer)), flush=True)
+    count.report()
+    print("%d cases that their machine cannot carry were left out" % impossible)
+    if options.json:
+        pathlib.Path(options.json).write_text(json.dumps(kept))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

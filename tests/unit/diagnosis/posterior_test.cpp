@@ -1,0 +1,135 @@
+#include "modelling/diagnosis/posterior.hpp"
+
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "config/run_file.hpp"
+#include "modelling/diagnosis/false_reading.hpp"
+#include "modelling/diagnosis/headroom.hpp"
+#include "modelling/diagnosis/hypothesis.hpp"
+#include "modelling/diagnosis/measured_runs.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::diagnosis;
+
+namespace {
+
+Hypothesis hypothesis(const char* cause, const char* subject) {
+  Hypothesis of;
+  of.cause = cause;
+  of.subject = subject;
+  return of;
+}
+
+Explanation explanation(const Hypothesis& of, double score, double log_left) {
+  Explanation each;
+  each.hypothesis = &of;
+  each.score = score;
+  each.log_left = log_left;
+  return each;
+}
+
+/// t1 and t2 move alike, t3 does not; the model has t1 with a lag, and leaves 2 (t3 lagged).
+RunFile two_bodies(int rows) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  RunFile run;
+  run.name = "run.csv";
+  run.columns = {"time_s", "t1_degC", "t2_degC", "t3_degC", "z_um"};
+  run.values.resize(5);
+  double late_K = 0.0;
+  for (int row = 0; row < rows; ++row) {
+    const double one_K = 5.0 * std::sin(row / 60.0);
+    const double other_K = 4.0 * std::sin(row / 23.0 + 1.0) - 4.0 * std::sin(1.0);
+    late_K += (other_K - late_K) * -std::expm1(-60.0 / 900.0);
+    run.values[0].push_back(60.0 * row);
+    run.values[1].push_back(20.0 + one_K);
+    run.values[2].push_back(22.0 + 0.8 * one_K + noise(random));
+    run.values[3].push_back(21.0 + other_K);
+    run.values[4].push_back(5.0 * one_K + 2.0 * late_K + noise(random));
+  }
+  run.selected_end = run.rows();
+  return run;
+}
+
+ThermalModel model_of_one() {
+  ThermalModel model;
+  model.inputs = {"t1_degC"};
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {{5.0}};
+  return model;
+}
+
+MeasuredData data_of(const ThermalModel& model, int rows) {
+  const std::vector<RunFile> runs = {two_bodies(rows)};
+  return training_data(model, runs, {"run.csv"}, shared_columns(model, runs));
+}
+
+}  // namespace
+
+TEST_CASE("probabilities of explanations, families and nothing add to one", "[diagnosis]") {
+  const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
+  const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
+  const Posterior all = posterior({explanation(heat, 200.0, -0.8), explanation(lag, 90.0, -0.5)});
+  CHECK(all.of[0] + all.of[1] + all.none == Approx(1.0));
+  CHECK(all.families.at("heat") == Approx(all.of[0]));
+  CHECK(all.families.at("structure") == Approx(all.of[1]));
+  CHECK(all.of[0] > all.of[1]);
+}
+
+TEST_CASE("what takes nothing of rows left out is no explanation", "[diagnosis]") {
+  const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
+  CHECK(posterior({}).none == 1.0);
+  CHECK(posterior({explanation(lag, 10.0, -0.02)}).none > 0.9);
+  CHECK(posterior({explanation(lag, 2000.0, -1.5)}).none < 0.1);
+}
+
+TEST_CASE("places that move alike are one group, whose probabilities add", "[diagnosis]") {
+  const MeasuredData data = data_of(model_of_one(), 600);
+  const PlaceGroups groups = place_groups(data);
+  CHECK(groups.at("t1_degC").size() == 2);
+  CHECK(groups.at("t3_degC") == std::vector<std::string>{"t3_degC"});
+  CHECK(same_places(groups, "t1_degC|x_mm", "t2_degC|x_mm"));
+  CHECK_FALSE(same_places(groups, "t1_degC", "t3_degC"));
+  CHECK(group_of(groups, "t2_degC") == std::vector<std::string>{"t2_degC", "t1_degC"});
+  const Hypothesis one = hypothesis("thermal_lag", "t1_degC");
+  const Hypothesis other = hypothesis("thermal_lag", "t2_degC");
+  const std::vector<Explanation> both = {explanation(one, 300.0, -0.9),
+                                         explanation(other, 290.0, -0.89)};
+  const Posterior all = posterior(both);
+  CHECK(probability_of_group(both, all, groups, 1) == Approx(all.of[0] + all.of[1]));
+}
+
+TEST_CASE("what recorded places predict is told from what they do not", "[diagnosis]") {
+  const MeasuredData data = data_of(model_of_one(), 900);
+  const StackedRows rows = stacked_rows(data);
+  const OutputEvidence evidence(data, rows, 0);
+  CHECK(predictable_share(rows, evidence, lag_bank(data, rows)) > 0.8);
+  const Headroom of = headroom(0.1, 0.5, 0.7);
+  CHECK(of.named == Approx(0.45));
+  CHECK(of.predictable == Approx(0.25));
+  CHECK(of.noise + of.named + of.predictable + of.not_recorded == Approx(1.0));
+}
+
+TEST_CASE("a false reading acts through coefficient and lags alike", "[diagnosis]") {
+  ThermalModel model = model_of_one();
+  model.terms.push_back(
+      {"thermal_lag", "t1_degC", {{"tau_s", 900.0}}, {{"gain_um_per_K", {{"z_um", 2.0}}}}});
+  const MeasuredData data = data_of(model, 300);
+  REQUIRE(has_terms_of(data.model, 0));
+  const MeasuredRun& run = data.runs.front();
+  Panel step = Panel::Zero(run.rows(), 1);
+  step.bottomRows(run.rows() - 100).setOnes();
+  Panel answer = step;
+  answer_to_errors(data, run, 0, 0, answer);
+  MeasuredRun wrong = run;
+  wrong.inputs_K[0] += step.col(0);
+  const Column expected = model_over(model, wrong, data)[0] - model_over(model, run, data)[0];
+  CHECK((answer.col(0) - expected).cwiseAbs().maxCoeff() < 1e-9);
+  CHECK(answer(101, 0) < 3.5);
+  CHECK(answer(299, 0) > 4.9);
+}
