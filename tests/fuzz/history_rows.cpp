@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstdio>
 #include <cstring>
 #include <map>
 #include <string>
@@ -210,7 +211,8 @@ std::vector<std::string> segments_as_text(const std::filesystem::path& file) {
       "SELECT segment.id, quote(run) || quote(setup) || quote(reason) || quote(grid_start_ns)"
       " || quote(period_ns) || quote(first_cycle) || quote(last_cycle) || quote(wall_ns)"
       " || quote(inputs) || quote(estimator_state) || quote(segment.checksum)"
-      " || quote(config_text) || quote(model_text),"
+      " || quote(config_text) || quote(model_text)"
+      " || quote(model_checksum) || quote(program_version),"
       " (SELECT group_concat(quote(number) || quote(through_cycle) || quote(count)"
       " || quote(wall_minus_grid_ns) || quote(records) || quote(checksum))"
       " FROM chunk WHERE chunk.segment = segment.id)"
@@ -260,6 +262,7 @@ void check_untouched(const std::filesystem::path& file, const std::vector<std::u
                                      [id](const HistoryDamage& of) { return of.segment == id; });
     FUZZ_PROMISE(part != check.segments.end() || is_told);
     if (part == check.segments.end()) continue;
+    if (!part->damage.empty()) std::fprintf(stderr, "%s\n", to_string(part->damage[0]).c_str());
     FUZZ_PROMISE(part->damage.empty());
     FUZZ_PROMISE(part->records == before.records.at(id));
   }
