@@ -43,22 +43,29 @@ std::vector<double> numbers_for(const TomlTable& table, std::string_view key, st
   return values;
 }
 
-void read_columns(const TomlTable& table, const ThermalModel& model, MadeFrom& made_from) {
+/// @return whether the shapes that stand on them can be judged
+bool read_columns(const TomlTable& table, const ThermalModel& model, MadeFrom& made_from) {
   made_from.columns = table.texts("columns");
   std::vector<std::string> read = model.temperature_columns();
   const std::vector<std::string> signals = model.signal_columns();
   read.insert(read.end(), signals.begin(), signals.end());
   std::set<std::string> seen;
+  bool known = !made_from.columns.empty();
   for (const std::string& name : made_from.columns) {
     if (name.empty()) continue;  // a problem already
     if (std::find(read.begin(), read.end(), name) == read.end()) {
       table.problem("columns", name, "must be a column that the model reads");
+      known = false;
     }
-    if (!seen.insert(name).second) table.problem("columns", name, "is named twice");
+    if (!seen.insert(name).second) {
+      table.problem("columns", name, "is named twice");
+      known = false;
+    }
   }
   if (table.has("columns") && made_from.columns.empty()) {
     table.problem("columns", "must name at least one column");
   }
+  if (!known) return false;
   made_from.low = numbers_for(table, "low", made_from.columns.size(), "a column");
   made_from.high = numbers_for(table, "high", made_from.columns.size(), "a column");
   for (std::size_t i = 0; i < std::min(made_from.low.size(), made_from.high.size()); ++i) {
@@ -66,6 +73,7 @@ void read_columns(const TomlTable& table, const ThermalModel& model, MadeFrom& m
       table.problem("high", "must not be below low");
     }
   }
+  return true;
 }
 
 bool is_positive_definite(const std::vector<std::vector<double>>& rows) {
@@ -126,7 +134,10 @@ MadeFrom read_made_from(const TomlTable& table, const ThermalModel& model) {
   made_from.rows = table.number("rows", Range::between(0, rows_max));
   made_from.hours = table.number("hours", Range::between(0, rows_max));
   made_from.within_one_run = table.flag("within_one_run");
-  read_columns(table, model, made_from);
+  if (!read_columns(table, model, made_from)) {
+    table.ignore_rest();
+    return made_from;
+  }
   read_domain(table, made_from);
   const TomlTable outputs = table.table("output");
   for (const std::string& output : outputs.keys()) {

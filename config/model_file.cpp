@@ -249,6 +249,10 @@ TermSpec read_bank(const TomlTable& table, const ThermalModel& model) {
   term.kind = table.text("kind");
   read_bank_subjects(table, term.bank);
   read_bank_taus(table, term.bank);
+  if (term.bank.subjects.empty() || term.bank.taus_s.empty()) {
+    table.ignore_rest();  // no shape can be judged
+    return term;
+  }
   read_bank_gains(table, model, term.bank);
   return term;
 }

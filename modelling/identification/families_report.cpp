@@ -23,6 +23,27 @@ std::string line_of(const FamilyResult& result, bool chosen) {
   return text + printed("   %5.1f %%\n", 100.0 * score_of(result));
 }
 
+/// Coefficients with their intervals. What this choice leaves on rows that took part in choosing
+/// it is not told: it is too good.
+std::string equation_text(const MeasuredTests& tests, const Fit& fit) {
+  std::string text;
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+    text += printed("%s:\n", tests.outputs[o].c_str());
+    for (std::size_t i = 0; i < fit.columns.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(i);
+      const FitColumn& column = fit.columns[i];
+      const std::string& place = tests.places[column.place];
+      text += printed("  %+10.4f +- %.4f um/K  ", fit.outputs[o].coefficients[at],
+                      fit.outputs[o].ci95[at]);
+      text += column.tau_s > 0 ? printed("lag of %s, %.0f s\n", place.c_str(), column.tau_s)
+                               : place + "\n";
+    }
+  }
+  for (const std::string& warning : fit.warnings)
+    text.append("warning: ").append(warning).append("\n");
+  return text + printed("condition of the chosen columns: %.1f\n", fit.condition);
+}
+
 }  // namespace
 
 std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
@@ -40,15 +61,14 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   text += printed("chosen: %s, the simplest within one standard error of the best\n",
                   std::string(to_string(fit.chosen)).c_str());
   if (one_run) text += "judged within one run: not valid for other days\n";
-  if (fit.few) {
-    text += fit_text(tests, *fit.few);
-  } else if (fit.chosen != Family::none) {
+  if (fit.chosen != Family::none) {
     const MadeFrom& made_from = *fit.model.made_from;
     for (const auto& [name, output] : made_from.outputs)
       text += printed("%s: RMS left out %.3f um%s, fitted %.3f, without a model %.3f\n",
                       name.c_str(), output.left_out_rms_um, one_run ? " (within this run)" : "",
                       output.remainder_rms_um, output.no_model_rms_um);
   }
+  if (fit.few) text += equation_text(tests, *fit.few);
   for (const std::string& warning : fit.warnings)
     text.append("warning: ").append(warning).append("\n");
   return text;
