@@ -18,7 +18,8 @@ bool same(const PersistentState& a, const PersistentState& b) {
   return a.enabled == b.enabled && a.reference_degC == b.reference_degC &&
          a.model_reference_degC == b.model_reference_degC &&
          a.reference_signals == b.reference_signals && a.offset_um == b.offset_um &&
-         a.held_degC == b.held_degC && a.held_signals == b.held_signals && a.correction == b.correction;
+         a.held_degC == b.held_degC && a.held_signals == b.held_signals &&
+         a.correction == b.correction;
 }
 
 }  // namespace
