@@ -9,8 +9,9 @@ using namespace thermocomp::testing;
 namespace {
 
 std::string request(int id, const std::string& method, const std::string& params = "{}") {
-  return R"({"jsonrpc":"2.0","id":)" + std::to_string(id) + R"(,"method":")" + method +
-         R"(","params":)" + params + "}\n";
+  std::string text(R"({"jsonrpc":"2.0","id":)");
+  text.append(std::to_string(id)).append(R"(,"method":")").append(method);
+  return text.append(R"(","params":)").append(params).append("}\n");
 }
 
 void wait_until_asked(const RunningServer& server) {

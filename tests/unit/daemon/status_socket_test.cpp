@@ -40,12 +40,14 @@ TEST_CASE("each kind of bad request has its error, and the next request works", 
       {"nonsense", rpc::parse_error},
       {"\xff\xfe", rpc::parse_error},
       {std::string(60000, '['), rpc::parse_error},
-      {R"({"jsonrpc":"2.0","id":1,"method":"status","params":{"a":)" + std::string(30000, '[') +
-           std::string(30000, ']') + "}}",
+      {std::string(R"({"jsonrpc":"2.0","id":1,"method":"status","params":{"a":)")
+           .append(30000, '[')
+           .append(30000, ']')
+           .append("}}"),
        rpc::parse_error},
       {R"({"jsonrpc":"2.0","id":1,"method":"status","params":{"a":"\xff\xfe"}})", rpc::parse_error},
       {R"({"jsonrpc":"2.0","id":1e999,"method":"status"})", rpc::parse_error},
-      {R"({"jsonrpc":"2.0","id":")" + std::string(300, 'x') + R"(","method":"status"})",
+      {std::string(R"({"jsonrpc":"2.0","id":")").append(300, 'x').append(R"(","method":"status"})"),
        rpc::invalid_request},
       {R"({"jsonrpc":"2.0","id":[1],"method":"status"})", rpc::invalid_request},
       {R"({"jsonrpc":"2.0","id":true,"method":"status"})", rpc::invalid_request},
