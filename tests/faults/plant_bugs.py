@@ -80,8 +80,8 @@ BUGS = [
      "if (reading.fault != Fault::none && reading.fault != Fault::no_answer) return reading.fault;\n"
      "  if (reading.fault != Fault::none) return {P} ? Fault::none : reading.fault;"),
     ("transaction_not_compared", "drivers/modbus/connection.cpp",
-     "if (word_at(frame, 0) != transaction_) return Frame::foreign;",
-     "if (word_at(frame, 0) != transaction_ && !{P}) return Frame::foreign;"),
+     "if (was_unasked_ || word_at(frame, 0) != transaction_) return Frame::foreign;",
+     "if (was_unasked_ || (word_at(frame, 0) != transaction_ && !{P})) return Frame::foreign;"),
     ("late_answer_taken", "drivers/modbus/late_answers.hpp",
      "return confusable(question_, question) ? std::max(ready_at_, others_at_) : ready_at_;",
      "return confusable(question_, question) && !{P} ? std::max(ready_at_, others_at_) : ready_at_;"),
