@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -47,7 +48,15 @@ int tell_damage(const std::string& history, const std::vector<HistoryDamage>& da
   return damage.empty() ? exit_success : exit_no;
 }
 
+/// An export that replaced its own history would lose what it came from.
+void refuse_onto_itself(const std::string& input, const std::string& output) {
+  std::error_code error;
+  if (output != "-" && std::filesystem::equivalent(input, output, error) && !error)
+    throw Failure(output + ": is what is read; the output must be another file");
+}
+
 int run_export(const ExportOptions& options) {
+  refuse_onto_itself(options.history, options.output);
   const auto from = time_or_none(options.from);
   const auto to = time_or_none(options.to);
   OutputFile file(options.output);
@@ -79,6 +88,7 @@ struct ReplayOptions {
 };
 
 int run_history_replay(const ReplayOptions& options) {
+  refuse_onto_itself(options.input, options.output);
   OutputFile file(options.output);
   ReplaySummary summary;
   {
@@ -108,6 +118,7 @@ int run_history_replay(const ReplayOptions& options) {
 
 int run_file_replay(const ReplayOptions& options) {
   const DaemonConfig config = load_daemon_config(options.config);
+  refuse_onto_itself(options.input, options.output);
   const RunFile run = RunLoader(options.columns).load(options.input);
   OutputFile file(options.output);
   const RunReplaySummary summary = replay_run_file(config, run, file.stream());

@@ -49,7 +49,8 @@ std::string name_of(const NamedFile& file) {
 }
 
 void check_kind(const NamedFile& file, const struct stat& status) {
-  if (file.use == FileUse::written && !S_ISREG(status.st_mode)) {
+  // A state file that cannot be used is moved aside by the daemon, whatever it is.
+  if (file.use == FileUse::written && file.key != "state_file" && !S_ISREG(status.st_mode)) {
     file.table.problem(file.key, file.path.string(), "must be a regular file, or not be there");
   }
   if (file.use == FileUse::socket && !S_ISSOCK(status.st_mode)) {

@@ -70,8 +70,8 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
   constexpr double most_um = 1000.0;  // no thermal displacement; a slip of the keyboard
-  refuse_unless(std::abs(command.value_um) <= most_um,
-                "measured: the value must be in [-1000, 1000] um");
+  if (!(std::abs(command.value_um) <= most_um))
+    throw RpcError(rpc::invalid_params, "params.value_um must be in [-1000, 1000]");
   const double displacement_um = view.report.axes[command.axis].displacement_um;
   return then(actions.command(command), [command, displacement_um] {
     // What remains at the tool is what the model did not foresee.

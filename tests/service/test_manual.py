@@ -18,7 +18,7 @@ PROGRAMS = {"thermocomp": "thermocomp.1", "thermocompd": "thermocompd.8",
             "thermocomp-sim": "thermocomp-sim.1",
             "thermocomp-modelling": "thermocomp-modelling.1"}
 # Carried out by a program of its own, which has the help.
-MODELLING = {"structure", "place", "tiebar", "plan", "group", "fit", "diagnose"}
+MODELLING = {"structure", "place", "tiebar", "plan", "group", "fit", "diagnose", "inspect"}
 
 
 def shown(page):
