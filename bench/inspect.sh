@@ -3,4 +3,4 @@
 # it names besides, what it names on recordings that were left as they are, and how long it takes.
 # Needs THERMOCOMP_DATA.
 set -eu
-exec python3 "$(dirname "$0")/inspect.py" "$@"
+exec python3 "$(dirname "$0")/inspect_runs.py" "$@"

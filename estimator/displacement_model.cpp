@@ -82,9 +82,8 @@ struct DisplacementModel::Parts {
   std::vector<Guideway> guideways;
   std::vector<TermSpec> term_specs;
   std::vector<std::unique_ptr<Term>> terms;
-  Vector rise_K;                      ///< shape (columns); scratch
-  std::vector<std::byte> states;      ///< of all terms; scratch
-  std::vector<std::byte> term_state;  ///< as large as any term's; scratch
+  Vector rise_K;                  ///< shape (columns); scratch
+  std::vector<std::byte> states;  ///< of all terms; scratch
 
   void add_guideways(std::span<const double> signal_values, std::span<double> out) const noexcept {
     const auto rise = rise_K.head(inputs);
@@ -115,11 +114,6 @@ DisplacementModel::DisplacementModel(const ThermalModel& model)
   StateArchive counting;
   visit_state(counting);
   parts_->states.resize(counting.position_bytes());
-  for (auto& term : parts_->terms) {
-    StateArchive count;
-    term->visit_state(count);
-    parts_->term_state.resize(std::max(parts_->term_state.size(), count.position_bytes()));
-  }
 }
 
 DisplacementModel::~DisplacementModel() = default;
@@ -175,7 +169,7 @@ std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) c
 }
 
 void DisplacementModel::adopt_terms(DisplacementModel& other, std::span<const int> plan) noexcept {
-  std::vector<std::byte>& state = parts_->term_state;  // a planned term's is as large as ours
+  std::vector<std::byte>& state = parts_->states;  // a planned term's is as large as ours
   for (std::size_t i = 0; i < plan.size(); ++i) {
     if (plan[i] < 0) continue;
     StateArchive save{std::span<std::byte>(state)};

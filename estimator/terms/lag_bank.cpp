@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -77,6 +78,9 @@ void LagBank::follow(nanoseconds now) noexcept {
       for (std::size_t i = 0; i < count; ++i) late[i] += share * (values_[i] - late[i]);
     }
   }
+  // A held state is asked again at its own moment, with the slides elsewhere.
+  for (std::size_t j = 0; j < taus_s_.size(); ++j)
+    if (!(taus_s_[j] > 0)) std::copy(values_.begin(), values_.end(), late_.data() + j * count);
   at_ = now;
 }
 

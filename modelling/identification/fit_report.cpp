@@ -123,14 +123,16 @@ std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
           "  %+10.4f +- %.4f um/K  %s\n", output.coefficients[static_cast<Eigen::Index>(i)],
           output.ci95[static_cast<Eigen::Index>(i)], column_name(tests, fit.columns[i]).c_str());
     for (std::size_t f = 0; f < tests.folds.size(); ++f)
-      text += printed("  without %s: %.3f there (no model: %.3f)\n", tests.fold_name(f).c_str(),
-                      output.fold_rms_um[f], output.fold_no_model_rms_um[f]);
+      text +=
+          printed("  %s left out: RMS %.3f um (uncompensated %.3f)\n", tests.fold_name(f).c_str(),
+                  output.fold_rms_um[f], output.fold_no_model_rms_um[f]);
   }
   for (std::size_t o = 0; o < tests.outputs.size() && !tests.hot.rows.empty(); ++o)
     text += printed("%s: the hotter half from the cooler one: %.3f um\n", tests.outputs[o].c_str(),
                     fit.outputs[o].hot_rms_um);
   text += printed("condition of the chosen columns: %.1f\n", fit.condition);
   text += losses_text(tests, fit);
+  if (tests.runs.size() < 2) text += "judged within one run: not valid for other days\n";
   for (const std::string& warning : fit.warnings)
     text.append("warning: ").append(warning).append("\n");
   return text;
@@ -160,6 +162,7 @@ std::string fit_json(const MeasuredTests& tests, const Fit& fit) {
            {"rms_um", output.fold_rms_um[f]},
            {"no_model_rms_um", output.fold_no_model_rms_um[f]}});
   }
+  json["judged_within_one_run"] = tests.runs.size() < 2;
   json["combinations"] = fit.judged;
   json["condition"] = fit.condition;
   for (const auto& group : fit.grouping.groups) {

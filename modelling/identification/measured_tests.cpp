@@ -34,25 +34,31 @@ bool in_all(const std::vector<RunFile>& runs, const std::string& column) {
 constexpr double spike_K_min = 10.0;
 constexpr double usual_steps = 30.0;
 constexpr std::size_t near = 5;
+constexpr double end_spike_K_min = 100.0;
+constexpr double ranges_beyond = 10.0;
 
-/// Whether the value stands off its neighbours by more than the limit: in the middle of five, off
-/// their median; at an end, where a true course goes on to one side, by three times what the other
-/// four span besides.
+/// Whether the value stands off the median of itself and its four neighbours by more than the
+/// limit.
 bool is_spike(const std::vector<double>& values, std::size_t row, double limit_K) {
-  const std::size_t begin = std::min(row < 2 ? 0 : row - 2, values.size() - near);
   std::array<double, near> five{};
-  std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(begin), near, five.begin());
+  std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(row - 2), near, five.begin());
   if (std::any_of(five.begin(), five.end(), [](double each) { return std::isnan(each); }))
     return false;
-  const std::size_t at = row - begin;
-  if (at != 2) {
-    std::swap(five[at], five[near - 1]);
-    const auto [least, most] = std::minmax_element(five.begin(), five.end() - 1);
-    limit_K += 3.0 * (*most - *least);
-    return values[row] < *least - limit_K || values[row] > *most + limit_K;
-  }
   std::nth_element(five.begin(), five.begin() + 2, five.end());
   return std::abs(values[row] - five[2]) > limit_K;
+}
+
+/// At an end nothing tells a spike from a heater that has just been switched on, and the first row
+/// is what rises count from. So only what is far beyond all that the reading ever shows.
+bool is_end_spike(const std::vector<double>& values, std::size_t row) {
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (std::size_t i = 2; i + 2 < values.size(); ++i) {
+    least = std::fmin(least, values[i]);
+    most = std::fmax(most, values[i]);
+  }
+  const double limit_K = std::max(end_spike_K_min, ranges_beyond * (most - least));
+  return values[row] < least - limit_K || values[row] > most + limit_K;
 }
 
 /// 10 K, or 30 of the reading's usual steps where these are more; NaN: it has none.
@@ -75,7 +81,8 @@ void leave_out_spikes(RunFile& run, std::vector<std::string>& notes) {
     const double limit_K = spike_limit_K(read);
     std::size_t spikes = 0;
     for (std::size_t row = 0; row < read.size(); ++row) {
-      if (!is_spike(read, row, limit_K)) continue;
+      const bool at_end = row < 2 || row + 2 >= read.size();
+      if (!(at_end ? is_end_spike(read, row) : is_spike(read, row, limit_K))) continue;
       run.values[i][row] = std::numeric_limits<double>::quiet_NaN();
       ++spikes;
     }

@@ -314,6 +314,21 @@ TEST_CASE("a large bank's state is saved, loaded and adopted whole", "[displacem
         displacement(other, 25s, zero, zero, Vector(60, 1.0), 2));
 }
 
+TEST_CASE("a bank's value without a lag is that of the call, also at the same moment",
+          "[displacement]") {
+  // A held state is asked again at its own moment, with the slides elsewhere.
+  ThermalModel spec = without_matrix();
+  TermSpec term;
+  term.kind = "lag_bank";
+  term.bank.subjects = {"x_mm"};
+  term.bank.taus_s = {0.0, 100.0};
+  term.bank.gain_um_per_unit["z_um"] = {{0.5, 0.25}};
+  spec.terms = {term};
+  DisplacementModel model(spec);
+  CHECK(single(model, 1s, {0.0}, {0.0}) == 0.0);
+  CHECK(single(model, 1s, {0.0}, {10.0}) == 5.0);
+}
+
 TEST_CASE("a bank whose shapes or names do not fit is refused", "[displacement]") {
   ThermalModel spec = with_bank();
   spec.terms[0].bank.gain_um_per_unit["z_um"].pop_back();

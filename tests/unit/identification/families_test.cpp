@@ -174,6 +174,19 @@ TEST_CASE("three readings of 3276.7 degC are left out with a word", "[families]"
   CHECK(tests.runs[0].places_K.maxCoeff() < 50.0);
 }
 
+TEST_CASE("a heater that is switched on after the first row is no spike there", "[families]") {
+  RunFile run =
+      machine_run("heater", 3, [](double quick, double, double, double) { return quick; });
+  for (std::size_t row = 0; row < run.rows(); ++row) run.values[2][row] = row == 0 ? 32.0 : 100.0;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  const MeasuredTests tests = measured_tests({run}, options);
+  CHECK(tests.notes.empty());
+  CHECK(tests.runs[0].reference_degC[1] == 32.0);
+  run.values[2][0] = 3276.7;
+  CHECK(measured_tests({run}, options).notes.size() == 2);  // ... and what is left never moves
+}
+
 TEST_CASE("the same rows twice are refused", "[families]") {
   const RunFile run =
       machine_run("run", 3, [](double quick, double, double, double) { return quick; });
