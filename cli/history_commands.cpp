@@ -97,7 +97,7 @@ int run_history_replay(const ReplayOptions& options) {
                             [&progress](double fraction) { progress.update(fraction); });
   }
   const int status = tell_damage(options.input, summary.damage);
-  if (summary.segments == 0 && status != exit_success) {
+  if (summary.compared == 0 && status != exit_success) {
     throw Failure(options.input + ": nothing of it can be replayed");
   }
   file.commit();

@@ -15,7 +15,7 @@ usage() { sed -n 's/^# \{0,1\}//; 4,5p' "${BASH_SOURCE[0]}"; }
 
 runs=build/fuzz/runs
 readonly input_seconds_max=20    # one input may take so long, by the clock of a busy machine
-readonly structured_bytes_max=65536  # of an input whose mutator builds it
+readonly structured_bytes_max=131072  # of an input whose mutator builds it
 readonly memory_MB_max=2048      # of the process, with the sanitizer's own
 readonly allocation_MB_max=512   # asked for at once
 mapfile -t known < <(sed -n 's/^fuzz_target(\([a-z0-9_]*\).*/\1/p' tests/fuzz/CMakeLists.txt)

@@ -16,6 +16,26 @@ std::vector<const CLI::App*> commands_of(const CLI::App& app) {
   return app.get_subcommands([](const CLI::App*) { return true; });
 }
 
+/// A command that does something, by the words that lead to it: "export", "history check".
+struct NamedCommand {
+  std::string name;
+  const CLI::App* app;
+  std::string group;
+};
+
+std::vector<NamedCommand> whole_commands_of(const CLI::App& app) {
+  std::vector<NamedCommand> commands;
+  for (const CLI::App* command : commands_of(app)) {
+    const auto within = commands_of(*command);
+    if (within.empty()) commands.push_back({command->get_name(), command, command->get_group()});
+    for (const CLI::App* part : within) {
+      commands.push_back(
+          {command->get_name() + " " + part->get_name(), part, command->get_group()});
+    }
+  }
+  return commands;
+}
+
 bool takes_value(const CLI::Option& option) {
   return option.get_items_expected_max() > 0;
 }
@@ -69,26 +89,25 @@ std::string usage(const CLI::App& app) {
 }
 
 std::string synopsis(const CLI::App& app) {
-  const auto commands = commands_of(app);
+  const auto commands = whole_commands_of(app);
   std::string text = ".SH SYNOPSIS\n";
   if (commands.empty()) return text + bold(app.get_name()) + usage(app) + '\n';
   text += bold(app.get_name()) + usage(app) + " " + italic("command") + " ...\n";
-  for (const CLI::App* command : commands)
-    text +=
-        ".br\n" + bold(app.get_name()) + " " + bold(command->get_name()) + usage(*command) + '\n';
+  for (const auto& [name, command, group] : commands)
+    text += ".br\n" + bold(app.get_name()) + " " + bold(name) + usage(*command) + '\n';
   return text;
 }
 
 std::string commands_section(const CLI::App& app) {
   std::string text;
   std::string group;
-  for (const CLI::App* command : commands_of(app)) {
-    if (command->get_group() != group) {
-      group = command->get_group();
+  for (const auto& [name, command, its_group] : whole_commands_of(app)) {
+    if (its_group != group) {
+      group = its_group;
       std::string title = group == "Subcommands" ? "COMMANDS" : group;
       text += ".SH " + escaped(title) + '\n';
     }
-    text += ".SS " + bold(command->get_name()) + usage(*command) + '\n';
+    text += ".SS " + bold(name) + usage(*command) + '\n';
     text += escaped(command->get_description()) + ".\n" + options_list(*command);
   }
   return text;

@@ -227,11 +227,12 @@ void TomlMutator::repeat_block(Blocks& blocks, std::size_t room) {
 }
 
 void TomlMutator::deepen_key(Blocks& blocks, std::size_t room) {
-  const std::size_t count = std::min(depth(), room / 3);
+  const std::string_view parts[] = {"a.", "b .", "'c'.", "\"d\"."};
+  const std::string_view part = parts[below(4)];
+  const std::size_t count = std::min(depth(), room / part.size());
   std::string* statement = any_statement(blocks);
   if (statement == nullptr || count == 0) return;
-  const std::string_view parts[] = {"a.", "b .", "'c'.", "\"d\"."};
-  const std::string path = repeated(parts[below(4)], count) + "z";
+  const std::string path = repeated(part, count) + "z";
   switch (below(4)) {
     case 0:
       *statement = "[" + path + "]\n" + *statement;
