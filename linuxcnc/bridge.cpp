@@ -25,6 +25,7 @@ using namespace std::chrono_literals;
 constexpr auto reconnect_after = 500ms;
 /// The daemon carries a command out before it answers, for some seconds at most.
 constexpr auto answer_max = 10s;
+constexpr auto offsets_cleared_within = 300ms;
 
 int open_signals() {
   sigset_t set;
@@ -41,6 +42,21 @@ std::uint64_t new_session() {
     if (getrandom(&number, sizeof number, 0) != static_cast<ssize_t>(sizeof number)) number = 0;
   return number;
 }
+
+/// When the machine has been switched on and homed LinuxCNC clears an external offset only some
+/// servo periods later. What is applied until then is of before: it is not told as taking yet.
+class Settled {
+ public:
+  bool taking(bool taking, Clock::time_point now) {
+    if (taking && !was_taking_) since_ = now;
+    was_taking_ = taking;
+    return taking && now - since_ >= offsets_cleared_within;
+  }
+
+ private:
+  bool was_taking_{false};
+  Clock::time_point since_{};
+};
 
 class Exchange {
  public:
@@ -119,21 +135,28 @@ void run_bridge(const BridgeOptions& options) {
   HalPins pins(options.name, options.axes);
   BridgeState state(options.axes.size(), options.limits);
   Exchange exchange(options, state);
+  Settled settled;
   const auto period =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.period_s));
+  const auto view = [&](Clock::time_point now) {
+    MachineView seen = pins.read();
+    seen.taking = settled.taking(seen.taking, now);
+    return seen;
+  };
   Clock::time_point next = Clock::now();
   for (;;) {
     const Clock::time_point now = Clock::now();
     if (now >= next) {
       next = std::max(next + period, now);
-      exchange.ask(pins.read(), now);
+      exchange.ask(view(now), now);
     }
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(next - Clock::now()).count();
     pollfd files[] = {{signals, POLLIN, 0}, {exchange.fd(), POLLIN, 0}};
     poll(files, 2, static_cast<int>(std::max<std::int64_t>(left, 0)));
     if ((files[0].revents & POLLIN) != 0) break;
     if (exchange.connected()) exchange.listen();
-    pins.write(state.show(pins.read(), Clock::now().time_since_epoch()), exchange.connected());
+    const Clock::time_point shown_at = Clock::now();
+    pins.write(state.show(view(shown_at), shown_at.time_since_epoch()), exchange.connected());
   }
   close(signals);
 }
