@@ -340,7 +340,8 @@ void Invariants::check_cycle_hold(const CycleSeen& seen) {
   const bool may_change = seen.report->cycle_ends > ends_at_hold_ || referenced_ || first_;
   demand(same || may_change, "held_between_cycle_ends", seen.now,
          [] { return std::string("the held temperatures change without a cycle end"); });
-  if (!same && !referenced_) ends_at_hold_ = seen.report->cycle_ends;
+  // In the first cycle there is nothing yet that could have been held.
+  if (!same && !referenced_ && !first_) ends_at_hold_ = seen.report->cycle_ends;
 }
 
 /// What is held are temperatures: the displacement is theirs, by the matrix and gains of now.
