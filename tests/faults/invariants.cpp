@@ -403,7 +403,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   budget.um = std::min(budget.um + rate_um * elapsed_s, rate_um * stall_s);
   budget.at = move.at;
   const double change_um = std::abs(move.to_um - move.from_um);
-  double allowed_um = budget.um + 2.0 * resolution_um_;
+  // Offsets move on the cycle's grid, writes come when the link has its turn: one cycle besides.
+  double allowed_um = budget.um + rate_um * period_s_ + 2.0 * resolution_um_;
   // An operator may have released an axis on the word of a controller that has stopped lying since.
   const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
   if (move.disturbed || lies) budget.disturbed_at = move.at;
