@@ -599,7 +599,7 @@ std::map<std::string, double> Estimator::model_reference_degC() const {
 
 std::vector<std::string> Estimator::restore(const PersistentState& state) {
   Parts& parts = *parts_;
-  const std::vector<std::string> refused =
+  std::vector<std::string> refused =
       impossible_references(parts.config, parts.columns, state.reference_degC);
   parts.enabled = state.enabled && refused.empty();
   if (refused.empty() && state.model_reference_degC == model_reference_degC()) {
