@@ -114,6 +114,10 @@ void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
     return note_unexplained(input, fresh);
   starting_ = false;
   in_doubt_ = false;
+  unwritten_for_ = read_backs_until_written;
+  // Nothing sent and nothing read: nothing is added there.
+  if (!driven_once_ && std::abs(input.applied_um) <= same_read_back_um)
+    pairs_.note(0.0, input.applied_um);
   start_from(input.now, std::clamp(input.applied_um, -trusted_um_, trusted_um_));
 }
 
@@ -122,7 +126,11 @@ void AxisChannel::note_explained(const AxisInput& input, bool fresh) noexcept {
   if (mismatch_ && input.now - agreed_since_ >= mismatch_after_) mismatch_ = false;
   if (!fresh) return;
   if (suspicion_ > 0) --suspicion_;
-  if (driven_once_) pairs_.note(limiter_.offset_um(), input.applied_um);
+  // Until the first command has been written it is not ours that is read back.
+  if (unwritten_for_ > 0)
+    --unwritten_for_;
+  else if (driven_once_)
+    pairs_.note(limiter_.offset_um(), input.applied_um);
 }
 
 void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept {
@@ -143,7 +151,9 @@ void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept 
 }
 
 void AxisChannel::release() noexcept {
-  if (!latched_) return;
+  // Said again while read-backs are awaited it must not make them begin anew: with a slow link and
+  // an impatient operator they would never be enough.
+  if (!latched_ || releasing_) return;
   releasing_ = true;
   released_um_ = not_a_number;
 }
@@ -230,6 +240,7 @@ void AxisChannel::adopt(const AxisChannel& previous) noexcept {
   pairs_ = previous.pairs_;
   read_back_at_ = previous.read_back_at_;
   stands_for_ = previous.stands_for_;
+  unwritten_for_ = previous.unwritten_for_;
   seen_at_ = previous.seen_at_;
   driven_at_ = previous.driven_at_;
   check_.adopt(previous.check_);

@@ -11,8 +11,10 @@ namespace {
 constexpr double noise_um = 0.3;
 /// Pairs nearer to one another tell nothing new.
 constexpr double apart_um = 0.2;
-/// Of a mismatch: how far off the older pairs may lie from what explains the newest.
+/// Of a mismatch: how far off the older pairs may lie from what explains the newest; and for being
+/// sure of it, for a release is not believed as long as what is sure explains what is read.
 constexpr double share_of_mismatch = 0.35;
+constexpr double sure_share_of_mismatch = 0.1;
 /// Below so little sent a factor says nothing.
 constexpr double sent_um_min = 0.2;
 /// What was sent must have changed by so much, and by so much of the mismatch, before a factor is
@@ -30,6 +32,22 @@ bool is_usual(double factor) noexcept {
 
 bool is_near(double a, double b) noexcept {
   return std::abs(a - b) < 0.05 * std::abs(b);
+}
+
+std::string factor_text(const Mismatch& mismatch) {
+  std::array<char, 96> text{};
+  if (is_near(mismatch.size, 2.0))
+    std::snprintf(text.data(), text.size(), "reads back twice what is sent: check scale");
+  else if (is_near(mismatch.size, 0.5))
+    std::snprintf(text.data(), text.size(), "reads back half of what is sent: check scale");
+  else
+    std::snprintf(text.data(), text.size(), "reads back %.3g times what is sent: check scale%s",
+                  mismatch.size, mismatch.size < 0.0 ? " and sign" : "");
+  std::string told = text.data();
+  if (!mismatch.or_constant) return told;
+  std::snprintf(text.data(), text.size(), "; or constant %+.1f um: check the offset's zero",
+                mismatch.read_um - mismatch.sent_um);
+  return told.append(text.data());
 }
 
 }  // namespace
@@ -51,6 +69,8 @@ std::string likely_text(const Mismatch& mismatch) {
     case MismatchCause::opposite_sign:
       return "opposite sign: check sign";
     case MismatchCause::stands_still:
+      if (std::abs(mismatch.read_um) <= noise_um)
+        return "reads back nothing of what is sent: not taken, or check scale";
       return "does not take what is sent (rejects it or stands still)";
     case MismatchCause::changes_alone:
       return "changes without us: another writer?";
@@ -59,11 +79,7 @@ std::string likely_text(const Mismatch& mismatch) {
                     mismatch.size);
       return text.data();
     case MismatchCause::factor:
-      if (is_near(mismatch.size, 2.0)) return "reads back twice what is sent: check scale";
-      if (is_near(mismatch.size, 0.5)) return "reads back half of what is sent: check scale";
-      std::snprintf(text.data(), text.size(), "reads back %.3g times what is sent: check scale%s",
-                    mismatch.size, mismatch.size < 0.0 ? " and sign" : "");
-      return text.data();
+      return factor_text(mismatch);
   }
   return {};
 }
@@ -107,7 +123,10 @@ bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
 }
 
 Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
-  Mismatch found{sent_um, read_um, MismatchCause::changes_alone, not_a_number, false};
+  Mismatch found;
+  found.sent_um = sent_um;
+  found.read_um = read_um;
+  found.likely = MismatchCause::changes_alone;
   if (stands_still(sent_um, read_um)) {
     found.likely = MismatchCause::stands_still;
     return found;
@@ -128,11 +147,14 @@ Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
   if (by_factor) {
     found.likely = is_near(factor, -1.0) ? MismatchCause::opposite_sign : MismatchCause::factor;
     found.size = factor;
+    found.or_constant = constant_fits && !found.sure;
   } else if (constant_fits) {
     found.likely = MismatchCause::constant;
     found.size = constant_um;
   }
-  if (found.likely == MismatchCause::changes_alone) found.sure = false;
+  const double off_um = by_factor ? of_factor_um : of_constant_um;
+  const double sure_um = noise_um + sure_share_of_mismatch * std::abs(read_um - sent_um);
+  if (found.likely == MismatchCause::changes_alone || off_um > sure_um) found.sure = false;
   return found;
 }
 

@@ -29,13 +29,16 @@ struct Mismatch {
   double size{not_a_number};  ///< factor: times what is sent; constant: [um]
   /// More than one value sent tells the same: a factor, sign or constant is no coincidence.
   bool sure{false};
+  /// A factor that is as well a constant: too little has been sent to tell them apart.
+  bool or_constant{false};
 
   /// Whether the same factor, sign or constant still explains a pair.
   [[nodiscard]] bool explains(double of_sent_um, double of_read_um) const noexcept;
-  void visit_state(StateArchive& archive) { archive(sent_um, read_um, likely, size, sure); }
+  void visit_state(StateArchive& archive) { archive(sent_um, read_um, likely, size, sure, or_constant); }
 };
 
-/// "reads back twice what is sent: check scale"; empty where there is nothing to say. Allocates.
+/// "reads back twice what is sent: check scale", with the other possibility where that is not sure;
+/// empty where there is nothing to say. Allocates.
 [[nodiscard]] std::string likely_text(const Mismatch& mismatch);
 
 /// The last values sent, each with what was read back: only those that differ, so that a slow

@@ -100,11 +100,18 @@ std::string read_all(const std::filesystem::path& path) {
   return text.str();
 }
 
+/// What stands there, a folder too, must not keep the next state from being written.
 std::string move_aside(const std::filesystem::path& file) {
+  constexpr int names_max = 9;
   std::error_code error;
-  const std::string aside = file.string() + ".unusable";
-  std::filesystem::rename(file, aside, error);
-  return error ? "it could not be moved aside (" + error.message() + ")" : "moved to " + aside;
+  for (int name = 1; name <= names_max; ++name) {
+    std::string aside = file.string() + ".unusable";
+    if (name > 1) aside += "." + std::to_string(name);
+    // A file takes the place of an older one; what cannot gets the next name.
+    std::filesystem::rename(file, aside, error);
+    if (!error) return "moved to " + aside;
+  }
+  return "it could not be moved aside (" + error.message() + ")";
 }
 
 /// Closes itself; -1 is none.

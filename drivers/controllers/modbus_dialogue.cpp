@@ -191,13 +191,25 @@ bool ModbusDialogue::synchronise() {
 }
 
 /// One period: read, and write only while what was read can be explained by what was written. In
-/// this order nothing computed before a re-homing was seen is written after it was.
+/// this order nothing computed before a re-homing was seen is written after it was. A write that was
+/// not answered is not repeated before another look either: in the time that an answer is waited for
+/// a controller can restart.
 void ModbusDialogue::exchange() {
   look_for_command();
-  if (!read_all()) {
-    if (!ending_.load()) lose(refused_);
-    return;
+  for (int retries = config_.line.retries;; --retries) {
+    if (!look()) {
+      if (!ending_.load()) lose(refused_);
+      return;
+    }
+    const SendVerdict verdict = gate_.verdict(connection_.now());
+    if (verdict == SendVerdict::resynchronise) lose(true);
+    if (verdict != SendVerdict::send || write_command()) return;
+    if (retries == 0 || !connection_.connected() || ending_.load()) return lose(refused_);
   }
+}
+
+bool ModbusDialogue::look() {
+  if (!read_all()) return false;
   show_piezos();
   if (!gate_.explains(without_leaps_um())) {
     gate_.synchronised(without_leaps_um());
@@ -205,11 +217,7 @@ void ModbusDialogue::exchange() {
     health_.last_error = "the controller applies what it was not sent";
   }
   publish(true);
-  const SendVerdict verdict = gate_.verdict(connection_.now());
-  if (verdict == SendVerdict::resynchronise)
-    lose(true);
-  else if (verdict == SendVerdict::send && !write_command())
-    lose(refused_);
+  return true;
 }
 
 void ModbusDialogue::look_for_command() {
@@ -255,8 +263,9 @@ bool ModbusDialogue::write_command() {
 }
 
 bool ModbusDialogue::write(const WriteField& request) {
-  const Exchange exchange = with_retries(
-      [&] { return connection_.write_registers(config_.unit, request.address, request.words); });
+  const Exchange exchange =
+      connection_.write_registers(config_.unit, request.address, request.words);
+  note_refusal(exchange);
   if (exchange.ok()) return true;
   const std::scoped_lock lock(health_mutex_);
   ++health_.write_errors;
@@ -274,10 +283,14 @@ Exchange ModbusDialogue::with_retries(Request&& request) {
     }
     exchange = request();
   }
+  note_refusal(exchange);
+  return exchange;
+}
+
+void ModbusDialogue::note_refusal(const Exchange& exchange) noexcept {
   refused_ = exchange.outcome == ExchangeOutcome::exception &&
              exchange.exception_code != gateway_path_unavailable &&
              exchange.exception_code != gateway_target_silent;
-  return exchange;
 }
 
 std::string ModbusDialogue::describe(const Exchange& exchange) const {

@@ -53,6 +53,8 @@ class ModbusDialogue {
  private:
   bool synchronise();
   void exchange();
+  /// Reads all and begins a new epoch where that is not explained. False: it could not be read.
+  bool look();
   void look_for_command();
   bool write_command();
   bool write(const WriteField& request);
@@ -68,6 +70,7 @@ class ModbusDialogue {
   /// Repeats `exchange` as the line's `retries` say. Notes why it failed in the end.
   template <class Request>
   Exchange with_retries(Request&& request);
+  void note_refusal(const Exchange& exchange) noexcept;
   [[nodiscard]] std::string describe(const Exchange& exchange) const;
 
   const ModbusControllerConfig config_;

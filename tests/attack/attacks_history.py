@@ -113,8 +113,8 @@ def damaged_segment(rig):
 
 @attack(links=("tcp",), limit_s=60.0)
 def history_of_another_version(rig):
-    """user_version 0, -1 and the largest, other tables, no tables: no crash, and not a row of it is
-    lost when a daemon starts on it."""
+    """user_version 0, -1 and the largest, other tables, no tables: no crash. A daemon whose history
+    is somebody else's database (0 is what every SQLite file has) leaves it alone and says so."""
     history = recorded(rig, reloads=1)
     if history is None:
         return
@@ -137,13 +137,20 @@ def history_of_another_version(rig):
         copy.unlink()
     with contextlib.closing(sqlite3.connect(history)) as base:
         base.execute(f"PRAGMA user_version = {rig.random.choice((0, -1))}")
+    before = history.read_bytes()
+    rig.must(not rig.daemon.start(may_refuse=True), "starts on a history that is not its own")
+    told = rig.daemon.log_text().splitlines()[-1]
+    rig.must(str(history) in told and "version" in told, f'says only "{told}"')
+    rig.must(history.read_bytes() == before, "the history that is not its own was changed")
+    history.rename(rig.folder / "not_ours.db")
+    for other in rig.daemon.folder.glob("history*"):
+        other.unlink()
+    rig.rows = set()
     rig.machine.wants_um(BEFORE_UM)
     if not rig.restart():
         return
-    time.sleep(1.0)
-    rig.note_rows()
+    rig.wait_for_rows(1)
     rig.daemon.end()
-    rig.note_rows()
 
 
 @attack(links=("tcp",), limit_s=60.0)

@@ -14,6 +14,12 @@ SEEN_WITHIN_S = 6.0
 LOOKED_AT_S = 3.0
 
 
+def seen_within_s(rig):
+    """While the offset moves, what differs by less than it moves within the controller's allowed lag
+    looks like that lag: it is seen at the latest when the offset has arrived."""
+    return SEEN_WITHIN_S + abs(WANTED_UM - BEFORE_UM) / rig.axis.rate_um_per_s
+
+
 def latched(daemon):
     status = daemon.status()
     return "mismatch_latched" in status["reasons"] and not status["axes"][0]["driven"] and status
@@ -28,7 +34,7 @@ def not_driven_from_now_on(rig, seconds=0.6):
 def must_latch(rig, likely):
     """Two unexplained read-backs are enough: the axis is left alone and somebody is told why.
     `likely`: words of which the reason must have one; empty: it must have any."""
-    status = eventually(lambda: latched(rig.daemon) or not rig.daemon.alive(), SEEN_WITHIN_S)
+    status = eventually(lambda: latched(rig.daemon) or not rig.daemon.alive(), seen_within_s(rig))
     if not rig.must(status and status is not True, "a mismatch is not latched"):
         return
     rig.must(not_driven_from_now_on(rig), "driven although the mismatch is latched")
@@ -144,7 +150,7 @@ def two_daemons_on_one_controller(rig):
     rig.machine.wants_um(WANTED_UM)
     told = eventually(lambda: any(
         daemon.alive() and latched(daemon) for daemon in (rig.daemon, second)) or
-        not second.alive(), 8.0)
+        not second.alive(), seen_within_s(rig))
     rig.must(told, "neither says that somebody else writes")
     began = time.monotonic()
     time.sleep(1.0)

@@ -1,6 +1,7 @@
 """The axis at the controller's side: where it stands, who wrote what and when, and what the
 controller says of it, which need not be true."""
 
+import collections
 import dataclasses
 import math
 import threading
@@ -49,7 +50,7 @@ class Axis:
         self.lied = False
         self.writes = []
         self.writers = {}
-        self.told = {}  # before its first write; writer: (when it read first, what it read last)
+        self.told = {}  # before its first write; writer: (when it read first, its last readings)
         self.before_shown = lambda: None
 
     def written(self, value_um, writer=1, at_s=None):
@@ -57,9 +58,11 @@ class Axis:
         with self.lock:
             last = self.writers.get(writer)
             if last is None:
-                told_at, stood_um = self.told.get(writer, (now, self.position_um))
+                told_at, readings_um = self.told.get(writer, (now, [self.position_um]))
                 if now < told_at:
                     return  # was on its way when the controller began anew, which drops its queue
+                # It starts from one of its readings.
+                stood_um = min(readings_um, key=lambda um: abs(value_um - um))
                 if abs(value_um - self.position_um) < abs(value_um - stood_um):
                     stood_um = self.position_um  # a lie that changes: the truth is right too
                 last = Writer(stood_um, told_at, told_at)
@@ -77,7 +80,7 @@ class Axis:
             self.lied = self.lied or self.lie is not None
             shown_um = self.position_um if self.lie is None else self.lie(self, now)
             if writer not in self.writers and math.isfinite(shown_um):
-                self.told[writer] = (self.told.get(writer, (now,))[0], shown_um)
+                self.told.setdefault(writer, (now, collections.deque(maxlen=64)))[1].append(shown_um)
             return shown_um
 
     def stands_at(self, position_um):

@@ -11,7 +11,10 @@ class Stall:
     def __init__(self, file):
         self.file = file
         self.environment = {"THERMOCOMP_STALL": str(file),
-                            "LD_PRELOAD": os.environ["THERMOCOMP_STALLED_CYCLE"]}
+                            "LD_PRELOAD": os.environ["THERMOCOMP_STALLED_CYCLE"],
+                            # What is preloaded comes before the sanitizer's own library.
+                            "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") +
+                                            ":verify_asan_link_order=0"}
 
     def __enter__(self):
         self.file.touch()
