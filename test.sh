@@ -1,7 +1,8 @@
 #!/bin/bash
 # Builds everything and runs every test of one build. What .ci/run does besides: the sanitizers'
 # builds, short runs of the fuzz targets, format and static checks.
-#   ./test.sh [--quick] [--preset debug|release|asan-ubsan|tsan|coverage] [-- CTEST_OPTION...]
+#   ./test.sh [--quick] [--preset PRESET] [-- CTEST_OPTION...]
+#   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
 #   --quick: for daily work, the test programs alone: no packages, processes, guests or campaigns
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
@@ -9,8 +10,7 @@ source scripts/common.sh
 exec </dev/null
 
 usage() {
-  echo "usage: ./test.sh [--quick] [--preset debug|release|asan-ubsan|tsan|coverage]" \
-    "[-- CTEST_OPTION...]"
+  sed -n 's/^# \{0,1\}//; 4,6p' "${BASH_SOURCE[0]}"
 }
 
 preset=release
@@ -43,7 +43,7 @@ while (($#)); do
   esac
 done
 case $preset in
-  debug | release | asan-ubsan | tsan | coverage) ;;
+  debug | release | asan-ubsan | asan-ubsan-all | tsan | coverage) ;;
   *)
     echo "test.sh: no preset called $preset" >&2
     usage >&2
@@ -83,7 +83,7 @@ show_sanitizer_reports() {
 run_tests() {
   local runner=() status=0
   export PYTEST_ADDOPTS=-rs  # pytest names what it skips
-  if [[ $preset == tsan || $preset == asan-ubsan ]]; then
+  if [[ $preset == tsan || $preset == asan-ubsan* ]]; then
     runner=(run_as_sanitizers_need)
     collect_sanitizer_reports
   fi
@@ -91,7 +91,7 @@ run_tests() {
   # Two places a CPU: a test that computes takes both (cmake/ThermocompTargets.cmake).
   "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((2 * $(nproc)))" \
     "${ctest_options[@]}" || status=$?
-  if [[ $preset == tsan || $preset == asan-ubsan ]]; then show_sanitizer_reports || status=1; fi
+  if [[ $preset == tsan || $preset == asan-ubsan* ]]; then show_sanitizer_reports || status=1; fi
   return "$status"
 }
 
@@ -112,7 +112,7 @@ stage "configure $preset" cmake --preset "$preset"
 stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)"
 # The guest in which programs with sanitizers can run. Without it the tests on CAN fail and say so;
 # all others need not suffer.
-if [[ $quick == no && ($preset == asan-ubsan || $preset == tsan) ]]; then
+if [[ $quick == no && ($preset == asan-ubsan* || $preset == tsan) ]]; then
   stage "kernel of the guest" scripts/guest-kernel.sh || true
 fi
 status=0

@@ -25,7 +25,7 @@ part() {
 
 # Before anything is configured: thermocomp-petsc is built where PETSc is there.
 part "packages of PETSc" scripts/setup.sh petsc
-for preset in release asan-ubsan tsan debug coverage; do
+for preset in release asan-ubsan-all tsan debug coverage; do
   part "$preset" ./test.sh --preset "$preset"
 done
 part "includes" scripts/check_includes.py
@@ -33,6 +33,9 @@ part "format" scripts/check-format.sh
 part "clang-tidy" scripts/check-tidy.sh
 part "fuzz" scripts/fuzz.sh --minutes 10
 bin=build/release/bin
+part "faults" "$bin/thermocomp_faults" --seeds 0:2560 --hours 4 --complete
+part "faults at 100 Hz" \
+  "$bin/thermocomp_faults" --seeds 0:192 --hours 1 --cycle-hz 100 --complete
 part "attacks" "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --jobs 4 --minutes 45
 part "attacks on CAN" tests/vm/run_with_can.sh --timeout 1500 env TMPDIR=/dev/shm \
   "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --links can --minutes 15

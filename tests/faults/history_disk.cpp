@@ -182,6 +182,7 @@ std::string HistoryDisk::verify() {
         replay(file, {}, {}, [&parts](const SegmentSetup& setup) -> ReplaySetup {
           return parts.setups.at(std::stoul(setup.config_text));
         });
+    if (!summary.damage.empty()) return to_string(summary.damage.front());
     if (summary.different != 0)
       return fmt::format("{} of {} offsets come out different, first in cycle {}",
                          summary.different, summary.compared,

@@ -250,6 +250,24 @@ TEST_CASE("a write that fails takes a new epoch and is not repeated with the old
   REQUIRE(eventually([&] { return int32_of(machine, 0) == 400; }));
 }
 
+TEST_CASE("a write that is not answered is not repeated before another look", "[controllers]") {
+  ModbusMachine machine;
+  machine.mirrored = 6;
+  ModbusController link(three_axes(machine.port()));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 30.0);
+  REQUIRE(eventually([&] { return cycle.state().applied_um[0] == Approx(30.0); }));
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.fixed_epoch = epoch;
+  machine.restart_on_write = true;
+  REQUIRE(eventually([&] { return !machine.restart_on_write; }));
+  const int writes = machine.writes;
+  REQUIRE(eventually([&] { return cycle.state().link_epoch > epoch; }));
+  CHECK(cycle.state().applied_um[0] == 0.0);
+  CHECK(machine.writes == writes);
+}
+
 TEST_CASE("a controller that cannot be read is offline and is not written", "[controllers]") {
   ModbusMachine machine;
   machine.refuse_reads = true;

@@ -1,6 +1,7 @@
 // A CNC's Modbus TCP server in a thread (libmodbus' server side), for the tests of the link.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -75,6 +76,8 @@ class ModbusMachine {
   std::atomic<int> mirrored{0};
   /// Writes are refused with "slave device failure".
   std::atomic<bool> refuse_writes{false};
+  /// The next write is lost in a restart: not answered, and what is shown is 0 from then on.
+  std::atomic<bool> restart_on_write{false};
   /// Reads are answered with "slave device failure".
   std::atomic<bool> refuse_reads{false};
   /// Requests are taken and never answered.
@@ -123,6 +126,12 @@ class ModbusMachine {
                           function == MODBUS_FC_WRITE_SINGLE_REGISTER;
     ++(is_write ? writes : reads);
     if (mute) return true;
+    if (is_write && restart_on_write.exchange(false)) {
+      const std::scoped_lock lock(mutex_);
+      mirrored = 0;
+      std::fill_n(mapping_->tab_input_registers, registers, std::uint16_t{0});
+      return true;
+    }
     if (is_write ? refuse_writes : refuse_reads) {
       return modbus_reply_exception(context_.get(), query,
                                     MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE) >= 0;
