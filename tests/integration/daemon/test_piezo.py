@@ -92,6 +92,7 @@ def test_an_amplifier_that_does_not_obey_is_seen_and_told_again(lab):
     machine.amplifier.give(75.0)
     eventually(lambda: abs(daemon.axis()["applied"] + 1.3) < 0.2, "what 75 V stand for")
     eventually(lambda: daemon.axis()["mismatch"], "the operator is told")
+    eventually(lambda: "mismatch_latched" in daemon.status()["reasons"], "and asked to mend it")
     eventually(lambda: "axis 1 shows 75" in daemon.status()["controller"]["last_error"],
                "and what the amplifier shows")
     disobeyed = len(machine.amplifier.all_volts())
