@@ -40,12 +40,14 @@ double displacement_at(const PiezoConfig& config, double volt) noexcept {
 PiezoDrive::PiezoDrive(const PiezoConfig& config) : config_((config.validate(), config)) {}
 
 void PiezoDrive::restart_at(double read_V) noexcept {
+  // Of a drive in use only what it had reached from 0 V itself, and was not about to leave.
+  const bool from_zero = !std::isfinite(volt_) || (known_ && obeyed_ && !zeroing_);
   known_ = zeroing_ = false;
   volt_ = asked_um_ = followed_um_ = not_a_number;
   written_since_.reset();
   obeyed_ = true;
   if (!(std::abs(read_V) > config_.tolerance_V)) return;
-  known_ = true;
+  known_ = from_zero;
   volt_ = std::clamp(read_V, config_.curve_V.front(), config_.curve_V.back());
   followed_um_ = displacement_at(config_, volt_);
 }

@@ -22,7 +22,8 @@ class PiezoDrive {
 
   /// After a lost link: the voltage in effect is not known.
   void restart() noexcept { known_ = false; }
-  /// The same where it has been read back: what stands there is kept, and need not be reached anew.
+  /// The same where it has been read back: what stands there is kept, and need not be reached anew
+  /// unless this drive knows that it was not reached from 0 V.
   /// 0 V is the rest of an amplifier that has not been told anything yet.
   void restart_at(double read_V) noexcept;
   /// @param now  must not run backwards. @return volts within the curve; NaN: nothing to write yet

@@ -107,9 +107,10 @@ std::uint8_t function_of(ModbusTable table) {
   return functions[static_cast<std::size_t>(table)];
 }
 
-/// Whether `part` stands somewhere in what arrived.
+/// Whether `part` stands somewhere in what arrived after the question: what came earlier answers
+/// nothing.
 bool has_arrived(const fuzz::VirtualLine& line, const Bytes& part) {
-  const Bytes& all = line.arrived();
+  const std::span<const std::uint8_t> all = line.arrived_since_asked();
   return std::search(all.begin(), all.end(), part.begin(), part.end()) != all.end();
 }
 

@@ -74,6 +74,8 @@ ssize_t VirtualLine::read(void* to, std::size_t size) {
 
 ssize_t VirtualLine::write(const void* from, std::size_t size) {
   const auto* bytes = static_cast<const std::uint8_t*>(from);
+  arrive();
+  asked_at_ = arrived_.size();
   due_ = std::max(due_, now_);
   for (Piece& piece : peer_({bytes, size})) {
     due_ += piece.delay;

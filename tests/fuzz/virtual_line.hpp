@@ -39,6 +39,10 @@ class VirtualLine {
   [[nodiscard]] nanoseconds now() const noexcept { return now_; }
   /// Everything that has arrived so far, read or not.
   [[nodiscard]] const std::vector<std::uint8_t>& arrived() const noexcept { return arrived_; }
+  /// The same, but for what was there before the newest request began to be sent.
+  [[nodiscard]] std::span<const std::uint8_t> arrived_since_asked() const noexcept {
+    return std::span(arrived_).subspan(asked_at_);
+  }
 
   // What the calls of the C library do.
   [[nodiscard]] nanoseconds tick() noexcept;
@@ -62,6 +66,7 @@ class VirtualLine {
   std::deque<Due> under_way_;
   std::vector<std::uint8_t> arrived_;
   std::size_t taken_{0};
+  std::size_t asked_at_{0};
   bool hung_up_{false};
 };
 

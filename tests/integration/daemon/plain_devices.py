@@ -95,6 +95,7 @@ class PlainController(PlainDevice):
 
     def start(self):
         self.applied_nm = 0
+        self.shown_more_um = 0.0
         self.order_log = []  # (CLOCK_MONOTONIC [s], offset [um]) of every valid write
         super().start()
 
@@ -108,7 +109,8 @@ class PlainController(PlainDevice):
         self.show_applied()
 
     def show_applied(self):
-        high, low = struct.unpack(">2H", struct.pack(">i", self.applied_nm))
+        shown_nm = self.applied_nm + round(1000 * self.shown_more_um)
+        high, low = struct.unpack(">2H", struct.pack(">i", shown_nm))
         self.tables[4].update({10: high, 11: low})
 
     def switch_compensation_off(self, off):
@@ -118,6 +120,12 @@ class PlainController(PlainDevice):
     def force_applied_um(self, offset_um):
         with self.lock:
             self.applied_nm = round(1000 * offset_um)
+            self.show_applied()
+
+    def show_more_um(self, um):
+        """What is shown is so much more than what is applied."""
+        with self.lock:
+            self.shown_more_um = um
             self.show_applied()
 
     def applied_um(self):

@@ -155,6 +155,27 @@ def test_proving_moves_one_axis_out_and_back(machine, lab):
     assert max(offsets_um) == 4.0
 
 
+def test_only_a_latched_axis_is_released(machine, lab):
+    daemon = machine.start()
+    status, _, said = daemon.cli("release", "z")
+    assert status == 1 and "no latched mismatch" in said
+    with pytest.raises(Refused):
+        daemon.call("release", axis="nosuch")
+    machine.warm_by(6.0)
+    daemon.wait_for_offset(6.0, 0.05)
+    machine.controller.show_more_um(20.0)
+    eventually(lambda: "mismatch_latched" in daemon.status()["reasons"], "latched")
+    told = daemon.axis()["mismatch"]
+    assert abs(told["read_um"] - told["sent_um"] - 20.0) < 0.1
+    assert "another writer" in told["likely"]  # it came while nothing was sent
+    machine.controller.show_more_um(0.0)
+    assert daemon.cli("release", "z")[0] == 0
+    eventually(lambda: daemon.axis()["driven"] and daemon.axis()["mismatch"] is None, "driven again")
+    machine.warm_by(3.0)
+    daemon.wait_for_offset(3.0, 0.05)
+    recorded(machine, lab)
+
+
 def test_measured_and_cycle_end_are_noted(machine, lab):
     daemon = machine.start()
     status, out, _ = daemon.cli("measured", "z", "3.25")

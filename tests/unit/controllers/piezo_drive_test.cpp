@@ -122,6 +122,28 @@ TEST_CASE("an amplifier that does not obey shows where the tool is and is told a
   CHECK(drive.step(11300ms, 2.0) == 0.0);
 }
 
+TEST_CASE("a lost link does not make a voltage one that was reached from 0 V", "[piezo]") {
+  PiezoDrive drive(measured_piezo());
+  drive.restart_at(50.0);
+  CHECK(drive.step(0s, 2.0) == 50.0);
+  drive.show(10s, 20.0);  // it does not obey
+  CHECK_FALSE(drive.obeyed());
+  drive.restart_at(50.0);  // it does again, and the link was away
+  drive.show(11s, 50.0);
+  CHECK(drive.obeyed());
+  CHECK(drive.step(11s, 2.0) == 50.0);
+  CHECK(drive.step(13s, 2.0) == 0.0);
+  CHECK(drive.step(14s, 2.0) == 50.0);
+  drive.restart_at(50.0);  // now it was
+  CHECK(drive.step(15s, 2.0) == 50.0);
+  CHECK(drive.step(17s, 2.0) == 50.0);
+  CHECK(drive.step(18s, 6.6) == 50.0);
+  CHECK(drive.step(20s, 6.6) == 0.0);
+  drive.restart_at(40.0);  // on the way down
+  CHECK(drive.step(21s, 6.6) == 40.0);
+  CHECK(drive.step(23s, 6.6) == 0.0);
+}
+
 TEST_CASE("a voltage that is no number stands for no offset", "[piezo]") {
   PiezoDrive drive(measured_piezo());
   drive.restart_at(not_a_number);
