@@ -127,7 +127,8 @@ def machine_text(bus, events=""):
 
 
 NO_SMOOTHING = 'form = "off"\nperiod_s = 0.0\n'
-AMPLE = "offset_um_max = 500.0\nrate_um_per_s_max = 1000.0\n"
+RATE_UM_PER_S = 1000.0
+AMPLE = f"offset_um_max = 500.0\nrate_um_per_s_max = {RATE_UM_PER_S}\n"
 
 
 def daemon_text(bus, rate_hz=500, smoothing=NO_SMOOTHING, model=MODEL, limits=AMPLE, more=""):
@@ -196,10 +197,11 @@ class Agreement:
                 f"bound {numbers(self.bound_um)} um, largest {numbers(self.largest_um)} um")
 
 
-def agreement_in_history(bus, folder, history, rows, repeats, row_log):
+def agreement_in_history(bus, folder, history, rows, repeats, row_log, rate_hz):
     """The last noted cycle before the next row became visible. A row is settled if all its
-    temperatures, and none of another row, had been read in that cycle; how many are so depends on
-    how busy this machine is."""
+    temperatures, and none of another row, had been read in that cycle, and the slew rate did not hold
+    the offset back (after several rows at once); how many are so depends on how busy this machine
+    is."""
     run = folder / "exported.csv"
     status, _, said = run_tool("export", history, "-o", run)
     assert status == 0, said
@@ -221,6 +223,8 @@ def agreement_in_history(bus, folder, history, rows, repeats, row_log):
     ends = np.searchsorted(times_s, visible_s[repeats:]) - 1
     ends = np.append(ends, len(times_s) - 1)  # the last row stood until all was over
     settled = np.all(np.abs(read[ends] - arriving) < 1e-9, axis=1)
+    steps = np.abs(offsets[ends] - offsets[ends - 1])
+    settled &= np.all(steps < 0.9 * RATE_UM_PER_S / rate_hz, axis=1)
     assert settled[0]
     differences = np.abs(offsets[ends] - wanted)[settled]
     return Agreement(f"{bus.name}, computed", rows, int(np.sum(settled)), bound_um(bus, temps),
@@ -265,7 +269,8 @@ def replay_spindle(lab, bus, rows, row_period_s, rate_hz=500, tick_ms=1):
     simulator.wait(60 + 3 * (FIRST_ROW_S + rows * row_period_s))
     missed = daemon.status()["cycle"]["missed"]
     daemon.end()
-    agreements = [agreement_in_history(bus, lab.folder, daemon.history, rows, repeats, row_log),
+    agreements = [agreement_in_history(bus, lab.folder, daemon.history, rows, repeats, row_log,
+                                       rate_hz),
                   agreement_at_controller(bus, lab.folder, truth, rows, repeats)]
     print(f"row period {1000 * row_period_s:g} ms, {rate_hz} Hz, {missed} cycles missed")
     for agreement in agreements:
