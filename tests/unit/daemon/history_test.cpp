@@ -293,7 +293,13 @@ TEST_CASE("what was committed before kill -9 is read and replayed whole", "[hist
     }
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(400 + 37 * seed));
-  const bool was_started = eventually([&] { return std::filesystem::exists(config.file); });
+  const bool was_started = eventually([&] {
+    try {
+      return !HistoryReader(config.file).segments().empty();
+    } catch (const HistoryError&) {
+      return false;  // not there, or not begun
+    }
+  });
   kill(child, SIGKILL);
   waitpid(child, nullptr, 0);
   REQUIRE(was_started);
