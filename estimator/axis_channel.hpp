@@ -70,7 +70,8 @@ class AxisChannel {
     archive(limiter_, check_, target_um_, applied_um_, epoch_, trusted_um_, synced_, starting_,
             driven_once_, out_of_bound_, mismatch_, agreed_since_, in_doubt_, suspicion_, latched_,
             releasing_, released_um_, latched_mismatch_, pairs_, stands_for_, unwritten_for_,
-            seen_at_, read_back_at_, driven_at_, prove_phase_, prove_from_um_, prove_move_um_, prove_until_);
+            seen_at_, read_back_at_, driven_at_, prove_phase_, prove_from_um_, prove_move_um_,
+            prove_until_);
   }
 
  private:
@@ -113,7 +114,7 @@ class AxisChannel {
   /// written.
   std::uint8_t stands_for_{0};
   std::uint8_t unwritten_for_{0};  ///< read-backs until what is read back is surely ours
-  nanoseconds seen_at_{};  ///< of the newest read-back, also of one without offsets
+  nanoseconds seen_at_{};          ///< of the newest read-back, also of one without offsets
   bool latched_{false};
   bool releasing_{false};
   double released_um_{not_a_number};  ///< read back since release(), to be confirmed

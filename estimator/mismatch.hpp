@@ -34,7 +34,9 @@ struct Mismatch {
 
   /// Whether the same factor, sign or constant still explains a pair.
   [[nodiscard]] bool explains(double of_sent_um, double of_read_um) const noexcept;
-  void visit_state(StateArchive& archive) { archive(sent_um, read_um, likely, size, sure, or_constant); }
+  void visit_state(StateArchive& archive) {
+    archive(sent_um, read_um, likely, size, sure, or_constant);
+  }
 };
 
 /// "reads back twice what is sent: check scale", with the other possibility where that is not sure;

@@ -191,9 +191,9 @@ bool ModbusDialogue::synchronise() {
 }
 
 /// One period: read, and write only while what was read can be explained by what was written. In
-/// this order nothing computed before a re-homing was seen is written after it was. A write that was
-/// not answered is not repeated before another look either: in the time that an answer is waited for
-/// a controller can restart.
+/// this order nothing computed before a re-homing was seen is written after it was. A write that
+/// was not answered is not repeated before another look either: in the time that an answer is
+/// waited for a controller can restart.
 void ModbusDialogue::exchange() {
   look_for_command();
   for (int retries = config_.line.retries;; --retries) {
