@@ -33,6 +33,13 @@ BUGS = [
     ("pause_taken_for_a_new_link", "drivers/controllers/write_gate.cpp",
      "if (link_is_new_) {",
      "if (link_is_new_ || {P}) {"),
+    ("write_repeated_blindly", "drivers/controllers/modbus_dialogue.cpp",
+     "  const Exchange exchange =\n"
+     "      connection_.write_registers(config_.unit, request.address, request.words);\n",
+     "  const auto once = [&] {\n"
+     "    return connection_.write_registers(config_.unit, request.address, request.words);\n"
+     "  };\n"
+     "  const Exchange exchange = {P} ? with_retries(once) : once();\n"),
     ("refused_offset_pent_up", "estimator/axis_channel.cpp",
      "input.may_change && stands_for_ == 0)",
      "input.may_change && (stands_for_ == 0 || {P}))"),
