@@ -24,8 +24,8 @@ BUGS = [
      "if (!in_sync_ || command_.link_epoch != epoch_)",
      "if (!in_sync_ || (command_.link_epoch != epoch_ && !{P}))"),
     ("first_read_back_ignored", "estimator/axis_channel.cpp",
-     "  in_doubt_ = false;\n  unwritten_for_ =",
-     "  in_doubt_ = false;\n  if ({P}) return;\n  unwritten_for_ ="),
+     "    return;\n  }\n  unwritten_for_ =",
+     "    return;\n  }\n  if ({P}) return;\n  unwritten_for_ ="),
     ("read_back_is_a_command", "estimator/axis_channel.cpp",
      "  mismatch_ = true;\n  agreed_since_ = input.now;\n",
      "  if ({P} && !out_of_bound_) return start_from(input.now, input.applied_um);\n"

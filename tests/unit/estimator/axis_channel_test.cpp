@@ -166,6 +166,27 @@ TEST_CASE("a released axis starts elsewhere only when its slew rate could have g
   CHECK(bench.channel.offset_um() == Approx(0.2));
 }
 
+TEST_CASE("a read-back that is old when the link is new does not take the offset back", "[axis]") {
+  Bench bench;
+  bench.steps(50, 30.0);
+  const double sent_um = bench.channel.offset_um();
+  bench.obeys = false;
+  bench.input.link_epoch = 2;
+  bench.input.applied_um = sent_um - 1.0;  // half a second ago
+  bench.step(30.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == sent_um);
+  bench.obeys = true;
+  bench.steps(4, 30.0);
+  CHECK(bench.channel.offset_um() > sent_um);
+  bench.obeys = false;
+  bench.input.link_epoch = 3;
+  bench.input.applied_um = 0.0;  // restarted
+  bench.step(30.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == Approx(0.2));
+}
+
 TEST_CASE("a release that is said again does not wait anew for the read-backs of a slow link",
           "[axis]") {
   Bench bench;
