@@ -251,6 +251,7 @@ void Estimator::step(nanoseconds now, std::span<const Reading> readings,
   parts.step_axes(now, controller);
 
   command.link_epoch = controller.link_epoch;
+  command.look = controller.look;
   for (std::size_t i = 0; i < parts.axes.size(); ++i) {
     command.offset_um[i] = parts.axes[i].offset_um();
     command.valid[i] = parts.axes[i].driven();

@@ -62,6 +62,7 @@ struct ControllerState {
   /// Changes each time the link is (re)established or pauses: a command of another epoch was
   /// computed without knowing what is applied now. 0: never connected.
   std::uint32_t link_epoch{0};
+  std::uint64_t look{0};  ///< the link's number of this read-back, counted up
   bool online{false};
   std::array<double, axes_max> applied_um{};  ///< offset in effect, order of the axes [um]
   std::array<double, signals_max> signals{};  ///< order of the configuration, unit of the name
@@ -78,6 +79,9 @@ struct OffsetCommand {
   std::array<bool, axes_max> valid{};        ///< false: this axis must not be driven
   /// The link epoch these offsets belong to; a controller link never sends offsets of another one.
   std::uint32_t link_epoch{0};
+  /// The ControllerState they were computed from: an axis is not driven away from where it was seen
+  /// last by what did not know of it.
+  std::uint64_t look{0};
 };
 
 /// What an operator (or the CNC program) asks of the estimator, or the daemon that is about to end

@@ -99,6 +99,7 @@ void BridgeController::publish(const BridgeReport& report, bool taking, nanoseco
   state_.taken_at = now;
   state_.online = true;
   state_.link_epoch = gate_.epoch();
+  state_.look = gate_.look();
   state_.signals = report.signals;
   state_.applied_um = report.applied_um;
   if (!taking) state_.applied_um.fill(not_a_number);

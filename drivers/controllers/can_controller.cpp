@@ -353,6 +353,7 @@ bool CanController::compose_and_send(Outgoing& outgoing) {
 void CanController::publish(bool online, nanoseconds now) {
   state_.online = online;
   state_.link_epoch = gate_.epoch();
+  state_.look = gate_.look();
   if (incoming_.empty()) {
     state_.taken_at = now;
   } else {

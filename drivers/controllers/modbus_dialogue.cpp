@@ -371,6 +371,7 @@ std::array<double, axes_max> ModbusDialogue::without_leaps_um() const noexcept {
 void ModbusDialogue::publish(bool online) {
   state_.online = online;
   state_.link_epoch = gate_.epoch();
+  state_.look = gate_.look();
   states_.back() = state_;
   states_.publish();
 }

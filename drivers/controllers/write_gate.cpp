@@ -27,6 +27,7 @@ std::uint32_t WriteGate::synchronised() noexcept {
   looks_ = 0;
   sent_ = {};
   applied_um_.fill(not_a_number);
+  stands_since_.fill(++look_);
   return epoch_;
 }
 
@@ -59,18 +60,23 @@ nanoseconds WriteGate::next_pause() noexcept {
 
 bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcept {
   bool explained = true;
+  ++look_;
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     const double before_um = applied_um_[axis];
-    const SentLately& lately = sent_[axis];
-    const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
-    // Until something is sent it is what was read before the command that a command starts from.
-    if (lately.count != 0 || !to_be_driven || !std::isfinite(before_um))
+    if (!std::isfinite(applied_um[axis])) {
       applied_um_[axis] = applied_um[axis];
-    if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
+      continue;
+    }
+    const SentLately& lately = sent_[axis];
+    // Until something is sent, it is from where it was read to stand that a command starts.
+    const bool stands = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
+    if (lately.count != 0 || !stands) {
+      applied_um_[axis] = applied_um[axis];
+      stands_since_[axis] = look_;
+    }
+    if (!std::isfinite(before_um)) continue;
     if (lately.count == 0) {
-      // Not driven: about to be, from where it stood before.
-      explained =
-          explained && (!to_be_driven || std::abs(applied_um[axis] - before_um) <= slack_um_[axis]);
+      explained = explained && (command_.link_epoch != epoch_ || !starts_elsewhere(axis));
       continue;
     }
     // Anywhere between where it stood and what it was told.
@@ -83,6 +89,11 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
   return explained;
 }
 
+/// The first command of an axis was computed before it was read to stand where it does.
+bool WriteGate::starts_elsewhere(std::size_t axis) const noexcept {
+  return command_.valid[axis] && sent_[axis].count == 0 && command_.look < stands_since_[axis];
+}
+
 void WriteGate::offered(const OffsetCommand& command, nanoseconds now) noexcept {
   command_ = command;
   offered_at_ = now;
@@ -92,6 +103,8 @@ SendVerdict WriteGate::verdict(nanoseconds now) const noexcept {
   if (!in_sync_ || command_.link_epoch != epoch_) return SendVerdict::nothing_to_send;
   if (now - offered_at_ > renewal_max) return SendVerdict::nothing_to_send;
   if (last_sent_ && now - *last_sent_ > stall_max_) return SendVerdict::resynchronise;
+  for (std::size_t axis = 0; axis < axes_max; ++axis)
+    if (starts_elsewhere(axis)) return SendVerdict::resynchronise;
   return SendVerdict::send;
 }
 

@@ -16,7 +16,8 @@ namespace thermocomp {
 enum class SendVerdict {
   send,
   nothing_to_send,  ///< no command of this epoch, or the cycle stands still: not even a heartbeat
-  resynchronise     ///< too long since the last write: what is applied must be read back first
+  resynchronise     ///< too long since the last write, or the command was computed before the axis
+                    ///< went elsewhere: what is applied must be read back first
 };
 
 class WriteGate {
@@ -53,6 +54,8 @@ class WriteGate {
   [[nodiscard]] bool in_sync() const noexcept { return in_sync_; }
   /// The newest epoch; 0: never synchronised.
   [[nodiscard]] std::uint32_t epoch() const noexcept { return epoch_; }
+  /// Counts synchronised() and explains(): the number of what was read back last.
+  [[nodiscard]] std::uint64_t look() const noexcept { return look_; }
 
   /// The cycle has left a command (again).
   void offered(const OffsetCommand& command, nanoseconds now) noexcept;
@@ -74,11 +77,14 @@ class WriteGate {
   [[nodiscard]] bool explains(const std::array<double, axes_max>& applied_um) noexcept;
 
  private:
+  [[nodiscard]] bool starts_elsewhere(std::size_t axis) const noexcept;
+
   nanoseconds period_;
   nanoseconds stall_max_;
   bool in_sync_{false};
   bool link_is_new_{true};
   std::uint32_t epoch_{0};
+  std::uint64_t look_{0};
   OffsetCommand command_{};
   nanoseconds offered_at_{};
   std::optional<nanoseconds> last_sent_;  ///< in this epoch
@@ -92,7 +98,10 @@ class WriteGate {
     std::size_t count{0};
   };
   std::array<SentLately, axes_max> sent_{};
-  std::array<double, axes_max> applied_um_{};  ///< as read last
+  /// As read last; of an axis to which nothing has been sent, where it stands since
+  /// `stands_since_`.
+  std::array<double, axes_max> applied_um_{};
+  std::array<std::uint64_t, axes_max> stands_since_{};  ///< look
   std::array<double, axes_max> slack_um_{};
 };
 

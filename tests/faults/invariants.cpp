@@ -412,7 +412,9 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   budget.at = move.at;
   const double change_um = std::abs(move.to_um - move.from_um);
   // Offsets move on the cycle's grid, writes come when the link has its turn: one cycle besides.
-  double allowed_um = budget.um + rate_um * period_s_ + 2.0 * resolution_um_;
+  const double since_seen_um = rate_um * to_s(move.at - move.seen_at);
+  double allowed_um = (move.disturbed ? std::min(budget.um, since_seen_um) : budget.um) +
+                      rate_um * period_s_ + 2.0 * resolution_um_;
   // An operator may have released an axis on the word of a controller that has stopped lying since.
   const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
   if (move.disturbed || lies) budget.disturbed_at = move.at;

@@ -216,6 +216,8 @@ void SimulatedController::advance(nanoseconds time) {
   on_ = on;
   const FaultEvent* rehoming = schedule_.find(FaultKind::controller_rehomed, time);
   if (rehoming == nullptr || rehoming->number == last_rehoming_) return;
+  // Every other one comes when it is least convenient: right after a new link's first reading.
+  if (rehoming->subject / 4 % 2 == 1 && reads_since_break_ != 1) return;
   last_rehoming_ = rehoming->number;
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     if (rehoming->subject % 4 != 3 && rehoming->subject % 4 != axis) continue;
@@ -245,7 +247,10 @@ void SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
   for (std::size_t i = 0; i < words.size(); ++i)
     words[i] =
         address + i >= 100 && address + i < 108 ? image[address + i - 100] : std::uint16_t{0};
+  for (std::size_t axis = 0; axis < axes_count; ++axis)
+    if (!seen_[axis]) seen_at_[axis] = time;
   seen_.fill(true);
+  ++reads_since_break_;
   looked_at_ = time;
 }
 
@@ -266,7 +271,7 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
       told_um = static_cast<double>(
           std::bit_cast<float>(static_cast<std::uint32_t>(written_[at]) << 16 | written_[at + 1]));
     moves_.push_back({axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis],
-                      breaks_, looked_at_});
+                      breaks_, looked_at_, seen_at_[axis]});
     if (lie(FaultKind::controller_ignoring, axis, time) != nullptr) {
       disturb(axis, applied_um_[axis]);
       continue;

@@ -115,6 +115,7 @@ struct Move {
   bool seen{false};         ///< ... and has told it since (a read-back was served)
   std::uint64_t breaks{0};  ///< of the link, until then
   nanoseconds looked_at{};  ///< when a read-back was served last
+  nanoseconds seen_at{};    ///< when the first that tells of the change was
 };
 
 class SimulatedController {
@@ -131,7 +132,10 @@ class SimulatedController {
   [[nodiscard]] bool lies(nanoseconds time) const noexcept;
   /// Something went wrong on the line, or it was connected anew: what comes after it may be another
   /// controller, or the same one restarted.
-  void link_broke() noexcept { ++breaks_; }
+  void link_broke() noexcept {
+    ++breaks_;
+    reads_since_break_ = 0;
+  }
   [[nodiscard]] std::uint64_t link_breaks() const noexcept { return breaks_; }
   /// As it shows it: where the model corrects itself, wrong for two seconds now and then.
   [[nodiscard]] bool says_cutting(nanoseconds time) const noexcept;
@@ -153,12 +157,14 @@ class SimulatedController {
   bool on_{true};
   std::uint64_t last_rehoming_{0};
   std::uint64_t breaks_{0};
+  std::uint64_t reads_since_break_{0};
   nanoseconds looked_at_{};
   std::array<std::uint64_t, axes_count> frozen_by_{};  ///< the fault that froze the read-back
   std::array<double, axes_count> frozen_um_{};
   std::array<double, axes_count> applied_um_{};
   std::array<bool, axes_count> disturbed_{};
   std::array<bool, axes_count> seen_{};
+  std::array<nanoseconds, axes_count> seen_at_{};
   std::array<std::uint16_t, 16> written_{};
   std::vector<Move> moves_;
 };

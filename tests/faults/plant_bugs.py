@@ -33,6 +33,9 @@ BUGS = [
     ("pause_taken_for_a_new_link", "drivers/controllers/write_gate.cpp",
      "if (link_is_new_) {",
      "if (link_is_new_ || {P}) {"),
+    ("older_look_is_sent", "drivers/controllers/write_gate.cpp",
+     "command_.look < stands_since_[axis];",
+     "!{P} && command_.look < stands_since_[axis];"),
     ("write_repeated_blindly", "drivers/controllers/modbus_dialogue.cpp",
      "  const Exchange exchange =\n"
      "      connection_.write_registers(config_.unit, request.address, request.words);\n",

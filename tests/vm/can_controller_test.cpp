@@ -269,6 +269,7 @@ TEST_CASE("the end of the CAN link sends the newest command once more", "[vm][co
   REQUIRE(eventually([&] { return dump.listens(bus, 0x100); }));
   OffsetCommand command;
   command.link_epoch = state.link_epoch;
+  command.look = state.look;
   command.offset_um[0] = 1.5;
   command.valid[0] = true;
   link.offer(command);

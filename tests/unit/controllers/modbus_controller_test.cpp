@@ -327,6 +327,7 @@ TEST_CASE("the link's end writes the newest command once more and nothing else",
   }));
   OffsetCommand command;
   command.link_epoch = state.link_epoch;
+  command.look = state.look;
   command.offset_um[0] = 1.5;
   command.valid[0] = true;
   link.offer(command);

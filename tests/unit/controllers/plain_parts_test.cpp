@@ -166,6 +166,31 @@ TEST_CASE("an axis on its way to what it was sent lately is explained, one elsew
   CHECK(gate.explains(applied_um));
 }
 
+TEST_CASE("what was computed before an axis went elsewhere is not sent", "[controllers]") {
+  WriteGate gate(100ms);
+  std::array<double, axes_max> applied_um{};
+  applied_um.fill(not_a_number);
+  applied_um[0] = 20.0;
+  static_cast<void>(gate.synchronised(applied_um));
+  OffsetCommand command = of_epoch(gate.epoch());
+  command.offset_um[0] = 20.0;
+  command.valid[0] = true;
+  command.look = gate.look();
+  CHECK(gate.explains(applied_um));
+  applied_um[0] = 0.0;  // re-homed; no command of this epoch is known yet
+  CHECK(gate.explains(applied_um));
+  gate.offered(command, 0s);
+  CHECK(gate.verdict(0s) == SendVerdict::resynchronise);
+  CHECK_FALSE(gate.explains(applied_um));
+  command.offset_um[0] = 0.0;
+  command.look = gate.look();
+  gate.offered(command, 0s);
+  CHECK(gate.verdict(0s) == SendVerdict::send);
+  gate.sent(0s);
+  gate.offered(command, 0s);
+  CHECK(gate.verdict(0s) == SendVerdict::send);
+}
+
 TEST_CASE("an axis that was never sent anything may go where it likes", "[controllers]") {
   WriteGate gate(100ms);
   static_cast<void>(gate.synchronised());
@@ -318,6 +343,7 @@ TEST_CASE("a controller that moves between read-back and first command is notice
   applied_um[0] = 23.0;
   OffsetCommand command;
   command.link_epoch = gate.synchronised(applied_um);
+  command.look = gate.look();
   command.offset_um[0] = 23.1;
   command.valid[0] = true;
   gate.offered(command, 1s);
