@@ -2,6 +2,7 @@
 
 import functools
 import math
+import threading
 import time
 
 import axis as lies
@@ -158,6 +159,73 @@ def two_daemons_on_one_controller(rig):
     rig.must(len(writers) < 2, "both still drive the axis")
     if second.alive():
         rig.must(second.end(), "the second daemon does not end well")
+
+
+@attack(links=("tcp", "bridge"))
+def late_on_a_link_that_is_lost(rig):
+    """An honest controller whose readings are half a second old, on a link that begins anew while
+    the axis is on its way."""
+    if not rig.start(BEFORE_UM):
+        return
+    rig.axis.lie = lies.late(0.5)
+    for attempt in range(6):
+        rig.tries += 1
+        rig.machine.wants_um(WANTED_UM if attempt % 4 < 2 else -WANTED_UM)
+        time.sleep(rig.random.uniform(0.5, 1.2))
+        if rig.machine.link == "bridge":
+            rig.machine.slave.session += 1
+        else:
+            rig.machine.slave.drop_links()
+    rig.axis.lie = None
+    rig.follows_again()
+
+
+@attack(links=("tcp", "rtu"))
+def restarts_while_a_write_is_said_again(rig):
+    """The answer to a write is lost, and the controller begins anew at 0 before the next."""
+    if not rig.start(-6.0):
+        return
+
+    def lose_one(_frame_of, request, answer):
+        if request[0] != 16:
+            return [answer]
+        rig.machine.slave.spoil = lambda _frame_of, _request, answer: [answer]
+        threading.Timer(rig.random.choice((0.0, 0.05, 0.15, 0.3)),
+                        rig.machine.controller.restart).start()
+        return []
+    for attempt in range(3):
+        rig.tries += 1
+        rig.machine.wants_um(WANTED_UM if attempt % 2 == 0 else -18.0)
+        # One that moves the axis by less than `mismatch_um` looks like the controller's own lag.
+        rig.must(eventually(lambda: rig.release() or abs(rig.axis.position_um) > 8.0, 15.0),
+                 "the axis is not driven")
+        rig.machine.slave.spoil = lose_one
+        time.sleep(1.0)
+    rig.follows_again()
+
+
+@attack(links=BUSES)
+def lies_when_it_is_released(rig):
+    """Whoever releases a latched axis is told something else the next moment."""
+    if not rig.start(BEFORE_UM):
+        return
+    for _ in range(3):
+        rig.tries += 1
+        rig.axis.lie = lies.constant(rig.random.choice((9.0, -9.0, 400.0)))
+        rig.machine.wants_um(rig.random.uniform(WANTED_UM, -WANTED_UM))
+        rig.must(eventually(lambda: latched(rig.daemon), 8.0), "a mismatch is not latched")
+        rig.axis.lie = None
+        time.sleep(rig.random.uniform(0.0, 0.6))
+        rig.release()
+        time.sleep(rig.random.uniform(0.0, 0.06))
+        rig.axis.lie = rig.random.choice((lies.constant(rig.random.uniform(-12.0, 12.0)),
+                                          lies.factor(0.5), lies.factor(-1.0)))
+        for _ in range(rig.random.randint(0, 4)):
+            time.sleep(rig.random.uniform(0.0, 0.1))
+            rig.release()
+        time.sleep(rig.random.choice((0.02, 0.2, 1.0)))
+    rig.axis.lie = None
+    rig.follows_again()
 
 
 @attack(links=("tcp", "rtu", "can"))

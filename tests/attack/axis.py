@@ -51,6 +51,7 @@ class Axis:
         self.writes = []
         self.writers = {}
         self.told = {}  # before its first write; writer: (when it read first, its last readings)
+        self.under_way = set()  # writers of which one value may come that knows of no new beginning
         self.before_shown = lambda: None
 
     def written(self, value_um, writer=1, at_s=None):
@@ -58,6 +59,9 @@ class Axis:
         with self.lock:
             last = self.writers.get(writer)
             if last is None:
+                if writer in self.under_way and writer not in self.told:
+                    self.under_way.discard(writer)
+                    return
                 told_at, readings_um = self.told.get(writer, (now, [self.position_um]))
                 if now < told_at:
                     return  # was on its way when the controller began anew, which drops its queue
@@ -66,6 +70,7 @@ class Axis:
                 if abs(value_um - self.position_um) < abs(value_um - stood_um):
                     stood_um = self.position_um  # a lie that changes: the truth is right too
                 last = Writer(stood_um, told_at, told_at)
+            self.under_way.discard(writer)
             self.writes.append(Write(now, last.since_s, last.value_um, value_um, writer,
                                      self.bound_um, self.rate_um_per_s))
             again = value_um == last.value_um and now - last.at_s > SENT_AGAIN_AFTER_S
@@ -96,6 +101,7 @@ class Axis:
 
     def begin_anew(self, writer=None):
         with self.lock:
+            self.under_way |= self.writers.keys() if writer is None else {writer}
             for each in (self.writers, self.told):
                 for one in [writer] if writer is not None else list(each):
                     each.pop(one, None)
