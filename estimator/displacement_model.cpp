@@ -96,6 +96,20 @@ struct DisplacementModel::Parts {
       }
     }
   }
+
+  void add_guideway_slopes(std::size_t output, std::span<const double> signal_values,
+                           std::span<double> slope_um_per_K) const noexcept {
+    for (const Guideway& guideway : guideways) {
+      const auto [lower, share] = guideway.place(signal_values[guideway.signal]);
+      for (std::size_t i = 0; i < guideway.outputs.size(); ++i) {
+        if (guideway.outputs[i] != output) continue;
+        const Matrix& rows = guideway.rows_um_per_K[i];
+        for (Eigen::Index j = 0; j < inputs; ++j)
+          slope_um_per_K[static_cast<std::size_t>(j)] +=
+              (1.0 - share) * rows(lower, j) + share * rows(lower + 1, j);
+      }
+    }
+  }
 };
 
 DisplacementModel::DisplacementModel(const ThermalModel& model)
@@ -141,6 +155,23 @@ void DisplacementModel::step(nanoseconds now, std::span<const double> temps_degC
   const TermInput input{now, rise_K, signals};
   for (auto& term : parts.terms) term->add(input, displacement_um);
   for (auto& term : parts.terms) term->correct_displacement(displacement_um);
+}
+
+void DisplacementModel::slope(std::size_t output, std::span<const double> rise_K,
+                              std::span<const double> signals,
+                              std::span<double> slope_um_per_K) const noexcept {
+  const Parts& parts = *parts_;
+  THERMOCOMP_ENSURE(output < parts.outputs && signals.size() == parts.signals);
+  THERMOCOMP_ENSURE(rise_K.size() == parts.columns && slope_um_per_K.size() == parts.columns);
+  std::fill(slope_um_per_K.begin(), slope_um_per_K.end(), 0.0);
+  for (Eigen::Index j = 0; j < parts.inputs; ++j)
+    slope_um_per_K[static_cast<std::size_t>(j)] =
+        parts.matrix_um_per_K(static_cast<Eigen::Index>(output), j);
+  parts.add_guideway_slopes(output, signals, slope_um_per_K);
+  const TermInput input{{}, rise_K, signals};
+  for (const auto& term : parts.terms) term->add_slope(input, output, slope_um_per_K);
+  for (const auto& term : parts.terms) term->add_slope_on_the_way(output, slope_um_per_K);
+  for (const auto& term : parts.terms) term->correct_slope(slope_um_per_K);
 }
 
 void DisplacementModel::visit_state(StateArchive& archive) {

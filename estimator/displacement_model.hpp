@@ -35,6 +35,16 @@ class DisplacementModel {
             std::span<const double> reference_degC, std::span<const double> signals,
             std::span<double> displacement_um) noexcept;
 
+  /// The derivative of an output to the temperatures, at these rises and positions: matrix,
+  /// guideway rows and terms. Where a term answers late, the larger of what it does on the way and
+  /// in the end.
+  /// @param rise_K          shape (temperature_columns)
+  /// @param signals         shape (signal_columns)
+  /// @param slope_um_per_K  shape (temperature_columns); overwritten
+  /// Never throws, never allocates; O(columns + terms).
+  void slope(std::size_t output, std::span<const double> rise_K, std::span<const double> signals,
+             std::span<double> slope_um_per_K) const noexcept;
+
   void visit_state(StateArchive& archive);
   /// Takes over the states of all terms. @pre made from the same model. Never allocates.
   void copy_states(DisplacementModel& same) noexcept;

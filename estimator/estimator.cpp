@@ -9,7 +9,6 @@
 #include "estimator/checks.hpp"
 #include "estimator/cycle_hold.hpp"
 #include "estimator/displacement_model.hpp"
-#include "estimator/input_gains.hpp"
 #include "estimator/lost_blocks.hpp"
 #include "estimator/model_domain.hpp"
 #include "estimator/name_index.hpp"
@@ -98,7 +97,6 @@ struct Estimator::Parts {
   std::vector<std::string> columns;
   BlockBank blocks;
   LostBlocks lost;
-  InputGains gains;
   DisplacementModel displacement;
   DisplacementModel at_reference;     ///< the same model, only ever asked for the zero
   std::optional<ModelDomain> domain;  ///< of a model that says what it was made from
@@ -162,7 +160,6 @@ Estimator::Parts::Parts(const EstimatorConfig& estimator_config, const ThermalMo
       columns(model.temperature_columns()),
       blocks(config, columns),
       lost(estimating_model(model, config), settling_time(config)),
-      gains(model),
       displacement(model),
       at_reference(model),
       cycle_hold(model, config.compensation.cycle_ahead),
@@ -299,7 +296,7 @@ bool Estimator::Parts::certain() noexcept {
   const double limit_um = config.compensation.offset_sd_um_max * (uncertain ? certain_again : 1.0);
   uncertain = false;
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    gains.of_output(axis_output[i], rise_K, signal_values, gain_um_per_K);
+    displacement.slope(axis_output[i], rise_K, signal_values, gain_um_per_K);
     offset_sd_um[i] = lost.sd_of(gain_um_per_K);
     // Negated so that NaN is uncertain.
     if (!(offset_sd_um[i] <= limit_um)) uncertain = true;

@@ -14,6 +14,8 @@ class OutputHysteresis final : public Term {
   void correct_displacement(std::span<double> displacement_um) noexcept override {
     displacement_um[subject_] = joint_.step(displacement_um[subject_]);
   }
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
   void restart() noexcept override { joint_.restart(); }
   void visit_state(StateArchive& archive) override { archive(joint_); }
 
@@ -31,6 +33,8 @@ class TemperatureHysteresis final : public Term {
   void correct_rise(nanoseconds /*now*/, std::span<double> rise_K) noexcept override {
     rise_K[subject_] = joint_.step(rise_K[subject_]);
   }
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
   void restart() noexcept override { joint_.restart(); }
   void visit_state(StateArchive& archive) override { archive(joint_); }
 

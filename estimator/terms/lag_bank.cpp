@@ -14,6 +14,10 @@ class LagBank final : public Term {
   explicit LagBank(const TermContext& context);
 
   void add(const TermInput& input, std::span<double> displacement_um) noexcept override;
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
+  void add_slope_on_the_way(std::size_t output,
+                            std::span<double> slope_um_per_K) const noexcept override;
   void restart() noexcept override { started_ = false; }
   void visit_state(StateArchive& archive) override {
     archive(started_, at_, step_, shares_, late_);
@@ -93,6 +97,23 @@ void LagBank::add(const TermInput& input, std::span<double> displacement_um) noe
     double sum_um = 0.0;
     for (std::size_t i = 0; i < states; ++i) sum_um += gains[i] * late_[i];
     displacement_um[output] += sum_um;
+  }
+}
+
+/// A rise acts through one time constant after the other.
+void LagBank::add_slope_on_the_way(std::size_t output,
+                                   std::span<double> slope_um_per_K) const noexcept {
+  const double* gains = gains_.data() + output * late_.size();
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    if (!columns_[i].temperature || columns_[i].squared) continue;
+    double& slope = slope_um_per_K[columns_[i].index];
+    double largest = slope;
+    double reached = 0.0;
+    for (std::size_t j = 0; j < taus_s_.size(); ++j) {
+      reached += gains[j * columns_.size() + i];
+      if (std::abs(slope + reached) > std::abs(largest)) largest = slope + reached;
+    }
+    slope = largest;
   }
 }
 

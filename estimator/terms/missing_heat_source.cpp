@@ -20,6 +20,8 @@ class MissingHeatSource final : public Term {
     for (std::size_t i = 0; i < gain_um_per_unit_.size(); ++i)
       displacement_um[i] += gain_um_per_unit_[i] * heat;
   }
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
   void restart() noexcept override { heat_.restart(); }
   void visit_state(StateArchive& archive) override { archive(heat_); }
 

@@ -17,6 +17,10 @@ class MissingTemperature final : public Term {
     for (std::size_t i = 0; i < gain_um_per_K_.size(); ++i)
       displacement_um[i] += gain_um_per_K_[i] * rise_K;
   }
+  void add_slope(const TermInput& /*input*/, std::size_t output,
+                 std::span<double> slope_um_per_K) const noexcept override {
+    slope_um_per_K[subject_] += gain_um_per_K_[output];
+  }
   void restart() noexcept override { rise_.restart(); }
   void visit_state(StateArchive& archive) override { archive(rise_); }
 

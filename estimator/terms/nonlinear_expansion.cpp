@@ -14,6 +14,10 @@ class NonlinearExpansion final : public Term {
     for (std::size_t i = 0; i < gain_um_per_K2_.size(); ++i)
       displacement_um[i] += gain_um_per_K2_[i] * squared_K2;
   }
+  void add_slope(const TermInput& input, std::size_t output,
+                 std::span<double> slope_um_per_K) const noexcept override {
+    slope_um_per_K[subject_] += 2.0 * gain_um_per_K2_[output] * input.rise_K[subject_];
+  }
   void restart() noexcept override {}
   void visit_state(StateArchive& /*archive*/) override {}
 

@@ -17,6 +17,10 @@ class PositionDependence final : public Term {
     for (std::size_t i = 0; i < gain_um_per_K_mm_.size(); ++i)
       displacement_um[i] += gain_um_per_K_mm_[i] * lever_K_mm;
   }
+  void add_slope(const TermInput& input, std::size_t output,
+                 std::span<double> slope_um_per_K) const noexcept override {
+    slope_um_per_K[temperature_] += gain_um_per_K_mm_[output] * (input.signals[position_] - p0_mm_);
+  }
   void restart() noexcept override {}
   void visit_state(StateArchive& /*archive*/) override {}
 

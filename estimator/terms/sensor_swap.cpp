@@ -14,6 +14,11 @@ class SensorSwap final : public Term {
   void correct_rise(nanoseconds /*now*/, std::span<double> rise_K) noexcept override {
     std::swap(rise_K[first_], rise_K[second_]);
   }
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
+  void correct_slope(std::span<double> slope_um_per_K) const noexcept override {
+    std::swap(slope_um_per_K[first_], slope_um_per_K[second_]);
+  }
   void restart() noexcept override {}
   void visit_state(StateArchive& /*archive*/) override {}
 

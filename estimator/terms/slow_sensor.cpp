@@ -13,6 +13,8 @@ class SlowSensor final : public Term {
   void correct_rise(nanoseconds now, std::span<double> rise_K) noexcept override {
     rise_K[subject_] = quick_.step(now, rise_K[subject_]);
   }
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
   void restart() noexcept override { quick_.restart(); }
   void visit_state(StateArchive& archive) override { archive(quick_); }
 

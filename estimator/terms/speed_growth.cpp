@@ -14,6 +14,8 @@ class SpeedGrowth final : public Term {
     for (std::size_t i = 0; i < gain_um_per_unit2_.size(); ++i)
       displacement_um[i] += gain_um_per_unit2_[i] * squared;
   }
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
   void restart() noexcept override {}
   void visit_state(StateArchive& /*archive*/) override {}
 

@@ -34,6 +34,17 @@ class Term {
   virtual void add(const TermInput& /*input*/, std::span<double> /*displacement_um*/) noexcept {}
   /// What the structure makes of the displacement.
   virtual void correct_displacement(std::span<double> /*displacement_um*/) noexcept {}
+
+  /// Adds how much `output` moves with each temperature by this term in the end
+  /// [um/K], shape (temperature_columns); for the spread of an offset. Every kind says it, also
+  /// that it is nothing: an operating signal's, or one that passes a temperature on late.
+  virtual void add_slope(const TermInput& input, std::size_t output,
+                         std::span<double> slope_um_per_K) const noexcept = 0;
+  /// After all add_slope(): where the way to the end goes further than the end, that.
+  virtual void add_slope_on_the_way(std::size_t /*output*/,
+                                    std::span<double> /*slope_um_per_K*/) const noexcept {}
+  /// After both: from the corrected rise to what was read.
+  virtual void correct_slope(std::span<double> /*slope_um_per_K*/) const noexcept {}
   /// Forgets the past: lags start at their input's present value.
   virtual void restart() noexcept = 0;
   virtual void visit_state(StateArchive& archive) = 0;

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "estimator/low_pass.hpp"
 #include "estimator/terms/term.hpp"
 
@@ -17,6 +19,14 @@ class ThermalLag final : public Term {
     const double lag_K = late_.step(input.now, rise_K) - rise_K;
     for (std::size_t i = 0; i < gain_um_per_K_.size(); ++i)
       displacement_um[i] += gain_um_per_K_[i] * lag_K;
+  }
+  void add_slope(const TermInput& /*input*/, std::size_t /*output*/,
+                 std::span<double> /*slope_um_per_K*/) const noexcept override {}
+  void add_slope_on_the_way(std::size_t output,
+                            std::span<double> slope_um_per_K) const noexcept override {
+    double& slope = slope_um_per_K[subject_];
+    const double at_once = slope - gain_um_per_K_[output];
+    if (std::abs(at_once) > std::abs(slope)) slope = at_once;
   }
   void restart() noexcept override { late_.restart(); }
   void visit_state(StateArchive& archive) override { archive(late_); }

@@ -13,6 +13,10 @@ class WrongCoefficient final : public Term {
     for (std::size_t i = 0; i < delta_um_per_K_.size(); ++i)
       displacement_um[i] += delta_um_per_K_[i] * input.rise_K[subject_];
   }
+  void add_slope(const TermInput& /*input*/, std::size_t output,
+                 std::span<double> slope_um_per_K) const noexcept override {
+    slope_um_per_K[subject_] += delta_um_per_K_[output];
+  }
   void restart() noexcept override {}
   void visit_state(StateArchive& /*archive*/) override {}
 

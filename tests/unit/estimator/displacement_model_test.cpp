@@ -7,7 +7,6 @@
 
 #include "estimator/checks.hpp"
 #include "estimator/estimator_config.hpp"
-#include "estimator/input_gains.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
@@ -341,15 +340,69 @@ TEST_CASE("a bank whose shapes or names do not fit is refused", "[displacement]"
   CHECK_THROWS_AS(DisplacementModel(spec), InvalidValue);
 }
 
+TEST_CASE("the slope is what a small rise does in the end, whatever the terms", "[displacement]") {
+  const auto term = [](const char* kind, const char* subject, const char* gain, double value) {
+    TermSpec spec;
+    spec.kind = kind;
+    spec.subject = subject;
+    if (*gain != '\0') spec.per_output[gain] = {{"z_um", value}};
+    return spec;
+  };
+  ThermalModel spec = two_by_two();
+  spec.guideways = {{"column", "y_mm", {0.0, 100.0}, {{"z_um", {{1.0, 0.0}, {3.0, 10.0}}}}}};
+  spec.terms = {term("wrong_coefficient", "t1_degC", "delta_um_per_K", 0.75),
+                term("nonlinear_expansion", "t2_degC", "gain_um_per_K2", 0.25),
+                term("missing_temperature", "room_degC", "gain_um_per_K", -1.5),
+                term("position_dependence", "t2_degC|y_mm", "gain_um_per_K_mm", 0.01),
+                term("thermal_lag", "t2_degC", "gain_um_per_K", 0.5),
+                term("sensor_swap", "t1_degC|t2_degC", "", 0.0)};
+  spec.terms[2].shared["tau_s"] = 600.0;
+  spec.terms[3].shared["p0_mm"] = 20.0;
+  spec.terms[4].shared["tau_s"] = 300.0;
+  DisplacementModel model(spec);
+  REQUIRE(spec.temperature_columns().size() == 3);
+  const Vector signals{60.0};
+  const auto z_um = [&](Vector rise_K) {
+    model.restart();  // every lag is over
+    return displacement(model, 1s, rise_K, Vector(3, 0.0), signals, 2)[1];
+  };
+  const Vector rise_K{4.0, 3.0, 2.0};
+  Vector slope(3);
+  // The slope is taken at the rises that the structure has, which here are exchanged.
+  model.slope(1, Vector{3.0, 4.0, 2.0}, signals, slope);
+  for (std::size_t i = 0; i < 3; ++i) {
+    Vector more = rise_K;
+    Vector less = rise_K;
+    more[i] += 1e-3;
+    less[i] -= 1e-3;
+    CAPTURE(i);
+    CHECK(slope[i] == Approx((z_um(more) - z_um(less)) / 2e-3));
+  }
+}
+
+TEST_CASE("the slope counts a lag that goes further on the way than in the end", "[displacement]") {
+  ThermalModel spec = two_by_two();
+  TermSpec lag;
+  lag.kind = "thermal_lag";
+  lag.subject = "t2_degC";
+  lag.shared["tau_s"] = 300.0;
+  lag.per_output["gain_um_per_K"] = {{"z_um", -2.0}};
+  spec.terms = {lag};
+  const DisplacementModel model(spec);
+  Vector slope(2);
+  model.slope(1, Vector{1.0, 1.0}, {}, slope);
+  CHECK(slope == Vector{-2.0, 5.0});  // 3 + 2 at once, 3 in the end
+}
+
 TEST_CASE("the certainty of an offset counts the largest that a bank may still do",
           "[displacement]") {
   ThermalModel spec = with_bank();  // z: -2 at once, then -0.5
-  InputGains gains(spec);
+  const DisplacementModel model(spec);
   Vector slope(2);
-  gains.of_output(1, Vector{1.0, 1.0}, Vector{0.0}, slope);
+  model.slope(1, Vector{1.0, 1.0}, Vector{0.0}, slope);
   CHECK(slope == Vector{-2.0, 3.0});
   spec.terms[0].bank.gain_um_per_unit["z_um"] = {{1.0, 9.0}, {0.0, 0.0}};
-  InputGains more(spec);  // -2, then -1, then 8
-  more.of_output(1, Vector{1.0, 1.0}, Vector{0.0}, slope);
+  const DisplacementModel more(spec);  // -2, then -1, then 8
+  more.slope(1, Vector{1.0, 1.0}, Vector{0.0}, slope);
   CHECK(slope == Vector{8.0, 3.0});
 }
