@@ -107,13 +107,19 @@ void AxisChannel::compare(const AxisInput& input) noexcept {
 }
 
 /// The axis is not driven until the controller itself is within the bound. A controller that was
-/// away may have lost its offset; one that comes back with another is not believed.
+/// away may have lost its offset; one that comes back with another is not believed. One that shows
+/// what was sent lately has it still, and only tells it late: the value sent stays the axis' own.
 void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
   if (out_of_bound_) return;
   if (driven_once_ && !check_.agrees_after_absence(input.applied_um))
     return note_unexplained(input, fresh);
   starting_ = false;
   in_doubt_ = false;
+  const bool at_nothing = std::abs(input.applied_um) <= same_read_back_um;
+  if (driven_once_ && !at_nothing && check_.agrees(input.applied_um)) {
+    stands_for_ = read_backs_until_written;  // what was sent last may not have been written
+    return;
+  }
   unwritten_for_ = read_backs_until_written;
   // Nothing sent and nothing read: nothing is added there.
   if (!driven_once_ && std::abs(input.applied_um) <= same_read_back_um)

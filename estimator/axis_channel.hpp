@@ -23,8 +23,9 @@ struct AxisInput {
 };
 
 /// A read-back is evidence, not a command. The offset starts from it in three cases only: at the
-/// first contact with a controller; on a new link, where it is what was sent, nothing, or between;
-/// and when an operator releases a mismatch. In all others the value sent stays the axis' own.
+/// first contact with a controller; on a new link, where it is nothing, or between that and what
+/// was sent lately; and when an operator releases a mismatch. In all others the value sent stays
+/// the axis' own.
 ///
 /// A read-back that nothing sent lately explains pauses the axis; a second one before so many good
 /// ones have followed latches the mismatch: the axis is not driven until release().

@@ -5,6 +5,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "modelling/diagnosis/false_reading.hpp"
+
 namespace thermocomp::diagnosis {
 namespace {
 
@@ -47,7 +49,7 @@ double noise_of(const Column& residual, const Eigen::Array<bool, Eigen::Dynamic,
 constexpr double seen_min = 0.1;
 
 /// Displacement that errors of the model's coefficients add, each of one standard deviation: the
-/// principal columns of coefficient times temperature, as independent of each other
+/// principal columns of what the model makes of each temperature, as independent of each other
 /// as the errors are.
 Eigen::MatrixXd coefficient_columns_of(const MeasuredData& data, const StackedRows& rows,
                                        std::size_t output,
@@ -60,8 +62,10 @@ Eigen::MatrixXd coefficient_columns_of(const MeasuredData& data, const StackedRo
       const MeasuredRun& run = data.runs[i];
       const Block& block = rows.runs[i];
       const Eigen::Index count = block.end - block.begin;
+      Panel moved = run.calm_inputs_K[input];
+      answer_to_errors(data, run, output, input, moved);
       all.col(static_cast<Eigen::Index>(input)).segment(block.begin, count) =
-          data.coefficient(run, output, input).cwiseProduct(run.calm_inputs_K[input]).tail(count);
+          moved.col(0).tail(count);
     }
   }
   all *= data.coefficient_sd;

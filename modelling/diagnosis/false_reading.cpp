@@ -1,66 +1,114 @@
 #include "modelling/diagnosis/false_reading.hpp"
 
 #include <algorithm>
-
-#include "modelling/diagnosis/series.hpp"
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace thermocomp::diagnosis {
 namespace {
 
-double value_of(const std::map<std::string, double>& values, const std::string& name) {
-  const auto found = values.find(name);
-  return found == values.end() ? 0.0 : found->second;
+using Names = std::set<std::string>;
+
+std::vector<std::string> subjects_of(const TermSpec& term) {
+  if (term.kind == "lag_bank") return term.bank.subjects;
+  const SubjectColumns columns = subject_columns(term.subject);
+  if (columns.second.empty()) return {columns.first};
+  return {columns.first, columns.second};
 }
 
-double gain_of(const TermSpec& term, const std::string& name, const std::string& output) {
-  const auto found = term.per_output.find(name);
-  return found == term.per_output.end() ? 0.0 : value_of(found->second, output);
+bool names_one_of(const TermSpec& term, const Names& readings) {
+  const std::vector<std::string> subjects = subjects_of(term);
+  return std::any_of(subjects.begin(), subjects.end(),
+                     [&](const std::string& subject) { return readings.contains(subject); });
 }
 
-/// Adds what one term makes of the errors.
-void add_answer(const TermSpec& term, const std::string& output, const Column& time_s,
-                const Panel& errors_K, Panel& answer_um) {
-  const bool late = term.kind == "thermal_lag";
-  const double gain =
-      gain_of(term, "gain_um_per_K", output) + gain_of(term, "delta_um_per_K", output);
-  if (gain == 0.0) return;
-  Panel filtered = errors_K;
-  const double tau_s = value_of(term.shared, "tau_s");
-  if (tau_s > 0) {
-    const std::vector<double> taus_s(static_cast<std::size_t>(errors_K.cols()), tau_s);
-    lag_each(time_s, taus_s, filtered);
+/// The input, and those that its reading goes to where channels are exchanged.
+Names readings_beside(const ThermalModel& model, std::size_t input) {
+  Names readings = {model.inputs[input]};
+  for (std::size_t known = 0; known < readings.size();) {
+    known = readings.size();
+    for (const TermSpec& term : model.terms) {
+      if (term.kind != "sensor_swap" || !names_one_of(term, readings)) continue;
+      for (std::string& name : subjects_of(term)) readings.insert(std::move(name));
+    }
   }
-  answer_um += gain * filtered;
-  if (late) answer_um -= gain * errors_K;
+  return readings;
 }
 
-bool is_linear(const TermSpec& term) {
-  return term.kind == "thermal_lag" || term.kind == "wrong_coefficient";
+/// Those of the values that stand where `kept` says so.
+template <class Value>
+std::vector<Value> kept_of(const std::vector<Value>& values, const std::vector<bool>& kept) {
+  std::vector<Value> some;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (kept[i]) some.push_back(values[i]);
+  return some;
+}
+
+std::vector<bool> which_are(const std::vector<std::string>& columns, const Names& readings) {
+  std::vector<bool> kept;
+  for (const std::string& column : columns) kept.push_back(readings.contains(column));
+  return kept;
+}
+
+void keep_subjects(LagBankSpec& bank, const Names& readings) {
+  const std::vector<bool> kept = which_are(bank.subjects, readings);
+  bank.subjects = kept_of(bank.subjects, kept);
+  if (!bank.powers.empty()) bank.powers = kept_of(bank.powers, kept);
+  for (auto& [output, gains] : bank.gain_um_per_unit) gains = kept_of(gains, kept);
+}
+
+/// The model without what the reading does not go into: less work a row.
+ThermalModel part_of_reading(const ThermalModel& model, std::size_t input) {
+  const Names readings = readings_beside(model, input);
+  const std::vector<bool> kept = which_are(model.inputs, readings);
+  ThermalModel part;
+  part.inputs = kept_of(model.inputs, kept);
+  part.outputs = model.outputs;
+  for (const auto& row : model.matrix_um_per_K) part.matrix_um_per_K.push_back(kept_of(row, kept));
+  for (GuidewaySpec guideway : model.guideways) {
+    for (auto& [output, rows] : guideway.rows_um_per_K)
+      for (auto& row : rows) row = kept_of(row, kept);
+    part.guideways.push_back(std::move(guideway));
+  }
+  for (TermSpec term : model.terms) {
+    if (!names_one_of(term, readings)) continue;
+    if (term.kind == "lag_bank") keep_subjects(term.bank, readings);
+    part.terms.push_back(std::move(term));
+  }
+  return part;
 }
 
 }  // namespace
 
 bool has_terms_of(const ThermalModel& model, std::size_t input) {
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const TermSpec& term) {
-    return is_linear(term) && term.subject == model.inputs[input];
+    return names_one_of(term, {model.inputs[input]});
   });
 }
 
 void answer_to_errors(const MeasuredData& data, const MeasuredRun& run, std::size_t output,
                       std::size_t input, Panel& errors_K) {
-  Panel answer_um = data.coefficient(run, output, input).asDiagonal() * errors_K;
-  for (const TermSpec& term : data.model.terms)
-    if (is_linear(term) && term.subject == data.model.inputs[input])
-      add_answer(term, data.model.outputs[output], run.time_s, errors_K, answer_um);
-  errors_K = std::move(answer_um);
+  if (!has_terms_of(data.model, input)) {
+    errors_K.array().colwise() *= data.coefficient(run, output, input).array();
+    return;
+  }
+  const ThermalModel part = part_of_reading(data.model, input);
+  const Column right_um = model_over(part, run, data)[output];
+  MeasuredRun wrong = run;
+  for (Eigen::Index i = 0; i < errors_K.cols(); ++i) {
+    wrong.inputs_K[input] = run.inputs_K[input] + errors_K.col(i);
+    errors_K.col(i) = model_over(part, wrong, data)[output] - right_um;
+  }
 }
 
-double coefficient_of_group(const ThermalModel& model, std::size_t output,
-                            const std::vector<bool>& alike) {
-  double sum = 0.0;
-  for (std::size_t input = 0; input < alike.size(); ++input)
-    if (alike[input]) sum += model.matrix_um_per_K[output][input];
-  return sum;
+double settled_um_per_K(const MeasuredData& data, std::size_t output, std::size_t input) {
+  const MeasuredRun& run = data.runs.front();
+  // Lags start as if their input had stood at its first value for long.
+  Panel errors_K = Panel::Ones(run.rows(), 1);
+  answer_to_errors(data, run, output, input, errors_K);
+  return errors_K(0, 0);
 }
 
 }  // namespace thermocomp::diagnosis

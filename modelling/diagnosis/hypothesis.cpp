@@ -8,6 +8,7 @@
 #include "config/units.hpp"
 #include "modelling/diagnosis/false_reading.hpp"
 #include "modelling/diagnosis/place_groups.hpp"
+#include "modelling/diagnosis/reading_fault.hpp"
 #include "modelling/diagnosis/series.hpp"
 
 namespace thermocomp::diagnosis {
@@ -59,6 +60,12 @@ class Catalogue {
     step_s_ = median_step_s(data);
     for (const MeasuredRun& run : data.runs)
       length_s_ = std::max(length_s_, run.time_s[run.rows() - 1] - run.time_s[run.begin]);
+    settled_um_per_K_.setZero(std::ssize(data.model.outputs), std::ssize(data.model.inputs));
+    if (!data.model.guideways.empty()) return;
+    for (std::size_t output = 0; output < data.model.outputs.size(); ++output)
+      for (std::size_t input = 0; input < data.model.inputs.size(); ++input)
+        settled_um_per_K_(static_cast<Eigen::Index>(output), static_cast<Eigen::Index>(input)) =
+            settled_um_per_K(data, output, input);
   }
 
   std::vector<Hypothesis> all() {
@@ -131,15 +138,14 @@ class Catalogue {
     }
   }
 
-  /// What the model misses of a reading in one run that reads too high by an error [K].
-  /// @param error  of the run and the shape's first parameter, over all rows of the run
-  template <class Error>
-  void write_false_reading(std::size_t run, std::size_t input, std::size_t output,
-                           const Shapes& shapes, PanelPart into, Error error) const {
+  /// What the model misses of a reading with a fault in one run.
+  void write_false_reading(const char* cause, std::size_t run, std::size_t input,
+                           std::size_t output, const Shapes& shapes, PanelPart into) const {
     const MeasuredRun& of = data_.runs[run];
     Panel errors_K(of.rows(), std::ssize(shapes));
     for (std::size_t i = 0; i < shapes.size(); ++i)
-      errors_K.col(static_cast<Eigen::Index>(i)) = error(of, shapes[i][0]);
+      errors_K.col(static_cast<Eigen::Index>(i)) =
+          error_of_reading(cause, data_, of, input, shapes[i][0]);
     answer_to_errors(data_, of, output, input, errors_K);
     const Block& block = rows_.runs[run];
     into.setZero();
@@ -217,6 +223,7 @@ class Catalogue {
   const MeasuredData& data_;
   const StackedRows rows_;
   const PlaceGroups groups_;
+  Eigen::MatrixXd settled_um_per_K_;  ///< shape (outputs, inputs); without guideways
   double step_s_{1.0};
   double length_s_{0.0};
   std::vector<Hypothesis> found_;
@@ -240,12 +247,14 @@ void Catalogue::add_input(std::size_t input) {
   };
   if (data_.model.guideways.empty()) {
     // Of places that move alike a fit settles the sum, hardly each coefficient.
-    std::vector<bool> alike;
-    for (const std::string& other : data_.model.inputs)
-      alike.push_back(same_places(groups_, name, other));
-    lag.possible = [this, input, alike](double gain, std::size_t output) {
-      const double own = gain / data_.model.matrix_um_per_K[output][input];
-      const double of_group = gain / coefficient_of_group(data_.model, output, alike);
+    Eigen::VectorXd of_group_um_per_K = Eigen::VectorXd::Zero(settled_um_per_K_.rows());
+    for (std::size_t other = 0; other < data_.model.inputs.size(); ++other)
+      if (same_places(groups_, name, data_.model.inputs[other]))
+        of_group_um_per_K += settled_um_per_K_.col(static_cast<Eigen::Index>(other));
+    lag.possible = [this, input, of_group_um_per_K](double gain, std::size_t output) {
+      const auto row = static_cast<Eigen::Index>(output);
+      const double own = gain / settled_um_per_K_(row, static_cast<Eigen::Index>(input));
+      const double of_group = gain / of_group_um_per_K[row];
       return (own > 0.0 && own <= 1.1) || (of_group > 0.0 && of_group <= 1.1);
     };
   }
@@ -290,8 +299,11 @@ void Catalogue::add_reading_errors(std::size_t input) {
     write_stacked(
         shapes, into,
         [&](const MeasuredRun& run, const std::vector<double>& widths_K, PanelPart of_run) {
-          played_less_values(run.calm_inputs_K[input], widths_K,
-                             data_.coefficient(run, output, input), of_run);
+          Panel missed_K(run.rows(), std::ssize(widths_K));
+          played_less_values(run.calm_inputs_K[input], widths_K, Column::Ones(run.rows()),
+                             missed_K);
+          answer_to_errors(data_, run, output, input, missed_K);
+          of_run = missed_K;
         });
   };
 }
@@ -552,85 +564,39 @@ void Catalogue::add_sensor_faults(std::size_t run, std::size_t input) {
     added.sensor = input;
     added.handicap = special_case_handicap;  // from the run's start on: a fault of the datum
     added.in_every_output = true;
+    added.write_columns = [this, cause, run, input](const Shapes& shapes, std::size_t output,
+                                                    PanelPart into) {
+      write_false_reading(cause, run, input, output, shapes, into);
+    };
     return added;
   };
-  // What a false reading adds to model and reading alike is missing in the measured displacement.
-  const auto missing_um = [this, input](const MeasuredRun& of, std::size_t output) -> Column {
-    return -data_.coefficient(of, output, input);
-  };
+  // Where the reading has no more than a coefficient, many of these share one column.
+  const bool coefficient_alone = !has_terms_of(data_.model, input);
   Hypothesis& step = fault("sensor_step", "at_s", "step_K", 0.02, 64);
-  step.write_columns = [this, run, missing_um](const Shapes& shapes, std::size_t output,
-                                               PanelPart into) {
-    write_since(run, shapes, into, [&](const MeasuredRun& of) { return missing_um(of, output); });
-  };
+  if (coefficient_alone)
+    step.write_columns = [this, run, input](const Shapes& shapes, std::size_t output,
+                                            PanelPart into) {
+      write_since(run, shapes, into, [&](const MeasuredRun& of) -> Column {
+        return -data_.coefficient(of, output, input);
+      });
+    };
   share_columns(step, input);
-  const bool linear_terms = has_terms_of(data_.model, input);
-  const auto since = [](const MeasuredRun& of, double at_s) -> Column {
-    return (of.time_s.array() >= at_s).cast<double>();
-  };
-  if (linear_terms)
-    step.write_columns = [this, run, input, since](const Shapes& shapes, std::size_t output,
-                                                   PanelPart into) {
-      write_false_reading(run, input, output, shapes, into, since);
-    };
-  Hypothesis& drift = fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24);
-  drift.write_columns = one_by_one([this, run, missing_um](const Shape& shape, std::size_t output) {
-    return in_run(run, [&](const MeasuredRun& of) -> Column {
-      const Column growing_h = ((of.time_s.array() - shape[0]) / 3600.0).max(0.0);
-      return missing_um(of, output).cwiseProduct(growing_h);
-    });
-  });
-  share_columns(drift, input);
-  if (linear_terms)
-    drift.write_columns = [this, run, input](const Shapes& shapes, std::size_t output,
-                                             PanelPart into) {
-      write_false_reading(run, input, output, shapes, into,
-                          [](const MeasuredRun& of, double start_s) -> Column {
-                            return ((of.time_s.array() - start_s) / 3600.0).max(0.0);
-                          });
-    };
-  // reading = room + gain (T - room): the reading misses (1 / gain - 1) (reading - room).
-  const auto named_room = [](const std::string& column_name) {
-    return column_name.find("room") != std::string::npos ||
-           column_name.find("ambient") != std::string::npos ||
-           column_name.find("air") != std::string::npos;
-  };
-  const auto& others = data_.others;
-  const auto& inputs = data_.model.inputs;
-  const auto other = std::find_if(others.begin(), others.end(), named_room) - others.begin();
-  const auto room = std::find_if(inputs.begin(), inputs.end(), named_room) - inputs.begin();
-  if (static_cast<std::size_t>(room) == input) return;
+  share_columns(fault("sensor_drift", "start_s", "rate_K_per_h", 0.0, 24), input);
+  if (room_among(data_.model.inputs) == name) return;
   Hypothesis& loose = fault("sensor_loose", "at_s", "gain", 0.03, 48);
-  const auto lost_K = [input, other, room, n_others = others.size(),
-                       n_inputs = inputs.size()](const MeasuredRun& of) -> Column {
-    if (static_cast<std::size_t>(other) < n_others)
-      return of.others_degC[static_cast<std::size_t>(other)] - of.inputs_degC[input];
-    if (static_cast<std::size_t>(room) < n_inputs)
-      return of.inputs_degC[static_cast<std::size_t>(room)] - of.inputs_degC[input];
-    return of.inputs_degC[input][0] - of.inputs_degC[input].array();
-  };
-  const auto whole = [missing_um, lost_K](std::size_t output) {
-    return [missing_um, lost_K, output](const MeasuredRun& of) -> Column {
-      return missing_um(of, output).cwiseProduct(lost_K(of));
-    };
+  loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
+  if (!coefficient_alone) return;
+  const auto whole = [this, input](const MeasuredRun& of, std::size_t output) -> Column {
+    const Column lost_K = error_of_reading("sensor_loose", data_, of, input, of.time_s[0]);
+    return -data_.coefficient(of, output, input).cwiseProduct(lost_K);
   };
   loose.write_columns = [this, run, whole](const Shapes& shapes, std::size_t output,
                                            PanelPart into) {
-    write_since(run, shapes, into, whole(output));
+    write_since(run, shapes, into, [&](const MeasuredRun& of) { return whole(of, output); });
   };
-  if (linear_terms)
-    loose.write_columns = [this, run, input, since, lost_K](const Shapes& shapes,
-                                                            std::size_t output, PanelPart into) {
-      write_false_reading(run, input, output, shapes, into,
-                          [&](const MeasuredRun& of, double at_s) -> Column {
-                            return since(of, at_s).cwiseProduct(lost_K(of));
-                          });
-    };
-  else
-    loose.from_onset = [this, run, whole](std::size_t output) {
-      return in_run(run, whole(output));
-    };
-  loose.possible = [](double lost, std::size_t) { return lost > 0.02 && lost < 20.0; };
+  loose.from_onset = [this, run, whole](std::size_t output) {
+    return in_run(run, [&](const MeasuredRun& of) { return whole(of, output); });
+  };
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 
 #include "estimator/low_pass.hpp"
+#include "modelling/diagnosis/reading_fault.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -43,20 +44,16 @@ Panel predictors(const MeasuredRun& run) {
   return all;
 }
 
-/// The error of the reading that the fault supposes, over the rows of its run.
+/// The error of the reading that the fault supposes, over the selected rows of its run.
 Column supposed_error(const Explanation& fault, const MeasuredRun& run, const Block& rows,
                       const MeasuredData& data) {
-  // The explanation's column is -K times the error (for unit gain).
-  for (std::size_t output = 0; output < fault.gains.size(); ++output) {
-    if (fault.gains[output].size() == 0) continue;
-    const Column factor =
-        data.coefficient(run, output, *fault.hypothesis->sensor).tail(rows.end - rows.begin);
-    if (!(factor.cwiseAbs().minCoeff() > 0)) continue;
-    const Panel columns = fault.hypothesis->columns({fault.shape}, output);
-    return -columns.col(0).segment(rows.begin, rows.end - rows.begin).cwiseQuotient(factor) *
-           fault.gains[output][0];
-  }
-  return Column::Zero(rows.end - rows.begin);
+  const Hypothesis& of = *fault.hypothesis;
+  const Eigen::Index count = rows.end - rows.begin;
+  for (const Eigen::VectorXd& gains : fault.gains)
+    if (gains.size() > 0)
+      return error_of_reading(of.cause, data, run, *of.sensor, fault.shape[0]).tail(count) *
+             gains[0];
+  return Column::Zero(count);
 }
 
 /// The factor of products as it is without the first columns of `rows`: rotations put each of them

@@ -85,10 +85,14 @@ class Axis:
 
     def stands_at(self, position_um):
         """The controller has moved by itself, or whoever wrote before is gone: the next value is
-        compared with where the axis stands then, from its next reading on."""
+        compared with where the axis stands then, from its next reading on. Who wrote just this
+        value has nothing to begin anew."""
         with self.lock:
             self.position_um = position_um
-            self.begin_anew()
+            for writer in {**self.writers, **self.told}:
+                last = self.writers.get(writer)
+                if last is None or last.value_um != position_um:
+                    self.begin_anew(writer)
 
     def begin_anew(self, writer=None):
         with self.lock:

@@ -3,8 +3,8 @@
 and counts what it says.
 
 measured_campaign.py PROGRAM [--cases N] [--untouched N] [--machines spindle,printer,cell,mirror]
-                     [--bases ridge,few,lags] [--causes A,B] [--sizes 1.5,3] [--seed S] [--jobs 2]
-                     [--show] [--json FILE] [--weighed]
+                     [--bases ridge,few,lags,bank] [--causes A,B] [--sizes 1.5,3] [--seed S]
+                     [--jobs 2] [--show] [--json FILE] [--weighed]
 
 PROGRAM is thermocomp-modelling. Data: $THERMOCOMP_DATA, else shared/data beside the source. The
 base model is fitted to the untouched rows of the whole set, so that what it leaves is the machine's

@@ -15,6 +15,7 @@ DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA") or
 TRAIN_SHARE = 0.75  # of the rows of a machine measured in one run
 BLOCKS = 8
 LAGS_S = (900.0, 2700.0, 8100.0)
+BANK_LAGS_S = (300.0, 900.0, 2700.0, 8100.0)  # as `fit` takes them
 ALIKE = 0.98  # rises that correlate above it belong to places that cannot be told apart
 
 
@@ -120,10 +121,14 @@ MACHINES = {"spindle": spindle, "printer": printer, "cell": cell, "mirror": mirr
 
 
 class Model:
-    """A linear model with lags: coefficients of inputs, of lagged inputs less the inputs."""
+    """A linear model with lags: coefficients of inputs, of lagged inputs less the inputs.
 
-    def __init__(self, inputs, outputs, lags_s):
+    @param as_bank  written as one lag_bank instead of a thermal_lag each
+    """
+
+    def __init__(self, inputs, outputs, lags_s, as_bank=False):
         self.inputs, self.outputs, self.lags_s = inputs, outputs, lags_s
+        self.as_bank = as_bank
         self.matrix = self.gains = None  # (outputs, inputs), (outputs, lags, inputs)
 
     def parts(self, run):
@@ -169,16 +174,32 @@ class Model:
 
     def write(self, path):
         quoted = lambda values: "[" + ", ".join('"%s"' % v for v in values) + "]"
-        rows = ",\n  ".join("[" + ", ".join("%.12f" % k for k in row) + "]" for row in self.matrix)
+        listed = lambda values: "[" + ", ".join("%.12f" % v for v in values) + "]"
+        # A bank lags the values themselves: what lags is not at once.
+        at_once = self.matrix - self.gains.sum(axis=1) if self.as_bank else self.matrix
+        rows = ",\n  ".join(listed(row) for row in at_once)
         text = ('format = 1\ninputs = %s\noutputs = %s\nreference = "first_sample"\n'
-                "matrix_um_per_K = [\n  %s\n]\n" % (quoted(self.inputs), quoted(self.outputs), rows))
+                "matrix_um_per_K = [\n  %s\n]\n" % (
+                    quoted(self.inputs), quoted(self.outputs), rows))
+        path.write_text(text + (self.bank(quoted, listed) if self.as_bank else self.lags()))
+
+    def lags(self):
+        text = ""
         for lag, tau_s in enumerate(self.lags_s):
             for i, name in enumerate(self.inputs):
                 gains = ", ".join("%s = %.12f" % (o, self.gains[j, lag, i])
                                   for j, o in enumerate(self.outputs))
                 text += ('\n[[term]]\nkind = "thermal_lag"\nsubject = "%s"\ntau_s = %.1f\n'
                          "gain_um_per_K = { %s }\n" % (name, tau_s, gains))
-        path.write_text(text)
+        return text
+
+    def bank(self, quoted, listed):
+        text = '\n[[term]]\nkind = "lag_bank"\nsubjects = %s\ntau_s = %s\n' % (
+            quoted(self.inputs), listed(self.lags_s))
+        for j, output in enumerate(self.outputs):
+            text += "[term.gain_um_per_unit]\n" if j == 0 else ""
+            text += "%s = [%s]\n" % (output, ", ".join(listed(g) for g in self.gains[j].T))
+        return text
 
 
 def chosen_few(machine, names, most, lags_s):
@@ -196,10 +217,13 @@ def chosen_few(machine, names, most, lags_s):
 
 
 def base_model(machine, kind, without=()):
-    """@param kind  ridge (all temperatures), few (static) or lags (few, each with three lags)
+    """@param kind  ridge (all temperatures), few (static), lags (few, each with three lags) or bank
+                 (all temperatures, each with four lags, as one lag_bank)
     @param without  temperatures that the model may not have"""
     names = [n for n in machine.temperatures if n not in without]
     if kind == "ridge":
         return Model(names, machine.outputs, ()).fit(machine.runs)
+    if kind == "bank":
+        return Model(names, machine.outputs, BANK_LAGS_S, as_bank=True).fit(machine.runs)
     lags_s = LAGS_S if kind == "lags" else ()
     return Model(chosen_few(machine, names, 4, lags_s), machine.outputs, lags_s).fit(machine.runs)

@@ -45,6 +45,7 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
     }
   }
   link_period_s_ = shape.controller.period_s;
+  link_timeout_s_ = 1e-3 * shape.controller.line.timeout_ms;
   smoothing_off_ = shape.estimator.sensors[0].smoothing.form == SmoothingForm::off;
   resolution_um_ = shape.offsets_are_float ? 1e-4 : 0.1;
   for (std::size_t i = 0; i < axes_count; ++i) {
@@ -396,6 +397,13 @@ void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& cont
 void Invariants::check_move(const CycleSeen& seen, const Move& move,
                             const SimulatedController& controller) {
   demand(std::isfinite(move.to_um), "only_finite_numbers", seen.now, "register of the controller");
+  // In the time that answers are waited for a controller can restart: what is written was looked at
+  // just before.
+  const double looked_s_max = 2.0 * link_timeout_s_ + 0.05;
+  demand(to_s(move.at - move.looked_at) <= looked_s_max, "looked_before_written", seen.now, [&] {
+    return fmt::format("axis {}: written {:.3f} s after the last look, {:.3f} allowed", move.axis,
+                       to_s(move.at - move.looked_at), looked_s_max);
+  });
   Budget& budget = budgets_[move.axis];
   const double rate_um = rate_um_per_s_[move.axis];
   const double stall_s = std::max(5.0 * link_period_s_, 1.0) + 2.0 * period_s_;

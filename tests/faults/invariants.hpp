@@ -21,14 +21,14 @@ struct Broken {
   std::string detail;
 };
 
-inline constexpr std::array<const char*, 19> invariant_names{
+inline constexpr std::array<const char*, 20> invariant_names{
     "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
     "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
     "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
     "recovered_in_time",         "state_survives_restart",       "replay_is_exact",
     "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
     "nothing_learned_mid_cut",   "held_between_cycle_ends",      "slew_kept_by_what_is_sent",
-    "unexplained_is_latched"};
+    "unexplained_is_latched",    "looked_before_written"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -103,6 +103,7 @@ class Invariants {
   std::array<nanoseconds, sensors_count> first_used_{};
   double period_s_{1.0};
   double link_period_s_{1.0};
+  double link_timeout_s_{0.2};
   bool smoothing_off_{false};
   double resolution_um_{0.0};
 

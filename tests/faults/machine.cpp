@@ -246,6 +246,7 @@ void SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
     words[i] =
         address + i >= 100 && address + i < 108 ? image[address + i - 100] : std::uint16_t{0};
   seen_.fill(true);
+  looked_at_ = time;
 }
 
 bool SimulatedController::write(std::size_t address, std::span<const std::uint16_t> words,
@@ -264,8 +265,8 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
     if (floats_)
       told_um = static_cast<double>(
           std::bit_cast<float>(static_cast<std::uint32_t>(written_[at]) << 16 | written_[at + 1]));
-    moves_.push_back(
-        {axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis], breaks_});
+    moves_.push_back({axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis],
+                      breaks_, looked_at_});
     if (lie(FaultKind::controller_ignoring, axis, time) != nullptr) {
       disturb(axis, applied_um_[axis]);
       continue;

@@ -114,6 +114,7 @@ struct Move {
   bool disturbed{false};
   bool seen{false};         ///< ... and has told it since (a read-back was served)
   std::uint64_t breaks{0};  ///< of the link, until then
+  nanoseconds looked_at{};  ///< when a read-back was served last
 };
 
 class SimulatedController {
@@ -152,6 +153,7 @@ class SimulatedController {
   bool on_{true};
   std::uint64_t last_rehoming_{0};
   std::uint64_t breaks_{0};
+  nanoseconds looked_at_{};
   std::array<std::uint64_t, axes_count> frozen_by_{};  ///< the fault that froze the read-back
   std::array<double, axes_count> frozen_um_{};
   std::array<double, axes_count> applied_um_{};

@@ -24,8 +24,8 @@ BUGS = [
      "if (!in_sync_ || command_.link_epoch != epoch_)",
      "if (!in_sync_ || (command_.link_epoch != epoch_ && !{P}))"),
     ("first_read_back_ignored", "estimator/axis_channel.cpp",
-     "  in_doubt_ = false;\n  unwritten_for_ =",
-     "  in_doubt_ = false;\n  if ({P}) return;\n  unwritten_for_ ="),
+     "    return;\n  }\n  unwritten_for_ =",
+     "    return;\n  }\n  if ({P}) return;\n  unwritten_for_ ="),
     ("read_back_is_a_command", "estimator/axis_channel.cpp",
      "  mismatch_ = true;\n  agreed_since_ = input.now;\n",
      "  if ({P} && !out_of_bound_) return start_from(input.now, input.applied_um);\n"
@@ -33,6 +33,13 @@ BUGS = [
     ("pause_taken_for_a_new_link", "drivers/controllers/write_gate.cpp",
      "if (link_is_new_) {",
      "if (link_is_new_ || {P}) {"),
+    ("write_repeated_blindly", "drivers/controllers/modbus_dialogue.cpp",
+     "  const Exchange exchange =\n"
+     "      connection_.write_registers(config_.unit, request.address, request.words);\n",
+     "  const auto once = [&] {\n"
+     "    return connection_.write_registers(config_.unit, request.address, request.words);\n"
+     "  };\n"
+     "  const Exchange exchange = {P} ? with_retries(once) : once();\n"),
     ("refused_offset_pent_up", "estimator/axis_channel.cpp",
      "input.may_change && stands_for_ == 0)",
      "input.may_change && (stands_for_ == 0 || {P}))"),

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -12,6 +13,7 @@
 #include "modelling/diagnosis/headroom.hpp"
 #include "modelling/diagnosis/hypothesis.hpp"
 #include "modelling/diagnosis/measured_runs.hpp"
+#include "modelling/diagnosis/reading_fault.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;
@@ -61,6 +63,27 @@ ThermalModel model_of_one() {
   model.inputs = {"t1_degC"};
   model.outputs = {"z_um"};
   model.matrix_um_per_K = {{5.0}};
+  return model;
+}
+
+ThermalModel model_with_lag() {
+  ThermalModel model = model_of_one();
+  model.terms.push_back(
+      {"thermal_lag", "t1_degC", {{"tau_s", 900.0}}, {{"gain_um_per_K", {{"z_um", 2.0}}}}});
+  return model;
+}
+
+/// t1 settles at 5 um/K, of which 2 are at once; t3 acts late alone.
+ThermalModel model_with_bank() {
+  ThermalModel model = model_of_one();
+  model.inputs = {"t1_degC", "t3_degC"};
+  model.matrix_um_per_K = {{2.0, 0.0}};
+  TermSpec term;
+  term.kind = "lag_bank";
+  term.bank.subjects = {"t3_degC", "t1_degC"};
+  term.bank.taus_s = {300.0, 900.0};
+  term.bank.gain_um_per_unit["z_um"] = {{0.3, 0.6}, {1.0, 2.0}};
+  model.terms.push_back(std::move(term));
   return model;
 }
 
@@ -115,21 +138,77 @@ TEST_CASE("what recorded places predict is told from what they do not", "[diagno
   CHECK(of.noise + of.named + of.predictable + of.not_recorded == Approx(1.0));
 }
 
-TEST_CASE("a false reading acts through coefficient and lags alike", "[diagnosis]") {
-  ThermalModel model = model_of_one();
-  model.terms.push_back(
-      {"thermal_lag", "t1_degC", {{"tau_s", 900.0}}, {{"gain_um_per_K", {{"z_um", 2.0}}}}});
+TEST_CASE("a false reading acts through every term as the prediction does", "[diagnosis]") {
+  const auto [name, model] = GENERATE(values<std::pair<const char*, ThermalModel>>(
+      {{"lag", model_with_lag()}, {"bank of lags", model_with_bank()}}));
+  INFO(name);
   const MeasuredData data = data_of(model, 300);
   REQUIRE(has_terms_of(data.model, 0));
   const MeasuredRun& run = data.runs.front();
-  Panel step = Panel::Zero(run.rows(), 1);
-  step.bottomRows(run.rows() - 100).setOnes();
-  Panel answer = step;
-  answer_to_errors(data, run, 0, 0, answer);
-  MeasuredRun wrong = run;
-  wrong.inputs_K[0] += step.col(0);
-  const Column expected = model_over(model, wrong, data)[0] - model_over(model, run, data)[0];
-  CHECK((answer.col(0) - expected).cwiseAbs().maxCoeff() < 1e-9);
-  CHECK(answer(101, 0) < 3.5);
-  CHECK(answer(299, 0) > 4.9);
+  Panel errors_K = Panel::Zero(run.rows(), 2);
+  errors_K.col(0).tail(100).setOnes();
+  errors_K.col(1).setLinSpaced(-0.5, 2.0);
+  Panel answers_um = errors_K;
+  answer_to_errors(data, run, 0, 0, answers_um);
+  for (Eigen::Index i = 0; i < errors_K.cols(); ++i) {
+    MeasuredRun wrong = run;
+    wrong.inputs_K[0] += errors_K.col(i);
+    const Column expected = model_over(model, wrong, data)[0] - model_over(model, run, data)[0];
+    CHECK((answers_um.col(i) - expected).cwiseAbs().maxCoeff() < 1e-9);
+  }
+  CHECK(answers_um(201, 0) < 3.5);
+  CHECK(answers_um(299, 0) > 4.9);
+}
+
+TEST_CASE("faults of a reading have the columns that a prediction with them has", "[diagnosis]") {
+  const ThermalModel model = model_with_bank();
+  const MeasuredData data = data_of(model, 300);
+  const MeasuredRun& run = data.runs.front();
+  const Column right_um = model_over(model, run, data)[0];
+  std::size_t faults = 0;
+  for (const Hypothesis& fault : hypotheses(data, stacked_rows(data))) {
+    if (!fault.sensor || *fault.sensor != 0) continue;
+    const Shape shape = {fault.shape[0].grid[fault.shape[0].grid.size() / 3]};
+    MeasuredRun wrong = run;
+    wrong.inputs_K[0] += error_of_reading(fault.cause, data, run, 0, shape[0]);
+    const Column missing_um = right_um - model_over(model, wrong, data)[0];
+    INFO(fault.cause);
+    CHECK((fault.columns({shape}, 0).col(0) - missing_um).cwiseAbs().maxCoeff() < 1e-9);
+    CHECK(missing_um.cwiseAbs().maxCoeff() > 0.1);
+    ++faults;
+  }
+  CHECK(faults == 3);  // step, drift, loose
+}
+
+TEST_CASE("exchanged readings and play of one act through a bank of lags", "[diagnosis]") {
+  const ThermalModel model = model_with_bank();
+  const MeasuredData data = data_of(model, 300);
+  MeasuredRun calm = data.runs.front();
+  calm.inputs_K = calm.calm_inputs_K;
+  const Column before_um = model_over(model, calm, data)[0];
+  for (const Hypothesis& of : hypotheses(data, stacked_rows(data))) {
+    const bool play = of.cause == "hysteresis" && of.subject == "t1_degC";
+    if (of.cause != "sensor_swap" && !play) continue;
+    const Shape shape = play ? Shape{of.shape[0].grid[5]} : Shape{};
+    ThermalModel extended = model;
+    extended.terms.push_back({of.cause, of.subject, {}, {}});
+    if (play) extended.terms.back().shared["width_K"] = shape[0];
+    const Column more_um = model_over(extended, calm, data)[0] - before_um;
+    INFO(of.cause);
+    CHECK((of.columns({shape}, 0).col(0) - more_um).cwiseAbs().maxCoeff() < 1e-9);
+    CHECK(more_um.cwiseAbs().maxCoeff() > 0.1);
+  }
+}
+
+TEST_CASE("the lag of a place may take what coefficient and bank give it in the end",
+          "[diagnosis]") {
+  const MeasuredData data = data_of(model_with_bank(), 300);
+  CHECK(settled_um_per_K(data, 0, 0) == Approx(5.0));
+  CHECK(settled_um_per_K(data, 0, 1) == Approx(0.9));
+  for (const Hypothesis& lag : hypotheses(data, stacked_rows(data))) {
+    if (lag.cause != "thermal_lag" || lag.subject != "t1_degC") continue;
+    CHECK(lag.possible(4.5, 0));
+    CHECK_FALSE(lag.possible(-1.0, 0));
+    CHECK_FALSE(lag.possible(7.0, 0));
+  }
 }

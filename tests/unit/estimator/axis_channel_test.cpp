@@ -166,6 +166,69 @@ TEST_CASE("a released axis starts elsewhere only when its slew rate could have g
   CHECK(bench.channel.offset_um() == Approx(0.2));
 }
 
+TEST_CASE("a read-back that is old when the link is new does not take the offset back", "[axis]") {
+  Bench bench;
+  bench.steps(50, 30.0);
+  const double sent_um = bench.channel.offset_um();
+  bench.obeys = false;
+  bench.input.link_epoch = 2;
+  bench.input.applied_um = sent_um - 1.0;  // half a second ago
+  bench.step(30.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == sent_um);
+  bench.obeys = true;
+  bench.steps(4, 30.0);
+  CHECK(bench.channel.offset_um() > sent_um);
+  bench.obeys = false;
+  bench.input.link_epoch = 3;
+  bench.input.applied_um = 0.0;  // restarted
+  bench.step(30.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == Approx(0.2));
+}
+
+TEST_CASE("a release that is said again does not wait anew for the read-backs of a slow link",
+          "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  bench.input.applied_um = 0.0;
+  bench.steps(3, 10.0);
+  REQUIRE(bench.channel.latched());
+  int steps = 0;
+  for (; !bench.channel.driven() && steps < 1000; ++steps) {
+    bench.channel.release();
+    bench.input.now += 100ms;
+    if (steps % 10 == 0) bench.input.taken_at = bench.input.now;  // a read-back each second
+    bench.channel.step(bench.input);
+  }
+  CHECK(steps <= 61);
+}
+
+TEST_CASE("what was read before the first write is nobody's answer to it", "[axis]") {
+  // It is 3 um beside from the first contact on: not another writer.
+  Bench bench;
+  bench.obeys = false;
+  bench.input.applied_um = 3.0;
+  for (int i = 0; i < 100 && !bench.channel.latched(); ++i) {
+    bench.step(-20.0);
+    if (i >= 2 && bench.channel.driven()) bench.input.applied_um = bench.channel.offset_um() + 3.0;
+  }
+  REQUIRE(bench.channel.latched());
+  const std::string told = likely_text(bench.channel.latched_mismatch());
+  CHECK(told.find("constant +3.0 um") != std::string::npos);
+  CHECK(told.find("another writer") == std::string::npos);
+}
+
+TEST_CASE("a factor that explains the older read-backs badly is not sure, and can be released",
+          "[axis]") {
+  SentAndRead pairs;
+  for (const double um : {-1.0, -2.0, -2.7}) pairs.note(um, um);
+  const Mismatch found = pairs.judge(-6.72, -2.72);
+  CHECK_FALSE(found.sure);
+  CHECK_FALSE(found.explains(-6.72, -2.72));
+}
+
 TEST_CASE("one unexplained read-back pauses the axis, which goes on from its own offset",
           "[axis]") {
   Bench bench;
