@@ -7,6 +7,7 @@
 
 #include "config/toml_reader.hpp"
 #include "estimator/checks.hpp"
+#include "modelling/identification/printed.hpp"
 #include "modelling/structure/heat_model.hpp"
 #include "modelling/structure/locate.hpp"
 #include "modelling/structure/statics.hpp"
@@ -38,8 +39,8 @@ std::string box_of(const FiniteTie& tie) {
   const double wide = std::min(depth_mm, tie.area_mm2 / tie_high_mm);
   const double high = tie.area_mm2 / wide;
   const auto corner = [&](double x, double sign) {
-    return "[" + std::to_string(x) + ", " + std::to_string(depth_mm / 2 + sign * wide / 2) + ", " +
-           std::to_string(tie.height_mm + sign * high / 2) + "]";
+    return identification::printed("[%f, %f, %f]", x, depth_mm / 2 + sign * wide / 2,
+                                   tie.height_mm + sign * high / 2);
   };
   return "from_mm = " + corner(width_mm, -1) + "\nto_mm = " + corner(width_mm + tie_length_mm, 1) +
          "\n";
