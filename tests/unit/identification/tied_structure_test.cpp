@@ -23,20 +23,16 @@ TEST_CASE("one tie and two are what finite elements of the gate machine say", "[
   const TiedStructure gate(ties, step_s);
   identification::TiedColumns free = gate.columns();
   free.ties.clear();
+  // What is left of Ki is a small difference of large ones.
   const double free_um_per_K = identification::tied_coefficients(free).ki_um_per_K;
   const auto beam = identification::tied_coefficients(gate.columns());
   const auto fe = gate.coefficients();
   CAPTURE(ties.size(), ties[0].height_mm, beam.ki_um_per_K, fe.ki_um_per_K);
   CHECK(std::abs(fe.ki_um_per_K - beam.ki_um_per_K) < 0.03 * free_um_per_K);
   REQUIRE(fe.kc_um_per_K.size() == beam.kc_um_per_K.size());
-  // As Ki beside that without ties: a Kc beside that which the tie has alone. With another tie it
-  // is a small difference of large ones.
   for (std::size_t j = 0; j < fe.kc_um_per_K.size(); ++j) {
-    identification::TiedColumns alone = gate.columns();
-    alone.ties = {gate.columns().ties[j]};
-    const double alone_um_per_K = identification::tied_coefficients(alone).kc_um_per_K[0];
     CAPTURE(j, beam.kc_um_per_K[j], fe.kc_um_per_K[j]);
-    CHECK(std::abs(fe.kc_um_per_K[j] - beam.kc_um_per_K[j]) < 0.03 * alone_um_per_K);
+    CHECK(std::abs(fe.kc_um_per_K[j] - beam.kc_um_per_K[j]) < 0.03 * beam.kc_um_per_K[j]);
   }
 }
 
