@@ -47,16 +47,17 @@ std::string box_of(const FiniteTie& tie) {
 }
 
 std::string text_of_tie(const std::string& name, const FiniteTie& tie) {
-  std::string text = "[[part]]\nname = \"" + name +
-                     "\"\nmaterial = \"steel\"\nsize_mm = [20, 12, 12.5]\n[[part.box]]\n" +
-                     box_of(tie);
+  std::string text = identification::printed(
+      "[[part]]\nname = \"%s\"\nmaterial = \"steel\"\nsize_mm = [20, 12, 12.5]\n[[part.box]]\n%s",
+      name.c_str(), box_of(tie).c_str());
   for (const auto& [column, x] : {std::pair{"warm_column", "80"}, std::pair{"cold_column", "480"}})
-    text += "[[joint]]\nname = \"" + name + "_on_" + column + "\"\nfrom = { part = \"" + name +
-            "\", x_mm = [" + x + ", " + x + "] }\nto = { part = \"" + column + "\", x_mm = [" + x +
-            ", " + x + "] }\nconductance_W_per_m2_K = 10000.0\n";
-  text += "[[convection]]\non = { part = \"" + name + "\" }\ncoefficient_W_per_m2_K = 8.4\n";
-  text += "[[convection]]\non = { part = \"" + name +
-          "\" }\ncoefficient_W_per_m2_K = 3.6\nto = \"coolant\"\n";
+    text += identification::printed(
+        "[[joint]]\nname = \"%s_on_%s\"\nfrom = { part = \"%s\", x_mm = [%s, %s] }\n"
+        "to = { part = \"%s\", x_mm = [%s, %s] }\nconductance_W_per_m2_K = 10000.0\n",
+        name.c_str(), column, name.c_str(), x, x, column, x, x);
+  for (const char* air : {"8.4", "3.6\nto = \"coolant\""})
+    text += identification::printed(
+        "[[convection]]\non = { part = \"%s\" }\ncoefficient_W_per_m2_K = %s\n", name.c_str(), air);
   return text;
 }
 
