@@ -27,7 +27,7 @@ struct ModellingCommand {
 constexpr std::array<ModellingCommand, 8> commands{{
     {"structure", "block matrix of a structure, by finite elements"},
     {"place", "sensor positions of a structure"},
-    {"tiebar", "the two coefficients of a gate-shaped machine with a tie bar"},
+    {"tiebar", "the coefficients of a gate-shaped machine with tie bars"},
     {"plan", "test plan from factors and levels"},
     {"inspect", "what is wrong with recordings themselves, and what they can tell at all"},
     {"group", "similarity groups of measured temperatures"},

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "config/toml_reader.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/identification/svg.hpp"
 
@@ -13,46 +12,6 @@ constexpr double lowest_tie = 0.2;  // of the working height
 constexpr double highest_tie = 3.0;
 constexpr int steps = 2800;
 constexpr double um_per_mm = 1000.0;
-
-GateMachine read(const TomlDocument& document) {
-  const TomlTable root = document.root();
-  const Range length = Range::above(0, 1e5);
-  GateMachine machine;
-  machine.working_height_mm = root.number("working_height_mm", length);
-  machine.heated_height_mm = root.number("heated_height_mm", length);
-  machine.tie_height_mm = root.number("tie_height_mm", length);
-  if (machine.heated_height_mm > machine.working_height_mm)
-    root.problem("heated_height_mm", "must not be above working_height_mm");
-  const TomlTable column = root.table("column");
-  machine.column_width_mm = column.number("width_mm", length);
-  const bool by_section = column.has("depth_mm");
-  if (by_section && column.has("inertia_mm4"))
-    column.problem("inertia_mm4", "must be left out where depth_mm is given");
-  if (by_section) {
-    const double depth_mm = column.number("depth_mm", length);
-    const double width_mm = machine.column_width_mm;
-    const double wall_mm =
-        column.number("wall_mm", Range::above(0, 1e5), std::max(width_mm, depth_mm));
-    const double inner_width_mm = std::max(0.0, width_mm - 2.0 * wall_mm);
-    const double inner_depth_mm = std::max(0.0, depth_mm - 2.0 * wall_mm);
-    machine.column_inertia_mm4 =
-        (depth_mm * std::pow(width_mm, 3) - inner_depth_mm * std::pow(inner_width_mm, 3)) / 12.0;
-  } else {
-    machine.column_inertia_mm4 = column.number("inertia_mm4", Range::above(0));
-  }
-  const Range modulus = Range::above(0, 1e7);
-  const Range expansion = Range::above(0, 1e-3);
-  machine.column_modulus_MPa = column.number("modulus_MPa", modulus);
-  machine.column_expansion_per_K = column.number("expansion_per_K", expansion);
-  const TomlTable tie = root.table("tie");
-  machine.tie_length_mm = tie.number("length_mm", length);
-  machine.tie_area_mm2 = tie.number("area_mm2", Range::above(0));
-  machine.tie_modulus_MPa = tie.number("modulus_MPa", modulus, machine.column_modulus_MPa);
-  machine.tie_expansion_per_K =
-      tie.number("expansion_per_K", expansion, machine.column_expansion_per_K);
-  document.finish();
-  return machine;
-}
 
 /// One curve a beta; `value` of a machine with the tie at l / a.
 template <class Value>
@@ -123,14 +82,6 @@ BestHeight best_tie_height(const GateMachine& machine, double ratio) {
       best = {other.tie_height_mm, displacement};
   }
   return best;
-}
-
-GateMachine load_gate_machine(const std::filesystem::path& path) {
-  return read(TomlDocument::from_file(path));
-}
-
-GateMachine parse_gate_machine(const std::string& text, const std::string& name) {
-  return read(TomlDocument::from_text(text, name));
 }
 
 std::string design_curves_svg(const GateMachine& machine) {

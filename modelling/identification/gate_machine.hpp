@@ -2,11 +2,7 @@
 /// theta_C from dimensions and material (Teratani et al. 1995; beam theory by Castigliano).
 #pragma once
 
-#include <filesystem>
 #include <string>
-#include <vector>
-
-#include "config/problems.hpp"
 
 namespace thermocomp::identification {
 
@@ -49,10 +45,6 @@ struct BestHeight {
   double displacement_um_per_K{0.0};  ///< Ki - Kc ratio there
 };
 [[nodiscard]] BestHeight best_tie_height(const GateMachine& machine, double ratio);
-
-/// @throws ConfigurationError with every problem of the file
-[[nodiscard]] GateMachine load_gate_machine(const std::filesystem::path& path);
-[[nodiscard]] GateMachine parse_gate_machine(const std::string& text, const std::string& name);
 
 /// Ki and Kc over l / l4, each relative to its value without a tie and to alpha_c lc, for this
 /// machine and for tie stiffnesses beside it (beta = 3 I lc / (Ac l^3) at one material).

@@ -1,4 +1,5 @@
-/// `thermocomp tiebar`: the two coefficients of a gate-shaped machine.
+/// `thermocomp tiebar`: the coefficients of a gate-shaped machine with one tie or several, and the
+/// ties that a measured course moves least.
 #pragma once
 
 #include <functional>

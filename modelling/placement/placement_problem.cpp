@@ -113,6 +113,15 @@ void add_blocks(const StructureSpec& spec, const Structure& structure, Placement
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
 }
 
+void add_patterns(const StructureSpec& spec, PlacementProblem& problem) {
+  for (const structure::PatternSpec& from : spec.patterns) {
+    Pattern pattern{from.name, std::vector<bool>(problem.blocks.size(), false), from.percents,
+                    true};
+    for (const Index block : from.blocks) pattern.blocks[block] = true;
+    problem.patterns.push_back(std::move(pattern));
+  }
+}
+
 }  // namespace
 
 PlacementProblem make_problem(const StructureSpec& spec, const Structure& structure,
@@ -130,6 +139,7 @@ PlacementProblem make_problem(const StructureSpec& spec, const Structure& struct
                                "placing sensors needs a [[load_case]] that is not left out"}});
   }
   add_blocks(spec, structure, problem);
+  add_patterns(spec, problem);
   add_curves(spec, statics.sensitivities(structure.rows), problem);
   for (const Numbers& row : problem.sensitivity_um) {
     Numbers& blocks = problem.block_matrix_um.emplace_back(problem.blocks.size(), 0.0);

@@ -40,6 +40,14 @@ struct BlockOfSensors {
   double from_support_m{0.0};     ///< of the block's middle from the middle of what is held
 };
 
+/// Blocks whose rise is changed together in the method of tendency patterns.
+struct Pattern {
+  std::string name;
+  std::vector<bool> blocks;    ///< shape (blocks)
+  Numbers percents;            ///< r, each tried
+  bool shrinks_as_one{false};  ///< where a block would leave its bounds; else each is cut alone
+};
+
 struct LoadCase {
   std::string name;
   bool left_out{false};
@@ -47,6 +55,7 @@ struct LoadCase {
 
 struct PlacementProblem {
   std::vector<BlockOfSensors> blocks;
+  std::vector<Pattern> patterns;  ///< of the structure file; none: derived ones
   std::vector<LoadCase> load_cases;
   std::vector<Vec3> nodes_m;
   std::vector<Curve> curves;

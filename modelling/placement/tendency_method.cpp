@@ -8,41 +8,15 @@
 #include "estimator/checks.hpp"
 #include "modelling/placement/quadratic_fit.hpp"
 #include "modelling/placement/sensor_choice.hpp"
+#include "modelling/placement/tendency_patterns.hpp"
 
 namespace thermocomp::placement {
 namespace {
 
-constexpr std::array<double, 4> degrees_percent{10.0, -10.0, 5.0, -5.0};
 constexpr double nothing_um = 1e-9;
 constexpr double improves_by = 1e-3;  ///< a round that gains less is none
 constexpr double same_share = 0.05;   ///< coefficients that differ by less count as equal
 constexpr double far = std::numeric_limits<double>::infinity();
-
-struct Bounds {
-  Numbers low_K, high_K;
-};
-
-/// What a sensor in each block can read (step 3).
-Bounds bounds_of(const PlacementProblem& problem, const Field& field) {
-  Bounds bounds;
-  for (const BlockOfSensors& block : problem.blocks) {
-    double low = far;
-    double high = -far;
-    for (const Index node : block.candidates) {
-      low = std::min(low, field.rise_K[node]);
-      high = std::max(high, field.rise_K[node]);
-    }
-    bounds.low_K.push_back(low);
-    bounds.high_K.push_back(high);
-  }
-  return bounds;
-}
-
-void keep_inside(const Bounds& bounds, Numbers& blocks_K) {
-  for (std::size_t b = 0; b < blocks_K.size(); ++b) {
-    blocks_K[b] = std::clamp(blocks_K[b], bounds.low_K[b], bounds.high_K[b]);
-  }
-}
 
 Numbers start_of(const PlacementProblem& problem, const Field& field, Start start) {
   if (start == Start::mean) return block_means_K(problem, field.rise_K);
@@ -59,46 +33,6 @@ Numbers start_of(const PlacementProblem& problem, const Field& field, Start star
     blocks_K.push_back(*middle);
   }
   return blocks_K;
-}
-
-/// Which blocks a pattern changes.
-struct Choice {
-  std::string name;
-  std::vector<bool> blocks;
-};
-
-void add_halves(const Numbers& values, const std::string& low, const std::string& high,
-                std::vector<Choice>& choices) {
-  Numbers sorted = values;
-  std::sort(sorted.begin(), sorted.end());
-  const double middle = 0.5 * (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]);
-  Choice below{low, {}};
-  Choice above{high, {}};
-  for (const double value : values) {
-    below.blocks.push_back(value < middle);
-    above.blocks.push_back(value > middle);
-  }
-  choices.push_back(std::move(below));
-  choices.push_back(std::move(above));
-}
-
-/// All blocks; those near to and far from what holds the machine; the warmer and the cooler half
-/// (near to and far from the heat); each alone.
-std::vector<Choice> choices_of(const PlacementProblem& problem, const Field& field) {
-  const std::size_t count = problem.blocks.size();
-  std::vector<Choice> choices{{"all", std::vector<bool>(count, true)}};
-  Numbers distances;
-  Numbers rises;
-  for (const BlockOfSensors& block : problem.blocks) distances.push_back(block.from_support_m);
-  for (const double mean : block_means_K(problem, field.rise_K)) rises.push_back(std::fabs(mean));
-  add_halves(distances, "near the support", "far from the support", choices);
-  add_halves(rises, "far from the heat", "near the heat", choices);
-  for (std::size_t b = 0; b < count; ++b) {
-    Choice alone{problem.blocks[b].name, std::vector<bool>(count, false)};
-    alone.blocks[b] = true;
-    choices.push_back(std::move(alone));
-  }
-  return choices;
 }
 
 Numbers difference(const Numbers& a, const Numbers& b) {
@@ -167,21 +101,15 @@ struct Candidate {
 
 /// Steps 5 to 7, the nearest in shape first.
 std::vector<Candidate> candidates_of(const PlacementProblem& problem,
-                                     const std::vector<Choice>& choices, const Bounds& bounds,
-                                     const Numbers& blocks_K, const Numbers& needed_um, Way way) {
+                                     const std::vector<Pattern>& patterns,
+                                     const BlockBounds& bounds, const Numbers& blocks_K,
+                                     const Numbers& needed_um, Way way) {
   std::vector<Candidate> candidates;
   const Numbers present_um = block_displacement_um(problem, blocks_K);
-  for (const Choice& choice : choices) {
-    for (const double degree : degrees_percent) {
-      Candidate candidate{choice.name + (degree > 0 ? " +" : " -") +
-                              std::to_string(static_cast<int>(std::fabs(degree))) + " %",
-                          blocks_K,
-                          {},
-                          {}};
-      for (std::size_t b = 0; b < blocks_K.size(); ++b) {
-        if (choice.blocks[b]) candidate.blocks_K[b] *= 1.0 + degree / 100.0;
-      }
-      keep_inside(bounds, candidate.blocks_K);
+  for (const Pattern& pattern : patterns) {
+    for (const double percent : pattern.percents) {
+      ChangedBlocks changed = change_blocks(pattern, percent, bounds, blocks_K);
+      Candidate candidate{std::move(changed.name), std::move(changed.blocks_K), {}, {}};
       candidate.tendency_um =
           difference(block_displacement_um(problem, candidate.blocks_K), present_um);
       if (!(size_of(candidate.tendency_um) > nothing_um)) continue;
@@ -212,8 +140,8 @@ std::string_view name_of(Way way) {
 TendencyRun run_tendencies(const PlacementProblem& problem, const Field& field, Way way,
                            const TendencyOptions& options) {
   TendencyRun run;
-  const Bounds bounds = bounds_of(problem, field);
-  const std::vector<Choice> choices = choices_of(problem, field);
+  const BlockBounds bounds = bounds_of(problem, field);
+  const std::vector<Pattern> patterns = patterns_of(problem, field);
   run.blocks_K = start_of(problem, field, options.start);
   keep_inside(bounds, run.blocks_K);
   Numbers needed_um =
@@ -231,7 +159,7 @@ TendencyRun run_tendencies(const PlacementProblem& problem, const Field& field, 
     run.ended = "no pattern makes it better inside what the blocks' sensors can read";
     int rank = 0;
     for (const Candidate& candidate :
-         candidates_of(problem, choices, bounds, run.blocks_K, needed_um, way)) {
+         candidates_of(problem, patterns, bounds, run.blocks_K, needed_um, way)) {
       ++rank;
       const double rho = product(problem, needed_um, candidate.tendency_um) /
                          product(problem, candidate.tendency_um, candidate.tendency_um);

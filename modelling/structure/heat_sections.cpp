@@ -16,8 +16,6 @@ class HeatReader {
     const Range air = Range::between(-20, 60);
     spec_.room_degC = root_.table_or_empty("room").number("temp_degC", air, spec_.room_degC);
     spec_.coolant_degC = root_.table_or_empty("coolant").number("temp_degC", air, spec_.room_degC);
-    spec_.sensors_on_surface =
-        root_.table_or_empty("placement").flag("on_surface", spec_.sensors_on_surface);
     for (const TomlTable& table : root_.tables("convection")) read_convection(table);
     for (const TomlTable& table : root_.tables("heat")) read_heat(table);
     for (const TomlTable& table : root_.tables("load_case")) read_load_case(table);

@@ -39,6 +39,7 @@ class Reader {
     }
     check_outputs();
     read_heat_sections(root_, spec_);
+    read_placement_section(root_, spec_);
     return std::move(spec_);
   }
 

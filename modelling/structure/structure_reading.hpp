@@ -47,4 +47,7 @@ template <class Items>
 /// [room], [coolant], [[convection]], [[heat]], [[load_case]]; after materials, parts and joints.
 void read_heat_sections(const TomlTable& root, StructureSpec& spec);
 
+/// [placement] with its [[placement.pattern]]; after blocks.
+void read_placement_section(const TomlTable& root, StructureSpec& spec);
+
 }  // namespace thermocomp::structure

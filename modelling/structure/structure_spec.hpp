@@ -131,6 +131,16 @@ struct LoadCaseSpec {
   bool left_out{false};  ///< judges a placement and takes no part in it
 };
 
+/// By how much a pattern changes the rise of its blocks where the file does not say it.
+inline const std::vector<double> usual_percents{10.0, -10.0, 5.0, -5.0};
+
+/// Blocks that are made warmer or cooler together where sensors are placed.
+struct PatternSpec {
+  std::string name;
+  std::vector<Index> blocks;     ///< places among StructureSpec::blocks
+  std::vector<double> percents;  ///< of the rise
+};
+
 struct StructureSpec {
   std::filesystem::path file;
   std::vector<Material> materials;
@@ -147,7 +157,8 @@ struct StructureSpec {
   std::vector<HeatSpec> heats;
   std::vector<LoadCaseSpec> load_cases;
   std::vector<SensorSpec> sensors;
-  bool sensors_on_surface{true};  ///< a sensor is screwed on, not cast in
+  bool sensors_on_surface{true};      ///< a sensor is screwed on, not cast in
+  std::vector<PatternSpec> patterns;  ///< none: derived from the structure
 };
 
 }  // namespace thermocomp::structure

@@ -122,6 +122,38 @@ def test_tiebar_gives_both_coefficients(tmp_path):
     assert (tmp_path / "curves.svg").read_text().startswith("<svg")
 
 
+def write_oil(folder):
+    """Oil on and off hourly: A - B within minutes, the ties within hours."""
+    rows = [["time_s", "side_a_degC", "side_b_degC", "tie_degC"]]
+    a, b, tie = 0.0, 0.0, 0.0
+    for minute in range(301):
+        rows.append([60 * minute, 20 + a, 20 + b, 20 + tie])
+        oil = 15.0 if minute // 60 % 2 == 0 else 0.0
+        a, b, tie = a + (oil - a) / 8, b + (0.8 * oil - b) / 25, tie + (6.0 - tie) / 70
+    path = folder / "oil.csv"
+    with open(path, "w", newline="") as file:
+        csv.writer(file).writerows(rows)
+    return path
+
+
+def test_tiebar_chooses_ties_for_a_measured_course(tmp_path):
+    answer = run("tiebar", EXAMPLES / "gate_machine_two_ties.toml", "--course", write_oil(tmp_path),
+                 "--optimise", "--picture", tmp_path / "ties.svg", "--json")
+    assert answer.returncode == 0, answer.stderr
+    said = json.loads(answer.stdout)
+    assert len(said["ties"]) == len(said["best"]["ties"]) == 2
+    course, = said["courses"]
+    assert course["swing_best_um"] < course["swing_drawn_um"] < course["swing_without_um"]
+    assert "best ties" in (tmp_path / "ties.svg").read_text()
+
+
+def test_tiebar_with_several_ties_refuses_what_is_for_one():
+    answer = run("tiebar", EXAMPLES / "gate_machine_two_ties.toml", "--ratio", "0.2")
+    assert answer.returncode == 2 and "--ratio" in answer.stderr
+    answer = run("tiebar", EXAMPLES / "gate_machine.toml", "--optimise")
+    assert answer.returncode == 2 and "--course" in answer.stderr
+
+
 @pytest.mark.parametrize("arguments, names", [
     (("fit", "@run", "--outputs", "y_um", "-o", "@out"), "y_um"),
     (("fit", "@run", "--outputs", "z_um", "--terms", "0..9", "-o", "@out"), "--terms"),

@@ -59,19 +59,5 @@ TEST_CASE("at the best height of the tie no other height displaces less", "[tieb
   }
 }
 
-TEST_CASE("a geometry with faults names every one of them", "[tiebar]") {
-  try {
-    (void)parse_gate_machine(
-        "working_height_mm = 100\nheated_height_mm = 200\ntie_height_mm = -1\n[column]\nwidth_mm "
-        "= 10\ndepth_mm = 5\ninertia_mm4 = 3\nmodulus_MPa = 1\n[tie]\nlength_mm = 1\ncolour = 2\n",
-        "gate.toml");
-    FAIL("accepted");
-  } catch (const ConfigurationError& error) {
-    for (const char* part : {"heated_height_mm", "tie_height_mm", "inertia_mm4", "expansion_per_K",
-                             "area_mm2", "colour"})
-      CHECK_THAT(error.what(), Catch::Contains(part));
-  }
-}
-
 }  // namespace
 }  // namespace thermocomp::identification

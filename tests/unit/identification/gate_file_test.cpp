@@ -1,0 +1,77 @@
+#include "modelling/identification/gate_file.hpp"
+
+#include <initializer_list>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+namespace thermocomp::identification {
+namespace {
+
+const std::string columns =
+    "working_height_mm = 600\nheated_height_mm = 300\n[column]\nwidth_mm = 80\ndepth_mm = 60\n"
+    "modulus_MPa = 206000\nexpansion_per_K = 11.5e-6\n";
+
+void refused(const std::string& text, std::initializer_list<const char*> parts) {
+  try {
+    (void)parse_gate_file(text, "gate.toml");
+    FAIL("accepted");
+  } catch (const ConfigurationError& error) {
+    for (const char* part : parts) CHECK_THAT(error.what(), Catch::Contains(part));
+  }
+}
+
+TEST_CASE("a geometry with faults names every one of them", "[tiebar]") {
+  refused(
+      "working_height_mm = 100\nheated_height_mm = 200\ntie_height_mm = -1\n[column]\nwidth_mm "
+      "= 10\ndepth_mm = 5\ninertia_mm4 = 3\nmodulus_MPa = 1\n[tie]\nlength_mm = 1\ncolour = 2\n",
+      {"heated_height_mm", "tie_height_mm", "inertia_mm4", "expansion_per_K", "area_mm2",
+       "colour"});
+}
+
+TEST_CASE("several ties with faults are told with file, line, key, value and rule", "[tiebar]") {
+  refused(columns +
+              "[[tie]]\nheight_mm = 0\nlength_mm = 400\narea_mm2 = 150\n"
+              "[[tie]]\nheight_mm = 700\nlength_mm = 400\narea_mm2 = 150\n"
+              "height_mm_range = [900, 650]\ntemperatures = []\n"
+              "[[tie]]\nheight_mm = 700\nlength_mm = 400\narea_mm2 = 150\nfixed = true\n"
+              "area_mm2_range = [1, 2]\n",
+          {"gate.toml:9", "height_mm = 0", "gate.toml:16", "the lowest and the highest",
+           "gate.toml:17", "at least one column", "gate.toml:23", "fixed = true"});
+}
+
+TEST_CASE("a height for one tie does not stand beside several", "[tiebar]") {
+  refused("tie_height_mm = 5\n" + columns +
+              "[[tie]]\nheight_mm = 700\nlength_mm = 400\narea_mm2 = 150\n",
+          {"tie_height_mm", "[[tie]]"});
+}
+
+TEST_CASE("one tie may be written either way", "[tiebar]") {
+  const std::string tie = "length_mm = 400\narea_mm2 = 150\n";
+  const GateFile one = parse_gate_file("tie_height_mm = 700\n" + columns + "[tie]\n" + tie, "a");
+  const GateFile list = parse_gate_file(columns + "[[tie]]\nheight_mm = 700\n" + tie, "b");
+  REQUIRE(one.columns.ties.size() == 1);
+  REQUIRE(list.columns.ties.size() == 1);
+  CHECK(tied_coefficients(one.columns).ki_um_per_K == tied_coefficients(list.columns).ki_um_per_K);
+  CHECK(one.choices[0].temperatures == list.choices[0].temperatures);
+}
+
+TEST_CASE("what a file does not say of the search has a default, and a fixed tie stays",
+          "[tiebar]") {
+  const GateFile file = parse_gate_file(
+      columns +
+          "[[tie]]\nheight_mm = 250\nlength_mm = 400\narea_mm2 = 150\nfixed = true\n"
+          "[[tie]]\nheight_mm = 700\nlength_mm = 400\narea_mm2 = 100\nrise_factor = 0.5\n",
+      "gate.toml");
+  CHECK(file.choices[0].height_mm.low == file.choices[0].height_mm.high);
+  CHECK(file.choices[0].area_mm2.low == 150.0);
+  CHECK(file.choices[1].height_mm.low == Approx(120.0));
+  CHECK(file.choices[1].height_mm.high == Approx(900.0));
+  CHECK(file.choices[1].area_mm2.low == Approx(25.0));
+  CHECK(file.choices[1].area_mm2.high == Approx(400.0));
+  CHECK(file.choices[1].temperatures == std::vector<std::string>{"tie_2_degC"});
+  CHECK(file.side_a == std::vector<std::string>{"side_a_degC"});
+}
+
+}  // namespace
+}  // namespace thermocomp::identification

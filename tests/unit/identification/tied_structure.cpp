@@ -1,0 +1,211 @@
+#include "tied_structure.hpp"
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "config/toml_reader.hpp"
+#include "estimator/checks.hpp"
+#include "modelling/identification/printed.hpp"
+#include "modelling/structure/heat_model.hpp"
+#include "modelling/structure/locate.hpp"
+#include "modelling/structure/statics.hpp"
+#include "modelling/structure/structure_model.hpp"
+
+namespace thermocomp::gate_tests {
+
+using namespace thermocomp::structure;
+
+namespace {
+
+constexpr double depth_mm = 60.0;  // of a column
+constexpr double width_mm = 80.0;
+constexpr double tie_length_mm = 400.0;
+constexpr double tie_high_mm = 12.5;  // as high as that of the file; wider where it is thicker
+constexpr double above_tie_mm = 40.0;
+constexpr double mm = 1e3;
+constexpr double um = 1e6;
+constexpr Index first_tie_part = 2;
+
+void replace(std::string& text, const std::string& what, const std::string& by) {
+  const std::size_t at = text.find(what);
+  THERMOCOMP_ENSURE(at != std::string::npos);
+  text.replace(at, what.size(), by);
+}
+
+/// As wide as its area asks for, then higher.
+std::string box_of(const FiniteTie& tie) {
+  const double wide = std::min(depth_mm, tie.area_mm2 / tie_high_mm);
+  const double high = tie.area_mm2 / wide;
+  const auto corner = [&](double x, double sign) {
+    return identification::printed("[%f, %f, %f]", x, depth_mm / 2 + sign * wide / 2,
+                                   tie.height_mm + sign * high / 2);
+  };
+  return "from_mm = " + corner(width_mm, -1) + "\nto_mm = " + corner(width_mm + tie_length_mm, 1) +
+         "\n";
+}
+
+std::string text_of_tie(const std::string& name, const FiniteTie& tie) {
+  std::string text = identification::printed(
+      "[[part]]\nname = \"%s\"\nmaterial = \"steel\"\nsize_mm = [20, 12, 12.5]\n[[part.box]]\n%s",
+      name.c_str(), box_of(tie).c_str());
+  for (const auto& [column, x] : {std::pair{"warm_column", "80"}, std::pair{"cold_column", "480"}})
+    text += identification::printed(
+        "[[joint]]\nname = \"%s_on_%s\"\nfrom = { part = \"%s\", x_mm = [%s, %s] }\n"
+        "to = { part = \"%s\", x_mm = [%s, %s] }\nconductance_W_per_m2_K = 10000.0\n",
+        name.c_str(), column, name.c_str(), x, x, column, x, x);
+  for (const char* air : {"8.4", "3.6\nto = \"coolant\""})
+    text += identification::printed(
+        "[[convection]]\non = { part = \"%s\" }\ncoefficient_W_per_m2_K = %s\n", name.c_str(), air);
+  return text;
+}
+
+StructureSpec spec_of(const std::vector<FiniteTie>& ties) {
+  std::string text = read_text_file(THERMOCOMP_GATE_STRUCTURE);
+  replace(text, "from_mm = [80, 24, 243.75]   # 150 mm^2, its middle 250 mm above the ground\n",
+          "");
+  replace(text, "to_mm = [480, 36, 256.25]\n", box_of(ties.front()));
+  for (std::size_t i = 1; i < ties.size(); ++i)
+    text += text_of_tie("tie_" + std::to_string(i + 1), ties[i]);
+  StructureSpec spec = parse_structure(text, THERMOCOMP_GATE_STRUCTURE);
+  for (const FiniteTie& tie : ties)
+    for (const std::size_t column : {0U, 1U}) {
+      double& top_m = spec.parts[column].boxes.back().box.high_m[2];
+      top_m = std::max(top_m, (tie.height_mm + above_tie_mm) / mm);
+    }
+  std::erase_if(spec.sensors,
+                [](const SensorSpec& sensor) { return sensor.name.starts_with("tie_"); });
+  return spec;
+}
+
+identification::TiedColumns beams_of(const StructureSpec& spec,
+                                     const std::vector<FiniteTie>& ties) {
+  const Material& material = spec.materials[spec.parts.front().material];
+  identification::TiedColumns columns;
+  columns.working_height_mm = mm * spec.outputs.front().places.front().at_m.front()[2];
+  columns.heated_height_mm = mm * spec.parts.front().boxes.front().box.high_m[2];
+  columns.column_width_mm = width_mm;
+  columns.column_inertia_mm4 = depth_mm * width_mm * width_mm * width_mm / 12.0;
+  columns.column_modulus_MPa = 1e-6 * material.youngs_modulus_Pa;
+  columns.column_expansion_per_K = material.expansion_per_K;
+  for (const FiniteTie& tie : ties)
+    columns.ties.push_back({tie.height_mm, tie_length_mm, tie.area_mm2, columns.column_modulus_MPa,
+                            columns.column_expansion_per_K});
+  return columns;
+}
+
+}  // namespace
+
+struct TiedStructure::Parts {
+  Parts(const std::vector<FiniteTie>& ties, double each_step_s)
+      : spec(spec_of(ties)),
+        beams(beams_of(spec, ties)),
+        structure(build_structure(spec, [](std::string_view) {})),
+        heat(build_heat_model(spec, structure)),
+        empty(structure.mesh, structure.material_of_part, heat.reduction, heat.dry),
+        filled(structure.mesh, structure.material_of_part, heat.reduction, heat.flooded),
+        step_s(each_step_s),
+        rise_K(structure.mesh.nodes_m.size(), 0.0) {
+    const Statics statics(structure.mesh, structure.material_of_part, structure.reduction,
+                          structure.springs);
+    sensitivity_m_per_K = statics.sensitivities(structure.rows).front();
+  }
+
+  [[nodiscard]] double displacement_um(const std::vector<double>& field_K) const {
+    double sum_um = 0.0;
+    for (std::size_t i = 0; i < field_K.size(); ++i)
+      sum_um += um * sensitivity_m_per_K[i] * field_K[i];
+    return sum_um;
+  }
+  /// Linear across the heated zone; ends within the rows of elements above and below its top.
+  [[nodiscard]] std::vector<double> linear_field() const {
+    const auto belongs = nodes_of_part(structure.mesh, 0);
+    const double top_m = beams.heated_height_mm / mm;
+    const double row_m = spec.parts.front().size_m[2];
+    std::vector<double> field(belongs.size(), 0.0);
+    for (std::size_t i = 0; i < field.size(); ++i) {
+      if (!belongs[i]) continue;
+      const Vec3& place_m = structure.mesh.nodes_m[i];
+      const double warm = std::clamp((top_m - place_m[2]) / (2.0 * row_m) + 0.5, 0.0, 1.0);
+      field[i] = warm * (0.5 - place_m[0] * mm / width_mm);
+    }
+    return field;
+  }
+  [[nodiscard]] double at_sensor_K(std::size_t index) const {
+    const PlaceSpec& place = spec.sensors[index].place;
+    const auto found =
+        locate_in_part(structure.mesh, place.part, place.at_m.front(), place.tolerance_m);
+    THERMOCOMP_ENSURE(found.has_value());
+    double sum_K = 0.0;
+    for (const Weighted& node : found->nodes) sum_K += node.weight * rise_K[node.node];
+    return sum_K;
+  }
+
+  StructureSpec spec;
+  identification::TiedColumns beams;
+  Structure structure;
+  HeatModel heat;
+  Conduction empty;  ///< the tank
+  Conduction filled;
+  double step_s;
+  std::vector<double> rise_K;
+  std::vector<double> sensitivity_m_per_K;
+  std::unique_ptr<TransientConduction> course;
+  bool oil_was_in{false};
+};
+
+TiedStructure::TiedStructure(const std::vector<FiniteTie>& ties, double step_s)
+    : parts_(std::make_unique<Parts>(ties, step_s)) {}
+TiedStructure::~TiedStructure() = default;
+
+const identification::TiedColumns& TiedStructure::columns() const {
+  return parts_->beams;
+}
+
+identification::TiedCoefficients TiedStructure::coefficients() const {
+  identification::TiedCoefficients k{parts_->displacement_um(parts_->linear_field()), {}};
+  for (std::size_t j = 0; j < parts_->beams.ties.size(); ++j) {
+    const auto belongs =
+        nodes_of_part(parts_->structure.mesh, first_tie_part + static_cast<Index>(j));
+    k.kc_um_per_K.push_back(
+        -parts_->displacement_um(std::vector<double>(belongs.begin(), belongs.end())));
+  }
+  return k;
+}
+
+void TiedStructure::advance(bool oil_in_tank, double oil_degC) {
+  Parts& parts = *parts_;
+  if (!parts.course || oil_in_tank != parts.oil_was_in) {
+    parts.course = std::make_unique<TransientConduction>(oil_in_tank ? parts.filled : parts.empty,
+                                                         parts.step_s, parts.rise_K);
+    parts.oil_was_in = oil_in_tank;
+  }
+  const double oil_K = oil_in_tank ? oil_degC - parts.spec.room_degC : 0.0;
+  parts.course->step([&](double, double, HeatInput& input) {
+    for (std::size_t i = 0; i < input.load_W.size(); ++i)
+      input.load_W[i] = parts.heat.coolant_W_per_K[i] * oil_K;
+  });
+  parts.rise_K = parts.course->temps_degC();
+}
+
+double TiedStructure::theta_a_K() const {
+  return parts_->at_sensor_K(0);
+}
+double TiedStructure::theta_b_K() const {
+  return parts_->at_sensor_K(1);
+}
+double TiedStructure::theta_c_K(std::size_t tie) const {
+  const auto belongs =
+      nodes_of_part(parts_->structure.mesh, first_tie_part + static_cast<Index>(tie));
+  double sum_K = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < belongs.size(); ++i)
+    if (belongs[i]) sum_K += parts_->rise_K[i], count += 1.0;
+  return sum_K / count;
+}
+double TiedStructure::displacement_um() const {
+  return parts_->displacement_um(parts_->rise_K);
+}
+
+}  // namespace thermocomp::gate_tests
