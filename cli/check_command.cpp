@@ -22,7 +22,7 @@ std::string line_kind(const ModbusLine& line) {
   return std::holds_alternative<ModbusRtu>(line.link) ? "modbus_rtu" : "modbus_tcp";
 }
 
-std::string controller_kind(const ControllerConfig& controller) {
+std::string own_kind(const ControllerConfig& controller) {
   if (const auto* modbus = std::get_if<ModbusControllerConfig>(&controller)) {
     return modbus->name + " (" + line_kind(modbus->line) + ")";
   }
@@ -32,7 +32,12 @@ std::string controller_kind(const ControllerConfig& controller) {
   if (const auto* bridge = std::get_if<BridgeControllerConfig>(&controller)) {
     return bridge->name + " (linuxcnc: its bridge calls the daemon)";
   }
-  return std::get<DryRunControllerConfig>(controller).name + " (dry_run: nothing is sent)";
+  return std::get<DryRunControllerConfig>(controller).name + " (none)";
+}
+
+std::string controller_kind(const DaemonConfig& config) {
+  return own_kind(config.controller) +
+         (config.dry_run ? ", DRY RUN: nothing is written to it" : "");
 }
 
 template <class Names>
@@ -65,7 +70,7 @@ void print_what_was_found(const DaemonConfig& config) {
             << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)
             << '\n'
             << "axes: " << list_names(estimator.axes) << '\n'
-            << "controller " << controller_kind(config.controller) << ", "
+            << "controller " << controller_kind(config) << ", "
             << counted(estimator.signals.size(), "signal") << '\n'
             << "model " << config.model_file.string() << ": "
             << counted(config.model.inputs.size(), "input") << ", "

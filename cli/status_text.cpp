@@ -58,6 +58,12 @@ std::string mode_words(const std::string& mode) {
 std::string headline(const json& status, bool colours) {
   const std::string mode = text_of(status, "mode");
   const std::string since = ", for " + duration_text(number_of(status, "mode_since_s"));
+  if (flag_of(status, "dry_run")) {
+    const std::string would = mode == "dry_run" ? "all is read and computed" : mode_words(mode);
+    return line("Compensating", coloured("no: DRY RUN", Colour::yellow, colours) +
+                                    ", nothing is written to the controller (" + would + since +
+                                    ")");
+  }
   if (is_compensating(status)) {
     return line("Compensating", coloured("yes", Colour::green, colours) + since);
   }
@@ -220,14 +226,24 @@ std::string trouble_lines(const json& status, bool colours) {
   return result.empty() ? line("Wrong", "nothing") : result;
 }
 
+/// Dry run: "; applies by itself z +3.00 um".
+std::string shown_text(const json& controller) {
+  std::string shown;
+  for (const auto& [axis, value] : object_of(controller, "shown").items())
+    if (value.is_number())
+      shown += (shown.empty() ? "; applies by itself " : ", ") + axis + " " +
+               fixed_signed(value.get<double>(), 2) + " um";
+  return shown;
+}
+
 std::string controller_line(const json& status) {
   const json& controller = object_of(status, "controller");
   std::string state = flag_of(controller, "online") ? "online" : "offline";
   if (!flag_of(controller, "online") && !text_of(controller, "last_error").empty()) {
     state += " (" + text_of(controller, "last_error") + ")";
   }
-  return line("Controller",
-              text_of(controller, "name") + " (" + text_of(controller, "kind") + "): " + state);
+  return line("Controller", text_of(controller, "name") + " (" + text_of(controller, "kind") +
+                                "): " + state + shown_text(controller));
 }
 
 std::string signals_line(const json& status) {
@@ -291,8 +307,8 @@ std::string history_line(const json& status) {
 }  // namespace
 
 bool is_compensating(const json& status) {
-  return text_of(status, "mode") == "compensating" && axes_not_driven(status).empty() &&
-         !has_reason(status, "controller_offline");
+  return text_of(status, "mode") == "compensating" && !flag_of(status, "dry_run") &&
+         axes_not_driven(status).empty() && !has_reason(status, "controller_offline");
 }
 
 std::string duration_text(double seconds) {

@@ -177,7 +177,8 @@ void Operations::carried_out(const Command& done) {
 }
 
 void Operations::save_state(bool at_once) {
-  const PersistentState state = persistent_state(cycle_.estimator(), cycle_.report());
+  PersistentState state = persistent_state(cycle_.estimator(), cycle_.report());
+  if (parts_.config.dry_run) state.offset_um = parts_.sent_before_um;
   if (at_once)
     parts_.keeper.save(state, Clock::now());
   else

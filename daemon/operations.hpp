@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,8 @@ class Operations {
     ServiceManager& service;
     HistoryWriter* history;                    ///< none: no history
     std::function<std::string()> status_line;  ///< for the service manager
+    /// By axis, when the daemon started: what a dry run keeps, since it sends nothing.
+    std::map<std::string, double> sent_before_um{};
   };
   explicit Operations(Parts parts);
 

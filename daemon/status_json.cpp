@@ -162,6 +162,11 @@ json controller(const StatusView& view) {
                {"read_errors", health.read_errors},
                {"last_error", health.last_error},
                {"signals", signals}};
+  if (health.shown_um) {
+    json& shown = told["shown"] = json::object();
+    for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i)
+      shown[view.config.estimator.axes[i].name] = number((*health.shown_um)[i]);
+  }
   if (!health.state.empty())
     told.update({{"state", health.state},
                  {"state_s", age_s(view, health.state_since)},
@@ -203,13 +208,18 @@ json of_axes(const StatusView& view, double AxisReport::*figure) {
 
 }  // namespace
 
+std::string_view mode_name(Mode mode, bool dry_run) noexcept {
+  return dry_run && mode == Mode::compensating ? "dry_run" : to_string(mode);
+}
+
 json status_json(const StatusView& view) {
   const DomainReport& domain = view.report.domain;
   json bad = json::array();
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i)
     if (view.report.sensors[i].fault != Fault::none)
       bad.push_back(view.config.estimator.sensors[i].name);
-  return {{"mode", to_string(view.report.mode)},
+  return {{"mode", mode_name(view.report.mode, view.config.dry_run)},
+          {"dry_run", view.config.dry_run},
           {"mode_since_s", number(seconds(view.report.now - view.report.mode_since))},
           {"enabled", view.report.enabled},
           {"reasons", reasons(view.report)},
@@ -256,7 +266,9 @@ json sensors_json(const StatusView& view) {
 }
 
 json offsets_json(const StatusView& view) {
-  return {{"mode", to_string(view.report.mode)}, {"axes", axes(view)}};
+  return {{"mode", mode_name(view.report.mode, view.config.dry_run)},
+          {"dry_run", view.config.dry_run},
+          {"axes", axes(view)}};
 }
 
 json timing_json(const StatusView& view) {
@@ -300,7 +312,8 @@ json model_json(const StatusView& view) {
 }
 
 std::string status_line(const StatusView& view) {
-  std::string line(to_string(view.report.mode));
+  std::string line(view.config.dry_run ? "DRY RUN, nothing is written; " : "");
+  line += mode_name(view.report.mode, view.config.dry_run);
   for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
     char text[64];
     const AxisConfig& axis = view.config.estimator.axes[i];

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -31,6 +32,9 @@ struct StatusView {
   bool real_time{false};
   SocketStatistics socket;
 };
+
+/// What a status calls the mode. A dry run does not compensate: "dry_run" in that one's place.
+[[nodiscard]] std::string_view mode_name(Mode mode, bool dry_run) noexcept;
 
 /// NaN becomes null. Units are the ends of the keys; axes and outputs name theirs.
 [[nodiscard]] nlohmann::json status_json(const StatusView& view);

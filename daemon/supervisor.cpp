@@ -47,6 +47,8 @@ void Supervisor::wait_until_ready(Cycle& running) {
   running.clear_timing();
   look_at_health();
   parts_.service.ready(status_line(view()));
+  if (parts_.config.dry_run)
+    spdlog::warn("DRY RUN: everything is read and computed, nothing is written to the controller");
   spdlog::info("ready: {} Hz, {} sensors, {} axes, {}", parts_.config.loop.rate_hz,
                parts_.config.estimator.sensors.size(), parts_.config.estimator.axes.size(),
                real_time_ ? "real-time" : "ordinary schedule");
@@ -55,7 +57,8 @@ void Supervisor::wait_until_ready(Cycle& running) {
 void Supervisor::run() {
   while (!turn()) {
   }
-  if (parts_.config.estimator.compensation.on_stop == StopPolicy::ramp_to_zero) ramp_to_zero();
+  const bool to_zero = parts_.config.estimator.compensation.on_stop == StopPolicy::ramp_to_zero;
+  if (to_zero && !parts_.config.dry_run) ramp_to_zero();
 }
 
 bool Supervisor::turn() {

@@ -85,6 +85,21 @@ TEST_CASE("compensating needs the mode, the controller and every axis", "[cli][s
   }
 }
 
+TEST_CASE("a dry run is never said to compensate", "[cli][status]") {
+  json status = good_status();
+  status["dry_run"] = true;
+  for (const char* mode : {"dry_run", "compensating", "holding", "disabled"}) {
+    status["mode"] = mode;
+    CHECK_FALSE(is_compensating(status));
+    const std::string text = status_text(status, false);
+    CHECK_THAT(text, Contains("Compensating    : no: DRY RUN, nothing is written"));
+    CHECK_THAT(text, !Contains("yes"));
+    CHECK_THAT(watch_screen(status, nullptr, false), Contains("DRY RUN"));
+  }
+  status["controller"]["shown"] = {{"z", 3.0}};
+  CHECK_THAT(status_text(status, false), Contains("online; applies by itself z +3.00 um"));
+}
+
 TEST_CASE("trouble is named in plain words", "[cli][status]") {
   json status = good_status();
   status["mode"] = "holding";
