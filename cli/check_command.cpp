@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/register_table.hpp"
 #include "config/daemon_config.hpp"
 #include "config/problems.hpp"
 
@@ -80,9 +81,19 @@ void print_what_was_found(const DaemonConfig& config) {
             << config.file.string() << ": OK\n";
 }
 
-int run_check(const std::string& file) {
+struct CheckOptions {
+  std::string file;
+  bool registers{false};
+};
+
+int run_check(const CheckOptions& options) {
+  const std::string& file = options.file;
   try {
-    print_what_was_found(load_daemon_config(file));
+    const DaemonConfig config = load_daemon_config(file);
+    if (options.registers)
+      std::cout << register_table(config);
+    else
+      print_what_was_found(config);
   } catch (const ConfigurationError& error) {
     const std::size_t count = error.problems().size();
     std::fprintf(stderr, "%s\n", error.what());
@@ -99,9 +110,14 @@ int run_check(const std::string& file) {
 void add_check_command(CLI::App& app, Action& action) {
   CLI::App* sub =
       app.add_subcommand("check", "a daemon's configuration with its model: every problem at once");
-  const auto file = std::make_shared<std::string>();
-  sub->add_option("CONFIG", *file, "configuration of thermocompd")->type_name("FILE")->required();
-  sub->callback([&action, file] { action = [file] { return run_check(*file); }; });
+  const auto options = std::make_shared<CheckOptions>();
+  sub->add_option("CONFIG", options->file, "configuration of thermocompd")
+      ->type_name("FILE")
+      ->required();
+  sub->add_flag("--registers", options->registers,
+                "what the controller's side must provide: every register or bit, its unit, and who "
+                "writes it");
+  sub->callback([&action, options] { action = [options] { return run_check(*options); }; });
 }
 
 }  // namespace thermocomp::cli

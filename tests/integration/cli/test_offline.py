@@ -60,6 +60,13 @@ def test_every_controller_can_be_run_dry(name, tmp_path):
     assert "DRY RUN: nothing is written to it" in answer.stdout
 
 
+def test_the_page_on_the_controllers_side_shows_what_the_command_prints():
+    answer = run("check", "--registers", EXAMPLES / "small_machine.toml")
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout in (SOURCE / "docs" / "controllers" / "plc.md").read_text()
+    assert "frame 0x200" in run("check", "--registers", EXAMPLES / "can.toml").stdout
+
+
 def test_check_names_every_problem_with_file_line_key_value_and_rule(tmp_path):
     text = (EXAMPLES / "small_machine.toml").read_text()
     text = text.replace("rate_hz = 100 ", "rate_hz = 99999 ").replace("data_bits", "data_bitz")
