@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/events_text.hpp"
 #include "cli/json_fields.hpp"
 #include "cli/reason_text.hpp"
 #include "cli/terminal.hpp"
@@ -190,7 +191,7 @@ std::vector<std::string> estimate_lines(const json& answer) {
 std::string trouble_lines(const json& status, bool colours) {
   std::string result;
   const auto add = [&](const std::string& what, std::string_view remedy) {
-    const std::string key = result.empty() ? "Wrong" : "";
+    const std::string key = result.empty() ? "Problems" : "";
     result += line(key, coloured(what, Colour::yellow, colours) +
                             (remedy.empty() ? "" : " -> " + std::string(remedy)));
   };
@@ -223,7 +224,15 @@ std::string trouble_lines(const json& status, bool colours) {
   for (const json& warning : list_of(status, "warnings")) {
     if (warning.is_string()) add(warning.get<std::string>(), "");
   }
-  return result.empty() ? line("Wrong", "nothing") : result;
+  return result.empty() ? line("Problems", "none") : result;
+}
+
+/// Outages of the last minutes that are over.
+std::string ended_lines(const json& status) {
+  std::string result;
+  for (const json& event : list_of(status, "ended"))
+    result += line(result.empty() ? "Lately" : "", event_text(event));
+  return result;
 }
 
 /// Dry run: "; applies by itself z +3.00 um".
@@ -306,27 +315,57 @@ std::string history_line(const json& status) {
 
 }  // namespace
 
+namespace {
+
+/// What is wrong while the machine is compensated all the same.
+void add_degradations(const json& status, std::vector<std::string>& why) {
+  for (const json& axis : list_of(status, "axes")) {
+    const std::string name = "axis " + text_of(axis, "name");
+    if (flag_of(axis, "at_bound")) why.push_back(name + " is at its bound");
+    if (flag_of(axis, "disagrees")) why.push_back(name + ": the read-back disagrees");
+  }
+  for (const json& sensor : list_of(status, "sensors_bad"))
+    if (sensor.is_string()) why.push_back("sensor " + sensor.get<std::string>() + " is bad");
+  for (const json& bus : list_of(status, "buses")) {
+    const std::string name = "bus " + text_of(bus, "name");
+    if (!flag_of(bus, "connected")) why.push_back(name + " is not connected");
+    for (const json& unit : list_of(bus, "units"))
+      if (!flag_of(unit, "answering"))
+        why.push_back(name + ": " + text_of(unit, "name") + " is silent");
+  }
+  const json& history = object_of(status, "history");
+  if (flag_of(history, "enabled") && !flag_of(history, "working"))
+    why.emplace_back("the history is not written");
+}
+
+}  // namespace
+
 bool is_compensating(const json& status) {
   return text_of(status, "mode") == "compensating" && !flag_of(status, "dry_run") &&
          axes_not_driven(status).empty() && !has_reason(status, "controller_offline");
 }
 
-std::string duration_text(double seconds) {
-  if (!(seconds >= 0.0 && seconds < 1e12)) return "-";
-  const auto total_s = static_cast<std::int64_t>(seconds);
-  const auto parts = [](std::int64_t large, const char* a, std::int64_t small, const char* b) {
-    return std::to_string(large) + a + std::to_string(small) + b;
-  };
-  if (total_s < 60) return std::to_string(total_s) + " s";
-  if (total_s < 3600) return parts(total_s / 60, " min ", total_s % 60, " s");
-  if (total_s < 86400) return parts(total_s / 3600, " h ", total_s % 3600 / 60, " min");
-  return parts(total_s / 86400, " d ", total_s % 86400 / 3600, " h");
+std::vector<std::string> why_not(const json& status, bool strict) {
+  std::vector<std::string> why;
+  if (!is_compensating(status)) {
+    if (flag_of(status, "dry_run")) why.emplace_back("dry run: nothing is written");
+    if (const std::string mode = text_of(status, "mode"); mode != "compensating")
+      why.push_back("mode " + mode);
+    for (const std::string& axis : axes_not_driven(status))
+      why.push_back("axis " + axis + " is not driven");
+  }
+  if (!is_compensating(status) || strict)
+    for (const json& reason : list_of(status, "reasons"))
+      if (reason.is_string() && reason != "cutting") why.push_back(reason.get<std::string>());
+  if (strict) add_degradations(status, why);
+  return why;
 }
 
 std::string status_text(const json& status, bool colours) {
-  return headline(status, colours) + trouble_lines(status, colours) + axes_lines(status) +
-         inputs_lines(status) + controller_line(status) + signals_line(status) +
-         buses_line(status) + model_line(status) + cycle_line(status) + history_line(status) +
+  return headline(status, colours) + trouble_lines(status, colours) + ended_lines(status) +
+         axes_lines(status) + inputs_lines(status) + controller_line(status) +
+         signals_line(status) + buses_line(status) + model_line(status) + cycle_line(status) +
+         history_line(status) +
          line("Daemon", "version " + text_of(status, "version") + ", up " +
                             duration_text(number_of(status, "uptime_s")));
 }

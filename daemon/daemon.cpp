@@ -115,6 +115,7 @@ struct Daemon::Parts {
   std::unique_ptr<HistoryWriter> history;
   Cycle cycle;
   ServiceManager service;
+  EventJournal journal;
   Operations operations;
   Supervisor supervisor;
   RealTimeThread thread;
@@ -138,9 +139,10 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       history(make_history(config.history, grid)),
       cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain()),
       operations({config, cycle, keeper, service, history.get(),
-                  [this] { return status_line(supervisor.view()); }, start_state.state.offset_um}),
-      supervisor(
-          {config, sources, *link, history.get(), keeper, server, signals, service, operations}) {
+                  [this] { return status_line(supervisor.view()); }, start_state.state.offset_um,
+                  &journal, [this] { return server.caller(); }}),
+      supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
+                  operations, journal}) {
   // A kill right now must not make this a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   if (!locks.warning.empty()) supervisor.add_warning(locks.warning);
@@ -159,7 +161,8 @@ DeskActions Daemon::Parts::actions() {
   DeskActions all{[this] { return supervisor.view(); },
                   [this](const Command& asked) { return operations.command(asked); },
                   [this] { return operations.reload(); },
-                  {}};
+                  {},
+                  [this] { return events_json(journal.events()); }};
   if (auto* bridge = dynamic_cast<BridgeController*>(real_link(*link)))
     all.controller_state = [this, bridge](const nlohmann::json& params) {
       return answer_bridge(*bridge, std::get<BridgeControllerConfig>(config.controller),
@@ -216,6 +219,7 @@ Daemon::~Daemon() = default;
 void Daemon::run() {
   try {
     parts_->start();
+    parts_->journal.daemon("started, version " THERMOCOMP_VERSION);
     parts_->supervisor.wait_until_ready(parts_->cycle);
     parts_->supervisor.run();
   } catch (...) {

@@ -47,6 +47,9 @@ void add_reads(StatusServer& server, const DeskActions& actions) {
   add("offsets", offsets_json);
   add("timing", timing_json);
   add("model", model_json);
+  server.add_method("events", AccessClass::read, [actions](const json&) {
+    return actions.events ? actions.events() : json{{"events", json::array()}};
+  });
 }
 
 /// `result` once `pending` has one.

@@ -198,6 +198,22 @@ json socket(const SocketStatistics& statistics) {
           {"buffered_bytes", statistics.buffered_bytes}};
 }
 
+json event_json(const Event& event) {
+  return {{"number", event.number},
+          {"wall_s", 1e-9 * static_cast<double>(event.wall_ns)},
+          {"kind", event.kind},
+          {"subject", event.subject},
+          {"what", event.what},
+          {"duration_s", number(event.duration_s)},
+          {"user", event.user < 0 ? json(nullptr) : json(event.user)}};
+}
+
+json ended(const StatusView& view) {
+  json list = json::array();
+  for (const Event& event : view.ended) list.push_back(event_json(event));
+  return list;
+}
+
 /// A figure of each axis by its name; null: not known.
 json of_axes(const StatusView& view, double AxisReport::*figure) {
   json told = json::object();
@@ -207,6 +223,12 @@ json of_axes(const StatusView& view, double AxisReport::*figure) {
 }
 
 }  // namespace
+
+json events_json(const std::deque<Event>& events) {
+  json list = json::array();
+  for (const Event& event : events) list.push_back(event_json(event));
+  return {{"events", list}};
+}
 
 std::string_view mode_name(Mode mode, bool dry_run) noexcept {
   return dry_run && mode == Mode::compensating ? "dry_run" : to_string(mode);
@@ -243,6 +265,7 @@ json status_json(const StatusView& view) {
           {"controller", controller(view)},
           {"history", history(view)},
           {"socket", socket(view.socket)},
+          {"ended", ended(view)},
           {"warnings", view.warnings}};
 }
 

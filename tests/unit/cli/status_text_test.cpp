@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/json_fields.hpp"
 #include "cli/reason_text.hpp"
 #include "cli/watch_text.hpp"
 #include "estimator/estimator.hpp"
@@ -44,7 +45,7 @@ TEST_CASE("the status says at one glance that and how much is compensated", "[cl
   const std::string text = status_text(good_status(), false);
   CHECK_THAT(text, Contains("Compensating    : yes, for 1 h 2 min"));
   CHECK_THAT(text, Contains("Axis z          : offset    +3.10 um, target    +3.20 um, applied"));
-  CHECK_THAT(text, Contains("Wrong           : nothing"));
+  CHECK_THAT(text, Contains("Problems        : none"));
   CHECK_THAT(text, Contains("SHA-256 0123456789abcdef)"));
   CHECK_THAT(text, Contains("100 Hz, 400000 cycles, 3 missed"));
   CHECK_THAT(text, !Contains("\033"));
