@@ -228,9 +228,10 @@ std::string bounds_text(const DaemonConfig& config) {
   std::string text = "\nWhat the daemon keeps to, and the controller should refuse beyond:\n";
   for (const AxisConfig& axis : config.estimator.axes) {
     const std::string unit = unit_of_axis(axis);
-    text += "  axis " + axis.name + ": offset within +-" + number_text(axis.limiter.offset_um_max) +
-            " " + unit + ", changing by at most " + number_text(axis.limiter.rate_um_per_s_max) +
-            " " + unit + "/s\n";
+    text.append("  axis ").append(axis.name).append(": offset within +-");
+    text.append(number_text(axis.limiter.offset_um_max)).append(" ").append(unit);
+    text.append(", changing by at most ").append(number_text(axis.limiter.rate_um_per_s_max));
+    text.append(" ").append(unit).append("/s\n");
   }
   return text;
 }
