@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/register_table.hpp"
 #include "config/daemon_config.hpp"
 #include "config/problems.hpp"
 
@@ -22,7 +23,7 @@ std::string line_kind(const ModbusLine& line) {
   return std::holds_alternative<ModbusRtu>(line.link) ? "modbus_rtu" : "modbus_tcp";
 }
 
-std::string controller_kind(const ControllerConfig& controller) {
+std::string own_kind(const ControllerConfig& controller) {
   if (const auto* modbus = std::get_if<ModbusControllerConfig>(&controller)) {
     return modbus->name + " (" + line_kind(modbus->line) + ")";
   }
@@ -32,7 +33,12 @@ std::string controller_kind(const ControllerConfig& controller) {
   if (const auto* bridge = std::get_if<BridgeControllerConfig>(&controller)) {
     return bridge->name + " (linuxcnc: its bridge calls the daemon)";
   }
-  return std::get<DryRunControllerConfig>(controller).name + " (dry_run: nothing is sent)";
+  return std::get<DryRunControllerConfig>(controller).name + " (none)";
+}
+
+std::string controller_kind(const DaemonConfig& config) {
+  return own_kind(config.controller) +
+         (config.dry_run ? ", DRY RUN: nothing is written to it" : "");
 }
 
 template <class Names>
@@ -65,7 +71,7 @@ void print_what_was_found(const DaemonConfig& config) {
             << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)
             << '\n'
             << "axes: " << list_names(estimator.axes) << '\n'
-            << "controller " << controller_kind(config.controller) << ", "
+            << "controller " << controller_kind(config) << ", "
             << counted(estimator.signals.size(), "signal") << '\n'
             << "model " << config.model_file.string() << ": "
             << counted(config.model.inputs.size(), "input") << ", "
@@ -75,9 +81,19 @@ void print_what_was_found(const DaemonConfig& config) {
             << config.file.string() << ": OK\n";
 }
 
-int run_check(const std::string& file) {
+struct CheckOptions {
+  std::string file;
+  bool registers{false};
+};
+
+int run_check(const CheckOptions& options) {
+  const std::string& file = options.file;
   try {
-    print_what_was_found(load_daemon_config(file));
+    const DaemonConfig config = load_daemon_config(file);
+    if (options.registers)
+      std::cout << register_table(config);
+    else
+      print_what_was_found(config);
   } catch (const ConfigurationError& error) {
     const std::size_t count = error.problems().size();
     std::fprintf(stderr, "%s\n", error.what());
@@ -94,9 +110,14 @@ int run_check(const std::string& file) {
 void add_check_command(CLI::App& app, Action& action) {
   CLI::App* sub =
       app.add_subcommand("check", "a daemon's configuration with its model: every problem at once");
-  const auto file = std::make_shared<std::string>();
-  sub->add_option("CONFIG", *file, "configuration of thermocompd")->type_name("FILE")->required();
-  sub->callback([&action, file] { action = [file] { return run_check(*file); }; });
+  const auto options = std::make_shared<CheckOptions>();
+  sub->add_option("CONFIG", options->file, "configuration of thermocompd")
+      ->type_name("FILE")
+      ->required();
+  sub->add_flag("--registers", options->registers,
+                "what the controller's side must provide: every register or bit, its unit, and who "
+                "writes it");
+  sub->callback([&action, options] { action = [options] { return run_check(*options); }; });
 }
 
 }  // namespace thermocomp::cli

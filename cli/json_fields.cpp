@@ -84,4 +84,16 @@ std::string padded(const std::string& text, int width) {
   return text + std::string(static_cast<std::size_t>(missing), ' ');
 }
 
+std::string duration_text(double seconds) {
+  if (!(seconds >= 0.0 && seconds < 1e12)) return "-";
+  const auto total_s = static_cast<std::int64_t>(seconds);
+  const auto parts = [](std::int64_t large, const char* a, std::int64_t small, const char* b) {
+    return std::to_string(large) + a + std::to_string(small) + b;
+  };
+  if (total_s < 60) return std::to_string(total_s) + " s";
+  if (total_s < 3600) return parts(total_s / 60, " min ", total_s % 60, " s");
+  if (total_s < 86400) return parts(total_s / 3600, " h ", total_s % 3600 / 60, " min");
+  return parts(total_s / 86400, " d ", total_s % 86400 / 3600, " h");
+}
+
 }  // namespace thermocomp::cli

@@ -24,5 +24,7 @@ namespace thermocomp::cli {
 [[nodiscard]] std::string fixed_signed(double value, int digits, int width = 0);
 /// `text` with blanks to its right (left-aligned) up to `width` characters (UTF-8).
 [[nodiscard]] std::string padded(const std::string& text, int width);
+/// A duration for people: "7 s", "12 min 5 s", "3 h 20 min", "5 d 2 h"; "-" for NaN.
+[[nodiscard]] std::string duration_text(double seconds);
 
 }  // namespace thermocomp::cli

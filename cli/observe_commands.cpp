@@ -7,12 +7,15 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <string>
 #include <unistd.h>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "cli/daemon_client.hpp"
+#include "cli/events_text.hpp"
 #include "cli/status_text.hpp"
 #include "cli/terminal.hpp"
 #include "cli/truth_file.hpp"
@@ -26,14 +29,29 @@ namespace {
 using nlohmann::json;
 using std::chrono::steady_clock;
 
-int run_status(const GlobalOptions& global, bool as_json) {
-  const json status = ask_daemon(global.socket, "status", json::object());
-  if (as_json) {
+struct StatusOptions {
+  bool as_json{false};
+  bool strict{false};
+};
+
+int run_status(const GlobalOptions& global, const StatusOptions& options) {
+  json status = ask_daemon(global.socket, "status", json::object());
+  const std::vector<std::string> why = why_not(status, options.strict);
+  const int exit_status = why.empty() ? exit_success : exit_no;
+  if (options.as_json) {
+    status["exit_status"] = exit_status;
+    status["why"] = why;
     std::cout << status.dump(2) << '\n';
   } else {
     std::cout << status_text(status, stdout_is_terminal());
   }
-  return is_compensating(status) ? exit_success : exit_no;
+  return exit_status;
+}
+
+int run_events(const GlobalOptions& global, bool as_json) {
+  const json events = ask_daemon(global.socket, "events", json::object());
+  std::cout << (as_json ? events.dump(2) + "\n" : events_text(events));
+  return exit_success;
 }
 
 int run_sensors(const GlobalOptions& global, bool as_json) {
@@ -114,11 +132,23 @@ int run_watch(const GlobalOptions& global, const WatchOptions& options) {
 
 void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
   const auto as_json = std::make_shared<bool>(false);
+  const auto wanted = std::make_shared<StatusOptions>();
   CLI::App* status = app.add_subcommand(
       "status", "whether the daemon compensates, by how much, since when, what is wrong");
-  status->add_flag("--json", *as_json, "the daemon's answer as JSON");
-  status->callback(
-      [&, as_json] { action = [&, as_json] { return run_status(global, *as_json); }; });
+  status->add_flag("--json", wanted->as_json,
+                   "the daemon's answer as JSON, with exit_status and why it is that");
+  status->add_flag("--strict", wanted->strict,
+                   "exit status 1 also while it compensates, but something is wrong: a bound "
+                   "reached, a read-back that disagrees, a bad sensor, a silent unit");
+  status->callback([&, wanted] { action = [&, wanted] { return run_status(global, *wanted); }; });
+
+  CLI::App* events = app.add_subcommand(
+      "events",
+      "what happened since the daemon started: faults and how long they lasted, changes "
+      "of mode, commands and who gave them");
+  events->add_flag("--json", *as_json, "the daemon's answer as JSON");
+  events->callback(
+      [&, as_json] { action = [&, as_json] { return run_events(global, *as_json); }; });
 
   CLI::App* sensors = app.add_subcommand("sensors", "every sensor: raw, smoothed, fault");
   sensors->add_flag("--json", *as_json, "the daemon's answer as JSON");

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/events_text.hpp"
 #include "cli/json_fields.hpp"
 #include "cli/reason_text.hpp"
 #include "cli/terminal.hpp"
@@ -58,6 +59,12 @@ std::string mode_words(const std::string& mode) {
 std::string headline(const json& status, bool colours) {
   const std::string mode = text_of(status, "mode");
   const std::string since = ", for " + duration_text(number_of(status, "mode_since_s"));
+  if (flag_of(status, "dry_run")) {
+    const std::string would = mode == "dry_run" ? "all is read and computed" : mode_words(mode);
+    return line("Compensating", coloured("no: DRY RUN", Colour::yellow, colours) +
+                                    ", nothing is written to the controller (" + would + since +
+                                    ")");
+  }
   if (is_compensating(status)) {
     return line("Compensating", coloured("yes", Colour::green, colours) + since);
   }
@@ -184,7 +191,7 @@ std::vector<std::string> estimate_lines(const json& answer) {
 std::string trouble_lines(const json& status, bool colours) {
   std::string result;
   const auto add = [&](const std::string& what, std::string_view remedy) {
-    const std::string key = result.empty() ? "Wrong" : "";
+    const std::string key = result.empty() ? "Problems" : "";
     result += line(key, coloured(what, Colour::yellow, colours) +
                             (remedy.empty() ? "" : " -> " + std::string(remedy)));
   };
@@ -217,7 +224,25 @@ std::string trouble_lines(const json& status, bool colours) {
   for (const json& warning : list_of(status, "warnings")) {
     if (warning.is_string()) add(warning.get<std::string>(), "");
   }
-  return result.empty() ? line("Wrong", "nothing") : result;
+  return result.empty() ? line("Problems", "none") : result;
+}
+
+/// Outages of the last minutes that are over.
+std::string ended_lines(const json& status) {
+  std::string result;
+  for (const json& event : list_of(status, "ended"))
+    result += line(result.empty() ? "Lately" : "", event_text(event));
+  return result;
+}
+
+/// Dry run: "; applies by itself z +3.00 um".
+std::string shown_text(const json& controller) {
+  std::string shown;
+  for (const auto& [axis, value] : object_of(controller, "shown").items())
+    if (value.is_number())
+      shown += (shown.empty() ? "; applies by itself " : ", ") + axis + " " +
+               fixed_signed(value.get<double>(), 2) + " um";
+  return shown;
 }
 
 std::string controller_line(const json& status) {
@@ -226,8 +251,8 @@ std::string controller_line(const json& status) {
   if (!flag_of(controller, "online") && !text_of(controller, "last_error").empty()) {
     state += " (" + text_of(controller, "last_error") + ")";
   }
-  return line("Controller",
-              text_of(controller, "name") + " (" + text_of(controller, "kind") + "): " + state);
+  return line("Controller", text_of(controller, "name") + " (" + text_of(controller, "kind") +
+                                "): " + state + shown_text(controller));
 }
 
 std::string signals_line(const json& status) {
@@ -290,27 +315,57 @@ std::string history_line(const json& status) {
 
 }  // namespace
 
-bool is_compensating(const json& status) {
-  return text_of(status, "mode") == "compensating" && axes_not_driven(status).empty() &&
-         !has_reason(status, "controller_offline");
+namespace {
+
+/// What is wrong while the machine is compensated all the same.
+void add_degradations(const json& status, std::vector<std::string>& why) {
+  for (const json& axis : list_of(status, "axes")) {
+    const std::string name = "axis " + text_of(axis, "name");
+    if (flag_of(axis, "at_bound")) why.push_back(name + " is at its bound");
+    if (flag_of(axis, "disagrees")) why.push_back(name + ": the read-back disagrees");
+  }
+  for (const json& sensor : list_of(status, "sensors_bad"))
+    if (sensor.is_string()) why.push_back("sensor " + sensor.get<std::string>() + " is bad");
+  for (const json& bus : list_of(status, "buses")) {
+    const std::string name = "bus " + text_of(bus, "name");
+    if (!flag_of(bus, "connected")) why.push_back(name + " is not connected");
+    for (const json& unit : list_of(bus, "units"))
+      if (!flag_of(unit, "answering"))
+        why.push_back(name + ": " + text_of(unit, "name") + " is silent");
+  }
+  const json& history = object_of(status, "history");
+  if (flag_of(history, "enabled") && !flag_of(history, "working"))
+    why.emplace_back("the history is not written");
 }
 
-std::string duration_text(double seconds) {
-  if (!(seconds >= 0.0 && seconds < 1e12)) return "-";
-  const auto total_s = static_cast<std::int64_t>(seconds);
-  const auto parts = [](std::int64_t large, const char* a, std::int64_t small, const char* b) {
-    return std::to_string(large) + a + std::to_string(small) + b;
-  };
-  if (total_s < 60) return std::to_string(total_s) + " s";
-  if (total_s < 3600) return parts(total_s / 60, " min ", total_s % 60, " s");
-  if (total_s < 86400) return parts(total_s / 3600, " h ", total_s % 3600 / 60, " min");
-  return parts(total_s / 86400, " d ", total_s % 86400 / 3600, " h");
+}  // namespace
+
+bool is_compensating(const json& status) {
+  return text_of(status, "mode") == "compensating" && !flag_of(status, "dry_run") &&
+         axes_not_driven(status).empty() && !has_reason(status, "controller_offline");
+}
+
+std::vector<std::string> why_not(const json& status, bool strict) {
+  std::vector<std::string> why;
+  if (!is_compensating(status)) {
+    if (flag_of(status, "dry_run")) why.emplace_back("dry run: nothing is written");
+    if (const std::string mode = text_of(status, "mode"); mode != "compensating")
+      why.push_back("mode " + mode);
+    for (const std::string& axis : axes_not_driven(status))
+      why.push_back("axis " + axis + " is not driven");
+  }
+  if (!is_compensating(status) || strict)
+    for (const json& reason : list_of(status, "reasons"))
+      if (reason.is_string() && reason != "cutting") why.push_back(reason.get<std::string>());
+  if (strict) add_degradations(status, why);
+  return why;
 }
 
 std::string status_text(const json& status, bool colours) {
-  return headline(status, colours) + trouble_lines(status, colours) + axes_lines(status) +
-         inputs_lines(status) + controller_line(status) + signals_line(status) +
-         buses_line(status) + model_line(status) + cycle_line(status) + history_line(status) +
+  return headline(status, colours) + trouble_lines(status, colours) + ended_lines(status) +
+         axes_lines(status) + inputs_lines(status) + controller_line(status) +
+         signals_line(status) + buses_line(status) + model_line(status) + cycle_line(status) +
+         history_line(status) +
          line("Daemon", "version " + text_of(status, "version") + ", up " +
                             duration_text(number_of(status, "uptime_s")));
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -16,7 +17,10 @@ namespace thermocomp::cli {
 /// `thermocomp sensors`: a line a sensor. @param sensors  result of the method `sensors`
 [[nodiscard]] std::string sensors_text(const nlohmann::json& sensors, bool colours);
 
-/// A duration for people: "7 s", "12 min 5 s", "3 h 20 min", "5 d 2 h"; "-" for NaN.
-[[nodiscard]] std::string duration_text(double seconds);
+/// Why `status` exits with 1, one line each; empty: it exits with 0.
+/// @param strict  also what does not stop the compensation: a bound reached, a read-back that
+///                disagrees, a lost sensor or unit, an outside domain, a history that is not
+///                written
+[[nodiscard]] std::vector<std::string> why_not(const nlohmann::json& status, bool strict);
 
 }  // namespace thermocomp::cli

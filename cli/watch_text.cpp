@@ -43,8 +43,9 @@ std::string reasons_text(const json& status) {
 std::string first_line(const json& status, bool colours) {
   const bool good = is_compensating(status);
   const json& cycle = object_of(status, "cycle");
-  return coloured(text_of(status, "mode"), good ? Colour::green : Colour::red, colours) + " for " +
-         duration_text(number_of(status, "mode_since_s")) + "   " +
+  const std::string dry = flag_of(status, "dry_run") ? "DRY RUN, nothing is written: " : "";
+  return coloured(dry + text_of(status, "mode"), good ? Colour::green : Colour::red, colours) +
+         " for " + duration_text(number_of(status, "mode_since_s")) + "   " +
          fixed(number_of(cycle, "rate_hz"), 0) + " Hz, " + fixed(number_of(cycle, "missed"), 0) +
          " missed, lateness p99.9 " + fixed(number_of(cycle, "lateness_us_p999"), 0) + " us\n";
 }

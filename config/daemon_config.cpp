@@ -137,12 +137,16 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
       root.table("controller"), tables.axes, config.estimator.axes, buses.serial_devices);
   config.controller = std::move(controller.config);
   config.estimator.signals = std::move(controller.signals);
-  config.estimator.controller_reads_back = controller.reads_back;
+  config.dry_run = controller.dry_run;
+  // A dry run stands in for what would be applied (drivers/controllers/dry_run_controller.hpp).
+  config.estimator.controller_reads_back = controller.reads_back || controller.dry_run;
   const TomlTable compensation = root.table_or_empty("compensation");
   config.estimator.compensation =
       sections::read_compensation(compensation, config.estimator.signals);
   check_controller_period(compensation, config, controller.period_s);
   config.estimator.correction = sections::read_correction(root.table_or_empty("correction"));
+  // With no offset at the machine what remains there is all of it.
+  if (config.dry_run) config.estimator.correction.measured = MeasuredMeaning::total;
   return tables;
 }
 

@@ -57,6 +57,7 @@ struct DaemonConfig {
   std::vector<CanopenBusConfig> canopen_buses;
   std::vector<J1939BusConfig> j1939_buses;
   ControllerConfig controller;
+  bool dry_run{false};  ///< the controller is read and nothing is written to it
   HistoryConfig history;
   SocketConfig socket;
   /// The texts as read, kept with the history so that a replay needs nothing else.

@@ -58,6 +58,7 @@ std::vector<std::string> restart_needed(const DaemonConfig& running, const Daemo
   // What the controller applies and shows would change its meaning at once.
   compare(same_signs(running.estimator.axes, next.estimator.axes), "sign of an axis");
   compare(running.controller == next.controller, "controller, or registers of the axes");
+  compare(running.dry_run == next.dry_run, "dry_run of the controller");
   compare(running.estimator.signals == next.estimator.signals, "signals of the controller");
   compare(running.history == next.history, "history");
   compare(running.socket == next.socket, "socket");

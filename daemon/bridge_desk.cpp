@@ -65,8 +65,8 @@ BridgeReport read_report(const BridgeControllerConfig& config, const json& param
 
 }  // namespace
 
-json answer_bridge(BridgeController& bridge, const BridgeControllerConfig& config, Mode mode,
-                   const json& params) {
+json answer_bridge(BridgeController& bridge, const BridgeControllerConfig& config,
+                   std::string_view mode, const json& params) {
   BridgeReport report;
   try {
     report = read_report(config, params);
@@ -81,7 +81,7 @@ json answer_bridge(BridgeController& bridge, const BridgeControllerConfig& confi
     offsets[config.axes[i]] = answer->valid[i] ? json(answer->offset_um[i]) : json(nullptr);
   return {{"epoch", answer->link_epoch},
           {"anew", answer->anew},
-          {"mode", to_string(mode)},
+          {"mode", mode},
           {"offsets_um", offsets}};
 }
 

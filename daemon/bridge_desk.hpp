@@ -1,10 +1,11 @@
 /// The method `controller_state`: from a bridge's JSON to its report, and the answer.
 #pragma once
 
+#include <string_view>
+
 #include <nlohmann/json_fwd.hpp>
 
 #include "drivers/controllers/bridge_controller.hpp"
-#include "estimator/estimator.hpp"
 
 namespace thermocomp {
 
@@ -13,9 +14,10 @@ namespace thermocomp {
 /// configuration must be there; further axes and signals are what others may want.
 /// result: {"epoch": 3, "anew": false, "mode": "compensating", "offsets_um": {"x": 1.5, "y": null}}
 /// where null is "leave it as it is".
+/// @param mode  as a status calls it
 /// @throws RpcError invalid_params (counted), refused
 [[nodiscard]] nlohmann::json answer_bridge(BridgeController& bridge,
-                                           const BridgeControllerConfig& config, Mode mode,
-                                           const nlohmann::json& params);
+                                           const BridgeControllerConfig& config,
+                                           std::string_view mode, const nlohmann::json& params);
 
 }  // namespace thermocomp

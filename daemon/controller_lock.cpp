@@ -57,13 +57,16 @@ struct Names {
 
 }  // namespace
 
-std::vector<std::string> controller_names(const ControllerConfig& config) {
+std::vector<std::string> controller_names(const ControllerConfig& config, bool dry_run) {
+  const auto* modbus = std::get_if<ModbusControllerConfig>(&config);
+  const bool is_serial = modbus != nullptr && std::holds_alternative<ModbusRtu>(modbus->line.link);
+  if (dry_run && !is_serial) return {};
   return std::visit(Names{}, config);
 }
 
-std::vector<NameLock> lock_controller(const ControllerConfig& config) {
+std::vector<NameLock> lock_controller(const ControllerConfig& config, bool dry_run) {
   std::vector<NameLock> locks;
-  for (const std::string& name : controller_names(config)) locks.emplace_back(name);
+  for (const std::string& name : controller_names(config, dry_run)) locks.emplace_back(name);
   return locks;
 }
 

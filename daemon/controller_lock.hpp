@@ -13,11 +13,13 @@ namespace thermocomp {
 ///   Modbus TCP   host, port and unit, as they are written
 ///   Modbus RTU   the serial device, whatever its path
 ///   CAN          the interface and the identifier of each frame that we send
-/// None for a dry run, and for a bridge: whoever calls the status socket of this daemon calls no
-/// other.
-[[nodiscard]] std::vector<std::string> controller_names(const ControllerConfig& config);
+/// None for a bridge: whoever calls the status socket of this daemon calls no other.
+/// @param dry_run  nothing is written: only a serial line, which has one master, is named
+[[nodiscard]] std::vector<std::string> controller_names(const ControllerConfig& config,
+                                                        bool dry_run = false);
 
 /// @throws LockHeld, LockImpossible
-[[nodiscard]] std::vector<NameLock> lock_controller(const ControllerConfig& config);
+[[nodiscard]] std::vector<NameLock> lock_controller(const ControllerConfig& config,
+                                                    bool dry_run = false);
 
 }  // namespace thermocomp

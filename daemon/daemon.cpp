@@ -19,6 +19,7 @@
 #include "daemon/operator_desk.hpp"
 #include "daemon/start_state.hpp"
 #include "daemon/supervisor.hpp"
+#include "drivers/controllers/dry_run_controller.hpp"
 #include "drivers/controllers/make_controller.hpp"
 #include "drivers/sensors/can_protocol_source.hpp"
 #include "drivers/sensors/can_source.hpp"
@@ -67,9 +68,21 @@ DaemonConfig load(const std::filesystem::path& file) {
   return config;
 }
 
+/// The controller's own link, also inside a dry run; nullptr: there is none.
+ControllerLink* real_link(ControllerLink& link) {
+  auto* dry_run = dynamic_cast<DryRunController*>(&link);
+  return dry_run != nullptr ? dry_run->read() : &link;
+}
+
+const char* what_stays(const DaemonConfig& config) {
+  return config.dry_run ? "dry run: nothing was written to the controller"
+                        : "the controller keeps the last offsets";
+}
+
 /// What this process alone may use while it runs; the history's lock is with its writer.
 struct Locks {
-  explicit Locks(const DaemonConfig& config) : controller(lock_controller(config.controller)) {
+  explicit Locks(const DaemonConfig& config)
+      : controller(lock_controller(config.controller, config.dry_run)) {
     try {
       state.emplace(config.state_file);
     } catch (const LockImpossible& problem) {
@@ -102,6 +115,7 @@ struct Daemon::Parts {
   std::unique_ptr<HistoryWriter> history;
   Cycle cycle;
   ServiceManager service;
+  EventJournal journal;
   Operations operations;
   Supervisor supervisor;
   RealTimeThread thread;
@@ -120,14 +134,15 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       keeper(config.state_file, start_state.state, start_state.is_on_disk,
              start_state.reference_lost),
       sources(make_sources(config)),
-      link(make_controller(config.controller)),
+      link(make_controller(config.controller, config.dry_run)),
       grid(make_grid(config.loop)),
       history(make_history(config.history, grid)),
       cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain()),
       operations({config, cycle, keeper, service, history.get(),
-                  [this] { return status_line(supervisor.view()); }}),
-      supervisor(
-          {config, sources, *link, history.get(), keeper, server, signals, service, operations}) {
+                  [this] { return status_line(supervisor.view()); }, start_state.state.offset_um,
+                  &journal, [this] { return server.caller(); }}),
+      supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
+                  operations, journal}) {
   // A kill right now must not make this a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   if (!locks.warning.empty()) supervisor.add_warning(locks.warning);
@@ -146,11 +161,12 @@ DeskActions Daemon::Parts::actions() {
   DeskActions all{[this] { return supervisor.view(); },
                   [this](const Command& asked) { return operations.command(asked); },
                   [this] { return operations.reload(); },
-                  {}};
-  if (auto* bridge = dynamic_cast<BridgeController*>(link.get()))
+                  {},
+                  [this] { return events_json(journal.events()); }};
+  if (auto* bridge = dynamic_cast<BridgeController*>(real_link(*link)))
     all.controller_state = [this, bridge](const nlohmann::json& params) {
       return answer_bridge(*bridge, std::get<BridgeControllerConfig>(config.controller),
-                           operations.cycle().report().mode, params);
+                           mode_name(operations.cycle().report().mode, config.dry_run), params);
     };
   return all;
 }
@@ -174,7 +190,7 @@ void Daemon::Parts::start() {
 }
 
 void Daemon::Parts::stop() noexcept {
-  service.stopping("the controller keeps the last offsets");
+  service.stopping(what_stays(config));
   cycle.stop();
   if (!thread.join_within(cycle_ends_within)) {
     // Nothing of it can be trusted, and it may stand in the midst of anything: what a kill would
@@ -203,6 +219,7 @@ Daemon::~Daemon() = default;
 void Daemon::run() {
   try {
     parts_->start();
+    parts_->journal.daemon("started, version " THERMOCOMP_VERSION);
     parts_->supervisor.wait_until_ready(parts_->cycle);
     parts_->supervisor.run();
   } catch (...) {
@@ -210,7 +227,7 @@ void Daemon::run() {
     throw;
   }
   parts_->stop();
-  spdlog::info("stopped; the controller keeps the last offsets");
+  spdlog::info("stopped; {}", what_stays(parts_->config));
 }
 
 }  // namespace thermocomp

@@ -4,6 +4,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "daemon/status_json.hpp"
+
 namespace thermocomp {
 namespace {
 
@@ -49,27 +51,54 @@ void EventLog::note_estimates(const Report& report, const EstimatorConfig& confi
   uncertain_ = uncertain;
 }
 
-void EventLog::note_report(const Report& report, const EstimatorConfig& config) {
+void EventLog::note_report(const Report& report, const EstimatorConfig& config, bool dry_run) {
+  constexpr nanoseconds settles = std::chrono::seconds(5);
+  if (settled_at_ == nanoseconds{}) settled_at_ = report.now + settles;
+  if (first_ && report.mode == Mode::starting && report.now < settled_at_) return;
+  note_sensors(report, config);
+  note_mismatches(report, config);
+  note_mode(report, std::string(mode_name(report.mode, dry_run)));  // what comes of them
+  first_ = false;
+}
+
+void EventLog::note_mode(const Report& report, const std::string& mode) {
   // "cutting" comes and goes with every part; it is in the status, not in the log.
   const std::uint32_t reasons = report.reasons & ~static_cast<std::uint32_t>(Reason::cutting);
   if (first_ || report.mode != mode_ || reasons != reasons_) {
     const bool good = report.mode == Mode::compensating && reasons == 0;
-    spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}",
-                to_string(report.mode), reason_names(reasons));
+    spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}", mode,
+                reason_names(reasons));
   }
-  note_mismatches(report, config);
-  first_ = false;
+  for (std::size_t i = 0; i < reasons_count; ++i) {
+    const auto reason = static_cast<Reason>(1u << i);
+    // What an operator wanted is no fault; the command and the mode tell of it.
+    if (reason == Reason::operator_disabled) continue;
+    if (has_reason(reasons, reason) == has_reason(reasons_, reason)) continue;
+    const std::string name(to_string(reason));
+    if (has_reason(reasons, reason))
+      journal_.fault("reason " + name, name);
+    else
+      journal_.recovery("reason " + name);
+  }
+  journal_.mode(mode);
   mode_ = report.mode;
   reasons_ = reasons;
+}
+
+void EventLog::note_sensors(const Report& report, const EstimatorConfig& config) {
   faults_.resize(report.sensors.size(), Fault::none);
   clipping_.resize(report.sensors.size(), false);
   for (std::size_t i = 0; i < report.sensors.size(); ++i) {
     const SensorReport& sensor = report.sensors[i];
     if (sensor.fault != faults_[i]) {
-      if (sensor.fault == Fault::none)
-        spdlog::info("sensor {}: good again", config.sensors[i].name);
-      else
-        spdlog::warn("sensor {}: {}", config.sensors[i].name, to_string(sensor.fault));
+      const std::string subject = "sensor " + config.sensors[i].name;
+      if (sensor.fault == Fault::none) {
+        spdlog::info("{}: good again", subject);
+        journal_.recovery(subject);
+      } else {
+        spdlog::warn("{}: {}", subject, to_string(sensor.fault));
+        journal_.fault(subject, std::string(to_string(sensor.fault)));
+      }
       faults_[i] = sensor.fault;
     }
     const bool clipping = sensor.clipped_in_a_row >= clipped_in_a_row_news;
@@ -87,15 +116,19 @@ void EventLog::note_mismatches(const Report& report, const EstimatorConfig& conf
     if (axis.latched == latched_[i]) continue;
     latched_[i] = axis.latched;
     const Mismatch& mismatch = axis.latched_mismatch;
-    if (axis.latched)
+    const std::string subject = "axis " + config.axes[i].name;
+    if (axis.latched) {
+      journal_.fault(subject, "mismatch latched: " + std::string(likely_text(mismatch)));
       spdlog::error(
           "axis {}: sent {:.3f} um, read back {:.3f} um: {}; not driven until it is mended and "
           "released (thermocomp release {})",
           config.axes[i].name, mismatch.sent_um, mismatch.read_um, likely_text(mismatch),
           config.axes[i].name);
-    else
+    } else {
+      journal_.recovery(subject);
       spdlog::info("axis {}: released, goes on from {:.3f} um", config.axes[i].name,
                    axis.offset_um);
+    }
   }
 }
 
@@ -103,10 +136,14 @@ void EventLog::note_link(const std::string& what, bool connected, const std::str
   const auto known = connected_.find(what);
   if (known != connected_.end() && known->second == connected) return;
   connected_[what] = connected;
-  if (connected)
+  const std::string why = error.empty() ? "not connected" : error;
+  if (connected) {
     spdlog::info("{}: connected", what);
-  else
-    spdlog::warn("{}: {}", what, error.empty() ? "not connected" : error);
+    journal_.recovery(what);
+  } else {
+    spdlog::warn("{}: {}", what, why);
+    journal_.fault(what, why);
+  }
 }
 
 // A bus that is not connected has said so already.
@@ -115,10 +152,14 @@ void EventLog::note_state(const std::string& what, bool connected, const std::st
   std::string& known = states_.try_emplace(what, "active").first->second;
   if (known == state) return;
   known = state;
-  if (state == "active")
+  const std::string subject = what + ", errors";
+  if (state == "active") {
     spdlog::info("{}: without errors again", what);
-  else
+    journal_.recovery(subject);
+  } else {
     spdlog::warn("{}: error state {}", what, state);
+    journal_.fault(subject, "error state " + state);
+  }
 }
 
 void EventLog::note_bus(const BusHealth& bus) {

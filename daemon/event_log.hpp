@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/event_journal.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
@@ -17,7 +18,12 @@ namespace thermocomp {
 /// Main's thread only. Each change is one line; a state that stays is not repeated.
 class EventLog {
  public:
-  void note_report(const Report& report, const EstimatorConfig& config);
+  /// @param journal  gets the same changes; outlives this
+  explicit EventLog(EventJournal& journal) : journal_(journal) {}
+
+  /// In the first seconds of a start nothing has been read yet, which is no news: the log begins
+  /// with the first mode other than `starting`, or 5 s after the first report.
+  void note_report(const Report& report, const EstimatorConfig& config, bool dry_run = false);
   /// @param columns  names of the report's inputs
   void note_estimates(const Report& report, const EstimatorConfig& config,
                       const std::vector<std::string>& columns);
@@ -30,11 +36,15 @@ class EventLog {
   void note_socket(const SocketStatistics& statistics);
 
  private:
+  void note_mode(const Report& report, const std::string& mode);
+  void note_sensors(const Report& report, const EstimatorConfig& config);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
   void note_link(const std::string& what, bool connected, const std::string& error);
   void note_state(const std::string& what, bool connected, const std::string& state);
 
+  EventJournal& journal_;
   bool first_{true};
+  nanoseconds settled_at_{};  ///< of the reports
   Mode mode_{Mode::starting};
   std::uint32_t reasons_{0};
   std::vector<Fault> faults_;

@@ -76,6 +76,7 @@ RpcPending Operations::command(const Command& asked) {
                    "machine is cold and even");
   const CycleHandle::Tracked outcome = cycle_.send(asked, Clock::now());
   if (!outcome) throw RpcError(rpc::refused, "too many commands wait for the cycle");
+  note_asked(asked, outcome);
   return [this, outcome, kind = asked.kind]() -> std::optional<json> {
     poll();
     if (!is_done(*outcome, "command")) return std::nullopt;
@@ -89,6 +90,7 @@ RpcPending Operations::command(const Command& asked) {
 
 RpcPending Operations::reload() {
   const CycleHandle::Tracked outcome = begin_reload();
+  reload_->user = asking_user();
   return [this, outcome]() -> std::optional<json> {
     poll();
     if (!is_done(*outcome, "new configuration")) return std::nullopt;
@@ -117,7 +119,7 @@ CycleHandle::Tracked Operations::begin_reload() {
                                                fmt::join(fixed, ", ")));
     auto brain = make_brain(next, parts_.history);
     brain->estimator.plan_adoption(cycle_.estimator());
-    reload_ = {std::move(next), cycle_.replace(std::move(brain), Clock::now())};
+    reload_ = {std::move(next), cycle_.replace(std::move(brain), Clock::now()), false, -1};
   } catch (...) {
     malloc_trim(0);  // what the refused files took; locked memory is never given back by itself
     parts_.service.ready(parts_.status_line());
@@ -147,6 +149,7 @@ void Operations::finish_reload() {
   if (*reload_->outcome == Outcome::done) {
     parts_.config = std::move(reload_->next);
     set_log_level(parts_.config.log_level);
+    if (parts_.journal != nullptr) parts_.journal->command("reload", reload_->user);
     spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
                  parts_.config.model_checksum);
   } else {
@@ -164,20 +167,39 @@ void Operations::carried_out(const Command& done) {
   if (done.kind == CommandKind::stop) return;  // not an operator's
   std::string axis;
   if (names_axis(done.kind)) axis = " " + parts_.config.estimator.axes[done.axis].name;
-  if (done.kind == CommandKind::release)
-    spdlog::info("operator: release{}", axis);
-  else if (!axis.empty())
-    spdlog::info("operator: {}{} {} um", to_string(done.kind), axis, done.value_um);
-  else
-    spdlog::info("operator: {}", to_string(done.kind));
+  std::string what = fmt::format("{}{}", to_string(done.kind), axis);
+  if (!axis.empty() && done.kind != CommandKind::release)
+    what += fmt::format(" {} um", done.value_um);
+  spdlog::info("operator: {}", what);
+  const std::int64_t user = take_asking(done);
+  if (parts_.journal != nullptr) parts_.journal->command(what, user);
   if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report()))
     parts_.keeper.reference_taken();
   // Called done only when it would survive a power cut.
   save_state(true);
 }
 
+void Operations::note_asked(const Command& asked, const CycleHandle::Tracked& outcome) {
+  std::erase_if(asked_, [](const Asked& old) { return *old.outcome == Outcome::withdrawn; });
+  asked_.push_back({asked, outcome, asking_user()});
+}
+
+/// Who asked for what is done now. @return -1: nobody known
+std::int64_t Operations::take_asking(const Command& done) {
+  const auto is_it = [&](const Asked& each) {
+    return each.command.kind == done.kind && each.command.axis == done.axis &&
+           each.command.value_um == done.value_um && *each.outcome != Outcome::withdrawn;
+  };
+  const auto found = std::find_if(asked_.begin(), asked_.end(), is_it);
+  if (found == asked_.end()) return -1;
+  const std::int64_t user = found->user;
+  asked_.erase(found);
+  return user;
+}
+
 void Operations::save_state(bool at_once) {
-  const PersistentState state = persistent_state(cycle_.estimator(), cycle_.report());
+  PersistentState state = persistent_state(cycle_.estimator(), cycle_.report());
+  if (parts_.config.dry_run) state.offset_um = parts_.sent_before_um;
   if (at_once)
     parts_.keeper.save(state, Clock::now());
   else

@@ -3,12 +3,15 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "config/daemon_config.hpp"
 #include "daemon/cycle/cycle_handle.hpp"
+#include "daemon/event_journal.hpp"
 #include "daemon/history/history_writer.hpp"
 #include "daemon/service_manager.hpp"
 #include "daemon/socket/rpc.hpp"
@@ -30,6 +33,10 @@ class Operations {
     ServiceManager& service;
     HistoryWriter* history;                    ///< none: no history
     std::function<std::string()> status_line;  ///< for the service manager
+    /// By axis, when the daemon started: what a dry run keeps, since it sends nothing.
+    std::map<std::string, double> sent_before_um{};
+    EventJournal* journal{nullptr};               ///< none: nothing is noted
+    std::function<std::int64_t()> asking_user{};  ///< of the request in hand; -1: nobody known
   };
   explicit Operations(Parts parts);
 
@@ -57,17 +64,29 @@ class Operations {
     DaemonConfig next;
     CycleHandle::Tracked outcome;
     bool is_overdue_told{false};
+    std::int64_t user{-1};
   };
 
   CycleHandle::Tracked begin_reload();
   void finish_reload();
   void carried_out(const Command& done);
+  void note_asked(const Command& asked, const CycleHandle::Tracked& outcome);
+  [[nodiscard]] std::int64_t take_asking(const Command& done);
+  [[nodiscard]] std::int64_t asking_user() const {
+    return parts_.asking_user ? parts_.asking_user() : -1;
+  }
 
+  struct Asked {
+    Command command;
+    CycleHandle::Tracked outcome;
+    std::int64_t user{-1};
+  };
   Parts parts_;
   CycleHandle cycle_;
   std::optional<Reload> reload_;
   bool reload_again_{false};
   std::string save_error_told_;
+  std::vector<Asked> asked_;  ///< commands on their way, in order
 };
 
 /// A brain for the configuration, with a recorder where there is a history.

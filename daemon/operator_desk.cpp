@@ -47,6 +47,9 @@ void add_reads(StatusServer& server, const DeskActions& actions) {
   add("offsets", offsets_json);
   add("timing", timing_json);
   add("model", model_json);
+  server.add_method("events", AccessClass::read, [actions](const json&) {
+    return actions.events ? actions.events() : json{{"events", json::array()}};
+  });
 }
 
 /// `result` once `pending` has one.
@@ -85,6 +88,7 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
 RpcPending prove(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::prove, axis_index(view, params), value_um(params)};
+  refuse_unless(!view.config.dry_run, "a dry run writes nothing: no axis would move");
   const double most_um = view.config.estimator.compensation.prove_um_max;
   refuse_unless(
       std::abs(command.value_um) <= most_um,

@@ -23,6 +23,8 @@ struct DeskActions {
   std::function<RpcPending()> reload;
   /// A bridge's report and its answer; empty where the controller is no bridge. @throws RpcError
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
+  /// What happened in this run, for `events`.
+  std::function<nlohmann::json()> events{};
 };
 
 /// Adds every method of CONTRACTS to `server`. @param actions  copied; must stay callable

@@ -162,6 +162,11 @@ json controller(const StatusView& view) {
                {"read_errors", health.read_errors},
                {"last_error", health.last_error},
                {"signals", signals}};
+  if (health.shown_um) {
+    json& shown = told["shown"] = json::object();
+    for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i)
+      shown[view.config.estimator.axes[i].name] = number((*health.shown_um)[i]);
+  }
   if (!health.state.empty())
     told.update({{"state", health.state},
                  {"state_s", age_s(view, health.state_since)},
@@ -193,6 +198,22 @@ json socket(const SocketStatistics& statistics) {
           {"buffered_bytes", statistics.buffered_bytes}};
 }
 
+json event_json(const Event& event) {
+  return {{"number", event.number},
+          {"wall_s", 1e-9 * static_cast<double>(event.wall_ns)},
+          {"kind", event.kind},
+          {"subject", event.subject},
+          {"what", event.what},
+          {"duration_s", number(event.duration_s)},
+          {"user", event.user < 0 ? json(nullptr) : json(event.user)}};
+}
+
+json ended(const StatusView& view) {
+  json list = json::array();
+  for (const Event& event : view.ended) list.push_back(event_json(event));
+  return list;
+}
+
 /// A figure of each axis by its name; null: not known.
 json of_axes(const StatusView& view, double AxisReport::*figure) {
   json told = json::object();
@@ -203,13 +224,24 @@ json of_axes(const StatusView& view, double AxisReport::*figure) {
 
 }  // namespace
 
+json events_json(const std::deque<Event>& events) {
+  json list = json::array();
+  for (const Event& event : events) list.push_back(event_json(event));
+  return {{"events", list}};
+}
+
+std::string_view mode_name(Mode mode, bool dry_run) noexcept {
+  return dry_run && mode == Mode::compensating ? "dry_run" : to_string(mode);
+}
+
 json status_json(const StatusView& view) {
   const DomainReport& domain = view.report.domain;
   json bad = json::array();
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i)
     if (view.report.sensors[i].fault != Fault::none)
       bad.push_back(view.config.estimator.sensors[i].name);
-  return {{"mode", to_string(view.report.mode)},
+  return {{"mode", mode_name(view.report.mode, view.config.dry_run)},
+          {"dry_run", view.config.dry_run},
           {"mode_since_s", number(seconds(view.report.now - view.report.mode_since))},
           {"enabled", view.report.enabled},
           {"reasons", reasons(view.report)},
@@ -233,6 +265,7 @@ json status_json(const StatusView& view) {
           {"controller", controller(view)},
           {"history", history(view)},
           {"socket", socket(view.socket)},
+          {"ended", ended(view)},
           {"warnings", view.warnings}};
 }
 
@@ -256,7 +289,9 @@ json sensors_json(const StatusView& view) {
 }
 
 json offsets_json(const StatusView& view) {
-  return {{"mode", to_string(view.report.mode)}, {"axes", axes(view)}};
+  return {{"mode", mode_name(view.report.mode, view.config.dry_run)},
+          {"dry_run", view.config.dry_run},
+          {"axes", axes(view)}};
 }
 
 json timing_json(const StatusView& view) {
@@ -300,7 +335,8 @@ json model_json(const StatusView& view) {
 }
 
 std::string status_line(const StatusView& view) {
-  std::string line(to_string(view.report.mode));
+  std::string line(view.config.dry_run ? "DRY RUN, nothing is written; " : "");
+  line += mode_name(view.report.mode, view.config.dry_run);
   for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
     char text[64];
     const AxisConfig& axis = view.config.estimator.axes[i];

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <chrono>
+#include <deque>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -10,6 +12,7 @@
 #include "config/daemon_config.hpp"
 #include "daemon/cycle/cycle.hpp"
 #include "daemon/history/history_writer.hpp"
+#include "daemon/recording/event.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
@@ -30,13 +33,19 @@ struct StatusView {
   double uptime_s{0.0};
   bool real_time{false};
   SocketStatistics socket;
+  std::vector<Event> ended{};  ///< outages that are over since a few minutes, newest first
 };
+
+/// What a status calls the mode. A dry run does not compensate: "dry_run" in that one's place.
+[[nodiscard]] std::string_view mode_name(Mode mode, bool dry_run) noexcept;
 
 /// NaN becomes null. Units are the ends of the keys; axes and outputs name theirs.
 [[nodiscard]] nlohmann::json status_json(const StatusView& view);
 [[nodiscard]] nlohmann::json sensors_json(const StatusView& view);
 [[nodiscard]] nlohmann::json offsets_json(const StatusView& view);
 [[nodiscard]] nlohmann::json timing_json(const StatusView& view);
+/// Oldest first.
+[[nodiscard]] nlohmann::json events_json(const std::deque<Event>& events);
 [[nodiscard]] nlohmann::json model_json(const StatusView& view);
 /// One line for systemctl status.
 [[nodiscard]] std::string status_line(const StatusView& view);

@@ -22,11 +22,16 @@ constexpr auto tick_period = 100ms;
 constexpr auto health_period = 1s;
 /// While a command or a reload is under way: at 1 kHz it takes a millisecond or two.
 constexpr auto busy_period = 1ms;
+/// Reports are looked at so often at least, whatever is under way.
+constexpr auto note_period_max = 1s;
 constexpr auto ready_within = 5s;
 constexpr std::uint64_t cycles_until_ready = 3;
 /// Offsets at zero are sent, and read back, for so long before the links are closed.
 constexpr auto zero_settles = 500ms;
 constexpr auto stop_extended_by = 10s;
+/// Outages that have ended are shown for so long, and so many.
+constexpr auto recent = 600s;
+constexpr std::size_t recent_max = 8;
 
 }  // namespace
 
@@ -47,6 +52,8 @@ void Supervisor::wait_until_ready(Cycle& running) {
   running.clear_timing();
   look_at_health();
   parts_.service.ready(status_line(view()));
+  if (parts_.config.dry_run)
+    spdlog::warn("DRY RUN: everything is read and computed, nothing is written to the controller");
   spdlog::info("ready: {} Hz, {} sensors, {} axes, {}", parts_.config.loop.rate_hz,
                parts_.config.estimator.sensors.size(), parts_.config.estimator.axes.size(),
                real_time_ ? "real-time" : "ordinary schedule");
@@ -55,7 +62,8 @@ void Supervisor::wait_until_ready(Cycle& running) {
 void Supervisor::run() {
   while (!turn()) {
   }
-  if (parts_.config.estimator.compensation.on_stop == StopPolicy::ramp_to_zero) ramp_to_zero();
+  const bool to_zero = parts_.config.estimator.compensation.on_stop == StopPolicy::ramp_to_zero;
+  if (to_zero && !parts_.config.dry_run) ramp_to_zero();
 }
 
 bool Supervisor::turn() {
@@ -69,6 +77,8 @@ bool Supervisor::turn() {
     throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
   const bool stopping = take_signals();
   parts_.operations.poll();
+  // What was before a command is told before it, what comes of it after it.
+  if (!parts_.operations.is_busy() || Clock::now() >= next_note_) note_report();
   parts_.server.handle(0ms);
   if (Clock::now() >= next_tick_) tick();
   return stopping;
@@ -76,9 +86,20 @@ bool Supervisor::turn() {
 
 bool Supervisor::take_signals() {
   const SignalFile::Asked asked = parts_.signals.drain();
-  if (asked.stop != 0) spdlog::info("stopping: {}", asked.stop == SIGTERM ? "SIGTERM" : "SIGINT");
+  if (asked.stop != 0) {
+    const std::string why = asked.stop == SIGTERM ? "SIGTERM" : "SIGINT";
+    spdlog::info("stopping: {}", why);
+    parts_.journal.daemon("stopping: " + why);
+  }
   if (asked.reload && asked.stop == 0) parts_.operations.hang_up();
   return asked.stop != 0;
+}
+
+void Supervisor::note_report() {
+  next_note_ = Clock::now() + note_period_max;
+  events_.note_report(cycle().report(), parts_.config.estimator, parts_.config.dry_run);
+  events_.note_estimates(cycle().report(), parts_.config.estimator,
+                         parts_.config.model.temperature_columns());
 }
 
 void Supervisor::tick() {
@@ -86,9 +107,6 @@ void Supervisor::tick() {
   const std::uint64_t cycles = cycle().timing().cycles.load(std::memory_order_acquire);
   if (cycles != cycles_seen_) parts_.service.alive();
   cycles_seen_ = cycles;
-  events_.note_report(cycle().report(), parts_.config.estimator);
-  events_.note_estimates(cycle().report(), parts_.config.estimator,
-                         parts_.config.model.temperature_columns());
   if (Clock::now() >= next_health_) look_at_health();
   parts_.operations.save_state(false);
 }
@@ -163,7 +181,8 @@ StatusView Supervisor::view() {
           std::move(all),
           std::chrono::duration<double>(Clock::now() - started_).count(),
           real_time_,
-          parts_.server.statistics()};
+          parts_.server.statistics(),
+          parts_.journal.ended_within(recent, recent_max)};
 }
 
 }  // namespace thermocomp

@@ -33,8 +33,9 @@ class Supervisor {
     SignalFile& signals;
     ServiceManager& service;
     Operations& operations;
+    EventJournal& journal;
   };
-  explicit Supervisor(const Parts& parts) : parts_(parts) {}
+  explicit Supervisor(const Parts& parts) : parts_(parts), events_(parts.journal) {}
 
   /// Shown with every status from now on.
   void add_warning(const std::string& warning);
@@ -53,6 +54,7 @@ class Supervisor {
   /// @return whether the daemon was asked to stop
   [[nodiscard]] bool turn();
   [[nodiscard]] bool take_signals();
+  void note_report();
   void tick();
   void look_at_health();
   void ramp_to_zero();
@@ -66,6 +68,7 @@ class Supervisor {
   Clock::time_point started_{Clock::now()};
   Clock::time_point next_tick_{};
   Clock::time_point next_health_{};
+  Clock::time_point next_note_{};
   std::uint64_t cycles_seen_{0};
   std::vector<BusHealth> buses_;
   ControllerHealth controller_health_;

@@ -81,6 +81,7 @@ class ControllerReader {
                                            {"can", Kind::can},
                                            {"linuxcnc", Kind::linuxcnc}},
                                           Kind::unknown);
+    result_.dry_run = kind == Kind::dry_run || table_.flag("dry_run", false);
     switch (kind) {
       case Kind::dry_run:
         read_dry_run();
@@ -118,7 +119,10 @@ class ControllerReader {
   }
 
   void read_dry_run() {
-    constexpr std::string_view rule = "makes no sense for a controller of kind = \"dry_run\"";
+    constexpr std::string_view rule =
+        "makes no sense for a controller of kind = \"dry_run\", which is none; to read a "
+        "controller "
+        "without writing to it, give its own kind and dry_run = true";
     for (const std::string& key : table_.keys()) {
       if (key != "name" && key != "kind") table_.refuse(key, rule);
     }
@@ -134,7 +138,8 @@ class ControllerReader {
     config.silent_after_s =
         table_.number("silent_after_s", Range::between(0.2, 60), config.silent_after_s);
     for (const std::string& key : table_.keys())
-      if (key != "name" && key != "kind" && key != "silent_after_s" && key != "signal")
+      if (key != "name" && key != "kind" && key != "silent_after_s" && key != "signal" &&
+          key != "dry_run")
         table_.refuse(key, rule);
     for (std::size_t i = 0; i < axes_.size(); ++i) {
       refuse_all(axis_tables_[i], {"offset", "applied", "piezo"}, rule);

@@ -16,6 +16,7 @@ struct ControllerReading {
   std::vector<std::string> signals;  ///< names, in order
   bool reads_back{true};
   double period_s{0.0};  ///< of the exchange; 0: there is none
+  bool dry_run{false};   ///< nothing is to be written
 };
 
 /// @param axis_tables  the [[axis]] tables, in the order of `axes`

@@ -77,6 +77,7 @@ class SegmentExport {
                 const SetupColumns& place, std::vector<HistoryDamage>& damage)
       : segment_(segment),
         config_(setup.estimator),
+        dry_run_(setup.dry_run),
         place_(place),
         damage_(damage),
         cursor_(reader.records(segment)) {
@@ -126,7 +127,8 @@ class SegmentExport {
     }
     for (std::size_t i = 0; i < place_.offsets.size(); ++i) {
       row[place_.offsets[i]] = offset_um_[i];
-      row[place_.applied[i]] = inputs_.controller.applied_um[i];
+      // What a dry run shows in its place was not applied.
+      row[place_.applied[i]] = dry_run_ ? not_a_number : inputs_.controller.applied_um[i];
       row[place_.measured[i]] = measured_um_[i];
     }
     measured_um_.fill(not_a_number);
@@ -187,6 +189,7 @@ class SegmentExport {
 
   const SegmentInfo& segment_;
   const EstimatorConfig& config_;
+  const bool dry_run_;
   const SetupColumns& place_;
   std::vector<HistoryDamage>& damage_;
   int told_{0};

@@ -16,7 +16,9 @@ PersistentState state_after(const HistoryReader& reader, const SegmentInfo& segm
   }
   Report report = steps.estimator().make_report();
   steps.estimator().report(report);
-  return persistent_state(steps.estimator(), report);
+  PersistentState state = persistent_state(steps.estimator(), report);
+  if (setup.dry_run) state.offset_um.clear();  // they were not sent
+  return state;
 }
 
 void search(const HistoryReader& reader, const SetupParser& parser, RecordedState& found) {

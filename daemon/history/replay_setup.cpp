@@ -9,7 +9,7 @@ namespace thermocomp {
 ReplaySetup parse_setup(const SegmentSetup& setup) {
   DaemonConfig config = parse_daemon_config(setup.config_text, "configuration of the segment",
                                             setup.model_text, "model of the segment");
-  return {std::move(config.estimator), std::move(config.model)};
+  return {std::move(config.estimator), std::move(config.model), config.dry_run};
 }
 
 }  // namespace thermocomp

@@ -13,6 +13,7 @@ namespace thermocomp {
 struct ReplaySetup {
   EstimatorConfig estimator;
   ThermalModel model;
+  bool dry_run{false};  ///< nothing was written to the controller
 };
 /// Texts -> configuration and model. The default parses them as the daemon does.
 using SetupParser = std::function<ReplaySetup(const SegmentSetup&)>;

@@ -41,6 +41,7 @@ struct ServedClient {
 
   int fd;
   PeerAccess access;
+  std::int64_t user{-1};  ///< as the kernel noted it; -1: it does not tell
   TokenBucket tokens;
   LineBuffer input;
   std::string output;

@@ -46,6 +46,7 @@ struct StatusServer::Parts {
   SocketLimits limits;
   ListeningSocket listener;
   RequestDesk desk;
+  std::int64_t caller{-1};  ///< of the request in hand
   int epoll_fd{-1};
   int timer_fd{-1};
   std::map<ClientId, ServedClient> clients;
@@ -156,6 +157,7 @@ void StatusServer::Parts::take(int fd, Clock::time_point now) {
                        now)
           .first->second;
   client.watched = EPOLLIN;
+  if (peer) client.user = peer->user;
   if (!allowed.any()) ++strangers;
   ++statistics.accepted;
 }
@@ -275,7 +277,9 @@ void StatusServer::Parts::answer_one(ClientId id, ServedClient& client) {
   std::string line;
   if (client.input.take(line) && !line.empty()) {
     ++statistics.requests;
+    caller = client.user;
     Answer answer = desk.answer(client.access, line);
+    caller = -1;
     const auto later = std::move(answer.later);
     if (later && !later(answer)) {
       client.later = later;
@@ -444,6 +448,10 @@ StatusServer::~StatusServer() = default;
 
 void StatusServer::add_method(const std::string& name, AccessClass access, RpcHandler handler) {
   parts_->desk.add_method(name, access, std::move(handler));
+}
+
+std::int64_t StatusServer::caller() const noexcept {
+  return parts_->caller;
 }
 
 void StatusServer::add_slow_method(const std::string& name, AccessClass access,

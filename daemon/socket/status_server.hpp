@@ -79,6 +79,8 @@ class StatusServer {
   /// fd() readable again. Throws nothing of a client's making.
   void handle(std::chrono::milliseconds timeout);
   [[nodiscard]] SocketStatistics statistics() const noexcept;
+  /// For a handler: the user of the request in hand, as the kernel gives it; -1: not known.
+  [[nodiscard]] std::int64_t caller() const noexcept;
 
  private:
   struct Parts;

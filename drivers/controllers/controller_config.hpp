@@ -72,7 +72,7 @@ struct CanControllerConfig {
   bool operator==(const CanControllerConfig&) const = default;
 };
 
-/// Sends nothing; applies at once what it is offered and shows it.
+/// No controller at all, or one that is only read (make_controller.hpp).
 struct DryRunControllerConfig {
   std::string name;
   std::size_t axes{0};

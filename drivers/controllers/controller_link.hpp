@@ -1,7 +1,9 @@
 /// A machine controller that takes offsets and tells what it does with them.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "estimator/types.hpp"
@@ -22,6 +24,8 @@ struct ControllerHealth {
   std::string state;
   nanoseconds state_since{};  ///< CLOCK_MONOTONIC when it was entered
   std::uint64_t bus_offs{0};  ///< CAN: times the interface left the bus
+  /// Dry run of a controller that is read: what it really applies [um], NaN: not told.
+  std::optional<std::array<double, axes_max>> shown_um{};
 };
 
 /// Rule of the link: after every (re)connection and after every write that failed the link takes a

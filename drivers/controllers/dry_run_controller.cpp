@@ -7,46 +7,88 @@
 
 namespace thermocomp {
 namespace {
+
 constexpr std::uint32_t only_epoch = 1;
+
+std::array<double, axes_max> nothing_told() noexcept {
+  std::array<double, axes_max> values{};
+  values.fill(not_a_number);
+  return values;
 }
 
-DryRunController::DryRunController(DryRunControllerConfig config) : config_(std::move(config)) {
+}  // namespace
+
+DryRunController::DryRunController(DryRunControllerConfig config,
+                                   std::unique_ptr<ControllerLink> read)
+    : config_(std::move(config)),
+      read_(std::move(read)),
+      applied_um_(nothing_told()),
+      shown_um_(nothing_told()) {
   require(config_.axes <= axes_max, "axes", static_cast<double>(config_.axes),
           "a controller has at most 16 axes");
-  for (std::size_t axis = 0; axis < config_.axes; ++axis) applied_.applied_um[axis] = 0.0;
+  for (std::size_t axis = 0; axis < config_.axes; ++axis) applied_um_[axis] = 0.0;
+}
+
+void DryRunController::start() {
+  if (read_) read_->start();
+  started_.store(true);
+}
+
+void DryRunController::stop() noexcept {
+  started_.store(false);
+  if (read_) read_->stop();
 }
 
 void DryRunController::newest(ControllerState& state) noexcept {
-  if (commands_.fresh()) {
-    const OffsetCommand& command = commands_.front();
-    for (std::size_t axis = 0; axis < config_.axes; ++axis) {
-      if (command.valid[axis] && std::isfinite(command.offset_um[axis])) {
-        applied_.applied_um[axis] = command.offset_um[axis];
-      }
-    }
+  read_state(state);
+  // Between two read-backs a controller shows what it showed.
+  if (state.online && state.taken_at != read_at_) {
+    read_at_ = state.taken_at;
+    apply_offered(state.link_epoch);
   }
-  applied_.online = started_.load(std::memory_order_relaxed);
-  if (applied_.online) {
-    applied_.link_epoch = only_epoch;
-    applied_.taken_at = monotonic_now();
+  state.applied_um = applied_um_;
+}
+
+void DryRunController::read_state(ControllerState& state) noexcept {
+  if (read_) {
+    read_->newest(state);
+    shown_um_.back() = state.applied_um;
+    shown_um_.publish();
+    return;
   }
-  state = applied_;
+  state = {};
+  state.online = started_.load(std::memory_order_relaxed);
+  if (!state.online) return;
+  state.link_epoch = only_epoch;
+  state.taken_at = monotonic_now();
+}
+
+void DryRunController::apply_offered(std::uint32_t link_epoch) noexcept {
+  commands_.fresh();
+  const OffsetCommand& command = commands_.front();
+  if (command.link_epoch != link_epoch) return;
+  for (std::size_t axis = 0; axis < config_.axes; ++axis)
+    if (command.valid[axis] && std::isfinite(command.offset_um[axis]))
+      applied_um_[axis] = command.offset_um[axis];
 }
 
 void DryRunController::offer(const OffsetCommand& command) noexcept {
-  if (command.link_epoch != only_epoch || !started_.load(std::memory_order_relaxed)) return;
   commands_.back() = command;
   commands_.publish();
-  writes_.fetch_add(1, std::memory_order_relaxed);
 }
 
 ControllerHealth DryRunController::health() const {
+  if (read_) {
+    ControllerHealth health = read_->health();
+    shown_um_.fresh();
+    health.shown_um = shown_um_.front();
+    return health;
+  }
   ControllerHealth health;
   health.name = config_.name;
   health.kind = "dry_run";
   health.connected = started_.load();
   health.connects = health.connected ? 1 : 0;
-  health.writes = writes_.load();
   return health;
 }
 

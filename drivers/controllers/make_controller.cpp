@@ -23,10 +23,22 @@ struct Maker {
   }
 };
 
+struct AxesCounter {
+  std::size_t operator()(const DryRunControllerConfig& config) const { return config.axes; }
+  template <class Config>
+  std::size_t operator()(const Config& config) const {
+    return config.axes.size();
+  }
+};
+
 }  // namespace
 
-std::unique_ptr<ControllerLink> make_controller(const ControllerConfig& config) {
-  return std::visit(Maker{}, config);
+std::unique_ptr<ControllerLink> make_controller(const ControllerConfig& config, bool dry_run) {
+  std::unique_ptr<ControllerLink> link = std::visit(Maker{}, config);
+  if (!dry_run || std::holds_alternative<DryRunControllerConfig>(config)) return link;
+  const std::string name = std::visit([](const auto& each) { return each.name; }, config);
+  return std::make_unique<DryRunController>(
+      DryRunControllerConfig{name, std::visit(AxesCounter{}, config)}, std::move(link));
 }
 
 }  // namespace thermocomp

@@ -51,7 +51,7 @@ class Daemon {
     clock_now = 1h;
     bridge_.start();
     desk_.add_method("controller_state", AccessClass::bridge, [this](const json& params) {
-      json result = answer_bridge(bridge_, places_, report_.mode, params);
+      json result = answer_bridge(bridge_, places_, to_string(report_.mode), params);
       check_taken(params, result);
       return result;
     });

@@ -47,6 +47,26 @@ def test_every_example_checks(name):
     assert "OK" in answer.stdout and "SHA-256" in answer.stdout
 
 
+@pytest.mark.parametrize("name", ["small_machine", "modbus_tcp", "can", "piezo"])
+def test_every_controller_can_be_run_dry(name, tmp_path):
+    for model in EXAMPLES.glob("*model*.toml"):
+        shutil.copy(model, tmp_path)
+    text = (EXAMPLES / f"{name}.toml").read_text()
+    lines = [line for line in text.splitlines() if not line.startswith("dry_run")]
+    lines.insert(lines.index("[controller]") + 1, "dry_run = true")
+    (tmp_path / "dry.toml").write_text("\n".join(lines) + "\n")
+    answer = run("check", "dry.toml", cwd=tmp_path)
+    assert answer.returncode == 0, answer.stderr
+    assert "DRY RUN: nothing is written to it" in answer.stdout
+
+
+def test_the_page_on_the_controllers_side_shows_what_the_command_prints():
+    answer = run("check", "--registers", EXAMPLES / "small_machine.toml")
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout in (SOURCE / "docs" / "controllers" / "plc.md").read_text()
+    assert "frame 0x200" in run("check", "--registers", EXAMPLES / "can.toml").stdout
+
+
 def test_check_names_every_problem_with_file_line_key_value_and_rule(tmp_path):
     text = (EXAMPLES / "small_machine.toml").read_text()
     text = text.replace("rate_hz = 100 ", "rate_hz = 99999 ").replace("data_bits", "data_bitz")

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/json_fields.hpp"
 #include "cli/reason_text.hpp"
 #include "cli/watch_text.hpp"
 #include "estimator/estimator.hpp"
@@ -44,7 +45,7 @@ TEST_CASE("the status says at one glance that and how much is compensated", "[cl
   const std::string text = status_text(good_status(), false);
   CHECK_THAT(text, Contains("Compensating    : yes, for 1 h 2 min"));
   CHECK_THAT(text, Contains("Axis z          : offset    +3.10 um, target    +3.20 um, applied"));
-  CHECK_THAT(text, Contains("Wrong           : nothing"));
+  CHECK_THAT(text, Contains("Problems        : none"));
   CHECK_THAT(text, Contains("SHA-256 0123456789abcdef)"));
   CHECK_THAT(text, Contains("100 Hz, 400000 cycles, 3 missed"));
   CHECK_THAT(text, !Contains("\033"));
@@ -83,6 +84,21 @@ TEST_CASE("compensating needs the mode, the controller and every axis", "[cli][s
     CHECK_FALSE(is_compensating(status));
     CHECK_THAT(status_text(status, false), Contains("Compensating    : no"));
   }
+}
+
+TEST_CASE("a dry run is never said to compensate", "[cli][status]") {
+  json status = good_status();
+  status["dry_run"] = true;
+  for (const char* mode : {"dry_run", "compensating", "holding", "disabled"}) {
+    status["mode"] = mode;
+    CHECK_FALSE(is_compensating(status));
+    const std::string text = status_text(status, false);
+    CHECK_THAT(text, Contains("Compensating    : no: DRY RUN, nothing is written"));
+    CHECK_THAT(text, !Contains("yes"));
+    CHECK_THAT(watch_screen(status, nullptr, false), Contains("DRY RUN"));
+  }
+  status["controller"]["shown"] = {{"z", 3.0}};
+  CHECK_THAT(status_text(status, false), Contains("online; applies by itself z +3.00 um"));
 }
 
 TEST_CASE("trouble is named in plain words", "[cli][status]") {

@@ -360,6 +360,8 @@ TEST_CASE("a dry run takes no place for offsets", "[config]") {
   const std::vector<Broken> table = {
       {"host", "kind = \"dry_run\"", "host = \"a\"\nkind = \"dry_run\"", "", "controller.host",
        "makes no sense"},
+      {"dry run twice", "kind = \"dry_run\"", "dry_run = true\nkind = \"dry_run\"", "",
+       "controller.dry_run", "give its own kind and dry_run = true"},
       {"signal", "[[axis]]", "[[controller.signal]]\nname = \"x_mm\"\n[[axis]]", "",
        "controller.signal", "makes no sense"},
       {"offset", "output = \"z_um\"", "offset = { address = 0 }\noutput = \"z_um\"", "",

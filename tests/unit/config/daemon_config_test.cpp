@@ -130,6 +130,30 @@ TEST_CASE("a dry run reads back what it is offered", "[config]") {
   CHECK(config.estimator.controller_reads_back);
 }
 
+TEST_CASE("any controller can be run dry", "[config]") {
+  for (const char* name : {"small_machine.toml", "modbus_tcp.toml", "can.toml", "piezo.toml"}) {
+    INFO(name);
+    const std::string text = example(name);
+    const bool is_small = std::string(name) == "small_machine.toml";
+    const char* model = is_small ? "small_machine_model.toml" : "column_model.toml";
+    const std::string dry = is_small
+                                ? edited(text, "dry_run = false ", "dry_run = true ")
+                                : edited(text, "[controller]\n", "[controller]\ndry_run = true\n");
+    const DaemonConfig real = parse(text, model);
+    const DaemonConfig config = parse(dry, model);
+    CHECK_FALSE(real.dry_run);
+    CHECK(config.dry_run);
+    CHECK(config.controller == real.controller);  // all places stay checked
+    CHECK(config.estimator.signals == real.estimator.signals);
+    CHECK(config.estimator.controller_reads_back);
+    // Nothing is in effect at the machine, so what remains there is all of it.
+    CHECK(real.estimator.correction.measured == MeasuredMeaning::remaining);
+    CHECK(config.estimator.correction.measured == MeasuredMeaning::total);
+    CHECK(restart_needed(real, config) == std::vector<std::string>{"dry_run of the controller"});
+  }
+  CHECK(load_daemon_config(examples / "modbus_rtu.toml").dry_run);  // the kind of no controller
+}
+
 TEST_CASE("without any applied offset the controller does not read back", "[config]") {
   const std::string text = edited(
       example("modbus_tcp.toml"),

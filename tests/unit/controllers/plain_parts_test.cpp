@@ -6,6 +6,7 @@
 
 #include "drivers/can/can_socket.hpp"
 #include "drivers/controllers/can_controller.hpp"
+#include "drivers/controllers/dry_run_controller.hpp"
 #include "drivers/controllers/make_controller.hpp"
 #include "drivers/controllers/modbus_layout.hpp"
 #include "drivers/controllers/write_gate.hpp"
@@ -301,10 +302,75 @@ TEST_CASE("a dry run applies what it is offered and shows it", "[controllers]") 
   link->offer(command);
   link->newest(state);
   CHECK(state.applied_um[0] == 1.0);
-  CHECK(link->health().writes == 2);
+  CHECK(link->health().writes == 0);  // nothing is written
   link->stop();
   link->newest(state);
   CHECK_FALSE(state.online);
+}
+
+namespace {
+
+/// A link that shows what the test says and notes whether it was ever offered anything.
+class ShownLink final : public ControllerLink {
+ public:
+  ShownLink(ControllerState& shown, int& offers) : shown_(shown), offers_(offers) {}
+  void start() override {}
+  void stop() noexcept override {}
+  void newest(ControllerState& state) noexcept override { state = shown_; }
+  void offer(const OffsetCommand&) noexcept override { ++offers_; }
+  [[nodiscard]] ControllerHealth health() const override {
+    ControllerHealth health;
+    health.kind = "shown";
+    return health;
+  }
+
+ private:
+  ControllerState& shown_;
+  int& offers_;
+};
+
+}  // namespace
+
+TEST_CASE("a dry run passes on what a controller shows and never offers it anything",
+          "[controllers]") {
+  ControllerState shown;
+  int offers = 0;
+  DryRunController link({"cnc", 1}, std::make_unique<ShownLink>(shown, offers));
+  link.start();
+  ControllerState state;
+  link.newest(state);
+  CHECK_FALSE(state.online);
+  shown.online = true;
+  shown.link_epoch = 3;
+  shown.taken_at = 1s;
+  shown.applied_um[0] = 40.0;
+  shown.signals[0] = 250.0;
+  link.newest(state);
+  CHECK(state.online);
+  CHECK(state.link_epoch == 3);
+  CHECK(state.signals[0] == 250.0);
+  CHECK(state.applied_um[0] == 0.0);  // of what it would apply, not of what it does
+  CHECK(link.health().shown_um->at(0) == 40.0);
+  CHECK(link.health().kind == "shown");
+
+  OffsetCommand command = of_epoch(3);
+  command.offset_um[0] = 5.0;
+  command.valid[0] = true;
+  link.offer(command);
+  link.newest(state);
+  CHECK(state.applied_um[0] == 0.0);  // no read-back since
+  shown.taken_at = 2s;
+  link.newest(state);
+  CHECK(state.applied_um[0] == 5.0);
+  command = of_epoch(2);
+  command.offset_um[0] = 9.0;
+  command.valid[0] = true;
+  link.offer(command);
+  shown.taken_at = 3s;
+  link.newest(state);
+  CHECK(state.applied_um[0] == 5.0);  // of another epoch
+  link.stop();
+  CHECK(offers == 0);
 }
 
 TEST_CASE("a CAN controller that cannot be is refused", "[controllers][can]") {

@@ -13,9 +13,7 @@ namespace {
 
 struct Desk {
   Desk() : bridge(config) { bridge.start(); }
-  json answer(const json& params) {
-    return answer_bridge(bridge, config, Mode::compensating, params);
-  }
+  json answer(const json& params) { return answer_bridge(bridge, config, "compensating", params); }
 
   BridgeControllerConfig config{"mill", 1.0, {"x"}, {"x_mm", "cutting_on"}};
   BridgeController bridge;

@@ -151,6 +151,10 @@ TEST_CASE("controllers are the same where the same registers or frames are writt
   other.interface = "can1";
   CHECK(names(can) != names(other));
 
+  // Whoever only reads is in nobody's way, but for a serial line: that has one master.
+  CHECK(controller_names(can, true).empty());
+  CHECK(controller_names(serial, true) == controller_names(serial));
+
   CHECK(names(DryRunControllerConfig{}).empty());
   CHECK(names(BridgeControllerConfig{}).empty());
 }

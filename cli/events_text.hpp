@@ -1,0 +1,16 @@
+/// Events of a daemon as lines for a person.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace thermocomp::cli {
+
+/// "sensor bed_front: the unit does not answer, for 28 s" and the like, without time and kind.
+[[nodiscard]] std::string event_text(const nlohmann::json& event);
+/// One line an event, oldest first: local time, kind, text.
+/// @param events  the daemon's answer to `events`
+[[nodiscard]] std::string events_text(const nlohmann::json& events);
+
+}  // namespace thermocomp::cli

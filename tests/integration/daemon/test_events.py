@@ -1,0 +1,91 @@
+"""What happened in a scripted shift: every event, in order, with how long it lasted."""
+
+import json
+import os
+import time
+
+from lab import eventually
+from plain_devices import Machine
+
+
+def events_of(daemon):
+    return daemon.call("events")["events"]
+
+
+def index_of(events, kind, subject="", what=""):
+    """The first such event; an error shows what there was."""
+    found = [i for i, event in enumerate(events) if event["kind"] == kind
+             and event["subject"].startswith(subject) and event["what"].startswith(what)]
+    assert found, (kind, subject, what, events)
+    return found[0]
+
+
+def test_a_shift_is_told_in_order_with_durations(lab):
+    machine = Machine(lab)
+    daemon = machine.start()
+    machine.warm_by(3.0)
+    daemon.wait_for_offset(3.0)
+    assert not [event for event in events_of(daemon) if "never_read" in event["what"]]
+    before = len(events_of(daemon))
+
+    machine.module.stop()
+    begun = time.monotonic()
+    daemon.wait_for_mode("holding")
+    # Longer than the reconnection's pauses are apart, so that a wrong duration would be seen.
+    eventually(lambda: time.monotonic() - begun > 3.0, "the outage lasts")
+    machine.module.start()
+    machine.warm_by(3.0)
+    daemon.wait_for_mode("compensating")
+    lasted_s = time.monotonic() - begun
+    eventually(lambda: any(event["kind"] == "recovery" and event["subject"] == "bus cabinet"
+                           for event in events_of(daemon)), "the bus is said to be back")
+    daemon.call("disable")
+    eventually(lambda: any(event["what"] == "disabled" for event in events_of(daemon)),
+               "the mode is told")
+    daemon.call("measured", axis="z", value_um=1.5)
+    daemon.call("enable")
+    daemon.wait_for_mode("compensating")
+    daemon.call("reload")
+    eventually(lambda: any(event["what"] == "reload" for event in events_of(daemon)), "reloaded")
+
+    events = events_of(daemon)
+    assert [event["number"] for event in events] == list(range(1, len(events) + 1))
+    assert events[0]["kind"] == "daemon" and events[0]["what"].startswith("started")
+    shift = events[before:]
+    order = [index_of(shift, "fault", "sensor column"), index_of(shift, "mode", "compensating"),
+             index_of(shift, "recovery", "sensor column"), index_of(shift, "mode", "holding"),
+             index_of(shift, "command", what="disable"), index_of(shift, "mode", what="disabled"),
+             index_of(shift, "command", what="measured z 1.5 um"),
+             index_of(shift, "command", what="enable"), index_of(shift, "command", what="reload")]
+    assert order == sorted(order), shift  # causes before what comes of them
+    outage = shift[order[2]]
+    # Seen as lost at once or, where the link still seems good, after stale_after_s = 1.
+    assert abs(outage["duration_s"] - lasted_s) < 1.5, (outage, lasted_s)
+    held = shift[order[3]]
+    assert held["what"] == "compensating" and abs(held["duration_s"] - lasted_s) < 1.5, held
+    for name in ("disable", "enable", "measured", "reload"):
+        assert shift[index_of(shift, "command", what=name)]["user"] == os.getuid()
+    assert not [event for event in shift if event["what"] == "operator_disabled"], "no fault"
+
+    status, out, _ = daemon.cli("events")
+    assert status == 0
+    assert "  recovery  sensor column: " in out and ": over, lasted " in out
+    assert "  command   measured z 1.5 um, by " in out
+    assert json.loads(daemon.cli("events", "--json")[1])["events"][0] == events[0]
+    # It is over, and still to be seen at one glance.
+    status, out, _ = daemon.cli("status")
+    assert status == 0 and "Lately" in out and "Problems        : none" in out
+
+
+def test_strict_sees_what_is_wrong_while_it_compensates(lab):
+    machine = Machine(lab)
+    daemon = machine.start()
+    assert daemon.cli("status", "--strict")[0] == 0
+    machine.warm_by(100.0)
+    eventually(lambda: daemon.axis()["at_bound"], "the bound")
+    assert daemon.cli("status")[0] == 0
+    status, out, _ = daemon.cli("status", "--strict", "--json")
+    told = json.loads(out)
+    assert (status, told["exit_status"], told["why"]) == (
+        1, 1, ["at_bound", "axis z is at its bound"])
+    assert json.loads(daemon.cli("status", "--json")[1])["why"] == []

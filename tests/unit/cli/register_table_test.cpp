@@ -1,0 +1,79 @@
+// The contract with the controller's side as a table.
+#include "cli/register_table.hpp"
+
+#include <filesystem>
+
+#include <catch2/catch.hpp>
+
+namespace {
+
+using Catch::Matchers::Contains;
+using thermocomp::DaemonConfig;
+using thermocomp::load_daemon_config;
+using thermocomp::cli::register_table;
+
+DaemonConfig example(const char* name) {
+  return load_daemon_config(std::filesystem::path(THERMOCOMP_EXAMPLES) / name);
+}
+
+}  // namespace
+
+TEST_CASE("the table names every register, its unit and who writes it", "[cli][registers]") {
+  const std::string text = register_table(example("small_machine.toml"));
+  CHECK_THAT(text, Contains("controller cnc: Modbus TCP 192.168.10.30:502, unit 1, every 0.1 s"));
+  const auto read = text.find("Written by the controller");
+  REQUIRE(read != std::string::npos);
+  const std::string written = text.substr(0, read);
+  const std::string shown = text.substr(read);
+  for (const char* row :
+       {"holding 0..1  int32 ABCD  offset of axis x", "holding 4..5  int32 ABCD  offset of axis z",
+        "holding 10    uint16", "bit 0: x, bit 1: y, bit 2: z; 1: take the offset",
+        "holding 11    uint16", "um, count x 0.01"}) {
+    INFO(row);
+    CHECK_THAT(written, Contains(row));
+  }
+  for (const char* row : {"input 4..5        int32 ABCD  applied offset of axis z",
+                          "mm, count x 0.001", "input 26          uint16      spindle_rpm",
+                          "discrete input 1  bit         compensation"}) {
+    INFO(row);
+    CHECK_THAT(shown, Contains(row));
+  }
+  CHECK_THAT(text, Contains("axis z: offset within +-60 um, changing by at most 0.5 um/s"));
+  CHECK_THAT(text, !Contains("Missing"));
+  CHECK_THAT(text, !Contains("DRY RUN"));
+}
+
+TEST_CASE("the table of CAN goes by frames and bits", "[cli][registers]") {
+  DaemonConfig config = example("can.toml");
+  const std::string text = register_table(config);
+  CHECK_THAT(text, Contains("CAN can0, every 0.1 s"));
+  const auto read = text.find("Sent by the controller, each frame at least every 2 s");
+  REQUIRE(read != std::string::npos);
+  const std::string sent = text.substr(0, read);
+  CHECK_THAT(sent, Contains("frame 0x200 (11 bits)"));
+  CHECK_THAT(sent, Contains("0, 16 bits            signed, little endian    offset of axis z"));
+  CHECK_THAT(sent, Contains("56, 8 bits            unsigned, little endian  heartbeat"));
+  CHECK_THAT(text.substr(read), Contains("frame 0x281 (11 bits)"));
+  CHECK_THAT(text.substr(read), Contains("signed, big endian       applied offset of axis z"));
+  CHECK_THAT(text.substr(read),
+             Contains("16, 1 bit             unsigned, little endian  cutting_on"));
+  config.dry_run = true;
+  CHECK_THAT(register_table(config), Contains("DRY RUN: the daemon reads, and writes none"));
+}
+
+TEST_CASE("what the contract lacks is said", "[cli][registers]") {
+  DaemonConfig config = example("can.toml");
+  auto& controller = std::get<thermocomp::CanControllerConfig>(config.controller);
+  controller.valid_bits.reset();
+  controller.heartbeat.reset();
+  controller.axes.at(0).applied.reset();
+  const std::string text = register_table(config);
+  CHECK_THAT(text, Contains("no valid_bits"));
+  CHECK_THAT(text, Contains("no heartbeat"));
+  CHECK_THAT(text, Contains("no applied"));
+}
+
+TEST_CASE("a piezo's registers are volts, and no controller has none", "[cli][registers]") {
+  CHECK_THAT(register_table(example("piezo.toml")), Contains("voltage of axis"));
+  CHECK_THAT(register_table(example("modbus_rtu.toml")), Contains("there is no controller"));
+}
