@@ -120,9 +120,8 @@ class ControllerReader {
 
   void read_dry_run() {
     constexpr std::string_view rule =
-        "makes no sense for a controller of kind = \"dry_run\", which is none; to read a "
-        "controller "
-        "without writing to it, give its own kind and dry_run = true";
+        "makes no sense for a controller of kind = \"dry_run\", which is none; to read a real one "
+        "and write nothing, give its own kind and dry_run = true";
     for (const std::string& key : table_.keys()) {
       if (key != "name" && key != "kind") table_.refuse(key, rule);
     }

@@ -31,12 +31,14 @@ def test_a_shift_is_told_in_order_with_durations(lab):
     machine.module.stop()
     begun = time.monotonic()
     daemon.wait_for_mode("holding")
+    seen = time.monotonic()
     # Longer than the reconnection's pauses are apart, so that a wrong duration would be seen.
-    eventually(lambda: time.monotonic() - begun > 3.0, "the outage lasts")
+    eventually(lambda: time.monotonic() - seen > 3.0, "the outage lasts")
+    at_least_s = time.monotonic() - seen
     machine.module.start()
     machine.warm_by(3.0)
     daemon.wait_for_mode("compensating")
-    lasted_s = time.monotonic() - begun
+    at_most_s = time.monotonic() - begun
     eventually(lambda: any(event["kind"] == "recovery" and event["subject"] == "bus cabinet"
                            for event in events_of(daemon)), "the bus is said to be back")
     daemon.call("disable")
@@ -59,10 +61,11 @@ def test_a_shift_is_told_in_order_with_durations(lab):
              index_of(shift, "command", what="enable"), index_of(shift, "command", what="reload")]
     assert order == sorted(order), shift  # causes before what comes of them
     outage = shift[order[2]]
-    # Seen as lost at once or, where the link still seems good, after stale_after_s = 1.
-    assert abs(outage["duration_s"] - lasted_s) < 1.5, (outage, lasted_s)
     held = shift[order[3]]
-    assert held["what"] == "compensating" and abs(held["duration_s"] - lasted_s) < 1.5, held
+    assert held["what"] == "compensating", held
+    # What was seen from outside lies within a second of it.
+    for event in (outage, held):
+        assert at_least_s - 1.0 < event["duration_s"] < at_most_s + 1.0, event
     for name in ("disable", "enable", "measured", "reload"):
         assert shift[index_of(shift, "command", what=name)]["user"] == os.getuid()
     assert not [event for event in shift if event["what"] == "operator_disabled"], "no fault"
