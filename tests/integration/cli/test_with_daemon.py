@@ -32,9 +32,9 @@ def test_status_is_1_when_not_compensating(daemon, changes):
     assert run("--socket", daemon.path, "status", "--json").returncode == 1
 
 
-def test_json_is_the_daemons_answer(daemon):
+def test_json_is_the_daemons_answer_and_why_the_exit_status(daemon):
     answer = run("--socket", daemon.path, "status", "--json")
-    assert json.loads(answer.stdout) == daemon.answers["status"]
+    assert json.loads(answer.stdout) == daemon.answers["status"] | {"exit_status": 0, "why": []}
 
 
 def test_the_socket_can_be_named_by_the_environment(daemon):
