@@ -10,6 +10,9 @@ import time
 
 # The same value after so long is the same request once more: its answer was late or lost.
 SENT_AGAIN_AFTER_S = 0.15
+# A cycle that the machine has stopped for a moment leaves its value to be sent again by the link
+# meanwhile: so long counts the time from when the value was sent first.
+RENEWED_AFTER_S = 0.1
 
 
 @dataclasses.dataclass
@@ -35,6 +38,7 @@ class Writer:
     value_um: float
     since_s: float
     at_s: float
+    first_at_s: float = -math.inf  # of `value_um`
 
 
 class Axis:
@@ -73,8 +77,12 @@ class Axis:
             self.under_way.discard(writer)
             self.writes.append(Write(now, last.since_s, last.value_um, value_um, writer,
                                      self.bound_um, self.rate_um_per_s))
-            again = value_um == last.value_um and now - last.at_s > SENT_AGAIN_AFTER_S
-            self.writers[writer] = Writer(value_um, last.since_s if again else last.at_s, now)
+            same = value_um == last.value_um
+            first_at_s = last.first_at_s if same else now
+            again = same and (now - last.at_s > SENT_AGAIN_AFTER_S or
+                              now - first_at_s < RENEWED_AFTER_S)
+            self.writers[writer] = Writer(value_um, last.since_s if again else last.at_s, now,
+                                          first_at_s)
             if self.obeys:
                 self.position_um = value_um
 
