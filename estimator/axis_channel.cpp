@@ -117,7 +117,7 @@ void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
   in_doubt_ = false;
   const bool at_nothing = std::abs(input.applied_um) <= same_read_back_um;
   if (driven_once_ && !at_nothing && check_.agrees(input.applied_um)) {
-    stands_for_ = read_backs_until_written;  // what was sent last may not have been written
+    stands_for_ = is_applied(input) ? 0 : read_backs_until_written;
     return;
   }
   unwritten_for_ = read_backs_until_written;
@@ -186,6 +186,11 @@ void AxisChannel::end_latch() noexcept {
   releasing_ = false;
   in_doubt_ = false;
   suspicion_ = 0;
+}
+
+/// What was sent last has been written, and nothing is on its way.
+bool AxisChannel::is_applied(const AxisInput& input) const noexcept {
+  return std::abs(input.applied_um - limiter_.offset_um()) <= register_rounding_um;
 }
 
 bool AxisChannel::is_out_of_bound(double applied_um) const noexcept {

@@ -87,6 +87,7 @@ class AxisChannel {
   void note_unexplained(const AxisInput& input, bool fresh) noexcept;
   void check_release(const AxisInput& input) noexcept;
   void end_latch() noexcept;
+  [[nodiscard]] bool is_applied(const AxisInput& input) const noexcept;
   [[nodiscard]] bool is_out_of_bound(double applied_um) const noexcept;
   void start_from(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] double prove_target_um(nanoseconds now) noexcept;

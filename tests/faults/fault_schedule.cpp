@@ -74,6 +74,12 @@ std::string_view name_of(FaultKind kind) noexcept {
   return names[static_cast<std::size_t>(kind)];
 }
 
+std::optional<FaultKind> kind_of(std::string_view name) noexcept {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<FaultKind>(found - names.begin());
+}
+
 std::size_t pair_index(FaultKind a, FaultKind b) noexcept {
   const auto low = static_cast<std::size_t>(std::min(a, b));
   const auto high = static_cast<std::size_t>(std::max(a, b));
@@ -104,9 +110,10 @@ FaultSchedule::FaultSchedule(std::uint64_t seed, const ScheduleOptions& options)
     const auto [first, second] = kinds_of_pair((options.directed_pair + index) % fault_pairs);
     const std::size_t count = 1 + chance.below(4);
     for (std::size_t i = 0; i < std::max<std::size_t>(count, 1); ++i) {
-      const FaultKind kind = i == 0   ? first
-                             : i == 1 ? second
-                                      : static_cast<FaultKind>(chance.below(fault_kinds));
+      FaultKind kind = i == 0   ? first
+                       : i == 1 ? second
+                                : static_cast<FaultKind>(chance.below(fault_kinds));
+      kind = options.only.value_or(kind);
       const nanoseconds begin =
           i == 0 ? at
                  : at + nanoseconds{static_cast<nanoseconds::rep>(

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -55,6 +56,7 @@ inline constexpr std::size_t fault_kinds = 33;
 inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 
 [[nodiscard]] std::string_view name_of(FaultKind kind) noexcept;
+[[nodiscard]] std::optional<FaultKind> kind_of(std::string_view name) noexcept;
 [[nodiscard]] std::size_t pair_index(FaultKind a, FaultKind b) noexcept;
 
 struct FaultEvent {
@@ -78,8 +80,9 @@ struct Episode {
 struct ScheduleOptions {
   nanoseconds start{};
   nanoseconds length{};
-  double seconds_scale{1.0};     ///< shorter for campaigns at a higher rate
-  std::size_t directed_pair{0};  ///< the first two faults of each episode take the pairs in turn
+  double seconds_scale{1.0};        ///< shorter for campaigns at a higher rate
+  std::size_t directed_pair{0};     ///< the first two faults of each episode take the pairs in turn
+  std::optional<FaultKind> only{};  ///< no other fault happens
 };
 
 class FaultSchedule {

@@ -29,7 +29,7 @@ class Life {
         shape_(options.seed, options.cycle_hz),
         schedule_(options.seed,
                   {life_begin, nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)},
-                   1.0, static_cast<std::size_t>(options.seed * 17 % fault_pairs)}),
+                   1.0, static_cast<std::size_t>(options.seed * 17 % fault_pairs), options.only}),
         world_(options.seed, shape_, schedule_),
         chance_(options.seed, 5),
         probings_(options.seed, 6),

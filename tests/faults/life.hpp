@@ -19,7 +19,8 @@ struct LifeOptions {
   /// Where the history is really written, with a disk that fills up and writes cut off by a kill;
   /// empty: it goes through the codec in memory, into a second estimator.
   std::filesystem::path history_folder;
-  bool verbose{false};  ///< the faults and what becomes of them, on standard output
+  std::optional<FaultKind> only{};  ///< no other fault happens
+  bool verbose{false};              ///< the faults and what becomes of them, on standard output
 };
 
 struct LifeResult {

@@ -28,6 +28,7 @@ struct Options {
   double hours{4.0};
   double cycle_hz{1.0};
   std::string planted;
+  std::string only;
   std::string history{"/dev/shm/thermocomp_faults"};
   unsigned history_every{16};
   unsigned threads{std::max(1u, std::thread::hardware_concurrency())};
@@ -111,6 +112,7 @@ class Campaign {
       life.hours = options_.hours;
       life.cycle_hz = options_.cycle_hz;
       life.verbose = options_.verbose;
+      life.only = kind_of(options_.only);
       if (options_.history_every != 0 && seed % options_.history_every == 0)
         life.history_folder = history_folder_;
       add(seed, live(life));
@@ -151,7 +153,8 @@ class Campaign {
     fmt::print(
         "  again: {} --seeds {}:{} --hours {} --cycle-hz {} --history-every {}{} --verbose\n",
         program_name, seed, seed + 1, options_.hours, options_.cycle_hz, options_.history_every,
-        options_.planted.empty() ? "" : " --planted " + options_.planted);
+        (options_.planted.empty() ? "" : " --planted " + options_.planted) +
+            (options_.only.empty() ? "" : " --only " + options_.only));
     std::fflush(stdout);
   }
 
@@ -195,6 +198,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0.5, 1000.0));
   app.add_option("--planted", options.planted, "a bug to plant; --list names them");
+  app.add_option("--only", options.only, "one kind of fault, no other; --list names them");
   app.add_option("--history", options.history,
                  "folder for the histories that are really written, one in it a process")
       ->capture_default_str();
@@ -221,6 +225,11 @@ int main(int argc, char** argv) {
     return 0;
   }
   if (options.verbose) options.threads = 1;
+  if (!options.only.empty() && !kind_of(options.only)) {
+    fmt::print(stderr, "{}: no kind of fault is called {}; --list names them\n", program_name,
+               options.only);
+    return 2;
+  }
   if (!options.planted.empty() && !plant(options.planted)) {
     fmt::print(stderr, "{}: no planted bug is called {} in this build; --list names them\n",
                program_name, options.planted);

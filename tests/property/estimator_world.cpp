@@ -15,6 +15,9 @@ constexpr std::size_t sensors_count = 6;
 constexpr double step_s_usual_max = 0.5;
 constexpr double tiny_um = 1e-9;
 constexpr double register_rounding_um = 0.1;
+// Of a new link, whose first read-backs may be late or none; until then an axis may stand.
+constexpr int reads_until_written = 6;
+constexpr double nothing_um = 0.3;  // what an axis at zero may read back
 
 /// A stream of chance of its own for each part of the world, so that withholding readings does not
 /// change what the controller or the operator does.
@@ -313,7 +316,8 @@ class World {
   void connect() {
     ++controller_.epoch;
     controller_.connected = true;
-    controller_.disturbed.fill(false);
+    // A read-back that agrees is taken for a late one, as on a link that is not new.
+    controller_.disturbed.fill(true);
   }
 
   /// What happens at the controller, and what its link reads of it in this step.
@@ -344,10 +348,14 @@ class World {
 
   void read_controller() {
     state_.taken_at = now_;
-    if (state_.link_epoch != controller_.epoch) controller_.told_um.fill(not_a_number);
+    const bool is_first = state_.link_epoch != controller_.epoch;
+    if (is_first) controller_.told_um.fill(not_a_number);
+    reads_in_epoch_ = is_first ? 1 : reads_in_epoch_ + 1;
     state_.link_epoch = controller_.epoch;
     for (std::size_t i = 0; i < axes_count; ++i) {
       state_.applied_um[i] = controller_.applied_um[i];
+      if (is_first && !controller_.rejecting && std::abs(controller_.applied_um[i]) <= nothing_um)
+        controller_.disturbed[i] = false;  // restarted: it starts from there
       // Whoever is re-homed and cannot be read at the same moment cannot be noticed in time.
       if (link_.one_in(60) && !controller_.disturbed[i]) {
         const std::array<double, 5> nonsense{not_a_number, 1e30, -700.0, 501.0,
@@ -447,8 +455,8 @@ class World {
       return;
     }
     const bool may_change = !config_.compensation.hold_while_cutting;
-    if (command_.valid[axis] && may_change && std::abs(before_um) > bound_um &&
-        std::abs(state_.applied_um[axis] - before_um) <= tiny_um)
+    if (command_.valid[axis] && may_change && reads_in_epoch_ > reads_until_written &&
+        std::abs(before_um) > bound_um && std::abs(state_.applied_um[axis] - before_um) <= tiny_um)
       demand("an offset outside a new bound comes in at the slew rate",
              std::abs(offset_um) <= std::max(bound_um, std::abs(before_um) - step_um + 3 * tiny_um),
              offset_um, bound_um);
@@ -547,6 +555,7 @@ class World {
   Controller controller_;
   bool switch_off_{false};
   ControllerState state_;
+  int reads_in_epoch_{0};
   OffsetCommand command_;
   struct Sent {
     double busy_s;

@@ -151,7 +151,7 @@ def test_the_simulated_machine_over_a_serial_line_is_served(running):
     try:
         with service.simulated_line() as line:
             service.write_config(service.serial_config(line))
-            now = service.start()
+            now = service.start("dry_run")
             assert [each["temp_degC"] for each in now["inputs"]] == [21.0, 22.0]
     finally:
         # The reference was that machine's.
