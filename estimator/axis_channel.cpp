@@ -16,6 +16,10 @@ constexpr std::uint8_t suspicion_of_one = 16;
 /// that shows that it was.
 constexpr std::uint8_t read_backs_until_written = 3;
 
+/// What is read back on a link that was away for less may be a value on the way to the one sent
+/// last; set from the slowest read-backs that were tried (0.5 s) and the pauses of a reconnection.
+constexpr nanoseconds lag_max = std::chrono::milliseconds(1500);
+
 /// Two read-backs after a release that are no further apart say the same.
 constexpr double same_read_back_um = 0.3;
 
@@ -83,6 +87,8 @@ void AxisChannel::synchronise(const AxisInput& input) noexcept {
     return;
   }
   if (!std::isfinite(input.applied_um)) return;
+  // Away for longer than a controller may lag, it shows none of the values on the way any more.
+  if (input.taken_at - read_back_at_ > lag_max) check_.restart(input.now, limiter_.offset_um());
   synced_ = true;
   starting_ = true;
   compare(input);

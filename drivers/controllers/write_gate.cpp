@@ -63,20 +63,17 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
   ++look_;
   for (std::size_t axis = 0; axis < axes_max; ++axis) {
     const double before_um = applied_um_[axis];
-    if (!std::isfinite(applied_um[axis])) {
-      applied_um_[axis] = applied_um[axis];
-      continue;
-    }
     const SentLately& lately = sent_[axis];
-    // Until something is sent, it is from where it was read to stand that a command starts.
-    const bool stands = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
-    if (lately.count != 0 || !stands) {
+    const bool to_be_driven = command_.link_epoch == epoch_ && command_.valid[axis];
+    // Until something is sent it is what was read before the command that a command starts from.
+    if (lately.count != 0 || !to_be_driven || !std::isfinite(before_um))
       applied_um_[axis] = applied_um[axis];
-      stands_since_[axis] = look_;
-    }
-    if (!std::isfinite(before_um)) continue;
+    if (!std::isfinite(applied_um[axis]) || !std::isfinite(before_um)) continue;
+    const bool stands = std::abs(applied_um[axis] - before_um) <= slack_um_[axis];
+    if (!stands) stands_since_[axis] = look_;
     if (lately.count == 0) {
-      explained = explained && (command_.link_epoch != epoch_ || !starts_elsewhere(axis));
+      // Not driven: about to be, from where it stood before.
+      explained = explained && (!to_be_driven || stands);
       continue;
     }
     // Anywhere between where it stood and what it was told.

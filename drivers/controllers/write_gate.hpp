@@ -98,10 +98,9 @@ class WriteGate {
     std::size_t count{0};
   };
   std::array<SentLately, axes_max> sent_{};
-  /// As read last; of an axis to which nothing has been sent, where it stands since
-  /// `stands_since_`.
-  std::array<double, axes_max> applied_um_{};
-  std::array<std::uint64_t, axes_max> stands_since_{};  ///< look
+  std::array<double, axes_max> applied_um_{};  ///< as read last
+  /// The look that showed an axis far from where the one before did.
+  std::array<std::uint64_t, axes_max> stands_since_{};
   std::array<double, axes_max> slack_um_{};
 };
 

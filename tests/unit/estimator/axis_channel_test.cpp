@@ -187,6 +187,21 @@ TEST_CASE("a read-back that is old when the link is new does not take the offset
   CHECK(bench.channel.offset_um() == Approx(0.2));
 }
 
+TEST_CASE("an axis that a new link finds on its way back starts from there", "[axis]") {
+  Bench bench;
+  bench.steps(145, 30.0);  // the values on the way are of the last moments
+  const double sent_um = bench.channel.offset_um();
+  bench.obeys = false;
+  bench.input.link_epoch = 2;
+  bench.input.applied_um = not_a_number;
+  for (int i = 0; i < 16; ++i) bench.step(30.0);
+  bench.input.link_epoch = 3;
+  bench.input.applied_um = 0.9 * sent_um;
+  bench.step(30.0);
+  CHECK(bench.channel.driven());
+  CHECK(bench.channel.offset_um() == Approx(0.9 * sent_um + 0.2));
+}
+
 TEST_CASE("a release that is said again does not wait anew for the read-backs of a slow link",
           "[axis]") {
   Bench bench;
