@@ -20,4 +20,25 @@ while read -r _ bug; do
   fi
   printf '%-34s %-30s %5s %14s\n' "$bug" "$invariant" "$seed" "$hours"
 done < <("$program" --list | grep '^planted ')
+# Each way of lying alone is enough to find a bug of what guards against it.
+while read -r lie bug; do
+  out=$("$program" --planted "$bug" --only "$lie" --expect-found --seeds 0:40 "${lives[@]}" \
+    2>/dev/null) || true
+  if ! read -r _ invariant seed hours < <(grep '^FOUND' <<<"$out"); then
+    printf '%-34s NOT FOUND by %s alone\n' "$bug" "$lie"
+    missed=1
+    continue
+  fi
+  printf '%-34s %-30s %5s %14s  %s alone\n' "$bug" "$invariant" "$seed" "$hours" "$lie"
+done <<'END'
+read_back_scaled read_back_is_a_command
+read_back_negated read_back_is_a_command
+read_back_shifted read_back_is_a_command
+read_back_drifting read_back_is_a_command
+read_back_jumped latch_ends_by_itself
+read_back_frozen read_back_is_a_command
+second_writer read_back_is_a_command
+controller_ignoring read_back_is_a_command
+controller_rejecting refused_offset_pent_up
+END
 exit "$missed"
