@@ -7,7 +7,8 @@
 
 namespace thermocomp::cli {
 
-/// "sensor bed_front: the unit does not answer, for 28 s" and the like, without time and kind.
+/// "sensor bed_front: not renewed in time: over, lasted 28.1 s" and the like, without time and
+/// kind.
 [[nodiscard]] std::string event_text(const nlohmann::json& event);
 /// One line an event, oldest first: local time, kind, text.
 /// @param events  the daemon's answer to `events`

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/json_fields.hpp"
+#include "cli/modbus_names.hpp"
 #include "config/number_text.hpp"
 #include "config/units.hpp"
 
@@ -55,63 +56,17 @@ std::string valid_text(const std::vector<AxisConfig>& axes) {
   return text + "; 1: take the offset";
 }
 
-const char* name_of(ModbusTable table) {
-  switch (table) {
-    case ModbusTable::coil:
-      return "coil";
-    case ModbusTable::discrete_input:
-      return "discrete input";
-    case ModbusTable::holding:
-      return "holding";
-    case ModbusTable::input:
-      break;
-  }
-  return "input";
-}
-
-const char* name_of(WordOrder order) {
-  switch (order) {
-    case WordOrder::abcd:
-      return "ABCD";
-    case WordOrder::dcba:
-      return "DCBA";
-    case WordOrder::badc:
-      return "BADC";
-    case WordOrder::cdab:
-      break;
-  }
-  return "CDAB";
-}
-
-const char* name_of(Encoding encoding) {
-  switch (encoding) {
-    case Encoding::int16:
-      return "int16";
-    case Encoding::uint16:
-      return "uint16";
-    case Encoding::int32:
-      return "int32";
-    case Encoding::uint32:
-      return "uint32";
-    case Encoding::float32:
-      return "float32";
-    case Encoding::float64:
-      break;
-  }
-  return "float64";
-}
-
 std::string place_of(const ModbusValue& value) {
   const auto words = words_of(value.table, value.encoding);
-  std::string text = std::string(name_of(value.table)) + " " + std::to_string(value.address);
+  std::string text = table_name(value.table) + " " + std::to_string(value.address);
   if (words > 1) text += ".." + std::to_string(value.address + words - 1);
   return text;
 }
 
 std::string type_of(const ModbusValue& value) {
   if (is_bit_table(value.table)) return "bit";
-  const std::string type = name_of(value.encoding);
-  return registers_of(value.encoding) == 1 ? type : type + " " + name_of(value.word_order);
+  const std::string type = encoding_name(value.encoding);
+  return registers_of(value.encoding) == 1 ? type : type + " " + order_name(value.word_order);
 }
 
 /// Bits and counts have no sign, whatever the configuration calls them.

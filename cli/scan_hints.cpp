@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "cli/modbus_names.hpp"
 #include "drivers/modbus/register_codec.hpp"
 
 namespace thermocomp::cli {
@@ -79,52 +80,6 @@ void hint_codes(const ModbusChannel& channel, std::span<const std::uint16_t> wor
 }
 
 }  // namespace
-
-std::string table_name(ModbusTable table) {
-  switch (table) {
-    case ModbusTable::coil:
-      return "coil";
-    case ModbusTable::discrete_input:
-      return "discrete_input";
-    case ModbusTable::holding:
-      return "holding";
-    case ModbusTable::input:
-      break;
-  }
-  return "input";
-}
-
-std::string order_name(WordOrder order) {
-  switch (order) {
-    case WordOrder::abcd:
-      return "ABCD";
-    case WordOrder::dcba:
-      return "DCBA";
-    case WordOrder::badc:
-      return "BADC";
-    case WordOrder::cdab:
-      break;
-  }
-  return "CDAB";
-}
-
-std::string encoding_name(Encoding encoding) {
-  switch (encoding) {
-    case Encoding::int16:
-      return "int16";
-    case Encoding::uint16:
-      return "uint16";
-    case Encoding::int32:
-      return "int32";
-    case Encoding::uint32:
-      return "uint32";
-    case Encoding::float32:
-      return "float32";
-    case Encoding::float64:
-      break;
-  }
-  return "float64";
-}
 
 bool is_plausible(const ModbusChannel& channel, double temp_degC, const PlausibleRange& range) {
   if (!(temp_degC >= range.min_degC && temp_degC <= range.max_degC)) return false;

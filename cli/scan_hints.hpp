@@ -16,10 +16,6 @@ struct PlausibleRange {
   double max_degC{200.0};
 };
 
-[[nodiscard]] std::string table_name(ModbusTable table);
-[[nodiscard]] std::string order_name(WordOrder order);
-[[nodiscard]] std::string encoding_name(Encoding encoding);
-
 /// Whether a decoded temperature may be true: in the range, and not a float so near 0 that only
 /// the bytes of another number in a wrong order make it.
 [[nodiscard]] bool is_plausible(const ModbusChannel& channel, double temp_degC,

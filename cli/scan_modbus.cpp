@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "cli/modbus_names.hpp"
 #include "cli/serial_holder.hpp"
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"

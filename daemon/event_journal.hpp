@@ -6,13 +6,24 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "daemon/recording/event.hpp"
-
 namespace thermocomp {
+
+/// What happened, for a person: faults with their ends, changes of mode, what operators did.
+struct Event {
+  std::uint64_t number{0};  ///< counts up from 1 in a run of the daemon
+  std::int64_t wall_ns{0};  ///< since 1970
+  std::string kind;         ///< "fault", "recovery", "mode", "command" or "daemon"
+  std::string subject;      ///< "sensor bed_front", "bus cabinet", ...; mode: the one before
+  std::string what;         ///< the fault (of a recovery: which has ended), the mode, the command
+  /// recovery: how long the fault lasted; mode: how long the one before it did [s]. NaN: neither
+  double duration_s{std::numeric_limits<double>::quiet_NaN()};
+  std::int64_t user{-1};  ///< command: who gave it, by the kernel; -1: nobody, or SIGHUP
+};
 
 /// Main's thread only. Every change is one event; the same fault told again is none.
 class EventJournal {
@@ -22,11 +33,9 @@ class EventJournal {
     std::chrono::nanoseconds wall{};  ///< since 1970
   };
   using Now = std::function<Moment()>;
-  using Sink = std::function<void(const Event&)>;
   static constexpr std::size_t kept_max = 1000;
 
-  explicit EventJournal(Now now = system_now, Sink sink = {})
-      : now_(std::move(now)), sink_(std::move(sink)) {}
+  explicit EventJournal(Now now = system_now) : now_(std::move(now)) {}
 
   /// The subject has this fault from now on. Another one than before is told, but the outage counts
   /// from the first.
@@ -54,7 +63,6 @@ class EventJournal {
   void add(const Moment& at, Event event);
 
   Now now_;
-  Sink sink_;
   std::uint64_t number_{0};
   std::deque<Event> events_;
   std::map<std::string, Outage> outages_;

@@ -11,8 +11,8 @@
 
 #include "config/daemon_config.hpp"
 #include "daemon/cycle/cycle.hpp"
+#include "daemon/event_journal.hpp"
 #include "daemon/history/history_writer.hpp"
-#include "daemon/recording/event.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"

@@ -34,7 +34,7 @@ TEST_CASE("the table names every register, its unit and who writes it", "[cli][r
   }
   for (const char* row : {"input 4..5        int32 ABCD  applied offset of axis z",
                           "mm, count x 0.001", "input 26          uint16      spindle_rpm",
-                          "discrete input 1  bit         compensation"}) {
+                          "discrete_input 1  bit         compensation"}) {
     INFO(row);
     CHECK_THAT(shown, Contains(row));
   }
