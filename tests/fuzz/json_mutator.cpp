@@ -1,6 +1,7 @@
 /// A mutator that knows how a JSON file is built: values of other types and sizes, objects within
 /// objects, keys moved and doubled. What it makes is JSON nearly always, so that it gets past the
 /// parser. Linked into a target it is libFuzzer's LLVMFuzzerCustomMutator.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -16,6 +17,10 @@ extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, st
 namespace {
 
 using nlohmann::json;
+
+/// Of a document that is changed, and of what is added to it: the library writes and copies
+/// levels by recursion, and a mutator that overflows its stack has found nothing.
+constexpr std::size_t levels_max = 3000;
 
 class JsonMutator {
  public:
@@ -103,7 +108,9 @@ class JsonMutator {
   json nested(const json& inside) {
     constexpr std::array<std::size_t, 5> depths{1, 2, 20, 500, 3000};
     json value = inside;
-    for (std::size_t i = depths[below(depths.size())]; i > 0; --i) {
+    const std::size_t levels = std::min(depths[below(depths.size())], levels_left_);
+    levels_left_ -= levels;
+    for (std::size_t i = levels; i > 0; --i) {
       json outer = json::array();
       outer.push_back(std::move(value));
       value = std::move(outer);
@@ -137,12 +144,25 @@ class JsonMutator {
   }
 
   std::mt19937 random_;
+  std::size_t levels_left_{levels_max};
 };
+
+/// How deep brackets are nested; those in strings count too.
+std::size_t nesting(const std::uint8_t* data, std::size_t size) {
+  std::size_t open = 0;
+  std::size_t deepest = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (data[i] == '[' || data[i] == '{') deepest = std::max(deepest, ++open);
+    if ((data[i] == ']' || data[i] == '}') && open > 0) --open;
+  }
+  return deepest;
+}
 
 }  // namespace
 
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size,
                                                std::size_t size_max, unsigned seed) {
+  if (nesting(data, size) > levels_max) return LLVMFuzzerMutate(data, size, size_max);
   JsonMutator mutator(seed);
   json document =
       json::parse(data, data + size, nullptr, false);  // discarded: no JSON, then bytes are changed
