@@ -44,6 +44,17 @@ void write(const std::string& destination, const std::string& text) {
   file.commit();
 }
 
+void print(const RemainderBank& remainder) {
+  std::printf("predictable without a name: carried by a bank of lags, last term of the model\n");
+  for (const auto& [output, gain] : remainder.left_out)
+    std::printf("  %s, rows left out: RMS %.3f -> %.3f\n", output.c_str(), gain.before_um,
+                gain.after_um);
+  for (const auto& [output, gain] : remainder.test)
+    std::printf("  %s, test rows: RMS %.3f -> %.3f (%.0f %%, 95 %%: %.0f to %.0f)\n",
+                output.c_str(), gain.before_um, gain.after_um, 100 * gain.reduction,
+                100 * gain.ci95.low, 100 * gain.ci95.high);
+}
+
 void print(const Diagnosis& diagnosis) {
   std::printf("verdict: %s\n", diagnosis.verdict.c_str());
   for (const NamedFinding& finding : diagnosis.findings) {
@@ -72,6 +83,7 @@ void print(const Diagnosis& diagnosis) {
       std::printf("  or: %s of %s (support %.2g)\n", other.cause.c_str(), other.subject.c_str(),
                   other.relative_support);
   }
+  if (diagnosis.remainder) print(*diagnosis.remainder);
   if (diagnosis.findings.empty())
     for (const auto& [family, probability] : diagnosis.families)
       std::printf("weighed: %s, probability %.2f\n", family.c_str(), probability);

@@ -53,6 +53,19 @@ struct NamedFinding {
   std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
 };
 
+/// RMS of training rows that were left out in turn.
+struct LeftOutGain {
+  double before_um{0.0};
+  double after_um{0.0};
+};
+
+/// The rest that is predictable and has no name, as one `lag_bank` term.
+struct RemainderBank {
+  TermSpec term;
+  std::map<std::string, LeftOutGain> left_out;  ///< of the outputs that it serves
+  std::map<std::string, TestGain> test;         ///< beside the findings
+};
+
 struct OutputFigures {
   double train_rms_um{0.0};
   double test_rms_um{0.0};
@@ -71,8 +84,9 @@ struct Diagnosis {
   std::string verdict;     ///< "effect", "none" or "unexplained"
   std::vector<NamedFinding> findings;
   std::map<std::string, OutputFigures> outputs;
-  ThermalModel extended;
-  std::vector<Weighed> weighed;  ///< what came into question in every round of the search
+  ThermalModel extended;                   ///< with every finding that a term can carry
+  std::optional<RemainderBank> remainder;  ///< its term is the extended model's last
+  std::vector<Weighed> weighed;            ///< what came into question in every round of the search
   /// Probability of each family, whether it is named or not; empty where nothing was weighed so.
   std::map<std::string, double> families{};
 };
