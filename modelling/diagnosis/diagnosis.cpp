@@ -46,7 +46,8 @@ void add_terms(ThermalModel& model, const std::vector<TermSpec>& terms) {
   }
 }
 
-/// The model with each finding added after those before it, and what each gains.
+/// The model with each finding added after those before it, and what each gains. One that the test
+/// runs speak against is told, and the model goes without it.
 /// @return what terms cannot carry, over the test runs
 /// @param fitted  if given, the search that they come from: what their causes had put into the
 ///                coefficients is taken out of them
@@ -78,8 +79,10 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
       if (std::isfinite(root_mean_square(before)))
         name.test[output] = test_gain(before, residuals(longer, more, test, index));
     }
-    diagnosis.extended = std::move(longer);
-    corrections = std::move(more);
+    if (!fails_on_test_runs(name)) {
+      diagnosis.extended = std::move(longer);
+      corrections = std::move(more);
+    }
     diagnosis.findings.push_back(std::move(name));
   }
   return corrections;
@@ -88,11 +91,13 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
 /// What no term carries, over the training runs.
 Corrections train_corrections(const Diagnosis& diagnosis, const MeasuredData& train) {
   Corrections corrections;
-  for (const NamedFinding& finding : diagnosis.findings)
+  for (const NamedFinding& finding : diagnosis.findings) {
+    if (fails_on_test_runs(finding)) continue;
     for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
       if (finding.outputs.front() == train.model.outputs[output])
         if (const auto correction = correction_of(finding, output))
           corrections.push_back(*correction);
+  }
   return corrections;
 }
 
@@ -120,7 +125,10 @@ void carry_remainder(Diagnosis& diagnosis, const std::vector<Headroom>& headroom
     if (std::isfinite(root_mean_square(before)))
       diagnosis.remainder->test[name] = test_gain(before, residuals(longer, of_test, test, output));
   }
-  diagnosis.extended = std::move(longer);
+  auto& gains = diagnosis.remainder->term.bank.gain_um_per_unit;
+  for (const auto& [name, gain] : diagnosis.remainder->test)
+    if (!(gain.reduction > 0)) gains.erase(name);
+  if (!gains.empty()) diagnosis.extended.terms.push_back(diagnosis.remainder->term);
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
