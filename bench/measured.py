@@ -1,4 +1,5 @@
-"""Test RMS on measured machines: what people fit, and `thermocomp fit` without further options.
+"""Test RMS on measured machines: what people fit, `thermocomp fit` without further options, and
+what `thermocomp diagnose` makes of a ridge model.
 
     measured.py PROGRAM [--data FOLDER] [--splits TEXT] [--peers NAME,...]
 
@@ -43,33 +44,53 @@ def arguments(runs, folder, prefix):
     return given
 
 
-def ours(program, split, folder):
-    """Left-over rows and flags of `outside`, each output behind the other's."""
-    folder.mkdir()
-    model = folder / "model.toml"
-    start = time.monotonic()
-    said = subprocess.run(
-        [program, "fit", *arguments(split.train, folder, "train"), "--outputs",
-         ",".join(split.outputs), "-o", model], capture_output=True, text=True, check=False)
-    if said.returncode != 0:
-        raise SystemExit(f"{split.name}: fit: {said.stderr}")
-    print(said.stdout + said.stderr, file=sys.stderr)
+def left_by(program, model, runs, split):
+    """Left-over rows, measured rows and flags of `outside`, each output behind the other's."""
     left = {name: [] for name in split.outputs}
     moved = {name: [] for name in split.outputs}
     outside = []
-    for run in arguments(split.test, folder, "test"):
-        out = folder / "predicted.csv"
+    for run in runs:
+        out = model.with_name("predicted.csv")
         subprocess.run([program, "predict", "--model", model, run, "-o", out], check=True,
                        capture_output=True)
         columns = data.read(out)
-        outside.append(columns["outside"])
+        outside.append(columns.get("outside", np.zeros(len(columns["time_s"]))))
         for name in split.outputs:
             stem, unit = name.rsplit("_", 1)
             left[name].append(columns[f"{stem}_residual_{unit}"])
             moved[name].append(columns[f"{stem}_measured_{unit}"])
     return ([np.concatenate(left[name]) for name in split.outputs],
             [np.concatenate(moved[name]) for name in split.outputs],
-            np.concatenate(outside) > 0.5, time.monotonic() - start)
+            np.concatenate(outside) > 0.5)
+
+
+def run(what, arguments_of):
+    start = time.monotonic()
+    said = subprocess.run(arguments_of, capture_output=True, text=True, check=False)
+    if said.returncode != 0:
+        raise SystemExit(f"{what}: {said.stderr}")
+    print(said.stdout + said.stderr, file=sys.stderr)
+    return time.monotonic() - start
+
+
+def write_ridge(split, path):
+    """Ridge regression of all temperatures as a model file: what `diagnose` starts from."""
+    def quoted(names):
+        return "[" + ", ".join(f'"{name}"' for name in names) + "]"
+    names, gains = peers.ridge_gains_um_per_K(split)
+    rows = ",\n  ".join("[" + ", ".join(f"{g:.12g}" for g in row) + "]" for row in gains)
+    path.write_text(f"format = 1\ninputs = {quoted(names)}\noutputs = {quoted(split.outputs)}\n"
+                    f'reference = "first_sample"\nmatrix_um_per_K = [\n  {rows}\n]\n')
+
+
+def diagnosed(program, split, train, test, folder):
+    """What `diagnose` leaves of the test rows when it extends the ridge model."""
+    base = folder / "ridge.toml"
+    write_ridge(split, base)
+    out = folder / "diagnosed"
+    seconds = run(f"{split.name}: diagnose", [program, "diagnose", "--model", base, "--train",
+                                              *train, "--test", *test, "--out", out])
+    return left_by(program, out / "model.toml", test, split)[0], seconds
 
 
 def judge(program, split, names, folder):
@@ -78,8 +99,15 @@ def judge(program, split, names, folder):
     for name in names:
         figures[name] = float(np.mean([rms(left) for left in peers.PEERS[name](split)]))
         print(f"{split.name} {name} {figures[name]:.3f}", file=sys.stderr, flush=True)
-    left, moved, outside, seconds = ours(program, split, folder)
+    folder.mkdir()
+    train, test = arguments(split.train, folder, "train"), arguments(split.test, folder, "test")
+    model = folder / "model.toml"
+    seconds = run(f"{split.name}: fit", [program, "fit", *train, "--outputs",
+                                         ",".join(split.outputs), "-o", model])
+    left, moved, outside = left_by(program, model, test, split)
     figures["fit"] = float(np.mean([rms(each) for each in left]))
+    left_diagnosed, figures["diagnose_seconds"] = diagnosed(program, split, train, test, folder)
+    figures["diagnose"] = float(np.mean([rms(each) for each in left_diagnosed]))
     inside = ~outside
     figures["inside"] = float(np.mean([rms(e[inside]) for e in left])) if inside.any() else 0.0
     figures["none_inside"] = (float(np.mean([rms(e[inside]) for e in moved]))
@@ -110,12 +138,15 @@ def main():
             best = min(figures[name] for name in names)
             ratios.append(figures["fit"] / best)
             worse += figures["inside"] > figures["none_inside"]
-            for name in [*names, "fit"]:
+            for name in [*names, "fit", "diagnose"]:
                 lines.append(f"{split.name}_{name} {figures[name]:.3f} um")
             lines.append(f"{split.name}_fit_over_best_peer {ratios[-1]:.3f} ratio")
+            lines.append(f"{split.name}_diagnose_over_ridge "
+                         f"{figures['diagnose'] / figures['ridge']:.3f} ratio")
             lines.append(f"{split.name}_outside {figures['outside_share']:.3f} share")
             lines.append(f"{split.name}_fit_inside {figures['inside']:.3f} um")
             lines.append(f"{split.name}_fit_seconds {figures['seconds']:.1f} s")
+            lines.append(f"{split.name}_diagnose_seconds {figures['diagnose_seconds']:.1f} s")
     print("\n".join(lines))
     print(f"fit_over_best_peer_median {np.median(ratios):.3f} ratio")
     print(f"fit_over_best_peer_largest {max(ratios):.3f} ratio")

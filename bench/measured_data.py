@@ -151,6 +151,7 @@ class Table:
             columns = run.columns
             time_s = columns["time_s"]
             names = sorted(n for n in columns if n.endswith(("_degC", "_K")))
+            self.temperatures = names
             signals = sorted(n for n in columns if n not in names and n not in outputs
                              and n != "time_s") if with_signals else []
             base = [columns[n] - columns[n][0] for n in names]

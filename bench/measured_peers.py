@@ -91,6 +91,19 @@ def ridge(split):
     return each_output(split, (0.0,), False, PENALTIES, ridge_predict)
 
 
+def ridge_gains_um_per_K(split):
+    """The gains of `ridge`; temperatures in ascending order, shape (outputs, temperatures)."""
+    train = Table(split.train, split.outputs)
+    x, ys = train.stacked()
+    gains = []
+    for i in range(len(split.outputs)):
+        ok = np.isfinite(ys[:, i])
+        parts = [part[np.isfinite(out[:, i])] for part, out in zip(train.x, train.y)]
+        best = chosen(parts, x[ok], ys[ok, i], PENALTIES, ridge_predict)
+        gains.append(ridge_predict(x[ok], ys[ok, i], np.eye(x.shape[1]), best))
+    return train.temperatures, np.array(gains)
+
+
 def ridge_lags(split):
     return each_output(split, LOW_PASSES_S, True, PENALTIES, ridge_predict)
 

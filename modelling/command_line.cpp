@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "modelling/diagnosis/diagnose_command.hpp"
+#include "modelling/diagnosis/command/diagnose_command.hpp"
 #include "modelling/experiments/plan_command.hpp"
 #include "modelling/identification/fit_command.hpp"
 #include "modelling/identification/group_command.hpp"

@@ -6,6 +6,7 @@
 #include "modelling/diagnosis/extended_model.hpp"
 #include "modelling/diagnosis/gain_on_test.hpp"
 #include "modelling/diagnosis/named_finding.hpp"
+#include "modelling/diagnosis/remainder_bank.hpp"
 #include "modelling/diagnosis/report_data.hpp"
 #include "modelling/diagnosis/search_beside_fit.hpp"
 
@@ -45,7 +46,8 @@ void add_terms(ThermalModel& model, const std::vector<TermSpec>& terms) {
   }
 }
 
-/// The model with each finding added after those before it, and what each gains.
+/// The model with each finding added after those before it, and what each gains. One that the test
+/// runs speak against is told, and the model goes without it.
 /// @return what terms cannot carry, over the test runs
 /// @param fitted  if given, the search that they come from: what their causes had put into the
 ///                coefficients is taken out of them
@@ -77,8 +79,10 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
       if (std::isfinite(root_mean_square(before)))
         name.test[output] = test_gain(before, residuals(longer, more, test, index));
     }
-    diagnosis.extended = std::move(longer);
-    corrections = std::move(more);
+    if (!fails_on_test_runs(name)) {
+      diagnosis.extended = std::move(longer);
+      corrections = std::move(more);
+    }
     diagnosis.findings.push_back(std::move(name));
   }
   return corrections;
@@ -87,12 +91,44 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
 /// What no term carries, over the training runs.
 Corrections train_corrections(const Diagnosis& diagnosis, const MeasuredData& train) {
   Corrections corrections;
-  for (const NamedFinding& finding : diagnosis.findings)
+  for (const NamedFinding& finding : diagnosis.findings) {
+    if (fails_on_test_runs(finding)) continue;
     for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
       if (finding.outputs.front() == train.model.outputs[output])
         if (const auto correction = correction_of(finding, output))
           corrections.push_back(*correction);
+  }
   return corrections;
+}
+
+/// Adds a bank of lags for the outputs of which enough can be predicted without a name.
+void carry_remainder(Diagnosis& diagnosis, const std::vector<Headroom>& headroom,
+                     const Corrections& of_train, const Corrections& of_test,
+                     const MeasuredData& train, const MeasuredData& test) {
+  std::vector<Residuals> left(headroom.size());
+  bool any = false;
+  for (std::size_t output = 0; output < headroom.size(); ++output) {
+    if (headroom[output].predictable < predictable_share_min) continue;
+    left[output] = residuals(diagnosis.extended, of_train, train, output);
+    any = true;
+  }
+  if (!any) return;
+  diagnosis.remainder = remainder_bank(train, left);
+  if (!diagnosis.remainder) return;
+  ThermalModel longer = diagnosis.extended;
+  longer.terms.push_back(diagnosis.remainder->term);
+  for (const auto& [name, gain] : diagnosis.remainder->left_out) {
+    const auto output = static_cast<std::size_t>(
+        std::find(train.model.outputs.begin(), train.model.outputs.end(), name) -
+        train.model.outputs.begin());
+    const Residuals before = residuals(diagnosis.extended, of_test, test, output);
+    if (std::isfinite(root_mean_square(before)))
+      diagnosis.remainder->test[name] = test_gain(before, residuals(longer, of_test, test, output));
+  }
+  auto& gains = diagnosis.remainder->term.bank.gain_um_per_unit;
+  for (const auto& [name, gain] : diagnosis.remainder->test)
+    if (!(gain.reduction > 0)) gains.erase(name);
+  if (!gains.empty()) diagnosis.extended.terms.push_back(diagnosis.remainder->term);
 }
 
 }  // namespace
@@ -124,6 +160,8 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   for (NamedFinding& finding : diagnosis.findings)
     finding.group = group_of(search.groups(), finding.subject);
   const std::vector<Headroom> headroom = search.headrooms(result);
+  carry_remainder(diagnosis, headroom, train_corrections(diagnosis, train_data), corrections,
+                  train_data, test_data);
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
     const Residuals base = residuals(test_data, output);
     const Residuals extended = residuals(diagnosis.extended, corrections, test_data, output);

@@ -1,81 +1,14 @@
-/// From measured runs to an answer: findings with parameters and intervals, the extended model, and
-/// what knowing them gains on runs that were not used.
+/// From measured runs to an answer.
 #pragma once
 
-#include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/headroom.hpp"
-#include "modelling/diagnosis/search.hpp"
+#include "modelling/diagnosis/answer.hpp"
 
 namespace thermocomp::diagnosis {
 
-struct Interval {
-  double low{0.0};
-  double high{0.0};
-};
-
-/// A parameter of a cause: one number, or one an output.
-struct Parameter {
-  std::string name;
-  std::map<std::string, double> values;  ///< by output; one of the name "" where it is shared
-  std::map<std::string, Interval> ci95;  ///< the same keys; may be empty
-};
-
-struct TestGain {
-  double before_um{0.0};
-  double after_um{0.0};
-  double reduction{0.0};  ///< 1 - after / before
-  Interval ci95;          ///< of the reduction, by blocks drawn anew
-};
-
-struct Alternative {
-  std::string cause;
-  std::string subject;
-  double relative_support{0.0};
-};
-
-struct NamedFinding {
-  std::string cause;
-  std::string subject;
-  std::vector<std::string> outputs;
-  std::vector<Parameter> parameters;
-  std::optional<std::string> run;  ///< of a fault of one run: its argument
-  std::string evidence;
-  std::vector<Alternative> alternatives;
-  /// By output; empty where no test run has it or no prediction can carry it.
-  std::map<std::string, TestGain> test;
-  double probability{not_a_number};  ///< of the cause with any place of the group
-  std::string family{};
-  double family_probability{not_a_number};
-  std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
-};
-
-struct OutputFigures {
-  double train_rms_um{0.0};
-  double test_rms_um{0.0};
-  double test_peak_um{0.0};
-  double extended_test_rms_um{0.0};
-  double extended_test_peak_um{0.0};
-  double unexplained_fraction{0.0};
-  std::optional<Headroom> headroom{};
-};
-
 struct ReportData;
-
-/// Figures named `_um` are in `unit`.
-struct Diagnosis {
-  std::string unit{"um"};  ///< "K" where temperatures were compared
-  std::string verdict;     ///< "effect", "none" or "unexplained"
-  std::vector<NamedFinding> findings;
-  std::map<std::string, OutputFigures> outputs;
-  ThermalModel extended;
-  std::vector<Weighed> weighed;  ///< what came into question in every round of the search
-  /// Probability of each family, whether it is named or not; empty where nothing was weighed so.
-  std::map<std::string, double> families{};
-};
 
 /// @param train, test  taken: their memory is free for the search
 /// @param train_names, test_names  the runs' arguments as given
@@ -86,9 +19,5 @@ struct Diagnosis {
                                  std::vector<RunFile> test,
                                  const std::vector<std::string>& test_names,
                                  ReportData* report = nullptr);
-
-/// The answer as JSON (indented, a newline at the end). Numbers that are not known are null.
-/// @param weighed  adds what came into question
-[[nodiscard]] std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed = false);
 
 }  // namespace thermocomp::diagnosis

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -40,6 +40,25 @@ std::string key_of(const char* what, const std::string& unit) {
   return std::string(what) + "_" + unit;
 }
 
+Json test_json(const std::map<std::string, TestGain>& gains) {
+  Json test = Json::object();
+  for (const auto& [output, gain] : gains)
+    test[output] = {{"before", number(gain.before_um)},
+                    {"after", number(gain.after_um)},
+                    {"reduction", number(gain.reduction)},
+                    {"ci95", interval(gain.ci95)}};
+  return test;
+}
+
+Json remainder_json(const RemainderBank& remainder, const std::string& unit) {
+  Json left_out = Json::object();
+  for (const auto& [output, gain] : remainder.left_out)
+    left_out[output] = {{"before", number(gain.before_um)}, {"after", number(gain.after_um)}};
+  return {{"term", remainder.term.kind},
+          {key_of("left_out_rms", unit), left_out},
+          {key_of("test_rms", unit), test_json(remainder.test)}};
+}
+
 Json finding_json(const NamedFinding& finding, const std::string& unit) {
   Json parameters = Json::object();
   Json ci95 = Json::object();
@@ -53,12 +72,7 @@ Json finding_json(const NamedFinding& finding, const std::string& unit) {
     alternatives.push_back({{"cause", other.cause},
                             {"subject", other.subject},
                             {"relative_support", number(other.relative_support)}});
-  Json test = Json::object();
-  for (const auto& [output, gain] : finding.test)
-    test[output] = {{"before", number(gain.before_um)},
-                    {"after", number(gain.after_um)},
-                    {"reduction", number(gain.reduction)},
-                    {"ci95", interval(gain.ci95)}};
+  const Json test = test_json(finding.test);
   return {{"cause", finding.cause},
           {"subject", finding.subject},
           {"probability", number(finding.probability)},
@@ -118,6 +132,7 @@ std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
                  {"extended", extended},
                  {"unexplained_fraction", unexplained}};
   if (!headroom.empty()) answer["headroom"] = headroom;
+  if (diagnosis.remainder) answer["remainder"] = remainder_json(*diagnosis.remainder, unit);
   if (!diagnosis.families.empty()) answer["families"] = diagnosis.families;
   if (weighed) answer["weighed"] = weighed_json(diagnosis);
   return answer.dump(2) + "\n";

@@ -123,4 +123,10 @@ TestGain test_gain(const Residuals& before, const Residuals& after) {
   return gain;
 }
 
+bool fails_on_test_runs(const NamedFinding& finding) {
+  return !finding.test.empty() &&
+         std::none_of(finding.test.begin(), finding.test.end(),
+                      [](const auto& of_output) { return of_output.second.reduction > 0; });
+}
+
 }  // namespace thermocomp::diagnosis

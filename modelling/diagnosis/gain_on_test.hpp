@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -31,5 +31,7 @@ struct Residuals {
 [[nodiscard]] double peak(const Residuals& residuals);
 /// The interval is from blocks of rows drawn anew.
 [[nodiscard]] TestGain test_gain(const Residuals& before, const Residuals& after);
+/// Whether no output gains by it on the test runs. The extended model goes without it then.
+[[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
 
 }  // namespace thermocomp::diagnosis

@@ -1,7 +1,7 @@
 /// A finding as it is told: names, alternatives, evidence.
 #pragma once
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 
 namespace thermocomp::diagnosis {
 

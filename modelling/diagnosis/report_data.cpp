@@ -106,10 +106,10 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel
   report.inputs = model.inputs;
   const std::size_t first = report.runs.size();
   for (const MeasuredRun& run : data.runs) {
-    ReportRun added{
-        run.name, test, run.time_s.tail(run.rows() - run.begin), phases_of(run, data), {}, {},
-        {},       {}};
-    const Eigen::Index rows = added.time_s.size();
+    const Eigen::Index rows = run.rows() - run.begin;
+    ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
+    for (const Column& measured : run.measured_um)
+      added.measured_um.emplace_back(measured.tail(rows));
     for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
     for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
     report.runs.push_back(std::move(added));

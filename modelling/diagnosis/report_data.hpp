@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 #include "modelling/diagnosis/gain_on_test.hpp"
 
 namespace thermocomp::diagnosis {
@@ -28,12 +28,13 @@ struct Whiteness {
 struct ReportRun {
   std::string name;
   bool test{false};
-  Column time_s;
-  std::vector<Phase> phases;
-  std::vector<Column> before_um;  ///< residual of the model, one an output; NaN: missing
-  std::vector<Column> after_um;   ///< of the extended model
-  std::vector<Column> signals;
-  std::vector<Column> inputs_K;
+  Column time_s{};
+  std::vector<Phase> phases{};
+  std::vector<Column> measured_um{};  ///< one an output, from the run's first row; NaN: missing
+  std::vector<Column> before_um{};    ///< residual of the model
+  std::vector<Column> after_um{};     ///< of the extended model
+  std::vector<Column> signals{};
+  std::vector<Column> inputs_K{};
 };
 
 struct ReportData {
@@ -46,8 +47,5 @@ struct ReportData {
 /// Adds the runs; `corrections` are what no term of the extended model carries.
 void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel& model,
               const Corrections& corrections, const MeasuredData& data, bool test);
-
-/// One self-contained HTML page.
-[[nodiscard]] std::string report_html(const Diagnosis& diagnosis, const ReportData& report);
 
 }  // namespace thermocomp::diagnosis

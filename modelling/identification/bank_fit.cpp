@@ -60,6 +60,19 @@ void descend(const Eigen::MatrixXd& a, const Eigen::VectorXd& c, double price, E
   }
 }
 
+struct Rows {
+  Eigen::MatrixXd x;
+  Eigen::MatrixXd y;
+};
+
+/// Those in which no output is missing.
+Rows complete_rows(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
+  std::vector<Eigen::Index> complete;
+  for (Eigen::Index row = 0; row < y.rows(); ++row)
+    if (y.row(row).allFinite()) complete.push_back(row);
+  return {x(complete, Eigen::all), y(complete, Eigen::all)};
+}
+
 /// Weights of penalties by what they leave: e^-8 each.
 std::vector<double> weights(const std::vector<double>& left_um2) {
   const double least = *std::min_element(left_um2.begin(), left_um2.end());
@@ -134,6 +147,26 @@ Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
   return bank;
 }
 
+TermSpec bank_term(const BankColumns& columns, const std::vector<std::string>& outputs,
+                   const Eigen::MatrixXd& gains) {
+  TermSpec term;
+  term.kind = "lag_bank";
+  term.bank.subjects = columns.subjects;
+  term.bank.powers = columns.powers;
+  term.bank.taus_s = columns.taus_s;
+  const std::size_t subjects = columns.subjects.size();
+  for (std::size_t o = 0; o < outputs.size(); ++o) {
+    const auto column = gains.col(static_cast<Eigen::Index>(o));
+    auto& table = term.bank.gain_um_per_unit[outputs[o]];
+    for (std::size_t i = 0; i < subjects; ++i) {
+      auto& of_subject = table.emplace_back();
+      for (std::size_t j = 0; j < columns.taus_s.size(); ++j)
+        of_subject.push_back(column[static_cast<Eigen::Index>(j * subjects + i)]);
+    }
+  }
+  return term;
+}
+
 BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& columns) {
   const auto count = static_cast<Eigen::Index>(columns.size());
   for (const TestRun& run : tests.runs) rows_.push_back(bank_of(run, tests, columns));
@@ -150,8 +183,11 @@ BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& colu
         return length * static_cast<Eigen::Index>(i) / static_cast<Eigen::Index>(cuts);
       };
       const Eigen::Index begin = fold.begin + at(cut);
-      const auto x = rows_[fold.run].middleRows(begin, at(cut + 1) - at(cut));
-      const auto y = tests.runs[fold.run].outputs_um.middleRows(begin, at(cut + 1) - at(cut));
+      const Rows part =
+          complete_rows(rows_[fold.run].middleRows(begin, at(cut + 1) - at(cut)),
+                        tests.runs[fold.run].outputs_um.middleRows(begin, at(cut + 1) - at(cut)));
+      const Eigen::MatrixXd& x = part.x;
+      const Eigen::MatrixXd& y = part.y;
       Sums& sums = pieces_.emplace_back();
       sums.xx = x.transpose() * x;
       sums.xy = x.transpose() * y;

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "estimator/thermal_model.hpp"
 #include "modelling/identification/measured_tests.hpp"
 
 namespace thermocomp::identification {
@@ -29,7 +30,14 @@ struct BankColumns {
 [[nodiscard]] Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
                                       const BankColumns& columns);
 
-/// X'X and X'Y of every fold, columns scaled to a standard deviation of 1.
+/// The term that the daemon evaluates.
+/// @param gains  [um per unit], shape (columns, outputs)
+[[nodiscard]] TermSpec bank_term(const BankColumns& columns,
+                                 const std::vector<std::string>& outputs,
+                                 const Eigen::MatrixXd& gains);
+
+/// X'X and X'Y of every fold, columns scaled to a standard deviation of 1. Rows in which an output
+/// is missing (NaN) do not count.
 class BankEquations {
  public:
   BankEquations(const MeasuredTests& tests, const BankColumns& columns);

@@ -15,6 +15,12 @@ namespace {
 
 constexpr std::size_t kept_for_lags = 200;
 constexpr Eigen::Index stretches_of_only_run = 6;
+/// Fewer runs say too little of a family by each predicting another: what is left of them then is
+/// mostly what a single run has not shown.
+constexpr std::size_t runs_that_choose = 4;
+constexpr std::size_t stretches_that_choose = 8;
+/// Squares, over those of no model, that a family may leave of a whole run: beyond, it is out.
+constexpr double runaway_score = 10.0;
 
 std::size_t index_of_family(Family family) {
   return static_cast<std::size_t>(family);
@@ -41,6 +47,22 @@ MeasuredTests without(const MeasuredTests& tests, std::size_t fold) {
     rest.folds.push_back({only.run, only.begin + rows * i / stretches_of_only_run,
                           only.begin + rows * (i + 1) / stretches_of_only_run});
   return rest;
+}
+
+/// Few runs, cut in stretches that are left out in turn.
+MeasuredTests in_stretches(const MeasuredTests& tests) {
+  MeasuredTests cut = tests;
+  cut.folds.clear();
+  const auto of_a_run = static_cast<Eigen::Index>((stretches_that_choose + tests.folds.size() - 1) /
+                                                  tests.folds.size());
+  for (const Fold& fold : tests.folds) {
+    const Eigen::Index rows = fold.end - fold.begin;
+    for (Eigen::Index i = 0; i < of_a_run; ++i)
+      if (rows * (i + 1) / of_a_run > rows * i / of_a_run)
+        cut.folds.push_back(
+            {fold.run, fold.begin + rows * i / of_a_run, fold.begin + rows * (i + 1) / of_a_run});
+  }
+  return cut;
 }
 
 FitOptions options_of(Family family, const MeasuredTests& tests, FitOptions options) {
@@ -146,6 +168,19 @@ FamilyResult judge_bank(const MeasuredTests& tests, const BankEquations& bank,
   return result;
 }
 
+/// Every family on the folds left out, order of all_families.
+std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& options,
+                                 const BankEquations& bank, const std::function<void()>& done) {
+  std::vector<FamilyResult> results(1);
+  results[0].left_out_um =
+      Eigen::MatrixXd::Zero(rows_of(tests), static_cast<Eigen::Index>(tests.outputs.size()));
+  judge(tests, results[0]);
+  for (const Family family : {Family::static_few, Family::lagged_few, Family::physical})
+    results.push_back(judge_few(family, tests, options, done));
+  results.push_back(judge_bank(tests, bank, done));
+  return results;
+}
+
 Family simplest_as_good(const std::vector<FamilyResult>& results) {
   const auto total = [](const FamilyResult& result) {
     return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
@@ -164,6 +199,17 @@ Family simplest_as_good(const std::vector<FamilyResult>& results) {
     if (mean <= error) return result.family;
   }
   return best->family;
+}
+
+/// @param by_runs  the same families on whole runs
+std::vector<FamilyResult> without_runaways(std::vector<FamilyResult> results,
+                                           const std::vector<FamilyResult>& by_runs) {
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const auto& scores = by_runs[i].scores;
+    if (std::accumulate(scores.begin(), scores.end(), 0.0) > runaway_score)
+      results[i].answers = false;
+  }
+  return results;
 }
 
 ThermalModel no_model(const MeasuredTests& tests) {
@@ -200,30 +246,17 @@ ThermalModel few_model(const MeasuredTests& tests, const HeatEquation& equation)
 
 /// What acts at once is the matrix's, the rest one term.
 ThermalModel bank_model(const MeasuredTests& tests, const BankColumns& columns,
-                        const Eigen::MatrixXd& gains) {
+                        Eigen::MatrixXd gains) {
   ThermalModel model;
   model.inputs = tests.places;
   model.outputs = tests.outputs;
-  const std::size_t places = tests.places.size();
-  const std::size_t subjects = columns.subjects.size();
-  TermSpec term;
-  term.kind = "lag_bank";
-  term.bank.subjects = columns.subjects;
-  term.bank.powers = columns.powers;
-  term.bank.taus_s = columns.taus_s;
-  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
-    const auto column = gains.col(static_cast<Eigen::Index>(o));
-    auto& row = model.matrix_um_per_K.emplace_back();
-    for (std::size_t i = 0; i < places; ++i) row.push_back(column[static_cast<Eigen::Index>(i)]);
-    auto& table = term.bank.gain_um_per_unit[tests.outputs[o]];
-    for (std::size_t i = 0; i < subjects; ++i) {
-      auto& of_subject = table.emplace_back();
-      for (std::size_t j = 0; j < columns.taus_s.size(); ++j)
-        of_subject.push_back(
-            i < places && j == 0 ? 0.0 : column[static_cast<Eigen::Index>(j * subjects + i)]);
-    }
+  const auto places = static_cast<Eigen::Index>(tests.places.size());
+  for (Eigen::Index o = 0; o < gains.cols(); ++o) {
+    const auto at_once = gains.col(o).head(places);
+    model.matrix_um_per_K.emplace_back(at_once.begin(), at_once.end());
   }
-  model.terms.push_back(std::move(term));
+  gains.topRows(places).setZero();
+  model.terms.push_back(bank_term(columns, tests.outputs, gains));
   return model;
 }
 
@@ -277,19 +310,22 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
                          std::optional<Family> forced,
                          const std::function<void(double)>& progress) {
   FamiliesFit fit;
-  const double steps = 4.0 * static_cast<double>(tests.folds.size());
+  const bool few_runs = tests.runs.size() > 1 && tests.runs.size() < runs_that_choose;
+  const MeasuredTests choosing = few_runs && !forced ? in_stretches(tests) : MeasuredTests{};
+  const double steps = 4.0 * static_cast<double>(tests.folds.size() + choosing.folds.size());
   double step = 0.0;
   const auto done = [&] { progress(++step / steps); };
-  FamilyResult& none = fit.results.emplace_back();
-  none.left_out_um =
-      Eigen::MatrixXd::Zero(rows_of(tests), static_cast<Eigen::Index>(tests.outputs.size()));
-  judge(tests, none);
-  for (const Family family : {Family::static_few, Family::lagged_few, Family::physical})
-    fit.results.push_back(judge_few(family, tests, options, done));
   const BankColumns columns = bank_columns(tests);
   const BankEquations bank(tests, columns);
-  fit.results.push_back(judge_bank(tests, bank, done));
-  fit.chosen = forced.value_or(simplest_as_good(fit.results));
+  fit.results = judged(tests, options, bank, done);
+  if (forced)
+    fit.chosen = *forced;
+  else if (choosing.folds.empty())
+    fit.chosen = simplest_as_good(fit.results);
+  else
+    fit.chosen = simplest_as_good(without_runaways(
+        judged(choosing, options, BankEquations(choosing, columns), done), fit.results));
+  fit.chosen_by_stretches = !choosing.folds.empty();
   if (!fit.chosen_result().answers)
     throw std::runtime_error(std::string(to_string(fit.chosen)) + ": " +
                              fit.chosen_result().why_not);

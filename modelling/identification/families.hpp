@@ -10,7 +10,7 @@
 namespace thermocomp::identification {
 
 /// The simplest family within one standard error of the best: of the difference to it, fold by
-/// fold.
+/// fold. Folds are the runs; of one run, and to choose among families with two or three, stretches.
 /// @param forced    instead of it
 /// @param progress  is told the share of the work done
 /// @throws std::runtime_error when the forced family has no answer

@@ -58,8 +58,9 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   text += "   of none's squares\n";
   for (const FamilyResult& result : fit.results)
     text += line_of(result, result.family == fit.chosen);
-  text += printed("chosen: %s, the simplest within one standard error of the best\n",
-                  std::string(to_string(fit.chosen)).c_str());
+  text += printed("chosen: %s, the simplest within one standard error of the best%s\n",
+                  std::string(to_string(fit.chosen)).c_str(),
+                  fit.chosen_by_stretches ? " on stretches of the few runs" : "");
   if (one_run) text += "judged within one run: not valid for other days\n";
   if (fit.chosen != Family::none) {
     const MadeFrom& made_from = *fit.model.made_from;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 
 namespace thermocomp::diagnosis {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 #include "modelling/diagnosis/hypothesis.hpp"
 #include "modelling/diagnosis/thermal/network_simulation.hpp"
 

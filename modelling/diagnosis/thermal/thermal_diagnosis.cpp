@@ -95,7 +95,9 @@ void add_to_report(ReportData& report, const HeatNetwork& before, const HeatNetw
   for (std::size_t i = 0; i < runs.runs.size(); ++i) {
     const MeasuredRun& run = data.runs[i];
     const Eigen::Index rows = run.rows() - run.begin;
-    ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data), {}, {}, {}, {}};
+    ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
+    for (const Column& measured : run.measured_um)
+      added.measured_um.emplace_back(measured.tail(rows));
     for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
     for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
     for (const Residuals& each : left_before) added.before_um.push_back(each.by_run[i]);

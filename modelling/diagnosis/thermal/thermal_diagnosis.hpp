@@ -6,10 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 #include "modelling/diagnosis/thermal/heat_network.hpp"
 
 namespace thermocomp::diagnosis {
+
+struct ReportData;
 
 /// @param train_names, test_names  the runs' arguments as given
 /// @param report  if given, receives what the report shows

@@ -2,11 +2,14 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
-#include "modelling/diagnosis/report_data.hpp"
-#include "modelling/diagnosis/report_texts.hpp"
+#include "modelling/diagnosis/report/report_html.hpp"
+#include "modelling/diagnosis/report/report_texts.hpp"
+#include "modelling/diagnosis/report/report_words.hpp"
+#include "modelling/diagnosis/report/svg_plot.hpp"
 #include "modelling/markup/xml_text.hpp"
 
 using namespace thermocomp;
@@ -30,6 +33,7 @@ ReportData one_run() {
                 true,
                 Column::LinSpaced(rows, 0.0, 60.0 * (rows - 1)),
                 std::vector<Phase>(rows, Phase::heating),
+                {wave(20.0, 0.02)},
                 {wave(5.0, 0.1)},
                 {wave(1.0, 0.3)},
                 {wave(3000.0, 0.05)},
@@ -81,7 +85,7 @@ TEST_CASE("a finding that the test runs do not bear out is not recommended", "[d
   REQUIRE_FALSE(fails_on_test_runs(finding));
   finding.test["z_um"] = {2.4, 3.0, -0.25, {-0.4, -0.1}};
   CHECK(fails_on_test_runs(finding));
-  CHECK(sentence_of(finding).find("makes the error larger: that of z_um goes from 2.4 to 3") !=
+  CHECK(sentence_of(finding).find("makes the error larger: that of z goes from 2.4 to 3.0") !=
         std::string::npos);
   CHECK(what_to_do(finding).starts_with("Do not use it yet"));
   CHECK(what_to_do(finding).ends_with(usual));
@@ -114,7 +118,8 @@ TEST_CASE("each finding is a sentence with its figures, what to do and what woul
     CHECK_FALSE(what_to_do(finding).empty());
     CHECK(has(html, xml_text(what_to_do(finding))));
   }
-  CHECK(has(html, "1810 (1650 to 2000)"));
+  CHECK(has(html, "time constant 30 min (28 min to 33 min)"));
+  CHECK(has(html, "Heat that no sensor sees"));
   CHECK(has(html, "from 6.7 to 2.4"));
   CHECK(has(html, xml_text(experiment_for(diagnosis.findings[0],
                                           diagnosis.findings[0].alternatives[0]))));
@@ -131,9 +136,9 @@ TEST_CASE("names are shown as they are, whatever is in them", "[diagnosis][repor
 TEST_CASE("the plots are there with and without a finding", "[diagnosis][report]") {
   const std::string silent = report_html(none(), one_run());
   const std::string named = report_html(with_findings(), one_run());
-  // The residual, what it goes with, the signal.
-  CHECK(count(silent, "<svg") == 3);
-  CHECK(count(named, "<svg") == 3);
+  // The course over signals and temperatures, and what the error goes with.
+  CHECK(count(silent, "<svg") == 2);
+  CHECK(count(named, "<svg") == 2);
   for (const std::string& html : {silent, named}) {
     CHECK(count(html, "d=\"M") >= 3);
     CHECK_FALSE(has(html, "nan"));
@@ -142,6 +147,55 @@ TEST_CASE("the plots are there with and without a finding", "[diagnosis][report]
   CHECK(count(silent, "<h3>") == 0);
   CHECK(has(silent, "Nothing worth saying"));
   CHECK(count(named, "<h3>") == 2);
+}
+
+TEST_CASE("numbers are told with two digits, three after a 1, and times in a fitting unit",
+          "[diagnosis][report]") {
+  CHECK(figure(0.0039628) == "0.0040");
+  CHECK(figure(5.653) == "5.7");
+  CHECK(figure(1.8104) == "1.81");
+  CHECK(figure(-92.6) == "-93");
+  CHECK(figure(1234.0) == "1230");
+  CHECK(figure(9.97) == "10.0");
+  CHECK(figure(0.0) == "0");
+  CHECK(figure(NAN) == "-");
+  CHECK(duration(45.0) == "45 s");
+  CHECK(duration(3162.6) == "53 min");
+  CHECK(duration(9000.0) == "2.5 h");
+}
+
+TEST_CASE("a parameter is told in words with its unit, an interval only where it says something",
+          "[diagnosis][report]") {
+  const Parameter heat{"gain_um_per_unit", {{"z_um", 0.0039628}}, {{"z_um", {0.00396, 0.00397}}}};
+  CHECK(parameter_words(heat, "spindle_rpm") == "effect 4.0 um/(1000 rpm) in z");
+  const Parameter lag{"tau_s", {{"", 3162.6}}, {{"", {2800.0, 3500.0}}}};
+  CHECK(parameter_words(lag, "t1_degC") == "time constant 53 min (47 min to 58 min)");
+  CHECK(parameter_words({"power", {{"", 2.0}}, {}}, "x") == "with the square of the signal");
+  CHECK(parameter_words({"step_um", {{"", -2.5}}, {}}, "z_um") == "jump -2.5 um");
+  CHECK(parameter_words({"news", {{"", 3.0}}, {}}, "z_um") == "news 3.0");
+}
+
+TEST_CASE("an axis has round ticks within its range", "[diagnosis][report]") {
+  CHECK(round_ticks(0.0, 10.0, 5) == std::vector<double>{0, 2, 4, 6, 8, 10});
+  const std::vector<double> small = round_ticks(-0.013, 0.021, 4);
+  REQUIRE(small.size() == 4);
+  CHECK(small[1] == 0.0);
+  CHECK(small[3] == Approx(0.02));
+  CHECK(round_ticks(3.0, 3.0, 5).empty());
+  CHECK(round_ticks(24.1, 32.2, 10).front() == Approx(25.0));
+}
+
+TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][report]") {
+  Diagnosis diagnosis = with_findings();
+  diagnosis.remainder.emplace();
+  diagnosis.remainder->test["z_um"] = {12.0, 2.0, 0.83, {0.7, 0.9}};
+  const std::string html = report_html(diagnosis, one_run());
+  const std::size_t bank = html.find("What can be predicted and has no name (up to 10.0 um");
+  const std::size_t heat = html.find("(up to 4.3 um RMS less). Use the extended model");
+  REQUIRE(bank != std::string::npos);
+  REQUIRE(heat != std::string::npos);
+  CHECK(bank < heat);
+  CHECK(heat < html.find("<h2>What was found"));
 }
 
 TEST_CASE("every cause that can be named has words of its own", "[diagnosis][report]") {

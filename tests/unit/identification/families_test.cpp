@@ -93,6 +93,26 @@ TEST_CASE("displacement that nothing recorded says gets no model", "[families]")
   CHECK(families_text(tests, fit).find("no model is better than none") != std::string::npos);
 }
 
+TEST_CASE("of two runs that are not alike the family is chosen by stretches of both",
+          "[families]") {
+  // The second run's speed is ten times the first one's: neither alone says what the other does.
+  const auto moved = [](double quick, double slow, double, double rpm) {
+    return 5.0 * quick - 3.0 * slow + 1e-6 * rpm * rpm;
+  };
+  RunFile slow = machine_run("slow", 4, moved);
+  RunFile fast = machine_run("fast", 3, moved);
+  for (double& rpm : slow.values[3]) rpm *= 0.1;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  const MeasuredTests tests = measured_tests({slow, fast}, options);
+  const FamiliesFit fit = fitted(tests);
+  CHECK(fit.chosen_by_stretches);
+  CHECK(fit.chosen != Family::none);
+  CHECK(fit.results.front().fold_um[0].size() == 2);  // what is told is of whole runs
+  CHECK(families_text(tests, fit).find("on stretches of the few runs") != std::string::npos);
+}
+
 TEST_CASE("one temperature is enough for an answer", "[families]") {
   RunFile run = machine_run("one", 3, [](double quick, double, double, double) { return quick; });
   run.columns = {"time_s", "t1_degC", "spindle_rpm", "z_um"};

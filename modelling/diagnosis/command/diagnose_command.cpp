@@ -1,4 +1,4 @@
-#include "modelling/diagnosis/diagnose_command.hpp"
+#include "modelling/diagnosis/command/diagnose_command.hpp"
 
 #include <cmath>
 #include <cstdio>
@@ -17,9 +17,9 @@
 #include "config/run_file.hpp"
 #include "config/run_overlap.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/gain_on_test.hpp"
 #include "modelling/diagnosis/large_pages.hpp"
-#include "modelling/diagnosis/report_data.hpp"
-#include "modelling/diagnosis/report_texts.hpp"
+#include "modelling/diagnosis/report/report_html.hpp"
 #include "modelling/diagnosis/still_searching.hpp"
 #include "modelling/diagnosis/thermal/corrected_machine.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
@@ -44,6 +44,24 @@ void write(const std::string& destination, const std::string& text) {
   file.commit();
 }
 
+void print_test_gain(const std::string& output, const TestGain& gain) {
+  std::printf("  %s, test rows: RMS %.3f -> %.3f (%.0f %%, 95 %%: %.0f to %.0f)\n", output.c_str(),
+              gain.before_um, gain.after_um, 100 * gain.reduction, 100 * gain.ci95.low,
+              100 * gain.ci95.high);
+}
+
+void print(const RemainderBank& remainder) {
+  std::printf("predictable without a name: carried by a bank of lags, last term of the model\n");
+  for (const auto& [output, gain] : remainder.left_out)
+    std::printf("  %s, rows left out: RMS %.3f -> %.3f\n", output.c_str(), gain.before_um,
+                gain.after_um);
+  for (const auto& [output, gain] : remainder.test) {
+    print_test_gain(output, gain);
+    if (!(gain.reduction > 0))
+      std::printf("  worse on the test runs: this output goes without it\n");
+  }
+}
+
 void print(const Diagnosis& diagnosis) {
   std::printf("verdict: %s\n", diagnosis.verdict.c_str());
   for (const NamedFinding& finding : diagnosis.findings) {
@@ -62,16 +80,14 @@ void print(const Diagnosis& diagnosis) {
       for (const auto& [output, value] : parameter.values)
         std::printf("  %s%s%s = %.6g\n", parameter.name.c_str(), output.empty() ? "" : " ",
                     output.c_str(), value);
-    for (const auto& [output, gain] : finding.test)
-      std::printf("  %s, test rows: RMS %.3f -> %.3f (%.0f %%, 95 %%: %.0f to %.0f)\n",
-                  output.c_str(), gain.before_um, gain.after_um, 100 * gain.reduction,
-                  100 * gain.ci95.low, 100 * gain.ci95.high);
+    for (const auto& [output, gain] : finding.test) print_test_gain(output, gain);
     if (fails_on_test_runs(finding))
-      std::printf("  worse on the test runs: do not use it before more runs confirm it\n");
+      std::printf("  worse on the test runs: left out of the extended model\n");
     for (const Alternative& other : finding.alternatives)
       std::printf("  or: %s of %s (support %.2g)\n", other.cause.c_str(), other.subject.c_str(),
                   other.relative_support);
   }
+  if (diagnosis.remainder) print(*diagnosis.remainder);
   if (diagnosis.findings.empty())
     for (const auto& [family, probability] : diagnosis.families)
       std::printf("weighed: %s, probability %.2f\n", family.c_str(), probability);
@@ -108,13 +124,20 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
                   options.test, report);
 }
 
+/// What the test runs do not speak against.
+std::vector<NamedFinding> confirmed(const Diagnosis& diagnosis) {
+  std::vector<NamedFinding> findings = diagnosis.findings;
+  std::erase_if(findings, fails_on_test_runs);
+  return findings;
+}
+
 /// The report, and the model or machine file with what was found.
 void write_folder(const Options& options, const Diagnosis& diagnosis, const ReportData& report) {
   const std::filesystem::path folder(options.folder);
   std::filesystem::create_directories(folder);
   if (options.thermal.empty())
     write((folder / "model.toml").string(), write_model(diagnosis.extended));
-  else if (const auto text = corrected_machine(options.thermal, diagnosis.findings))
+  else if (const auto text = corrected_machine(options.thermal, confirmed(diagnosis)))
     write((folder / "machine.toml").string(), *text);
   write((folder / "report.html").string(), report_html(diagnosis, report));
 }

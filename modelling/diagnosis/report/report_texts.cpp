@@ -1,68 +1,89 @@
-#include "modelling/diagnosis/report_texts.hpp"
+#include "modelling/diagnosis/report/report_texts.hpp"
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <string_view>
+
+#include "modelling/diagnosis/gain_on_test.hpp"
+#include "modelling/diagnosis/report/report_words.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
 
 struct CauseTexts {
   std::string_view cause;
+  std::string_view title;
   std::string_view says;  ///< continues "SUBJECT: "
   std::string_view to_do;
 };
 
 constexpr std::array<CauseTexts, 23> texts = {{
-    {"thermal_lag", "a part of the structure follows this temperature late",
+    {"thermal_lag", "Part of the structure follows late",
+     "a part of the structure follows this temperature late",
      "Use the extended model; a sensor deeper in the slow part would make it unnecessary."},
-    {"slow_sensor", "the displacement leads the reading: the sensor follows its place late",
+    {"slow_sensor", "A sensor follows its place late",
+     "the displacement leads the reading: the sensor follows its place late",
      "Look at how the sensor is mounted (paste, clamp, tape); until then use the extended model."},
-    {"time_shift", "the displacement is logged at other times than the temperatures",
+    {"time_shift", "The recorders' clocks differ",
+     "the displacement is logged at other times than the temperatures",
      "Set the clocks of both recorders, or correct the time column before anything is fitted."},
-    {"missing_heat_source",
+    {"missing_heat_source", "Heat that no sensor sees",
      "the machine goes on moving after this signal changes: heat that no sensor sees",
      "Use the extended model, or put a sensor where that heat enters."},
-    {"speed_growth", "the displacement jumps with the square of this signal",
+    {"speed_growth", "Growth with speed, not with heat",
+     "the displacement jumps with the square of this signal",
      "Use the extended model; this part is not thermal and no sensor will show it."},
-    {"missing_temperature", "a measured place that the model ignores moves the machine",
+    {"missing_temperature", "A measured place that the model leaves out",
+     "a measured place that the model ignores moves the machine",
      "Use the extended model, or take this place into the model when it is fitted again."},
-    {"wrong_coefficient", "the model moves by the wrong amount for each kelvin of this place",
+    {"wrong_coefficient", "The effect of a place has another size",
+     "the model moves by the wrong amount for each kelvin of this place",
      "Use the extended model; look at the support or material that the coefficient came from."},
-    {"nonlinear_expansion", "the effect of this temperature is curved",
+    {"nonlinear_expansion", "The effect of a temperature is curved",
+     "the effect of this temperature is curved",
      "Use the extended model; beyond the temperatures seen here the curve is not known."},
-    {"position_dependence", "the effect of this temperature grows along the axis",
+    {"position_dependence", "The effect grows along the axis",
+     "the effect of this temperature grows along the axis",
      "Use the extended model, or give the model a guideway along this axis."},
-    {"hysteresis", "what moves sticks before it follows: a loop that does not depend on speed",
+    {"hysteresis", "Something sticks before it follows",
+     "what moves sticks before it follows: a loop that does not depend on speed",
      "Look for a joint or a clamp that slips; the extended model carries it until then."},
-    {"periodic_disturbance", "a cycle of its own, which no temperature here explains",
+    {"periodic_disturbance", "A cycle of its own",
+     "a cycle of its own, which no temperature here explains",
      "Look for what switches with this period: a cooler, a pump, the room's ventilation."},
-    {"displacement_step", "the datum of the displacement jumped once",
+    {"displacement_step", "The datum jumped", "the datum of the displacement jumped once",
      "Do not fit to this run across the jump; look whether the probe was touched or set again."},
-    {"displacement_drift", "the datum of the displacement creeps through the whole run",
+    {"displacement_drift", "The datum creeps",
+     "the datum of the displacement creeps through the whole run",
      "Do not fit to this run; look at the probe, its holder and its amplifier's warm-up."},
-    {"sensor_drift", "this reading creeps away from what its neighbours and the displacement say",
+    {"sensor_drift", "A reading creeps",
+     "this reading creeps away from what its neighbours and the displacement say",
      "Replace or calibrate the sensor; leave the run out of any fit."},
-    {"sensor_step", "this reading jumped and stayed",
+    {"sensor_step", "A reading jumped", "this reading jumped and stayed",
      "Look at the connector and the amplifier's channel; leave the run out of any fit."},
-    {"sensor_loose", "from a time on this sensor shows more of the room than of its place",
+    {"sensor_loose", "A sensor has come loose",
+     "from a time on this sensor shows more of the room than of its place",
      "Fasten the sensor; leave the rest of the run out of any fit."},
-    {"sensor_swap", "these two channels are exchanged",
+    {"sensor_swap", "Two channels are exchanged", "these two channels are exchanged",
      "Exchange the two plugs or the two names in the configuration."},
-    {"missing_heat", "this place warms with this signal: heat that the thermal model does not have",
+    {"missing_heat", "Heat that the thermal model does not have",
+     "this place warms with this signal: heat that the thermal model does not have",
      "Add a [[source]] with these figures, then look which motor, bearing or pump it is."},
-    {"wrong_heat_source", "this source gives another heat than the thermal model says",
+    {"wrong_heat_source", "A source gives another heat",
+     "this source gives another heat than the thermal model says",
      "Put the new heat_W into the thermal model; look at preload, load and speed of what warms."},
-    {"wrong_film_coefficient",
+    {"wrong_film_coefficient", "Air or coolant takes another heat",
      "this place gives another heat to the air or the coolant than the "
      "thermal model says",
      "Put the new value into the thermal model; look for a cover, a fan or a blocked jacket."},
-    {"wrong_conductance", "this joint conducts otherwise than the thermal model says",
+    {"wrong_conductance", "A joint conducts otherwise",
+     "this joint conducts otherwise than the thermal model says",
      "Put the new value into the thermal model; look at pressure and flatness of the joint."},
-    {"wrong_heat_capacity", "this place stores another heat than the thermal model says",
+    {"wrong_heat_capacity", "A place stores another heat",
+     "this place stores another heat than the thermal model says",
      "Put the new value into the thermal model; look whether a mass was left out of it."},
-    {"wrong_ambient", "the air around this is warmer or colder than the reading of the room",
+    {"wrong_ambient", "The air here is not the room's",
+     "the air around this is warmer or colder than the reading of the room",
      "Move the room's sensor to the air that the machine is in, or take the offset into account."},
 }};
 
@@ -77,30 +98,6 @@ const CauseTexts* texts_of(std::string_view cause) {
   const auto at = std::find_if(texts.begin(), texts.end(),
                                [cause](const CauseTexts& each) { return each.cause == cause; });
   return at == texts.end() ? nullptr : &*at;
-}
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, value >= 100.0 ? "%.0f" : "%.3g", value);
-  return text;
-}
-
-std::string parameter_text(const Parameter& parameter) {
-  std::string text;
-  for (const auto& [output, value] : parameter.values) {
-    if (!text.empty()) text += "; ";
-    text += parameter.name;
-    if (!output.empty()) text.append(" of ").append(output);
-    text.append(" ").append(number(value));
-    const auto ci = parameter.ci95.find(output);
-    if (ci != parameter.ci95.end())
-      text.append(" (")
-          .append(number(ci->second.low))
-          .append(" to ")
-          .append(number(ci->second.high))
-          .append(")");
-  }
-  return text;
 }
 
 bool acts_at_once(std::string_view cause) {
@@ -125,40 +122,45 @@ bool has_memory(std::string_view cause) {
 
 }  // namespace
 
+std::string title_of(const NamedFinding& finding) {
+  const CauseTexts* of = texts_of(key_of(finding));
+  std::string text(of == nullptr ? std::string_view(finding.cause) : of->title);
+  return text.append(": ").append(finding.subject);
+}
+
+std::string title_of(const Alternative& other) {
+  NamedFinding finding;
+  finding.cause = other.cause;
+  finding.subject = other.subject;
+  return title_of(finding);
+}
+
 std::string sentence_of(const NamedFinding& finding) {
   const CauseTexts* of = texts_of(key_of(finding));
   std::string text = finding.subject;
   text += ": ";
   text += of == nullptr ? std::string_view(finding.cause) : of->says;
   if (finding.run) text.append(" (in ").append(*finding.run).append(")");
-  std::string figures;
   for (const Parameter& parameter : finding.parameters)
-    figures.append(figures.empty() ? "" : "; ").append(parameter_text(parameter));
-  if (!figures.empty()) text.append("; ").append(figures);
+    text.append("; ").append(parameter_words(parameter, finding.subject));
   for (const auto& [output, gain] : finding.test)
     text.append(gain.reduction > 0 ? "; knowing it takes the error of "
                                    : "; on the test runs it makes the error larger: that of ")
-        .append(output)
+        .append(name_of_column(output))
         .append(gain.reduction > 0 ? "" : " goes")
         .append(" from ")
-        .append(number(gain.before_um))
+        .append(figure(gain.before_um))
         .append(" to ")
-        .append(number(gain.after_um));
+        .append(figure(gain.after_um));
   return text + ".";
-}
-
-bool fails_on_test_runs(const NamedFinding& finding) {
-  return !finding.test.empty() &&
-         std::none_of(finding.test.begin(), finding.test.end(),
-                      [](const auto& of_output) { return of_output.second.reduction > 0; });
 }
 
 std::string what_to_do(const NamedFinding& finding) {
   const CauseTexts* of = texts_of(key_of(finding));
   std::string usual = of == nullptr ? std::string() : std::string(of->to_do);
   if (!fails_on_test_runs(finding)) return usual;
-  return "Do not use it yet: it holds for the training runs and not for the test runs. Take its "
-         "[[term]] out of the extended model and record more runs. If they confirm it: " +
+  return "Do not use it yet: it holds for the training runs and not for the test runs, so the "
+         "extended model goes without it. Record more runs. If they confirm it: " +
          usual;
 }
 

@@ -4,14 +4,15 @@
 
 #include <string>
 
-#include "modelling/diagnosis/diagnosis.hpp"
+#include "modelling/diagnosis/answer.hpp"
 
 namespace thermocomp::diagnosis {
 
+/// What was found, in a few words, and where.
+[[nodiscard]] std::string title_of(const NamedFinding& finding);
+[[nodiscard]] std::string title_of(const Alternative& other);
 /// One or two sentences with the finding's own figures.
 [[nodiscard]] std::string sentence_of(const NamedFinding& finding);
-/// Whether no output gains by it on the test runs.
-[[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
 [[nodiscard]] std::string what_to_do(const NamedFinding& finding);
 /// The experiment that tells the finding from one of its alternatives.
 [[nodiscard]] std::string experiment_for(const NamedFinding& finding, const Alternative& other);

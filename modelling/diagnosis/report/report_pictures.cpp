@@ -1,0 +1,109 @@
+#include "modelling/diagnosis/report/report_pictures.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "modelling/diagnosis/report/report_words.hpp"
+#include "modelling/diagnosis/report/svg_plot.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr std::size_t scatters_max = 3;
+constexpr std::size_t signals_max = 4;
+/// More temperatures than this are drawn without their names.
+constexpr std::size_t named_max = 6;
+constexpr double signal_height = 50.0;
+constexpr const char* measured_colour = "#222";
+constexpr const char* model_colour = "#c53030";
+constexpr const char* extended_colour = "#2b6cb0";
+constexpr std::array<const char*, 8> colours = {"#2b6cb0", "#c05621", "#2f855a", "#6b46c1",
+                                                "#b7791f", "#97266d", "#285e61", "#718096"};
+
+/// Correlation of two columns over the rows in which both have values.
+double correlation(const Column& a, const Column& b) {
+  const auto both = a.array().isFinite() && b.array().isFinite();
+  const double n = static_cast<double>(both.count());
+  if (!(n > 2)) return 0.0;
+  const Eigen::ArrayXd x = both.select(a.array(), 0.0);
+  const Eigen::ArrayXd y = both.select(b.array(), 0.0);
+  const double cross = (x * y).sum() / n - x.sum() * y.sum() / (n * n);
+  const double xx = x.square().sum() / n - std::pow(x.sum() / n, 2);
+  const double yy = y.square().sum() / n - std::pow(y.sum() / n, 2);
+  return xx > 0 && yy > 0 ? cross / std::sqrt(xx * yy) : 0.0;
+}
+
+std::string unit_of(const std::string& column) {
+  const std::size_t last = column.rfind('_');
+  return last == std::string::npos ? std::string() : column.substr(last + 1);
+}
+
+PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
+  PlotPanel panel{"temperatures, rise", "K", {}, 110.0};
+  for (std::size_t i = 0; i < run.inputs_K.size(); ++i)
+    panel.lines.push_back(
+        {run.inputs_K.size() <= named_max ? name_of_column(report.inputs[i]) : std::string(),
+         colours[i % colours.size()], &run.inputs_K[i]});
+  return panel;
+}
+
+}  // namespace
+
+std::string course_picture(const ReportRun& run, const ReportData& report, std::size_t output,
+                           const std::string& unit) {
+  const std::string name = name_of_column(report.outputs[output]);
+  const Column model = run.measured_um[output] - run.before_um[output];
+  const Column extended = run.measured_um[output] - run.after_um[output];
+  std::vector<PlotPanel> panels;
+  panels.push_back({name,
+                    unit,
+                    {{"measured", measured_colour, &run.measured_um[output]},
+                     {"model", model_colour, &model},
+                     {"extended model", extended_colour, &extended}},
+                    170.0});
+  panels.push_back({"error of " + name,
+                    unit,
+                    {{"model", model_colour, &run.before_um[output]},
+                     {"extended model", extended_colour, &run.after_um[output]}},
+                    110.0});
+  for (std::size_t i = 0; i < std::min(signals_max, run.signals.size()); ++i)
+    panels.push_back({name_of_column(report.signals[i]),
+                      unit_of(report.signals[i]),
+                      {{"", "#444", &run.signals[i]}},
+                      signal_height});
+  if (!run.inputs_K.empty()) panels.push_back(temperatures_panel(run, report));
+  return panels_plot(run.time_s, panels);
+}
+
+std::string scatter_pictures(const ReportRun& run, const ReportData& report, std::size_t output,
+                             const std::string& unit) {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t input = 0; input < report.inputs.size(); ++input)
+    order.emplace_back(-std::abs(correlation(run.inputs_K[input], run.before_um[output])), input);
+  std::sort(order.begin(), order.end());
+  std::string html = "<div class=\"few\">";
+  for (std::size_t i = 0; i < std::min(scatters_max, order.size()); ++i) {
+    const std::size_t input = order[i].second;
+    char title[80];
+    std::snprintf(title, sizeof title, "%.40s, correlation %.2f",
+                  name_of_column(report.inputs[input]).c_str(), -order[i].first);
+    html += scatter_plot({title, &run.inputs_K[input], "rise, K", &run.before_um[output], unit});
+  }
+  return html + "</div>\n";
+}
+
+std::string headroom_picture(const Diagnosis& diagnosis) {
+  std::vector<NamedBar> bars;
+  for (const auto& [output, of] : diagnosis.outputs)
+    if (of.headroom)
+      bars.push_back({name_of_column(output),
+                      {{"named here", "#2b6cb0", of.headroom->named},
+                       {"predictable, without a name", "#b7791f", of.headroom->predictable},
+                       {"in nothing that was recorded", "#c53030", of.headroom->not_recorded},
+                       {"noise of a single value", "#a0aec0", of.headroom->noise}}});
+  return bars.empty() ? std::string() : bars_plot(bars);
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,129 @@
+#include "modelling/diagnosis/report/report_words.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+
+namespace thermocomp::diagnosis {
+namespace {
+
+struct Words {
+  std::string_view parameter;
+  std::string_view says;
+  std::string_view unit;  ///< "s": a duration; "?": of the subject
+};
+
+constexpr std::array<Words, 28> words = {{
+    {"tau_s", "time constant", "s"},
+    {"shift_s", "shifted by", "s"},
+    {"period_s", "period", "s"},
+    {"at_s", "from the start of the recording on", "s"},
+    {"gain_um_per_K", "effect", "um/K"},
+    {"gain_um_per_unit", "effect", "um/?"},
+    {"gain_um_per_unit2", "effect", "um/?^2"},
+    {"gain_um_per_K2", "curvature", "um/K^2"},
+    {"gain_um_per_K_mm", "effect along the axis", "um/(K mm)"},
+    {"delta_um_per_K", "the coefficient lacks", "um/K"},
+    {"p0_mm", "none at", "mm"},
+    {"width_K", "dead band", "K"},
+    {"width_um", "dead band", "um"},
+    {"amplitude_um", "amplitude", "um"},
+    {"step_um", "jump", "um"},
+    {"step_K", "jump", "K"},
+    {"rate_um_per_h", "creep", "um/h"},
+    {"rate_K_per_h", "creep", "K/h"},
+    {"gain", "of its motion left:", ""},
+    {"start_s", "creeps from", "s"},
+    {"factor", "times what the model has:", ""},
+    {"room_W_per_K", "to the air", "W/K"},
+    {"coolant_W_per_K", "to the coolant", "W/K"},
+    {"conductance_W_per_K", "conducts", "W/K"},
+    {"capacity_J_per_K", "stores", "J/K"},
+    {"heat_W", "heat", "W"},
+    {"at", "at a signal of", ""},
+    {"offset_K", "warmer by", "K"},
+}};
+
+constexpr std::string_view thousand_of = "rpm";
+
+std::string words_of(double value, double scale, bool is_duration) {
+  return is_duration ? duration(value) : figure(scale * value);
+}
+
+/// " (47 min to 59 min)"; empty where the ends are the value, as far as it is told.
+std::string interval_words(const Interval& interval, double value, double scale, bool is_duration) {
+  const std::string low = words_of(interval.low, scale, is_duration);
+  const std::string high = words_of(interval.high, scale, is_duration);
+  const std::string told = words_of(value, scale, is_duration);
+  if (low == told && high == told) return "";
+  return " (" + low + " to " + high + ")";
+}
+
+std::string unit_of_column(const std::string& column) {
+  const std::size_t last = column.rfind('_');
+  return last == std::string::npos ? column : column.substr(last + 1);
+}
+
+}  // namespace
+
+std::string figure(double value) {
+  if (!std::isfinite(value)) return "-";
+  if (value == 0.0) return "0";
+  const int power = static_cast<int>(std::floor(std::log10(std::abs(value)) + 1e-9));
+  const bool begins_with_1 = std::abs(value) < 2.0 * std::pow(10.0, power);
+  const int digits = begins_with_1 ? 3 : 2;
+  const double unit = std::pow(10.0, power - digits + 1);
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*f", std::max(0, digits - 1 - power),
+                std::round(value / unit) * unit);
+  return text;
+}
+
+std::string duration(double seconds) {
+  const double size = std::abs(seconds);
+  if (!(size >= 120.0)) return figure(seconds) + " s";
+  if (size < 7200.0) return figure(seconds / 60.0) + " min";
+  return figure(seconds / 3600.0) + " h";
+}
+
+std::string name_of_column(const std::string& column) {
+  const std::size_t last = column.rfind('_');
+  return last == std::string::npos || last == 0 ? column : column.substr(0, last);
+}
+
+std::string parameter_words(const Parameter& parameter, const std::string& subject) {
+  if (parameter.name == "power") {
+    const bool square = parameter.values.contains("") && parameter.values.at("") > 1.5;
+    return square ? "with the square of the signal" : "in proportion to the signal";
+  }
+  const auto* const known = std::find_if(words.begin(), words.end(), [&](const Words& each) {
+    return each.parameter == parameter.name;
+  });
+  std::string says(known == words.end() ? std::string_view(parameter.name) : known->says);
+  std::string unit(known == words.end() ? std::string_view() : known->unit);
+  double scale = 1.0;
+  if (const std::size_t at = unit.find('?'); at != std::string::npos) {
+    const std::string of_subject = unit_of_column(subject);
+    const bool squared = unit.ends_with("^2");
+    const bool thousand = of_subject == thousand_of;
+    unit.replace(at, 1, thousand ? "(1000 " + of_subject + ")" : of_subject);
+    if (thousand) scale = squared ? 1e6 : 1e3;
+  }
+  const bool is_duration = unit == "s";
+  std::string text = says;
+  bool first = true;
+  for (const auto& [output, value] : parameter.values) {
+    text += first ? " " : ", ";
+    first = false;
+    text += words_of(value, scale, is_duration);
+    const auto ci = parameter.ci95.find(output);
+    if (ci != parameter.ci95.end()) text += interval_words(ci->second, value, scale, is_duration);
+    if (!is_duration && !unit.empty()) text.append(" ").append(unit);
+    if (!output.empty()) text.append(" in ").append(name_of_column(output));
+  }
+  return text;
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,242 @@
+#include "modelling/diagnosis/report/svg_plot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "modelling/markup/xml_text.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr double width = 860.0;
+constexpr double left = 52.0;
+constexpr double right = 10.0;
+constexpr double title_height = 20.0;
+constexpr double axis_height = 32.0;
+constexpr double gap = 8.0;
+constexpr double small_width = 240.0;
+constexpr double small_height = 190.0;
+constexpr double bar_height = 20.0;
+constexpr double bar_left = 120.0;
+constexpr double share_written_min = 0.06;
+/// Of all lines of a panel together, and of one.
+constexpr std::size_t panel_points_max = 8000;
+constexpr Eigen::Index points_max = 2000;
+constexpr Eigen::Index dots_max = 300;
+
+struct Range {
+  double low{0.0};
+  double high{1.0};
+  [[nodiscard]] double share(double value) const { return (value - low) / (high - low); }
+};
+
+Range range_of(const std::vector<const Column*>& columns) {
+  Range range{1e300, -1e300};
+  for (const Column* column : columns) {
+    for (const double value : *column) {
+      if (!std::isfinite(value)) continue;
+      range.low = std::min(range.low, value);
+      range.high = std::max(range.high, value);
+    }
+  }
+  if (!(range.low <= range.high)) return {};
+  if (!(range.low < range.high)) return {range.low - 1.0, range.high + 1.0};
+  return range;
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+std::string coordinate(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f", value);
+  return text;
+}
+
+/// "1.5 2.5": a place in the drawing.
+std::string place(double x, double y) {
+  return coordinate(x) + " " + coordinate(y);
+}
+
+std::string label(double x, double y, const std::string& text, const std::string& attributes = "") {
+  std::string svg = "<text x=\"" + coordinate(x);
+  svg.append("\" y=\"").append(coordinate(y)).append("\" ").append(attributes).append(">");
+  return svg.append(xml_text(text)).append("</text>");
+}
+
+/// "h120.0"
+std::string way(char direction, double length) {
+  return std::string(1, direction).append(coordinate(length));
+}
+
+std::string straight(double x, double y, const std::string& along, const char* kind) {
+  std::string svg = "<path class=\"";
+  svg.append(kind).append("\" d=\"M").append(place(x, y)).append(along);
+  return svg.append("\"/>");
+}
+
+std::string begin(double whole_width, double height) {
+  return std::string("<svg viewBox=\"0 0 ")
+      .append(place(whole_width, height))
+      .append("\" role=\"img\">");
+}
+
+/// A frame in which values stand.
+struct Box {
+  double x;
+  double y;
+  double width;
+  double height;
+  [[nodiscard]] double across(const Range& range, double value) const {
+    return x + width * range.share(value);
+  }
+  [[nodiscard]] double up(const Range& range, double value) const {
+    return y + height * (1.0 - range.share(value));
+  }
+};
+
+std::string vertical_axis(const Box& box, const Range& range, int wanted) {
+  std::string svg;
+  for (const double tick : round_ticks(range.low, range.high, wanted)) {
+    const double at = box.up(range, tick);
+    svg += straight(box.x, at, way('h', box.width), tick == 0.0 ? "zero" : "grid");
+    svg += label(box.x - 4, at + 4, number(tick), "text-anchor=\"end\"");
+  }
+  return svg + straight(box.x, box.y, way('v', box.height), "axis");
+}
+
+std::string horizontal_axis(const Box& box, const Range& range, const std::string& unit,
+                            int wanted) {
+  std::string svg;
+  for (const double tick : round_ticks(range.low, range.high, wanted)) {
+    const double at = box.across(range, tick);
+    svg += straight(at, box.y + box.height, "v4", "axis");
+    svg += label(at, box.y + box.height + 16, number(tick), "text-anchor=\"middle\"");
+  }
+  svg += straight(box.x, box.y + box.height, way('h', box.width), "axis");
+  return svg + label(box.x + box.width, box.y + box.height + 28, unit, "text-anchor=\"end\"");
+}
+
+std::string curve(const Box& box, const Range& x, const Range& y, const Column& time,
+                  const PlotLine& line, Eigen::Index points) {
+  std::string svg = "<path fill=\"none\" stroke=\"";
+  svg.append(line.colour).append("\" d=\"");
+  const Eigen::Index stride = 1 + (time.size() - 1) / points;
+  bool pen_down = false;
+  for (Eigen::Index row = 0; row < time.size(); row += stride) {
+    const double value = (*line.values)[row];
+    if (!std::isfinite(value)) continue;
+    svg.append(pen_down ? "L" : "M").append(place(box.across(x, time[row]), box.up(y, value)));
+    pen_down = true;
+  }
+  return svg + "\"/>";
+}
+
+std::string panel_svg(const PlotPanel& panel, const Box& box, const Column& time, const Range& x) {
+  std::vector<const Column*> columns;
+  columns.reserve(panel.lines.size());
+  for (const PlotLine& line : panel.lines) columns.push_back(line.values);
+  const Range y = range_of(columns);
+  const std::string title = panel.title + (panel.unit.empty() ? "" : ", " + panel.unit);
+  std::string svg = label(4, box.y - 6, title, "class=\"title\"");
+  svg += vertical_axis(box, y, panel.height > 100 ? 5 : 3);
+  double legend = width - right;
+  for (auto line = panel.lines.rbegin(); line != panel.lines.rend(); ++line) {
+    if (line->label.empty()) continue;
+    svg +=
+        label(legend, box.y - 6, line->label, "text-anchor=\"end\" fill=\"" + line->colour + "\"");
+    legend -= 14.0 + 6.6 * static_cast<double>(line->label.size());
+  }
+  const auto points = std::min<Eigen::Index>(
+      points_max,
+      static_cast<Eigen::Index>(panel_points_max / std::max<std::size_t>(1, panel.lines.size())));
+  for (const PlotLine& line : panel.lines) svg += curve(box, x, y, time, line, points);
+  return svg;
+}
+
+}  // namespace
+
+std::vector<double> round_ticks(double low, double high, int wanted) {
+  std::vector<double> ticks;
+  if (!(high > low) || wanted < 1) return ticks;
+  const double raw = (high - low) / wanted;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  double step = 10.0 * power;
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power < raw) continue;
+    step = factor * power;
+    break;
+  }
+  for (double n = std::ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n += 1.0)
+    ticks.push_back(n == 0.0 ? 0.0 : n * step);
+  return ticks;
+}
+
+std::string panels_plot(const Column& time_s, const std::vector<PlotPanel>& panels) {
+  double height = axis_height;
+  for (const PlotPanel& panel : panels) height += title_height + panel.height + gap;
+  std::string svg = begin(width, height);
+  const Column hours = time_s / 3600.0;
+  const Range x = range_of({&hours});
+  double top = title_height;
+  for (const PlotPanel& panel : panels) {
+    const Box box{left, top, width - left - right, panel.height};
+    svg += panel_svg(panel, box, hours, x);
+    if (&panel == &panels.back()) svg += horizontal_axis(box, x, "time, h", 10);
+    top += panel.height + gap + title_height;
+  }
+  return svg + "</svg>\n";
+}
+
+std::string scatter_plot(const PlotDots& dots) {
+  const Range across = range_of({dots.x});
+  const Range up = range_of({dots.y});
+  const Box box{left, title_height + 4, small_width - left - right,
+                small_height - title_height - 4 - axis_height};
+  std::string svg = begin(small_width, small_height) + label(4, 14, dots.title, "class=\"title\"");
+  svg += vertical_axis(box, up, 4) + horizontal_axis(box, across, dots.x_unit, 3);
+  svg += "<path class=\"dots\" d=\"";
+  const Eigen::Index stride = 1 + (dots.x->size() - 1) / dots_max;
+  for (Eigen::Index row = 0; row < dots.x->size(); row += stride) {
+    const double x = (*dots.x)[row];
+    const double y = (*dots.y)[row];
+    if (!std::isfinite(x) || !std::isfinite(y)) continue;
+    svg.append("M").append(place(box.across(across, x), box.up(up, y))).append("h1");
+  }
+  return svg + "\"/></svg>\n";
+}
+
+std::string bars_plot(const std::vector<NamedBar>& bars) {
+  const double height = title_height + static_cast<double>(bars.size()) * (bar_height + gap);
+  std::string svg = begin(width, height + gap);
+  double legend = bar_left;
+  if (!bars.empty())
+    for (const BarPart& part : bars.front().parts) {
+      svg.append("<path stroke=\"").append(part.colour).append("\" stroke-width=\"10\" d=\"M");
+      svg.append(place(legend, 10)).append("h10\"/>").append(label(legend + 14, 14, part.label));
+      legend += 34.0 + 6.6 * static_cast<double>(part.label.size());
+    }
+  double top = title_height + gap;
+  for (const NamedBar& bar : bars) {
+    svg += label(4, top + 14, bar.name, "class=\"title\"");
+    double x = bar_left;
+    for (const BarPart& part : bar.parts) {
+      const double length = (width - bar_left - right) * part.share;
+      svg.append("<path fill=\"").append(part.colour).append("\" d=\"M").append(place(x, top));
+      svg.append(way('h', length)).append(way('v', bar_height)).append(way('h', -length));
+      svg.append("z\"/>");
+      if (part.share >= share_written_min)
+        svg += label(x + length / 2, top + 14, number(std::round(100.0 * part.share)).append(" %"),
+                     "class=\"share\" text-anchor=\"middle\"");
+      x += length;
+    }
+    top += bar_height + gap;
+  }
+  return svg + "</svg>\n";
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,55 @@
+/// Pictures as SVG, for a page that needs nothing else.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "modelling/diagnosis/measured_runs.hpp"
+
+namespace thermocomp::diagnosis {
+
+struct PlotLine {
+  std::string label;  ///< empty: not in the legend
+  std::string colour;
+  const Column* values{nullptr};  ///< NaN leaves a gap
+};
+
+/// Lines over the axis of time that all panels share.
+struct PlotPanel {
+  std::string title;
+  std::string unit;
+  std::vector<PlotLine> lines;
+  double height{150.0};
+};
+
+/// Panels one above the other, with ticks, grid and units; long columns are thinned to what a
+/// screen shows when the picture is made wider.
+[[nodiscard]] std::string panels_plot(const Column& time_s, const std::vector<PlotPanel>& panels);
+
+/// Dots of y over x.
+struct PlotDots {
+  std::string title;
+  const Column* x{nullptr};
+  std::string x_unit;
+  const Column* y{nullptr};
+  std::string y_unit;
+};
+[[nodiscard]] std::string scatter_plot(const PlotDots& dots);
+
+struct BarPart {
+  std::string label;
+  std::string colour;
+  double share{0.0};  ///< of the whole bar
+};
+
+/// Bars with a name before each, and one legend for all; every bar has the same labels.
+struct NamedBar {
+  std::string name;
+  std::vector<BarPart> parts;
+};
+[[nodiscard]] std::string bars_plot(const std::vector<NamedBar>& bars);
+
+/// About `wanted` round numbers (1, 2 or 5 times a power of ten apart) within the range.
+[[nodiscard]] std::vector<double> round_ticks(double low, double high, int wanted);
+
+}  // namespace thermocomp::diagnosis
