@@ -63,6 +63,8 @@ TEST_CASE("the random lives reach what they are meant to test", "[property][esti
     const Outcome outcome = live(seed, {});
     all.steps_compensating += outcome.steps_compensating;
     all.steps_estimating += outcome.steps_estimating;
+    all.steps_outside += outcome.steps_outside;
+    all.returns += outcome.returns;
     all.resyncs += outcome.resyncs;
     all.reloads += outcome.reloads;
     all.restarts += outcome.restarts;
@@ -70,6 +72,8 @@ TEST_CASE("the random lives reach what they are meant to test", "[property][esti
   }
   CHECK(all.steps_compensating > seeds * 60);
   CHECK(all.steps_estimating > seeds * 10);
+  CHECK(all.steps_outside > seeds * 30);
+  CHECK(all.returns > seeds);
   CHECK(all.resyncs > seeds);
   CHECK(all.reloads > seeds);
   CHECK(all.restarts > seeds);
@@ -100,6 +104,7 @@ TEST_CASE("planted bugs break the rules", "[property][estimator]") {
   CHECK(noticed(Planted::nothing) == 0);
   CHECK(noticed(Planted::double_rate) > seeds / 2);
   CHECK(noticed(Planted::larger_bound) > seeds / 20);
+  CHECK(noticed(Planted::domain_ignored) > seeds / 20);
   CHECK(noticed(Planted::always_valid) > seeds / 2);
   CHECK(noticed(Planted::epoch_ignored) > seeds / 20);
   CHECK(noticed(Planted::read_back_hidden) > seeds / 2);

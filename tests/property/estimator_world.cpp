@@ -91,6 +91,7 @@ EstimatorConfig random_config(Chance& chance) {
     config.correction.bias_drift_um_per_sqrt_h = chance.between(0.0, 20.0);
   }
   if (chance.one_in(8)) config.compensation.update = UpdateRule::each_cycle;
+  config.compensation.outside_domain = static_cast<OutsidePolicy>(chance.below(3));
   return config;
 }
 
@@ -106,6 +107,23 @@ void add_covariance(Chance& chance, ThermalModel& model) {
   }
   model.covariance_growth.drift_time_s = chance.one_in(3) ? 0.0 : chance.between(1.0, 1000.0);
   if (chance.one_in(2)) model.covariance_growth.scatter_factor = {0.5, 0.0, 2.0};
+}
+
+/// A domain that the drifting readings leave and return to.
+void add_domain(Chance& chance, ThermalModel& model) {
+  MadeFrom& made_from = model.made_from.emplace();
+  made_from.columns = model.inputs;
+  made_from.taus_s = {0.0};
+  if (chance.one_in(2)) made_from.taus_s.push_back(chance.between(1.0, 300.0));
+  made_from.distance_max = chance.between(0.3, 2.0);
+  const std::size_t levels = model.inputs.size();
+  const std::size_t features = levels * (1 + made_from.taus_s.size());
+  for (std::size_t i = 0; i < features; ++i) {
+    made_from.mean.push_back(i < levels ? chance.between(20.0, 23.0) : chance.between(-0.5, 0.5));
+    made_from.covariance.emplace_back(features, 0.0)[i] = chance.between(0.3, 3.0);
+  }
+  for (const std::string& output : model.outputs)
+    made_from.outputs[output] = {1.0, 0.1, 600.0, chance.between(0.5, 3.0), 10.0, 8.0};
 }
 
 ThermalModel random_model(Chance& chance) {
@@ -130,6 +148,7 @@ ThermalModel random_model(Chance& chance) {
                            {{"tau_s", 30.0}, {"power", 2.0}},
                            {{"gain_um_per_unit", {{"z_um", chance.between(-1e-6, 1e-6)}}}}});
   if (!chance.one_in(3)) add_covariance(chance, model);
+  if (chance.one_in(2)) add_domain(chance, model);
   return model;
 }
 
@@ -184,6 +203,8 @@ class World {
       if (options_.planted == Planted::double_rate) axis.limiter.rate_um_per_s_max *= 2;
       if (options_.planted == Planted::larger_bound) axis.limiter.offset_um_max *= 2;
     }
+    if (options_.planted == Planted::domain_ignored)
+      config.compensation.outside_domain = OutsidePolicy::warn;
     return config;
   }
 
@@ -400,6 +421,7 @@ class World {
           step_um_max(i) + register_rounding_um)
         sent_.back().start_um[i] = state_.applied_um[i];
     check_estimates();
+    check_domain();
     for (std::size_t i = 0; i < axes_count && !outcome_.violation; ++i) {
       check_offset(i);
       check_valid(i);
@@ -426,6 +448,28 @@ class World {
       demand("what is too uncertain is not compensated with",
              axis.offset_sd_um >= 0 && !(estimating && axis.offset_sd_um > most_um),
              axis.offset_sd_um, most_um);
+  }
+
+  /// Leaving the domain and coming back; that neither is a leap, check_offset() sees.
+  void check_domain() {
+    const bool outside = model_.made_from && report_.domain.outside;
+    if (outside) ++outcome_.steps_outside;
+    if (was_outside_ && !outside) ++outcome_.returns;
+    demand("what is outside the domain is told",
+           !outside || has_reason(report_.reasons, Reason::outside_domain), 0, 0);
+    const bool stays = outside && was_outside_ && report_.mode == Mode::compensating &&
+                       config_.compensation.outside_domain == OutsidePolicy::hold;
+    for (std::size_t i = 0; i < axes_count && stays && mode_before_ == Mode::compensating; ++i)
+      demand("with hold, an offset outside the domain goes no further",
+             !command_.valid[i] || !valid_before_[i] || report_.axes[i].proving ||
+                 std::abs(command_.offset_um[i] - before_um_[i]) <= tiny_um ||
+                 std::abs(before_um_[i]) > config_.axes[i].limiter.offset_um_max ||
+                 std::abs(command_.offset_um[i] - state_.applied_um[i]) <=
+                     step_um_max(i) + register_rounding_um,
+             command_.offset_um[i] - before_um_[i], 0);
+    was_outside_ = outside;
+    mode_before_ = report_.mode;
+    std::copy_n(command_.valid.begin(), axes_count, valid_before_.begin());
   }
 
   [[nodiscard]] double step_um_max(std::size_t axis) const {
@@ -563,6 +607,9 @@ class World {
     std::array<double, axes_max> start_um;
   };
   std::vector<Sent> sent_;
+  bool was_outside_{false};
+  Mode mode_before_{Mode::holding};
+  std::array<bool, axes_count> valid_before_{};
   std::array<double, axes_count> before_um_{};
   std::array<std::uint32_t, axes_count> started_on_{};  ///< link epoch
   std::array<bool, axes_count> released_{};

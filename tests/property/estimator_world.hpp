@@ -29,6 +29,7 @@ enum class Planted {
   nothing,
   double_rate,          ///< the estimator gets twice the slew bound that the rules know
   larger_bound,         ///< ... and twice the offset bound
+  domain_ignored,       ///< ... and follows outside the domain of its model
   faults_hidden,        ///< impossible values reach the estimator as plausible ones
   always_valid,         ///< axes are marked valid although they are not driven
   epoch_ignored,        ///< the controller takes offsets of another epoch
@@ -54,6 +55,8 @@ struct Outcome {
   double largest_offset_um{0.0};
   std::size_t steps_compensating{0};
   std::size_t steps_estimating{0};
+  std::size_t steps_outside{0};  ///< of the model's domain
+  std::size_t returns{0};        ///< into it
   std::size_t resyncs{0};
   std::size_t reloads{0};
   std::size_t restarts{0};
