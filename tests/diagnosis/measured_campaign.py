@@ -4,6 +4,7 @@ and counts what it says.
 
 measured_campaign.py PROGRAM [--cases N] [--untouched N] [--machines spindle,printer,cell,mirror]
                      [--bases ridge,few,lags,bank] [--causes A,B] [--sizes 1.5,3] [--seed S]
+                     [--kind single|pair|outside|sparse|outputs]
                      [--jobs 2] [--show] [--json FILE] [--weighed]
 
 PROGRAM is thermocomp-modelling. Data: $THERMOCOMP_DATA, else shared/data beside the source. The
@@ -29,9 +30,11 @@ import tempfile
 import numpy as np
 
 import measured_machines
-from measured_plants import CAUSES, FAMILIES, Impossible, Planted
+from measured_plants import CAUSES, FAMILIES, OUTSIDE, Impossible, Planted
 
 ATTEMPTS = 12
+KINDS = ("single", "pair", "outside", "sparse", "outputs")
+PROBED_EACH_S = 1800.0
 STATED = 0.8  # a name with more than this probability on untouched data is an invention
 
 
@@ -48,16 +51,29 @@ def spared(machine, cause, random):
     return (str(random.choice(machine.temperatures)),)
 
 
-def planted_case(seed, machines, base, cause, times):
+def second_cause(first, random):
+    """Of another family."""
+    family = lambda cause: FAMILIES["hysteresis" if cause.startswith("hysteresis") else cause]
+    return str(random.choice([c for c in CAUSES if family(c) != family(first)]))
+
+
+def planted_case(seed, machines, base, cause, times, kind):
     """A machine that cannot carry the cause gives way to another one.
-    @return the machine with the effect in it and the truth
+    @return the machine with the effects in it, its model, and the truths
     @throws Impossible when no attempt can carry it"""
     for attempt in range(ATTEMPTS):
         random = np.random.default_rng([seed, attempt])
         machine = machine_of(str(random.choice(machines)), random)
         model = measured_machines.base_model(machine, base, spared(machine, cause, random))
         try:
-            return Planted(machine, model, cause, times, random)
+            first = Planted(machine, model, cause, times, random)
+            truths = [first.truth]
+            if kind == "pair":
+                other = second_cause(cause, random)
+                truths.append(Planted(machine, model, other, times, random, first.size_um).truth)
+            if kind == "sparse":
+                machine.keep_probings(PROBED_EACH_S)
+            return machine, model, truths
         except Impossible:
             continue
     raise Impossible
@@ -101,20 +117,22 @@ def diagnosed(program, machine, model):
 
 
 def examine(task):
-    """@return the task, the truth (None: untouched or not to be planted), the answer"""
-    program, seed, machines, base, cause, times = task
-    named = lambda machine: (program, seed, machine.name, base, cause, times)
+    """@return the task, the truths (None: untouched or not to be planted), the answer"""
+    program, seed, machines, base, cause, times, kind = task
+    named = lambda machine: (program, seed, machine.name, base, cause, times, kind)
     if cause is None:
         machine, model = untouched_case(seed, machines, base)
+        if kind == "sparse":
+            machine.keep_probings(PROBED_EACH_S)
         return named(machine), None, diagnosed(program, machine, model)
     try:
-        case = planted_case(seed, machines, base, cause, times)
+        machine, model, truths = planted_case(seed, machines, base, cause, times, kind)
     except Impossible:
         return task, None, None
-    places = case.truth["subject"].split("|")
-    groups = [sorted(case.machine.group(p)) if p.endswith("_degC") else [p] for p in places]
-    answer = diagnosed(program, case.machine, case.model)
-    return named(case.machine), dict(case.truth, groups=groups), answer
+    for truth in truths:
+        truth["groups"] = [sorted(machine.group(p)) if p.endswith("_degC") else [p]
+                           for p in truth["subject"].split("|")]
+    return named(machine), truths, diagnosed(program, machine, model)
 
 
 def subject_right(subject, truth):
@@ -152,9 +170,10 @@ class Count:
         self.stated_family = []
         self.covers = []
         self.untouched, self.invented, self.named_untouched = 0, 0, 0
+        self.one_of_two = 0
 
-    def add(self, task, truth, answer):
-        _, _, machine, base, cause, times = task
+    def add(self, task, truths, answer):
+        cause, kind = task[4], task[6]
         found = answer["findings"]
         if cause is None:
             self.untouched += 1
@@ -162,12 +181,28 @@ class Count:
             self.invented += any(f.get("probability", 1.0) > STATED for f in found)
             self.stated += [(f["probability"], False) for f in found if "probability" in f]
             return not found
+        if kind == "outside":
+            return self.judge(task, truths[0], found, answer, not found, not found)
+        if kind == "pair":
+            hit = all(any(right(f, truth) for f in found) for truth in truths)
+            self.one_of_two += any(right(f, truth) for f in found for truth in truths)
+            family = all(any(f["family"] == truth["family"] for f in found) for truth in truths)
+            return self.judge(task, truths[0], found, answer, hit, family, truths)
+        truth = truths[0]
         hit = bool(found) and right(found[0], truth)
         family = bool(found) and FAMILIES.get(found[0]["cause"]) == truth["family"]
         if not found and answer.get("families"):
             weighed = answer["families"]
             likeliest = max(weighed, key=lambda f: weighed[f])
             family = likeliest == truth["family"] and weighed[likeliest] >= 0.5
+        if hit:
+            self.covers += covered(found[0], truth)
+        return self.judge(task, truth, found, answer, hit, family)
+
+    def judge(self, task, truth, found, answer, hit, family, truths=None):
+        """Counts one planted machine. @return whether it was right"""
+        _, _, machine, base, _, times, _ = task
+        truths = truths or [truth]
         for key in ((times, "all"), (times, machine), (times, base), (times, truth["cause"])):
             self.total[key] += 1
             self.right[key] += hit
@@ -177,11 +212,9 @@ class Count:
                                                 else ""))] += 1
         for finding in found:
             if "probability" in finding:
-                self.stated.append((finding["probability"], right(finding, truth)))
+                self.stated.append((finding["probability"], any(right(finding, t) for t in truths)))
                 self.stated_family.append((finding["family_probability"],
-                                           finding["family"] == truth["family"]))
-        if hit:
-            self.covers += covered(found[0], truth)
+                                           any(finding["family"] == t["family"] for t in truths)))
         return hit
 
     def report(self):
@@ -190,6 +223,8 @@ class Count:
             print("size %-4g %-22s cause and subject %3d of %3d (%3.0f %%), family %3.0f %%" % (
                 key[0], key[1], self.right[key], count, 100.0 * self.right[key] / count,
                 100.0 * self.family[key] / count))
+        if self.one_of_two:
+            print("one of two found at least: %d" % self.one_of_two)
         if self.untouched:
             print("untouched: %d of %d named, %d above probability %g" % (
                 self.named_untouched, self.untouched, self.invented, STATED))
@@ -216,17 +251,21 @@ def print_reliability(text, stated):
 def tasks_of(options):
     machines, bases = options.machines.split(","), options.bases.split(",")
     causes, sizes = options.causes.split(","), options.sizes.split(",")
+    if options.kind == "outside":
+        causes = OUTSIDE
+    if options.kind in ("sparse", "outputs"):
+        machines = ["spindle_outputs" if options.kind == "outputs" else "spindle"]
     tasks = []
     for i in range(options.cases):
         # One draw a case: no two of the cycles can fall in step.
         random = np.random.default_rng([options.seed, i])
         tasks.append((options.program, 100000 * options.seed + i, machines,
                       str(random.choice(bases)), causes[i % len(causes)],
-                      float(sizes[(i // len(causes)) % len(sizes)])))
+                      float(sizes[(i // len(causes)) % len(sizes)]), options.kind))
     for i in range(options.untouched):
         random = np.random.default_rng([options.seed, 50000 + i])
         tasks.append((options.program, 100000 * options.seed + 50000 + i,
-                      machines, str(random.choice(bases)), None, 0.0))
+                      machines, str(random.choice(bases)), None, 0.0, options.kind))
     return tasks
 
 
@@ -246,6 +285,7 @@ def arguments():
     parser.add_argument("--causes", default=",".join(CAUSES))
     parser.add_argument("--sizes", default="1.5,3")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", choices=KINDS, default="single")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--show", action="store_true")
     parser.add_argument("--json")
@@ -270,11 +310,11 @@ def main():
                 continue
             fine = count.add(task, truth, answer)
             kept.append(dict(machine=task[2], base=task[3], size=task[5], seed=task[1],
-                             truth=truth, answer=answer))
+                             truth=truth and truth[0], truths=truth, answer=answer))
             if options.show and not fine:
                 print("  %s %s %s %s x%g: %s -> %s" % (
-                    task[1], *task[2:4], truth and truth["cause"], task[5],
-                    truth and truth["subject"], said(answer)), flush=True)
+                    task[1], *task[2:4], truth and [t["cause"] for t in truth], task[5],
+                    truth and [t["subject"] for t in truth], said(answer)), flush=True)
     count.report()
     print("%d cases that their machine cannot carry were left out" % impossible)
     if options.json:

@@ -67,6 +67,14 @@ class Machine:
         """@param values  one array a run"""
         return [v[rows] for v, rows in zip(values, self.train) if rows.stop]
 
+    def keep_probings(self, apart_s):
+        """Displacement is known in one row each `apart_s` only, as where somebody probes."""
+        for run in self.runs:
+            slot = np.floor((run["time_s"] - run["time_s"][0]) / apart_s + 1e-9)
+            probed = np.concatenate([[True], np.diff(slot) > 0])
+            for output in self.outputs:
+                run[output] = np.where(probed, run[output], np.nan)
+
     def group(self, name):
         """Temperatures whose rises cannot be told from this one's in the training rows."""
         def stacked(of):
@@ -82,11 +90,13 @@ def one_run(name, run, outputs, signals):
     return Machine(name, [run], outputs, signals, [slice(0, int(TRAIN_SHARE * rows))])
 
 
-def spindle(random):
+def spindle(random, count=None):
+    """@param count  of outputs; None: one or two"""
     run = columns(DATA / "spindle_46h" / "hours_00_32.csv")
     hours = [(0, 32), (0, 16), (16, 32)][int(random.integers(3))]
     run = thinned(run, 60.0, hours[0] * 3600.0, hours[1] * 3600.0)
-    outputs = ["ch%d_um" % i for i in random.permutation(5)[:random.choice([1, 1, 2])] + 1]
+    count = count or random.choice([1, 1, 2])
+    outputs = ["ch%d_um" % i for i in random.permutation(5)[:count] + 1]
     for other in [n for n in run if n.endswith("_um") and n not in outputs]:
         del run[other]
     return one_run("spindle", run, outputs, ["spindle_rpm"])
@@ -117,7 +127,12 @@ def mirror(_):
     return Machine("mirror", runs, ["m2_focus_um"], ["sin_elevation"], train)
 
 
-MACHINES = {"spindle": spindle, "printer": printer, "cell": cell, "mirror": mirror}
+def spindle_outputs(random):
+    return spindle(random, 5)
+
+
+MACHINES = {"spindle": spindle, "spindle_outputs": spindle_outputs, "printer": printer,
+            "cell": cell, "mirror": mirror}
 
 
 class Model:

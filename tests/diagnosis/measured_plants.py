@@ -18,6 +18,7 @@ CAUSES = ("thermal_lag", "wrong_coefficient", "nonlinear_expansion", "missing_te
           "hysteresis_output", "hysteresis_temperature", "slow_sensor", "missing_heat_source",
           "speed_growth", "displacement_step", "displacement_drift", "time_shift",
           "periodic_disturbance", "sensor_drift", "sensor_step", "sensor_loose", "sensor_swap")
+OUTSIDE = ("outside_walk", "outside_chirp", "outside_bursts")  # nothing recorded goes with them
 SHARE_MIN = 0.7  # of the wanted size that a fault of a reading must move the prediction by
 
 
@@ -29,16 +30,17 @@ class Planted:
     """A machine with one effect in it.
 
     @param times  size of the effect over what the base model leaves
+    @param size_um  by output, of a second effect: as large as the first
     """
 
-    def __init__(self, machine, model, cause, times, random):
+    def __init__(self, machine, model, cause, times, random, size_um=None):
         self.machine, self.model, self.random = machine, model, random
         left = self.left()
         self.left_um = [rms(machine.train_parts(of)) for of in left]
-        self.size_um = [max(1.0, times * um) for um in self.left_um]
+        self.size_um = size_um or [max(1.0, times * um) for um in self.left_um]
         subject, parameters = getattr(self, "_" + cause)()
         named = "hysteresis" if cause.startswith("hysteresis") else cause
-        self.truth = dict(cause=named, subject=subject, family=FAMILIES[named],
+        self.truth = dict(cause=named, subject=subject, family=FAMILIES.get(named, "outside"),
                           parameters=parameters)
 
     def left(self):
@@ -278,3 +280,27 @@ class Planted:
                     run[a], run[b] = run[b], run[a]
                 return a + "|" + b, {}
         raise Impossible
+
+    def _outside(self, unit):
+        """@param unit  of a run's times"""
+        return "", dict(gain_um=self._add_scaled([unit(r["time_s"]) for r in self.machine.runs]))
+
+    def _outside_walk(self):
+        return self._outside(lambda time_s: low_pass(
+            time_s, np.cumsum(self.random.normal(size=len(time_s))), 1200.0))
+
+    def _outside_chirp(self):
+        """A sine whose period grows sevenfold in the course of a run."""
+        def unit(time_s):
+            share = (time_s - time_s[0]) / (time_s[-1] - time_s[0])
+            period_s = min(1500.0, time_s[-1] / 30.0) * 7.0 ** share
+            return np.sin(2 * np.pi * np.cumsum(np.gradient(time_s) / period_s))
+        return self._outside(unit)
+
+    def _outside_bursts(self):
+        def unit(time_s):
+            hits = np.zeros(len(time_s))
+            for at in self.random.integers(0, len(hits), 6):
+                hits[at:at + max(2, len(hits) // 20)] += self.random.choice([-1.0, 1.0])
+            return hits
+        return self._outside(unit)
