@@ -79,7 +79,8 @@ ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
     if (!wanted(bus.name)) continue;
     report.buses.push_back(scan_j1939(bus, sensors, options.listen_s, progress));
   }
-  if (wanted(controller_name(config))) report.controller = scan_controller(config, progress);
+  if (wanted(controller_name(config)))
+    report.controller = scan_controller(config, options.listen_s, progress);
   if (report.buses.empty() && !report.controller) {
     throw Failure(options.bus + ": no such bus in " + options.file + " that can be scanned");
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/modbus_names.hpp"
+#include "cli/scan_can.hpp"
 #include "cli/serial_holder.hpp"
 #include "config/number_text.hpp"
 #include "config/units.hpp"
@@ -108,6 +109,7 @@ class ControllerScan {
   /// @return false: the unit does not answer at all, which result.error says
   bool ask_together(std::vector<Place>& places, ScanController& result) {
     std::vector<ModbusValue> values;
+    values.reserve(places.size());
     for (const Place& place : places) values.push_back(place.value);
     const ReadPlan plan = plan_reads(values);
     for (std::size_t r = 0; r < plan.requests.size(); ++r) {
@@ -216,12 +218,12 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
 }  // namespace
 
 std::optional<ScanController> scan_controller(
-    const DaemonConfig& config, const std::function<void(const std::string&)>& progress) {
+    const DaemonConfig& config, double listen_s,
+    const std::function<void(const std::string&)>& progress) {
   if (const auto* modbus = std::get_if<ModbusControllerConfig>(&config.controller))
     return scan_modbus_controller(config, *modbus, progress);
   if (const auto* can = std::get_if<CanControllerConfig>(&config.controller))
-    progress("controller " + can->name +
-             ": is on CAN and not scanned; `thermocomp status` shows what it sends");
+    return scan_can_controller(config, *can, listen_s, progress);
   if (const auto* bridge = std::get_if<BridgeControllerConfig>(&config.controller))
     progress("controller " + bridge->name + ": not scanned; its bridge calls the daemon");
   return std::nullopt;

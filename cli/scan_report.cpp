@@ -74,8 +74,8 @@ void append(std::string& text, const ScanDevice& device, bool colours) {
 }
 
 void append(std::string& text, const ScanController& controller, bool colours) {
-  text += "controller " + controller.name + " (" + controller.kind + ", " + controller.where +
-          "), " + controller.address + ", only read\n";
+  text += "controller " + controller.name + " (" + controller.kind + ", " + controller.where + ")" +
+          (controller.address.empty() ? "" : ", " + controller.address) + ", only read\n";
   for (const std::string& trouble : {controller.error, controller.refused})
     if (!trouble.empty()) text += "    " + coloured(trouble, Colour::red, colours) + "\n";
   std::size_t what_width = 0;

@@ -62,7 +62,7 @@ struct ScanController {
   std::string name;
   std::string kind;
   std::string where;    ///< as of a bus
-  std::string address;  ///< "unit 1"
+  std::string address;  ///< "unit 1"; empty on a CAN bus
   std::string error;    ///< empty: it could be asked
   std::string refused;  ///< not empty: values are there, but not as the daemon asks for them
   std::vector<ScanValue> values;
