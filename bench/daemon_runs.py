@@ -43,6 +43,7 @@ def daemon_toml(port, rate_hz, history):
             '[[device]]\nname = "module"\nbus = "cabinet"\nunit = 1\nperiod_s = 1.0\n'
             'table = "input"\nencoding = "float32"\n' + sensors + blocks +
             '[controller]\nname = "none"\nkind = "dry_run"\n' + axes +
+            '[compensation]\nenabled_at_first_start = true\n'
             f'[history]\nenabled = {str(history).lower()}\nfile = "history.db"\n'
             '[socket]\npath = "status.sock"\n')
 

@@ -38,6 +38,7 @@ EstimatorConfig make_config(const ThermalModel& model, bool estimate) {
   for (const std::string& output : model.outputs)
     config.axes.push_back({output, output, 1.0, {500.0, 1000.0}});
   config.controller_reads_back = false;
+  config.compensation.enabled_at_first_start = true;
   config.compensation.estimate_lost_blocks = estimate;
   config.compensation.offset_sd_um_max = 500.0;  // to see all of it
   return config;

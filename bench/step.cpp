@@ -49,6 +49,7 @@ EstimatorConfig machine_config(double smoothing_period_s) {
     config.signals.push_back(numbered("p", i, "_mm"));
     config.axes.push_back({numbered("a", i), numbered("o", i, "_um"), 1.0, {}});
   }
+  config.compensation.enabled_at_first_start = true;
   return config;
 }
 

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/json_fields.hpp"
 #include "cli/register_table.hpp"
 #include "config/daemon_config.hpp"
 #include "config/problems.hpp"
@@ -48,6 +49,25 @@ std::string list_names(const Names& items) {
   return result;
 }
 
+/// What the model file says of how well it fits a machine.
+std::string comparison_text(const ThermalModel& model) {
+  if (!is_compared(model))
+    return "compared: NEVER, as far as the model file says (no [made_from] with errors on rows "
+           "left "
+           "out): size and sign may be those of no machine";
+  std::string text("compared: left on rows that it was not fitted to");
+  for (const auto& [name, output] : model.made_from->outputs)
+    text += ", " + name + " " + fixed(output.left_out_rms_um, 1) + " rms of " +
+            fixed(output.no_model_rms_um, 1);
+  return text;
+}
+
+std::string first_start_text(const DaemonConfig& config) {
+  if (config.estimator.compensation.enabled_at_first_start)
+    return "first start: COMPENSATES AT ONCE (compensation.enabled_at_first_start = true)";
+  return "first start: switched off until `thermocomp enable`";
+}
+
 void print_what_was_found(const DaemonConfig& config) {
   const EstimatorConfig& estimator = config.estimator;
   for (const ModbusBusConfig& bus : config.modbus_buses) {
@@ -78,6 +98,8 @@ void print_what_was_found(const DaemonConfig& config) {
             << counted(config.model.outputs.size(), "output") << ", "
             << counted(config.model.terms.size(), "extension term") << ", SHA-256 "
             << config.model_checksum << '\n'
+            << comparison_text(config.model) << '\n'
+            << first_start_text(config) << '\n'
             << config.file.string() << ": OK\n";
 }
 

@@ -18,17 +18,6 @@ namespace {
 
 using nlohmann::json;
 
-std::string local_time(double wall_s) {
-  if (!(wall_s >= 0.0 && wall_s < 1e11)) return "-";
-  const auto seconds = static_cast<std::time_t>(wall_s);
-  std::tm parts{};
-  localtime_r(&seconds, &parts);
-  std::array<char, 40> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M:%S", &parts);
-  const auto tenths = static_cast<int>(10.0 * (wall_s - std::floor(wall_s)));
-  return std::string(text.data()) + "." + std::to_string(tenths);
-}
-
 std::string user_text(const json& event) {
   const double user = number_of(event, "user");
   if (!(user >= 0.0 && user < 4294967295.0)) return "";
@@ -50,6 +39,17 @@ std::string fault_words(const std::string& subject, const std::string& what) {
 }
 
 }  // namespace
+
+std::string local_time(double wall_s) {
+  if (!(wall_s >= 0.0 && wall_s < 1e11)) return "-";
+  const auto seconds = static_cast<std::time_t>(wall_s);
+  std::tm parts{};
+  localtime_r(&seconds, &parts);
+  std::array<char, 40> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M:%S", &parts);
+  const auto tenths = static_cast<int>(10.0 * (wall_s - std::floor(wall_s)));
+  return std::string(text.data()) + "." + std::to_string(tenths);
+}
 
 std::string event_text(const json& event) {
   const std::string kind = text_of(event, "kind");

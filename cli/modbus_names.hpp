@@ -1,14 +1,26 @@
-/// Tables, word orders and encodings as a configuration names them.
+/// Tables, word orders and encodings as a configuration names them; places, lines and exceptions as
+/// people do.
 #pragma once
 
 #include <string>
 
-#include "drivers/modbus/modbus_config.hpp"
+#include "drivers/controllers/controller_config.hpp"
 
 namespace thermocomp::cli {
 
 [[nodiscard]] std::string table_name(ModbusTable table);
 [[nodiscard]] std::string order_name(WordOrder order);
 [[nodiscard]] std::string encoding_name(Encoding encoding);
+
+/// "holding 0..1"
+[[nodiscard]] std::string place_name(const ModbusValue& value);
+/// "int32 ABCD", "uint16", "bit"
+[[nodiscard]] std::string type_name(const ModbusValue& value);
+/// As of a value that is a count or bits and has no sign, whatever the configuration calls it.
+[[nodiscard]] ModbusValue without_sign(ModbusValue value) noexcept;
+/// "127.0.0.1:502", or "/dev/ttyUSB0, 19200 baud, 8N1"
+[[nodiscard]] std::string line_name(const ModbusLine& line);
+/// "exception 2 (illegal data address)"
+[[nodiscard]] std::string exception_name(int code);
 
 }  // namespace thermocomp::cli

@@ -10,6 +10,7 @@
 
 #include "cli/daemon_client.hpp"
 #include "cli/json_fields.hpp"
+#include "cli/prove_command.hpp"
 
 namespace thermocomp::cli {
 
@@ -23,9 +24,7 @@ struct PlainCommand {
   const char* help;
   const char* done;
 };
-constexpr std::array<PlainCommand, 5> plain_commands{{
-    {"reference", "reference", "takes the present temperatures as the state without displacement",
-     "reference: the present temperatures"},
+constexpr std::array<PlainCommand, 4> plain_commands{{
     {"enable", "enable", "switches the compensation on; offsets approach at their slew rate",
      "compensation switched on"},
     {"disable", "disable", "switches the compensation off; offsets go to zero at their slew rate",
@@ -58,14 +57,32 @@ int run_measured(const GlobalOptions& global, const AxisValue& given) {
   return exit_success;
 }
 
-int run_prove(const GlobalOptions& global, const AxisValue& given) {
-  ask_daemon(global.socket, "prove", {{"axis", given.axis}, {"value_um", given.value_um}});
-  const std::string amount = fixed_signed(given.value_um, 2);
-  std::cout << "axis " << given.axis << ": moves by " << amount
-            << " um, stands for a few seconds and comes back;\nan indicator at the tool must show "
-            << amount
-            << " um in the axis' positive direction, else change the sign in its [[axis]] table\n";
+/// What less than this has seen is too little to tell slow warming [s].
+constexpr double watched_enough_s = 1800.0;
+
+int run_reference(const GlobalOptions& global, bool force) {
+  json params = json::object();
+  if (force) params["force"] = true;
+  const json answer = ask_daemon(global.socket, "reference", params);
+  std::cout << "reference: the present temperatures\n";
+  if (const std::string although = text_of(answer, "although"); !although.empty())
+    std::cout << "taken although " << although << '\n';
+  // An earlier daemon does not say.
+  if (const double watched_s = number_of(answer, "watched_s"); watched_s < watched_enough_s)
+    std::cout << "the temperatures have been watched for " << duration_text(watched_s)
+              << " only: whether the machine still warms slowly is not known\n";
   return exit_success;
+}
+
+void add_reference_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* sub = app.add_subcommand(
+      "reference", "takes the present temperatures as the state without displacement");
+  const auto force = std::make_shared<bool>(false);
+  sub->add_flag("--force", *force,
+                "also during a proving move, with an offset applied, or while the machine warms");
+  sub->callback([&global, &action, force] {
+    action = [&global, force] { return run_reference(global, *force); };
+  });
 }
 
 int run_release(const GlobalOptions& global, const std::string& axis) {
@@ -92,6 +109,7 @@ void add_axis_command(CLI::App& app, const GlobalOptions& global, Action& action
 }  // namespace
 
 void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
+  add_reference_command(app, global, action);
   for (const PlainCommand& command : plain_commands) {
     CLI::App* sub = app.add_subcommand(command.name, command.help);
     sub->callback([&global, &action, &command] {
@@ -101,9 +119,13 @@ void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& ac
   add_axis_command(app, global, action, "measured",
                    "gives the daemon a displacement that was measured at the tool",
                    "measured displacement in um, positive as the axis counts", run_measured);
-  add_axis_command(app, global, action, "prove",
-                   "moves one axis a few um and back, to confirm the sign with an indicator",
-                   "by how much, in um", run_prove);
+  add_axis_command(
+      app, global, action, "prove",
+      "moves one axis a few um and back, to confirm the sign with an indicator; waits, and "
+      "says what was read back",
+      "by how much, in um", [](const GlobalOptions& options, const AxisValue& given) {
+        return run_prove(options, given.axis, given.value_um);
+      });
   CLI::App* sub = app.add_subcommand(
       "release", "drives an axis again after what made it apply something else was mended");
   const auto axis = std::make_shared<std::string>();

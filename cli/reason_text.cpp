@@ -8,7 +8,8 @@ namespace thermocomp::cli {
 namespace {
 
 constexpr std::array<ReasonText, 15> reasons{{
-    {"operator_disabled", "switched off by an operator", "thermocomp enable"},
+    {"operator_disabled", "switched off: by an operator, or never switched on yet",
+     "thermocomp enable"},
     {"controller_disabled", "switched off at the controller",
      "release the switch that the configuration names as disable_signal"},
     {"block_lost", "an input of the model has no good sensor left",

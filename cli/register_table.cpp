@@ -56,26 +56,6 @@ std::string valid_text(const std::vector<AxisConfig>& axes) {
   return text + "; 1: take the offset";
 }
 
-std::string place_of(const ModbusValue& value) {
-  const auto words = words_of(value.table, value.encoding);
-  std::string text = table_name(value.table) + " " + std::to_string(value.address);
-  if (words > 1) text += ".." + std::to_string(value.address + words - 1);
-  return text;
-}
-
-std::string type_of(const ModbusValue& value) {
-  if (is_bit_table(value.table)) return "bit";
-  const std::string type = encoding_name(value.encoding);
-  return registers_of(value.encoding) == 1 ? type : type + " " + order_name(value.word_order);
-}
-
-/// Bits and counts have no sign, whatever the configuration calls them.
-std::string raw_type_of(ModbusValue value) {
-  if (value.encoding == Encoding::int16) value.encoding = Encoding::uint16;
-  if (value.encoding == Encoding::int32) value.encoding = Encoding::uint32;
-  return type_of(value);
-}
-
 std::string line_of(const ModbusControllerConfig& config) {
   const std::string unit = ", unit " + std::to_string(config.unit);
   if (const auto* tcp = std::get_if<ModbusTcp>(&config.line.link))
@@ -88,7 +68,7 @@ Row axis_row(const ModbusAxis& place, const ModbusValue& value, const AxisConfig
              const std::string& what) {
   const std::string meant = place.piezo ? "voltage of axis " : "offset of axis ";
   const std::string unit = place.piezo ? "V" : unit_of_axis(axis);
-  return {place_of(value), type_of(value), what + meant + axis.name, scaled(unit, value.scale)};
+  return {place_name(value), type_name(value), what + meant + axis.name, scaled(unit, value.scale)};
 }
 
 std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfig& controller) {
@@ -101,13 +81,13 @@ std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfi
     if (place.applied) read.push_back(axis_row(place, *place.applied, axes[i], "applied "));
   }
   if (const auto& valid = controller.valid_bits)
-    written.push_back({place_of(*valid), raw_type_of(*valid), valid_text(axes), "-"});
+    written.push_back({place_name(*valid), type_name(without_sign(*valid)), valid_text(axes), "-"});
   if (const auto& count = controller.heartbeat)
-    written.push_back({place_of(*count), raw_type_of(*count),
+    written.push_back({place_name(*count), type_name(without_sign(*count)),
                        "heartbeat; counts up with every write, begins anew when full", "-"});
   for (const ModbusSignal& signal : controller.signals) {
     const std::string& name = config.estimator.signals[signal.signal];
-    read.push_back({place_of(signal.value), type_of(signal.value), name,
+    read.push_back({place_name(signal.value), type_name(signal.value), name,
                     scaled(std::string(unit_of(name).symbol), signal.value.scale)});
   }
   std::string text = line_of(controller) + ", every " + number_text(controller.period_s) +
@@ -193,13 +173,16 @@ std::string bounds_text(const DaemonConfig& config) {
 
 /// What the contract lacks here, for whoever programs the other side.
 std::string missing_text(bool valid_bits, bool heartbeat, bool reads_back) {
-  if (valid_bits && heartbeat && reads_back) return {};
-  std::string text("\nMissing:\n");
+  std::vector<std::string> lacks;
   if (!valid_bits)
-    text += "  no valid_bits: the controller cannot tell an axis that must be left alone\n";
+    lacks.emplace_back("valid_bits: the controller cannot tell an axis that must be left alone");
   if (!heartbeat)
-    text += "  no heartbeat: the controller cannot tell that the daemon has stopped\n";
-  if (!reads_back) text += "  no applied: the daemon cannot tell what the controller applies\n";
+    lacks.emplace_back("heartbeat: the controller cannot tell that the daemon has stopped");
+  if (!reads_back)
+    lacks.emplace_back("applied: the daemon cannot tell what the controller applies");
+  std::string text;
+  for (const std::string& lack : lacks)
+    text.append(text.empty() ? "\nMissing:\n" : "").append("  no ").append(lack).append("\n");
   return text;
 }
 

@@ -6,11 +6,24 @@
 
 #include "cli/scan_modbus.hpp"
 #include "cli/scan_report.hpp"
+#include "config/daemon_config.hpp"
 #include "drivers/can/can_config.hpp"
+#include "drivers/can/can_socket.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"
 
 namespace thermocomp::cli {
+
+/// "0x281"
+[[nodiscard]] std::string id_name(const CanId& id);
+/// "0x281 bit 7 length 16 big_endian x 0.01"
+[[nodiscard]] std::string place_name(const CanSignal& signal);
+
+/// The controller's frames: what of `applied` and signals they carry. Nothing is sent, so that what
+/// the daemon sends is not among the values.
+[[nodiscard]] ScanController scan_can_controller(
+    const DaemonConfig& config, const CanControllerConfig& controller, double listen_s,
+    const std::function<void(const std::string&)>& progress);
 
 /// Listens for `listen_s` seconds and sends nothing. Every channel gets the newest frame that
 /// carries its signal; where none came, the identifiers that did come are named.

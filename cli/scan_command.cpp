@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/scan_can.hpp"
+#include "cli/scan_controller.hpp"
 #include "cli/scan_modbus.hpp"
 #include "cli/scan_report.hpp"
 #include "cli/terminal.hpp"
@@ -50,13 +51,17 @@ ScanSensors sensors_of(const DaemonConfig& config) {
   return sensors;
 }
 
+std::string controller_name(const DaemonConfig& config) {
+  return std::visit([](const auto& each) { return each.name; }, config.controller);
+}
+
 ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
   const ScanSensors sensors = sensors_of(config);
   const auto progress = [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
   const auto wanted = [&](const std::string& name) {
     return options.bus.empty() || options.bus == name;
   };
-  ScanReport report{options.file, {}};
+  ScanReport report{options.file, {}, {}};
   for (const ModbusBusConfig& bus : config.modbus_buses) {
     if (!wanted(bus.name)) continue;
     report.buses.push_back(scan_modbus(bus, sensors, options.search, progress));
@@ -74,7 +79,9 @@ ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
     if (!wanted(bus.name)) continue;
     report.buses.push_back(scan_j1939(bus, sensors, options.listen_s, progress));
   }
-  if (report.buses.empty()) {
+  if (wanted(controller_name(config)))
+    report.controller = scan_controller(config, options.listen_s, progress);
+  if (report.buses.empty() && !report.controller) {
     throw Failure(options.bus + ": no such bus in " + options.file + " that can be scanned");
   }
   return report;
@@ -89,20 +96,23 @@ int run_scan(ScanOptions options) {
   } else {
     std::cout << scan_text(report, stdout_is_terminal());
   }
-  return count_good(report) == count_channels(report) ? exit_success : exit_no;
+  return is_complete(report) ? exit_success : exit_no;
 }
 
 }  // namespace
 
 void add_scan_command(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand(
-      "scan", "every channel of a configuration, live: bytes, value, fault and why");
+      "scan",
+      "every channel and every register of the controller, live: bytes, value, fault and why");
   const auto options = std::make_shared<ScanOptions>();
   sub->add_option("CONFIG", options->file, "configuration of thermocompd")
       ->type_name("FILE")
       ->required();
   sub->add_flag("--json", options->as_json, "the result as JSON");
-  sub->add_option("--bus", options->bus, "only this bus of the configuration")->type_name("NAME");
+  sub->add_option("--bus", options->bus,
+                  "only this bus of the configuration, or the controller of this name")
+      ->type_name("NAME");
   sub->add_option("--listen", options->listen_s, "seconds to listen to a CAN bus for (default 3)")
       ->check(CLI::Range(0.1, 600.0));
   sub->add_flag("--find", options->search.wanted,

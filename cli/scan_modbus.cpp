@@ -25,35 +25,6 @@ std::string number_text(double value) {
   return text;
 }
 
-std::string exception_text(int code) {
-  constexpr std::array names{"",
-                             "illegal function",
-                             "illegal data address",
-                             "illegal data value",
-                             "device failure",
-                             "acknowledge",
-                             "busy",
-                             "",
-                             "memory parity",
-                             "",
-                             "gateway has no path",
-                             "gateway has no answer of the unit"};
-  std::string text = "exception " + std::to_string(code);
-  if (code > 0 && static_cast<std::size_t>(code) < names.size()) {
-    text.append(" (").append(names[static_cast<std::size_t>(code)]).append(")");
-  }
-  return text;
-}
-
-std::string where(const ModbusLine& line) {
-  if (const auto* rtu = std::get_if<ModbusRtu>(&line.link)) {
-    return rtu->device + ", " + std::to_string(rtu->baud) + " baud, " +
-           std::to_string(rtu->data_bits) + rtu->parity + std::to_string(rtu->stop_bits);
-  }
-  const auto& tcp = std::get<ModbusTcp>(line.link);
-  return std::string(tcp.host).append(":").append(std::to_string(tcp.port));
-}
-
 std::string place_of(const ModbusChannel& channel) {
   std::string text = table_name(channel.table);
   text.append(" ").append(std::to_string(channel.address));
@@ -63,15 +34,6 @@ std::string place_of(const ModbusChannel& channel) {
   }
   if (channel.scale != 1.0) text.append(" x ").append(number_text(channel.scale));
   return text;
-}
-
-std::vector<std::uint8_t> bytes_of(std::span<const std::uint16_t> words) {
-  std::vector<std::uint8_t> bytes;
-  for (const std::uint16_t word : words) {
-    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
-    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
-  }
-  return bytes;
 }
 
 /// Every channel of a device that nothing could be read of.
@@ -161,7 +123,7 @@ class ModbusScan {
 
 std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchange& exchange) const {
   if (exchange.outcome == ExchangeOutcome::exception) {
-    return "the device answers with " + exception_text(exchange.exception_code);
+    return "the device answers with " + exception_name(exchange.exception_code);
   }
   if (exchange.outcome == ExchangeOutcome::timeout) {
     return "unit " + std::to_string(device.unit) + " does not answer within " +
@@ -240,11 +202,11 @@ ScanChannel ModbusScan::evaluate(const ModbusDeviceConfig& device, std::size_t i
     return result;
   }
   const auto seconds = [](nanoseconds time) { return static_cast<double>(time.count()) * 1e-9; };
-  result.raw = hex_bytes(bytes_of(value.words));
+  result.raw = hex_words(value.words);
   result.round_trip_ms = seconds(value.exchange.arrived_at - value.exchange.sent_at) * 1e3;
   result.age_s = seconds(connection_.now() - value.exchange.arrived_at);
   if (const auto& status = statuses_[index]) {
-    result.raw.append(" | ").append(hex_bytes(bytes_of(status->words)));
+    result.raw.append(" | ").append(hex_words(status->words));
     if (!status->exchange.ok()) {
       result.fault = status->exchange.fault();
       result.why = "status: " + describe(device, status->exchange);
@@ -399,7 +361,7 @@ ScanBus scan_modbus(const ModbusBusConfig& config, const ScanSensors& sensors,
   bus.name = config.name;
   const auto* rtu = std::get_if<ModbusRtu>(&config.line.link);
   bus.kind = rtu != nullptr ? "modbus_rtu" : "modbus_tcp";
-  bus.where = where(config.line);
+  bus.where = line_name(config.line);
   if (rtu != nullptr) {
     const SerialHolder holder = holder_of(rtu->device);
     if (holder.is_daemon) {

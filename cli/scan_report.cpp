@@ -73,6 +73,46 @@ void append(std::string& text, const ScanDevice& device, bool colours) {
   for (const ScanChannel& channel : device.channels) append(text, channel, widths, colours);
 }
 
+void append(std::string& text, const ScanController& controller, bool colours) {
+  text += "controller " + controller.name + " (" + controller.kind + ", " + controller.where + ")" +
+          (controller.address.empty() ? "" : ", " + controller.address) + ", only read\n";
+  for (const std::string& trouble : {controller.error, controller.refused})
+    if (!trouble.empty()) text += "    " + coloured(trouble, Colour::red, colours) + "\n";
+  std::size_t what_width = 0;
+  std::size_t place_width = 0;
+  std::size_t raw_width = 1;
+  for (const ScanValue& value : controller.values) {
+    what_width = std::max(what_width, value.what.size());
+    place_width = std::max(place_width, value.place.size());
+    raw_width = std::max(raw_width, value.raw.size());
+  }
+  for (const ScanValue& value : controller.values) {
+    text += "    " + padded(value.what, what_width) + "  " + padded(value.place, place_width) +
+            "  " + padded(value.raw.empty() ? "-" : value.raw, raw_width) + "  -> ";
+    const std::string shown =
+        value.is_there() ? fixed(value.value, 2) + (value.unit.empty() ? "" : " " + value.unit)
+                         : "missing";
+    text += coloured(shown, value.is_there() ? Colour::green : Colour::red, colours);
+    if (value.round_trip_ms) text.append("  ").append(fixed(*value.round_trip_ms, 1)).append(" ms");
+    text += '\n';
+    if (!value.is_there()) text.append("        ").append(value.why).append("\n");
+  }
+}
+
+/// "9 of 11 places of the controller are there; missing: x_mm, heartbeat"
+std::string controller_summary(const ScanController& controller) {
+  std::string text = std::to_string(controller.count_there()) + " of " +
+                     std::to_string(controller.values.size()) +
+                     " places of the controller are there";
+  const char* separator = "; missing: ";
+  for (const ScanValue& value : controller.values) {
+    if (value.is_there()) continue;
+    text.append(separator).append(value.what);
+    separator = ", ";
+  }
+  return text + "\n";
+}
+
 ordered_json optional_number(const std::optional<double>& value) {
   return value && std::isfinite(*value) ? ordered_json(*value) : ordered_json(nullptr);
 }
@@ -99,6 +139,27 @@ ordered_json json_of(const ScanDevice& device) {
           {"channels", std::move(channels)}};
 }
 
+ordered_json json_of(const ScanController& controller) {
+  ordered_json values = ordered_json::array();
+  for (const ScanValue& value : controller.values)
+    values.push_back({{"what", value.what},
+                      {"place", value.place},
+                      {"written", value.is_written},
+                      {"raw", value.raw},
+                      {"value", optional_number(value.value)},
+                      {"unit", value.unit},
+                      {"why", value.why},
+                      {"round_trip_ms", optional_number(value.round_trip_ms)}});
+  return {{"name", controller.name},
+          {"kind", controller.kind},
+          {"where", controller.where},
+          {"address", controller.address},
+          {"error", controller.error},
+          {"refused", controller.refused},
+          {"complete", controller.is_complete()},
+          {"values", std::move(values)}};
+}
+
 }  // namespace
 
 std::size_t count_channels(const ScanReport& report) {
@@ -120,6 +181,20 @@ std::size_t count_good(const ScanReport& report) {
   return count;
 }
 
+std::size_t ScanController::count_there() const {
+  return static_cast<std::size_t>(
+      std::count_if(values.begin(), values.end(), [](const auto& v) { return v.is_there(); }));
+}
+
+bool ScanController::is_complete() const {
+  return error.empty() && refused.empty() && count_there() == values.size();
+}
+
+bool is_complete(const ScanReport& report) {
+  return count_good(report) == count_channels(report) &&
+         (!report.controller || report.controller->is_complete());
+}
+
 std::string scan_text(const ScanReport& report, bool colours) {
   std::string text;
   for (const ScanBus& bus : report.buses) {
@@ -131,8 +206,11 @@ std::string scan_text(const ScanReport& report, bool colours) {
     if (!bus.found.empty()) text.append("    ").append(bus.found).append("\n");
     for (const ScanDevice& device : bus.devices) append(text, device, colours);
   }
-  text += std::to_string(count_good(report)) + " of " + std::to_string(count_channels(report)) +
-          " channels give a temperature\n";
+  if (report.controller) append(text, *report.controller, colours);
+  if (!report.buses.empty())
+    text += std::to_string(count_good(report)) + " of " + std::to_string(count_channels(report)) +
+            " channels give a temperature\n";
+  if (report.controller) text += controller_summary(*report.controller);
   return text;
 }
 
@@ -152,7 +230,17 @@ ordered_json scan_json(const ScanReport& report) {
   return {{"file", report.file},
           {"channels", count_channels(report)},
           {"good", count_good(report)},
-          {"buses", std::move(buses)}};
+          {"buses", std::move(buses)},
+          {"controller", report.controller ? json_of(*report.controller) : ordered_json(nullptr)}};
+}
+
+std::string hex_words(std::span<const std::uint16_t> words) {
+  std::vector<std::uint8_t> bytes;
+  for (const std::uint16_t word : words) {
+    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
+  }
+  return hex_bytes(bytes);
 }
 
 std::string hex_bytes(const std::vector<std::uint8_t>& bytes) {

@@ -1,7 +1,9 @@
 /// What `thermocomp scan` found, as text for a person and as JSON.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -43,13 +45,41 @@ struct ScanBus {
   std::vector<ScanDevice> devices;
 };
 
+/// A register, bit or signal of the controller.
+struct ScanValue {
+  std::string what;  ///< "applied offset of axis z", "spindle_rpm"
+  std::string place;
+  bool is_written{false};      ///< by the daemon; what stands there was read all the same
+  std::string raw;             ///< as of a channel
+  double value{not_a_number};  ///< in `unit`
+  std::string unit;
+  std::string why;  ///< empty: it is there
+  std::optional<double> round_trip_ms;
+  [[nodiscard]] bool is_there() const noexcept { return why.empty(); }
+};
+
+struct ScanController {
+  std::string name;
+  std::string kind;
+  std::string where;    ///< as of a bus
+  std::string address;  ///< "unit 1"; empty on a CAN bus
+  std::string error;    ///< empty: it could be asked
+  std::string refused;  ///< not empty: values are there, but not as the daemon asks for them
+  std::vector<ScanValue> values;
+  [[nodiscard]] std::size_t count_there() const;
+  [[nodiscard]] bool is_complete() const;
+};
+
 struct ScanReport {
   std::string file;
   std::vector<ScanBus> buses;
+  std::optional<ScanController> controller{};  ///< none: it cannot be scanned, or was not asked
 };
 
 [[nodiscard]] std::size_t count_channels(const ScanReport& report);
 [[nodiscard]] std::size_t count_good(const ScanReport& report);
+/// Every channel gives a temperature, and nothing of the controller is missing.
+[[nodiscard]] bool is_complete(const ScanReport& report);
 
 /// @param colours  for a terminal
 [[nodiscard]] std::string scan_text(const ScanReport& report, bool colours);
@@ -57,5 +87,7 @@ struct ScanReport {
 
 /// Bytes as two hexadecimal digits each, a space between.
 [[nodiscard]] std::string hex_bytes(const std::vector<std::uint8_t>& bytes);
+/// The same of registers, as they come over the wire.
+[[nodiscard]] std::string hex_words(std::span<const std::uint16_t> words);
 
 }  // namespace thermocomp::cli

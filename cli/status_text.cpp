@@ -277,10 +277,47 @@ std::string buses_line(const json& status) {
   return buses.empty() ? "" : line("Buses", buses);
 }
 
+/// "; probings here differ by z 1.2 um rms"
+std::string probed_text(const json& model) {
+  std::string text;
+  for (const auto& [axis, rms] : object_of(model, "probed_rms_um").items())
+    if (rms.is_number())
+      text += (text.empty() ? "; probings here differ by " : ", ") + axis + " " +
+              fixed(rms.get<double>(), 1) + " um rms";
+  return text;
+}
+
+/// Who took the reference, when, and at what temperatures; each is with its input.
+std::string reference_line(const json& status) {
+  const json& reference = object_of(status, "reference");
+  if (reference.empty()) return {};  // an earlier daemon does not say
+  double low = std::nan("");
+  double high = std::nan("");
+  for (const auto& [name, temp_degC] : object_of(reference, "temps_degC").items()) {
+    if (!temp_degC.is_number()) continue;
+    low = std::fmin(low, temp_degC.get<double>());
+    high = std::fmax(high, temp_degC.get<double>());
+  }
+  if (!std::isfinite(low)) return line("Reference", "none yet");
+  const std::string by = text_of(reference, "by");
+  const std::string when = local_time(number_of(reference, "wall_s"));
+  std::string text = "it is not known when it was taken";
+  if (by == "model_file") text = "the temperatures of the model file";
+  if (by == "operator") text = "taken " + when + " by thermocomp reference";
+  if (by == "first_values") text = "taken " + when + " from the first values of a start";
+  if (by == "reload") text = "changed " + when + " with a reload";
+  text += ", at " + fixed(low, 2) + (high > low ? " to " + fixed(high, 2) : "") + " degC";
+  return line("Reference", (flag_of(reference, "lost") ? "LOST; in its place " : "") + text);
+}
+
 std::string model_line(const json& status) {
   const json& model = object_of(status, "model");
-  const std::string file = line("Model", text_of(model, "file") + " (SHA-256 " +
-                                             text_of(model, "checksum").substr(0, 16) + ")");
+  std::string file = line("Model", text_of(model, "file") + " (SHA-256 " +
+                                       text_of(model, "checksum").substr(0, 16) + ")");
+  // An earlier daemon does not say.
+  if (model.contains("compared") && !flag_of(model, "compared"))
+    file += line("", "NEVER COMPARED with measured displacement, as far as its file says" +
+                         probed_text(model));
   if (!flag_of(model, "outside")) return file;
   return file + line("Domain", "outside of what the model was made from, " +
                                    fixed(100.0 * number_of(model, "outside_share_24h"), 0) +
@@ -363,9 +400,9 @@ std::vector<std::string> why_not(const json& status, bool strict) {
 
 std::string status_text(const json& status, bool colours) {
   return headline(status, colours) + trouble_lines(status, colours) + ended_lines(status) +
-         axes_lines(status) + inputs_lines(status) + controller_line(status) +
-         signals_line(status) + buses_line(status) + model_line(status) + cycle_line(status) +
-         history_line(status) +
+         axes_lines(status) + inputs_lines(status) + reference_line(status) +
+         controller_line(status) + signals_line(status) + buses_line(status) + model_line(status) +
+         cycle_line(status) + history_line(status) +
          line("Daemon", "version " + text_of(status, "version") + ", up " +
                             duration_text(number_of(status, "uptime_s")));
 }

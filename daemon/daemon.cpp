@@ -132,7 +132,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       locks(config),
       start_state(find_start_state(config)),
       keeper(config.state_file, start_state.state, start_state.is_on_disk,
-             start_state.reference_lost),
+             start_state.reference_lost, start_state.reference),
       sources(make_sources(config)),
       link(make_controller(config.controller, config.dry_run)),
       grid(make_grid(config.loop)),
@@ -140,7 +140,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain()),
       operations({config, cycle, keeper, service, history.get(),
                   [this] { return status_line(supervisor.view()); }, start_state.state.offset_um,
-                  &journal, [this] { return server.caller(); }}),
+                  &journal, [this] { return server.caller(); }, start_state.state.reference_degC}),
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal}) {
   // A kill right now must not make this a first start.

@@ -1,6 +1,7 @@
 #include "daemon/operations.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fmt/format.h>
 #include <malloc.h>
@@ -149,6 +150,7 @@ void Operations::finish_reload() {
   if (*reload_->outcome == Outcome::done) {
     parts_.config = std::move(reload_->next);
     set_log_level(parts_.config.log_level);
+    note_reference(persistent_state(cycle_.estimator(), cycle_.report()), ReferenceOrigin::reload);
     if (parts_.journal != nullptr) parts_.journal->command("reload", reload_->user);
     spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
                  parts_.config.model_checksum);
@@ -173,10 +175,21 @@ void Operations::carried_out(const Command& done) {
   spdlog::info("operator: {}", what);
   const std::int64_t user = take_asking(done);
   if (parts_.journal != nullptr) parts_.journal->command(what, user);
-  if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report()))
+  if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report())) {
     parts_.keeper.reference_taken();
+    // Also where the temperatures are those of the reference before.
+    parts_.reference_before_degC.clear();
+    note_reference(persistent_state(cycle_.estimator(), cycle_.report()), ReferenceOrigin::command);
+  }
   // Called done only when it would survive a power cut.
   save_state(true);
+}
+
+void Operations::note_reference(const PersistentState& state, ReferenceOrigin origin) {
+  if (state.reference_degC == parts_.reference_before_degC) return;
+  parts_.reference_before_degC = state.reference_degC;
+  const std::chrono::duration<double> wall = std::chrono::system_clock::now().time_since_epoch();
+  parts_.keeper.note_reference({wall.count(), origin});
 }
 
 void Operations::note_asked(const Command& asked, const CycleHandle::Tracked& outcome) {
@@ -199,6 +212,7 @@ std::int64_t Operations::take_asking(const Command& done) {
 
 void Operations::save_state(bool at_once) {
   PersistentState state = persistent_state(cycle_.estimator(), cycle_.report());
+  note_reference(state, ReferenceOrigin::first_values);
   if (parts_.config.dry_run) state.offset_um = parts_.sent_before_um;
   if (at_once)
     parts_.keeper.save(state, Clock::now());

@@ -37,6 +37,8 @@ class Operations {
     std::map<std::string, double> sent_before_um{};
     EventJournal* journal{nullptr};               ///< none: nothing is noted
     std::function<std::int64_t()> asking_user{};  ///< of the request in hand; -1: nobody known
+    /// By column, when the daemon started: what differs from it was taken since.
+    std::map<std::string, double> reference_before_degC{};
   };
   explicit Operations(Parts parts);
 
@@ -70,6 +72,7 @@ class Operations {
   CycleHandle::Tracked begin_reload();
   void finish_reload();
   void carried_out(const Command& done);
+  void note_reference(const PersistentState& state, ReferenceOrigin origin);
   void note_asked(const Command& asked, const CycleHandle::Tracked& outcome);
   [[nodiscard]] std::int64_t take_asking(const Command& done);
   [[nodiscard]] std::int64_t asking_user() const {

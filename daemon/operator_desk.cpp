@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/problems.hpp"
+#include "daemon/reference_rules.hpp"
 
 namespace thermocomp {
 namespace {
@@ -60,13 +61,28 @@ RpcPending then(RpcPending pending, std::function<json()> result) {
   };
 }
 
-RpcPending take_reference(const DeskActions& actions) {
+bool is_forced(const json& params) {
+  if (!params.contains("force")) return false;
+  if (!params["force"].is_boolean())
+    throw RpcError(rpc::invalid_params, "params.force must be true or false");
+  return params["force"].get<bool>();
+}
+
+RpcPending take_reference(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
+  const bool forced = is_forced(params);
   const auto columns = view.config.model.temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)
     refuse_unless(view.report.inputs[i].good,
                   "no reference can be taken: " + columns[i] + " has no good sensor now");
-  return actions.command({CommandKind::reference, 0, 0.0});
+  const std::string why = why_no_reference(view);
+  refuse_unless(why.empty() || forced,
+                "no reference is taken: " + why +
+                    ". To take it all the same: thermocomp reference --force (on the socket "
+                    "params {\"force\": true})");
+  return then(actions.command({CommandKind::reference, 0, 0.0}), [why, watched = watched_s(view)] {
+    return json{{"done", true}, {"watched_s", watched}, {"although", why}};
+  });
 }
 
 RpcPending note_measured(const DeskActions& actions, const json& params) {
@@ -98,7 +114,12 @@ RpcPending prove(const DeskActions& actions, const json& params) {
   refuse_unless(!axis.proving, "the axis is being proved already");
   refuse_unless(!has_reason(view.report.reasons, Reason::cutting),
                 "not while the controller says it is cutting");
-  return actions.command(command);
+  const double rate_um_per_s = view.config.estimator.axes[command.axis].limiter.rate_um_per_s_max;
+  const double takes_s = 2.0 * std::abs(command.value_um) / rate_um_per_s +
+                         view.config.estimator.compensation.prove_hold_s;
+  return then(actions.command(command), [takes_s] {
+    return json{{"done", true}, {"takes_s", takes_s}};
+  });
 }
 
 RpcPending release(const DeskActions& actions, const json& params) {
@@ -131,7 +152,7 @@ void add_operator_methods(StatusServer& server, const DeskActions& actions) {
   simple("enable", CommandKind::enable);
   simple("disable", CommandKind::disable);
   simple("cycle_end", CommandKind::cycle_end);
-  add("reference", [actions](const json&) { return take_reference(actions); });
+  add("reference", [actions](const json& params) { return take_reference(actions, params); });
   add("measured", [actions](const json& params) { return note_measured(actions, params); });
   add("prove", [actions](const json& params) { return prove(actions, params); });
   add("release", [actions](const json& params) { return release(actions, params); });

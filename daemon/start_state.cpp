@@ -35,6 +35,7 @@ void refuse_impossible(const DaemonConfig& config, StartState& start) {
     start.warnings.push_back("state file " + config.state_file.string() + ": " + each +
                              "; the reference is lost and the compensation off");
   start.state.reference_degC.clear();
+  start.reference = {};
   start.state.enabled = false;
   start.reference_lost = true;
   start.is_on_disk = false;
@@ -47,6 +48,7 @@ StartState find(const DaemonConfig& config) {
   const LoadedState loaded = load_state_file(config.state_file, first);
   start.state = loaded.state;
   start.reference_lost = loaded.reference_lost;
+  start.reference = loaded.reference;
   if (loaded.found) return start;
   const RecordedState recorded = recorded_state(config.history);
   if (!loaded.damaged && !recorded.has_run) return start;  // the first start

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "config/daemon_config.hpp"
+#include "daemon/state/reference_record.hpp"
 #include "estimator/estimator.hpp"
 
 namespace thermocomp {
@@ -13,6 +14,7 @@ struct StartState {
   PersistentState state;
   bool is_on_disk{true};       ///< false: came from elsewhere than the file, and must be written
   bool reference_lost{false};  ///< nobody knows the machine's reference: stay disabled
+  ReferenceRecord reference;   ///< when that of `state` was taken, as far as the file says
   std::vector<std::string> warnings;
 };
 

@@ -95,6 +95,12 @@ std::string block_of(const StatusView& view, const std::string& column) {
   return column;
 }
 
+json rate_K_per_h(const StatusView& view, std::size_t i) {
+  if (view.trend == nullptr) return nullptr;
+  return number(
+      view.trend->change(i, view.report.now, view.report.inputs[i].temp_degC).rate_K_per_h);
+}
+
 json inputs(const StatusView& view) {
   json list = json::array();
   const auto columns = view.config.model.temperature_columns();
@@ -106,7 +112,8 @@ json inputs(const StatusView& view) {
                     {"good", input.good},
                     {"block", block_of(view, columns[i])},
                     {"estimated", input.estimated},
-                    {"sd_K", number(input.sd_K)}});
+                    {"sd_K", number(input.sd_K)},
+                    {"rate_K_per_h", rate_K_per_h(view, i)}});
   }
   return list;
 }
@@ -214,6 +221,33 @@ json ended(const StatusView& view) {
   return list;
 }
 
+/// Whether the reference is that of the model file, number for number.
+bool is_of_model_file(const StatusView& view) {
+  const std::vector<double>& given = view.config.model.reference_degC;
+  if (given.empty() || given.size() > view.report.inputs.size()) return false;
+  for (std::size_t i = 0; i < given.size(); ++i)
+    if (view.report.inputs[i].reference_degC != given[i]) return false;
+  return true;
+}
+
+json reference(const StatusView& view) {
+  const bool of_file = is_of_model_file(view);
+  const bool is_known = !of_file && view.reference.is_known();
+  json temps = json::object();
+  const auto columns = view.config.model.temperature_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    temps[columns[i]] = number(view.report.inputs[i].reference_degC);
+  json told = {{"by", nullptr},
+               {"wall_s", is_known ? number(view.reference.wall_s) : json(nullptr)},
+               {"lost", view.reference_lost},
+               {"temps_degC", std::move(temps)}};
+  if (of_file)
+    told["by"] = "model_file";
+  else if (is_known)
+    told["by"] = to_string(view.reference.origin);
+  return told;
+}
+
 /// A figure of each axis by its name; null: not known.
 json of_axes(const StatusView& view, double AxisReport::*figure) {
   json told = json::object();
@@ -254,12 +288,14 @@ json status_json(const StatusView& view) {
             {"checksum", view.config.model_checksum},
             {"inputs", view.config.model.inputs.size()},
             {"outputs", view.config.model.outputs.size()},
+            {"compared", is_compared(view.config.model)},
             {"outside", domain.known ? json(domain.outside) : json(nullptr)},
             {"outside_share_24h", domain.known ? number(domain.outside_share_24h) : json(nullptr)},
             {"claimed_sd_um", of_axes(view, &AxisReport::claimed_sd_um)},
             {"probed_rms_um", of_axes(view, &AxisReport::probed_rms_um)}}},
           {"axes", axes(view)},
           {"inputs", inputs(view)},
+          {"reference", reference(view)},
           {"sensors_bad", bad},
           {"buses", buses(view)},
           {"controller", controller(view)},

@@ -14,6 +14,8 @@
 #include "daemon/event_journal.hpp"
 #include "daemon/history/history_writer.hpp"
 #include "daemon/socket/status_server.hpp"
+#include "daemon/state/reference_record.hpp"
+#include "daemon/temperature_trend.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "estimator/estimator.hpp"
@@ -34,6 +36,9 @@ struct StatusView {
   bool real_time{false};
   SocketStatistics socket;
   std::vector<Event> ended{};  ///< outages that are over since a few minutes, newest first
+  const TemperatureTrend* trend{nullptr};  ///< nullptr: nobody watches the temperatures
+  ReferenceRecord reference{};
+  bool reference_lost{false};  ///< see StateKeeper
 };
 
 /// What a status calls the mode. A dry run does not compensate: "dry_run" in that one's place.

@@ -100,6 +100,9 @@ void Supervisor::note_report() {
   events_.note_report(cycle().report(), parts_.config.estimator, parts_.config.dry_run);
   events_.note_estimates(cycle().report(), parts_.config.estimator,
                          parts_.config.model.temperature_columns());
+  const Report& report = cycle().report();
+  if (trend_.is_due(report.now))
+    trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);
 }
 
 void Supervisor::tick() {
@@ -182,7 +185,10 @@ StatusView Supervisor::view() {
           std::chrono::duration<double>(Clock::now() - started_).count(),
           real_time_,
           parts_.server.statistics(),
-          parts_.journal.ended_within(recent, recent_max)};
+          parts_.journal.ended_within(recent, recent_max),
+          &trend_,
+          parts_.keeper.reference(),
+          parts_.keeper.is_reference_lost()};
 }
 
 }  // namespace thermocomp

@@ -13,6 +13,7 @@
 #include "daemon/signal_file.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status_json.hpp"
+#include "daemon/temperature_trend.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 
@@ -63,6 +64,7 @@ class Supervisor {
 
   Parts parts_;
   EventLog events_;
+  TemperatureTrend trend_;
   std::vector<std::string> warnings_;
   bool real_time_{false};
   Clock::time_point started_{Clock::now()};

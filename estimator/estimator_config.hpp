@@ -95,7 +95,8 @@ struct CompensationConfig {
   double hold_s{600.0};                  ///< ramp_to_zero: hold this long first
   StopPolicy on_stop{StopPolicy::hold};  ///< where the daemon leaves the offsets when it is stopped
   double stop_ramp_s_max{120.0};         ///< ramp_to_zero: it ends after so long wherever they are
-  bool enabled_at_first_start{true};
+  /// Without a state to go on from; false: nothing moves before an operator enables it.
+  bool enabled_at_first_start{false};
   bool hold_while_cutting{false};  ///< the offset changes only while cutting_signal is 0
   std::string cutting_signal;      ///< "cutting_on"; empty: none
   std::string disable_signal;      ///< "compensation_off_on": 1 disables; empty: none

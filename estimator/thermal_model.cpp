@@ -68,4 +68,11 @@ std::vector<std::string> ThermalModel::signal_columns() const {
   return columns;
 }
 
+bool is_compared(const ThermalModel& model) {
+  return model.made_from &&
+         std::all_of(model.outputs.begin(), model.outputs.end(), [&](const std::string& output) {
+           return model.made_from->outputs.contains(output);
+         });
+}
+
 }  // namespace thermocomp

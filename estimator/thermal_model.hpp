@@ -122,6 +122,11 @@ struct ThermalModel {
   [[nodiscard]] std::vector<std::string> signal_columns() const;
 };
 
+/// Whether the model file itself says, for each output, what the model left of measured
+/// displacement that it was not fitted to (`[made_from]`). Without it, as with an example or a
+/// computed model, nothing tells whether size and sign are those of any machine.
+[[nodiscard]] bool is_compared(const ThermalModel& model);
+
 /// What the subject of a kind of term is, and which parameters it takes.
 struct TermParameter {
   std::string name;

@@ -115,8 +115,10 @@ class RunBinding {
   std::vector<Problem> problems_;
 };
 
-EstimatorConfig adapt_stale(EstimatorConfig config, const RunBinding& binding, const RunFile& run,
-                            std::vector<std::string>& notes) {
+/// What a run file needs: nobody is there to enable it, and its samples may be far apart.
+EstimatorConfig adapted(EstimatorConfig config, const RunBinding& binding, const RunFile& run,
+                        std::vector<std::string>& notes) {
+  config.compensation.enabled_at_first_start = true;
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
     if (!binding.sensors()[i]) continue;
     const double needed_s = stale_in_sample_distances *
@@ -137,7 +139,7 @@ class RunReplay {
       : run_(run),
         binding_(config, run),
         summary_(summary),
-        estimator_(adapt_stale(config.estimator, binding_, run, summary.notes), config.model),
+        estimator_(adapted(config.estimator, binding_, run, summary.notes), config.model),
         report_(estimator_.make_report()),
         readings_(config.estimator.sensors.size()) {
     controller_.online = true;
@@ -147,10 +149,6 @@ class RunReplay {
     }
     assume_zero(config.estimator.compensation.cutting_signal);
     assume_zero(config.estimator.compensation.disable_signal);
-    if (!config.estimator.compensation.enabled_at_first_start) {
-      summary_.notes.emplace_back(
-          "compensation.enabled_at_first_start is false: nothing is compensated");
-    }
   }
 
   void take_row(std::size_t row) {

@@ -29,9 +29,10 @@ struct RunReplaySummary {
 /// `stale_after_s` would call each of them stale before the next one, it is raised to 2.5 times
 /// their median distance, which a note says.
 ///
-/// The controller is a dry run: always online, it applies what it was sent by the next step. Its
-/// signals are the columns of their names, held from row to row; `cutting_signal` and
-/// `disable_signal` without a column are taken for 0, which a note says.
+/// The compensation is switched on, whatever a first start would do. The controller is a dry run:
+/// always online, it applies what it was sent by the next step. Its signals are the columns of
+/// their names, held from row to row; `cutting_signal` and `disable_signal` without a column are
+/// taken for 0, which a note says.
 ///
 /// Output: a run file with the selected rows: time_s, then for each axis `<axis>_offset_um` (sent)
 /// and `<axis>_displacement_um` (of its model output, before limits), after the step that saw the

@@ -46,13 +46,30 @@ std::map<std::string, double> numbers(const json& file, const char* key) {
   return values;
 }
 
-std::string to_text(const PersistentState& state, bool reference_lost) {
+/// Only for people: what cannot be understood costs no reference.
+ReferenceRecord record_in(const json& file) {
+  const auto found = file.find("reference_taken");
+  if (found == file.end() || !found->is_object()) return {};
+  const json& wall_s = found->value("wall_s", json());
+  const json& by = found->value("by", json());
+  if (!wall_s.is_number() || !by.is_string()) return {};
+  ReferenceRecord record{wall_s.get<double>()};
+  for (const ReferenceOrigin origin :
+       {ReferenceOrigin::first_values, ReferenceOrigin::command, ReferenceOrigin::reload})
+    if (by.get<std::string>() == to_string(origin)) record.origin = origin;
+  return record.is_known() ? record : ReferenceRecord{};
+}
+
+std::string to_text(const PersistentState& state, bool reference_lost,
+                    const ReferenceRecord& reference) {
   json file;
   file["format"] = format;
   file["program"] = "thermocomp";
   file["enabled"] = state.enabled;
   if (reference_lost) file["reference_lost"] = true;
   file["reference_degC"] = numbers(state.reference_degC);
+  if (reference.is_known())
+    file["reference_taken"] = {{"wall_s", reference.wall_s}, {"by", to_string(reference.origin)}};
   file["model_reference_degC"] = numbers(state.model_reference_degC);
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);
@@ -63,7 +80,8 @@ std::string to_text(const PersistentState& state, bool reference_lost) {
   return file.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
-PersistentState from_text(const std::string& text, bool& reference_lost) {
+PersistentState from_text(const std::string& text, bool& reference_lost,
+                          ReferenceRecord& reference) {
   const json file = json::parse(text);
   if (!file.is_object() || file.value("program", "") != "thermocomp") {
     throw std::runtime_error("is not a state file of thermocomp");
@@ -79,6 +97,7 @@ PersistentState from_text(const std::string& text, bool& reference_lost) {
   state.enabled = file.at("enabled").get<bool>();
   reference_lost = file.contains("reference_lost") && file["reference_lost"].get<bool>();
   state.reference_degC = numbers(file, "reference_degC");
+  reference = record_in(file);
   state.model_reference_degC = numbers(file, "model_reference_degC");
   state.reference_signals = numbers(file, "reference_signals");
   state.offset_um = numbers(file, "offset_um");
@@ -157,11 +176,12 @@ LoadedState load_state_file(const std::filesystem::path& file,
     const auto status = std::filesystem::status(file, error);
     if (status.type() == std::filesystem::file_type::not_found) return loaded;
     if (error) throw std::runtime_error(error.message());
-    loaded.state = from_text(read_all(file), loaded.reference_lost);
+    loaded.state = from_text(read_all(file), loaded.reference_lost, loaded.reference);
     loaded.found = true;
   } catch (const std::exception& error) {
     loaded.damaged = true;
     loaded.reference_lost = false;
+    loaded.reference = {};
     try {
       loaded.state = fallback;
       loaded.warning = "state file " + file.string() + " cannot be used: " + error.what() + "; " +
@@ -174,10 +194,10 @@ LoadedState load_state_file(const std::filesystem::path& file,
 }
 
 std::string save_state_file(const std::filesystem::path& file, const PersistentState& state,
-                            bool reference_lost) noexcept {
+                            bool reference_lost, const ReferenceRecord& reference) noexcept {
   try {
     const std::string beside = file.string() + ".new";
-    write_flushed(beside, to_text(state, reference_lost));
+    write_flushed(beside, to_text(state, reference_lost, reference));
     if (rename(beside.c_str(), file.c_str()) != 0) fail(file.string());
     const std::filesystem::path folder =
         file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "daemon/state/reference_record.hpp"
 #include "estimator/estimator.hpp"
 
 namespace thermocomp {
@@ -16,6 +17,7 @@ struct LoadedState {
   std::string warning;  ///< what, for the log; not empty where `damaged`, memory permitting
   /// The reference in it was taken because the right one had been lost (see StateKeeper).
   bool reference_lost{false};
+  ReferenceRecord reference;  ///< unknown where the file does not say
 };
 
 /// Never throws: a damaged or foreign file is moved aside (`<file>.unusable`) and said in
@@ -27,7 +29,7 @@ struct LoadedState {
 /// Writes beside the file, flushes to the disk, renames over it, flushes the folder.
 /// @return empty, or what went wrong; the old file then still stands
 [[nodiscard]] std::string save_state_file(const std::filesystem::path& file,
-                                          const PersistentState& state,
-                                          bool reference_lost = false) noexcept;
+                                          const PersistentState& state, bool reference_lost = false,
+                                          const ReferenceRecord& reference = {}) noexcept;
 
 }  // namespace thermocomp

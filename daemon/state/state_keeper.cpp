@@ -23,9 +23,14 @@ void StateKeeper::reference_taken() noexcept {
   is_on_disk_ = false;
 }
 
+void StateKeeper::note_reference(const ReferenceRecord& reference) noexcept {
+  reference_ = reference;
+  is_on_disk_ = false;
+}
+
 void StateKeeper::write(const PersistentState& state, Clock::time_point now) {
   next_offsets_ = now + offsets_saved_every;
-  error_ = save_state_file(file_, state, reference_lost_);
+  error_ = save_state_file(file_, state, reference_lost_, reference_);
   if (!error_.empty()) return;
   saved_ = state;
   is_on_disk_ = true;

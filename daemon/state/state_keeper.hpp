@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "daemon/state/reference_record.hpp"
 #include "estimator/estimator.hpp"
 
 namespace thermocomp {
@@ -19,12 +20,14 @@ class StateKeeper {
   /// @param start           the daemon's at its start; only what differs from it is written
   /// @param is_on_disk      `start` need not be written
   /// @param reference_lost  the reference of `start` is not the machine's: nobody knows that one
+  /// @param reference       when the reference of `start` was taken
   StateKeeper(std::filesystem::path file, PersistentState start, bool is_on_disk,
-              bool reference_lost)
+              bool reference_lost, const ReferenceRecord& reference = {})
       : file_(std::move(file)),
         saved_(std::move(start)),
         is_on_disk_(is_on_disk),
-        reference_lost_(reference_lost) {}
+        reference_lost_(reference_lost),
+        reference_(reference) {}
 
   /// Writes what must be written at once, and the rest when it is due.
   void note(const PersistentState& state, Clock::time_point now);
@@ -40,6 +43,10 @@ class StateKeeper {
   /// An operator has taken a reference. Written with the next save().
   void reference_taken() noexcept;
 
+  /// When the reference was taken. Written with the next save().
+  void note_reference(const ReferenceRecord& reference) noexcept;
+  [[nodiscard]] const ReferenceRecord& reference() const noexcept { return reference_; }
+
  private:
   void write(const PersistentState& state, Clock::time_point now);
 
@@ -47,6 +54,7 @@ class StateKeeper {
   PersistentState saved_;
   bool is_on_disk_;
   bool reference_lost_;
+  ReferenceRecord reference_;
   std::string error_;
   Clock::time_point next_offsets_{};
 };

@@ -139,6 +139,7 @@ settle_s = 0.1
 steady_s = 0.2
 """
 TAIL = """[compensation]
+enabled_at_first_start = true
 mismatch_um = 2.0
 mismatch_after_s = 1.0
 {compensation}[history]

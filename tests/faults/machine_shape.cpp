@@ -156,6 +156,7 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
   compensation.cutting_signal = "cutting_on";
   compensation.hold_while_cutting = chance.one_in(3);
   compensation.disable_signal = "compensation_off_on";
+  compensation.enabled_at_first_start = true;
   compensation.mismatch_um = chance.between(1.0, 3.0);
   compensation.mismatch_after_s = chance.between(1.0, 4.0);
   model.inputs = {"t1_degC", "t2_degC", "t3_degC"};

@@ -140,6 +140,8 @@ name = "z"
 output = "z_um"
 offset_um_max = 60.0
 rate_um_per_s_max = 0.5
+[compensation]
+enabled_at_first_start = true
 )";
 }
 

@@ -61,6 +61,7 @@ class Desk {
     for (SensorConfig& sensor : config.estimator.sensors)
       sensor.smoothing.form = SmoothingForm::off;
     config.estimator.compensation.update = UpdateRule::each_cycle;
+    config.estimator.compensation.enabled_at_first_start = true;
     CorrectionConfig& correction = config.estimator.correction;
     correction.form = CorrectionForm::recursive;
     for (const std::string& input : config.model.inputs) correction.groups.push_back({input});

@@ -106,6 +106,7 @@ silent_after_s = @SILENT@
                "homed_on")) + "".join(
     f'[[axis]]\nname = "{a}"\noutput = "{a}_um"\noffset_um_max = 100.0\n'
     "rate_um_per_s_max = @RATE@\n" for a in AXES) + """[compensation]
+enabled_at_first_start = true
 cutting_signal = "cutting_on"
 mismatch_um = 5.0
 controller_stale_after_s = 5.0

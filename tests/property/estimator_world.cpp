@@ -77,6 +77,7 @@ EstimatorConfig random_config(Chance& chance) {
   config.compensation.hold_while_cutting = chance.one_in(4);
   config.compensation.cutting_signal = "cutting_on";
   config.compensation.disable_signal = "off_on";
+  config.compensation.enabled_at_first_start = true;
   config.compensation.mismatch_um = chance.between(0.5, 3.0);
   config.compensation.mismatch_after_s = chance.between(0.5, 3.0);
   config.compensation.prove_hold_s = chance.between(0.0, 2.0);

@@ -108,6 +108,7 @@ EstimatorConfig make_config() {
   config.axes.push_back({"x", "x_um", 1.0, {}});
   config.axes.push_back({"y", "y_um", 1.0, {}});
   config.axes.push_back({"z", "z_um", 1.0, {}});
+  config.compensation.enabled_at_first_start = true;
   return config;
 }
 

@@ -20,7 +20,8 @@ def run(*arguments, program=PROGRAM, env=None, **options):
 
 
 class FakeDaemon:
-    """Answers methods of the status socket from a table; an exception is an error (code, text)."""
+    """Answers methods of the status socket from a table. A tuple is an error (code, text); a list
+    is one answer after the other, of which the last stays."""
 
     def __init__(self):
         self.folder = tempfile.TemporaryDirectory(prefix="tc")
@@ -46,6 +47,8 @@ class FakeDaemon:
                 request = json.loads(line)
                 self.requests.append(request)
                 answer = self.answers.get(request["method"], {"done": True})
+                if isinstance(answer, list):
+                    answer = answer.pop(0) if len(answer) > 1 else answer[0]
                 reply = {"jsonrpc": "2.0", "id": request["id"]}
                 if isinstance(answer, tuple):
                     reply["error"] = {"code": answer[0], "message": answer[1]}

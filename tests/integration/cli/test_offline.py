@@ -45,6 +45,9 @@ def test_every_example_checks(name):
     answer = run("check", EXAMPLES / f"{name}.toml")
     assert answer.returncode == 0, answer.stderr
     assert "OK" in answer.stdout and "SHA-256" in answer.stdout
+    # An example is of no machine, and its first start moves nothing.
+    assert "\ncompared: NEVER, as far as the model file says" in answer.stdout
+    assert "\nfirst start: switched off until `thermocomp enable`\n" in answer.stdout
 
 
 @pytest.mark.parametrize("name", ["small_machine", "modbus_tcp", "can", "piezo"])
@@ -58,6 +61,18 @@ def test_every_controller_can_be_run_dry(name, tmp_path):
     answer = run("check", "dry.toml", cwd=tmp_path)
     assert answer.returncode == 0, answer.stderr
     assert "DRY RUN: nothing is written to it" in answer.stdout
+
+
+def test_check_says_when_a_first_start_compensates_at_once(tmp_path):
+    for model in EXAMPLES.glob("*model*.toml"):
+        shutil.copy(model, tmp_path)
+    text = (EXAMPLES / "small_machine.toml").read_text()
+    key = "enabled_at_first_start = false"
+    assert key in text
+    (tmp_path / "at_once.toml").write_text(text.replace(key, "enabled_at_first_start = true "))
+    answer = run("check", "at_once.toml", cwd=tmp_path)
+    assert answer.returncode == 0, answer.stderr
+    assert "\nfirst start: COMPENSATES AT ONCE (compensation.enabled" in answer.stdout
 
 
 def test_the_page_on_the_controllers_side_shows_what_the_command_prints():

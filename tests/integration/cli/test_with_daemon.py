@@ -46,12 +46,53 @@ def test_operator_commands_ask_the_right_method(daemon):
             (["enable"], "enable", {}), (["disable"], "disable", {}),
             (["reference"], "reference", {}), (["cycle-end"], "cycle_end", {}),
             (["reload"], "reload", {}),
-            (["measured", "z", "-1.5"], "measured", {"axis": "z", "value_um": -1.5}),
-            (["prove", "z", "5"], "prove", {"axis": "z", "value_um": 5.0})):
+            (["reference", "--force"], "reference", {"force": True}),
+            (["measured", "z", "-1.5"], "measured", {"axis": "z", "value_um": -1.5})):
         answer = run("--socket", daemon.path, *arguments)
         assert answer.returncode == 0, answer.stderr
         assert daemon.requests[-1]["method"] == method
         assert daemon.requests[-1].get("params", {}) == params
+
+
+def offsets(offset_um, applied_um, proving):
+    return {"axes": [{"name": "x"}, {"name": "z", "offset": offset_um, "applied": applied_um,
+                                     "proving": proving}]}
+
+
+@pytest.mark.parametrize("there_um, status, words", [
+    (5.0, 0, "moved and came back"), (0.1, 1, "did NOT move as asked"),
+    (-5.0, 1, "moved the OTHER way")])
+def test_prove_waits_until_the_move_is_over_and_tells_what_was_read(daemon, there_um, status,
+                                                                    words):
+    daemon.answers["offsets"] = [offsets(0.0, 0.0, False), offsets(2.0, 0.4 * there_um, True),
+                                 offsets(5.0, there_um, True), offsets(0.0, 0.0, False)]
+    daemon.answers["prove"] = {"done": True, "takes_s": 1.0}
+    answer = run("--socket", daemon.path, "prove", "z", "5")
+    asked = [request["method"] for request in daemon.requests]
+    assert asked == ["offsets", "prove"] + 3 * ["offsets"]
+    assert daemon.requests[1]["params"] == {"axis": "z", "value_um": 5.0}
+    assert answer.returncode == status and words in answer.stdout, answer.stdout
+    assert "\033" not in answer.stdout + answer.stderr
+
+
+def test_prove_gives_up_on_a_move_that_does_not_end(daemon):
+    daemon.answers["offsets"] = [offsets(0.0, 0.0, False), offsets(2.0, 1.9, True)]
+    daemon.answers["prove"] = {"done": True, "takes_s": -3.5}  # 3 s are left of its patience
+    answer = run("--socket", daemon.path, "prove", "z", "5")
+    assert answer.returncode == 1 and "the move is not over" in answer.stdout
+    assert "axis z: sent +2.00 um, read back +1.90 um\n" in answer.stderr
+
+
+def test_a_reference_says_how_long_the_temperatures_were_watched(daemon):
+    for watched_s, words in ((40.0, "watched for 40 s only"), (1800.0, None)):
+        daemon.answers["reference"] = {"done": True, "watched_s": watched_s, "although": ""}
+        answer = run("--socket", daemon.path, "reference")
+        assert answer.returncode == 0
+        assert (words or "reference: the present temperatures") in answer.stdout
+        assert ("watched" in answer.stdout) == bool(words)
+    daemon.answers["reference"] = {"done": True, "although": "axis z has an offset of +2.00"}
+    answer = run("--socket", daemon.path, "reference", "--force")
+    assert "taken although axis z has an offset" in answer.stdout
 
 
 def test_a_refusal_is_1_and_a_forbidden_or_wrong_request_is_2(daemon):

@@ -124,7 +124,8 @@ class KillRounds:
         """Sends without waiting; the socket, on which the answer may come."""
         link = socket.socket(socket.AF_UNIX)
         link.connect(str(self.daemon.socket))
-        link.sendall(b'{"jsonrpc":"2.0","id":1,"method":"%s"}\n' % method.encode())
+        params = b',"params":{"force":true}' if method == "reference" else b""
+        link.sendall(b'{"jsonrpc":"2.0","id":1,"method":"%s"%s}\n' % (method.encode(), params))
         return link
 
     def wait_for_commit(self):

@@ -205,6 +205,7 @@ rate_um_per_s_max = 8.0
 offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
 applied = {{ table = "input", address = 10, encoding = "int32", scale = 0.001 }}
 [compensation]
+enabled_at_first_start = true
 disable_signal = "compensation_off_on"
 prove_hold_s = 0.2
 [history]

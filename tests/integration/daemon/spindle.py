@@ -128,10 +128,13 @@ def machine_text(bus, events=""):
 
 NO_SMOOTHING = 'form = "off"\nperiod_s = 0.0\n'
 RATE_UM_PER_S = 1000.0
+# The first start of each test.
+ENABLED = "[compensation]\nenabled_at_first_start = true\n"
 AMPLE = f"offset_um_max = 500.0\nrate_um_per_s_max = {RATE_UM_PER_S}\n"
 
 
-def daemon_text(bus, rate_hz=500, smoothing=NO_SMOOTHING, model=MODEL, limits=AMPLE, more=""):
+def daemon_text(bus, rate_hz=500, smoothing=NO_SMOOTHING, model=MODEL, limits=AMPLE,
+                more=""):
     sensors = (f'[[sensor]]\nname = "t{i + 1}"\ndevice = "module"\n{bus.place(i)}\n'
                f'[[block]]\nname = "t{i + 1}"\ninput = "t{i + 1}_degC"\nsensors = ["t{i + 1}"]\n'
                for i in range(SENSORS))
@@ -140,7 +143,8 @@ def daemon_text(bus, rate_hz=500, smoothing=NO_SMOOTHING, model=MODEL, limits=AM
             bus.daemon + "".join(axis_text(bus, i, limits) for i in range(AXES)) +
             "".join(sensors) +
             "[screening]\nrate_K_per_s_max = 1e6\nrate_allowance_K = 100.0\n[smoothing]\n" +
-            smoothing + more + "[history]\n@HISTORY@\noffsets_period_s = 0.01\ncommit_s = 0.5\n")
+            smoothing + ENABLED + more +
+            "[history]\n@HISTORY@\noffsets_period_s = 0.01\ncommit_s = 0.5\n")
 
 
 def write_replay_file(path, rows, row_period_s):

@@ -87,7 +87,7 @@ def test_faults_commands_reloads_and_power_cuts_are_replayed_bit_for_bit(lab):
     model = lab.folder / "model.toml"
     model.write_text(spindle.MODEL.read_text())
     limits = "offset_um_max = 40.0\nrate_um_per_s_max = 15.0\n"
-    more = ('[compensation]\non_loss = "ramp_to_zero"\nhold_s = 0.3\nmismatch_after_s = 0.3\n'
+    more = ('on_loss = "ramp_to_zero"\nhold_s = 0.3\nmismatch_after_s = 0.3\n'
             "prove_hold_s = 0.2\n")
     text = spindle.daemon_text(over_tcp(), smoothing=smoothing("sliding_line", "screened", 0.05),
                                model="model.toml", limits=limits, more=more)
@@ -102,7 +102,7 @@ def test_faults_commands_reloads_and_power_cuts_are_replayed_bit_for_bit(lab):
         modes.add(status["mode"])
         reasons.update(status["reasons"])
         command = (("disable",), ("enable",), ("measured", "ch2", "1.25"), ("cycle-end",),
-                   ("prove", "ch1", "3"), ("reference",))[turn % 6]
+                   ("prove", "ch1", "3"), ("reference", "--force"))[turn % 6]
         code = daemon.cli(*command)[0]
         # While sensors or controller are away some of these are refused, with a reason.
         assert code == 0 or (code == 1 and command[0] in ("prove", "reference"))

@@ -71,7 +71,7 @@ def test_a_commanded_reference_comes_from_the_history_too(machine):
     daemon = machine.start()
     machine.warm_by(9.0)
     daemon.wait_for_offset(9.0, 0.05)
-    assert daemon.cli("reference")[0] == 0
+    assert daemon.cli("reference", "--force")[0] == 0
     daemon.end()
     machine.warm_by(3.0)
     DAMAGE["cut"](daemon.state)
@@ -100,7 +100,7 @@ def test_without_a_history_it_stays_off_and_says_what_to_do(machine, damage):
     daemon.start()
     machine.warm_by(0.0)
     eventually(lambda: daemon.status()["inputs"][0]["temp_degC"] == 20.0, "it is cold")
-    assert daemon.cli("reference")[0] == 0
+    assert daemon.cli("reference", "--force")[0] == 0
     assert daemon.cli("enable")[0] == 0
     assert "reference is lost" not in warnings(daemon)
     daemon.kill()

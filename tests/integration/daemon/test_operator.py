@@ -117,7 +117,7 @@ def test_a_new_reference_makes_the_present_state_the_straight_one(machine):
     daemon = machine.start()
     machine.warm_by(6.0)
     daemon.wait_for_offset(6.0, 0.05)
-    assert daemon.cli("reference")[0] == 0
+    assert daemon.cli("reference", "--force")[0] == 0
     daemon.wait_for_offset(0.0, 0.0)
     assert_slewed(machine.controller.orders())
 
@@ -145,9 +145,10 @@ def test_the_switch_at_the_controller_works_without_a_terminal(machine):
 
 def test_proving_moves_one_axis_out_and_back(machine, lab):
     daemon = machine.start()
-    assert daemon.cli("prove", "z", "4")[0] == 0
-    eventually(lambda: machine.controller.applied_um() == 4.0, "it moved out")
+    status, out, said = daemon.cli("prove", "z", "4")
+    assert status == 0 and "axis z: moved and came back" in out, (out, said)
     eventually(lambda: machine.controller.applied_um() == 0.0, "it came back")
+    assert max(offset_um for _, offset_um in machine.controller.orders()) == 4.0
     assert daemon.cli("prove", "z", "11")[0] == 1
     assert daemon.cli("prove", "nosuch", "1")[0] in (1, 2)
     times_s, offsets_um = recorded(machine, lab)

@@ -31,7 +31,7 @@ def test_a_commanded_reference_survives_a_power_cut_right_after_the_answer(machi
     daemon = machine.start()
     machine.warm_by(9.0)
     daemon.wait_for_offset(9.0, 0.05)
-    assert daemon.cli("reference")[0] == 0
+    assert daemon.cli("reference", "--force")[0] == 0
     daemon.kill()
     machine.start()
     assert daemon.status()["inputs"][0]["reference_degC"] == 17.0

@@ -134,6 +134,7 @@ offsets_period_s = 0.01
 commit_s = 0.2
 """
 LIMITS = f"offset_um_max = 60.0\nrate_um_per_s_max = {SLEW_UM_PER_S}\n"
+ENABLED = "[compensation]\nenabled_at_first_start = true\n"
 OVER_TCP = """[[bus]]
 name = "cabinet"
 kind = "modbus_tcp"
@@ -193,7 +194,7 @@ class Machine:
 
     def config(self, more=""):
         return COMMON + OVER_TCP.format(module=self.module.port,
-                                        controller=self.controller.port) + LIMITS + more
+                                        controller=self.controller.port) + LIMITS + ENABLED + more
 
     def warm_by(self, offset_um):
         """The column is so much off the 20 degC of the reference that this is the offset."""
@@ -326,4 +327,4 @@ def serial_config(device):
     line = LINE.replace("/run/service-test-line", str(device)).replace(
         "encoding", 'table = "input"\nencoding').replace("baud", 'parity = "none"\nbaud')
     return (COMMON + line + sensors + '[controller]\nname = "none"\nkind = "dry_run"\n'
-            '[[axis]]\nname = "z"\noutput = "z_um"\n' + LIMITS)
+            '[[axis]]\nname = "z"\noutput = "z_um"\n' + LIMITS + ENABLED)

@@ -131,7 +131,7 @@ def test_a_stop_holds(running):
 
 def test_a_stop_ramps_to_zero_where_that_is_configured(running):
     # Longer than TimeoutStopSec: the daemon asks for the time it needs.
-    service.write_config(running.config('[compensation]\non_stop = "ramp_to_zero"\n'))
+    service.write_config(running.config('on_stop = "ramp_to_zero"\n'))
     run("systemctl", "reload", UNIT)
     running.settled_at(36.0)
     orders, began = running.count(), time.monotonic()

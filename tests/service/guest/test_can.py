@@ -118,7 +118,7 @@ def compensating(node):
 
 def test_the_installed_service_compensates_over_can(node):
     run("dpkg", "-i", service.package("thermocomp"))
-    service.write_config(service.COMMON + OVER_CAN + service.LIMITS)
+    service.write_config(service.COMMON + OVER_CAN + service.LIMITS + service.ENABLED)
     service.drop_in("planted", "[Service]\nEnvironment=LD_PRELOAD=/opt/service-test/planted_hang.so\n")
     service.start()
     node.settled_at(9.0)

@@ -51,6 +51,42 @@ TEST_CASE("the status says at one glance that and how much is compensated", "[cl
   CHECK_THAT(text, !Contains("\033"));
 }
 
+TEST_CASE("the status says when, by whom and at what temperatures the reference was taken",
+          "[cli][status]") {
+  json status = good_status();
+  CHECK_THAT(status_text(status, false), !Contains("Reference"));  // an earlier daemon
+  json& reference = status["reference"];
+  reference = {{"by", "operator"},
+               {"wall_s", 1772350211.5},
+               {"lost", false},
+               {"temps_degC", {{"bed_degC", 20.25}, {"head_degC", 21.5}, {"new_degC", nullptr}}}};
+  CHECK_THAT(status_text(status, false), Contains("Reference       : taken 2026-0") &&
+                                             Contains(".5 by thermocomp reference") &&
+                                             Contains("at 20.25 to 21.50 degC"));
+  reference["by"] = "first_values";
+  reference["lost"] = true;
+  CHECK_THAT(status_text(status, false),
+             Contains("LOST; in its place taken ") && Contains("first values of a start"));
+  reference["by"] = "model_file";
+  reference["wall_s"] = nullptr;
+  CHECK_THAT(status_text(status, false), Contains("the temperatures of the model file, at 20.25"));
+  reference["by"] = nullptr;
+  CHECK_THAT(status_text(status, false), Contains("it is not known when"));
+  reference["temps_degC"] = {{"bed_degC", nullptr}};
+  CHECK_THAT(status_text(status, false), Contains("Reference       : ") && Contains("none yet"));
+}
+
+TEST_CASE("a model that was never compared is named as such", "[cli][status]") {
+  json status = good_status();
+  CHECK_THAT(status_text(status, false), !Contains("COMPARED"));  // an earlier daemon
+  status["model"]["compared"] = true;
+  CHECK_THAT(status_text(status, false), !Contains("COMPARED"));
+  status["model"]["compared"] = false;
+  CHECK_THAT(status_text(status, false), Contains("NEVER COMPARED") && !Contains("probings"));
+  status["model"]["probed_rms_um"] = {{"x", nullptr}, {"z", 1.25}};
+  CHECK_THAT(status_text(status, false), Contains("probings here differ by z 1.2 um rms"));
+}
+
 TEST_CASE("a machine outside of what its model was made from is told so", "[cli][status]") {
   json status = good_status();
   CHECK_THAT(status_text(status, false), !Contains("Domain"));

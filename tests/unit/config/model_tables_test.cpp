@@ -129,6 +129,15 @@ TEST_CASE("a bank and what a model was made from are read and written bit for bi
   CHECK(write_model(back) == write_model(model));
 }
 
+TEST_CASE("a model is compared where each output has errors on rows left out", "[config][model]") {
+  ThermalModel model = parse_model(good, "model.toml");
+  CHECK_FALSE(is_compared(model));  // nothing is said of the second output
+  model.made_from->outputs["c_urad"] = {};
+  CHECK(is_compared(model));
+  model.made_from.reset();  // an example, or computed from a structure
+  CHECK_FALSE(is_compared(model));
+}
+
 TEST_CASE("the commented example of a bank of lags loads", "[config][model]") {
   const ThermalModel model =
       load_model(std::filesystem::path(THERMOCOMP_EXAMPLES) / "lag_bank_model.toml");

@@ -28,6 +28,7 @@ EstimatorConfig machine(const std::vector<std::string>& axes) {
   config.sensors.push_back({"s", std::nullopt, {}, {}});
   config.blocks.push_back({"b", "b_degC", {0}});
   for (const std::string& name : axes) config.axes.push_back({name, name + "_um", 1.0, {}});
+  config.compensation.enabled_at_first_start = true;
   return config;
 }
 

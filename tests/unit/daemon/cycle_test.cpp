@@ -55,6 +55,7 @@ EstimatorConfig one_sensor() {
   config.sensors.push_back({"s", std::nullopt, {}, {}});
   config.blocks.push_back({"b", "b_degC", {0}});
   config.axes.push_back({"z", "z_um", 1.0, {}});
+  config.compensation.enabled_at_first_start = true;
   return config;
 }
 

@@ -51,6 +51,7 @@ inline ReplaySetup machine_setup(double gain_um_per_K) {
     setup.model.inputs.push_back(block.input);
   }
   setup.estimator.signals = {"spindle_rpm"};
+  setup.estimator.compensation.enabled_at_first_start = true;
   for (const char* name : {"y", "z"}) {
     AxisConfig axis;
     axis.name = name;

@@ -108,3 +108,18 @@ TEST_CASE("nobody has to ask for what was commanded to be saved", "[daemon]") {
   desk.operations.poll();
   CHECK_FALSE(desk.on_disk().state.enabled);
 }
+
+TEST_CASE("when and by whom the reference was taken is on disk with it", "[daemon]") {
+  Desk desk;
+  desk.operations.save_state(false);
+  const ReferenceRecord first = desk.on_disk().reference;
+  CHECK(first.origin == ReferenceOrigin::first_values);
+  CHECK(first.is_known());
+  // At the very same temperatures it is a reference of another moment all the same.
+  desk.give(CommandKind::reference);
+  const ReferenceRecord second = desk.on_disk().reference;
+  CHECK(second.origin == ReferenceOrigin::command);
+  CHECK(second.wall_s >= first.wall_s);
+  desk.operations.save_state(true);
+  CHECK(desk.on_disk().reference.wall_s == second.wall_s);
+}

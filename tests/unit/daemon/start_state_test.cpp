@@ -93,6 +93,20 @@ TEST_CASE("without state file and history it is the first start", "[state]") {
   CHECK_FALSE(start.reference_lost);
 }
 
+TEST_CASE("a first start is switched off unless the configuration says otherwise", "[state]") {
+  const TempFolder folder;
+  const DaemonConfig config = in_folder(folder);
+  CHECK_FALSE(find_start_state(config).state.enabled);
+  // What an operator said goes before what the configuration says.
+  PersistentState said;
+  said.enabled = true;
+  REQUIRE(
+      save_state_file(config.state_file, said, false, {12.0, ReferenceOrigin::command}).empty());
+  const StartState start = find_start_state(config);
+  CHECK(start.state.enabled);
+  CHECK(start.reference.wall_s == 12.0);
+}
+
 TEST_CASE("an unusable state file without a history keeps the machine off", "[state]") {
   const TempFolder folder;
   const DaemonConfig config = in_folder(folder);

@@ -86,3 +86,27 @@ TEST_CASE("a state that cannot be written is an error and leaves the old file", 
   CHECK(load_state_file(file, {}).state.offset_um == sample_state().offset_um);
   CHECK_FALSE(save_state_file(folder / "missing/state.json", sample_state()).empty());
 }
+
+TEST_CASE("when the reference was taken comes back, and costs nothing where it cannot be read",
+          "[state]") {
+  const TempFolder folder;
+  const auto file = folder / "state.json";
+  REQUIRE(save_state_file(file, sample_state(), false, {1772350211.5, ReferenceOrigin::command})
+              .empty());
+  LoadedState loaded = load_state_file(file, {});
+  CHECK(loaded.reference.wall_s == 1772350211.5);
+  CHECK(loaded.reference.origin == ReferenceOrigin::command);
+  REQUIRE(save_state_file(file, sample_state()).empty());  // as an earlier version wrote it
+  CHECK_FALSE(load_state_file(file, {}).reference.is_known());
+  const auto* record = GENERATE("7", "{}", R"({"wall_s": "noon", "by": "operator"})",
+                                R"({"wall_s": 1.0, "by": 2})", R"({"wall_s": 1.0, "by": "who"})");
+  std::ifstream in(file);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  text.insert(text.find('{') + 1, std::string("\"reference_taken\": ") + record + ",");
+  std::ofstream(file) << text;
+  loaded = load_state_file(file, {});
+  CHECK(loaded.found);
+  CHECK_FALSE(loaded.damaged);
+  CHECK(loaded.state.reference_degC == sample_state().reference_degC);
+  CHECK_FALSE(loaded.reference.is_known());
+}

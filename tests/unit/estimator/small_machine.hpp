@@ -26,6 +26,7 @@ inline EstimatorConfig small_config() {
   config.signals = {"spindle_rpm", "cutting_on", "compensation_off_on"};
   config.axes = {{"z", "z_um", 1.0, {50.0, 10.0}}};
   config.compensation.disable_signal = "compensation_off_on";
+  config.compensation.enabled_at_first_start = true;
   return config;
 }
 

@@ -90,6 +90,7 @@ def daemon_text(interface, controller_interface):
             f'[controller]\nname = "cnc"\nkind = "can"\ninterface = "{controller_interface}"\n'
             f'period_s = 0.05\nsilent_after_s = {SILENT_AFTER_S}\n' + PLACES +
             AXIS.replace("@LIMITS@", LIMITS) +
+            "[compensation]\nenabled_at_first_start = true\n"
             "[history]\n@HISTORY@\noffsets_period_s = 0.01\ncommit_s = 0.5\n")
 
 

@@ -77,6 +77,8 @@ offset_um_max = 100.0
 rate_um_per_s_max = 200.0
 offset = { id = 0x200, start_bit = 0, length_bits = 32, scale = 0.01 }
 applied = { id = 0x300, start_bit = 7, length_bits = 32, byte_order = "big_endian", scale = 0.01 }
+[compensation]
+enabled_at_first_start = true
 [history]
 @HISTORY@
 offsets_period_s = 0.01
@@ -191,7 +193,8 @@ def test_a_message_of_the_controller_ends_a_machining_cycle(lab):
     config = CONFIG.replace("stale_after_s = 60.0", "stale_after_s = 600.0")
     config = config.replace("[[axis]]", '[[controller.signal]]\nname = "cycles"\nid = 0x301\n'
                             "start_bit = 0\nlength_bits = 16\n[[axis]]")
-    config += '[compensation]\nupdate = "each_cycle"\ncycle_end_signal = "cycles"\n'
+    config = config.replace("[compensation]\n", '[compensation]\nupdate = "each_cycle"\n'
+                            'cycle_end_signal = "cycles"\n')
     daemon = lab.daemon(config).start()
     send_temperatures(20.0, 20.0)
     daemon.wait_for_mode("compensating")

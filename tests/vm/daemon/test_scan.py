@@ -66,7 +66,10 @@ def frames():
         bus.end()
 
 
-def configuration(folder, kind, device, sensors):
+NO_CONTROLLER = 'name = "n"\nkind = "dry_run"\n[[axis]]\nname = "z"\noutput = "z_um"\n'
+
+
+def configuration(folder, kind, device, sensors, controller=NO_CONTROLLER):
     (folder / "model.toml").write_text(MODEL)
     text = 'format = 1\n[model]\nfile = "model.toml"\n'
     text += f'[[bus]]\nname = "b"\nkind = "{kind}"\ninterface = "vcan0"\n'
@@ -75,7 +78,7 @@ def configuration(folder, kind, device, sensors):
                     for name, keys in sensors)
     names = json.dumps([name for name, _ in sensors])
     text += f'[[block]]\nname = "a"\ninput = "t_degC"\nsensors = {names}\n'
-    text += '[controller]\nname = "n"\nkind = "dry_run"\n[[axis]]\nname = "z"\noutput = "z_um"\n'
+    text += "[controller]\n" + controller
     text += "offset_um_max = 60.0\nrate_um_per_s_max = 0.5\n"
     (folder / "c.toml").write_text(text)
     return folder / "c.toml"
@@ -123,3 +126,53 @@ def test_canopen_nodes_are_found_whether_configured_or_not(frames, tmp_path):
                          [("probe", "channel = 1")])
     bus, _ = scan(path, "--find")
     assert bus["found"] == [5, 9, 12]
+
+
+def test_a_controller_is_listened_to_and_nothing_is_sent(frames, tmp_path):
+    applied = struct.pack(">h", -250)
+    frames([(0x181, bytes.fromhex("FA00")), (0x281, applied + b"\x01"), (0x282, b"\x07")])
+    controller = """name = "cnc"
+kind = "can"
+interface = "vcan0"
+heartbeat = { id = 0x200, start_bit = 56, length_bits = 8 }
+[[controller.signal]]
+name = "cutting_on"
+id = 0x281
+start_bit = 16
+length_bits = 1
+signed = false
+[[controller.signal]]
+name = "x_mm"
+id = 0x282
+start_bit = 0
+length_bits = 32
+[[controller.signal]]
+name = "y_mm"
+id = 0x283
+start_bit = 0
+length_bits = 32
+[[axis]]
+name = "z"
+output = "z_um"
+offset = { id = 0x200, start_bit = 0, length_bits = 16, scale = 0.01 }
+applied = { id = 0x281, start_bit = 7, length_bits = 16, byte_order = "big_endian", scale = 0.01 }
+"""
+    path = configuration(tmp_path, "can", "id = 0x181\nlength_bits = 16\nscale = 0.1\n",
+                         [("good", "start_bit = 0")], controller)
+    listener = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    listener.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", 0x200, 0x7FF))
+    listener.bind(("vcan0",))
+    listener.setblocking(False)
+    done = subprocess.run([BIN / "thermocomp", "scan", path, "--json", "--listen", "3"],
+                          capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1, done.stderr
+    report = json.loads(done.stdout)
+    assert report["good"] == 1
+    found = report["controller"]
+    assert found["kind"] == "can" and found["error"] == "" and not found["complete"]
+    values = {each["what"]: each for each in found["values"]}
+    assert values["applied of axis z"]["value"] == -2.5 and values["cutting_on"]["value"] == 1
+    assert values["x_mm"]["why"] == "the frame has 1 bytes, too few"
+    assert values["y_mm"]["why"] == "no frame with identifier 0x283 came"
+    with pytest.raises(BlockingIOError), listener:
+        listener.recv(16)

@@ -1,0 +1,171 @@
+"""A machine's first day: nothing moves before an operator says so, and what would take a wrong
+reference is refused. The real daemon beside the simulated machine."""
+
+import json
+import subprocess
+import time
+
+import pytest
+
+from lab import BIN, Refused, eventually, run_tool
+from plain_devices import CONFIG, MODEL
+from test_survival import SIMULATED
+
+# The column cools by 4 K, for which 12 um are to be added.
+WANTED_um = 12.0
+REJECTS = '[[event]]\nkind = "reject"\ntarget = "cnc"\nat_s = 0.0\nduration_s = 1e9\n'
+
+
+class FirstDay:
+    """thermocomp-sim with module and controller; the daemon's configuration says nothing of its
+    first start."""
+
+    def __init__(self, lab):
+        self.lab = lab
+        run = lab.folder / "run.csv"
+        run.write_text("time_s,column_degC,spindle_degC,z_um\n0,20,20,0\n1,16,20,0\n2,16,20,0\n")
+        (lab.folder / "model.toml").write_text(MODEL)
+        self.ports = {"sensors": 0, "cnc": 0}
+        self.simulator = None
+
+    def show(self, rows, events=""):
+        """These rows of the run, from now on; the machine stays where it was switched off."""
+        if self.simulator is not None:
+            self.simulator.end()
+        ports = [word for name, port in self.ports.items() for word in ("--port", f"{name}={port}")]
+        self.simulator = self.lab.simulator(
+            SIMULATED + events, *ports, "--replay", self.lab.folder / "run.csv", "--rows", rows,
+            "--row-period-ms", 20, "--stay")
+        self.ports = self.simulator.ready["ports"]
+
+    def daemon(self, more=""):
+        config = CONFIG.format(module=self.ports["sensors"], controller=self.ports["cnc"])
+        assert "enabled_at_first_start = true\n" in config
+        config = config.replace("enabled_at_first_start = true\n", more)
+        return self.lab.daemon(config.replace("prove_hold_s = 0.2", "prove_hold_s = 3.0"))
+
+
+@pytest.fixture
+def day(lab):
+    return FirstDay(lab)
+
+
+def column(daemon):
+    return daemon.status()["inputs"][0]
+
+
+def test_nothing_moves_before_an_operator_enables_it_and_what_was_said_survives(day):
+    day.show("0:1")
+    daemon = day.daemon()
+    status, out, said = run_tool("check", daemon.config)
+    assert status == 0, said
+    assert "first start: switched off until `thermocomp enable`" in out
+    assert "compared: NEVER" in out
+    daemon.start()
+    eventually(lambda: daemon.status()["reasons"] == ["operator_disabled"] and
+               daemon.axis()["driven"], "nothing but the operator is missing")
+    assert daemon.status()["mode"] == "disabled" and not daemon.status()["enabled"]
+    day.show("1:")  # cold now
+    eventually(lambda: daemon.axis()["displacement"] == pytest.approx(-WANTED_um, abs=0.05),
+               "the model sees it")
+    eventually(lambda: daemon.axis()["driven"], "the controller is back")
+    told = daemon.status()
+    assert told["axes"][0]["offset"] == 0.0 and told["axes"][0]["applied"] == 0.0
+    assert not told["model"]["compared"]
+    status, out, _ = daemon.cli("status")
+    assert status == 1 and "never switched on yet -> thermocomp enable" in out
+    assert "NEVER COMPARED with measured displacement" in out
+    daemon.end()
+    daemon.start().wait_for_mode("disabled")  # a restart is no answer
+
+    assert daemon.cli("enable")[0] == 0
+    eventually(lambda: daemon.axis()["applied"] == pytest.approx(WANTED_um, abs=0.05), "applied")
+    daemon.kill()
+    daemon.start().wait_for_mode("compensating")
+    assert daemon.cli("disable")[0] == 0
+    daemon.kill()
+    daemon.start().wait_for_mode("disabled")
+
+
+def test_the_key_makes_a_first_start_compensate_at_once(day):
+    day.show("0:1")
+    daemon = day.daemon("enabled_at_first_start = true\n")
+    assert "COMPENSATES AT ONCE" in run_tool("check", daemon.config)[1]
+    daemon.start().wait_for_mode("compensating")
+
+
+def test_a_reference_is_refused_where_it_would_be_wrong_unless_forced(day):
+    day.show("0:1")
+    daemon = day.daemon().start()
+    eventually(lambda: column(daemon)["rate_K_per_h"] == 0.0, "temperatures, twice")
+    began_s = time.time()
+    status, out, said = daemon.cli("reference")
+    assert status == 0, said
+    assert "the temperatures have been watched for" in out  # too short to tell slow warming
+    told = daemon.status()["reference"]
+    assert told["by"] == "operator" and not told["lost"]
+    assert began_s - 1.0 <= told["wall_s"] <= time.time() + 1.0
+    assert told["temps_degC"] == {"column_degC": 20.0, "spindle_degC": 20.0}
+    taken = [line for line in daemon.cli("status")[1].splitlines() if "Reference" in line]
+    assert len(taken) == 1 and "by thermocomp reference, at 20.00 degC" in taken[0], taken
+
+    # Warming or cooling, with the offsets at zero.
+    day.show("1:")
+    eventually(lambda: column(daemon)["temp_degC"] == 16.0, "it is cold")
+    status, _, said = daemon.cli("reference")
+    assert status == 1, said
+    assert "no reference is taken: column_degC changes by -" in said and "cooling" in said
+    assert "thermocomp reference --force" in said and "has an offset" not in said
+    assert daemon.status()["reference"] == told
+
+    # With an offset too.
+    assert daemon.cli("enable")[0] == 0
+    daemon.wait_for_offset(WANTED_um, 0.05)
+    with pytest.raises(Refused, match=r"axis z has an offset of \+1[12]\.[0-9]*: .*column_degC"):
+        daemon.call("reference")
+    with pytest.raises(Refused, match="params.force must be true or false"):
+        daemon.call("reference", force="yes")
+    assert daemon.status()["reference"] == told
+
+    # While an axis is proved.
+    moving = subprocess.Popen([BIN / "thermocomp", "--socket", daemon.socket, "prove", "z", "4"],
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    eventually(lambda: daemon.axis()["proving"], "it moves")
+    with pytest.raises(Refused, match="axis z is being proved: wait until it has come back"):
+        daemon.call("reference")
+    out, said = moving.communicate(timeout=60)
+    assert moving.returncode == 0, (out, said)
+
+    status, out, said = daemon.cli("reference", "--force")
+    assert status == 0 and "taken although axis z has an offset" in out, (out, said)
+    forced = daemon.status()["reference"]
+    assert forced["temps_degC"]["column_degC"] == 16.0 and forced["wall_s"] > told["wall_s"]
+    daemon.wait_for_offset(0.0, 0.0)
+    # It is the state file's, also for the next start.
+    daemon.kill()
+    kept = json.loads(daemon.state.read_text())["reference_taken"]
+    assert kept == {"by": "operator", "wall_s": forced["wall_s"]}
+    daemon.start()
+    eventually(lambda: column(daemon)["good"], "temperatures")
+    assert daemon.status()["reference"] == forced
+
+
+def test_proving_waits_shows_progress_and_tells_what_was_read(day):
+    day.show("0:1")
+    daemon = day.daemon().start()
+    daemon.wait_for_mode("disabled")
+    eventually(lambda: daemon.axis()["driven"], "the controller takes orders")
+    status, out, said = daemon.cli("prove", "z", "4")
+    assert status == 0, (out, said)
+    assert "axis z: moved and came back: sent +4.00 um at the farthest, read back +4.00 um" in out
+    # 3 s there, and no terminal: a line every two seconds
+    assert "axis z: sent +4.00 um, read back +4.00 um\n" in said
+    eventually(lambda: not daemon.axis()["proving"] and daemon.axis()["applied"] == 0.0, "back")
+
+    # A controller that takes nothing: what is read back does not move.
+    day.show("0:1", REJECTS)
+    eventually(lambda: daemon.status()["controller"]["online"] and daemon.axis()["driven"],
+               "the controller is back")
+    status, out, said = daemon.cli("prove", "z", "4")
+    assert status == 1, (out, said)
+    assert "axis z: " in out and "NOT" in out and "read back +0.00 um there" in out, out

@@ -1,0 +1,72 @@
+#include "cli/scan_report.hpp"
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+using namespace thermocomp;
+using namespace thermocomp::cli;
+using Catch::Matchers::Contains;
+
+namespace {
+
+ScanValue there(const std::string& what, double value) {
+  ScanValue shown;
+  shown.what = what;
+  shown.place = "input 10 uint16";
+  shown.raw = "00 0A";
+  shown.value = value;
+  return shown;
+}
+
+ScanValue missing(const std::string& what) {
+  ScanValue shown;
+  shown.what = what;
+  shown.place = "input 20 uint16";
+  shown.why = "the controller answers with exception 2 (illegal data address)";
+  return shown;
+}
+
+ScanReport report_of(std::vector<ScanValue> values) {
+  ScanReport report;
+  report.controller = {"cnc", "modbus_tcp", "127.0.0.1:502", "unit 1", "", "", std::move(values)};
+  return report;
+}
+
+}  // namespace
+
+TEST_CASE("a controller that has everything makes a scan complete", "[cli][scan]") {
+  const ScanReport report = report_of({there("spindle_rpm", 10.0), there("heartbeat", 0.0)});
+  CHECK(is_complete(report));
+  CHECK_THAT(scan_text(report, false), Contains("spindle_rpm  input 10 uint16  00 0A  -> 10.00") &&
+                                           Contains("2 of 2 places of the controller are there\n"));
+  CHECK(scan_json(report)["controller"]["complete"] == true);
+  CHECK(scan_json(ScanReport{})["controller"].is_null());
+  CHECK(is_complete(ScanReport{}));
+}
+
+TEST_CASE("what a controller lacks is named, with what it answered", "[cli][scan]") {
+  const ScanReport report =
+      report_of({there("spindle_rpm", 10.0), missing("x_mm"), missing("heartbeat")});
+  CHECK_FALSE(is_complete(report));
+  CHECK_THAT(scan_text(report, false),
+             Contains("-> missing\n        the controller answers with exception 2") &&
+                 Contains("1 of 3 places of the controller are there; missing: x_mm, heartbeat\n"));
+  const auto values = scan_json(report)["controller"]["values"];
+  CHECK(values[1]["value"].is_null());
+  CHECK_THAT(values[1]["why"].get<std::string>(), Contains("exception 2"));
+}
+
+TEST_CASE("values that are there, but not as the daemon asks for them, are no complete controller",
+          "[cli][scan]") {
+  ScanReport report = report_of({there("spindle_rpm", 10.0)});
+  report.controller->refused = "the daemon reads input 10..18 in one request";
+  CHECK_FALSE(is_complete(report));
+  CHECK_THAT(scan_text(report, false), Contains("in one request"));
+  report.controller->refused.clear();
+  report.controller->error = "cannot be opened: Connection refused";
+  CHECK_FALSE(is_complete(report));
+}
+
+TEST_CASE("registers are shown as they come over the wire", "[cli][scan]") {
+  CHECK(hex_words(std::vector<std::uint16_t>{0x12AB, 0x0003}) == "12 AB 00 03");
+}
