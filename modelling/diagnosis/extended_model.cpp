@@ -7,9 +7,18 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double normal_95 = 1.96;
+/// What a machine does besides is no noise of this search: with this factor 92 of 100 values that
+/// were planted in measured machines lie within (1: 60 to 70). Jumps need none.
+constexpr double wider_on_machines = 4.0;
 
-Interval around(double value, double sd) {
-  return {value - normal_95 * sd, value + normal_95 * sd};
+double reach(const std::string& parameter, double sd) {
+  const bool of_a_jump =
+      parameter == "at_s" || parameter == "gain" || parameter == "step_K" || parameter == "step_um";
+  return normal_95 * (of_a_jump ? 1.0 : wider_on_machines) * sd;
+}
+
+Interval around(double value, double reach) {
+  return {value - reach, value + reach};
 }
 
 /// The first output that the explanation acts on.
@@ -27,7 +36,8 @@ Parameter gain_table(const Finding& finding, const MeasuredData& data, Eigen::In
     if (each.gains[output].size() == 0) continue;
     const std::string& name = data.model.outputs[output];
     parameter.values[name] = each.gains[output][index];
-    parameter.ci95[name] = around(each.gains[output][index], finding.gain_sd[output][index]);
+    parameter.ci95[name] =
+        around(each.gains[output][index], reach(parameter.name, finding.gain_sd[output][index]));
   }
   return parameter;
 }
@@ -56,12 +66,12 @@ Parameter single_gain(const Finding& finding) {
   const Explanation& each = finding.explanation;
   const std::size_t output = first_output(each);
   const double gain = each.gains[output][0];
-  const double sd = finding.gain_sd[output][0];
   const std::string& name = each.hypothesis->gains.front();
+  const double wide = reach(name, finding.gain_sd[output][0]);
   if (each.hypothesis->cause != "sensor_loose")
-    return {name, {{"", gain}}, {{"", around(gain, sd)}}};
+    return {name, {{"", gain}}, {{"", around(gain, wide)}}};
   const double kept = 1.0 / (1.0 + gain);
-  return {name, {{"", kept}}, {{"", around(kept, sd * kept * kept)}}};
+  return {name, {{"", kept}}, {{"", around(kept, wide * kept * kept)}}};
 }
 
 }  // namespace
@@ -73,11 +83,11 @@ std::vector<Parameter> parameters_of(const Finding& finding, const MeasuredData&
   for (std::size_t i = 0; i < hypothesis.shape.size(); ++i) {
     const double value = each.shape[i];
     Parameter parameter{hypothesis.shape[i].name, {{"", value}}, {}};
-    const double sd = finding.shape_sd[i];
+    const double wide = reach(parameter.name, finding.shape_sd[i]);
     if (hypothesis.shape[i].logarithmic && value > 0)
-      parameter.ci95[""] = {value * std::exp(-normal_95 * sd), value * std::exp(normal_95 * sd)};
+      parameter.ci95[""] = {value * std::exp(-wide), value * std::exp(wide)};
     else if (!hypothesis.shape[i].discrete)
-      parameter.ci95[""] = around(value, sd);
+      parameter.ci95[""] = around(value, wide);
     all.push_back(std::move(parameter));
   }
   if (hypothesis.cause == "position_dependence") {

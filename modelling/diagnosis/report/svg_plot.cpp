@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <ranges>
 
 #include "modelling/markup/xml_text.hpp"
 
@@ -145,11 +146,10 @@ std::string panel_svg(const PlotPanel& panel, const Box& box, const Column& time
   std::string svg = label(4, box.y - 6, title, "class=\"title\"");
   svg += vertical_axis(box, y, panel.height > 100 ? 5 : 3);
   double legend = width - right;
-  for (auto line = panel.lines.rbegin(); line != panel.lines.rend(); ++line) {
-    if (line->label.empty()) continue;
-    svg +=
-        label(legend, box.y - 6, line->label, "text-anchor=\"end\" fill=\"" + line->colour + "\"");
-    legend -= 14.0 + 6.6 * static_cast<double>(line->label.size());
+  for (const PlotLine& line : std::ranges::reverse_view(panel.lines)) {
+    if (line.label.empty()) continue;
+    svg += label(legend, box.y - 6, line.label, "text-anchor=\"end\" fill=\"" + line.colour + "\"");
+    legend -= 14.0 + 6.6 * static_cast<double>(line.label.size());
   }
   const auto points = std::min<Eigen::Index>(
       points_max,
