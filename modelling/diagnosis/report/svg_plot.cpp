@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ranges>
 
 #include "modelling/markup/xml_text.hpp"
 
@@ -146,7 +145,8 @@ std::string panel_svg(const PlotPanel& panel, const Box& box, const Column& time
   std::string svg = label(4, box.y - 6, title, "class=\"title\"");
   svg += vertical_axis(box, y, panel.height > 100 ? 5 : 3);
   double legend = width - right;
-  for (const PlotLine& line : std::ranges::reverse_view(panel.lines)) {
+  for (std::size_t i = panel.lines.size(); i > 0; --i) {
+    const PlotLine& line = panel.lines[i - 1];
     if (line.label.empty()) continue;
     svg += label(legend, box.y - 6, line.label, "text-anchor=\"end\" fill=\"" + line.colour + "\"");
     legend -= 14.0 + 6.6 * static_cast<double>(line.label.size());
