@@ -23,13 +23,16 @@ def main(program):
         print("no measured data at %s" % measured_machines.DATA)
         return 77
     machines = ["spindle", "printer"]
-    tasks = [([program], SEED + i, machines, "few", cause, 3.0) for i, cause in enumerate(CAUSES)]
-    tasks += [([program], SEED + i, machines, "ridge", None, 0.0) for i in range(UNTOUCHED)]
+    tasks = [([program], SEED + i, machines, "few", cause, 3.0, "single")
+             for i, cause in enumerate(CAUSES)]
+    tasks += [([program], SEED + i, machines, "ridge", None, 0.0, "single")
+              for i in range(UNTOUCHED)]
     wrong = invented = 0
     for task in tasks:
-        task, truth, answer = measured.examine(task)
+        task, truths, answer = measured.examine(task)
         if answer is None:
             continue
+        truth = truths and truths[0]
         if truth is None:
             invented += any(f["probability"] > measured.STATED for f in answer["findings"])
         elif not (answer["findings"] and measured.right(answer["findings"][0], truth)):
