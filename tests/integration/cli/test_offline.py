@@ -113,6 +113,15 @@ def test_predict_of_a_selection_refers_to_the_first_row_of_the_file(files):
     assert answer.stdout.splitlines()[1].split(",") == ["30", "4", "4", "0"]
 
 
+def test_predict_says_when_nothing_was_measured(files):
+    (files / "run.csv").write_text("time_s,t1_degC,z_measured_um\n0,20,\n10,21,3\n")
+    answer = predict(files)
+    assert answer.returncode == 0
+    assert answer.stderr.splitlines() == [
+        "z_um nan nan",
+        "z_um: run.csv has no such column, so there is nothing to compare with"]
+
+
 @pytest.mark.parametrize("name, text", [
     ("model.toml", "format = 2\n"), ("model.toml", MODEL + "surprise = 1\n"),
     ("model.toml", MODEL.replace("2.0", "nan")), ("model.toml", "not toml"),
