@@ -1,7 +1,7 @@
 #!/bin/bash
 # A simulated machining centre works through an eight-hour shift in 48 s; thermocompd reads its
-# thermocouples over Modbus, and keeps its tool where it should be. At the end: a picture, and what
-# was left of the error. Everything it writes is in demo_output/.
+# thermocouples and the height of its head over Modbus, and keeps its tool where it should be. At the
+# end: a picture, and what was left of the error. Everything it writes is in demo_output/.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
 source scripts/common.sh
@@ -88,9 +88,10 @@ start_daemon() {
   eventually 20 "thermocompd does not get ready" daemon_answers
 }
 
+# Until a second before the machine ends: without it the daemon has only faults to tell.
 watch_the_shift() {
   local ended=0
-  "$bin/thermocomp" --socket "$run/status.sock" watch --truth "$out/truth.csv" --for "$shift_s" &
+  "$bin/thermocomp" --socket "$run/status.sock" watch --truth "$out/truth.csv" --for "$((shift_s - 1))" &
   watch_pid=$!
   wait "$watch_pid" || ended=$?
   watch_pid=''

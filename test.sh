@@ -51,6 +51,11 @@ case $preset in
     ;;
 esac
 
+# The results of the tests, and of those that were repeated (.ci/run counts them).
+results=$PWD/build/$preset/results.xml
+repeated=$PWD/build/$preset/results_repeated.xml
+failed_names=build/$preset/Testing/Temporary/LastTestsFailed.log  # ctest's own
+
 # What was left out, and why: a skipped test must not look like one that passed.
 say_what_was_skipped() {
   local log=build/$preset/Testing/Temporary/LastTest.log
@@ -80,6 +85,19 @@ show_sanitizer_reports() {
   return "$status"
 }
 
+# What failed beside others runs once more, alone: a machine that is busy with something else must not
+# decide. What then passes is named, for a test that fails by chance is a defect too.
+repeat_failed() {
+  local status=0
+  [[ -s $failed_names ]] || return 1
+  echo "== repeating alone what failed"
+  "$@" ctest --preset "$preset" --no-tests=error --rerun-failed -j 1 --output-junit "$repeated" ||
+    status=$?
+  sed -n 's/.*<testcase name="\([^"]*\)".* status="run".*/passed only when repeated alone: \1/p' \
+    "$repeated"
+  return "$status"
+}
+
 run_tests() {
   local runner=() status=0
   export PYTEST_ADDOPTS=-rs  # pytest names what it skips
@@ -90,7 +108,11 @@ run_tests() {
   if [[ $preset == coverage ]]; then find "build/$preset" -name '*.gcda' -delete; fi
   # Two places a CPU: a test that computes takes both (cmake/ThermocompTargets.cmake).
   "${runner[@]}" ctest --preset "$preset" --no-tests=error -j "$((2 * $(nproc)))" \
-    "${ctest_options[@]}" || status=$?
+    "${ctest_options[@]}" --output-junit "$results" || status=$?
+  if ((status != 0)); then
+    status=0
+    repeat_failed "${runner[@]}" || status=$?
+  fi
   if [[ $preset == tsan || $preset == asan-ubsan* ]]; then show_sanitizer_reports || status=1; fi
   return "$status"
 }
@@ -117,6 +139,7 @@ stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)" "${bui
 if [[ $quick == no && ($preset == asan-ubsan* || $preset == tsan) ]]; then
   stage "kernel of the guest" scripts/guest-kernel.sh || true
 fi
+rm -f "$results" "$repeated" "$failed_names"
 status=0
 stage "tests $preset" run_tests || status=$?
 say_what_was_skipped

@@ -4,4 +4,4 @@
 # splits. Takes some minutes.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
-exec /usr/bin/python3 "$here/diagnose_baselines.py" "$THERMOCOMP_BENCH_BUILD/bin/thermocomp-modelling"
+exec /usr/bin/python3 "$here/diagnose/baselines.py" "$THERMOCOMP_BENCH_BUILD/bin/thermocomp-modelling"

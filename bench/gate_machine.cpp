@@ -18,9 +18,9 @@
 #include <vector>
 
 #include "config/model_file.hpp"
-#include "estimator/displacement_model.hpp"
-#include "estimator/low_pass.hpp"
-#include "estimator/running_correction.hpp"
+#include "estimator/learning/running_correction.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/model/terms/low_pass.hpp"
 #include "gate_structure.hpp"
 
 namespace {

@@ -6,8 +6,8 @@
 
 #include "estimator/checks.hpp"
 #include "modelling/structure/heat_model.hpp"
-#include "modelling/structure/locate.hpp"
-#include "modelling/structure/statics.hpp"
+#include "modelling/structure/solve/locate.hpp"
+#include "modelling/structure/solve/statics.hpp"
 #include "modelling/structure/structure_model.hpp"
 
 namespace thermocomp::bench {

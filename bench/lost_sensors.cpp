@@ -15,7 +15,7 @@
 #include "cli/covariance_fit.hpp"
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 namespace {

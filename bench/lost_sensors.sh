@@ -1,5 +1,5 @@
 #!/bin/sh
-# The offset's error when sensors are lost, estimated and held; docs/lost_sensors.md explains the
+# The offset's error when sensors are lost, estimated and held; docs/measurements.md has the
 # table. The data: $THERMOCOMP_DATA, else shared/data beside the source.
 set -eu
 source_dir=$(cd "$(dirname "$0")/.." && pwd)

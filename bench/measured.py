@@ -3,12 +3,15 @@ what `thermocomp diagnose` makes of a ridge model.
 
     measured.py PROGRAM [--data FOLDER] [--splits TEXT] [--peers NAME,...]
 
-The last lines: each split's RMS by method (mean over its outputs), then ours over the best peer of
-the split: the median, the largest; and rows that are worse than no model without being called
-outside.
+The last lines: each split's RMS by method (mean over its outputs); what `fit` stated of its model
+beside what it left of the test rows (the median over outputs of their ratio; `told_as_range` where
+it states no figure); how many rows were said to be outside, and the error inside and outside. Then
+ours over the best peer of the split: the median, the largest; rows that are worse than no model
+without being called outside; and how many stated figures are right within 0.7 to 1.5.
 """
 
 import argparse
+import json
 import os
 import pathlib
 import subprocess
@@ -93,6 +96,24 @@ def diagnosed(program, split, train, test, folder):
     return left_by(program, out / "model.toml", test, split)[0], seconds
 
 
+def fitted(program, split, train, model):
+    """Fits without further options; the answer for a program, and seconds."""
+    start = time.monotonic()
+    said = subprocess.run([program, "fit", *train, "--outputs", ",".join(split.outputs), "-o",
+                           model, "--json"], capture_output=True, text=True, check=False)
+    if said.returncode != 0:
+        raise SystemExit(f"{split.name}: fit: {said.stderr}")
+    print(said.stderr, file=sys.stderr)
+    return json.loads(said.stdout), time.monotonic() - start
+
+
+def share_covered(columns, name):
+    """Rows on which the error is less than twice the stated standard deviation."""
+    stem, unit = name.rsplit("_", 1)
+    error, sd = columns[f"{stem}_residual_{unit}"], columns[f"{stem}_sd_{unit}"]
+    return float(np.mean(np.abs(error) <= 2 * sd))
+
+
 def judge(program, split, names, folder):
     """RMS of each method, mean over outputs; and of ours where it is not called outside."""
     figures = {}
@@ -102,9 +123,14 @@ def judge(program, split, names, folder):
     folder.mkdir()
     train, test = arguments(split.train, folder, "train"), arguments(split.test, folder, "test")
     model = folder / "model.toml"
-    seconds = run(f"{split.name}: fit", [program, "fit", *train, "--outputs",
-                                         ",".join(split.outputs), "-o", model])
+    answer, seconds = fitted(program, split, train, model)
     left, moved, outside = left_by(program, model, test, split)
+    figures["family"] = answer["family"]
+    figures["runs"] = len(train)
+    figures["stated"] = float(np.median([rms(e) / answer["left_out_rms_um"][name]
+                                         for name, e in zip(split.outputs, left)]))
+    last = data.read(model.with_name("predicted.csv"))
+    figures["covered"] = float(np.mean([share_covered(last, name) for name in split.outputs]))
     figures["fit"] = float(np.mean([rms(each) for each in left]))
     left_diagnosed, figures["diagnose_seconds"] = diagnosed(program, split, train, test, folder)
     figures["diagnose"] = float(np.mean([rms(each) for each in left_diagnosed]))
@@ -112,6 +138,7 @@ def judge(program, split, names, folder):
     figures["inside"] = float(np.mean([rms(e[inside]) for e in left])) if inside.any() else 0.0
     figures["none_inside"] = (float(np.mean([rms(e[inside]) for e in moved]))
                               if inside.any() else 0.0)
+    figures["outside"] = float(np.mean([rms(e[outside]) for e in left])) if outside.any() else 0.0
     figures["outside_share"] = float(outside.mean())
     figures["seconds"] = seconds
     return figures
@@ -129,7 +156,7 @@ def main():
         print(f"no measured data in {options.data} (THERMOCOMP_DATA): nothing to measure")
         return 77
     names = options.peers.split(",")
-    ratios, lines, worse = [], [], 0
+    ratios, lines, worse, stated = [], [], 0, []
     with tempfile.TemporaryDirectory() as folder:
         for split in data.all_splits(options.data):
             if options.splits not in split.name:
@@ -143,14 +170,23 @@ def main():
             lines.append(f"{split.name}_fit_over_best_peer {ratios[-1]:.3f} ratio")
             lines.append(f"{split.name}_diagnose_over_ridge "
                          f"{figures['diagnose'] / figures['ridge']:.3f} ratio")
+            lines.append(f"{split.name}_family {figures['family']} name")
+            lines.append(f"{split.name}_true_over_stated {figures['stated']:.3f} "
+                         f"{'ratio' if figures['runs'] >= 3 else 'told_as_range'}")
+            lines.append(f"{split.name}_within_two_sd {figures['covered']:.3f} share")
+            if figures["runs"] >= 3:  # fewer: `fit` tells a range in words
+                stated.append(figures["stated"])
             lines.append(f"{split.name}_outside {figures['outside_share']:.3f} share")
             lines.append(f"{split.name}_fit_inside {figures['inside']:.3f} um")
+            lines.append(f"{split.name}_fit_outside {figures['outside']:.3f} um")
             lines.append(f"{split.name}_fit_seconds {figures['seconds']:.1f} s")
             lines.append(f"{split.name}_diagnose_seconds {figures['diagnose_seconds']:.1f} s")
     print("\n".join(lines))
     print(f"fit_over_best_peer_median {np.median(ratios):.3f} ratio")
     print(f"fit_over_best_peer_largest {max(ratios):.3f} ratio")
     print(f"splits_worse_than_none_inside {worse} splits")
+    right = sum(0.7 <= ratio <= 1.5 for ratio in stated)
+    print(f"stated_figures_right {right} of_{len(stated)}")
     return 0
 
 

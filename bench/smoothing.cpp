@@ -4,7 +4,7 @@
 /// Spikes, per sensor and row (15 s): 0.5 % single ones of +-1..10 K; 0.05 % begin a burst of 2 to
 /// 4 rows, each with an amplitude of its own of +-1..10 K. Screening is left out: only the
 /// smoothing is looked at.
-#include "estimator/smoothing.hpp"
+#include "estimator/sensing/smoothing.hpp"
 
 #include <algorithm>
 #include <cmath>

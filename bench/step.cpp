@@ -17,7 +17,7 @@
 
 #include <Eigen/Core>
 
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 namespace {

@@ -22,7 +22,7 @@
 #include <sys/resource.h>
 
 #include "config/number_text.hpp"
-#include "modelling/structure/statics.hpp"
+#include "modelling/structure/solve/statics.hpp"
 #include "modelling/structure/structure_model.hpp"
 
 namespace {

@@ -1,5 +1,6 @@
 #include "cli/check_command.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "cli/register_table.hpp"
 #include "config/daemon_config.hpp"
 #include "config/problems.hpp"
+#include "gateway/settings/gateway_settings.hpp"
 
 namespace thermocomp::cli {
 
@@ -47,6 +49,24 @@ std::string list_names(const Names& items) {
   std::string result;
   for (const auto& item : items) result += (result.empty() ? "" : ", ") + item.name;
   return result;
+}
+
+/// Sensors that the model gets nothing from; empty where there is none.
+std::string unused_sensors_text(const EstimatorConfig& config) {
+  std::string names;
+  for (std::size_t i = 0; i < config.sensors.size(); ++i) {
+    const bool is_used =
+        std::any_of(config.blocks.begin(), config.blocks.end(),
+                    [i](const BlockConfig& block) {
+                      return std::find(block.sensors.begin(), block.sensors.end(), i) !=
+                             block.sensors.end();
+                    }) ||
+        std::any_of(config.sensors.begin(), config.sensors.end(),
+                    [i](const SensorConfig& other) { return other.reference_sensor == i; });
+    if (!is_used) names += (names.empty() ? "" : ", ") + config.sensors[i].name;
+  }
+  if (names.empty()) return {};
+  return "in no block: " + names + " (recorded, but nothing is computed from it)\n";
 }
 
 /// What the model file says of how well it fits a machine.
@@ -90,7 +110,7 @@ void print_what_was_found(const DaemonConfig& config) {
             << '\n'
             << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)
             << '\n'
-            << "axes: " << list_names(estimator.axes) << '\n'
+            << unused_sensors_text(estimator) << "axes: " << list_names(estimator.axes) << '\n'
             << "controller " << controller_kind(config) << ", "
             << counted(estimator.signals.size(), "signal") << '\n'
             << "model " << config.model_file.string() << ": "
@@ -103,6 +123,35 @@ void print_what_was_found(const DaemonConfig& config) {
             << config.file.string() << ": OK\n";
 }
 
+std::string door_text(const gateway::HttpSettings& http) {
+  if (!http.enabled) return "http: off";
+  return "http: " + http.address + " port " + std::to_string(http.port) +
+         (http.has_tls() ? ", TLS" : ", no TLS") +
+         (http.passwords.empty() ? ", no passwords" : ", passwords");
+}
+
+void print_gateway(const gateway::GatewaySettings& settings) {
+  const gateway::MqttSettings& mqtt = settings.mqtt;
+  const gateway::ShdrSettings& shdr = settings.shdr;
+  std::string commands = settings.commands.users.empty() ? "none" : "";
+  for (const std::string& method : settings.commands.methods)
+    commands += (commands.empty() ? "" : ", ") + method;
+  std::cout << "gateway of machine " << settings.machine << ", daemon at "
+            << settings.socket.string() << '\n'
+            << door_text(settings.http) << '\n'
+            << "commands: " << commands << '\n'
+            << "mqtt: "
+            << (mqtt.enabled ? mqtt.host + " port " + std::to_string(mqtt.port) +
+                                   (mqtt.authority.empty() ? ", no TLS" : ", TLS")
+                             : "off")
+            << '\n'
+            << "shdr: "
+            << (shdr.enabled ? shdr.address + " port " + std::to_string(shdr.port) : "off") << '\n'
+            << "alarm command: "
+            << (settings.alarm.command.empty() ? "none" : settings.alarm.command.front()) << '\n'
+            << settings.file.string() << ": OK\n";
+}
+
 struct CheckOptions {
   std::string file;
   bool registers{false};
@@ -111,6 +160,10 @@ struct CheckOptions {
 int run_check(const CheckOptions& options) {
   const std::string& file = options.file;
   try {
+    if (gateway::is_gateway_file(file)) {
+      print_gateway(gateway::load_gateway_settings(file));
+      return exit_success;
+    }
     const DaemonConfig config = load_daemon_config(file);
     if (options.registers)
       std::cout << register_table(config);
@@ -130,10 +183,10 @@ int run_check(const CheckOptions& options) {
 }  // namespace
 
 void add_check_command(CLI::App& app, Action& action) {
-  CLI::App* sub =
-      app.add_subcommand("check", "a daemon's configuration with its model: every problem at once");
+  CLI::App* sub = app.add_subcommand(
+      "check", "a daemon's configuration with its model, or a gateway's: every problem at once");
   const auto options = std::make_shared<CheckOptions>();
-  sub->add_option("CONFIG", options->file, "configuration of thermocompd")
+  sub->add_option("CONFIG", options->file, "configuration of thermocompd or thermocomp-gateway")
       ->type_name("FILE")
       ->required();
   sub->add_flag("--registers", options->registers,

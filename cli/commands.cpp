@@ -4,6 +4,7 @@
 
 #include "cli/check_command.hpp"
 #include "cli/history_commands.hpp"
+#include "cli/init_command.hpp"
 #include "cli/model_commands.hpp"
 #include "cli/modelling_dispatch.hpp"
 #include "cli/observe_commands.hpp"
@@ -21,6 +22,7 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
       ->default_str(global.socket);
   app.require_subcommand(1);
   app.footer("Exit status: 0 success, 1 the answer is no, 2 bad use, bad input or unreachable.");
+  add_init_command(app, action);
   add_check_command(app, action);
   add_scan_command(app, action);
   add_observe_commands(app, global, action);

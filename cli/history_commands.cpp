@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -29,6 +28,7 @@ struct ExportOptions {
   std::string from;
   std::string to;
   std::string output;
+  bool sensors{false};
 };
 
 std::optional<HistoryTime> time_or_none(const std::string& text) {
@@ -63,8 +63,10 @@ int run_export(const ExportOptions& options) {
   ExportSummary summary;
   {
     Progress progress("export");
-    summary = export_run(options.history, from, to, file.stream(),
-                         [&progress](double fraction) { progress.update(fraction); });
+    summary = export_run(
+        options.history, from, to, file.stream(),
+        [&progress](double fraction) { progress.update(fraction); }, parse_setup,
+        options.sensors ? ExportContent::sensors : ExportContent::inputs);
   }
   if (summary.rows == 0) {
     tell_damage(options.history, summary.damage);
@@ -74,7 +76,7 @@ int run_export(const ExportOptions& options) {
   std::fprintf(stderr, "%llu rows, %zu columns\n", static_cast<unsigned long long>(summary.rows),
                summary.columns.size());
   if (summary.gaps > 0) {
-    std::fprintf(stderr, "%llu gap%s, each told by a comment line in the file\n",
+    std::fprintf(stderr, "%llu gap%s, each marked by a comment line in the file\n",
                  static_cast<unsigned long long>(summary.gaps), summary.gaps == 1 ? "" : "s");
   }
   return tell_damage(options.history, summary.damage);
@@ -130,16 +132,6 @@ int run_file_replay(const ReplayOptions& options) {
   return exit_success;
 }
 
-/// "2026-03-01T08:30:00Z"
-std::string utc_text(std::int64_t wall_ns) {
-  const std::time_t seconds = static_cast<std::time_t>(wall_ns / 1'000'000'000);
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[40];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text;
-}
-
 int run_history_check(const std::string& history) {
   HistoryCheck check;
   {
@@ -184,13 +176,19 @@ void add_history_check(CLI::App& app, Action& action) {
 void add_history_commands(CLI::App& app, Action& action) {
   const auto export_options = std::make_shared<ExportOptions>();
   CLI::App* sub = app.add_subcommand(
-      "export", "a daemon's history as a run file; what is damaged is told by comment lines");
+      "export",
+      "a daemon's history as a run file for predict, fit, diagnose and inspect: the model's inputs "
+      "as the daemon computed with them, signals, probed displacement, offsets; wall time, faults, "
+      "commands and damage stand in comment lines");
   sub->add_option("HISTORY", export_options->history, "history of thermocompd")
       ->type_name("FILE")
       ->required();
   sub->add_option("--from", export_options->from,
-                  "seconds since the history's start, or a time such as 2026-03-01T08:30:00");
+                  "start: a time such as 2026-03-01T08:30:00 (local; Z: UTC) or 2026-03-01, "
+                  "\"8 hours ago\", -8h, or seconds since the history's start");
   sub->add_option("--to", export_options->to, "end, not included; as --from");
+  sub->add_flag("--sensors", export_options->sensors,
+                "every sensor as it was read, in place of the model's inputs");
   sub->add_option("-o,--output", export_options->output, "run file; - is standard output")
       ->type_name("FILE")
       ->required();

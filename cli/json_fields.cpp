@@ -74,6 +74,8 @@ std::string fixed(double value, int digits, int width) {
 }
 
 std::string fixed_signed(double value, int digits, int width) {
+  // What is shown as zero has no sign to tell.
+  if (std::abs(value) < 0.5 * std::pow(10.0, -digits)) value = 0.0;
   return formatted(value, digits, width, "%+*.*f");
 }
 

@@ -47,7 +47,8 @@ int run_predict(const PredictOptions& options) {
   for (const PredictedOutput& output : prediction.outputs) {
     std::fprintf(stderr, "%s %.3f %.3f\n", output.name.c_str(), output.rms_um, output.peak_um);
     if (!output.measured_there)
-      std::fprintf(stderr, "%s: %s has no such column, so there is nothing to compare with\n",
+      std::fprintf(stderr,
+                   "%s: %s has no measured value of it, so there is nothing to compare with\n",
                    output.name.c_str(), run.name.c_str());
   }
   if (model.made_from) std::fprintf(stderr, "outside %.3f\n", outside_share(prediction));

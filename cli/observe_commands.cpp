@@ -20,6 +20,7 @@
 #include "cli/terminal.hpp"
 #include "cli/truth_file.hpp"
 #include "cli/watch_text.hpp"
+#include "daemon/history/recorded_event.hpp"
 #include "daemon/socket/status_client.hpp"
 
 namespace thermocomp::cli {
@@ -48,9 +49,52 @@ int run_status(const GlobalOptions& global, const StatusOptions& options) {
   return exit_status;
 }
 
-int run_events(const GlobalOptions& global, bool as_json) {
-  const json events = ask_daemon(global.socket, "events", json::object());
-  std::cout << (as_json ? events.dump(2) + "\n" : events_text(events));
+struct EventsOptions {
+  std::string history;  ///< empty: ask the daemon
+  std::string from;
+  std::string to;
+  bool as_json{false};
+};
+
+/// In the shape of the daemon's answer, with the run beside each.
+json recorded_events_json(const RecordedEvents& recorded) {
+  json list = json::array();
+  for (const RecordedEvent& event : recorded.events)
+    list.push_back({{"run", event.run},
+                    {"number", event.number},
+                    {"wall_s", 1e-9 * static_cast<double>(event.wall_ns)},
+                    {"kind", event.kind},
+                    {"subject", event.subject},
+                    {"what", event.what},
+                    {"duration_s", event.duration_ns < 0
+                                       ? json(nullptr)
+                                       : json(1e-9 * static_cast<double>(event.duration_ns))},
+                    {"user", event.user < 0 ? json(nullptr) : json(event.user)}});
+  return {{"events", list}};
+}
+
+std::optional<HistoryTime> time_or_none(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  return parse_history_time(text);
+}
+
+json events_of(const GlobalOptions& global, const EventsOptions& options) {
+  if (options.history.empty()) {
+    if (!options.from.empty() || !options.to.empty())
+      throw Failure("--from and --to need a history: thermocomp events HISTORY.db");
+    return ask_daemon(global.socket, "events", json::object());
+  }
+  const RecordedEvents recorded =
+      read_events(options.history, time_or_none(options.from), time_or_none(options.to));
+  if (!recorded.are_kept)
+    throw Failure(options.history + ": was written by a version that kept no events");
+  return recorded_events_json(recorded);
+}
+
+int run_events(const GlobalOptions& global, const EventsOptions& options) {
+  const json events = events_of(global, options);
+  std::cout << (options.as_json ? events.dump(2, ' ', false, json::error_handler_t::replace) + "\n"
+                                : events_text(events));
   return exit_success;
 }
 
@@ -144,11 +188,20 @@ void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& ac
 
   CLI::App* events = app.add_subcommand(
       "events",
-      "what happened since the daemon started: faults and how long they lasted, changes "
-      "of mode, commands and who gave them");
-  events->add_flag("--json", *as_json, "the daemon's answer as JSON");
-  events->callback(
-      [&, as_json] { action = [&, as_json] { return run_events(global, *as_json); }; });
+      "what happened since the daemon started, or in all of a history: faults and how long they "
+      "lasted, changes of mode, commands and who gave them");
+  const auto asked = std::make_shared<EventsOptions>();
+  events
+      ->add_option("HISTORY", asked->history,
+                   "history of thermocompd, earlier runs of the daemon too; left out: the running "
+                   "daemon's list")
+      ->type_name("FILE");
+  events->add_option(
+      "--from", asked->from,
+      "of a history: start, a time such as 2026-03-01T08:30:00, \"8 hours ago\", -8h");
+  events->add_option("--to", asked->to, "end, not included; as --from");
+  events->add_flag("--json", asked->as_json, "the list as JSON");
+  events->callback([&, asked] { action = [&, asked] { return run_events(global, *asked); }; });
 
   CLI::App* sensors = app.add_subcommand("sensors", "every sensor: raw, smoothed, fault");
   sensors->add_flag("--json", *as_json, "the daemon's answer as JSON");

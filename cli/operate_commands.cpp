@@ -51,9 +51,16 @@ int run_plain(const GlobalOptions& global, const PlainCommand& command) {
 int run_measured(const GlobalOptions& global, const AxisValue& given) {
   const json answer =
       ask_daemon(global.socket, "measured", {{"axis", given.axis}, {"value_um", given.value_um}});
+  const bool remains = text_of(answer, "meaning") == "remaining";
+  const double predicted_um =
+      number_of(answer, remains ? "predicted_remaining_um" : "predicted_um");
   std::cout << "axis " << given.axis << ": measured " << fixed_signed(given.value_um, 2)
-            << " um, the model says " << fixed_signed(number_of(answer, "predicted_um"), 2)
-            << " um\n";
+            << (remains ? " um left at the tool; by the model "
+                        : " um without offset; by the model ")
+            << fixed_signed(predicted_um, 2) << (remains ? " um are left" : " um") << '\n';
+  if (remains)
+    std::cout << "(displacement by the model " << fixed_signed(number_of(answer, "predicted_um"), 2)
+              << " um, the rest is taken out by the offset in effect)\n";
   return exit_success;
 }
 
@@ -88,8 +95,8 @@ void add_reference_command(CLI::App& app, const GlobalOptions& global, Action& a
 int run_release(const GlobalOptions& global, const std::string& axis) {
   ask_daemon(global.socket, "release", {{"axis", axis}});
   std::cout << "axis " << axis
-            << ": its next read-backs are looked at; it is driven again unless they still say\n"
-               "what they said: see thermocomp status\n";
+            << ": released; it is driven again unless its next read-backs show the same fault\n"
+               "(thermocomp status)\n";
   return exit_success;
 }
 

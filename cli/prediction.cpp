@@ -5,10 +5,10 @@
 #include <optional>
 #include <string_view>
 
-#include "config/problems.hpp"
+#include "config/model_inputs.hpp"
 #include "config/units.hpp"
-#include "estimator/displacement_model.hpp"
-#include "estimator/model_domain.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/model/model_domain.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp::cli {
@@ -18,55 +18,6 @@ namespace {
 using Column = std::vector<double>;
 using Columns = std::vector<const Column*>;
 
-Columns columns_of(const RunFile& run, const std::vector<std::string>& names,
-                   std::vector<Problem>& problems) {
-  Columns columns;
-  for (const std::string& name : names) {
-    const auto index = run.find(name);
-    if (index) {
-      columns.push_back(&run.values[*index]);
-    } else {
-      problems.push_back({run.name, 0, name, "(missing)", "the model needs this column"});
-    }
-  }
-  return columns;
-}
-
-// References, order of the model's temperatures: the model's own for its inputs where it has them,
-// else the first value of the column.
-Column references(const ThermalModel& model, const RunFile& run, const Columns& temperatures,
-                  const std::vector<std::string>& names, std::vector<Problem>& problems) {
-  Column result;
-  for (std::size_t i = 0; i < temperatures.size(); ++i) {
-    if (i < model.reference_degC.size()) {
-      result.push_back(model.reference_degC[i]);
-      continue;
-    }
-    const Column& column = *temperatures[i];
-    const auto first = std::find_if(column.begin(), column.end(),
-                                    [](double value) { return std::isfinite(value); });
-    if (first == column.end()) {
-      problems.push_back({run.name, 0, names[i], "(missing)", "has no value to refer to"});
-      continue;
-    }
-    result.push_back(*first);
-  }
-  return result;
-}
-
-// @return false when a value is missing
-bool row_of(const Columns& columns, std::size_t row, Column& out) {
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    out[i] = (*columns[i])[row];
-    if (!std::isfinite(out[i])) return false;
-  }
-  return true;
-}
-
-nanoseconds time_of(double time_s) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
-}
-
 // The model at every row of the file, NaN where an input is missing.
 struct ModelRows {
   std::vector<Column> displacement_um;  ///< shape (outputs, rows)
@@ -74,34 +25,31 @@ struct ModelRows {
   Column outside;                       ///< one a row
 };
 
-ModelRows model_rows(const ThermalModel& model, const RunFile& run) {
-  std::vector<Problem> problems;
-  const std::vector<std::string> names = model.temperature_columns();
-  const Columns temperatures = columns_of(run, names, problems);
-  const Columns signals = columns_of(run, model.signal_columns(), problems);
-  if (!problems.empty()) throw ConfigurationError(problems);
-  const Column reference_degC = references(model, run, temperatures, names, problems);
-  if (!problems.empty()) throw ConfigurationError(problems);
+void take(const Columns& columns, std::size_t row, Column& out) {
+  for (std::size_t i = 0; i < columns.size(); ++i) out[i] = (*columns[i])[row];
+}
 
+ModelRows model_rows(const ThermalModel& model, const RunFile& run) {
+  const ModelInputs inputs = model_inputs(model, run);
   DisplacementModel displacement_model(model);
   displacement_model.restart();
-  Column temps_degC(temperatures.size());
-  Column signal_values(signals.size());
+  Column temps_degC(inputs.temperatures.size());
+  Column signal_values(inputs.signals.size());
   Column displacement_um(model.outputs.size());
   std::optional<ModelDomain> domain;
   if (model.made_from) domain.emplace(model);
   const std::vector<Column> empty(model.outputs.size(), Column(run.rows(), not_a_number));
   ModelRows rows{empty, domain ? empty : std::vector<Column>{}, {}};
   if (domain) rows.outside.assign(run.rows(), not_a_number);
-  const Column& time_s = run.time_s();
-  for (std::size_t row = 0; row < run.rows(); ++row) {
-    if (!row_of(temperatures, row, temps_degC) || !row_of(signals, row, signal_values)) continue;
-    displacement_model.step(time_of(time_s[row]), temps_degC, reference_degC, signal_values,
-                            displacement_um);
+  for (const std::size_t row : inputs.rows) {
+    take(inputs.temperatures, row, temps_degC);
+    take(inputs.signals, row, signal_values);
+    const nanoseconds now = time_of_row(run.time_s()[row]);
+    displacement_model.step(now, temps_degC, inputs.reference_degC, signal_values, displacement_um);
     for (std::size_t i = 0; i < displacement_um.size(); ++i)
       rows.displacement_um[i][row] = displacement_um[i];
     if (!domain) continue;
-    domain->step(time_of(time_s[row]), temps_degC, reference_degC, signal_values);
+    domain->step(now, temps_degC, inputs.reference_degC, signal_values);
     rows.outside[row] = domain->outside() ? 1.0 : 0.0;
     for (std::size_t i = 0; i < rows.sd_um.size(); ++i) rows.sd_um[i][row] = domain->sd_um(i);
   }
@@ -145,13 +93,28 @@ void measure_residual(PredictedOutput& output) {
 
 }  // namespace
 
+namespace {
+
+/// @return nullptr where nothing of it was measured in the selected rows
+const Column* measured_column(const RunFile& run, const std::string& output) {
+  const auto index = run.find(output);
+  if (!index) return nullptr;
+  const Column& column = run.values[*index];
+  const auto has_value = [](double value) { return std::isfinite(value); };
+  const bool any =
+      std::any_of(column.begin() + static_cast<std::ptrdiff_t>(run.selected_begin),
+                  column.begin() + static_cast<std::ptrdiff_t>(run.selected_end), has_value);
+  return any ? &column : nullptr;
+}
+
+}  // namespace
+
 Prediction predict(const ThermalModel& model, const RunFile& run) {
   const ModelRows all = model_rows(model, run);
   const std::vector<Column>& predicted = all.displacement_um;
   Columns measured;
   for (const std::string& output : model.outputs) {
-    const auto index = run.find(output);
-    measured.push_back(index ? &run.values[*index] : nullptr);
+    measured.push_back(measured_column(run, output));
   }
 
   Prediction result;

@@ -27,7 +27,8 @@ constexpr std::array<ReasonText, 15> reasons{{
     {"cutting", "the offset is held until the cut ends", "nothing to do"},
     {"at_bound", "an offset is at its bound, so that part of the displacement remains",
      "check the sensors and the reference; if the warming is real, look at offset_um_max"},
-    {"applied_out_of_bound", "the controller applies an offset beyond every bound of ours",
+    {"applied_out_of_bound",
+     "the controller applies an offset beyond the bound that is configured here",
      "that axis is not driven; set the offset at the controller to zero and look for who set it"},
     {"block_estimated", "an input of the model has no good sensor left and is estimated",
      "compensation goes on; thermocomp sensors says which and why; mend the sensor"},
@@ -45,7 +46,7 @@ constexpr std::array<ReasonText, 12> faults{{
     {"stale", "not renewed in time", "check the device; compare stale_after_s with its period"},
     {"open_circuit", "thermocouple broken", "check the thermocouple and its terminals"},
     {"short_circuit", "thermocouple shorted", "check the thermocouple's insulation"},
-    {"out_of_range", "impossible value", "check type, scale and offset of the channel"},
+    {"out_of_range", "implausible value", "check type, scale and offset of the channel"},
     {"too_fast", "changed faster than the structure can", "check the contact and the shielding"},
     {"stuck", "the very same value for too long", "check the device"},
     {"no_answer", "the unit does not answer", "check its power, cable and unit number"},
@@ -65,6 +66,10 @@ ReasonText find(const Table& table, std::string_view name) {
 
 ReasonText reason_text(std::string_view name) {
   return find(reasons, name);
+}
+ReasonText nan_text() {
+  return {"out_of_range", "NaN, no number",
+          "many modules send NaN for a broken wire: look at the terminals"};
 }
 ReasonText fault_text(std::string_view name) {
   return find(faults, name);

@@ -13,6 +13,8 @@ struct ReasonText {
 
 /// @return the text of a reason; an unknown one is shown by its name
 [[nodiscard]] ReasonText reason_text(std::string_view name);
+/// Of a value that is no number at all: the same words wherever it is seen.
+[[nodiscard]] ReasonText nan_text();
 /// The same for the fault of a reading.
 [[nodiscard]] ReasonText fault_text(std::string_view name);
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "cli/modbus_names.hpp"
+#include "cli/reason_text.hpp"
 #include "drivers/modbus/register_codec.hpp"
 
 namespace thermocomp::cli {
@@ -75,7 +76,7 @@ void hint_codes(const ModbusChannel& channel, std::span<const std::uint16_t> wor
     hints.emplace_back(text);
   }
   if (std::isnan(raw)) {
-    hints.emplace_back("many modules send NaN for a broken wire: look at the terminals");
+    hints.emplace_back(nan_text().remedy);
   }
 }
 

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <optional>
 #include <set>
 
 #include "cli/modbus_names.hpp"
+#include "cli/reason_text.hpp"
 #include "cli/serial_holder.hpp"
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"
@@ -249,8 +251,11 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
     return;
   }
   result.fault = Fault::out_of_range;
-  result.why = number_text(decoded.value) + " degC is no temperature of [" +
-               number_text(range.min_degC) + ", " + number_text(range.max_degC) + "] ([screening])";
+  result.why = std::isnan(decoded.value)
+                   ? std::string(nan_text().meaning)
+                   : number_text(decoded.value) + " degC is no temperature of [" +
+                         number_text(range.min_degC) + ", " + number_text(range.max_degC) +
+                         "] ([screening])";
   result.hints = hints_for_words(channel, words, range);
   if (result.hints.empty()) hint_neighbours(device, channel, result);
   if (result.hints.empty()) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -12,6 +11,7 @@
 #include "cli/json_fields.hpp"
 #include "cli/reason_text.hpp"
 #include "cli/terminal.hpp"
+#include "cli/troubles.hpp"
 
 namespace thermocomp::cli {
 
@@ -29,54 +29,12 @@ std::string with_unit(double value, int digits, const std::string& unit) {
   return fixed_signed(value, digits, 8) + " " + unit;
 }
 
-bool has_reason(const json& status, const char* name) {
-  const json& reasons = list_of(status, "reasons");
-  return std::find(reasons.begin(), reasons.end(), json(name)) != reasons.end();
-}
-
-std::vector<std::string> axes_not_driven(const json& status) {
-  std::vector<std::string> names;
-  for (const json& axis : list_of(status, "axes")) {
-    if (!flag_of(axis, "driven")) names.push_back(text_of(axis, "name"));
-  }
-  return names;
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string result;
-  for (const std::string& word : words) result += (result.empty() ? "" : ", ") + word;
-  return result;
-}
-
-std::string mode_words(const std::string& mode) {
-  if (mode == "starting") return "starting: waiting for the first good values";
-  if (mode == "disabled") return "switched off: offsets at or on the way to zero";
-  if (mode == "holding") return "data lost: holding the last offsets";
-  if (mode == "ramping_to_zero") return "data lost: offsets on the way to zero";
-  return mode;
-}
-
 std::string headline(const json& status, bool colours) {
-  const std::string mode = text_of(status, "mode");
-  const std::string since = ", for " + duration_text(number_of(status, "mode_since_s"));
-  if (flag_of(status, "dry_run")) {
-    const std::string would = mode == "dry_run" ? "all is read and computed" : mode_words(mode);
-    return line("Compensating", coloured("no: DRY RUN", Colour::yellow, colours) +
-                                    ", nothing is written to the controller (" + would + since +
-                                    ")");
-  }
-  if (is_compensating(status)) {
-    return line("Compensating", coloured("yes", Colour::green, colours) + since);
-  }
-  if (mode == "compensating") {
-    const auto idle = axes_not_driven(status);
-    const std::string what = idle.empty() ? " (the controller takes no offsets)"
-                                          : " (axes not driven: " + joined(idle) + ")";
-    return line("Compensating", coloured("no", Colour::red, colours) + what);
-  }
-  const Colour colour = mode == "disabled" ? Colour::yellow : Colour::red;
-  return line("Compensating",
-              coloured("no", colour, colours) + " (" + mode_words(mode) + since + ")");
+  const Verdict told = verdict(status);
+  const Colour colour = told.compensating ? Colour::green
+                        : told.intended   ? Colour::yellow
+                                          : Colour::red;
+  return line("Compensating", coloured(told.answer, colour, colours) + told.detail);
 }
 
 std::string axis_marks(const json& axis) {
@@ -141,89 +99,13 @@ std::string inputs_lines(const json& status) {
   return result;
 }
 
-// What a CAN interface says of itself, where that is trouble; `what` is a bus or the controller.
-std::string can_trouble(const json& what) {
-  const std::string state = text_of(what, "state");
-  const std::string since = " for " + duration_text(number_of(what, "state_s"));
-  if (state == "bus_off") return "bus-off" + since;
-  if (state == "passive") return "error passive" + since;
-  if (state == "warning") return "error warning" + since;
-  return {};
-}
-
-constexpr std::string_view bus_off_remedy =
-    "cable, termination, bit rate; then ip link set IF type can restart, or let restart-ms do it";
-constexpr std::string_view can_remedy = "cable, termination, bit rate";
-
-using AddTrouble = std::function<void(const std::string& what, std::string_view remedy)>;
-
-void add_can_trouble(const std::string& name, const json& what, const AddTrouble& add) {
-  const std::string trouble = can_trouble(what);
-  if (trouble.empty()) return;
-  add(name + ": " + trouble, text_of(what, "state") == "bus_off" ? bus_off_remedy : can_remedy);
-}
-
-// "block head is estimated from 5 others, +-0.40 K (1 sd)", one line a block, then the offsets.
-std::vector<std::string> estimate_lines(const json& answer) {
-  std::vector<std::string> lines;
-  std::vector<std::string> offsets;
-  const json& inputs = list_of(answer, "inputs");
-  const auto measured = std::count_if(inputs.begin(), inputs.end(),
-                                      [](const json& input) { return flag_of(input, "good"); });
-  for (const json& input : inputs) {
-    if (!flag_of(input, "estimated")) continue;
-    lines.push_back("block " + text_of(input, "block") + " is estimated from " +
-                    std::to_string(measured) + (measured == 1 ? " other" : " others") + ", +-" +
-                    fixed(number_of(input, "sd_K"), 2) + " K (1 sd)");
-  }
-  if (lines.empty()) return lines;
-  for (const json& axis : list_of(answer, "axes")) {
-    const double sd = number_of(axis, "offset_sd");
-    const double sd_max = number_of(axis, "offset_sd_max");
-    offsets.push_back(text_of(axis, "name") + " +-" + fixed(sd, 2) + " " + text_of(axis, "unit") +
-                      (sd > sd_max ? " (too uncertain: at most " + fixed(sd_max, 2) + ")" : ""));
-  }
-  lines.push_back("offsets that makes uncertain by (1 sd): " + joined(offsets));
-  return lines;
-}
-
 // Everything that is wrong, worst first: each line says what it is and what to do.
 std::string trouble_lines(const json& status, bool colours) {
   std::string result;
-  const auto add = [&](const std::string& what, std::string_view remedy) {
-    const std::string key = result.empty() ? "Problems" : "";
-    result += line(key, coloured(what, Colour::yellow, colours) +
-                            (remedy.empty() ? "" : " -> " + std::string(remedy)));
-  };
-  for (const json& reason : list_of(status, "reasons")) {
-    const std::string name = reason.is_string() ? reason.get<std::string>() : reason.dump();
-    const ReasonText text = reason_text(name);
-    add(std::string(text.meaning), text.remedy);
-  }
-  for (const std::string& estimate : estimate_lines(status)) add(estimate, "");
-  std::vector<std::string> bad;
-  for (const json& sensor : list_of(status, "sensors_bad")) {
-    if (sensor.is_string()) bad.push_back(sensor.get<std::string>());
-  }
-  if (!bad.empty()) add("bad sensors: " + joined(bad), "thermocomp sensors says why");
-  for (const json& bus : list_of(status, "buses")) {
-    for (const json& unit : list_of(bus, "units")) {
-      if (flag_of(unit, "answering") || !flag_of(bus, "connected")) continue;
-      add("bus " + text_of(bus, "name") + ": " + text_of(unit, "name") + " does not answer (" +
-              text_of(unit, "last_error") + ")",
-          "");
-    }
-    add_can_trouble("bus " + text_of(bus, "name"), bus, add);
-    if (!flag_of(bus, "connected") && text_of(bus, "state") != "bus_off") {
-      add("bus " + text_of(bus, "name") + " is not connected (" + text_of(bus, "last_error") + ")",
-          "");
-    }
-  }
-  const json& controller = object_of(status, "controller");
-  add_can_trouble("controller " + text_of(controller, "name"), controller, add);
-  for (const json& warning : list_of(status, "warnings")) {
-    if (warning.is_string()) add(warning.get<std::string>(), "");
-  }
+  for (const Trouble& trouble : troubles(status))
+    result += line(result.empty() ? "Problems" : "",
+                   coloured(trouble.what, Colour::yellow, colours) +
+                       (trouble.remedy.empty() ? "" : " -> " + trouble.remedy));
   return result.empty() ? line("Problems", "none") : result;
 }
 
@@ -377,11 +259,6 @@ void add_degradations(const json& status, std::vector<std::string>& why) {
 
 }  // namespace
 
-bool is_compensating(const json& status) {
-  return text_of(status, "mode") == "compensating" && !flag_of(status, "dry_run") &&
-         axes_not_driven(status).empty() && !has_reason(status, "controller_offline");
-}
-
 std::vector<std::string> why_not(const json& status, bool strict) {
   std::vector<std::string> why;
   if (!is_compensating(status)) {
@@ -417,7 +294,9 @@ std::string sensors_text(const json& sensors, bool colours) {
       padded("sensor", width) + "  raw degC  smoothed  age s  clipped  in a row  rejected  state\n";
   for (const json& sensor : list) {
     const std::string fault = text_of(sensor, "fault");
-    const ReasonText text = fault_text(fault);
+    // Only a value that is no number comes without one.
+    const bool is_nan = fault == "out_of_range" && std::isnan(number_of(sensor, "raw_degC"));
+    const ReasonText text = is_nan ? nan_text() : fault_text(fault);
     const bool good = fault == "none";
     std::string state = coloured(text.meaning, good ? Colour::green : Colour::red, colours);
     if (!text.remedy.empty()) state += " -> " + std::string(text.remedy);

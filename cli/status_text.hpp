@@ -8,9 +8,6 @@
 
 namespace thermocomp::cli {
 
-/// Whether offsets reach the machine now: mode "compensating", and every axis driven.
-[[nodiscard]] bool is_compensating(const nlohmann::json& status);
-
 /// `thermocomp status`: aligned `Key : value` lines. @param status  result of the method `status`
 [[nodiscard]] std::string status_text(const nlohmann::json& status, bool colours);
 

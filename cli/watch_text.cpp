@@ -9,8 +9,8 @@
 
 #include "cli/json_fields.hpp"
 #include "cli/reason_text.hpp"
-#include "cli/status_text.hpp"
 #include "cli/terminal.hpp"
+#include "cli/troubles.hpp"
 
 namespace thermocomp::cli {
 

@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "config/toml_text.hpp"
-#include "estimator/model_domain.hpp"
+#include "estimator/model/model_domain.hpp"
 
 namespace thermocomp {
 namespace {

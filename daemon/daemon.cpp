@@ -60,6 +60,19 @@ std::unique_ptr<HistoryWriter> make_history(const HistoryConfig& config, const G
   return std::make_unique<HistoryWriter>(config, grid, THERMOCOMP_VERSION);
 }
 
+RecordedEvent recorded(const Event& event) {
+  RecordedEvent kept;
+  kept.number = static_cast<std::int64_t>(event.number);
+  kept.wall_ns = event.wall_ns;
+  kept.kind = event.kind;
+  kept.subject = event.subject;
+  kept.what = event.what;
+  if (std::isfinite(event.duration_s))
+    kept.duration_ns = static_cast<std::int64_t>(std::llround(1e9 * event.duration_s));
+  kept.user = event.user;
+  return kept;
+}
+
 DaemonConfig load(const std::filesystem::path& file) {
   DaemonConfig config = load_daemon_config(file);
   set_log_level(config.log_level);
@@ -143,6 +156,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
                   &journal, [this] { return server.caller(); }, start_state.state.reference_degC}),
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal}) {
+  if (history) journal.tell([this](const Event& event) { history->note(recorded(event)); });
   // A kill right now must not make this a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   if (!locks.warning.empty()) supervisor.add_warning(locks.warning);

@@ -27,6 +27,7 @@ EventJournal::Moment EventJournal::system_now() {
 void EventJournal::add(const Moment& at, Event event) {
   event.number = ++number_;
   event.wall_ns = at.wall.count();
+  if (listener_) listener_(event);
   events_.push_back(std::move(event));
   if (events_.size() > kept_max) events_.pop_front();
 }

@@ -36,6 +36,8 @@ class EventJournal {
   static constexpr std::size_t kept_max = 1000;
 
   explicit EventJournal(Now now = system_now) : now_(std::move(now)) {}
+  /// Is told every event from now on, such as the history's writer.
+  void tell(std::function<void(const Event&)> listener) { listener_ = std::move(listener); }
 
   /// The subject has this fault from now on. Another one than before is told, but the outage counts
   /// from the first.
@@ -63,6 +65,7 @@ class EventJournal {
   void add(const Moment& at, Event event);
 
   Now now_;
+  std::function<void(const Event&)> listener_;
   std::uint64_t number_{0};
   std::deque<Event> events_;
   std::map<std::string, Outage> outages_;

@@ -54,7 +54,12 @@ void EventLog::note_estimates(const Report& report, const EstimatorConfig& confi
 void EventLog::note_report(const Report& report, const EstimatorConfig& config, bool dry_run) {
   constexpr nanoseconds settles = std::chrono::seconds(5);
   if (settled_at_ == nanoseconds{}) settled_at_ = report.now + settles;
-  if (first_ && report.mode == Mode::starting && report.now < settled_at_) return;
+  // A first start is switched off from the beginning, and has read nothing yet all the same.
+  const auto off = static_cast<std::uint32_t>(Reason::operator_disabled) |
+                   static_cast<std::uint32_t>(Reason::controller_disabled);
+  const bool is_beginning = report.mode == Mode::starting ||
+                            (report.mode == Mode::disabled && (report.reasons & ~off) != 0);
+  if (first_ && is_beginning && report.now < settled_at_) return;
   note_sensors(report, config);
   note_mismatches(report, config);
   note_mode(report, std::string(mode_name(report.mode, dry_run)));  // what comes of them

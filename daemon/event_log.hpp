@@ -11,7 +11,7 @@
 #include "daemon/socket/status_server.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 
@@ -22,7 +22,8 @@ class EventLog {
   explicit EventLog(EventJournal& journal) : journal_(journal) {}
 
   /// In the first seconds of a start nothing has been read yet, which is no news: the log begins
-  /// with the first mode other than `starting`, or 5 s after the first report.
+  /// with the first mode other than `starting` (where it is switched off: once nothing else is
+  /// missing), or 5 s after the first report.
   void note_report(const Report& report, const EstimatorConfig& config, bool dry_run = false);
   /// @param columns  names of the report's inputs
   void note_estimates(const Report& report, const EstimatorConfig& config,

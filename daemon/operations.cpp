@@ -11,7 +11,6 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/log_setup.hpp"
-#include "estimator/persistent_state.hpp"
 
 namespace thermocomp {
 namespace {
@@ -116,8 +115,10 @@ CycleHandle::Tracked Operations::begin_reload() {
     DaemonConfig next = load_daemon_config(parts_.config.file);
     const std::vector<std::string> fixed = restart_needed(parts_.config, next);
     if (!fixed.empty())
-      throw RpcError(rpc::refused, fmt::format("a restart is needed for a change of: {}",
-                                               fmt::join(fixed, ", ")));
+      throw RpcError(rpc::refused,
+                     fmt::format("nothing was taken, the running configuration stays: a "
+                                 "restart is needed for a change of {}",
+                                 fmt::join(fixed, ", ")));
     auto brain = make_brain(next, parts_.history);
     brain->estimator.plan_adoption(cycle_.estimator());
     reload_ = {std::move(next), cycle_.replace(std::move(brain), Clock::now()), false, -1};
@@ -150,7 +151,7 @@ void Operations::finish_reload() {
   if (*reload_->outcome == Outcome::done) {
     parts_.config = std::move(reload_->next);
     set_log_level(parts_.config.log_level);
-    note_reference(persistent_state(cycle_.estimator(), cycle_.report()), ReferenceOrigin::reload);
+    note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::reload);
     if (parts_.journal != nullptr) parts_.journal->command("reload", reload_->user);
     spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
                  parts_.config.model_checksum);
@@ -179,7 +180,7 @@ void Operations::carried_out(const Command& done) {
     parts_.keeper.reference_taken();
     // Also where the temperatures are those of the reference before.
     parts_.reference_before_degC.clear();
-    note_reference(persistent_state(cycle_.estimator(), cycle_.report()), ReferenceOrigin::command);
+    note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::command);
   }
   // Called done only when it would survive a power cut.
   save_state(true);
@@ -211,7 +212,7 @@ std::int64_t Operations::take_asking(const Command& done) {
 }
 
 void Operations::save_state(bool at_once) {
-  PersistentState state = persistent_state(cycle_.estimator(), cycle_.report());
+  PersistentState state = cycle_.estimator().persistent_state(cycle_.report());
   note_reference(state, ReferenceOrigin::first_values);
   if (parts_.config.dry_run) state.offset_um = parts_.sent_before_um;
   if (at_once)

@@ -91,13 +91,20 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
   constexpr double most_um = 1000.0;  // no thermal displacement; a slip of the keyboard
   if (!(std::abs(command.value_um) <= most_um))
     throw RpcError(rpc::invalid_params, "params.value_um must be in [-1000, 1000]");
-  const double displacement_um = view.report.axes[command.axis].displacement_um;
-  return then(actions.command(command), [command, displacement_um] {
-    // What remains at the tool is what the model did not foresee.
+  const AxisReport& axis = view.report.axes[command.axis];
+  const double displacement_um = axis.displacement_um;
+  const bool remains = view.config.estimator.correction.measured == MeasuredMeaning::remaining;
+  const double applied_um = std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
+  const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;
+  return then(actions.command(command), [command, displacement_um, remains, effect_um] {
+    // What is left at the tool, where the model is right: nothing but what the offset still lacks.
+    const double left_um = displacement_um + effect_um;
     return json{
         {"done", true},
         {"measured_um", command.value_um},
-        {"predicted_um", std::isfinite(displacement_um) ? json(displacement_um) : json(nullptr)}};
+        {"meaning", remains ? "remaining" : "total"},
+        {"predicted_um", std::isfinite(displacement_um) ? json(displacement_um) : json(nullptr)},
+        {"predicted_remaining_um", std::isfinite(left_um) ? json(left_um) : json(nullptr)}};
   });
 }
 
@@ -135,7 +142,9 @@ RpcPending reload(const DeskActions& actions) {
       return json{{"done", true}, {"checksum", actions.view().config.model_checksum}};
     });
   } catch (const ConfigurationError& error) {
-    throw RpcError(rpc::refused, error.what());
+    throw RpcError(
+        rpc::refused,
+        std::string("nothing was taken, the running configuration stays:\n") + error.what());
   }
 }
 

@@ -1,5 +1,6 @@
 #include "daemon/status_json.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -256,6 +257,28 @@ json of_axes(const StatusView& view, double AxisReport::*figure) {
   return told;
 }
 
+/// The blocks that a sensor belongs to.
+json blocks_of(const StatusView& view, std::size_t sensor) {
+  json list = json::array();
+  for (const BlockConfig& block : view.config.estimator.blocks)
+    if (std::find(block.sensors.begin(), block.sensors.end(), sensor) != block.sensors.end())
+      list.push_back(block.name);
+  return list;
+}
+
+/// What the model file says it was made from; null: nothing.
+json made_from(const ThermalModel& model) {
+  if (!model.made_from) return nullptr;
+  json outputs = json::object();
+  for (const auto& [name, output] : model.made_from->outputs)
+    outputs[name] = {{"left_out_rms_um", number(output.left_out_rms_um)},
+                     {"no_model_rms_um", number(output.no_model_rms_um)}};
+  return {{"runs", model.made_from->runs},
+          {"hours", number(model.made_from->hours)},
+          {"rows", number(model.made_from->rows)},
+          {"outputs", std::move(outputs)}};
+}
+
 }  // namespace
 
 json events_json(const std::deque<Event>& events) {
@@ -312,6 +335,7 @@ json sensors_json(const StatusView& view) {
     const bool ever = sensor.taken_at != nanoseconds{};
     list.push_back(
         {{"name", view.config.estimator.sensors[i].name},
+         {"blocks", blocks_of(view, i)},
          {"raw_degC", number(sensor.raw_degC)},
          {"smoothed_degC", number(sensor.smoothed_degC)},
          {"fault", to_string(sensor.fault)},
@@ -367,7 +391,8 @@ json model_json(const StatusView& view) {
           {"inputs", view.config.model.inputs},
           {"outputs", view.config.model.outputs},
           {"matrix_um_per_K", view.config.model.matrix_um_per_K},
-          {"terms", terms}};
+          {"terms", terms},
+          {"made_from", made_from(view.config.model)}};
 }
 
 std::string status_line(const StatusView& view) {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -32,10 +34,18 @@ namespace thermocomp {
 }
 
 /// What stands at the same name takes the place of ours.
-inline void take_by_plan(const std::vector<int>& plan, const std::vector<double>& from,
-                         std::vector<double>& to) noexcept {
+template <class T>
+void take_by_plan(const std::vector<int>& plan, const std::vector<T>& from,
+                  std::vector<T>& to) noexcept {
   for (std::size_t i = 0; i < plan.size(); ++i)
     if (plan[i] >= 0) to[i] = from[static_cast<std::size_t>(plan[i])];
+}
+
+/// What stands under the name, where it is a finite number.
+inline void take_if_finite(const std::map<std::string, double>& from, const std::string& name,
+                           double& to) {
+  const auto found = from.find(name);
+  if (found != from.end() && std::isfinite(found->second)) to = found->second;
 }
 
 }  // namespace thermocomp

@@ -160,8 +160,8 @@ struct SubjectColumns {
 /// Whether a column is called as a temperature is (*_degC, *_K).
 [[nodiscard]] bool is_temperature_name(std::string_view column) noexcept;
 
-/// Every kind of term that the daemon evaluates. Names and parameters: CAUSES, fixed. A name can be
-/// there twice: for outputs and for temperatures.
+/// Every kind of term that the daemon evaluates, with the names and parameters of model files
+/// (docs/methods.md). A name can be there twice: for outputs and for temperatures.
 [[nodiscard]] const std::vector<TermKind>& term_kinds();
 /// @return the kind called `name` that takes such a subject, any kind of that name where none does,
 ///         nullptr where there is no such name

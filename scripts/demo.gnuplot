@@ -3,9 +3,9 @@
 set datafile separator ","
 set datafile columnheaders
 if (format eq "png") {
-  set terminal pngcairo size 1100,1150 font "DejaVu Sans,11" background rgb "white"
+  set terminal pngcairo size 1100,1350 font "DejaVu Sans,11" background rgb "white"
 } else {
-  set terminal svg size 1100,1150 font "DejaVu Sans,14" background rgb "white"
+  set terminal svg size 1100,1350 font "DejaVu Sans,14" background rgb "white"
 }
 set output picture
 
@@ -41,7 +41,7 @@ x_colour = "#1f6fb4"
 y_colour = "#d95f02"
 z_colour = "#1b9e77"
 
-set multiplot layout 3,1
+set multiplot layout 4,1
 set ylabel "displacement, um"
 set title "Tool against work since the start of the shift, without compensation" offset 0,1
 plot truth using (column("time_s")/3600):(column("x_error_um")-column("x_offset_um")) \
@@ -56,6 +56,12 @@ set title "The same with the offsets that the controller applied" offset 0,0
 plot truth using (column("time_s")/3600):"x_error_um" with lines lw 1.5 lc rgb x_colour title "x", \
      truth using (column("time_s")/3600):"y_error_um" with lines lw 1.5 lc rgb y_colour title "y", \
      truth using (column("time_s")/3600):"z_error_um" with lines lw 1.5 lc rgb z_colour title "z"
+
+set title "Head on the column's guideway: the position that the daemon reads, and the rows of its matrix go by"
+set ylabel "mm"
+set yrange [0:500]
+plot truth using (column("time_s")/3600):"z_mm" with lines lw 1.5 lc rgb "#555555" title "z"
+set yrange [*:*]
 
 set title "Temperatures"
 set ylabel "degC"

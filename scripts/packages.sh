@@ -6,6 +6,8 @@ packages_build=(
   cmake ninja-build g++ pkg-config ccache
   libeigen3-dev libmodbus-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
   libsqlite3-dev libsystemd-dev libssl-dev libcli11-dev
+  # Of thermocomp-gateway; its page takes its charts from the last.
+  libmicrohttpd-dev libmosquitto-dev libcrypt-dev libjs-dygraphs
   # Configuring the tree looks for it, also where only the programs are built.
   catch2
 )
@@ -28,6 +30,8 @@ packages_test=(
   calculix-ccx python3-allpairspy
   mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-canmatrix
   python3-numpy python3-pytest
+  # What the gateway is read by: its page, metrics and messages.
+  chromium chromium-driver python3-selenium prometheus mosquitto mosquitto-clients openssl
   sqlite3 socat rt-tests user-mode-linux kmod iproute2 procps valgrind
   clang-tidy clang-tools clang-format gcovr
   # The fuzz targets: the compiler, libFuzzer and the sanitizers' runtime.

@@ -90,6 +90,22 @@ std::int64_t Database::number(const char* sql) {
   return statement.step() ? statement.number(0) : 0;
 }
 
+void require_history(Database& database) {
+  const std::string name = database.file().string();
+  if (database.number("PRAGMA application_id") != history_application_id) {
+    throw HistoryError(name + ": is not a history of thermocomp");
+  }
+  const std::int64_t version = database.number("PRAGMA user_version");
+  if (version < 1) {
+    throw HistoryError(name + ": is of version " + std::to_string(version) +
+                       ", which no thermocomp wrote (damaged)");
+  }
+  if (version > history_version) {
+    throw HistoryError(name + ": is of version " + std::to_string(version) +
+                       ", this program reads up to version " + std::to_string(history_version));
+  }
+}
+
 Statement::Statement(Database& database, const char* sql) : database_(database) {
   const int code = sqlite3_prepare_v2(database.handle(), sql, -1, &handle_, nullptr);
   if (code != SQLITE_OK) database.fail(code);

@@ -55,6 +55,9 @@ class Database {
   sqlite3* handle_{nullptr};
 };
 
+/// @throws HistoryError: the file is of another program, or of a version that is not known
+void require_history(Database& database);
+
 class Statement {
  public:
   Statement(Database& database, const char* sql);

@@ -43,22 +43,6 @@ SegmentInfo segment_from(const Statement& row) {
   return segment;
 }
 
-void check_is_history(Database& database) {
-  const std::string name = database.file().string();
-  if (database.number("PRAGMA application_id") != history_application_id) {
-    throw HistoryError(name + ": is not a history of thermocomp");
-  }
-  const std::int64_t version = database.number("PRAGMA user_version");
-  if (version < 1) {
-    throw HistoryError(name + ": is of version " + std::to_string(version) +
-                       ", which no thermocomp wrote (damaged)");
-  }
-  if (version > history_version) {
-    throw HistoryError(name + ": is of version " + std::to_string(version) +
-                       ", this program reads up to version " + std::to_string(history_version));
-  }
-}
-
 constexpr const char* columns_of_segment =
     "SELECT id, run, setup, reason, grid_start_ns, period_ns, first_cycle, last_cycle,"
     " wall_ns, records, bytes, program_version FROM segment";
@@ -126,7 +110,7 @@ HistoryReader::HistoryReader(const std::filesystem::path& file) {
                        (failed ? failed.message() : std::string("there is no such file")));
   }
   parts_ = std::make_unique<Parts>(file);
-  check_is_history(parts_->database);
+  require_history(parts_->database);
   parts_->has_checksums = has_checksum_columns(parts_->database);
   std::vector<SegmentInfo> found;
   try {

@@ -36,6 +36,16 @@ constexpr const char* tables =
     "CREATE UNIQUE INDEX chunk_of_segment ON chunk (segment, number);"
     "INSERT INTO meta VALUES ('format', 'thermocomp history'), ('schema_version', '1');";
 
+constexpr const char* event_table =
+    "CREATE TABLE IF NOT EXISTS event (run INTEGER NOT NULL, number INTEGER NOT NULL,"
+    " wall_ns INTEGER NOT NULL, kind TEXT NOT NULL, subject TEXT NOT NULL, what TEXT NOT NULL,"
+    " duration_ns INTEGER NOT NULL, user INTEGER NOT NULL, PRIMARY KEY (run, number))"
+    " WITHOUT ROWID;";
+
+/// So many events are kept, or as many as take a twentieth of the file.
+constexpr double events_max = 20000.0;
+constexpr double event_bytes = 150.0;
+
 std::string utc_stamp() {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
@@ -79,6 +89,11 @@ void PendingRows::add(SegmentRow row) {
 void PendingRows::add(ChunkRow row) {
   bytes_ += row.records.size() + sizeof(ChunkRow);
   records_ += row.count;
+  rows_.emplace_back(std::move(row));
+}
+
+void PendingRows::add(RecordedEvent row) {
+  bytes_ += sizeof(RecordedEvent) + row.what.size();
   rows_.emplace_back(std::move(row));
 }
 
@@ -155,7 +170,12 @@ void HistoryStore::prepare() {
       "PRAGMA journal_mode = WAL; PRAGMA journal_size_limit = 1048576;"
       "PRAGMA wal_autocheckpoint = 500");
   if (!has_checksum_columns(*database_)) add_checksum_columns(*database_);
-  if (run_ == 0) run_ = database_->number("SELECT max(run) FROM segment") + 1;
+  database_->run(event_table);
+  if (run_ == 0)
+    run_ = database_->number(
+               "SELECT max((SELECT ifnull(max(run), 0) FROM segment),"
+               " (SELECT ifnull(max(run), 0) FROM event))") +
+           1;
   struct stat status {};
   if (stat(config_.file.c_str(), &status) == 0) {
     device_ = status.st_dev;
@@ -208,8 +228,10 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
   for (const PendingRows::Row& row : pending.rows()) {
     if (const auto* segment = std::get_if<SegmentRow>(&row)) {
       insert(*segment, tokens);
+    } else if (const auto* chunk = std::get_if<ChunkRow>(&row)) {
+      insert(*chunk, tokens);
     } else {
-      insert(std::get<ChunkRow>(row), tokens);
+      insert(std::get<RecordedEvent>(row));
     }
   }
   transaction.commit();
@@ -296,6 +318,25 @@ void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
   update.bind(static_cast<std::int64_t>(row.records.size())).bind(segment->second).run();
 }
 
+/// One that is there already was committed by a commit that was reported as failed.
+void HistoryStore::insert(const RecordedEvent& row) {
+  Statement statement(*database_, "INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+  statement.bind(run_).bind(row.number).bind(row.wall_ns);
+  statement.bind(std::string_view(row.kind)).bind(std::string_view(row.subject));
+  statement.bind(std::string_view(row.what)).bind(row.duration_ns).bind(row.user).run();
+}
+
+void HistoryStore::forget_old_events() {
+  const double room = 0.05 * config_.size_MB_max * 1e6 / event_bytes;
+  const auto kept = static_cast<std::int64_t>(std::min(events_max, room));
+  if (database_->number("SELECT count(*) FROM event") <= kept) return;
+  Statement statement(*database_,
+                      "DELETE FROM event WHERE (run, number) IN (SELECT run, number FROM event"
+                      " ORDER BY run DESC, number DESC LIMIT -1 OFFSET ?)");
+  // Some more at once, so that not every commit has one to delete.
+  statement.bind(kept - kept / 10).run();
+}
+
 std::int64_t HistoryStore::oldest_other_than(std::int64_t current, std::int64_t& last_wall_ns) {
   Statement oldest(*database_,
                    "SELECT id, last_wall_ns FROM segment WHERE id <> ? ORDER BY id LIMIT 1");
@@ -327,6 +368,7 @@ bool HistoryStore::wall_clock_is_steady() {
 }
 
 void HistoryStore::keep_within_bounds(std::int64_t current_token) {
+  forget_old_events();
   const auto token = tokens_.find(current_token);
   const std::int64_t current = token == tokens_.end() ? 0 : token->second;
   const double page_bytes = static_cast<double>(database_->number("PRAGMA page_size"));

@@ -10,6 +10,8 @@
 ///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more a
 ///   commit;
 ///            wall_minus_grid_ns: wall clock minus the grid's time when it was written
+///   event    what happened (recorded_event.hpp), the newest; a file of an earlier version gets the
+///            table when it is opened for writing
 /// segment and chunk have a checksum (row_checksum.hpp); files of earlier versions get the columns
 /// when they are opened for writing.
 #pragma once
@@ -28,7 +30,8 @@
 #include "config/daemon_config.hpp"
 #include "daemon/history/chunk_codec.hpp"
 #include "daemon/history/database.hpp"
-#include "daemon/history/history_writer.hpp"
+#include "daemon/history/recorded_event.hpp"
+#include "daemon/history/writer_inputs.hpp"
 #include "daemon/locks/file_lock.hpp"
 #include "daemon/recording/grid.hpp"
 #include "daemon/recording/record.hpp"
@@ -59,9 +62,10 @@ struct ChunkRow {
 /// What waits for the next commit.
 class PendingRows {
  public:
-  using Row = std::variant<SegmentRow, ChunkRow>;
+  using Row = std::variant<SegmentRow, ChunkRow, RecordedEvent>;
   void add(SegmentRow row);
   void add(ChunkRow row);
+  void add(RecordedEvent row);
   void clear();
   [[nodiscard]] const std::vector<Row>& rows() const noexcept { return rows_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
@@ -109,6 +113,8 @@ class HistoryStore {
   [[nodiscard]] bool is_same_file() const noexcept;
   void insert(const SegmentRow& row, Tokens& tokens);
   void insert(const ChunkRow& row, const Tokens& tokens);
+  void insert(const RecordedEvent& row);
+  void forget_old_events();
   [[nodiscard]] bool is_known(std::int64_t segment, const ChunkRow& row);
   [[nodiscard]] std::int64_t setup_id(const HistorySetup& setup);
   void delete_segment(std::int64_t id);

@@ -73,6 +73,7 @@ struct HistoryWriter::Parts {
   std::condition_variable wake;
   bool stopping{false};
   std::vector<KnownSession> sessions;
+  std::vector<RecordedEvent> events;  ///< that no commit has taken yet
   std::uint16_t next_session{1};
   HistoryStatistics statistics;
   std::optional<nanoseconds> last_commit;
@@ -111,6 +112,7 @@ struct HistoryWriter::Parts {
   void begin_segment(const Record& record);
   void close_segment(std::int64_t last_whole_cycle);
   void cut_chunk();
+  void take_events();
   void commit();
   bool write();
   [[nodiscard]] bool is_working() const;
@@ -224,8 +226,18 @@ void HistoryWriter::Parts::cut_chunk() {
   pending.add(std::move(row));
 }
 
+void HistoryWriter::Parts::take_events() {
+  std::vector<RecordedEvent> taken;
+  {
+    const std::lock_guard lock(mutex);
+    taken.swap(events);
+  }
+  for (RecordedEvent& event : taken) pending.add(std::move(event));
+}
+
 void HistoryWriter::Parts::commit() {
   cut_chunk();
+  take_events();
   if (write()) {
     backoff_s = 0.0;
     next_commit = clocks.monotonic() + as_duration(std::min(config.commit_s, commit_s_max));
@@ -349,6 +361,11 @@ std::unique_ptr<CycleRecorder> HistoryWriter::make_recorder(const HistorySetup& 
   }
   return std::make_unique<CycleRecorder>(parts_->ring, std::move(session), parts_->grid,
                                          as_duration(parts_->config.offsets_period_s), estimator);
+}
+
+void HistoryWriter::note(RecordedEvent event) {
+  const std::lock_guard lock(parts_->mutex);
+  parts_->events.push_back(std::move(event));
 }
 
 WriterClocks system_clocks() {

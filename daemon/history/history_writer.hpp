@@ -3,11 +3,12 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <string>
 
 #include "config/daemon_config.hpp"
+#include "daemon/history/recorded_event.hpp"
+#include "daemon/history/writer_inputs.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/grid.hpp"
 
@@ -26,20 +27,6 @@ struct HistoryStatistics {
   double last_commit_age_s{not_a_number};
   std::string last_error;  ///< empty when the last attempt was good
 };
-
-/// What a replay needs besides the records.
-struct HistorySetup {
-  std::string config_text;
-  std::string model_text;
-  std::string model_checksum;
-};
-
-/// Where the writer has its times from.
-struct WriterClocks {
-  std::function<nanoseconds()> monotonic;  ///< the grid's
-  std::function<nanoseconds()> wall;       ///< since 1970, may be stepped
-};
-[[nodiscard]] WriterClocks system_clocks();
 
 /// Drains the ring on a thread of its own. Not on main, where the watchdog is fed and the
 /// operators' socket answered: fsync on a worn SD card or a disk that spins up takes seconds, and a
@@ -65,6 +52,8 @@ class HistoryWriter {
   /// not outlive the writer.
   [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const HistorySetup& setup,
                                                              const Estimator& estimator);
+  /// Something has happened; it is on disk with the next commit. Any ordinary thread.
+  void note(RecordedEvent event);
   /// Opens the file and starts the thread. A damaged file is moved aside with a warning in the log;
   /// a disk that does not work is tried again for ever.
   /// @throws HistoryError when the file is of a newer version or of another program, or another

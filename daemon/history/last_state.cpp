@@ -3,7 +3,6 @@
 #include <system_error>
 
 #include "daemon/history/segment_steps.hpp"
-#include "estimator/persistent_state.hpp"
 
 namespace thermocomp {
 namespace {
@@ -16,7 +15,7 @@ PersistentState state_after(const HistoryReader& reader, const SegmentInfo& segm
   }
   Report report = steps.estimator().make_report();
   steps.estimator().report(report);
-  PersistentState state = persistent_state(steps.estimator(), report);
+  PersistentState state = steps.estimator().persistent_state(report);
   if (setup.dry_run) state.offset_um.clear();  // they were not sent
   return state;
 }

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "daemon/history/replay_setup.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 

@@ -7,7 +7,7 @@
 
 #include "daemon/history/segment_steps.hpp"
 #include "daemon/history/segment_walk.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 namespace {

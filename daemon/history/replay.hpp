@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/history/history_reader.hpp"
+#include "daemon/history/history_time.hpp"
 #include "daemon/history/replay_setup.hpp"
 #include "estimator/estimator_config.hpp"
 
@@ -52,15 +53,6 @@ ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sin
 ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& out,
                             const Progress& progress = {}, const SetupParser& parser = parse_setup);
 
-/// A time in a history: seconds since its first cycle, or wall time (ISO 8601: 2026-03-01T08:30:00,
-/// local unless it ends with Z or +hh:mm; date alone is midnight).
-struct HistoryTime {
-  std::optional<double> seconds;
-  std::optional<std::int64_t> wall_ns;
-};
-/// @throws std::invalid_argument naming the text
-[[nodiscard]] HistoryTime parse_history_time(const std::string& text);
-
 struct ExportSummary {
   std::uint64_t rows{0};
   std::uint64_t gaps{0};  ///< between rows of the file, each told by a comment line
@@ -70,19 +62,30 @@ struct ExportSummary {
 /// The column of a run file that holds a sensor's readings: `<sensor>_degC`.
 [[nodiscard]] std::string sensor_column(const std::string& sensor);
 
+/// What the temperatures of an export are.
+enum class ExportContent {
+  inputs,  ///< the model's inputs, by its names, as the daemon computed with them
+  sensors  ///< every sensor as the driver gave it, `<sensor>_degC`; then no inputs beside them
+};
+
 /// A run file with a row at every cycle whose offsets were noted and from <= time < to: time_s
-/// (since the first row), `<sensor>_degC` (as the driver gave it; missing where it had a fault),
-/// the model's inputs that no sensor column is called like (mean of the block's good sensors), the
-/// controller's signals, `<axis>_offset_um`, `<axis>_applied_um` and, in the first row after an
-/// operator gave one, `<axis>_measured_um`. Where cycles are missing between two rows, because the
-/// daemon did not run or because it could not write and memory was full, a comment line says so.
-/// So it is with a chunk that is damaged: the rows behind it have what was recorded since, and a
-/// segment that cannot be read at all is left out. Segments outside of `from` and `to` are not
-/// read.
+/// (since the first row); the temperatures (missing where no sensor of the block was good; sensors
+/// of no block by their own names, as read); the controller's signals; the outputs of which
+/// something was probed, in the first row after an operator gave it (without the offset in effect,
+/// as `[correction] measured` says what he gave); `<axis>_offset_um`, `<axis>_applied_um` and
+/// `<axis>_measured_um`, which is what the operator said.
+/// Comment lines tell the wall time of the first row, of one an hour and of each that follows a
+/// gap or a clock that was set; what is missing between two rows; faults of sensors as they begin
+/// and end, commands and changes of the model.
+/// The inputs come from stepping the estimator again. Where a segment is damaged that ends, and
+/// they are means of what was read until the next segment. A chunk that is damaged costs its own
+/// rows, and a segment that cannot be read at all is left out. Segments outside of `from` and `to`
+/// are not read.
 /// @throws HistoryError when nothing can be taken from the file
 ExportSummary export_run(const std::filesystem::path& history,
                          const std::optional<HistoryTime>& from,
                          const std::optional<HistoryTime>& to, std::ostream& out,
-                         const Progress& progress = {}, const SetupParser& parser = parse_setup);
+                         const Progress& progress = {}, const SetupParser& parser = parse_setup,
+                         ExportContent content = ExportContent::inputs);
 
 }  // namespace thermocomp

@@ -11,7 +11,7 @@
 #include "config/problems.hpp"
 #include "daemon/history/replay.hpp"
 #include "daemon/history/segment_walk.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 namespace {

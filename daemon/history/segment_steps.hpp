@@ -6,7 +6,7 @@
 
 #include "daemon/history/replay_setup.hpp"
 #include "daemon/history/segment_walk.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 
@@ -19,6 +19,7 @@ class SegmentSteps {
   /// @return false after the last cycle that is recorded whole. @throws HistoryError
   [[nodiscard]] bool step();
   /// Of the last step: its cycle, and what came out of it.
+  [[nodiscard]] bool has_stepped() const noexcept { return stepped_; }
   [[nodiscard]] std::uint64_t cycle() const noexcept { return cycle_; }
   [[nodiscard]] const OffsetCommand& command() const noexcept { return command_; }
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }

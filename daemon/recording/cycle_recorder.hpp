@@ -12,7 +12,7 @@
 
 #include "daemon/recording/grid.hpp"
 #include "daemon/recording/record_ring.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

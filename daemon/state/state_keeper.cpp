@@ -1,7 +1,7 @@
 #include "daemon/state/state_keeper.hpp"
 
 #include "daemon/state/state_file.hpp"
-#include "estimator/persistent_state.hpp"
+#include "estimator/pipeline/persistent_state.hpp"
 
 namespace thermocomp {
 

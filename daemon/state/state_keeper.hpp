@@ -6,7 +6,7 @@
 #include <string>
 
 #include "daemon/state/reference_record.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/persistent_state.hpp"
 
 namespace thermocomp {
 

@@ -17,6 +17,9 @@
 #include "docs/manual/completion.hpp"
 #include "docs/manual/format_page.hpp"
 #include "simulator/command_line.hpp"
+#ifdef THERMOCOMP_WITH_GATEWAY
+#include "gateway/command_line.hpp"
+#endif
 #ifdef THERMOCOMP_WITH_MODELLING
 #include "modelling/command_line.hpp"
 #endif
@@ -61,8 +64,8 @@ void write_command(const fs::path& folder) {
       {"THERMOCOMP_SOCKET", "the daemon's status socket, instead of the default"}};
   extras.files = {{global.socket, "the daemon's status socket"},
                   {HistoryConfig{}.file.string(), "the daemon's history"}};
-  extras.see_also = {"thermocompd(8)", "thermocompd.toml(5)", "thermocomp-sim(1)",
-                     "thermocomp-modelling(1)"};
+  extras.see_also = {"thermocompd(8)", "thermocompd.toml(5)", "thermocomp-run(5)",
+                     "thermocomp-sim(1)", "thermocomp-modelling(1)"};
   write_program(folder, app, extras);
 }
 
@@ -105,6 +108,33 @@ void write_modelling(const fs::path& folder) {
 }
 #endif
 
+#ifdef THERMOCOMP_WITH_GATEWAY
+void write_gateway(const fs::path& examples, const fs::path& folder) {
+  CLI::App app;
+  gateway::GatewayOptions options;
+  gateway::declare_gateway_command_line(app, options);
+  PageExtras extras;
+  extras.files = {
+      {options.config_file, "the configuration; the service does not start without it"},
+      {"/usr/share/thermocomp/monitoring", "alert rules for Prometheus, a dashboard for Grafana"}};
+  extras.see_also = {"gateway.toml(5)", "thermocompd(8)", "thermocomp(1)"};
+  write_program(folder, app, extras);
+  FormatPage page;
+  page.name = "gateway.toml";
+  page.what = "configuration of thermocomp-gateway";
+  page.text =
+      "The file is TOML, and is read strictly; all problems are shown by\n"
+      "\n"
+      " thermocomp check " +
+      options.config_file +
+      "\n\n"
+      "The commented example below is the reference; every key is shown with its default.\n";
+  page.examples = {{"THE CONFIGURATION", content(examples / "gateway.toml")}};
+  page.see_also = {"thermocomp-gateway(1)", "thermocomp(1)"};
+  write(folder / "gateway.toml.5", format_page(page));
+}
+#endif
+
 void write_formats(const fs::path& examples, const fs::path& folder) {
   FormatPage page;
   page.name = "thermocompd.toml";
@@ -137,6 +167,37 @@ void write_formats(const fs::path& examples, const fs::path& folder) {
   write(folder / "thermocompd.toml.5", format_page(page));
 }
 
+void write_run_format(const fs::path& examples, const fs::path& folder) {
+  FormatPage page;
+  page.name = "thermocomp-run";
+  page.what = "run file: measured or simulated data";
+  page.text =
+      "CSV in UTF-8 with commas, decimal points and one header row; lines that start with # are\n"
+      "comments. One file is one run. time_s is required and increases; steps may differ. An "
+      "empty\n"
+      "field or nan is a missing value. The unit is the longest known end of a column's name:\n"
+      "_degC and _K (temperatures), _um (displacement), _urad (tilt), _mm (position), _rpm,\n"
+      "_mm_per_min, _A, _W, _V, _on (0 or 1), _percent; any other name is an operating signal "
+      "without\n"
+      "unit. FILE@T0:T1 on a command line selects the rows with T0 <= time_s < T1.\n"
+      "\n"
+      "\"thermocomp export\" writes this form from a daemon's history: the model's inputs as the\n"
+      "daemon computed with them, signals, the displacement where it was probed, and for each "
+      "axis\n"
+      "_offset_um, _applied_um and _measured_um. Comments tell wall time, faults of sensors, "
+      "commands\n"
+      "and gaps. \"inspect\", \"fit\", \"predict\", \"diagnose\" and \"covariance\" take it as it "
+      "is.\n"
+      "\n"
+      "Readers also take what people have: other separators, decimal commas, dates, units in\n"
+      "brackets; what was understood is told on stderr, and what may mean two things is asked for\n"
+      "with the line to write into a file of --columns.\n";
+  page.examples = {{"A RUN FILE", content(examples / "run.csv")},
+                   {"A FILE OF --COLUMNS", content(examples / "columns.toml")}};
+  page.see_also = {"thermocomp(1)", "thermocomp-modelling(1)"};
+  write(folder / "thermocomp-run.5", format_page(page));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -153,7 +214,11 @@ int main(int argc, char** argv) {
 #ifdef THERMOCOMP_WITH_MODELLING
     write_modelling(folder);
 #endif
+#ifdef THERMOCOMP_WITH_GATEWAY
+    write_gateway(argv[1], folder);
+#endif
     write_formats(argv[1], folder);
+    write_run_format(argv[1], folder);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "thermocomp-manual: %s\n", error.what());
     return 1;

@@ -3,27 +3,24 @@
 #include <algorithm>
 #include <cmath>
 
-#include "modelling/diagnosis/extended_model.hpp"
-#include "modelling/diagnosis/gain_on_test.hpp"
-#include "modelling/diagnosis/named_finding.hpp"
-#include "modelling/diagnosis/remainder_bank.hpp"
-#include "modelling/diagnosis/report_data.hpp"
-#include "modelling/diagnosis/search_beside_fit.hpp"
+#include "modelling/diagnosis/answer/extended_model.hpp"
+#include "modelling/diagnosis/answer/gain_on_test.hpp"
+#include "modelling/diagnosis/answer/named_finding.hpp"
+#include "modelling/diagnosis/answer/remainder_bank.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/report/report_data.hpp"
+#include "modelling/diagnosis/search/search_beside_fit.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
 
 /// What a finding that no term can carry corrects, if it acts in every run.
 std::optional<Correction> correction_of(const NamedFinding& name, std::size_t output) {
-  const auto value = [&name](const std::string& parameter) {
-    for (const Parameter& each : name.parameters)
-      if (each.name == parameter) return each.values.at("");
-    return 0.0;
-  };
-  if (name.cause == "time_shift") return Correction{output, value("shift_s"), 0.0, 0.0};
-  if (name.cause == "periodic_disturbance")
-    return Correction{output, 0.0, value("period_s"), value("amplitude_um")};
-  return std::nullopt;
+  const Cause& cause = cause_named(name.cause);
+  if (cause.correction == nullptr) return std::nullopt;
+  Correction correction = cause.correction(name.parameters);
+  correction.output = output;
+  return correction;
 }
 
 /// A search in rows that the model was fitted to must leave less by this share than one that takes

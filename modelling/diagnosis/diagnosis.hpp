@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/answer.hpp"
+#include "modelling/diagnosis/answer/answer.hpp"
 
 namespace thermocomp::diagnosis {
 

@@ -2,6 +2,7 @@
 /// knows which few sensors matter.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -44,8 +45,13 @@ class BankEquations {
 
   /// Gains [um per unit], shape (columns, outputs), from all folds but `left_out` (none: past the
   /// last). Half of them from ridge regression, half from L1 regression, in each an average over
-  /// penalties: one that leaves e^2 on folds left out inside counts as e^-8. On measured machines
-  /// neither kind is better than the other, and their mean is seldom worse than the better one.
+  /// penalties. On measured machines neither kind is better than the other, and their mean is
+  /// seldom worse than the better one.
+  ///
+  /// With four runs or more the runs choose: a penalty that leaves e^2 on runs left out inside
+  /// counts as e^-8. Stretches of fewer runs share their loads, and predict penalties alike that
+  /// part by several times on another day: a decade of them counts alike then, and L1 regression is
+  /// a mean over records that lack a stretch each.
   [[nodiscard]] Eigen::MatrixXd fit(std::size_t left_out) const;
 
   [[nodiscard]] const std::vector<Eigen::MatrixXd>& rows() const noexcept { return rows_; }
@@ -58,12 +64,22 @@ class BankEquations {
     double rows{0.0};
   };
   [[nodiscard]] Sums sums_without(std::size_t left_out, std::size_t also) const;
-  [[nodiscard]] std::vector<Eigen::MatrixXd> paths(const Sums& sums) const;
+  /// Whether leaving the part out too takes something away, and not everything.
+  [[nodiscard]] bool lacks_more(std::size_t left_out, std::size_t part) const;
+  [[nodiscard]] static std::vector<Eigen::MatrixXd> ridge_path(const Sums& sums,
+                                                               std::span<const double> penalties);
+  /// @param prices  descending
+  [[nodiscard]] static std::vector<Eigen::MatrixXd> l1_path(const Sums& sums,
+                                                            std::span<const double> prices);
+  [[nodiscard]] static std::vector<Eigen::MatrixXd> paths(const Sums& sums);
+  [[nodiscard]] Eigen::MatrixXd chosen(std::size_t left_out) const;
+  [[nodiscard]] Eigen::MatrixXd unchosen(std::size_t left_out) const;
 
   std::vector<Sums> pieces_;       ///< of the folds
   std::vector<std::size_t> fold_;  ///< of each piece
   std::vector<std::size_t> part_;  ///< of each piece: which are left out together inside
   std::size_t parts_{0};
+  bool runs_choose_{false};
   Eigen::VectorXd scale_;
   std::vector<Eigen::MatrixXd> rows_;  ///< one a run
 };

@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include <nlohmann/json.hpp>
 
+#include "estimator/model/model_domain.hpp"
 #include "modelling/identification/families.hpp"
 #include "modelling/identification/printed.hpp"
 
@@ -44,6 +46,32 @@ std::string equation_text(const MeasuredTests& tests, const Fit& fit) {
   return text + printed("condition of the chosen columns: %.1f\n", fit.condition);
 }
 
+/// Two digits, or all before the point.
+std::string about(double value) {
+  return printed(std::abs(value) < 99.5 ? "%.2g" : "%.0f", value);
+}
+
+/// What another day will show, as far as so many runs can tell. One run has seen no other day; two
+/// judge one another, each by a model of the other alone, which may be far worse than that of both.
+std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom& made_from,
+                       const MadeFrom::Output& output) {
+  const char* of = name.c_str();
+  const std::string left_out = about(output.left_out_rms_um);
+  const std::string no_model = about(output.no_model_rms_um);
+  if (runs == 1)
+    return printed(
+        "%s: another day is not known; on it expect about %s um, that is between %s (stretches of "
+        "this run) and %s (no model)\n",
+        of, about(spread_um(made_from, output)).c_str(), left_out.c_str(), no_model.c_str());
+  if (runs == 2)
+    return printed(
+        "%s: on a third run expect between %s um (rows fitted) and %s (each run by a model of the "
+        "other), without a model %s; with three runs there would be a figure\n",
+        of, about(output.remainder_rms_um).c_str(), left_out.c_str(), no_model.c_str());
+  return printed("%s: RMS left out %.3f um, fitted %.3f, without a model %.3f\n", of,
+                 output.left_out_rms_um, output.remainder_rms_um, output.no_model_rms_um);
+}
+
 }  // namespace
 
 std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
@@ -65,9 +93,7 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   if (fit.chosen != Family::none) {
     const MadeFrom& made_from = *fit.model.made_from;
     for (const auto& [name, output] : made_from.outputs)
-      text += printed("%s: RMS left out %.3f um%s, fitted %.3f, without a model %.3f\n",
-                      name.c_str(), output.left_out_rms_um, one_run ? " (within this run)" : "",
-                      output.remainder_rms_um, output.no_model_rms_um);
+      text += claim_text(tests.runs.size(), name, made_from, output);
   }
   if (fit.few) text += equation_text(tests, *fit.few);
   for (const std::string& warning : fit.warnings)

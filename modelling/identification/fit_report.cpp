@@ -115,9 +115,11 @@ std::string fit_text(const MeasuredTests& tests, const Fit& fit) {
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
     const OutputFit& output = fit.outputs[o];
-    text += printed("%s: RMS left out %.3f um (peak %.3f), fitted %.3f, without a model %.3f\n",
-                    tests.outputs[o].c_str(), output.left_out_rms_um, output.left_out_peak_um,
-                    output.train_rms_um, output.no_model_rms_um);
+    text += printed("%s: RMS %s %.3f um (peak %.3f), fitted %.3f, without a model %.3f\n",
+                    tests.outputs[o].c_str(),
+                    tests.runs.size() < 2 ? "of blocks of this run left out" : "left out",
+                    output.left_out_rms_um, output.left_out_peak_um, output.train_rms_um,
+                    output.no_model_rms_um);
     for (std::size_t i = 0; i < fit.columns.size(); ++i)
       text += printed(
           "  %+10.4f +- %.4f um/K  %s\n", output.coefficients[static_cast<Eigen::Index>(i)],

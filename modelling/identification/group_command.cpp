@@ -56,6 +56,34 @@ std::string json_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+/// Names in full, at least two blanks between the columns.
+std::string table_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
+                     const Grouping& grouping) {
+  std::size_t longest = 7;  // of a value
+  for (const std::string& place : tests.places) longest = std::max(longest, place.size());
+  const std::size_t width = longest + 2;
+  const auto right = [width](const std::string& cell) {
+    return std::string(width - std::min(width - 1, cell.size()), ' ') + cell;
+  };
+  std::string text = "\nS, a row against a column:\n" + std::string(width, ' ');
+  for (const auto& group : grouping.groups)
+    for (const std::size_t b : group) text += right(tests.places[b]);
+  text += "\n";
+  for (const auto& group : grouping.groups)
+    for (const std::size_t a : group) {
+      text += tests.places[a] + std::string(width - tests.places[a].size(), ' ');
+      for (const auto& other : grouping.groups)
+        for (const std::size_t b : other) {
+          char value[32];
+          std::snprintf(value, sizeof value, "%.2g",
+                        s(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)));
+          text += right(value);
+        }
+      text += "\n";
+    }
+  return text;
+}
+
 std::string text_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
                     const Grouping& grouping) {
   std::string text;
@@ -76,26 +104,7 @@ std::string text_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
                   merge.groups);
     text += line;
   }
-  text += "\nS, a row against a column:\n          ";
-  for (const auto& group : grouping.groups)
-    for (const std::size_t b : group) {
-      std::snprintf(line, sizeof line, "%9.9s", tests.places[b].c_str());
-      text += line;
-    }
-  text += "\n";
-  for (const auto& group : grouping.groups)
-    for (const std::size_t a : group) {
-      std::snprintf(line, sizeof line, "%-10.10s", tests.places[a].c_str());
-      text += line;
-      for (const auto& other : grouping.groups)
-        for (const std::size_t b : other) {
-          std::snprintf(line, sizeof line, "%9.2g",
-                        s(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)));
-          text += line;
-        }
-      text += "\n";
-    }
-  return text;
+  return text + table_of(tests, s, grouping);
 }
 
 std::string picture_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,

@@ -8,7 +8,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "estimator/low_pass.hpp"
+#include "estimator/model/terms/low_pass.hpp"
 
 namespace thermocomp::identification {
 namespace {

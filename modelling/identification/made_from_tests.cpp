@@ -8,9 +8,9 @@
 
 #include <Eigen/Cholesky>
 
-#include "estimator/displacement_model.hpp"
-#include "estimator/low_pass.hpp"
-#include "estimator/model_domain.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/model/model_domain.hpp"
+#include "estimator/model/terms/low_pass.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -244,7 +244,7 @@ std::string inspection_html(const std::vector<RunFile>& runs, const Inspection& 
   std::string html = head;
   html += "<h1>What these recordings are worth</h1>\n";
   html += inspection.findings.empty()
-              ? "<p>Nothing is wrong with these recordings that they show.</p>\n"
+              ? "<p>No faults found in these recordings.</p>\n"
               : "<p>What is wrong with them, likeliest first. The bar is the probability.</p>\n";
   for (const Finding& finding : inspection.findings)
     html += finding_html(runs, inspection, finding);

@@ -64,8 +64,7 @@ std::string inspection_text(const Inspection& inspection) {
     text += run.file + line;
   }
   text += "\n";
-  if (inspection.findings.empty())
-    text += "Nothing is wrong with these recordings that they show.\n";
+  if (inspection.findings.empty()) text += "No faults found in these recordings.\n";
   for (const Finding& finding : inspection.findings) {
     std::snprintf(line, sizeof line, "%3.0f %%  ", 100 * finding.probability);
     text += line + inspection.runs[finding.run].file + ": " + finding.text + "\n";

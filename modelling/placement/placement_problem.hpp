@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "modelling/structure/heat_model.hpp"
-#include "modelling/structure/statics.hpp"
+#include "modelling/structure/solve/statics.hpp"
 #include "modelling/structure/structure_model.hpp"
 
 namespace thermocomp::placement {

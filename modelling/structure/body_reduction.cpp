@@ -7,7 +7,7 @@
 
 #include "config/problems.hpp"
 #include "estimator/checks.hpp"
-#include "modelling/structure/locate.hpp"
+#include "modelling/structure/solve/locate.hpp"
 
 namespace thermocomp::structure {
 namespace {
@@ -118,6 +118,7 @@ class Reducer {
     for (std::size_t i = 0; i < spec_.outputs.size(); ++i) {
       body.outputs.push_back({spec_.outputs[i].name, states_of(outputs[i])});
     }
+    add_guideways(sensitivities, body);
     if (with_parts) {
       add_couplings(body);
       add_capacities(body);
@@ -126,6 +127,21 @@ class Reducer {
   }
 
  private:
+  /// Their rows take no part in the choice of the basis, which has the field that every input
+  /// makes.
+  void add_guideways(const std::vector<std::vector<double>>& sensitivities,
+                     ReducedBody& body) const {
+    std::size_t next = spec_.outputs.size();
+    for (const GuidewayRows& guideway : spec_.guideways) {
+      for (const auto& [output, direction] : guideway.outputs) {
+        BodyGuideway& rows = body.guideways.emplace_back(
+            BodyGuideway{guideway.name, guideway.axis, output, guideway.positions_mm, {}});
+        for (std::size_t i = 0; i < guideway.places.size(); ++i)
+          rows.rows.push_back(states_of(um * restricted(sensitivities[next++])));
+      }
+    }
+  }
+
   /// Each coupling is strength w w', so that its projection is strength v v' with v = V' w.
   void add_couplings(ReducedBody& body) const {
     Matrix everywhere(static_cast<Eigen::Index>(structure_.mesh.nodes_m.size()), basis_.cols());
@@ -289,9 +305,6 @@ ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
   if (spec.heats.empty()) problem("heat", "a body for the simulator needs a [[heat]]");
   if (spec.convections.empty()) {
     problem("convection", "a body for the simulator needs a [[convection]]");
-  }
-  if (!spec.guideways.empty()) {
-    problem("guideway", "a body for the simulator has outputs of one pose; leave guideways out");
   }
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
   return Reducer(spec, structure, heat).reduce(statics, with_parts);

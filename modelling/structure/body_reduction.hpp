@@ -3,7 +3,7 @@
 #pragma once
 
 #include "modelling/structure/heat_model.hpp"
-#include "modelling/structure/statics.hpp"
+#include "modelling/structure/solve/statics.hpp"
 #include "simulator/plant/reduced_body.hpp"
 
 namespace thermocomp::structure {
@@ -15,7 +15,7 @@ namespace thermocomp::structure {
 /// the displacements with its slope; symmetric, so stable.
 /// Source: E. J. Grimme, Krylov projection methods for model reduction, 1997.
 /// @param with_parts  also what each film, joint and part has in the matrices
-/// @throws ConfigurationError: sensors outside their part, no sensors, outputs on a guideway
+/// @throws ConfigurationError: sensors outside their part, no sensors
 [[nodiscard]] ReducedBody reduce_body(const StructureSpec& spec, const Structure& structure,
                                       const HeatModel& heat, const Statics& statics,
                                       bool with_parts = false);

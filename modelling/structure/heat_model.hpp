@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/structure/conduction.hpp"
+#include "modelling/structure/solve/conduction.hpp"
 #include "modelling/structure/structure_model.hpp"
 #include "simulator/plant/reduced_body.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "modelling/structure/locate.hpp"
+#include "modelling/structure/solve/locate.hpp"
 
 namespace thermocomp::structure {
 namespace {

@@ -1,8 +1,8 @@
 /// Faces of two parts that meet.
 #pragma once
 
-#include "modelling/structure/reduction.hpp"
 #include "modelling/structure/regions.hpp"
+#include "modelling/structure/solve/reduction.hpp"
 
 namespace thermocomp::structure {
 

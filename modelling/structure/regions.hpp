@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "modelling/structure/matrices.hpp"
-#include "modelling/structure/structure_file.hpp"
+#include "modelling/structure/elements/matrices.hpp"
+#include "modelling/structure/files/structure_file.hpp"
 
 namespace thermocomp::structure {
 

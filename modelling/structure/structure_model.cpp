@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "config/number_text.hpp"
-#include "modelling/structure/file_mesh.hpp"
 #include "modelling/structure/joints.hpp"
-#include "modelling/structure/locate.hpp"
+#include "modelling/structure/mesh/file_mesh.hpp"
+#include "modelling/structure/solve/locate.hpp"
 
 namespace thermocomp::structure {
 namespace {
@@ -192,7 +192,8 @@ class Builder {
 
   // ---------------------------------------------------------------- outputs
 
-  void add_place(const PlaceSpec& place, const Vec3& direction, Functional& row) {
+  void add_place(const PlaceSpec& place, Vec3 direction, Functional& row, double factor = 1.0) {
+    direction = factor * direction;
     const bool tilt = place.at_m.size() == 2;
     const double scale = place.sign / (tilt ? length(place.at_m[1] - place.at_m[0]) : 1.0);
     for (std::size_t i = 0; i < place.at_m.size(); ++i) {
@@ -216,7 +217,9 @@ class Builder {
     for (const GuidewayRows& guideway : spec_.guideways) {
       for (const auto& [name, direction] : guideway.outputs) {
         for (const PlaceSpec& place : guideway.places) {
-          add_place(place, direction, structure.rows.emplace_back());
+          Functional& row = structure.rows.emplace_back();
+          add_place(place, direction, row);
+          if (guideway.drawn) add_place(*guideway.drawn, direction, row, -1.0);
         }
       }
     }

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "estimator/thermal_model.hpp"
-#include "modelling/structure/reduction.hpp"
-#include "modelling/structure/statics.hpp"
-#include "modelling/structure/structure_file.hpp"
+#include "modelling/structure/files/structure_file.hpp"
+#include "modelling/structure/solve/reduction.hpp"
+#include "modelling/structure/solve/statics.hpp"
 
 namespace thermocomp::structure {
 

@@ -12,6 +12,10 @@ SimulatedCnc::SimulatedCnc(const SimulatedController& config)
   const bool watched =
       (config.heartbeat || config.can_heartbeat) && config.heartbeat_timeout_s > 0.0;
   if (!watched) config_.heartbeat_timeout_s = 0.0;
+  for (const SimulatedAxis& axis : config.axes) {
+    auto& piezo = piezos_.emplace_back();
+    if (axis.piezo) piezo.emplace(*axis.piezo);
+  }
 }
 
 void SimulatedCnc::take(double now_s, const CncOrder& order) {
@@ -56,6 +60,7 @@ bool SimulatedCnc::step(double now_s, const ControllerEffect& effect) {
     const double rate = config_.axes[i].rate_um_per_s_max;
     if (rate > 0.0) change = std::clamp(change, -rate * dt_s, rate * dt_s);
     applied_um_[i] += change;
+    if (piezos_[i]) piezos_[i]->step(applied_um_[i]);
   }
   return homed;
 }
@@ -63,6 +68,8 @@ bool SimulatedCnc::step(double now_s, const ControllerEffect& effect) {
 void SimulatedCnc::forget() {
   std::fill(wanted_um_.begin(), wanted_um_.end(), 0.0);
   std::fill(applied_um_.begin(), applied_um_.end(), 0.0);
+  for (auto& piezo : piezos_)
+    if (piezo) piezo->step(0.0);
 }
 
 }  // namespace thermocomp

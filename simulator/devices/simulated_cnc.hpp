@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "simulator/devices/simulated_piezo.hpp"
 #include "simulator/plant/machine_config.hpp"
 #include "simulator/plant/scripted_events.hpp"
 
@@ -32,14 +34,20 @@ class SimulatedCnc {
   /// Power lost or axes homed: applied and wanted offsets are zero until the next order.
   void forget();
 
-  [[nodiscard]] double applied_um(std::size_t axis) const { return applied_um_.at(axis); }
+  /// What moves the tool.
+  [[nodiscard]] double applied_um(std::size_t axis) const {
+    return piezos_.at(axis) ? piezos_[axis]->displacement_um() : applied_um_[axis];
+  }
+  /// What it says: the offset, of a piezo the voltage.
+  [[nodiscard]] double shown(std::size_t axis) const { return applied_um_.at(axis); }
   [[nodiscard]] bool alive() const noexcept { return alive_; }    ///< the heartbeat beats
   [[nodiscard]] bool beaten() const noexcept { return beaten_; }  ///< has it ever
 
  private:
   SimulatedController config_;
   std::vector<double> wanted_um_;
-  std::vector<double> applied_um_;
+  std::vector<double> applied_um_;  ///< of a piezo volts, as `wanted_um_`
+  std::vector<std::optional<SimulatedPiezo>> piezos_;
   bool rejects_{false};
   bool told_{false};
   bool beaten_{false};

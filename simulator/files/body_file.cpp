@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "config/number_text.hpp"
 #include "config/toml_reader.hpp"
@@ -67,6 +68,29 @@ std::vector<BodyRow> read_rows(const TomlTable& root, std::string_view key, std:
   return rows;
 }
 
+BodyGuideway read_guideway(const TomlTable& table, const std::vector<BodyRow>& outputs,
+                           std::size_t states) {
+  BodyGuideway guideway;
+  guideway.name = table.text("name");
+  guideway.axis = table.text("axis");
+  if (kind_of(guideway.axis) != QuantityKind::position) {
+    table.problem("axis", "must be a position, a column *_mm");
+  }
+  guideway.output = table.text("output");
+  const auto same = [&](const BodyRow& output) { return output.name == guideway.output; };
+  if (std::none_of(outputs.begin(), outputs.end(), same)) {
+    table.problem("output", "must be the name of an [[output]]");
+  }
+  std::vector<double>& at = guideway.positions_mm;
+  at = table.numbers("positions_mm");
+  if (at.size() < 2 ||
+      std::adjacent_find(at.begin(), at.end(), std::greater_equal<>()) != at.end()) {
+    table.problem("positions_mm", "must be two or more numbers, strictly increasing");
+  }
+  guideway.rows = table.matrix("rows", at.size(), states);
+  return guideway;
+}
+
 BodyPart read_part(const TomlTable& table, std::size_t states) {
   BodyPart part;
   part.name = table.text("name");
@@ -95,6 +119,9 @@ ReducedBody read_body(const TomlDocument& document) {
   }
   body.sensors = read_rows(root, "sensor", states);
   body.outputs = read_rows(root, "output", states);
+  for (const TomlTable& table : root.tables("guideway")) {
+    body.guideways.push_back(read_guideway(table, body.outputs, states));
+  }
   for (const TomlTable& table : root.tables("part")) body.parts.push_back(read_part(table, states));
   document.finish();
   return body;
@@ -123,6 +150,12 @@ void append_square(std::string& text, const char* key, const std::vector<double>
   for (std::size_t i = 0; i < states; ++i) {
     text.append("  ").append(list(&values[i * states], states)).append(",\n");
   }
+  text.append("]\n");
+}
+
+void append_rows(std::string& text, const char* key, const std::vector<std::vector<double>>& rows) {
+  text.append(key).append(" = [\n");
+  for (const auto& row : rows) text.append("  ").append(list(row.data(), row.size())).append(",\n");
   text.append("]\n");
 }
 
@@ -166,6 +199,14 @@ std::string write_body(const ReducedBody& body, const std::string& comment) {
       append_text(text, "name", row.name);
       append(text, "row", row.row);
     }
+  }
+  for (const BodyGuideway& guideway : body.guideways) {
+    text.append("[[guideway]]\n");
+    append_text(text, "name", guideway.name);
+    append_text(text, "axis", guideway.axis);
+    append_text(text, "output", guideway.output);
+    append(text, "positions_mm", guideway.positions_mm);
+    append_rows(text, "rows", guideway.rows);
   }
   for (const BodyPart& part : body.parts) {
     text.append("[[part]]\n");

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <functional>
 #include <map>
 
 #include "config/sections/presets.hpp"
+#include "config/units.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"
 #include "simulator/files/can_places.hpp"
@@ -268,6 +270,23 @@ void read_value(Draft& state, const TomlTable& table, ModbusTable usual, std::si
   take(state, bus, state.machine.controller->unit, *registers, table);
 }
 
+SimulatedPiezoConfig read_piezo(const TomlTable& table) {
+  SimulatedPiezoConfig piezo;
+  piezo.dead_band_V = table.number("dead_band_V", Range::between(0.0, 1000.0), 0.0);
+  piezo.curve_V = table.numbers("curve_V", Range::between(0.0, 1000.0));
+  piezo.curve_um = table.numbers("curve_um", Range::between(-1000.0, 1000.0));
+  for (const auto& [key, values] :
+       {std::pair{"curve_V", &piezo.curve_V}, std::pair{"curve_um", &piezo.curve_um}}) {
+    if (values->size() < 2 || values->size() != piezo.curve_V.size())
+      table.problem(key, "must be two or more numbers, as many of volts as of displacement");
+    if (std::adjacent_find(values->begin(), values->end(), std::greater_equal<>()) != values->end())
+      table.problem(key, "must increase");
+  }
+  if (!piezo.curve_V.empty() && piezo.curve_V.front() != 0.0)
+    table.problem("curve_V", "must begin at 0 V");
+  return piezo;
+}
+
 void read_axis(Draft& state, const TomlTable& table, NameList& axes, std::size_t bus) {
   SimulatedAxis axis;
   axis.name = axes.read(table);
@@ -281,6 +300,7 @@ void read_axis(Draft& state, const TomlTable& table, NameList& axes, std::size_t
   axis.sign = table.number("sign", Range::between(-1.0, 1.0), 1.0);
   if (axis.sign != 1.0 && axis.sign != -1.0) table.problem("sign", "must be 1 or -1");
   axis.offset_um_max = table.number("offset_um_max", Range::between(0.0, 1e6), 0.0);
+  if (table.has("piezo")) axis.piezo = read_piezo(table.table("piezo"));
   axis.rate_um_per_s_max = table.number("rate_um_per_s_max", Range::between(0.0, 1e6), 0.0);
   std::optional<ModbusValue> registers;
   std::optional<CanSignal> frame;
@@ -299,7 +319,14 @@ void read_controller_signal(Draft& state, const TomlTable& table, NameList& name
   SimulatedControllerSignal signal;
   signal.name = names.read(table);
   if (table.has("value")) signal.value = table.number("value", Range::between(-large, large));
-  if (!signal.value) check_column(state, table, "name", signal.name);
+  if (table.has("probe_of")) {
+    signal.probe_of = table.text("probe_of");
+    check_column(state, table, "probe_of", *signal.probe_of);
+    if (!is_output(*signal.probe_of)) table.problem("probe_of", "must end in _um or _urad");
+    signal.noise_um = table.number("noise_um", Range::between(0.0, 1e6), 0.0);
+  } else if (!signal.value) {
+    check_column(state, table, "name", signal.name);
+  }
   std::optional<ModbusValue> registers;
   std::optional<CanSignal> frame;
   read_value(state, table, ModbusTable::input, bus, registers, frame);

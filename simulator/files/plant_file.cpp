@@ -49,11 +49,13 @@ SignalConfig read_signal(const TomlTable& table, NameList& signals) {
     table.problem("name", "must be an operating signal or position, not a temperature or output");
   }
   signal.kind = table.choice<SignalKind>("kind", {{"steps", SignalKind::steps},
+                                                  {"line", SignalKind::line},
                                                   {"random", SignalKind::random},
                                                   {"sine", SignalKind::sine},
                                                   {"while_above", SignalKind::while_above}});
   switch (signal.kind) {
     case SignalKind::steps:
+    case SignalKind::line:
       read_signal_steps(table, signal);
       break;
     case SignalKind::random:
@@ -180,6 +182,8 @@ void read_body_of(const TomlTable& table, const std::filesystem::path& folder,
     if (found == rows.end()) table.problem("body", output.name, "the body has no such output");
     plant.body_outputs.push_back(static_cast<std::size_t>(found - rows.begin()));
   }
+  for (const BodyGuideway& guideway : plant.body->guideways)
+    plant.body_axes.push_back(signals.index_of(table, "body", guideway.axis, "signal"));
 }
 
 /// Lumps, what joins them and what warms them.
@@ -216,6 +220,11 @@ PlantConfig read_plant(const TomlTable& root, const std::filesystem::path& folde
   const TomlTable coolant = root.table_or_empty("coolant");
   plant.coolant.temp_degC = coolant.number("temp_degC", Range::between(-20.0, 60.0), 20.0);
   plant.coolant.room_share = coolant.number("room_share", Range::between(0.0, 1.0), 0.0);
+  if (coolant.has("temp_signal")) {
+    for (const char* key : {"temp_degC", "room_share"})
+      coolant.refuse(key, "the coolant's temperature is a signal (temp_signal)");
+    plant.coolant.temp_signal = signals.index(coolant, "temp_signal", "signal");
+  }
   if (coolant.has("signal")) plant.coolant.signal = signals.index(coolant, "signal", "signal");
   for (const TomlTable& table : root.tables("output")) {
     OutputConfig output;

@@ -65,6 +65,17 @@ struct SimulatedControllerSignal {
   ModbusValue place;
   CanSignal can;
   std::optional<double> value;  ///< shown where no column of that name exists
+  /// An output: shows what is left of it at the tool, displacement and offset together, as a probe
+  /// would find it.
+  std::optional<std::string> probe_of{};
+  double noise_um{0.0};  ///< standard deviation of the probe
+};
+
+/// The axis is a stacked piezo: its register is a voltage.
+struct SimulatedPiezoConfig {
+  double dead_band_V{0.0};       ///< after each turn nothing moves for so long
+  std::vector<double> curve_V;   ///< felt by the stack; begins with 0, both strictly increase
+  std::vector<double> curve_um;  ///< displacement then
 };
 
 struct SimulatedAxis {
@@ -77,6 +88,7 @@ struct SimulatedAxis {
   std::optional<ModbusValue> applied;
   CanSignal can_offset;
   std::optional<CanSignal> can_applied;
+  std::optional<SimulatedPiezoConfig> piezo{};
 };
 
 struct SimulatedController {

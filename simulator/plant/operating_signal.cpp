@@ -12,10 +12,10 @@ namespace thermocomp {
 OperatingSignal::OperatingSignal(const SignalConfig& config, std::uint64_t seed,
                                  std::uint64_t stream)
     : config_(config), seed_(seed), stream_(stream) {
-  const bool from_list = config.kind == SignalKind::steps || config.kind == SignalKind::random;
+  const bool in_time = config.kind == SignalKind::steps || config.kind == SignalKind::line;
+  const bool from_list = in_time || config.kind == SignalKind::random;
   THERMOCOMP_ENSURE(!from_list || !config.values.empty());
-  THERMOCOMP_ENSURE(config.kind != SignalKind::steps ||
-                    config.times_s.size() == config.values.size());
+  THERMOCOMP_ENSURE(!in_time || config.times_s.size() == config.values.size());
   THERMOCOMP_ENSURE(config.kind != SignalKind::random || config.dwell_s_min > 0.0);
 }
 
@@ -23,6 +23,8 @@ double OperatingSignal::value(double time_s, double watched) {
   switch (config_.kind) {
     case SignalKind::steps:
       return step_value(time_s);
+    case SignalKind::line:
+      return line_value(time_s);
     case SignalKind::random:
       return random_value(time_s);
     case SignalKind::sine:
@@ -39,6 +41,17 @@ double OperatingSignal::step_value(double time_s) const {
   const auto next = std::upper_bound(config_.times_s.begin(), config_.times_s.end(), t);
   const auto index = std::max<std::ptrdiff_t>(1, next - config_.times_s.begin()) - 1;
   return config_.values[static_cast<std::size_t>(index)];
+}
+
+double OperatingSignal::line_value(double time_s) const {
+  const double t = config_.repeat_s > 0.0 ? std::fmod(time_s, config_.repeat_s) : time_s;
+  const auto next = std::upper_bound(config_.times_s.begin(), config_.times_s.end(), t);
+  if (next == config_.times_s.end()) return config_.values.back();
+  const auto index = static_cast<std::size_t>(next - config_.times_s.begin());
+  if (index == 0) return config_.values.front();
+  const double begin_s = config_.times_s[index - 1];
+  const double share = (t - begin_s) / (config_.times_s[index] - begin_s);
+  return config_.values[index - 1] + share * (config_.values[index] - config_.values[index - 1]);
 }
 
 double OperatingSignal::random_value(double time_s) {

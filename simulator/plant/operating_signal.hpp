@@ -19,6 +19,7 @@ class OperatingSignal {
 
  private:
   [[nodiscard]] double step_value(double time_s) const;
+  [[nodiscard]] double line_value(double time_s) const;
   [[nodiscard]] double random_value(double time_s);
 
   SignalConfig config_;

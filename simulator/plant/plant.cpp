@@ -124,6 +124,7 @@ struct Plant::Parts {
     room_degC = room.temp_degC(grid_time_s());
     coolant_degC =
         config.coolant.temp_degC + config.coolant.room_share * (room_degC - config.room.mean_degC);
+    if (config.coolant.temp_signal) coolant_degC = signals[*config.coolant.temp_signal];
     coolant_flows = config.coolant.signal && signals[*config.coolant.signal] != 0.0;
     if (config.body) {
       take_body_inputs(*config.body);
@@ -191,6 +192,21 @@ struct Plant::Parts {
     }
   }
 
+  [[nodiscard]] double rise(const std::vector<double>& row) const {
+    return dot(row, now_degC) - dot(row, start_degC);
+  }
+
+  /// @return what the guideway adds at this position; beyond its ends what it adds there [um]
+  [[nodiscard]] double along(const BodyGuideway& guideway, double position_mm) const {
+    const std::vector<double>& at = guideway.positions_mm;
+    const auto above = std::upper_bound(at.begin(), at.end(), position_mm);
+    if (above == at.begin()) return rise(guideway.rows.front());
+    if (above == at.end()) return rise(guideway.rows.back());
+    const auto next = static_cast<std::size_t>(above - at.begin());
+    const double share = (position_mm - at[next - 1]) / (at[next] - at[next - 1]);
+    return (1.0 - share) * rise(guideway.rows[next - 1]) + share * rise(guideway.rows[next]);
+  }
+
   void grid_step() {
     std::vector<double>& nodes = now_degC;
     look_ahead(config.step_s, nodes, now_lagged_degC);
@@ -248,8 +264,14 @@ double Plant::thermocouple_degC(std::size_t thermocouple) const {
 double Plant::displacement_um(std::size_t output) const {
   const PlantConfig& config = parts_->config;
   if (config.body) {
-    const std::vector<double>& row = config.body->outputs.at(config.body_outputs.at(output)).row;
-    return dot(row, parts_->now_degC) - dot(row, parts_->start_degC);
+    const BodyRow& own = config.body->outputs.at(config.body_outputs.at(output));
+    double sum = parts_->rise(own.row);
+    for (std::size_t i = 0; i < config.body->guideways.size(); ++i) {
+      const BodyGuideway& guideway = config.body->guideways[i];
+      if (guideway.output != own.name) continue;
+      sum += parts_->along(guideway, parts_->signals.at(config.body_axes.at(i)));
+    }
+    return sum;
   }
   double sum = 0.0;
   for (std::size_t i = 0; i < config.nodes.size(); ++i) {

@@ -40,6 +40,7 @@ struct HeatSourceConfig {
 
 enum class SignalKind {
   steps,       ///< values[i] from times_s[i] on, repeated every repeat_s where that is > 0
+  line,        ///< values[i] at times_s[i], straight between them, repeated as steps are
   random,      ///< one of values, each kept for dwell_s_min..dwell_s_max, drawn from the seed
   sine,        ///< centre + amplitude sin(2 pi t / period_s)
   while_above  ///< 1 while the watched signal is above a level, else 0
@@ -83,6 +84,8 @@ struct CoolantConfig {
   std::optional<std::size_t> signal;  ///< flows while this is not 0; none: never flows
   double temp_degC{20.0};             ///< with the room at its mean
   double room_share{0.0};             ///< how much of the room's departure from its mean it follows
+  /// Its temperature [degC] is this signal, whatever the room does.
+  std::optional<std::size_t> temp_signal{};
 };
 
 struct ThermocoupleConfig {
@@ -120,6 +123,7 @@ struct PlantConfig {
   std::optional<ReducedBody> body;
   std::vector<std::size_t> body_signals;  ///< the signal of each of the body's sources
   std::vector<std::size_t> body_outputs;  ///< the body's row of each output
+  std::vector<std::size_t> body_axes;     ///< the signal of each of the body's guideways
   std::vector<NodeConfig> nodes;
   std::vector<LinkConfig> links;
   std::vector<HeatSourceConfig> sources;

@@ -28,6 +28,15 @@ struct BodyRow {
   std::vector<double> row;
 };
 
+/// What an output moves further with an axis elsewhere: rows at positions, straight between them.
+struct BodyGuideway {
+  std::string name;
+  std::string axis;    ///< a position, "w_mm"
+  std::string output;  ///< one of the body's
+  std::vector<double> positions_mm;
+  std::vector<std::vector<double>> rows;  ///< one a position
+};
+
 enum class BodyPartKind { room_film, coolant_film, joint, capacity };
 
 /// What one film, joint or part of the structure has in the matrices: `thermocomp diagnose
@@ -48,7 +57,8 @@ struct ReducedBody {
   std::vector<BodySource> sources;
   std::vector<BodyRow> sensors;  ///< degC
   std::vector<BodyRow> outputs;  ///< um or urad
-  std::vector<BodyPart> parts;   ///< may be empty
+  std::vector<BodyGuideway> guideways;
+  std::vector<BodyPart> parts;  ///< may be empty
 
   [[nodiscard]] std::size_t states() const noexcept { return one_degC.size(); }
 };

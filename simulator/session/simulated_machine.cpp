@@ -19,6 +19,7 @@ namespace thermocomp {
 namespace {
 
 constexpr std::uint64_t garbage_stream = 0x40000;
+constexpr std::uint64_t probe_stream = 0x50000;
 constexpr std::uint8_t gateway_target_failed = 0x0B;
 
 double seconds_of(nanoseconds time) {
@@ -74,6 +75,7 @@ struct Controller {
   CncOrder order;
   SimulatedCnc cnc;
   std::vector<std::optional<std::size_t>> columns;  ///< of the signals; none: its fixed value
+  std::vector<double> start;  ///< of the signals that are probes: their output at the first look
   nanoseconds next_frame{};
 
   explicit Controller(const SimulatedController& from) : config(from), cnc(from) {
@@ -123,11 +125,13 @@ struct SimulatedMachine::Parts {
     Controller& made = controller.emplace(*config.controller);
     const bool can = made.config.bus.kind == SimulatedBusKind::can;
     for (const SimulatedControllerSignal& signal : made.config.signals) {
-      const bool known = std::find(columns.begin(), columns.end(), signal.name) != columns.end();
+      const std::string& column = signal.probe_of.value_or(signal.name);
+      const bool known = std::find(columns.begin(), columns.end(), column) != columns.end();
       made.columns.push_back(
           known || !signal.value
-              ? std::optional(index_in(columns, signal.name, "the controller", source))
+              ? std::optional(index_in(columns, column, "the controller", source))
               : std::nullopt);
+      made.start.push_back(not_a_number);
       can ? made.frames.define(signal.can) : made.unit.define(signal.place, false);
     }
     for (const SimulatedAxis& axis : made.config.axes) {
@@ -281,7 +285,7 @@ struct SimulatedMachine::Parts {
     if (homed) forget_offsets();
     for (std::size_t i = 0; i < controller->config.axes.size(); ++i) {
       const SimulatedAxis& axis = controller->config.axes[i];
-      const double applied = controller->cnc.applied_um(i);
+      const double applied = controller->cnc.shown(i);
       if (axis.applied) controller->unit.set_value(*axis.applied, 0.0, applied);
       if (axis.can_applied) controller->frames.set_value(*axis.can_applied, applied);
     }
@@ -300,12 +304,30 @@ struct SimulatedMachine::Parts {
     }
   }
 
-  void update_controller(nanoseconds now, std::span<const double> row) {
+  /// What the tool is off by, and what a probe makes of it: new noise each second.
+  double probed_um(std::size_t signal, double plant_time_s, double displacement_um) {
+    const SimulatedControllerSignal& probe = controller->config.signals[signal];
+    double& start_um = controller->start[signal];
+    if (std::isnan(start_um)) start_um = displacement_um;
+    const auto second = static_cast<std::uint64_t>(std::max(0.0, plant_time_s));
+    return displacement_um - start_um + applied_um(*probe.probe_of) +
+           probe.noise_um * seeded_normal(config.seed, probe_stream + signal, second);
+  }
+
+  [[nodiscard]] double applied_um(const std::string& output) const {
+    const auto& axes = controller->config.axes;
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      if (axes[i].output == output) return axes[i].sign * controller->cnc.applied_um(i);
+    return 0.0;
+  }
+
+  void update_controller(nanoseconds now, double plant_time_s, std::span<const double> row) {
     const SimulatedController& from = controller->config;
     const bool can = from.bus.kind == SimulatedBusKind::can;
     for (std::size_t i = 0; i < from.signals.size(); ++i) {
-      const double value =
+      double value =
           controller->columns[i] ? row[*controller->columns[i]] : from.signals[i].value.value_or(0);
+      if (from.signals[i].probe_of) value = probed_um(i, plant_time_s, value);
       if (can) {
         controller->frames.set_value(from.signals[i].can, value);
       } else {
@@ -454,16 +476,11 @@ void SimulatedMachine::update(nanoseconds now, double plant_time_s, std::span<co
   for (std::size_t i = 0; i < parts_->devices.size(); ++i) {
     parts_->update_device(i, now, row, new_row);
   }
-  if (parts_->controller) parts_->update_controller(now, row);
+  if (parts_->controller) parts_->update_controller(now, plant_time_s, row);
 }
 
 double SimulatedMachine::applied_um(const std::string& output) const {
-  if (!parts_->controller) return 0.0;
-  const auto& axes = parts_->controller->config.axes;
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (axes[i].output == output) return axes[i].sign * parts_->controller->cnc.applied_um(i);
-  }
-  return 0.0;
+  return parts_->controller ? parts_->applied_um(output) : 0.0;
 }
 
 bool SimulatedMachine::heartbeat_seen() const {

@@ -22,8 +22,8 @@ TruthRecord::TruthRecord(const std::vector<std::string>& columns, const std::fil
     : path_(file) {
   std::string header = "time_s";
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (is_temperature(columns[i])) {
-      temps_.push_back(i);
+    if (is_temperature(columns[i]) || kind_of(columns[i]) == QuantityKind::position) {
+      beside_.push_back(i);
       header += "," + columns[i];
     } else if (is_output(columns[i])) {
       outputs_.push_back({columns[i], i, 0.0, unit_of(columns[i]).suffix == "_um"});
@@ -42,9 +42,9 @@ TruthRecord::TruthRecord(const std::vector<std::string>& columns, const std::fil
 
 void TruthRecord::add(double time_s, std::span<const double> row, const Applied& applied_um) {
   std::string line = number_text(time_s);
-  for (const std::size_t temp : temps_) {
+  for (const std::size_t column : beside_) {
     line += ',';
-    append_number(line, row[temp]);
+    append_number(line, row[column]);
   }
   double uncompensated = 0.0;
   double compensated = 0.0;

@@ -12,7 +12,8 @@
 namespace thermocomp {
 
 /// For each displacement x_um: x_um as it is, x_offset_um applied by the controller, x_error_um =
-/// what is left = displacement since the first row + offset. Beside them the temperatures.
+/// what is left = displacement since the first row + offset. Beside them temperatures and
+/// positions.
 class TruthRecord {
  public:
   using Applied = std::function<double(const std::string& output)>;
@@ -42,7 +43,7 @@ class TruthRecord {
     bool counts;  ///< in um, so part of the norm
   };
   std::vector<Output> outputs_;
-  std::vector<std::size_t> temps_;
+  std::vector<std::size_t> beside_;  ///< temperatures and positions
   std::vector<double> error_um_;
   std::filesystem::path path_;
   std::ofstream file_;

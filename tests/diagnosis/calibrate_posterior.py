@@ -5,8 +5,9 @@ calibrate_posterior.py ANSWERS.json...     written by
     measured_campaign.py PROGRAM --weighed --json ANSWERS.json
     campaign.py PROGRAM --answers ANSWERS.json
 
-Prints the figures for modelling/diagnosis/posterior.cpp, and how well they do on the cases they
-come from and on machines that were left out of the fit one after the other.
+Prints the weights of modelling/diagnosis/evidence/posterior.cpp and the priors of
+modelling/diagnosis/causes/, and how well they do on the cases they come from and on machines that
+were left out of the fit one after the other.
 """
 
 import collections

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """The short campaign: every cause once, silence on untouched machines. Exit status 1 when it is
-worse than docs/diagnosis.md promises of these seeds.
+worse than docs/measurements.md promises of these seeds.
 
 hidden_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """

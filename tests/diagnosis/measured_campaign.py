@@ -116,6 +116,14 @@ def diagnosed(program, machine, model):
         return json.loads((folder / "answer.json").read_text())
 
 
+def with_groups(truths, machine):
+    """The truths with the places that cannot be told from their subjects."""
+    for truth in truths:
+        truth["groups"] = [sorted(machine.group(p)) if p.endswith("_degC") else [p]
+                           for p in truth["subject"].split("|")]
+    return truths
+
+
 def examine(task):
     """@return the task, the truths (None: untouched or not to be planted), the answer"""
     program, seed, machines, base, cause, times, kind = task
@@ -129,10 +137,7 @@ def examine(task):
         machine, model, truths = planted_case(seed, machines, base, cause, times, kind)
     except Impossible:
         return task, None, None
-    for truth in truths:
-        truth["groups"] = [sorted(machine.group(p)) if p.endswith("_degC") else [p]
-                           for p in truth["subject"].split("|")]
-    return named(machine), truths, diagnosed(program, machine, model)
+    return named(machine), with_groups(truths, machine), diagnosed(program, machine, model)
 
 
 def subject_right(subject, truth):
@@ -275,7 +280,7 @@ def said(answer):
                      for f in found) or answer["verdict"]
 
 
-def arguments():
+def arguments(words=None):
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("program")
     parser.add_argument("--cases", type=int, default=408)
@@ -290,7 +295,7 @@ def arguments():
     parser.add_argument("--show", action="store_true")
     parser.add_argument("--json")
     parser.add_argument("--weighed", action="store_true")
-    options = parser.parse_args()
+    options = parser.parse_args(words)
     options.program = [str(pathlib.Path(options.program).resolve())]
     if options.weighed:
         options.program.append("--weighed")

@@ -7,7 +7,7 @@
 
 #include "daemon/history/history_reader.hpp"
 #include "daemon/history/replay.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "faulty_vfs.hpp"
 
 namespace thermocomp::faults {

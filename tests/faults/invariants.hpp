@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "machine.hpp"
 
 namespace thermocomp::faults {

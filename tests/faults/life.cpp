@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "estimator/checks.hpp"
-#include "estimator/persistent_state.hpp"
+#include "estimator/pipeline/persistent_state.hpp"
 #include "history_disk.hpp"
 #include "recorded_twin.hpp"
 #include "simulated_daemon.hpp"
@@ -273,7 +273,7 @@ class Life {
 
   /// As the daemon does: switches and references at once, offsets every 10 s.
   void save_state() {
-    const PersistentState state = persistent_state(daemon_->cycle().brain().estimator, report_);
+    const PersistentState state = daemon_->cycle().brain().estimator.persistent_state(report_);
     if (world_.now < next_save_ && !must_be_saved(state, saved_)) return;
     next_save_ = world_.now + saved_every;
     saved_ = state;

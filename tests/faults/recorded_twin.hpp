@@ -11,7 +11,7 @@
 #include "daemon/history/segment_walk.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/record.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp::faults {
 

@@ -9,7 +9,7 @@
 
 #include "daemon/bridge_desk.hpp"
 #include "daemon/socket/request_desk.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "fuzz.hpp"
 #include "recorded_history.hpp"
 

@@ -14,7 +14,7 @@
 #include "drivers/sensors/can_protocol_source.hpp"
 #include "drivers/sensors/can_source.hpp"
 #include "drivers/sensors/modbus_source.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "fuzz.hpp"
 #include "model_promises.hpp"
 

@@ -221,6 +221,21 @@ def socket_seeds():
           b'{"jsonrpc":"2.0","id":null,"method":"status","params":[]}\n')
 
 
+def gateway_seeds():
+    for name, fields in {
+            "page": ("GET", "/", "localhost:8420", "", "none", "", "", ""),
+            "own": ("GET", "/api/status", "[::1]:8420", "http://[::1]:8420", "same-origin", "", "",
+                    ""),
+            "post": ("POST", "/api/command", "mill.example", "https://mill.example", "", "", "",
+                     ""),
+            "elsewhere": ("GET", "/api/status", "evil.example", "http://evil.example",
+                          "cross-site", "", "", ""),
+            "history": ("GET", "/api/history", "10.0.0.5", "", "", "-3600", "1.7e9", "600"),
+            "history_wrong": ("PUT", "../x", "[::1", "null", "same-site", "nan", "-1e400", "2.5"),
+    }.items():
+        write("gateway_request", name, b"\xff".join(field.encode() for field in fields))
+
+
 def controller_state(session=5, taking=True, applied_um=0.0, cutting=0, number=1):
     return request("controller_state", {
         "session": session, "taking": taking, "applied_um": {"z": applied_um, "y": 1.0},
@@ -468,7 +483,7 @@ def dictionaries():
     DICTIONARIES.mkdir(exist_ok=True)
     toml = {"[[", "]]", " = ", "true", "false", "nan", "-inf", "1e300", '"""', "0x", "{ ", " }", "\n[",
             "\\u0000", "1979-05-27T07:32:00Z"}
-    model = literals("config/model_file.cpp", "estimator/terms/*.cpp", "config/units.cpp")
+    model = literals("config/model_file.cpp", "estimator/model/terms/*.cpp", "config/units.cpp")
     dictionary("model_file", toml | model)
     dictionary("daemon_config", toml | model | {"#### model\n"} |
                literals("config/daemon_config.cpp", "config/sections/*.cpp"))
@@ -505,6 +520,7 @@ def main():
     preset_seeds()
     run_seeds()
     socket_seeds()
+    gateway_seeds()
     bridge_seeds()
     state_seeds()
     modbus_seeds()

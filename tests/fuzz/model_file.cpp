@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/displacement_model.hpp"
+#include "estimator/model/displacement_model.hpp"
 #include "fuzz.hpp"
 #include "model_promises.hpp"
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/displacement_model.hpp"
-#include "estimator/model_domain.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/model/model_domain.hpp"
 #include "fuzz.hpp"
 
 namespace thermocomp::fuzz {

@@ -10,7 +10,7 @@
 #include <sqlite3.h>
 
 #include "daemon/history/history_writer.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "fuzz.hpp"
 
 namespace thermocomp::fuzz {

@@ -15,7 +15,7 @@
 
 #include "daemon/operator_desk.hpp"
 #include "daemon/socket/status_server.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "fuzz.hpp"
 #include "recorded_history.hpp"
 

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/persistent_state.hpp"
-
 namespace thermocomp::property {
 namespace {
 
@@ -253,7 +251,7 @@ class World {
   /// The daemon comes back with what its state file held, perhaps of a while ago; its link is new.
   void restart() {
     ++outcome_.restarts;
-    PersistentState state = persistent_state(*estimator_, report_);
+    PersistentState state = estimator_->persistent_state(report_);
     for (std::size_t i = 0; i < axes_count; ++i) {
       double offset_um = command_.offset_um[i];
       if (shape_.one_in(3)) offset_um = shape_.between(-1.0, 1.0) * 60.0;

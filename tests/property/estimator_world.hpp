@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp::property {
 

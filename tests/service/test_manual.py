@@ -13,10 +13,11 @@ import pytest
 BIN = pathlib.Path(os.environ["THERMOCOMP_BIN"])
 MANUAL = pathlib.Path(os.environ["THERMOCOMP_MANUAL"])
 PAGES = ["thermocomp.1", "thermocompd.8", "thermocomp-sim.1", "thermocomp-modelling.1",
-         "thermocompd.toml.5"]
+         "thermocomp-gateway.1", "thermocompd.toml.5", "gateway.toml.5", "thermocomp-run.5"]
 PROGRAMS = {"thermocomp": "thermocomp.1", "thermocompd": "thermocompd.8",
             "thermocomp-sim": "thermocomp-sim.1",
-            "thermocomp-modelling": "thermocomp-modelling.1"}
+            "thermocomp-modelling": "thermocomp-modelling.1",
+            "thermocomp-gateway": "thermocomp-gateway.1"}
 # Carried out by a program of its own, which has the help.
 MODELLING = {"structure", "place", "tiebar", "plan", "group", "fit", "diagnose", "inspect"}
 

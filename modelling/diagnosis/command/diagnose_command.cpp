@@ -16,11 +16,10 @@
 #include "config/model_file.hpp"
 #include "config/run_file.hpp"
 #include "config/run_overlap.hpp"
+#include "modelling/diagnosis/answer/gain_on_test.hpp"
+#include "modelling/diagnosis/command/still_searching.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
-#include "modelling/diagnosis/gain_on_test.hpp"
-#include "modelling/diagnosis/large_pages.hpp"
 #include "modelling/diagnosis/report/report_html.hpp"
-#include "modelling/diagnosis/still_searching.hpp"
 #include "modelling/diagnosis/thermal/corrected_machine.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 
@@ -150,7 +149,6 @@ int run(const Options& options) {
       std::filesystem::exists(options.thermal) &&
       std::filesystem::equivalent(corrected, options.thermal))
     throw std::runtime_error(corrected.string() + ": --out would write over the machine file");
-  use_large_pages();
   ReportData report;
   const Diagnosis diagnosis = diagnosis_of(options, options.folder.empty() ? nullptr : &report);
   if (!options.folder.empty()) write_folder(options, diagnosis, report);

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/report/report_data.hpp"
 
 namespace thermocomp::diagnosis {
 

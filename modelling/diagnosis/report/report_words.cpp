@@ -1,50 +1,14 @@
 #include "modelling/diagnosis/report/report_words.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <string_view>
 
+#include "modelling/diagnosis/causes/cause.hpp"
+
 namespace thermocomp::diagnosis {
 namespace {
-
-struct Words {
-  std::string_view parameter;
-  std::string_view says;
-  std::string_view unit;  ///< "s": a duration; "?": of the subject
-};
-
-constexpr std::array<Words, 28> words = {{
-    {"tau_s", "time constant", "s"},
-    {"shift_s", "shifted by", "s"},
-    {"period_s", "period", "s"},
-    {"at_s", "from the start of the recording on", "s"},
-    {"gain_um_per_K", "effect", "um/K"},
-    {"gain_um_per_unit", "effect", "um/?"},
-    {"gain_um_per_unit2", "effect", "um/?^2"},
-    {"gain_um_per_K2", "curvature", "um/K^2"},
-    {"gain_um_per_K_mm", "effect along the axis", "um/(K mm)"},
-    {"delta_um_per_K", "the coefficient lacks", "um/K"},
-    {"p0_mm", "none at", "mm"},
-    {"width_K", "dead band", "K"},
-    {"width_um", "dead band", "um"},
-    {"amplitude_um", "amplitude", "um"},
-    {"step_um", "jump", "um"},
-    {"step_K", "jump", "K"},
-    {"rate_um_per_h", "creep", "um/h"},
-    {"rate_K_per_h", "creep", "K/h"},
-    {"gain", "of its motion left:", ""},
-    {"start_s", "creeps from", "s"},
-    {"factor", "times what the model has:", ""},
-    {"room_W_per_K", "to the air", "W/K"},
-    {"coolant_W_per_K", "to the coolant", "W/K"},
-    {"conductance_W_per_K", "conducts", "W/K"},
-    {"capacity_J_per_K", "stores", "J/K"},
-    {"heat_W", "heat", "W"},
-    {"at", "at a signal of", ""},
-    {"offset_K", "warmer by", "K"},
-}};
 
 constexpr std::string_view thousand_of = "rpm";
 
@@ -93,16 +57,16 @@ std::string name_of_column(const std::string& column) {
   return last == std::string::npos || last == 0 ? column : column.substr(0, last);
 }
 
-std::string parameter_words(const Parameter& parameter, const std::string& subject) {
+std::string parameter_words(const std::string& cause, const Parameter& parameter,
+                            const std::string& subject) {
   if (parameter.name == "power") {
     const bool square = parameter.values.contains("") && parameter.values.at("") > 1.5;
     return square ? "with the square of the signal" : "in proportion to the signal";
   }
-  const auto* const known = std::find_if(words.begin(), words.end(), [&](const Words& each) {
-    return each.parameter == parameter.name;
-  });
-  std::string says(known == words.end() ? std::string_view(parameter.name) : known->says);
-  std::string unit(known == words.end() ? std::string_view() : known->unit);
+  const Cause* const of = find_cause(cause);
+  const CauseParameter* const known = of == nullptr ? nullptr : find_parameter(*of, parameter.name);
+  const std::string says(known == nullptr ? std::string_view(parameter.name) : known->says);
+  std::string unit(known == nullptr || known->unit == "1" ? std::string_view() : known->unit);
   double scale = 1.0;
   if (const std::size_t at = unit.find('?'); at != std::string::npos) {
     const std::string of_subject = unit_of_column(subject);

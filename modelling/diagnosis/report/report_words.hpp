@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "modelling/diagnosis/answer.hpp"
+#include "modelling/diagnosis/answer/answer.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -15,6 +15,7 @@ namespace thermocomp::diagnosis {
 [[nodiscard]] std::string name_of_column(const std::string& column);
 /// "time constant 53 min (51 to 55 min)"; of several outputs one after the other. What the values
 /// are per is the subject's unit.
-[[nodiscard]] std::string parameter_words(const Parameter& parameter, const std::string& subject);
+[[nodiscard]] std::string parameter_words(const std::string& cause, const Parameter& parameter,
+                                          const std::string& subject);
 
 }  // namespace thermocomp::diagnosis

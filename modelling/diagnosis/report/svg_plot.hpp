@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/measured_runs.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis {
 

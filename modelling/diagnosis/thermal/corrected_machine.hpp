@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/answer.hpp"
+#include "modelling/diagnosis/answer/answer.hpp"
 
 namespace thermocomp::diagnosis {
 

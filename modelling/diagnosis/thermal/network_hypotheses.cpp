@@ -4,62 +4,13 @@
 #include <cmath>
 
 #include "estimator/checks.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double normal_95 = 1.96;
 constexpr std::size_t columns_kept = 24;
-/// A strength is sought between these shares of what the file says. None is 1.
-constexpr double factor_min = 0.15;
-constexpr double factor_max = 7.0;
-constexpr std::size_t factors = 14;
-constexpr double source_factor_max = 10.0;
-constexpr double offset_K_max = 20.0;
-constexpr std::size_t onsets = 48;
-constexpr std::size_t lags = 12;
-constexpr double lag_s_max = 3600.0;
-
-std::vector<double> geometric(double low, double high, std::size_t count) {
-  std::vector<double> grid;
-  for (std::size_t i = 0; i < count; ++i)
-    grid.push_back(low *
-                   std::pow(high / low, static_cast<double>(i) / static_cast<double>(count - 1)));
-  return grid;
-}
-
-const char* name_of(PartKind kind) {
-  switch (kind) {
-    case PartKind::room_film:
-    case PartKind::coolant_film:
-      return "wrong_film_coefficient";
-    case PartKind::joint:
-      return "wrong_conductance";
-    case PartKind::capacity:
-      break;
-  }
-  return "wrong_heat_capacity";
-}
-
-void scale(HeatNetwork& network, const NetworkPart& part, double factor) {
-  const double more = factor - 1.0;
-  switch (part.kind) {
-    case PartKind::room_film:
-      network.conductance += more * part.matrix;
-      network.room_inflow += more * part.inflow;
-      break;
-    case PartKind::coolant_film:
-      network.coolant_conductance += more * part.matrix;
-      network.coolant_inflow += more * part.inflow;
-      break;
-    case PartKind::joint:
-      network.conductance += more * part.matrix;
-      break;
-    case PartKind::capacity:
-      network.capacity += more * part.matrix;
-      break;
-  }
-}
 
 /// The shared gain and its spread: what each output knows of it, taken together.
 struct Gain {
@@ -89,153 +40,38 @@ Parameter shared(const char* name, double value, double low, double high) {
 
 NetworkHypotheses::NetworkHypotheses(const ThermalPlant& plant, const ThermalRuns& runs,
                                      const StackedRows& rows)
-    : plant_(plant), runs_(runs), rows_(rows) {
-  for (const NetworkPart& part : plant.parts) add_part(part);
-  for (std::size_t i = 0; i < plant.network.sources.size(); ++i) add_source(i);
-  for (const NetworkPlace& place : plant.places)
-    for (std::size_t signal = 0; signal < runs.signals.size(); ++signal) add_missing(place, signal);
-  add_ambient("room", plant.network.room_inflow);
-  for (const NetworkPart& part : plant.parts)
-    if (part.kind == PartKind::room_film) add_ambient(part.subject, part.inflow);
+    : material_{plant, runs, rows} {
+  using Kind = NetworkSubjectKind;
+  for (std::size_t i = 0; i < plant.parts.size(); ++i) add({Kind::part, i});
+  for (std::size_t i = 0; i < plant.network.sources.size(); ++i) add({Kind::source, i});
+  for (std::size_t place = 0; place < plant.places.size(); ++place)
+    for (std::size_t signal = 0; signal < runs.signals.size(); ++signal)
+      add({Kind::signal_at_place, place, signal});
+  add({Kind::room});
+  for (std::size_t i = 0; i < plant.parts.size(); ++i)
+    if (plant.parts[i].kind == PartKind::room_film) add({Kind::air_of_part, i});
   for (std::size_t sensor = 0; sensor < plant.network.sensors.size(); ++sensor) {
-    add_slow_sensor(sensor);
-    for (std::size_t run = 0; run < runs.runs.size(); ++run) add_faults(run, sensor);
+    add({Kind::sensor, sensor});
+    for (std::size_t run = 0; run < runs.runs.size(); ++run)
+      add({Kind::sensor_in_run, sensor, run});
   }
   const NetworkSimulation unchanged(plant.network);
   bases_.push_back({unchanged, stacked(unchanged)});
 }
 
-void NetworkHypotheses::add_part(const NetworkPart& part) {
-  Cause cause;
-  cause.hypothesis.cause = name_of(part.kind);
-  cause.hypothesis.subject = part.subject;
-  cause.hypothesis.form = Form::no_gain;
-  cause.hypothesis.shape = {{"factor", geometric(factor_min, factor_max, factors), true, false}};
-  cause.apply = [&part](HeatNetwork& network, const Shape& shape, double gain) {
-    scale(network, part, 1.0 + gain * (shape[0] - 1.0));
-  };
-  cause.value = part.value.value_or(0.0);
-  cause.key = part.key;
-  causes_.push_back(std::move(cause));
-}
-
-void NetworkHypotheses::add_source(std::size_t source) {
-  const NetworkSource& of = plant_.network.sources[source];
-  if (of.heat_W == 0.0) return;
-  Cause cause;
-  cause.hypothesis.cause = "wrong_heat_source";
-  cause.hypothesis.subject = plant_.source_names[source];
-  cause.hypothesis.form = Form::shared_gain;
-  cause.hypothesis.gains = {"factor"};
-  cause.hypothesis.possible = [](double gain, std::size_t) {
-    return gain >= -1.0 && gain <= source_factor_max - 1.0;
-  };
-  cause.apply = [source](HeatNetwork& network, const Shape&, double gain) {
-    network.sources[source].heat_W *= 1.0 + gain;
-  };
-  cause.value = of.heat_W;
-  cause.key = "heat_W";
-  causes_.push_back(std::move(cause));
-}
-
-double NetworkHypotheses::largest(std::size_t signal) const {
-  double most = 0.0;
-  for (const ThermalRun& run : runs_.runs)
-    most = std::max(most, run.signals[signal].cwiseAbs().maxCoeff());
-  return most;
-}
-
-void NetworkHypotheses::add_missing(const NetworkPlace& place, std::size_t signal) {
-  const std::string subject = runs_.signals[signal] + "|" + place.name;
-  const double at = largest(signal);
-  const auto& known = plant_.source_names;
-  const bool moves = std::any_of(runs_.runs.begin(), runs_.runs.end(), [&](const ThermalRun& run) {
-    return run.signals[signal].maxCoeff() > run.signals[signal].minCoeff();
-  });
-  if (!moves || std::find(known.begin(), known.end(), subject) != known.end()) return;
-  Cause cause;
-  cause.hypothesis.cause = "missing_heat_source";
-  cause.hypothesis.subject = subject;
-  cause.hypothesis.form = Form::shared_gain;
-  cause.hypothesis.gains = {"heat_W"};
-  cause.hypothesis.shape = {{"power", {1.0, 2.0}, false, true}};
-  cause.hypothesis.possible = [](double gain, std::size_t) { return gain > 0.0; };
-  cause.apply = [&place, at, name = runs_.signals[signal]](HeatNetwork& network, const Shape& shape,
-                                                           double gain) {
-    network.sources.push_back({name, gain, at, shape[0], place.inflow});
-  };
-  cause.at = at;
-  causes_.push_back(std::move(cause));
-}
-
-void NetworkHypotheses::add_ambient(const std::string& subject, const Eigen::VectorXd& inflow) {
-  Cause cause;
-  cause.hypothesis.cause = "wrong_ambient";
-  cause.hypothesis.subject = subject;
-  cause.hypothesis.form = Form::shared_gain;
-  cause.hypothesis.gains = {"offset_K"};
-  cause.hypothesis.possible = [](double gain, std::size_t) {
-    return std::abs(gain) <= offset_K_max;
-  };
-  // Air that is warmer by so much brings in a constant heat.
-  cause.apply = [inflow](HeatNetwork& network, const Shape&, double gain) {
-    network.sources.push_back({"", gain, 1.0, 1.0, inflow});
-  };
-  causes_.push_back(std::move(cause));
-}
-
-void NetworkHypotheses::add_slow_sensor(std::size_t sensor) {
-  Cause cause;
-  cause.hypothesis.cause = "slow_sensor";
-  cause.hypothesis.subject = plant_.network.sensors[sensor].column;
-  cause.hypothesis.form = Form::no_gain;
-  cause.hypothesis.shape = {{"tau_s", geometric(30.0, lag_s_max, lags), true, false}};
-  cause.hypothesis.output = sensor;
-  cause.apply = [sensor](HeatNetwork& network, const Shape& shape, double gain) {
-    network.sensors[sensor].lag_s += gain * shape[0];
-  };
-  causes_.push_back(std::move(cause));
-}
-
-void NetworkHypotheses::add_faults(std::size_t run, std::size_t sensor) {
-  const Block& block = rows_.runs[run];
-  const double first_s = rows_.time_s[block.begin];
-  const double length_s = rows_.time_s[block.end - 1] - first_s;
-  const auto in_run = [this, block](const auto& value) {
-    Column column = Column::Zero(rows_.time_s.size());
-    for (Eigen::Index row = block.begin; row < block.end; ++row)
-      column[row] = value(rows_.time_s[row]);
-    return column;
-  };
-  Cause step;
-  step.hypothesis.cause = "sensor_step";
-  step.hypothesis.subject = plant_.network.sensors[sensor].column;
-  step.hypothesis.gains = {"step_K"};
-  step.hypothesis.output = sensor;
-  step.hypothesis.run = run;
-  Cause drift = step;
-  ShapeParameter at{"at_s", {}, false, false};
-  for (std::size_t i = 1; i <= onsets; ++i)
-    at.grid.push_back(first_s +
-                      length_s * static_cast<double>(i) / static_cast<double>(onsets + 1));
-  step.hypothesis.shape = {at};
-  step.fault = [in_run](const Shape& shape) {
-    return in_run([&](double time_s) { return time_s >= shape[0] ? 1.0 : 0.0; });
-  };
-  drift.hypothesis.cause = "sensor_drift";
-  drift.hypothesis.gains = {"rate_K_per_h"};
-  drift.fault = [in_run, first_s](const Shape&) {
-    return in_run([&](double time_s) { return (time_s - first_s) / 3600.0; });
-  };
-  causes_.push_back(std::move(step));
-  causes_.push_back(std::move(drift));
+void NetworkHypotheses::add(const NetworkSubject& subject) {
+  for (const Cause& cause : all_causes()) {
+    if (cause.in_network == nullptr) continue;
+    for (NetworkHypothesis& each : cause.in_network(material_, subject))
+      causes_.push_back(std::move(each));
+  }
 }
 
 std::vector<Hypothesis> NetworkHypotheses::all(const std::shared_ptr<NetworkHypotheses>& self) {
   std::vector<Hypothesis> all;
   for (std::size_t i = 0; i < self->causes_.size(); ++i) {
     all.push_back(self->causes_[i].hypothesis);
-    all.back().rows = self->rows_.time_s.size();
+    all.back().rows = self->material_.rows.time_s.size();
     all.back().write_columns = one_by_one([self, i](const Shape& shape, std::size_t output) {
       return self->columns(i, shape, output);
     });
@@ -244,10 +80,11 @@ std::vector<Hypothesis> NetworkHypotheses::all(const std::shared_ptr<NetworkHypo
 }
 
 std::vector<Column> NetworkHypotheses::stacked(const NetworkSimulation& simulation) const {
-  std::vector<Column> all(simulation.network().sensors.size(), Column(rows_.time_s.size()));
-  for (std::size_t run = 0; run < runs_.runs.size(); ++run) {
-    const std::vector<Column> readings = simulation.readings_degC(runs_, run);
-    const Block& block = rows_.runs[run];
+  std::vector<Column> all(simulation.network().sensors.size(),
+                          Column(material_.rows.time_s.size()));
+  for (std::size_t run = 0; run < material_.runs.runs.size(); ++run) {
+    const std::vector<Column> readings = simulation.readings_degC(material_.runs, run);
+    const Block& block = material_.rows.runs[run];
     for (std::size_t sensor = 0; sensor < all.size(); ++sensor)
       all[sensor].segment(block.begin, block.end - block.begin) =
           readings[sensor].tail(block.end - block.begin);
@@ -257,7 +94,7 @@ std::vector<Column> NetworkHypotheses::stacked(const NetworkSimulation& simulati
 
 Eigen::MatrixXd NetworkHypotheses::columns(std::size_t cause, const Shape& shape,
                                            std::size_t output) {
-  const Cause& of = causes_[cause];
+  const NetworkHypothesis& of = causes_[cause];
   if (of.fault) return of.fault(shape);
   const auto place = std::find(accepted_.begin(), accepted_.end(), cause);
   const auto base = static_cast<std::size_t>(place - accepted_.begin());
@@ -278,7 +115,7 @@ Eigen::MatrixXd NetworkHypotheses::columns(std::size_t cause, const Shape& shape
 }
 
 std::size_t NetworkHypotheses::cause_of(const Hypothesis& hypothesis) const {
-  const auto at = std::find_if(causes_.begin(), causes_.end(), [&](const Cause& each) {
+  const auto at = std::find_if(causes_.begin(), causes_.end(), [&](const NetworkHypothesis& each) {
     return each.hypothesis.cause == hypothesis.cause &&
            each.hypothesis.subject == hypothesis.subject && each.hypothesis.run == hypothesis.run;
   });
@@ -303,12 +140,12 @@ void NetworkHypotheses::accept(const std::vector<Explanation>& found) {
 }
 
 void NetworkHypotheses::apply(const Finding& finding, HeatNetwork& network) const {
-  const Cause& cause = causes_[cause_of(*finding.explanation.hypothesis)];
+  const NetworkHypothesis& cause = causes_[cause_of(*finding.explanation.hypothesis)];
   if (cause.apply) cause.apply(network, finding.explanation.shape, gain_of(finding).value);
 }
 
 std::vector<Parameter> NetworkHypotheses::parameters_of(const Finding& finding) const {
-  const Cause& cause = causes_[cause_of(*finding.explanation.hypothesis)];
+  const NetworkHypothesis& cause = causes_[cause_of(*finding.explanation.hypothesis)];
   const Explanation& each = finding.explanation;
   std::vector<Parameter> parameters;
   const auto with_file_value = [&](double factor, double low, double high) {

@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/answer.hpp"
-#include "modelling/diagnosis/hypothesis.hpp"
-#include "modelling/diagnosis/thermal/network_simulation.hpp"
+#include "modelling/diagnosis/answer/answer.hpp"
+#include "modelling/diagnosis/hypothesis/network_hypothesis.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -28,16 +27,6 @@ class NetworkHypotheses {
   [[nodiscard]] std::vector<Parameter> parameters_of(const Finding& finding) const;
 
  private:
-  using Shape = std::vector<double>;
-  struct Cause {
-    Hypothesis hypothesis{};
-    /// Changes the network; a gain of 0 changes nothing. Empty: a fault of a reading.
-    std::function<void(HeatNetwork&, const Shape&, double gain)> apply{};
-    std::function<Column(const Shape&)> fault{};  ///< its column, where nothing is simulated
-    double value{0.0};                            ///< of the file, that a factor multiplies
-    std::string key{};
-    double at{0.0};  ///< signal at which a missing source has its heat
-  };
   struct Base {
     NetworkSimulation simulation;
     std::vector<Column> stacked;  ///< readings, one column a sensor
@@ -49,21 +38,13 @@ class NetworkHypotheses {
     std::vector<Column> columns;
   };
 
-  void add_part(const NetworkPart& part);
-  void add_source(std::size_t source);
-  void add_missing(const NetworkPlace& place, std::size_t signal);
-  void add_ambient(const std::string& subject, const Eigen::VectorXd& inflow);
-  void add_slow_sensor(std::size_t sensor);
-  void add_faults(std::size_t run, std::size_t sensor);
+  void add(const NetworkSubject& subject);
   [[nodiscard]] Eigen::MatrixXd columns(std::size_t cause, const Shape& shape, std::size_t output);
   [[nodiscard]] std::vector<Column> stacked(const NetworkSimulation& simulation) const;
   [[nodiscard]] std::size_t cause_of(const Hypothesis& hypothesis) const;
-  [[nodiscard]] double largest(std::size_t signal) const;
 
-  const ThermalPlant& plant_;
-  const ThermalRuns& runs_;
-  const StackedRows& rows_;
-  std::vector<Cause> causes_;
+  const NetworkMaterial material_;
+  std::vector<NetworkHypothesis> causes_;
   std::vector<std::size_t> accepted_;  ///< causes, in their order
   std::vector<Base> bases_;            ///< before each accepted one; the last: with all of them
   std::deque<Known> known_;            ///< the newest columns: several outputs ask for the same

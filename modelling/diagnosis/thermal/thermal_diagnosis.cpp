@@ -5,11 +5,11 @@
 #include <limits>
 #include <memory>
 
-#include "modelling/diagnosis/gain_on_test.hpp"
-#include "modelling/diagnosis/named_finding.hpp"
-#include "modelling/diagnosis/report_data.hpp"
+#include "modelling/diagnosis/answer/gain_on_test.hpp"
+#include "modelling/diagnosis/answer/named_finding.hpp"
+#include "modelling/diagnosis/network/network_simulation.hpp"
+#include "modelling/diagnosis/report/report_data.hpp"
 #include "modelling/diagnosis/thermal/network_hypotheses.hpp"
-#include "modelling/diagnosis/thermal/network_simulation.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/answer.hpp"
-#include "modelling/diagnosis/thermal/heat_network.hpp"
+#include "modelling/diagnosis/answer/answer.hpp"
+#include "modelling/diagnosis/network/heat_network.hpp"
 
 namespace thermocomp::diagnosis {
 

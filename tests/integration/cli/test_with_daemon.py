@@ -54,6 +54,24 @@ def test_operator_commands_ask_the_right_method(daemon):
         assert daemon.requests[-1].get("params", {}) == params
 
 
+def test_measured_shows_what_is_left_beside_what_the_model_says_is_left(daemon):
+    daemon.answers["measured"] = {"done": True, "measured_um": 3.0, "meaning": "remaining",
+                                  "predicted_um": -12.0, "predicted_remaining_um": 0.4}
+    answer = run("--socket", daemon.path, "measured", "z", "3")
+    assert answer.stdout.startswith(
+        "axis z: measured +3.00 um left at the tool; by the model +0.40 um are left\n"), answer.stdout
+    daemon.answers["measured"] |= {"meaning": "total"}
+    answer = run("--socket", daemon.path, "measured", "z", "3")
+    assert answer.stdout == "axis z: measured +3.00 um without offset; by the model -12.00 um\n"
+
+
+def test_nan_is_told_in_the_same_words_by_sensors_and_scan(daemon):
+    daemon.answers["sensors"] = {"sensors": [{"name": "bed", "raw_degC": None,
+                                              "fault": "out_of_range"}], "inputs": [], "axes": []}
+    assert "NaN, no number -> many modules send NaN for a broken wire" in run(
+        "--socket", daemon.path, "sensors").stdout
+
+
 def offsets(offset_um, applied_um, proving):
     return {"axes": [{"name": "x"}, {"name": "z", "offset": offset_um, "applied": applied_um,
                                      "proving": proving}]}

@@ -4,7 +4,7 @@ import json
 import os
 import time
 
-from lab import eventually
+from lab import eventually, run_tool
 from plain_devices import Machine
 
 
@@ -80,10 +80,59 @@ def test_a_shift_is_told_in_order_with_durations(lab):
     assert status == 0 and "Lately" in out and "Problems        : none" in out
 
 
+def test_a_first_start_that_is_switched_off_tells_no_faults_of_its_first_moments(lab):
+    machine = Machine(lab)
+    machine.daemon.write_config(machine.config.replace("enabled_at_first_start = true",
+                                                       "enabled_at_first_start = false"))
+    daemon = machine.daemon.start()
+    eventually(lambda: [event for event in events_of(daemon) if event["kind"] == "mode"],
+               "the first mode is told")
+    told = events_of(daemon)
+    assert [event["what"] for event in told if event["kind"] == "mode"] == ["disabled"]
+    assert not [event for event in told if event["kind"] == "fault"
+                and event["subject"].startswith(("sensor ", "reason "))], told
+
+
+def plain(event):
+    """What a history keeps of an event; durations to a microsecond."""
+    duration_s = event["duration_s"]
+    return (event["number"], event["kind"], event["subject"], event["what"], event["user"],
+            round(event["wall_s"], 6), duration_s if duration_s is None else round(duration_s, 6))
+
+
+def test_earlier_runs_are_in_the_history(lab):
+    machine = Machine(lab)
+    daemon = machine.start()
+    machine.module.stop()
+    daemon.wait_for_mode("holding")
+    machine.module.start()
+    machine.warm_by(3.0)
+    daemon.wait_for_mode("compensating")
+    daemon.call("measured", axis="z", value_um=1.5)
+    first = events_of(daemon)
+    daemon.end()
+    daemon.start().wait_for_mode("compensating")
+    daemon.kill()  # what is committed stays
+    status, out, said = run_tool("events", daemon.history, "--json")
+    assert status == 0, said
+    told = json.loads(out)["events"]
+    assert [plain(event) for event in told if event["run"] == 1][:len(first)] == [
+        plain(event) for event in first]
+    ended = [event for event in told if event["run"] == 1][-1]
+    assert ended["kind"] == "daemon" and ended["what"].startswith("stopping")
+    assert {event["run"] for event in told} <= {1, 2}
+    status, out, _ = run_tool("events", daemon.history, "--from", "-1h")
+    assert status == 0 and "  recovery  sensor column: " in out and ", by " in out
+    status, out, _ = run_tool("events", daemon.history, "--to", "-1h")
+    assert status == 0 and out == "nothing has happened\n"
+    status, _, said = run_tool("events", lab.folder / "none.db")
+    assert status == 2 and "none.db" in said
+
+
 def test_strict_sees_what_is_wrong_while_it_compensates(lab):
     machine = Machine(lab)
     daemon = machine.start()
-    assert daemon.cli("status", "--strict")[0] == 0
+    eventually(lambda: daemon.cli("status", "--strict")[0] == 0, "every unit has answered")
     machine.warm_by(100.0)
     eventually(lambda: daemon.axis()["at_bound"], "the bound")
     assert daemon.cli("status")[0] == 0

@@ -150,7 +150,7 @@ def test_a_daemon_killed_and_started_on_a_full_disk_compensates_and_the_gap_is_t
     run = lab.folder / "run.csv"
     status, _, said = run_tool("export", daemon.history, "-o", run)
     assert status == 0 and "1 gap" in said, said
-    told = [line for line in run.read_text().splitlines() if line.startswith("#")]
+    told = [line for line in run.read_text().splitlines() if line.startswith("# nothing")]
     assert len(told) == 1 and "nothing is recorded from" in told[0], told
     times = read_columns(run)["time_s"]
     assert max(later - earlier for earlier, later in zip(times, times[1:])) > 1.0

@@ -198,7 +198,7 @@ def test_an_offset_counts_at_the_tool(simulate, tmp_path):
     lines = simulator.end().splitlines()
     assert lines[-1].startswith("error rms at the tool: uncompensated 0.00 um, compensated ")
     rows = (tmp_path / "truth.csv").read_text().splitlines()
-    assert rows[0] == "time_s,spindle_degC,room_degC,z_um,z_offset_um,z_error_um"
+    assert rows[0] == "time_s,x_mm,spindle_degC,room_degC,z_um,z_offset_um,z_error_um"
     assert rows[-1].split(",")[-2:] == ["3", "3"]
     times = [float(row.split(",")[0]) for row in rows[1:]]
     assert times == pytest.approx([0.05 * i for i in range(len(times))])

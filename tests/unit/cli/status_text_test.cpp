@@ -7,8 +7,9 @@
 
 #include "cli/json_fields.hpp"
 #include "cli/reason_text.hpp"
+#include "cli/troubles.hpp"
 #include "cli/watch_text.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace {
 

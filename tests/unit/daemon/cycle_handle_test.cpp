@@ -7,7 +7,6 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/controllers/dry_run_controller.hpp"
-#include "estimator/persistent_state.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
@@ -170,7 +169,7 @@ TEST_CASE("a command of the step in which the brain changes is reported by the n
   stepped.handle.poll(stepped.now);
   CHECK(*brain == Outcome::done);
   CHECK(*command == Outcome::done);
-  CHECK_FALSE(persistent_state(stepped.handle.estimator(), stepped.handle.report()).enabled);
+  CHECK_FALSE(stepped.handle.estimator().persistent_state(stepped.handle.report()).enabled);
 }
 
 TEST_CASE("a brain waits for commands that name an axis: it may number them otherwise", "[cycle]") {

@@ -13,7 +13,7 @@
 
 #include "daemon/history/history_writer.hpp"
 #include "daemon/history/replay.hpp"
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp::testing {
 

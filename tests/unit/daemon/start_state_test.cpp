@@ -8,7 +8,7 @@
 
 #include "daemon/history/last_state.hpp"
 #include "daemon/state/state_file.hpp"
-#include "estimator/persistent_state.hpp"
+#include "estimator/pipeline/persistent_state.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;
@@ -35,7 +35,7 @@ PersistentState record(const std::filesystem::path& file, unsigned seed, bool re
   machine.stop();
   Report report = machine.estimator().make_report();
   machine.estimator().report(report);
-  return persistent_state(machine.estimator(), report);
+  return machine.estimator().persistent_state(report);
 }
 
 void damage_newest_segment(const std::filesystem::path& file) {

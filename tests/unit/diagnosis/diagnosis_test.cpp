@@ -13,9 +13,9 @@
 #include "config/model_file.hpp"
 #include "config/problems.hpp"
 #include "config/run_file.hpp"
-#include "modelling/diagnosis/coloured_noise.hpp"
-#include "modelling/diagnosis/hypothesis.hpp"
-#include "modelling/diagnosis/series.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+#include "modelling/diagnosis/evidence/coloured_noise.hpp"
+#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

@@ -1,5 +1,5 @@
 // Whether a model's coefficients come from the rows that it is diagnosed with.
-#include "modelling/diagnosis/own_fit.hpp"
+#include "modelling/diagnosis/evidence/own_fit.hpp"
 
 #include <cmath>
 #include <random>

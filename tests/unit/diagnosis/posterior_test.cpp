@@ -1,4 +1,4 @@
-#include "modelling/diagnosis/posterior.hpp"
+#include "modelling/diagnosis/evidence/posterior.hpp"
 
 #include <cmath>
 #include <random>
@@ -9,11 +9,11 @@
 #include <catch2/catch.hpp>
 
 #include "config/run_file.hpp"
-#include "modelling/diagnosis/false_reading.hpp"
-#include "modelling/diagnosis/headroom.hpp"
-#include "modelling/diagnosis/hypothesis.hpp"
-#include "modelling/diagnosis/measured_runs.hpp"
-#include "modelling/diagnosis/reading_fault.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/data/false_reading.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
+#include "modelling/diagnosis/evidence/headroom.hpp"
+#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;
@@ -170,7 +170,7 @@ TEST_CASE("faults of a reading have the columns that a prediction with them has"
     if (!fault.sensor || *fault.sensor != 0) continue;
     const Shape shape = {fault.shape[0].grid[fault.shape[0].grid.size() / 3]};
     MeasuredRun wrong = run;
-    wrong.inputs_K[0] += error_of_reading(fault.cause, data, run, 0, shape[0]);
+    wrong.inputs_K[0] += cause_named(fault.cause).error_of_reading(data, run, 0, shape[0]);
     const Column missing_um = right_um - model_over(model, wrong, data)[0];
     INFO(fault.cause);
     CHECK((fault.columns({shape}, 0).col(0) - missing_um).cwiseAbs().maxCoeff() < 1e-9);

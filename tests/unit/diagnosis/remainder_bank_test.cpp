@@ -1,4 +1,4 @@
-#include "modelling/diagnosis/remainder_bank.hpp"
+#include "modelling/diagnosis/answer/remainder_bank.hpp"
 
 #include <cmath>
 #include <random>

@@ -167,12 +167,18 @@ TEST_CASE("numbers are told with two digits, three after a 1, and times in a fit
 TEST_CASE("a parameter is told in words with its unit, an interval only where it says something",
           "[diagnosis][report]") {
   const Parameter heat{"gain_um_per_unit", {{"z_um", 0.0039628}}, {{"z_um", {0.00396, 0.00397}}}};
-  CHECK(parameter_words(heat, "spindle_rpm") == "effect 4.0 um/(1000 rpm) in z");
+  CHECK(parameter_words("missing_heat_source", heat, "spindle_rpm") ==
+        "effect 4.0 um/(1000 rpm) in z");
   const Parameter lag{"tau_s", {{"", 3162.6}}, {{"", {2800.0, 3500.0}}}};
-  CHECK(parameter_words(lag, "t1_degC") == "time constant 53 min (47 min to 58 min)");
-  CHECK(parameter_words({"power", {{"", 2.0}}, {}}, "x") == "with the square of the signal");
-  CHECK(parameter_words({"step_um", {{"", -2.5}}, {}}, "z_um") == "jump -2.5 um");
-  CHECK(parameter_words({"news", {{"", 3.0}}, {}}, "z_um") == "news 3.0");
+  CHECK(parameter_words("thermal_lag", lag, "t1_degC") ==
+        "time constant 53 min (47 min to 58 min)");
+  CHECK(parameter_words("missing_heat_source", {"power", {{"", 2.0}}, {}}, "x") ==
+        "with the square of the signal");
+  CHECK(parameter_words("displacement_step", {"step_um", {{"", -2.5}}, {}}, "z_um") ==
+        "jump -2.5 um");
+  CHECK(parameter_words("displacement_step", {"news", {{"", 3.0}}, {}}, "z_um") == "news 3.0");
+  CHECK(parameter_words("sensor_loose", {"gain", {{"", 0.5}}, {}}, "t1_degC") ==
+        "of its motion left: 0.50");
 }
 
 TEST_CASE("an axis has round ticks within its range", "[diagnosis][report]") {

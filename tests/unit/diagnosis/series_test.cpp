@@ -1,5 +1,5 @@
 // The filters of many time constants at once against the estimator's, which take a value at a time.
-#include "modelling/diagnosis/series.hpp"
+#include "modelling/diagnosis/data/series.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -7,12 +7,12 @@
 
 #include <catch2/catch.hpp>
 
-#include "estimator/low_pass.hpp"
-#include "estimator/play.hpp"
-#include "modelling/diagnosis/coloured_noise.hpp"
-#include "modelling/diagnosis/evidence.hpp"
-#include "modelling/diagnosis/panel.hpp"
-#include "modelling/diagnosis/settings_together.hpp"
+#include "estimator/model/terms/low_pass.hpp"
+#include "estimator/model/terms/play.hpp"
+#include "modelling/diagnosis/data/panel.hpp"
+#include "modelling/diagnosis/evidence/coloured_noise.hpp"
+#include "modelling/diagnosis/evidence/evidence.hpp"
+#include "modelling/diagnosis/evidence/settings_together.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

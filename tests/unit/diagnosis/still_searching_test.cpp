@@ -1,5 +1,5 @@
 // The line that tells that a search goes on.
-#include "modelling/diagnosis/still_searching.hpp"
+#include "modelling/diagnosis/command/still_searching.hpp"
 
 #include <array>
 #include <csignal>

@@ -8,9 +8,9 @@
 #include <catch2/catch.hpp>
 
 #include "config/problems.hpp"
+#include "modelling/diagnosis/network/network_simulation.hpp"
 #include "modelling/diagnosis/report/report_html.hpp"
 #include "modelling/diagnosis/thermal/corrected_machine.hpp"
-#include "modelling/diagnosis/thermal/network_simulation.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 
 using namespace thermocomp;

@@ -1,4 +1,4 @@
-#include "estimator/axis_channel.hpp"
+#include "estimator/axes/axis_channel.hpp"
 
 #include <algorithm>
 #include <cmath>

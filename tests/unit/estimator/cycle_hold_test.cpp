@@ -1,8 +1,9 @@
 /// Corrections once a machining cycle, and what is held between.
-#include "estimator/cycle_hold.hpp"
+#include "estimator/learning/cycle_hold.hpp"
 
 #include <catch2/catch.hpp>
 
+#include "estimator/learning/cycle_ends.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -1,4 +1,4 @@
-#include "estimator/displacement_model.hpp"
+#include "estimator/model/displacement_model.hpp"
 
 #include <cmath>
 #include <vector>

@@ -4,7 +4,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -1,4 +1,4 @@
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 #include <cmath>
 #include <vector>
@@ -459,4 +459,10 @@ TEST_CASE("configuration and model that do not fit are refused", "[estimator]") 
   refused([](auto&, auto& model) { model.matrix_um_per_K[0].pop_back(); });
   refused([](auto&, auto& model) { model.matrix_um_per_K[0][1] = not_a_number; });
   refused([](auto&, auto& model) { model.matrix_um_per_K[0][0] = HUGE_VAL; });
+  // Whatever else reads the rows: it comes after the model's own check.
+  refused([](auto& config, auto& model) {
+    config.correction.form = CorrectionForm::recursive;
+    config.correction.groups = {{model.inputs[0]}};
+    model.matrix_um_per_K.clear();
+  });
 }

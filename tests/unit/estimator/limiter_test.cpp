@@ -1,4 +1,4 @@
-#include "estimator/limiter.hpp"
+#include "estimator/axes/limiter.hpp"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-#include "estimator/lost_blocks.hpp"
+#include "estimator/sensing/lost_blocks.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "estimator/model_domain.hpp"
+#include "estimator/model/model_domain.hpp"
 
 #include <cmath>
 #include <cstring>
@@ -7,8 +7,8 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
-#include "estimator/outside_share.hpp"
-#include "estimator/probed_error.hpp"
+#include "estimator/learning/probed_error.hpp"
+#include "estimator/model/outside_share.hpp"
 #include "small_machine.hpp"
 
 using namespace thermocomp;

@@ -1,4 +1,4 @@
-#include "estimator/running_correction.hpp"
+#include "estimator/learning/running_correction.hpp"
 
 #include <algorithm>
 #include <cmath>

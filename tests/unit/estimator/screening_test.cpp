@@ -1,4 +1,4 @@
-#include "estimator/screening.hpp"
+#include "estimator/sensing/screening.hpp"
 
 #include <limits>
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/estimator.hpp"
+#include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
 

@@ -1,4 +1,4 @@
-#include "estimator/smoothing.hpp"
+#include "estimator/sensing/smoothing.hpp"
 
 #include <array>
 #include <cmath>

@@ -4,10 +4,10 @@
 #include <catch2/catch.hpp>
 
 #include "estimator/checks.hpp"
-#include "estimator/displacement_model.hpp"
 #include "estimator/estimator_config.hpp"
-#include "estimator/lead.hpp"
-#include "estimator/play.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/model/terms/lead.hpp"
+#include "estimator/model/terms/play.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/model_file.hpp"
-#include "estimator/model_domain.hpp"
+#include "estimator/model/model_domain.hpp"
 #include "modelling/identification/bank_fit.hpp"
 #include "synthetic_places.hpp"
 
@@ -133,6 +133,31 @@ TEST_CASE("a model judged within one run says so", "[families]") {
   const std::string said = families_text(tests, fit);
   CHECK(said.find("judged within one run: not valid for other days") != std::string::npos);
   CHECK(said.find("Next: a run of another day") != std::string::npos);
+  CHECK(said.find("another day is not known") != std::string::npos);
+  CHECK(said.find("RMS left out") == std::string::npos);
+}
+
+TEST_CASE("two runs, each judged by the other alone, give a range and three a figure",
+          "[families]") {
+  const auto follows = [](double quick, double slow, double, double) { return 5.0 * quick - slow; };
+  const MeasuredTests two = machine_tests(2, follows);
+  const std::string said = families_text(two, fitted(two));
+  CHECK(said.find("on a third run expect between") != std::string::npos);
+  CHECK(said.find("RMS left out") == std::string::npos);
+  const MeasuredTests three = machine_tests(3, follows);
+  CHECK(families_text(three, fitted(three)).find("z_um: RMS left out") != std::string::npos);
+}
+
+TEST_CASE("what one run cannot tell widens what a prediction may be off by", "[families]") {
+  MadeFrom made_from;
+  MadeFrom::Output output;
+  output.left_out_rms_um = 2.0;
+  output.no_model_rms_um = 18.0;
+  CHECK(spread_um(made_from, output) == 2.0);
+  made_from.within_one_run = true;
+  CHECK(spread_um(made_from, output) == 6.0);
+  output.no_model_rms_um = 1.0;  // a model that is worse than none says so already
+  CHECK(spread_um(made_from, output) == 2.0);
 }
 
 TEST_CASE("a bank of lags is written, read and predicts what was judged", "[families]") {

@@ -210,6 +210,82 @@ TEST_CASE("a position effect is zero at its centre and linear beside it") {
   CHECK(with.displacement_um(0) - without.displacement_um(0) == Approx(3.0 * 15.0 * 0.2));
 }
 
+TEST_CASE("a line goes straight from one value to the next, and anew when it repeats") {
+  PlantConfig config = two_lumps();
+  SignalConfig line = constant("oil", 0.0);
+  line.kind = SignalKind::line;
+  line.times_s = {0.0, 100.0, 300.0};
+  line.values = {20.0, 40.0, 30.0};
+  config.signals.push_back(line);
+  Plant once(config, 1);
+  config.signals.back().repeat_s = 400.0;
+  Plant again(config, 1);
+  const std::vector<std::pair<double, double>> seen{{0, 20},   {50, 30},  {100, 40},
+                                                    {200, 35}, {300, 30}, {350, 30}};
+  for (const auto& [time_s, value] : seen) {
+    once.advance_to(time_s);
+    again.advance_to(time_s);
+    CHECK(once.signal(1) == Approx(value));
+    CHECK(again.signal(1) == Approx(value));
+  }
+  once.advance_to(450.0);
+  again.advance_to(450.0);
+  CHECK(once.signal(1) == Approx(30.0));
+  CHECK(again.signal(1) == Approx(30.0));  // 50 s into the second round
+  again.advance_to(475.0);
+  CHECK(again.signal(1) == Approx(35.0));
+}
+
+TEST_CASE("a coolant whose temperature is a signal has that, whatever the room does") {
+  PlantConfig config = two_lumps();
+  config.sources.clear();
+  config.nodes[0].coolant_W_per_K = 1e6;
+  config.signals.push_back(constant("pump_on", 1.0));
+  config.signals.push_back(constant("oil", 43.0));
+  config.coolant.signal = 1;
+  config.coolant.temp_signal = 2;
+  Plant plant(config, 1);
+  plant.advance_to(1000.0);
+  CHECK(plant.node_degC(0) == Approx(43.0).margin(0.01));
+}
+
+TEST_CASE("a body's guideway adds its rows at the axis' position to the output") {
+  PlantConfig config;
+  config.room = {20.0, 0.0, 15.0, 7.0, 0.0, 3600.0, {}};
+  config.signals = {constant("z_mm", 0.0), constant("warm", 1.0)};
+  config.signals[0].kind = SignalKind::line;
+  config.signals[0].times_s = {0.0, 1e6, 2e6};
+  config.signals[0].values = {-100.0, 50.0, 900.0};
+  ReducedBody body;
+  body.conductance = {1e-3};
+  body.coolant_conductance = {0.0};
+  body.room_inflow = {1e-3};
+  body.coolant_inflow = {0.0};
+  body.one_degC = {1.0};
+  body.sources = {{"heat", "warm", 1.0, 1.0, 1.0, {1e-2}}};  // 10 K in the end
+  body.sensors = {{"there", {1.0}}};
+  body.outputs = {{"x_um", {2.0}}};
+  body.guideways = {{"rail", "z_mm", "x_um", {0.0, 100.0, 800.0}, {{-1.0}, {1.0}, {3.0}}}};
+  config.body = body;
+  config.body_signals = {1};
+  config.body_outputs = {0};
+  config.body_axes = {0};
+  config.outputs = {{"x_um", 0.0}};
+  Plant plant(config, 1);
+  CHECK(plant.displacement_um(0) == 0.0);  // nothing is warm yet
+  plant.advance_to(1e5);
+  CHECK(plant.displacement_um(0) == Approx(10.0 * (2.0 - 1.0)));  // below its first position
+  plant.advance_to(1e6);
+  CHECK(plant.displacement_um(0) == Approx(10.0 * (2.0 + 0.0)));  // at 50 mm
+  plant.advance_to(2e6);
+  CHECK(plant.displacement_um(0) == Approx(10.0 * (2.0 + 3.0)));
+  const ReducedBody read = parse_body(write_body(body, ""), "body.toml");
+  REQUIRE(read.guideways.size() == 1);
+  CHECK(read.guideways[0].output == "x_um");
+  CHECK(read.guideways[0].positions_mm == body.guideways[0].positions_mm);
+  CHECK(read.guideways[0].rows == body.guideways[0].rows);
+}
+
 TEST_CASE("the room follows the clock and the draught") {
   PlantConfig config = two_lumps();
   config.room = {20.0, 2.0, 15.0, 7.0, 0.0, 3600.0, {{3600.0, 60.0, -5.0}}};

@@ -150,3 +150,33 @@ TEST_CASE("a controller rejects, misapplies and forgets as the script says") {
   cnc.step(0.9, {false, 0.0, 1});
   CHECK(cnc.applied_um(0) == 6.0);
 }
+
+TEST_CASE("a piezo with a dead band has two branches, and only one for who comes from 0 V") {
+  const SimulatedPiezoConfig config{10.0, {0.0, 100.0}, {-20.0, 30.0}};
+  SimulatedPiezo piezo(config);
+  CHECK(piezo.step(8.0) == -20.0);  // within the dead band
+  CHECK(piezo.step(70.0) == Approx(10.0));
+  CHECK(piezo.step(62.0) == Approx(10.0));  // turned: nothing moves for 10 V
+  CHECK(piezo.step(50.0) == Approx(5.0));
+  CHECK(piezo.step(55.0) == Approx(5.0));
+  CHECK(piezo.step(70.0) == Approx(10.0));
+  CHECK(piezo.step(30.0) == Approx(-5.0));  // from above ...
+  piezo.step(0.0);
+  CHECK(piezo.step(30.0) == Approx(-10.0));  // ... and from 0 V
+  CHECK(piezo.step(not_a_number) == Approx(-10.0));
+}
+
+TEST_CASE("a controller with a piezo shows volts, and its tool moves by the curve") {
+  SimulatedController controller = two_axes();
+  controller.axes[0].piezo = SimulatedPiezoConfig{10.0, {0.0, 100.0}, {-20.0, 30.0}};
+  SimulatedCnc cnc(controller);
+  cnc.take(0.0, {{60.0, 5.0}, 3, 1.0});
+  cnc.take(0.2, {{60.0, 5.0}, 3, 2.0});
+  cnc.step(0.3, {});
+  CHECK(cnc.shown(0) == 60.0);
+  CHECK(cnc.applied_um(0) == Approx(5.0));
+  CHECK(cnc.shown(1) == cnc.applied_um(1));
+  cnc.forget();
+  CHECK(cnc.shown(0) == 0.0);
+  CHECK(cnc.applied_um(0) == -20.0);
+}

@@ -1,4 +1,4 @@
-#include "modelling/structure/file_mesh.hpp"
+#include "modelling/structure/mesh/file_mesh.hpp"
 
 #include <fstream>
 #include <gmsh.h>

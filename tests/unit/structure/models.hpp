@@ -6,9 +6,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "modelling/structure/box_mesh.hpp"
-#include "modelling/structure/conduction.hpp"
-#include "modelling/structure/statics.hpp"
+#include "modelling/structure/mesh/box_mesh.hpp"
+#include "modelling/structure/solve/conduction.hpp"
+#include "modelling/structure/solve/statics.hpp"
 
 namespace thermocomp::test {
 

@@ -151,6 +151,21 @@ TEST_CASE("a guideway has a row a position, and what carries the work counts the
   CHECK(again.guideways[0].rows_um_per_K == tool.model.guideways[0].rows_um_per_K);
 }
 
+TEST_CASE("where the meshes have the axis a guideway adds nothing, elsewhere what it differs by",
+          "[structure][model]") {
+  const std::string rail =
+      "[[guideway]]\nname = \"rail\"\naxis = \"z_mm\"\npart = \"column\"\n"
+      "from_mm = [0, 50, 100]\nto_mm = [0, 50, 300]\npositions_mm = [0, 100, 200]\n"
+      "carries = \"tool\"\noutputs = { z_um = \"z\" }\n";
+  const std::string machine = material + column + foot + all_warm + top + rail;
+  const auto rows_of = [](const Result& result) {
+    return result.model.guideways.at(0).rows_um_per_K.at("z_um");
+  };
+  const auto whole = rows_of(matrix_of(machine));
+  const auto drawn = rows_of(matrix_of(machine + "drawn_at_mm = 100\n"));
+  for (std::size_t i = 0; i < 3; ++i) CHECK(near(drawn[i][0], whole[i][0] - whole[1][0], 1e-9));
+}
+
 TEST_CASE("tool and work: what moves both moves neither", "[structure][model]") {
   const std::string both =
       "[[output]]\nname = \"z_um\"\ndirection = \"z\"\n"

@@ -1,0 +1,29 @@
+/// A moment in a history, as a person writes it.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace thermocomp {
+
+/// Seconds since the history's first cycle, or wall time [ns since 1970].
+struct HistoryTime {
+  std::optional<double> seconds;
+  std::optional<std::int64_t> wall_ns;
+};
+
+/// "12.5": seconds since the history's start. "2026-03-01T08:30:00", "2026-03-01 08:30",
+/// "2026-03-01" (midnight): local unless it ends with Z or +hh:mm. "now", "8 hours ago", "90 min
+/// ago", "-8h", "-1.5d": before `now`; units s, m or min, h, d, w, and their English words.
+/// @param now  wall clock, since 1970
+/// @throws std::invalid_argument naming the text
+[[nodiscard]] HistoryTime parse_history_time(
+    const std::string& text,
+    std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch());
+
+/// "2026-03-01T08:30:00.123Z"
+[[nodiscard]] std::string utc_text(std::int64_t wall_ns);
+
+}  // namespace thermocomp

@@ -1,0 +1,65 @@
+#include "estimator/axes/axis_bank.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+
+AxisBank::AxisBank(const EstimatorConfig& config) {
+  static_assert(axes_max == 16);
+  require(config.axes.size() <= axes_max, "axis", static_cast<double>(config.axes.size()),
+          "must be at most 16");
+  for (const AxisConfig& axis : config.axes) {
+    axes_.emplace_back(axis, config.compensation, config.controller_reads_back);
+    signs_.push_back(axis.sign);
+  }
+}
+
+void AxisBank::step(const StepTime& time, const Targets& targets, const Signals& signals,
+                    const ControllerState& controller, OffsetCommand& command) noexcept {
+  AxisInput input;
+  input.now = time.now;
+  input.dt_s = time.dt_s;
+  input.may_change = targets.may_change;
+  input.link_epoch = controller.link_epoch;
+  input.online = signals.online;
+  input.taken_at = controller.taken_at;
+  command.link_epoch = controller.link_epoch;
+  command.look = controller.look;
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    input.applied_um = controller.applied_um[i];
+    input.target_um = targets.axis_um[i];
+    if (targets.stand_where_unknown && !std::isfinite(input.target_um))
+      input.target_um = axes_[i].offset_um();
+    axes_[i].step(input);
+    command.offset_um[i] = axes_[i].offset_um();
+    command.valid[i] = axes_[i].driven();
+  }
+}
+
+bool AxisBank::synced() const noexcept {
+  return std::all_of(axes_.begin(), axes_.end(),
+                     [](const AxisChannel& axis) { return axis.synced(); });
+}
+
+double AxisBank::compensated_um(std::size_t axis) const noexcept {
+  const double applied_um = axes_[axis].applied_um();
+  return signs_[axis] * (std::isfinite(applied_um) ? applied_um : axes_[axis].offset_um());
+}
+
+void AxisBank::end_proves() noexcept {
+  for (AxisChannel& axis : axes_) axis.end_prove();
+}
+
+void AxisBank::adopt(const AxisBank& previous, const std::vector<int>& axes) noexcept {
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    if (axes[i] >= 0) axes_[i].adopt(previous.axes_[static_cast<std::size_t>(axes[i])]);
+}
+
+void AxisBank::visit_state(StateArchive& archive) {
+  for (AxisChannel& axis : axes_) archive(axis);
+}
+
+}  // namespace thermocomp

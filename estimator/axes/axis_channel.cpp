@@ -1,0 +1,252 @@
+#include "estimator/axes/axis_channel.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace thermocomp {
+namespace {
+
+/// What a read-back may lie outside our bound because registers are rounded.
+constexpr double register_rounding_um = 0.1;
+
+/// One unexplained read-back outweighs so many good ones; a second one within them latches.
+constexpr std::uint8_t suspicion_of_one = 16;
+
+/// The one that comes with a new epoch, the one before its first command is written, and the one
+/// that shows that it was.
+constexpr std::uint8_t read_backs_until_written = 3;
+
+/// What is read back on a link that was away for less may be a value on the way to the one sent
+/// last; set from the slowest read-backs that were tried (0.5 s) and the pauses of a reconnection.
+constexpr nanoseconds lag_max = std::chrono::milliseconds(1500);
+
+/// Two read-backs after a release that are no further apart say the same.
+constexpr double same_read_back_um = 0.3;
+
+nanoseconds from_seconds(double seconds) {
+  return std::chrono::duration_cast<nanoseconds>(seconds_d(seconds));
+}
+double to_seconds(nanoseconds time) {
+  return 1e-9 * static_cast<double>(time.count());
+}
+
+}  // namespace
+
+AxisChannel::AxisChannel(const AxisConfig& config, const CompensationConfig& compensation,
+                         bool reads_back)
+    : limiter_(config.limiter),
+      check_(compensation.mismatch_um, from_seconds(compensation.mismatch_after_s)),
+      reads_back_(reads_back),
+      mismatch_after_(from_seconds(compensation.mismatch_after_s)),
+      prove_um_max_(compensation.prove_um_max),
+      prove_hold_(from_seconds(compensation.prove_hold_s)) {
+  state_.trusted_um = config.limiter.offset_um_max;
+}
+
+void AxisChannel::step(const AxisInput& input) noexcept {
+  if (input.link_epoch != state_.epoch) take_epoch(input.link_epoch);
+  if (input.online) note_read_back(input);
+  if (!state_.synced)
+    synchronise(input);
+  else if (input.online && reads_back_)
+    compare(input);
+  if (!driven()) {
+    state_.prove.phase = ProvePhase::none;
+    return;
+  }
+  state_.driven_once = true;
+  state_.driven_at = input.now;
+  state_.target_um = input.target_um;
+  if (proving()) state_.target_um = prove_target_um(input.now);
+  if (input.may_change && state_.stands_for == 0) limiter_.step(state_.target_um, input.dt_s);
+  check_.sent(input.now, limiter_.offset_um());
+}
+
+/// A pause of the same link changes nothing by itself: what is read back is compared as ever. But
+/// what was sent last may not have been written (a controller that refuses it pauses the link each
+/// time), so the offset does not go on before a command of the new epoch has been.
+void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
+  if (is_same_link(epoch, state_.epoch))
+    state_.stands_for = read_backs_until_written;
+  else
+    state_.synced = false;
+  state_.epoch = epoch;
+}
+
+void AxisChannel::note_read_back(const AxisInput& input) noexcept {
+  state_.applied_um = input.applied_um;
+  if (state_.stands_for > 0 && input.taken_at != state_.seen_at) --state_.stands_for;
+  state_.seen_at = input.taken_at;
+}
+
+void AxisChannel::synchronise(const AxisInput& input) noexcept {
+  if (!input.online || state_.epoch == 0) return;
+  if (!reads_back_) {
+    // Nothing better is known than what was sent last.
+    start_from(input.now, limiter_.offset_um());
+    state_.synced = true;
+    return;
+  }
+  if (!std::isfinite(input.applied_um)) return;
+  // Away for longer than a controller may lag, it shows none of the values on the way any more.
+  if (input.taken_at - state_.read_back_at > lag_max)
+    check_.restart(input.now, limiter_.offset_um());
+  state_.synced = true;
+  state_.starting = true;
+  compare(input);
+}
+
+void AxisChannel::compare(const AxisInput& input) noexcept {
+  if (!std::isfinite(input.applied_um)) return;
+  const bool fresh = input.taken_at != state_.read_back_at;
+  state_.read_back_at = input.taken_at;
+  state_.out_of_bound = is_out_of_bound(input.applied_um);
+  if (state_.latched) {
+    state_.starting = false;  // a release decides where to start
+    state_.agreed_since = input.now;
+    if (state_.releasing && fresh) check_release(input);
+  } else if (state_.starting) {
+    start_on_link(input, fresh);
+  } else if (check_.agrees(input.applied_um)) {
+    note_explained(input, fresh);
+  } else {
+    note_unexplained(input, fresh);
+  }
+}
+
+/// The axis is not driven until the controller itself is within the bound. A controller that was
+/// away may have lost its offset; one that comes back with another is not believed. One that shows
+/// what was sent lately has it still, and only tells it late: the value sent stays the axis' own.
+void AxisChannel::start_on_link(const AxisInput& input, bool fresh) noexcept {
+  if (state_.out_of_bound) return;
+  if (state_.driven_once && !check_.agrees_after_absence(input.applied_um))
+    return note_unexplained(input, fresh);
+  state_.starting = false;
+  state_.in_doubt = false;
+  const bool at_nothing = std::abs(input.applied_um) <= same_read_back_um;
+  if (state_.driven_once && !at_nothing && check_.agrees(input.applied_um)) {
+    state_.stands_for = is_applied(input) ? 0 : read_backs_until_written;
+    return;
+  }
+  state_.unwritten_for = read_backs_until_written;
+  // Nothing sent and nothing read: nothing is added there.
+  if (!state_.driven_once && std::abs(input.applied_um) <= same_read_back_um)
+    state_.pairs.note(0.0, input.applied_um);
+  start_from(input.now, std::clamp(input.applied_um, -state_.trusted_um, state_.trusted_um));
+}
+
+void AxisChannel::note_explained(const AxisInput& input, bool fresh) noexcept {
+  state_.in_doubt = false;
+  if (state_.mismatch && input.now - state_.agreed_since >= mismatch_after_)
+    state_.mismatch = false;
+  if (!fresh) return;
+  if (state_.suspicion > 0) --state_.suspicion;
+  // Until the first command has been written it is not ours that is read back.
+  if (state_.unwritten_for > 0)
+    --state_.unwritten_for;
+  else if (state_.driven_once)
+    state_.pairs.note(limiter_.offset_um(), input.applied_um);
+}
+
+void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept {
+  state_.mismatch = true;
+  state_.agreed_since = input.now;
+  const bool counts = fresh || !state_.in_doubt;
+  state_.in_doubt = true;
+  if (!counts) return;
+  if (state_.suspicion == 0) {
+    state_.suspicion = suspicion_of_one;
+    return;
+  }
+  state_.latched = true;
+  state_.releasing = false;
+  state_.starting = false;
+  state_.latched_mismatch = state_.pairs.judge(limiter_.offset_um(), input.applied_um);
+  state_.pairs.note(limiter_.offset_um(), input.applied_um);
+}
+
+void AxisChannel::release() noexcept {
+  // Said again while read-backs are awaited it must not make them begin anew: with a slow link and
+  // an impatient operator they would never be enough.
+  if (!state_.latched || state_.releasing) return;
+  state_.releasing = true;
+  state_.released_um = not_a_number;
+}
+
+void AxisChannel::check_release(const AxisInput& input) noexcept {
+  const double sent_um = limiter_.offset_um();
+  const bool mended = std::abs(input.applied_um - sent_um) <= same_read_back_um;
+  const bool first = std::isnan(state_.released_um);
+  const bool stands = std::abs(input.applied_um - state_.released_um) <= same_read_back_um;
+  if (state_.out_of_bound || !(first || stands) ||
+      (!mended && state_.latched_mismatch.explains(sent_um, input.applied_um))) {
+    state_.releasing = false;
+    return;
+  }
+  state_.released_um = input.applied_um;
+  const double could_go_um = limiter_.rate_um_per_s() * to_seconds(input.now - state_.driven_at);
+  if (first || std::abs(input.applied_um - sent_um) > could_go_um) return;
+  end_latch();
+  start_from(input.now, std::clamp(input.applied_um, -state_.trusted_um, state_.trusted_um));
+}
+
+void AxisChannel::end_latch() noexcept {
+  state_.latched = false;
+  state_.releasing = false;
+  state_.in_doubt = false;
+  state_.suspicion = 0;
+}
+
+/// What was sent last has been written, and nothing is on its way.
+bool AxisChannel::is_applied(const AxisInput& input) const noexcept {
+  return std::abs(input.applied_um - limiter_.offset_um()) <= register_rounding_um;
+}
+
+bool AxisChannel::is_out_of_bound(double applied_um) const noexcept {
+  return !(std::abs(applied_um) <= state_.trusted_um + register_rounding_um);
+}
+
+void AxisChannel::start_from(nanoseconds now, double offset_um) noexcept {
+  limiter_.start_from(offset_um);
+  check_.restart(now, offset_um);
+}
+
+void AxisChannel::prove(double move_um) noexcept {
+  // Negated so that NaN is ignored too.
+  if (!driven() || !(std::abs(move_um) <= prove_um_max_)) return;
+  state_.prove.phase = ProvePhase::out;
+  state_.prove.from_um =
+      std::clamp(limiter_.offset_um(), -limiter_.bound_um(), limiter_.bound_um());
+  state_.prove.move_um = move_um;
+}
+
+double AxisChannel::prove_target_um(nanoseconds now) noexcept {
+  const double out_um = std::clamp(state_.prove.from_um + state_.prove.move_um,
+                                   -limiter_.bound_um(), limiter_.bound_um());
+  if (state_.prove.phase == ProvePhase::out && limiter_.offset_um() == out_um) {
+    state_.prove.phase = ProvePhase::wait;
+    state_.prove.until = now + prove_hold_;
+  }
+  if (state_.prove.phase == ProvePhase::wait && now >= state_.prove.until)
+    state_.prove.phase = ProvePhase::back;
+  if (state_.prove.phase != ProvePhase::back) return out_um;
+  if (limiter_.offset_um() == state_.prove.from_um) state_.prove.phase = ProvePhase::none;
+  return state_.prove.from_um;
+}
+
+void AxisChannel::restore(double offset_um) noexcept {
+  // Beyond what any configuration allows it cannot be ours.
+  if (!(std::abs(offset_um) <= offset_um_max_of_any_axis)) return;
+  limiter_.start_from(offset_um);
+  state_.trusted_um = std::max(state_.trusted_um, std::abs(offset_um));
+}
+
+void AxisChannel::adopt(const AxisChannel& previous) noexcept {
+  limiter_.start_from(previous.limiter_.offset_um());
+  check_.adopt(previous.check_);
+  state_ = previous.state_;
+  state_.trusted_um = std::max(limiter_.bound_um(), previous.state_.trusted_um);
+  state_.prove = {};  // an indicator waits for nothing that another configuration allowed
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,161 @@
+#include "estimator/axes/mismatch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace thermocomp {
+namespace {
+
+/// Registers are rounded and an offset that moves is read back a moment late.
+constexpr double noise_um = 0.3;
+/// Pairs nearer to one another tell nothing new.
+constexpr double apart_um = 0.2;
+/// Of a mismatch: how far off the older pairs may lie from what explains the newest; and for being
+/// sure of it, for a release is not believed as long as what is sure explains what is read.
+constexpr double share_of_mismatch = 0.35;
+constexpr double sure_share_of_mismatch = 0.1;
+/// Below so little sent a factor says nothing.
+constexpr double sent_um_min = 0.2;
+/// What was sent must have changed by so much, and by so much of the mismatch, before a factor is
+/// no coincidence.
+constexpr double spread_um_min = 0.5;
+constexpr double spread_share_min = 0.2;
+
+/// Factors that people make: units, decimal places, radius and diameter.
+bool is_usual(double factor) noexcept {
+  constexpr std::array usual{2.0, 0.5, 10.0, 0.1, 100.0, 0.01, 1000.0, 0.001, 25.4, 1.0 / 25.4};
+  return std::any_of(usual.begin(), usual.end(), [factor](double each) {
+    return std::abs(std::abs(factor) / each - 1.0) < 0.03;
+  });
+}
+
+bool is_near(double a, double b) noexcept {
+  return std::abs(a - b) < 0.05 * std::abs(b);
+}
+
+std::string factor_text(const Mismatch& mismatch) {
+  std::array<char, 96> text{};
+  if (is_near(mismatch.size, 2.0))
+    std::snprintf(text.data(), text.size(), "reads back twice what is sent: check scale");
+  else if (is_near(mismatch.size, 0.5))
+    std::snprintf(text.data(), text.size(), "reads back half of what is sent: check scale");
+  else
+    std::snprintf(text.data(), text.size(), "reads back %.3g times what is sent: check scale%s",
+                  mismatch.size, mismatch.size < 0.0 ? " and sign" : "");
+  std::string told = text.data();
+  if (!mismatch.or_constant) return told;
+  std::snprintf(text.data(), text.size(), "; or constant %+.1f um: check the offset's zero",
+                mismatch.read_um - mismatch.sent_um);
+  return told.append(text.data());
+}
+
+}  // namespace
+
+bool Mismatch::explains(double of_sent_um, double of_read_um) const noexcept {
+  if (!sure) return false;
+  double expected_um = not_a_number;
+  if (likely == MismatchCause::factor) expected_um = size * of_sent_um;
+  if (likely == MismatchCause::opposite_sign) expected_um = -of_sent_um;
+  if (likely == MismatchCause::constant) expected_um = of_sent_um + size;
+  return std::abs(of_read_um - expected_um) <= noise_um + 0.1 * std::abs(read_um - sent_um);
+}
+
+std::string likely_text(const Mismatch& mismatch) {
+  std::array<char, 96> text{};
+  switch (mismatch.likely) {
+    case MismatchCause::none:
+      return {};
+    case MismatchCause::opposite_sign:
+      return "opposite sign: check sign";
+    case MismatchCause::stands_still:
+      if (std::abs(mismatch.read_um) <= noise_um)
+        return "reads back nothing of what is sent: not taken, or check scale";
+      return "does not take what is sent (rejects it or stands still)";
+    case MismatchCause::changes_alone:
+      return "changes without us: another writer?";
+    case MismatchCause::constant:
+      std::snprintf(text.data(), text.size(), "constant %+.1f um: check the offset's zero",
+                    mismatch.size);
+      return text.data();
+    case MismatchCause::factor:
+      return factor_text(mismatch);
+  }
+  return {};
+}
+
+void SentAndRead::note(double sent_um, double read_um) noexcept {
+  if (count_ != 0) {
+    const std::size_t last = (count_ - 1) % length;
+    if (std::abs(sent_um - sent_um_[last]) < apart_um &&
+        std::abs(read_um - read_um_[last]) < apart_um)
+      return;
+  }
+  sent_um_[count_ % length] = sent_um;
+  read_um_[count_ % length] = read_um;
+  ++count_;
+}
+
+double SentAndRead::worst_um(double factor, double constant_um) const noexcept {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < kept(); ++i)
+    worst = std::max(worst, std::abs(read_um_[i] - (factor * sent_um_[i] + constant_um)));
+  return worst;
+}
+
+double SentAndRead::spread_um(double sent_um) const noexcept {
+  double low = sent_um;
+  double high = sent_um;
+  for (std::size_t i = 0; i < kept(); ++i) {
+    low = std::min(low, sent_um_[i]);
+    high = std::max(high, sent_um_[i]);
+  }
+  return high - low;
+}
+
+bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
+  double apart = 0.0;
+  for (std::size_t i = 0; i < kept(); ++i) {
+    // Where the offset was at rest it need not have moved: only what the newest were sent counts.
+    apart = std::max(apart, std::abs(read_um_[i] - read_um));
+  }
+  return apart <= noise_um && spread_um(sent_um) > 3.0 * noise_um;
+}
+
+Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
+  Mismatch found;
+  found.sent_um = sent_um;
+  found.read_um = read_um;
+  found.likely = MismatchCause::changes_alone;
+  if (stands_still(sent_um, read_um)) {
+    found.likely = MismatchCause::stands_still;
+    return found;
+  }
+  const double allowed_um = noise_um + share_of_mismatch * std::abs(read_um - sent_um);
+  const double factor = std::abs(sent_um) >= sent_um_min ? read_um / sent_um : not_a_number;
+  const double constant_um = read_um - sent_um;
+  const double of_factor_um = worst_um(factor, 0.0);
+  const double of_constant_um = worst_um(1.0, constant_um);
+  // Negated comparisons would take NaN, the factor of next to nothing, for a good one.
+  const bool factor_fits = std::isfinite(factor) && of_factor_um <= allowed_um;
+  const bool constant_fits = of_constant_um <= allowed_um;
+  found.sure =
+      spread_um(sent_um) > std::max(spread_um_min, spread_share_min * std::abs(read_um - sent_um));
+  const bool by_factor =
+      factor_fits && (!constant_fits || is_usual(factor) || is_near(factor, -1.0) ||
+                      (found.sure && of_factor_um < of_constant_um));
+  if (by_factor) {
+    found.likely = is_near(factor, -1.0) ? MismatchCause::opposite_sign : MismatchCause::factor;
+    found.size = factor;
+    found.or_constant = constant_fits && !found.sure;
+  } else if (constant_fits) {
+    found.likely = MismatchCause::constant;
+    found.size = constant_um;
+  }
+  const double off_um = by_factor ? of_factor_um : of_constant_um;
+  const double sure_um = noise_um + sure_share_of_mismatch * std::abs(read_um - sent_um);
+  if (found.likely == MismatchCause::changes_alone || off_um > sure_um) found.sure = false;
+  return found;
+}
+
+}  // namespace thermocomp

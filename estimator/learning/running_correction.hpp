@@ -1,0 +1,121 @@
+/// Gains of the model that are corrected while it runs, from a displacement measured now and then.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/correction_config.hpp"
+#include "estimator/state_archive.hpp"
+#include "estimator/thermal_model.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+/// What there is to know about one axis' correction.
+struct CorrectionReport {
+  std::array<double, correction_groups_max> gain{};       ///< learned, one a group
+  std::array<double, correction_groups_max> gain_used{};  ///< in use: mid-cut those from before it
+  std::array<double, correction_groups_max> gain_sd{};    ///< as of the last probing
+  double bias_um{0.0};
+  double bias_used_um{0.0};
+  double sd_um{0.0};           ///< of the corrected displacement now, as far as gains go
+  bool probing_wanted{false};  ///< sd_um is above probe_sd_um
+  std::uint8_t phase{1};       ///< two_phase: 1 or 2
+  std::uint64_t taken{0};      ///< probings that changed the gains
+  std::uint64_t refused{0};    ///< outliers, and those that could say nothing
+};
+
+/// One axis. With contributions p_g = sum over the inputs of group g of matrix * rise, and model
+/// output d of the estimator: d_corrected = d + sum_g (R_g - 1) p_g + bias.
+///
+/// two_phase (Teratani et al. 1995; group 1: heat source, group 2: tie):
+///   phase 1   R_1 = (d_ex - d + p_1) / p_1        printed form: R_1 = d_ex / d;   R_2 = 1
+///   phase 2   R_1 stays, R_2 = (d_ex - d + p_2 - (R_1 - 1) p_1) / p_2
+/// Phase 2 begins when the measured displacement has turned by turn_um. A p below
+/// contribution_um_min changes nothing.
+///
+/// recursive: a Kalman filter whose state is the gains (and a bias), which wander with
+/// gain_drift_per_sqrt_h; a probing further off than outlier_sigma is refused, unless the next one
+/// agrees with it.
+///
+/// A probing moves the estimate by at most step_um_max, the gains stay in [gain_min, gain_max], and
+/// nothing that was learned is used before `may_change`.
+class RunningCorrection {
+ public:
+  /// @throws InvalidValue when a group names no input of the model, or one twice
+  RunningCorrection(const CorrectionConfig& config, const ThermalModel& model, std::size_t output);
+
+  /// @param rise_K      of the model's temperature columns
+  /// @param may_change  false while cutting: what was learned waits
+  void step(nanoseconds now, std::span<const double> rise_K, bool may_change) noexcept;
+  /// What the corrected displacement differs from the model's by [um].
+  [[nodiscard]] double correction_um() const noexcept { return correction_of(state_.used); }
+  /// The same at another state of the machine.
+  [[nodiscard]] double correction_um(std::span<const double> rise_K) const noexcept {
+    return correction_of(state_.used, contributions_um(rise_K));
+  }
+  /// @param displacement_um  measured, as it would be without any offset
+  /// @param model_um         the model's at the same moment, without correction
+  void measured(double displacement_um, double model_um) noexcept;
+  /// A new reference: displacements count from here. Gains stay as they are.
+  void restart() noexcept;
+
+  [[nodiscard]] CorrectionReport report() const noexcept;
+  /// Gains by name ("gain1", ...), as in `report`, and those in use where they differ; allocates.
+  [[nodiscard]] static std::map<std::string, double> persistent(const CorrectionReport& report);
+  /// Before the first step, from "AXIS.gain1" and so on. Values that are no gains are ignored.
+  void restore(const std::map<std::string, double>& of_all_axes, const std::string& axis);
+  /// After a reload, where the groups are the same.
+  void adopt(const RunningCorrection& previous) noexcept;
+
+  void visit_state(StateArchive& archive) { archive(state_); }
+
+ private:
+  static constexpr std::size_t states_max = correction_groups_max + 1;
+  using Gains = std::array<double, states_max>;  ///< gains, then the bias
+  using Contributions = std::array<double, correction_groups_max>;
+  struct State {
+    Gains used{};
+    Gains learned{};
+    std::array<Gains, states_max> covariance{};
+    Contributions contributions_um{};
+    nanoseconds now{};
+    nanoseconds probed_at{};
+    double refused_error_um{0.0};
+    bool doubted{false};  ///< the last probing was refused as an outlier
+    std::uint8_t phase{1};
+    double extreme_um{0.0};  ///< of the measured displacement in phase 1, by magnitude
+    std::uint64_t taken{0};
+    std::uint64_t refused{0};
+    void visit_state(StateArchive& archive) {
+      auto& [a, b, c, d, e, f, g, h, i, j, k, l] = *this;
+      archive(a, b, c, d, e, f, g, h, i, j, k, l);
+    }
+  };
+
+  [[nodiscard]] Contributions contributions_um(std::span<const double> rise_K) const noexcept;
+  [[nodiscard]] double correction_of(const Gains& state, const Contributions& of_um) const noexcept;
+  [[nodiscard]] double correction_of(const Gains& state) const noexcept {
+    return correction_of(state, state_.contributions_um);
+  }
+  [[nodiscard]] Gains slopes() const noexcept;
+  [[nodiscard]] double sd_um() const noexcept;
+  [[nodiscard]] double hours_since_probing() const noexcept;
+  void learn_two_phases(double displacement_um, double model_um) noexcept;
+  void learn_recursively(double error_um) noexcept;
+  void move_to(Gains wanted) noexcept;
+
+  const CorrectionConfig config_;
+  std::vector<std::vector<std::size_t>> inputs_;      ///< of each group
+  std::vector<std::vector<double>> matrix_um_per_K_;  ///< the same shape
+  const std::size_t groups_;
+
+  State state_;
+};
+
+}  // namespace thermocomp

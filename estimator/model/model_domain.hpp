@@ -1,0 +1,66 @@
+/// How far the machine is from where its model was made.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "estimator/state_archive.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// What a prediction may be off by [um, 1 sd] at states of the record: the left-out error. One run
+/// says nothing of how another day differs: between what is left within it and no use at all only
+/// the scale is known, so the middle of the logarithms of both.
+[[nodiscard]] double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output);
+
+/// The distance of what the model reads from the rows that it was made from, in the metric of their
+/// covariance S,
+///
+///     d^2 = (x - m)^T S^-1 (x - m) / n,
+///
+/// x: levels of the temperatures [degC], then, after each low pass of the domain, rises of the
+/// temperatures and signals; n: their number. About 1 where the model was made; large in directions
+/// that were never excited. Evaluated once a second, since temperatures do not move faster.
+class ModelDomain {
+ public:
+  /// @param model  with `made_from`. @throws InvalidValue when shapes or names do not fit
+  explicit ModelDomain(const ThermalModel& model);
+  ~ModelDomain();
+  ModelDomain(ModelDomain&&) noexcept;
+  ModelDomain& operator=(ModelDomain&&) noexcept;
+
+  /// Low passes start anew at the next step.
+  void restart() noexcept;
+  /// The arguments of DisplacementModel::step(). Never throws, never allocates; once a second
+  /// O(n^2).
+  void step(nanoseconds now, std::span<const double> temps_degC,
+            std::span<const double> reference_degC, std::span<const double> signals) noexcept;
+
+  [[nodiscard]] double distance() const noexcept;  ///< d; 0 before the first step
+  [[nodiscard]] bool outside() const noexcept;     ///< d > distance_max
+  /// What of the model's displacement is still believed: 1 inside, (distance_max / d)^2 outside.
+  [[nodiscard]] double believed_share() const noexcept;
+  /// Standard deviation of an output's prediction: spread_um(), times
+  /// sqrt((1 + n d^2 / f) / (1 + n / f)) for what f rows' worth of data say about gains, where d is
+  /// above 1. NaN: nothing is known about the output.
+  [[nodiscard]] double sd_um(std::size_t output) const noexcept;
+
+  void visit_state(StateArchive& archive);
+  /// Whether `other` keeps the same states.
+  [[nodiscard]] bool alike(const ModelDomain& other) const;
+  /// @pre alike(other)
+  void adopt(const ModelDomain& other) noexcept;
+
+ private:
+  struct Metric;
+  std::unique_ptr<Metric> metric_;
+};
+
+/// Number of features of a domain: levels of the temperatures, then (temperatures + signals) times
+/// low passes.
+[[nodiscard]] std::size_t domain_features(const MadeFrom& made_from);
+
+}  // namespace thermocomp

@@ -1,0 +1,55 @@
+/// Whether the estimates of lost blocks are good enough to compensate by.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "estimator/estimator_config.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/sensing/lost_blocks.hpp"
+#include "estimator/state_archive.hpp"
+#include "estimator/step_values.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// Standard deviation that the estimated temperatures give each axis,
+///
+///     sd = sqrt(g^T V g),   g: slope of the axis' output, V: LostBlocks,
+///
+/// against compensation.offset_sd_um_max.
+class Certainty {
+ public:
+  struct State {
+    std::vector<double> offset_sd_um;  ///< one an axis; 0 where all is measured
+    bool uncertain{false};
+  };
+
+  /// @param axis_output  axis -> output of the model
+  Certainty(const EstimatorConfig& config, const ThermalModel& model,
+            const std::vector<std::size_t>& axis_output);
+
+  /// @return whether each column is measured, or estimated well enough. Without signals or a
+  ///         reference nothing is compensated, and nothing new can be said.
+  [[nodiscard]] bool step(const LostBlocks& lost, const DisplacementModel& model,
+                          const ReferenceState& reference, const Signals& signals) noexcept;
+  [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {
+    return state_.offset_sd_um[axis];
+  }
+
+  void adopt(const Certainty& previous) noexcept { state_.uncertain = previous.state_.uncertain; }
+  void visit_state(StateArchive& archive) {
+    auto& [offset_sd_um, uncertain] = state_;
+    archive(offset_sd_um, uncertain);
+  }
+
+ private:
+  const double sd_um_max_;
+  const std::vector<std::size_t> axis_output_;
+
+  State state_;
+  std::vector<double> rise_K_;          ///< scratch, one a column
+  std::vector<double> slope_um_per_K_;  ///< scratch, one a column
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,151 @@
+#include "estimator/pipeline/estimator.hpp"
+
+#include <stdexcept>
+
+#include "estimator/checks.hpp"
+#include "estimator/name_index.hpp"
+#include "estimator/pipeline/stages.hpp"
+#include "estimator/temperature_range.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// The machine is straight now. All or nothing: a reference of two moments would be no state that
+/// the machine was ever in.
+void take_reference(Stages& stages) noexcept {
+  if (!stages.sensing.all_good()) return;
+  const std::span<const double> temps_degC = stages.sensing.blocks().temps_degC();
+  stages.reference.take(temps_degC);
+  stages.prediction.restart();
+  stages.learned.restart();
+  stages.cycle_update.restart(stages.record.now, temps_degC, stages.signals.of_model());
+}
+
+void take_measured(Stages& stages, std::size_t axis, double value_um) noexcept {
+  stages.learned.note(axis, value_um);
+  if (!stages.record.displacement_known) return;  // nothing to compare it with
+  const bool remains = stages.config.correction.measured == MeasuredMeaning::remaining;
+  const double total_um = remains ? value_um - stages.axes.compensated_um(axis) : value_um;
+  stages.learned.learn(axis, total_um, stages.prediction.model_um(axis));
+}
+
+/// What was held between two cycle ends; a temperature that no sensor can show was not.
+void restore_held(Stages& stages, const PersistentState& state) {
+  const std::vector<std::string> columns = stages.model.temperature_columns();
+  const std::vector<std::string> names = stages.model.signal_columns();
+  std::vector<double> temps_degC(columns.size(), not_a_number);
+  std::vector<double> signals(names.size(), not_a_number);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    take_if_finite(state.held_degC, columns[i], temps_degC[i]);
+    if (!TemperatureRange(stages.config, columns[i]).holds(temps_degC[i]))
+      temps_degC[i] = not_a_number;
+  }
+  for (std::size_t i = 0; i < names.size(); ++i)
+    take_if_finite(state.held_signals, names[i], signals[i]);
+  stages.cycle_update.restore(temps_degC, signals);
+}
+
+}  // namespace
+
+Estimator::Estimator(const EstimatorConfig& config, const ThermalModel& model)
+    : stages_(std::make_unique<Stages>(config, model)) {}
+Estimator::~Estimator() = default;
+Estimator::Estimator(Estimator&&) noexcept = default;
+Estimator& Estimator::operator=(Estimator&&) noexcept = default;
+
+void Estimator::step(nanoseconds now, std::span<const Reading> readings,
+                     const ControllerState& controller, OffsetCommand& command) noexcept {
+  stages_->step(now, readings, controller, command);
+}
+
+void Estimator::apply(const Command& command) noexcept {
+  Stages& stages = *stages_;
+  const bool has_axis = command.axis < stages.axes.size();
+  switch (command.kind) {
+    case CommandKind::enable:
+      return stages.mode.enable(true);
+    case CommandKind::disable:
+      stages.mode.enable(false);
+      return stages.axes.end_proves();
+    case CommandKind::stop:
+      stages.mode.stop();
+      return stages.axes.end_proves();
+    case CommandKind::reference:
+      return take_reference(stages);
+    case CommandKind::cycle_end:
+      return stages.cycle_update.command();
+    case CommandKind::measured:
+      if (has_axis) take_measured(stages, command.axis, command.value_um);
+      return;
+    case CommandKind::prove:
+      if (has_axis) stages.axes.prove(command.axis, command.value_um);
+      return;
+    case CommandKind::release:
+      if (has_axis) stages.axes.release(command.axis);
+      return;
+  }
+}
+
+Report Estimator::make_report() const {
+  Report out = sized_report(*stages_);
+  report(out);
+  return out;
+}
+
+void Estimator::report(Report& out) const noexcept {
+  fill_report(*stages_, out);
+}
+
+std::size_t Estimator::state_size_bytes() const noexcept {
+  StateArchive archive;
+  stages_->visit_state(archive);
+  return archive.position_bytes();
+}
+
+void Estimator::save_state(std::span<std::byte> out) const noexcept {
+  StateArchive archive(out);
+  stages_->visit_state(archive);
+  THERMOCOMP_ENSURE(archive.position_bytes() == out.size());
+}
+
+void Estimator::load_state(std::span<const std::byte> in) {
+  if (in.size() != state_size_bytes())
+    throw std::runtime_error("the estimator's state has another size than this program's");
+  StateArchive archive(in);
+  stages_->visit_state(archive);
+}
+
+std::vector<std::string> Estimator::restore(const PersistentState& state) {
+  Stages& stages = *stages_;
+  std::vector<std::string> refused = impossible_references(
+      stages.config, stages.model.temperature_columns(), state.reference_degC);
+  stages.mode.enable(state.enabled && refused.empty());
+  if (refused.empty() && state.model_reference_degC == reference_numbers(stages.model))
+    stages.reference.restore(state.reference_degC, state.reference_signals);
+  stages.sensing.restore(state.temp_degC);
+  restore_held(stages, state);
+  for (std::size_t i = 0; i < stages.axes.size(); ++i) {
+    double offset_um = 0.0;
+    take_if_finite(state.offset_um, stages.config.axes[i].name, offset_um);
+    stages.axes.restore(i, offset_um);
+  }
+  stages.learned.restore(state.correction);
+  return refused;
+}
+
+void Estimator::plan_adoption(const Estimator& previous) {
+  stages_->plan_adoption(*previous.stages_);
+}
+
+void Estimator::adopt(const Estimator& previous) noexcept {
+  stages_->adopt(*previous.stages_);
+}
+
+const EstimatorConfig& Estimator::config() const noexcept {
+  return stages_->config;
+}
+const ThermalModel& Estimator::model() const noexcept {
+  return stages_->model;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,46 @@
+/// What the estimator does, and why it does not simply compensate.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace thermocomp {
+
+enum class Mode : std::uint8_t {
+  starting,  ///< not all inputs have had a value yet; offsets stay where they were
+  disabled,  ///< by an operator or the controller's switch; offsets at or on the way to zero
+  compensating,
+  holding,         ///< data lost: offsets stay
+  ramping_to_zero  ///< data lost for longer than hold_s and the policy says so
+};
+[[nodiscard]] std::string_view to_string(Mode mode) noexcept;
+
+/// Why the estimator does not simply compensate; a set of bits.
+enum class Reason : std::uint32_t {
+  operator_disabled = 1u << 0,
+  controller_disabled = 1u << 1,  ///< disable_signal is 1
+  block_lost = 1u << 2,           ///< no good sensor left in a block the model needs
+  signal_lost = 1u << 3,          ///< a position or operating signal the model needs is missing
+  no_reference = 1u << 4,
+  controller_offline = 1u << 5,
+  not_synced = 1u << 6,  ///< what the controller applies is not known yet
+  mismatch = 1u << 7,    ///< applied and sent differ
+  cutting = 1u << 8,     ///< hold_while_cutting holds the offset
+  at_bound = 1u << 9,
+  applied_out_of_bound = 1u << 10,  ///< read-back beyond any bound of ours: axis is not driven
+  block_estimated = 1u << 11,       ///< a warning: compensating, with an estimate for a lost block
+  mismatch_latched =
+      1u << 12,              ///< read-backs that nothing sent explains: not driven until released
+  no_target = 1u << 13,      ///< the model's answer is no finite number
+  outside_domain = 1u << 14  ///< the machine is where its model was never made or judged
+};
+inline constexpr std::size_t reasons_count = 15;
+[[nodiscard]] std::string_view to_string(Reason reason) noexcept;
+
+/// Of a set of reasons (Report::reasons), whether one is in it.
+[[nodiscard]] constexpr bool has_reason(std::uint32_t reasons, Reason reason) noexcept {
+  return (reasons & static_cast<std::uint32_t>(reason)) != 0;
+}
+
+}  // namespace thermocomp

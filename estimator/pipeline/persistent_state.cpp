@@ -1,0 +1,65 @@
+#include "estimator/pipeline/persistent_state.hpp"
+
+#include <cmath>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+namespace {
+
+void add(std::map<std::string, double>& values, const std::string& name, double value) {
+  if (std::isfinite(value)) values[name] = value;
+}
+
+void add_inputs(const std::vector<std::string>& columns, const Report& report,
+                PersistentState& state) {
+  THERMOCOMP_ENSURE(columns.size() == report.inputs.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const InputReport& input = report.inputs[i];
+    add(state.reference_degC, columns[i], input.reference_degC);
+    add(state.held_degC, columns[i], input.held_degC);
+    if (input.good || input.estimated) add(state.temp_degC, columns[i], input.temp_degC);
+  }
+}
+
+void add_axis(const std::string& name, const AxisReport& axis, PersistentState& state) {
+  add(state.offset_um, name, axis.offset_um);
+  for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
+    state.correction[std::string(name).append(".").append(key)] = value;
+}
+
+}  // namespace
+
+std::map<std::string, double> reference_numbers(const ThermalModel& model) {
+  std::map<std::string, double> numbers;
+  for (std::size_t i = 0; i < model.reference_degC.size(); ++i)
+    numbers[model.inputs[i]] = model.reference_degC[i];
+  return numbers;
+}
+
+PersistentState make_persistent_state(const EstimatorConfig& config, const ThermalModel& model,
+                                      const Report& report) {
+  PersistentState state;
+  state.enabled = report.enabled;
+  state.model_reference_degC = reference_numbers(model);
+  add_inputs(model.temperature_columns(), report, state);
+  const std::vector<std::string> signals = model.signal_columns();
+  THERMOCOMP_ENSURE(signals.size() == report.signals.size());
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    add(state.reference_signals, signals[i], report.signals[i].reference);
+    add(state.held_signals, signals[i], report.signals[i].held);
+  }
+  THERMOCOMP_ENSURE(config.axes.size() == report.axes.size());
+  for (std::size_t i = 0; i < report.axes.size(); ++i)
+    add_axis(config.axes[i].name, report.axes[i], state);
+  return state;
+}
+
+bool must_be_saved(const PersistentState& now, const PersistentState& saved) {
+  return now.enabled != saved.enabled || now.reference_degC != saved.reference_degC ||
+         now.model_reference_degC != saved.model_reference_degC ||
+         now.reference_signals != saved.reference_signals || now.held_degC != saved.held_degC ||
+         now.held_signals != saved.held_signals || now.correction != saved.correction;
+}
+
+}  // namespace thermocomp

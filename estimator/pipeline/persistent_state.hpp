@@ -1,0 +1,42 @@
+/// What of an estimator is to survive a restart, said once.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "estimator/estimator_config.hpp"
+#include "estimator/pipeline/report.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// What survives a restart by name (the state file).
+struct PersistentState {
+  bool enabled{true};
+  std::map<std::string, double> reference_degC;  ///< by temperature column
+  /// The numbers that the model file gave as reference at the time, by input; none: first sample.
+  /// Other numbers in the file at a restart are meant, and take the place of the stored ones.
+  std::map<std::string, double> model_reference_degC;
+  std::map<std::string, double> reference_signals;  ///< operating signals then, by column
+  std::map<std::string, double> offset_um;          ///< by axis, last sent
+  std::map<std::string, double> temp_degC;          ///< in use then, by temperature column
+  std::map<std::string, double> held_degC;          ///< InputReport::held_degC, by column
+  std::map<std::string, double> held_signals;       ///< SignalReport::held, by column
+  /// RunningCorrection::persistent(), "z.gain1" and so on.
+  std::map<std::string, double> correction;
+};
+
+/// The numbers that a model file gives as reference, by input.
+[[nodiscard]] std::map<std::string, double> reference_numbers(const ThermalModel& model);
+
+/// See Estimator::persistent_state().
+/// @param report  of the estimator with this configuration and model (sizes are checked)
+[[nodiscard]] PersistentState make_persistent_state(const EstimatorConfig& config,
+                                                    const ThermalModel& model,
+                                                    const Report& report);
+
+/// Whether something differs that must be written at once: switch, references, what was learned
+/// and held. Offsets and temperatures move all the time; they may wait.
+[[nodiscard]] bool must_be_saved(const PersistentState& now, const PersistentState& saved);
+
+}  // namespace thermocomp

@@ -1,0 +1,106 @@
+/// Temperatures, reference and signals to the displacement of each axis.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "estimator/estimator_config.hpp"
+#include "estimator/learning/probings.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/model/model_domain.hpp"
+#include "estimator/model/outside_share.hpp"
+#include "estimator/pipeline/certainty.hpp"
+#include "estimator/sensing/lost_blocks.hpp"
+#include "estimator/state_archive.hpp"
+#include "estimator/step_values.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// displacement of an axis = share (model now - model at the reference state) + correction,
+///
+/// share: what is believed of the model outside of its domain (outside_domain = "shrink"), else 1.
+/// What was learned by probing stays believed: it is the model that left its domain.
+class Prediction {
+ public:
+  struct State {
+    bool zero_known{false};
+    std::vector<double> model_um;  ///< of the outputs, as the model says
+    std::vector<double> zero_um;   ///< of the outputs: the model at the reference state
+  };
+
+  /// @param axis_output  axis -> output of the model
+  /// @throws InvalidValue when the model's parts do not fit each other
+  Prediction(const EstimatorConfig& config, const ThermalModel& model,
+             const std::vector<std::size_t>& axis_output);
+
+  /// @param lost      stepped with `temps`
+  /// @param learned   stepped here, where there is something to correct
+  [[nodiscard]] Displacement step(nanoseconds now, const Temperatures& temps,
+                                  const ReferenceState& reference, const Signals& signals,
+                                  const LostBlocks& lost, Probings& learned) noexcept;
+  /// A new reference: lags start anew.
+  void restart() noexcept;
+
+  /// Of an output, since the reference; NaN before the first.
+  [[nodiscard]] double output_um(std::size_t output) const noexcept {
+    return state_.model_um[output] - state_.zero_um[output];
+  }
+  /// Of an axis by the model alone.
+  [[nodiscard]] double model_um(std::size_t axis) const noexcept {
+    return output_um(axis_output_[axis]);
+  }
+  [[nodiscard]] double axis_um(std::size_t axis, const Probings& learned) const noexcept {
+    return believed_share() * model_um(axis) + learned.correction_um(axis);
+  }
+  [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {
+    return certainty_.offset_sd_um(axis);
+  }
+  /// What the model says of itself, standard deviation [um]; NaN: it says nothing.
+  [[nodiscard]] double claimed_sd_um(std::size_t axis) const noexcept {
+    return domain_ ? domain_->sd_um(axis_output_[axis]) : not_a_number;
+  }
+  [[nodiscard]] const std::optional<ModelDomain>& domain() const noexcept { return domain_; }
+  [[nodiscard]] double outside_share_24h() const noexcept { return outside_share_.share(); }
+  /// As of this step, for whoever goes on from the state of its lags.
+  [[nodiscard]] const DisplacementModel& model() const noexcept { return model_; }
+
+  /// How the terms of another one become those of this one.
+  [[nodiscard]] std::vector<int> plan_terms(const Prediction& previous) const {
+    return model_.plan_terms(previous.model_);
+  }
+  [[nodiscard]] bool same_domain(const Prediction& previous) const {
+    return domain_ && previous.domain_ && domain_->alike(*previous.domain_);
+  }
+  /// After a reload: lags, domain and certainty go on; displacement is asked for anew.
+  void adopt(const Prediction& previous, const std::vector<int>& terms, bool domain) noexcept;
+  void visit_lags(StateArchive& archive) { archive(model_); }
+  void visit_domain(StateArchive& archive);
+  void visit_state(StateArchive& archive) {
+    auto& [zero_known, model_um, zero_um] = state_;
+    archive(zero_known, model_um, zero_um);
+  }
+  void visit_certainty(StateArchive& archive) { archive(certainty_); }
+
+ private:
+  void predict(nanoseconds now, const Temperatures& temps, const ReferenceState& reference,
+               const Signals& signals) noexcept;
+  [[nodiscard]] bool outside() const noexcept { return domain_ && domain_->outside(); }
+  [[nodiscard]] double believed_share() const noexcept {
+    return policy_ == OutsidePolicy::shrink && domain_ ? domain_->believed_share() : 1.0;
+  }
+
+  const OutsidePolicy policy_;
+  const std::vector<std::size_t> axis_output_;
+
+  DisplacementModel model_;
+  DisplacementModel at_reference_;     ///< the same model, only ever asked for the zero
+  std::optional<ModelDomain> domain_;  ///< of a model that says what it was made from
+  OutsideShare outside_share_;
+  Certainty certainty_;
+  State state_;
+  std::vector<double> axis_um_;
+};
+
+}  // namespace thermocomp

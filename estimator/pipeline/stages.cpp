@@ -1,0 +1,121 @@
+#include "estimator/pipeline/stages.hpp"
+
+#include "estimator/checks.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "estimator/name_index.hpp"
+#include "estimator/pipeline/reasons.hpp"
+#include "estimator/temperature_range.hpp"
+
+namespace thermocomp {
+namespace {
+
+const EstimatorConfig& checked(const EstimatorConfig& config, const ThermalModel& model) {
+  config.compensation.validate();
+  check_reference(config, model);
+  // One that is broken is refused before a stage reads its rows.
+  [[maybe_unused]] const DisplacementModel whole{model};
+  return config;
+}
+
+std::vector<std::size_t> outputs_of_axes(const EstimatorConfig& config, const ThermalModel& model) {
+  std::vector<std::size_t> outputs;
+  for (const AxisConfig& axis : config.axes)
+    outputs.push_back(
+        index_of(model.outputs, axis.output, "axis.output", "is not an output of the model"));
+  return outputs;
+}
+
+std::vector<std::string> axis_names(const EstimatorConfig& config) {
+  std::vector<std::string> names;
+  for (const AxisConfig& axis : config.axes) names.push_back(axis.name);
+  return names;
+}
+
+}  // namespace
+
+Stages::Stages(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model)
+    : config(checked(estimator_config, thermal_model)),
+      model(thermal_model),
+      axis_output(outputs_of_axes(config, model)),
+      signals(config, model),
+      sensing(config, model),
+      reference(model),
+      learned(config, model, axis_output),
+      prediction(config, model, axis_output),
+      mode(config.compensation),
+      cycle_update(config, model, axis_output),
+      targets(config),
+      axes(config) {}
+
+void Stages::step(nanoseconds now, std::span<const Reading> readings,
+                  const ControllerState& controller, OffsetCommand& command) noexcept {
+  THERMOCOMP_ENSURE(!record.stepped || now >= record.now);
+  StepTime time{now, 0.0, !record.stepped};
+  if (record.stepped) time.dt_s = 1e-9 * static_cast<double>((now - record.now).count());
+
+  const Signals told = signals.step(now, controller);
+  const Temperatures temps = sensing.step(now, readings);
+  const ReferenceState straight = reference.step(temps, told);
+  const Displacement displacement =
+      prediction.step(now, temps, straight, told, sensing.lost(), learned);
+  const Mode what =
+      mode.step({time, displacement.known, told.online, axes.synced(), told.disable >= 0.5});
+  const std::span<const double> compensated_um =
+      cycle_update.step(now, displacement, what == Mode::compensating, temps, straight, told,
+                        prediction.model(), learned);
+  const Targets where = targets.step(what, compensated_um, displacement, told);
+  axes.step(time, where, told, controller, command);
+
+  record = {record.cycle + 1,
+            true,
+            now,
+            time.dt_s,
+            displacement.known,
+            reasons_of(told, straight, displacement, mode.state(), where, axes)};
+}
+
+void Stages::plan_adoption(const Stages& previous) {
+  sensing.plan_adoption(previous.sensing);
+  plan.columns = plan_names(model.temperature_columns(), previous.model.temperature_columns());
+  plan.signals = plan_names(model.signal_columns(), previous.model.signal_columns());
+  plan.axes = plan_names(axis_names(config), axis_names(previous.config));
+  plan.terms = prediction.plan_terms(previous.prediction);
+  plan.same_domain = prediction.same_domain(previous.prediction);
+}
+
+void Stages::adopt(const Stages& previous) noexcept {
+  signals.adopt(previous.signals, plan.signals);
+  sensing.adopt(previous.sensing);
+  reference.adopt(previous.reference, plan.columns, plan.signals);
+  learned.adopt(previous.learned, plan.axes);
+  prediction.adopt(previous.prediction, plan.terms, plan.same_domain);
+  mode.adopt(previous.mode);
+  cycle_update.adopt(previous.cycle_update, plan.columns, plan.signals, plan.axes, plan.terms);
+  axes.adopt(previous.axes, plan.axes);
+  record = previous.record;
+  // Nothing of this model has been asked yet.
+  record.displacement_known = false;
+  record.reasons = 0;
+}
+
+/// The order is that of the histories that are there already: `replay` loads them.
+void Stages::visit_state(StateArchive& archive) {
+  auto& [cycle, stepped, now, dt_s, displacement_known, reasons] = record;
+  archive(sensing);
+  prediction.visit_lags(archive);
+  archive(axes);
+  learned.visit_learned(archive);
+  prediction.visit_domain(archive);
+  archive(cycle, stepped, now, dt_s);
+  signals.visit_told(archive);
+  reference.visit_temperatures(archive);
+  signals.visit_of_model(archive);
+  reference.visit_signals(archive);
+  archive(prediction);
+  learned.visit_measured(archive);
+  prediction.visit_certainty(archive);
+  archive(cycle_update, displacement_known, mode, reasons);
+  cycle_update.visit_cycles(archive);
+}
+
+}  // namespace thermocomp

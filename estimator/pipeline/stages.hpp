@@ -1,0 +1,72 @@
+/// The makers of the values of a step, one after the other.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "estimator/axes/axis_bank.hpp"
+#include "estimator/estimator_config.hpp"
+#include "estimator/learning/cycle_update.hpp"
+#include "estimator/learning/probings.hpp"
+#include "estimator/pipeline/mode_decision.hpp"
+#include "estimator/pipeline/prediction.hpp"
+#include "estimator/pipeline/reference.hpp"
+#include "estimator/pipeline/signal_intake.hpp"
+#include "estimator/pipeline/target_rule.hpp"
+#include "estimator/sensing/sensing.hpp"
+#include "estimator/state_archive.hpp"
+#include "estimator/step_values.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// Time of the steps, and what the last one came to.
+struct StepRecord {
+  std::uint64_t cycle{0};
+  bool stepped{false};
+  nanoseconds now{};
+  double dt_s{0.0};
+  bool displacement_known{false};
+  std::uint32_t reasons{0};
+};
+
+/// How a reload takes over: the previous one's index for each of ours, or -1.
+struct AdoptionPlan {
+  std::vector<int> columns;
+  std::vector<int> signals;
+  std::vector<int> axes;
+  std::vector<int> terms;
+  bool same_domain{false};
+};
+
+/// In the order in which a step goes through them; each knows only what it is handed.
+struct Stages {
+  /// @throws InvalidValue when configuration and model do not fit each other
+  Stages(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model);
+
+  void step(nanoseconds now, std::span<const Reading> readings, const ControllerState& controller,
+            OffsetCommand& command) noexcept;
+
+  void plan_adoption(const Stages& previous);
+  void adopt(const Stages& previous) noexcept;
+  void visit_state(StateArchive& archive);
+
+  const EstimatorConfig config;
+  const ThermalModel model;
+  const std::vector<std::size_t> axis_output;  ///< axis -> output of the model
+
+  SignalIntake signals;
+  Sensing sensing;
+  Reference reference;
+  Probings learned;
+  Prediction prediction;
+  ModeDecision mode;
+  CycleUpdate cycle_update;
+  TargetRule targets;
+  AxisBank axes;
+  StepRecord record;
+  AdoptionPlan plan;
+};
+
+}  // namespace thermocomp

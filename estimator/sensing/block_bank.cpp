@@ -1,0 +1,183 @@
+#include "estimator/sensing/block_bank.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr int no_sensor = -1;
+constexpr int unknown_sensor = -2;  ///< one that the previous bank did not have
+
+bool same(const SmoothingConfig& a, const SmoothingConfig& b) {
+  return a.form == b.form && a.history == b.history && a.period_s == b.period_s &&
+         a.samples == b.samples && a.half_width_K == b.half_width_K && a.outage_s == b.outage_s;
+}
+
+}  // namespace
+
+BlockBank::Sensor::Sensor(const SensorConfig& sensor_config)
+    : screening(sensor_config.screening),
+      smoother(sensor_config.smoothing),
+      reference(sensor_config.reference_sensor ? static_cast<int>(*sensor_config.reference_sensor)
+                                               : no_sensor),
+      config(sensor_config) {}
+
+BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns) {
+  for (const SensorConfig& sensor : config.sensors) {
+    if (sensor.reference_sensor && *sensor.reference_sensor >= config.sensors.size())
+      throw InvalidValue("sensor[" + sensor.name + "].reference_sensor",
+                         std::to_string(*sensor.reference_sensor), "must be the index of a sensor");
+    sensors_.emplace_back(sensor);
+  }
+  for (const std::string& column : columns) {
+    const auto block = std::find_if(config.blocks.begin(), config.blocks.end(),
+                                    [&](const BlockConfig& each) { return each.input == column; });
+    if (block == config.blocks.end())
+      throw InvalidValue("model.inputs", column, "no [[block]] has this input");
+    if (block->sensors.empty())
+      throw InvalidValue("block[" + block->name + "].sensors", "[]", "must name a sensor");
+    for (const std::size_t index : block->sensors)
+      if (index >= sensors_.size())
+        throw InvalidValue("block[" + block->name + "].sensors", std::to_string(index),
+                           "must be the index of a sensor");
+    blocks_.push_back({block->sensors, std::vector<double>(block->sensors.size(), 0.0)});
+  }
+  values_K_.assign(sensors_.size(), not_a_number);
+  temps_degC_.assign(columns.size(), not_a_number);
+  good_.assign(columns.size(), 0);
+}
+
+bool BlockBank::step(nanoseconds now, std::span<const Reading> readings) noexcept {
+  THERMOCOMP_ENSURE(readings.size() == sensors_.size());
+  now_ = now;
+  // All are looked at before any is smoothed: a difference needs its reference of this very cycle.
+  for (std::size_t i = 0; i < sensors_.size(); ++i) look_at(sensors_[i], now, readings[i]);
+  for (std::size_t i = 0; i < sensors_.size(); ++i) values_K_[i] = smooth(sensors_[i], now);
+  bool all_good = true;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    good_[i] = update(blocks_[i], temps_degC_[i]) ? 1 : 0;
+    all_good = all_good && good_[i] != 0;
+  }
+  return all_good;
+}
+
+void BlockBank::look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept {
+  sensor.fresh = sensor.screening.look(now, reading);
+  sensor.raw_degC = reading.temp_degC;
+  sensor.fault = sensor.screening.fault(now);
+}
+
+double BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
+  double reference_degC = 0.0;
+  bool usable = sensor.screening.usable(now);
+  if (sensor.reference != no_sensor) {
+    const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
+    usable = usable && reference.usable(now);
+    reference_degC = reference.good_degC();
+  }
+  if (sensor.fresh && usable)
+    sensor.smoother.add(
+        {sensor.screening.good_at(), sensor.screening.good_degC() - reference_degC});
+  return usable && sensor.smoother.has_value() ? sensor.smoother.value_K() : not_a_number;
+}
+
+bool BlockBank::update(Block& block, double& temp_degC) noexcept {
+  double sum_degC = 0.0;
+  for (const std::size_t sensor : block.sensors) sum_degC += values_K_[sensor];
+  if (std::isnan(sum_degC)) return update_without_the_missing(block, temp_degC);
+  temp_degC = sum_degC / static_cast<double>(block.sensors.size());
+  for (std::size_t i = 0; i < block.sensors.size(); ++i)
+    block.deviation_K[i] = values_K_[block.sensors[i]] - temp_degC;
+  return true;
+}
+
+bool BlockBank::update_without_the_missing(const Block& block, double& temp_degC) const noexcept {
+  double sum_degC = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < block.sensors.size(); ++i) {
+    const double value_K = values_K_[block.sensors[i]];
+    if (std::isnan(value_K)) continue;
+    sum_degC += value_K - block.deviation_K[i];
+    ++count;
+  }
+  if (count > 0) temp_degC = sum_degC / static_cast<double>(count);
+  return count > 0;
+}
+
+void BlockBank::report(std::span<SensorReport> sensors) const noexcept {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    const Sensor& sensor = sensors_[i];
+    sensors[i] = {sensor.raw_degC,
+                  sensor.smoother.has_value() ? sensor.smoother.value_K() : not_a_number,
+                  sensor.screening.good_at(),
+                  sensor.fault,
+                  sensor.smoother.clipped_in_a_row(),
+                  sensor.smoother.clipped(),
+                  sensor.screening.rejected()};
+  }
+}
+
+void BlockBank::visit_state(StateArchive& archive) {
+  for (Sensor& sensor : sensors_) archive(sensor);
+  for (Block& block : blocks_) archive(block.deviation_K);
+  archive(temps_degC_, good_, now_);
+}
+
+void BlockBank::plan_adoption(const BlockBank& previous) {
+  sensor_plan_.clear();
+  for (const Sensor& sensor : sensors_) {
+    const auto found =
+        std::find_if(previous.sensors_.begin(), previous.sensors_.end(),
+                     [&](const Sensor& each) { return each.config.name == sensor.config.name; });
+    sensor_plan_.push_back(found == previous.sensors_.end()
+                               ? -1
+                               : static_cast<int>(found - previous.sensors_.begin()));
+  }
+  block_plan_.clear();
+  for (const Block& block : blocks_) {
+    const auto found =
+        std::find_if(previous.blocks_.begin(), previous.blocks_.end(), [&](const Block& each) {
+          // The same sensors by name: a new file may number them anew.
+          return std::equal(block.sensors.begin(), block.sensors.end(), each.sensors.begin(),
+                            each.sensors.end(), [&](std::size_t ours, std::size_t theirs) {
+                              return sensor_plan_[ours] == static_cast<int>(theirs);
+                            });
+        });
+    block_plan_.push_back(
+        found == previous.blocks_.end() ? -1 : static_cast<int>(found - previous.blocks_.begin()));
+  }
+}
+
+int BlockBank::previous_reference(const Sensor& sensor) const noexcept {
+  if (sensor.reference == no_sensor) return no_sensor;
+  const int previous = sensor_plan_[static_cast<std::size_t>(sensor.reference)];
+  return previous < 0 ? unknown_sensor : previous;
+}
+
+void BlockBank::adopt(const BlockBank& previous) noexcept {
+  now_ = previous.now_;
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    if (sensor_plan_[i] < 0) continue;
+    const Sensor& other = previous.sensors_[static_cast<std::size_t>(sensor_plan_[i])];
+    Sensor& sensor = sensors_[i];
+    sensor.screening.adopt(other.screening);
+    sensor.raw_degC = other.raw_degC;
+    sensor.fault = other.fault;
+    if (!same(sensor.config.smoothing, other.config.smoothing) ||
+        previous_reference(sensor) != other.reference)
+      continue;
+    sensor.smoother = other.smoother;  // same sizes: copies into what is there
+  }
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (block_plan_[i] < 0) continue;
+    const auto other = static_cast<std::size_t>(block_plan_[i]);
+    blocks_[i].deviation_K = previous.blocks_[other].deviation_K;
+    temps_degC_[i] = previous.temps_degC_[other];
+    good_[i] = previous.good_[other];
+  }
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,76 @@
+/// Sensors to block temperatures: screening, smoothing, differences, the mean of a block's sensors.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/sensing/screening.hpp"
+#include "estimator/sensing/sensor_report.hpp"
+#include "estimator/sensing/smoothing.hpp"
+
+namespace thermocomp {
+
+/// All sensors and the blocks they stand for, in the order of the model's temperature columns.
+class BlockBank {
+ public:
+  /// @throws InvalidValue when a column has no block or a block no sensor
+  BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns);
+
+  /// Takes in the newest readings. @return whether every column has a temperature in use
+  bool step(nanoseconds now, std::span<const Reading> readings) noexcept;
+
+  /// Shape (columns): the blocks' temperatures; the last known one where not good, NaN before the
+  /// first.
+  [[nodiscard]] std::span<const double> temps_degC() const noexcept { return temps_degC_; }
+  [[nodiscard]] bool good(std::size_t column) const noexcept { return good_[column] != 0; }
+  [[nodiscard]] std::span<const std::uint8_t> good() const noexcept { return good_; }
+
+  void report(std::span<SensorReport> sensors) const noexcept;
+  void visit_state(StateArchive& archive);
+
+  void plan_adoption(const BlockBank& previous);
+  void adopt(const BlockBank& previous) noexcept;
+
+ private:
+  struct Sensor {
+    Sensor(const SensorConfig& sensor_config);
+    Screening screening;
+    Smoother smoother;
+    int reference;  ///< index of the reference sensor, or no_sensor
+    double raw_degC{not_a_number};
+    Fault fault{Fault::never_read};
+    bool fresh{false};    ///< the newest reading is a new and good one
+    SensorConfig config;  ///< last: a step does not touch it
+    void visit_state(StateArchive& archive) {
+      archive(screening, smoother, raw_degC, fault, fresh);
+    }
+  };
+  struct Block {
+    std::vector<std::size_t> sensors;
+    /// What each sensor differs from the block's mean, kept from when all were good: a sensor that
+    /// drops out does not shift the mean.
+    std::vector<double> deviation_K;
+  };
+
+  static void look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept;
+  /// @return the sensor's value for its block; NaN where there is none to be used
+  [[nodiscard]] double smooth(Sensor& sensor, nanoseconds now) noexcept;
+  /// Index of the reference sensor in the previous bank, or no_sensor.
+  [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
+  [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
+  /// From those that are left, less what each deviated by while all were there. @return any left
+  [[nodiscard]] bool update_without_the_missing(const Block& block,
+                                                double& temp_degC) const noexcept;
+
+  std::vector<Sensor> sensors_;
+  std::vector<double> values_K_;  ///< of this step, one a sensor; NaN: not to be used
+  std::vector<Block> blocks_;     ///< one a column
+  std::vector<double> temps_degC_;
+  std::vector<std::uint8_t> good_;
+  nanoseconds now_{};
+  std::vector<int> sensor_plan_;  ///< index of the previous bank's sensor, -1: none
+  std::vector<int> block_plan_;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,66 @@
+#include "estimator/sensing/sensing.hpp"
+
+#include <algorithm>
+
+#include "estimator/name_index.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// The model as LostBlocks is to see it.
+ThermalModel estimating_model(const ThermalModel& model, const EstimatorConfig& config) {
+  ThermalModel seen = model;
+  if (!config.compensation.estimate_lost_blocks) seen.covariance_K2.clear();
+  return seen;
+}
+
+/// The longest that a working sensor may take until its first reading.
+nanoseconds settling_time(const EstimatorConfig& config) {
+  double longest_s = 0.0;
+  for (const SensorConfig& sensor : config.sensors)
+    longest_s = std::max(longest_s, sensor.screening.stale_after_s);
+  return std::chrono::duration_cast<nanoseconds>(seconds_d(longest_s));
+}
+
+}  // namespace
+
+Sensing::Sensing(const EstimatorConfig& config, const ThermalModel& model)
+    : columns_(model.temperature_columns()),
+      blocks_(config, columns_),
+      lost_(estimating_model(model, config), settling_time(config)) {}
+
+Temperatures Sensing::step(nanoseconds now, std::span<const Reading> readings) noexcept {
+  Temperatures temps;
+  temps.all_good = blocks_.step(now, readings);
+  lost_.step(now, blocks_.temps_degC(), blocks_.good());
+  temps.measured_degC = blocks_.temps_degC();
+  temps.good = blocks_.good();
+  temps.estimated_degC = lost_.temps_degC();
+  temps.complete = lost_.complete();
+  return temps;
+}
+
+bool Sensing::all_good() const noexcept {
+  const auto good = blocks_.good();
+  return std::all_of(good.begin(), good.end(), [](std::uint8_t each) { return each != 0; });
+}
+
+void Sensing::restore(const std::map<std::string, double>& temps_degC) {
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    double temp_degC = not_a_number;
+    take_if_finite(temps_degC, columns_[i], temp_degC);
+    lost_.restore(i, temp_degC);
+  }
+}
+
+void Sensing::plan_adoption(const Sensing& previous) {
+  blocks_.plan_adoption(previous.blocks_);
+  lost_.plan_adoption(previous.lost_);
+}
+
+void Sensing::adopt(const Sensing& previous) noexcept {
+  blocks_.adopt(previous.blocks_);
+  lost_.adopt(previous.lost_);
+}
+
+}  // namespace thermocomp

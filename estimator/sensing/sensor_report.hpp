@@ -1,0 +1,20 @@
+/// What there is to know about one sensor after a step.
+#pragma once
+
+#include <cstdint>
+
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+struct SensorReport {
+  double raw_degC{not_a_number};       ///< as the driver gave it
+  double smoothed_degC{not_a_number};  ///< what the block gets; a difference where configured
+  nanoseconds taken_at{};
+  Fault fault{Fault::never_read};     ///< after screening
+  std::uint32_t clipped_in_a_row{0};  ///< smoothing clipped so many values running
+  std::uint64_t clipped{0};
+  std::uint64_t rejected{0};  ///< readings refused by screening since the start
+};
+
+}  // namespace thermocomp

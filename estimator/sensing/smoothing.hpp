@@ -1,0 +1,152 @@
+/// Regression-line expected-band clipper: a value is believed only near where the recent past says
+/// it should be. Source: JPH0736976B2, claims 1 (sliding line) and 2 (line of lines).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/estimator_config.hpp"
+#include "estimator/sensing/line_fit.hpp"
+#include "estimator/state_archive.hpp"
+
+namespace thermocomp {
+
+/// The last few samples, oldest first. Each is stored twice, n apart in a ring of 2n, so that the
+/// last n always lie in a row and nothing is ever moved.
+class SampleHistory {
+ public:
+  explicit SampleHistory(std::size_t capacity) : capacity_(capacity), samples_(2 * capacity) {}
+  void clear() noexcept { size_ = 0; }
+  /// Drops the oldest sample when full.
+  void push(const Sample& sample) noexcept {
+    samples_[next_] = sample;
+    samples_[next_ + capacity_] = sample;
+    next_ = next_ + 1 == capacity_ ? 0 : next_ + 1;
+    if (size_ < capacity_) ++size_;
+  }
+  [[nodiscard]] bool full() const noexcept { return size_ == capacity_; }
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  /// @pre not empty
+  [[nodiscard]] const Sample& newest() const noexcept { return in_a_row().back(); }
+  [[nodiscard]] Line line() const noexcept { return fit_line(in_a_row()); }
+  /// Robust spread of the samples around `line`: 1.4826 times the median absolute residual [K].
+  [[nodiscard]] double spread_K(const Line& line) const noexcept;
+  void visit_state(StateArchive& archive) { archive(size_, next_, samples_); }
+
+ private:
+  [[nodiscard]] std::span<const Sample> in_a_row() const noexcept {
+    return {samples_.data() + (next_ + capacity_ - size_), size_};
+  }
+
+  std::size_t capacity_;
+  std::size_t size_{0};
+  std::size_t next_{0};  ///< where the next sample goes, below capacity_
+  std::vector<Sample> samples_;
+};
+
+/// Form A. The line through the last n values, extended to the next one's time.
+class SlidingLine {
+ public:
+  explicit SlidingLine(std::size_t samples) : history_(samples) {}
+  [[nodiscard]] bool ready() const noexcept { return history_.full(); }
+  [[nodiscard]] Line expected() const noexcept { return history_.line(); }
+  [[nodiscard]] double spread_K() const noexcept { return history_.spread_K(history_.line()); }
+  void keep(const Sample& sample) noexcept { history_.push(sample); }
+  void restart() noexcept { history_.clear(); }
+  void visit_state(StateArchive& archive) { archive(history_); }
+
+ private:
+  SampleHistory history_;
+};
+
+/// Form B. Three blocks of n values with slopes C (oldest), B, A: the coming block's line starts at
+/// the newest block's fitted value at its last sample and has slope D = 3A - 3B + C.
+class LineOfLines {
+ public:
+  explicit LineOfLines(std::size_t samples);
+  [[nodiscard]] bool ready() const noexcept { return blocks_ == 3; }
+  [[nodiscard]] Line expected() const noexcept { return expected_; }
+  [[nodiscard]] double spread_K() const noexcept { return newest_spread_K_; }
+  void keep(const Sample& sample) noexcept;
+  void restart() noexcept;
+  void visit_state(StateArchive& archive) {
+    archive(coming_, blocks_, slopes_K_per_s_, newest_spread_K_, expected_);
+  }
+
+ private:
+  SampleHistory coming_;
+  std::size_t blocks_{0};                   ///< complete blocks so far, at most 3
+  std::array<double, 3> slopes_K_per_s_{};  ///< C, B, A
+  double newest_spread_K_{0.0};
+  Line expected_;
+};
+
+/// One sensor's smoothing: picks one value a period, clips it into the expected band, keeps the
+/// history as configured, restarts after an outage.
+class Smoother {
+ public:
+  explicit Smoother(const SmoothingConfig& config);
+
+  /// A new good value. Takes it when its period has come (always with period 0).
+  void add(const Sample& sample) noexcept {
+    if (form_ == SmoothingForm::off) {
+      value_K_ = sample.value_K;
+      has_value_ = true;
+      return;
+    }
+    if (has_value_ && sample.at - taken_at_ > outage_) restart();
+    if (due(sample.at)) take(sample);
+  }
+
+  [[nodiscard]] bool has_value() const noexcept { return has_value_; }
+  [[nodiscard]] double value_K() const noexcept { return value_K_; }
+  [[nodiscard]] std::uint64_t clipped() const noexcept { return clipped_; }
+  [[nodiscard]] std::uint32_t clipped_in_a_row() const noexcept { return clipped_in_a_row_; }
+  void visit_state(StateArchive& archive);
+
+  /// How many values in a row must be far outside and agree - beside each other, or on one line -
+  /// before they become the new history.
+  static constexpr std::size_t agreeing_values = 3;
+  /// Far outside: this many times the half-width or the robust spread, whichever is larger.
+  static constexpr double far_factor = 3.0;
+
+ private:
+  [[nodiscard]] bool due(nanoseconds at) noexcept {
+    if (!has_value_ || period_ <= nanoseconds{0}) {
+      due_at_ = at + period_;
+      return true;
+    }
+    if (at < due_at_) return false;
+    // Whole periods, so that late samples do not shift the grid.
+    due_at_ += period_ * (1 + (at - due_at_) / period_);
+    return true;
+  }
+  void take(const Sample& sample) noexcept;
+  template <class Form>
+  void take_into(Form& form, const Sample& sample) noexcept;
+  [[nodiscard]] static bool agree(const std::array<Sample, agreeing_values>& far,
+                                  double within_K) noexcept;
+  template <class Form>
+  void keep_screened(Form& form, const Sample& sample, double distance_K) noexcept;
+  void restart() noexcept;
+
+  SmoothingForm form_;
+  bool screened_;
+  nanoseconds period_;
+  nanoseconds outage_;
+  double half_width_K_;
+  SlidingLine sliding_line_;
+  LineOfLines line_of_lines_;
+
+  bool has_value_{false};
+  double value_K_{0.0};
+  nanoseconds taken_at_{};
+  nanoseconds due_at_{};
+  std::uint64_t clipped_{0};
+  std::uint32_t clipped_in_a_row_{0};
+  std::array<Sample, agreeing_values> far_{};  ///< far values waiting to be believed
+  std::size_t far_count_{0};
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,56 @@
+/// What is worth waking somebody for, with hysteresis: raised when it has been wrong for a while,
+/// cleared when it has been right for a while. Pure; time is an argument.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "gateway/feed/snapshot.hpp"
+
+namespace thermocomp::gateway {
+
+/// One thing that may be wrong now.
+struct AlarmCondition {
+  std::string name;    ///< "compensation", "sensor/bed_front", "suspected/bed_front", "bound/z",
+                       ///< "domain", "bus/cabinet", "daemon"
+  std::string text;    ///< what is wrong
+  std::string remedy;  ///< what to do; empty: nothing that is known
+};
+
+/// What is wrong in a snapshot. While the daemon is away nothing is known of the rest.
+[[nodiscard]] std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot);
+
+struct Alarm {
+  AlarmCondition condition;
+  double since_s{0.0};  ///< of the clock of update()
+};
+struct AlarmChange {
+  bool is_raised{false};
+  Alarm alarm;
+};
+
+class AlarmWatch {
+ public:
+  AlarmWatch(double raise_after_s, double clear_after_s)
+      : raise_after_s_(raise_after_s), clear_after_s_(clear_after_s) {}
+
+  /// @param is_known  false: only what is listed is known; the rest stays as it is
+  /// @return what was raised or cleared by this
+  std::vector<AlarmChange> update(double now_s, const std::vector<AlarmCondition>& wrong,
+                                  bool is_known);
+  [[nodiscard]] std::vector<Alarm> active() const;
+
+ private:
+  struct Place {
+    Alarm alarm;
+    bool is_wrong{false};
+    bool is_raised{false};
+    double turned_s{0.0};  ///< when is_wrong changed last
+  };
+  double raise_after_s_;
+  double clear_after_s_;
+  std::map<std::string, Place> places_;  ///< by name; those that are right and cleared are dropped
+};
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,21 @@
+/// The command line of `thermocomp-gateway`; `--help` and manual page are made from it.
+#pragma once
+
+#include <string>
+
+namespace CLI {  // NOLINT(readability-identifier-naming): the name is that of CLI11
+class App;
+}
+
+namespace thermocomp::gateway {
+
+struct GatewayOptions {
+  std::string config_file{"/etc/thermocomp/gateway.toml"};
+  std::string password_user;  ///< --password-line; empty: not asked for
+  bool device_file{false};    ///< --device-file
+};
+
+/// @param options  outlives the parsing; its values are the defaults
+void declare_gateway_command_line(CLI::App& app, GatewayOptions& options);
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,14 @@
+/// The answer to /api/history.
+#pragma once
+
+#include "gateway/feed/daemon_feed.hpp"
+#include "gateway/http/request_rules.hpp"
+#include "gateway/http/work_desk.hpp"
+
+namespace thermocomp::gateway {
+
+/// {"from_s", "to_s", "span_s", "columns": {"time_s": [...], "bed_degC": [...], "z_offset_um":
+/// [...], "z_displacement_um": [...]}, "chunks", "chunks_read", "damage": [...]}; null: not known.
+[[nodiscard]] JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request);
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,41 @@
+/// The gateway's door for browsers, Prometheus and programs: page, /metrics, /api.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "gateway/feed/daemon_feed.hpp"
+#include "gateway/http/page_files.hpp"
+#include "gateway/settings/gateway_settings.hpp"
+#include "gateway/texts/metrics_text.hpp"
+
+namespace thermocomp::gateway {
+
+/// One thread of libmicrohttpd serves all connections. What a client may cost: `connections_max`
+/// connections, 16 kB of headers, 4 kB of body, 10 s without a byte, 15 s until its request is
+/// whole, however slowly it comes.
+class HttpServer {
+ public:
+  /// Fills in, for /metrics, what other parts of the gateway know; called on the server's thread.
+  using AddFigures = std::function<void(GatewayFigures&)>;
+
+  /// @throws std::runtime_error when it cannot listen, or certificate or key cannot be used
+  HttpServer(const GatewaySettings& settings, DaemonFeed& feed, const PageFiles& files,
+             AddFigures add_figures);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  void show(const SnapshotPointer& snapshot);  ///< to all pages
+  /// Ends connections that do not get on; called each second.
+  void end_slow_connections();
+  [[nodiscard]] std::uint16_t port() const noexcept;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace thermocomp::gateway

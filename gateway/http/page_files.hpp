@@ -1,0 +1,36 @@
+/// The files of the page, read once at the start: a request can name nothing else.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+
+namespace thermocomp::gateway {
+
+struct PageFile {
+  std::string type;  ///< of its content
+  std::string bytes;
+};
+
+class PageFiles {
+ public:
+  /// @param folder  of index.html, page.js, page.css and icon.svg
+  /// @param charts  of dygraph.min.js and dygraph.min.css; where they are missing the page has no
+  ///                charts, and says so
+  /// @throws std::runtime_error naming the file
+  PageFiles(const std::filesystem::path& folder, const std::filesystem::path& charts);
+
+  /// By the path of a request; nullptr: none.
+  [[nodiscard]] const PageFile* find(std::string_view path) const;
+
+ private:
+  std::map<std::string, PageFile, std::less<>> files_;
+};
+
+/// share/thermocomp/gateway beside the folder of the programs.
+[[nodiscard]] std::filesystem::path page_folder();
+/// Where Debian's libjs-dygraphs puts its files.
+[[nodiscard]] std::filesystem::path charts_folder();
+
+}  // namespace thermocomp::gateway

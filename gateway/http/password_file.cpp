@@ -1,0 +1,113 @@
+#include "gateway/http/password_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <crypt.h>
+#include <cstring>
+#include <memory>
+#include <openssl/crypto.h>
+#include <openssl/evp.h>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include <sys/random.h>
+
+#include "config/problems.hpp"
+#include "config/toml_reader.hpp"
+
+namespace thermocomp::gateway {
+namespace {
+
+constexpr std::size_t password_bytes_max = 256;
+
+bool is_user_name(const std::string& name) {
+  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
+    return c > ' ' && c < 127 && c != ':' && c != '#';
+  });
+}
+
+std::string random_bytes(std::size_t count) {
+  std::string bytes(count, '\0');
+  if (getrandom(bytes.data(), count, 0) != static_cast<ssize_t>(count))
+    throw std::runtime_error("the kernel gives no random numbers");
+  return bytes;
+}
+
+/// Empty where the library refuses.
+std::string crypted(const std::string& password, const std::string& setting) {
+  const auto work = std::make_unique<crypt_data>();
+  const char* made = crypt_r(password.c_str(), setting.c_str(), work.get());
+  return made != nullptr && made[0] != '*' ? made : "";
+}
+
+}  // namespace
+
+PasswordFile::PasswordFile(const std::filesystem::path& file) : key_(random_bytes(32)) {
+  std::vector<Problem> problems;
+  std::istringstream lines(read_text_file(file));
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    if (line.empty() || line.front() == '#') continue;
+    const std::size_t colon = line.find(':');
+    const std::string user = line.substr(0, colon);
+    const std::string hash = colon == std::string::npos ? "" : line.substr(colon + 1);
+    if (!is_user_name(user) || crypt_checksalt(hash.c_str()) != CRYPT_SALT_OK)
+      problems.push_back({file.string(), number, user, "",
+                          "must be user:hash as thermocomp-gateway --password-line prints it"});
+    else if (!hashes_.emplace(user, hash).second)
+      problems.push_back({file.string(), number, user, "", "is there twice"});
+  }
+  if (problems.empty() && hashes_.empty())
+    problems.push_back({file.string(), 0, "", "", "must have at least one line user:hash"});
+  if (!problems.empty()) throw ConfigurationError(problems);
+}
+
+std::string PasswordFile::digest(const std::string& user, const std::string& password) const {
+  const std::string text = key_ + user + '\n' + password;
+  std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
+  unsigned size = 0;
+  if (EVP_Digest(text.data(), text.size(), bytes.data(), &size, EVP_sha256(), nullptr) != 1)
+    throw std::runtime_error("SHA-256 is not to be had");
+  return {bytes.begin(), bytes.begin() + size};
+}
+
+PasswordFile::Answer PasswordFile::check(const std::string& user, const std::string& password,
+                                         Clock::time_point now) {
+  if (password.size() > password_bytes_max) return Answer::wrong;
+  const std::string seen = digest(user, password);
+  if (const auto right = right_.find(user);
+      right != right_.end() && CRYPTO_memcmp(right->second.data(), seen.data(), seen.size()) == 0)
+    return Answer::right;
+  const double passed_s = std::chrono::duration<double>(now - filled_at_).count();
+  tokens_ = std::min(looked_at_burst, tokens_ + std::max(0.0, passed_s) * looked_at_per_s);
+  filled_at_ = now;
+  if (!(tokens_ >= 1.0)) return Answer::too_many;
+  tokens_ -= 1.0;
+  // An unknown user takes as long as a known one.
+  const auto found = hashes_.find(user);
+  const std::string& hash = found != hashes_.end() ? found->second : hashes_.begin()->second;
+  const std::string made = crypted(password, hash);
+  const bool same =
+      made.size() == hash.size() && CRYPTO_memcmp(made.data(), hash.data(), hash.size()) == 0;
+  if (!same || found == hashes_.end()) return Answer::wrong;
+  right_[user] = seen;
+  return Answer::right;
+}
+
+std::string password_line(const std::string& user, const std::string& password) {
+  if (!is_user_name(user))
+    throw std::runtime_error("a user's name has letters, digits and signs other than : and #");
+  if (password.size() < 8 || password.size() > password_bytes_max)
+    throw std::runtime_error("a password has 8 to 256 characters");
+  const std::string salt = random_bytes(16);
+  std::array<char, CRYPT_GENSALT_OUTPUT_SIZE> setting{};
+  if (crypt_gensalt_rn("$y$", 0, salt.data(), static_cast<int>(salt.size()), setting.data(),
+                       static_cast<int>(setting.size())) == nullptr)
+    throw std::runtime_error("yescrypt is not to be had");
+  const std::string hash = crypted(password, setting.data());
+  if (hash.empty()) throw std::runtime_error("the password cannot be hashed");
+  return user + ":" + hash;
+}
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,43 @@
+/// Users of the page and their passwords, as crypt(5) hashes.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <string>
+
+namespace thermocomp::gateway {
+
+class PasswordFile {
+ public:
+  using Clock = std::chrono::steady_clock;
+  enum class Answer { right, wrong, too_many };
+
+  /// Lines `user:hash`; empty ones and those that begin with # are passed over.
+  /// @throws ConfigurationError naming file, line and rule
+  explicit PasswordFile(const std::filesystem::path& file);
+
+  /// A hash takes some hundredths of a second, on purpose. So what was right is remembered (as a
+  /// digest with a key of this process), and of what was not only so many a second are looked at:
+  /// who guesses neither gets far nor keeps anybody out who is in.
+  [[nodiscard]] Answer check(const std::string& user, const std::string& password,
+                             Clock::time_point now);
+  [[nodiscard]] bool knows(const std::string& user) const { return hashes_.count(user) != 0; }
+
+  static constexpr double looked_at_per_s = 4.0;
+  static constexpr double looked_at_burst = 8.0;
+
+ private:
+  [[nodiscard]] std::string digest(const std::string& user, const std::string& password) const;
+
+  std::map<std::string, std::string> hashes_;  ///< by user
+  std::map<std::string, std::string> right_;   ///< digest of what was right last, by user
+  std::string key_;                            ///< random
+  double tokens_{looked_at_burst};
+  Clock::time_point filled_at_{};
+};
+
+/// A line for the file. @throws std::runtime_error when the user's name or the password cannot be
+[[nodiscard]] std::string password_line(const std::string& user, const std::string& password);
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,64 @@
+#include "gateway/http/work_desk.hpp"
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace thermocomp::gateway {
+
+struct WorkDesk::Parts {
+  struct Job {
+    Work work;
+    Done done;
+  };
+  void run();
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::deque<Job> jobs;
+  bool stops{false};
+  std::thread thread;
+};
+
+void WorkDesk::Parts::run() {
+  for (;;) {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [this] { return stops || !jobs.empty(); });
+    if (jobs.empty()) return;
+    const Job job = std::move(jobs.front());
+    jobs.pop_front();
+    const bool refuses = stops;
+    lock.unlock();
+    constexpr unsigned unavailable = 503;
+    job.done(refuses ? JsonAnswer{unavailable, R"({"error":"the gateway stops"})"} : job.work());
+  }
+}
+
+WorkDesk::WorkDesk() : parts_(std::make_unique<Parts>()) {
+  parts_->thread = std::thread([this] { parts_->run(); });
+}
+
+WorkDesk::~WorkDesk() {
+  stop();
+}
+
+bool WorkDesk::ask(Work work, Done done) {
+  const std::lock_guard lock(parts_->mutex);
+  if (parts_->stops || parts_->jobs.size() >= waiting_max) return false;
+  parts_->jobs.push_back({std::move(work), std::move(done)});
+  parts_->changed.notify_one();
+  return true;
+}
+
+void WorkDesk::stop() noexcept {
+  {
+    const std::lock_guard lock(parts_->mutex);
+    parts_->stops = true;
+  }
+  parts_->changed.notify_all();
+  if (parts_->thread.joinable()) parts_->thread.join();
+}
+
+}  // namespace thermocomp::gateway

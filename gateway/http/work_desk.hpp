@@ -1,0 +1,37 @@
+/// Answers that take their time, made one after the other on a thread of its own: a long one makes
+/// no page wait for its live values.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace thermocomp::gateway {
+
+struct JsonAnswer {
+  unsigned status{200};
+  std::string text;
+};
+
+class WorkDesk {
+ public:
+  using Work = std::function<JsonAnswer()>;  ///< must not throw
+  using Done = std::function<void(JsonAnswer)>;
+  static constexpr std::size_t waiting_max = 16;
+
+  WorkDesk();
+  ~WorkDesk();  ///< those that wait are answered 503
+  WorkDesk(const WorkDesk&) = delete;
+  WorkDesk& operator=(const WorkDesk&) = delete;
+
+  /// `done` is called on the desk's thread. @return false: too many wait; nothing is called
+  [[nodiscard]] bool ask(Work work, Done done);
+  void stop() noexcept;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,223 @@
+#include "gateway/mqtt/mqtt_publisher.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <map>
+#include <mosquitto.h>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+
+#include "config/toml_reader.hpp"
+#include "gateway/mqtt/message_buffer.hpp"
+#include "gateway/texts/mqtt_texts.hpp"
+
+namespace thermocomp::gateway {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr int keepalive_s = 10;
+constexpr int quality = 1;
+constexpr int unacknowledged_max = 20;
+constexpr milliseconds again_after_min(1000);
+constexpr milliseconds again_after_max(30000);
+
+void require(int code, const std::string& what) {
+  if (code != MOSQ_ERR_SUCCESS) throw std::runtime_error(what + ": " + mosquitto_strerror(code));
+}
+
+const char* or_null(const std::string& text) {
+  return text.empty() ? nullptr : text.c_str();
+}
+
+std::string first_line(const std::filesystem::path& file) {
+  const std::string text = read_text_file(file);
+  return text.substr(0, text.find_first_of("\r\n"));
+}
+
+}  // namespace
+
+/// All calls of the library are made by one thread; others only reach the buffer.
+struct MqttPublisher::Parts {
+  explicit Parts(const GatewaySettings& settings_in);
+  ~Parts();
+
+  void set_up();
+  void run();
+  void send_waiting();
+  void say_goodbye();
+  void sleep(milliseconds time) const;
+
+  const GatewaySettings& settings;
+  mosquitto* client{nullptr};
+  std::thread thread;
+  std::atomic<bool> stops{false};
+  std::atomic<bool> is_connected{false};
+
+  mutable std::mutex mutex;  ///< of the next three
+  MessageBuffer buffer;
+  std::map<std::string, nlohmann::json> said;  ///< by topic, last state
+  double said_at_s{0.0};
+
+  // Only of the thread.
+  int unacknowledged{0};
+  milliseconds again_after{again_after_min};
+  std::string last_problem;
+};
+
+MqttPublisher::Parts::Parts(const GatewaySettings& settings_in)
+    : settings(settings_in), buffer(settings_in.mqtt.buffer_messages) {
+  mosquitto_lib_init();
+  client = mosquitto_new(settings.mqtt.client_id.c_str(), true, this);
+  if (client == nullptr) throw std::runtime_error("mqtt: no memory");
+  try {
+    set_up();
+  } catch (...) {
+    mosquitto_destroy(client);
+    mosquitto_lib_cleanup();
+    throw;
+  }
+}
+
+MqttPublisher::Parts::~Parts() {
+  stops = true;
+  if (thread.joinable()) thread.join();
+  mosquitto_destroy(client);
+  mosquitto_lib_cleanup();
+}
+
+void MqttPublisher::Parts::set_up() {
+  const MqttSettings& mqtt = settings.mqtt;
+  if (!mqtt.user.empty()) {
+    const std::string password = mqtt.password_file.empty() ? "" : first_line(mqtt.password_file);
+    require(mosquitto_username_pw_set(client, mqtt.user.c_str(), or_null(password)), "mqtt.user");
+  }
+  if (!mqtt.authority.empty()) {
+    const std::string certificate = mqtt.certificate.string();
+    const std::string key = mqtt.key.string();
+    require(mosquitto_tls_set(client, mqtt.authority.c_str(), nullptr, or_null(certificate),
+                              or_null(key), nullptr),
+            "mqtt.authority");
+  }
+  const std::string will = offline_payload();
+  require(mosquitto_will_set(client, topic_of(settings.machine, "status").c_str(),
+                             static_cast<int>(will.size()), will.data(), quality, true),
+          "mqtt: last will");
+  mosquitto_connect_callback_set(client, [](mosquitto*, void* self, int code) {
+    Parts& parts = *static_cast<Parts*>(self);
+    if (code != 0) {
+      parts.last_problem = mosquitto_connack_string(code);
+      return;
+    }
+    spdlog::info("mqtt: connected to {}", parts.settings.mqtt.host);
+    parts.again_after = again_after_min;
+    parts.is_connected = true;
+    const std::lock_guard lock(parts.mutex);
+    parts.buffer.repeat_newest();
+  });
+  mosquitto_publish_callback_set(
+      client, [](mosquitto*, void* self, int) { --static_cast<Parts*>(self)->unacknowledged; });
+}
+
+void MqttPublisher::Parts::sleep(milliseconds time) const {
+  constexpr milliseconds step(50);
+  const auto end = Clock::now() + time;
+  while (!stops && Clock::now() < end) std::this_thread::sleep_for(step);
+}
+
+void MqttPublisher::Parts::run() {
+  constexpr int wait_ms = 100;
+  int code = mosquitto_connect(client, settings.mqtt.host.c_str(), settings.mqtt.port, keepalive_s);
+  while (!stops) {
+    if (code == MOSQ_ERR_SUCCESS) code = mosquitto_loop(client, wait_ms, 1);
+    if (code == MOSQ_ERR_SUCCESS) {
+      if (is_connected) send_waiting();
+      continue;
+    }
+    const std::string problem =
+        last_problem.empty() ? mosquitto_strerror(code) : std::exchange(last_problem, "");
+    if (is_connected.exchange(false) || again_after == again_after_min)
+      spdlog::warn("mqtt: {} port {}: {}", settings.mqtt.host, settings.mqtt.port, problem);
+    sleep(again_after);
+    again_after = std::min(2 * again_after, again_after_max);
+    if (!stops) code = mosquitto_reconnect(client);
+  }
+  if (is_connected) say_goodbye();
+}
+
+/// Only so many at a time, so that the library's own queue stays small; it sends those again by
+/// itself when the connection is lost before they are acknowledged.
+void MqttPublisher::Parts::send_waiting() {
+  while (unacknowledged < unacknowledged_max) {
+    std::unique_lock lock(mutex);
+    const std::optional<Message> message = buffer.take();
+    lock.unlock();
+    if (!message) return;
+    const int code = mosquitto_publish(client, nullptr, message->topic.c_str(),
+                                       static_cast<int>(message->payload.size()),
+                                       message->payload.data(), quality, true);
+    if (code == MOSQ_ERR_SUCCESS || code == MOSQ_ERR_NO_CONN) ++unacknowledged;
+    if (code != MOSQ_ERR_SUCCESS) return;
+  }
+}
+
+void MqttPublisher::Parts::say_goodbye() {
+  const std::string offline = offline_payload();
+  const std::string topic = topic_of(settings.machine, "status");
+  ++unacknowledged;
+  mosquitto_publish(client, nullptr, topic.c_str(), static_cast<int>(offline.size()),
+                    offline.data(), quality, true);
+  constexpr int wait_ms = 50;
+  const auto end = Clock::now() + std::chrono::seconds(1);
+  while (unacknowledged > 0 && Clock::now() < end)
+    if (mosquitto_loop(client, wait_ms, 1) != MOSQ_ERR_SUCCESS) return;
+  mosquitto_disconnect(client);
+  mosquitto_loop(client, wait_ms, 1);
+}
+
+MqttPublisher::MqttPublisher(const GatewaySettings& settings)
+    : parts_(std::make_unique<Parts>(settings)) {
+  parts_->thread = std::thread([this] { parts_->run(); });
+}
+MqttPublisher::~MqttPublisher() = default;
+
+void MqttPublisher::show(const SnapshotPointer& snapshot) {
+  std::vector<TopicState> states = topic_states(*snapshot, parts_->settings.machine);
+  const std::lock_guard lock(parts_->mutex);
+  constexpr double early_s = 0.1;  // snapshots do not come to the microsecond
+  const double passed_s = snapshot->wall_s - parts_->said_at_s;
+  const bool is_due = !(passed_s >= 0.0 && passed_s < parts_->settings.mqtt.period_s - early_s);
+  if (is_due) parts_->said_at_s = snapshot->wall_s;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    // The status, which comes first, is told at once; numbers wait for their period.
+    if (i > 0 && !is_due) return;
+    nlohmann::json& said = parts_->said[states[i].topic];
+    if (said == states[i].state) continue;
+    parts_->buffer.push({states[i].topic, payload_of(states[i].state, snapshot->wall_s)});
+    said = std::move(states[i].state);
+  }
+}
+
+void MqttPublisher::show_alarms(const std::vector<Alarm>& active, const AlarmChange* changed,
+                                double wall_s) {
+  const std::lock_guard lock(parts_->mutex);
+  parts_->buffer.push({topic_of(parts_->settings.machine, "alarm"),
+                       payload_of(alarm_state(active, changed), wall_s)});
+}
+
+void MqttPublisher::add_figures(GatewayFigures& figures) const {
+  figures.mqtt_enabled = true;
+  figures.mqtt_connected = parts_->is_connected;
+  const std::lock_guard lock(parts_->mutex);
+  figures.mqtt_dropped = parts_->buffer.dropped();
+}
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,132 @@
+#include "gateway/texts/mqtt_texts.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/json_fields.hpp"
+#include "cli/troubles.hpp"
+#include "gateway/feed/page_state.hpp"
+
+namespace thermocomp::gateway {
+namespace {
+
+using cli::flag_of;
+using cli::list_of;
+using cli::number_of;
+using cli::text_of;
+using nlohmann::json;
+
+json rounded(double value) {
+  constexpr double per_unit = 1000.0;
+  if (!std::isfinite(value)) return nullptr;
+  return std::round(value * per_unit) / per_unit;
+}
+
+json status_state(const Snapshot& snapshot) {
+  json state = {{"state", "online"}, {"daemon", snapshot.is_here ? "here" : "away"}};
+  if (!snapshot.is_here) {
+    state.update({{"compensating", false}, {"why", snapshot.why}});
+    return state;
+  }
+  json problems = json::array();
+  for (const cli::Trouble& trouble : cli::troubles(snapshot.status))
+    problems.push_back({{"what", trouble.what}, {"remedy", trouble.remedy}});
+  state.update({{"compensating", cli::is_compensating(snapshot.status)},
+                {"mode", text_of(snapshot.status, "mode")},
+                {"enabled", flag_of(snapshot.status, "enabled")},
+                {"reasons", list_of(snapshot.status, "reasons")},
+                {"problems", std::move(problems)},
+                {"version", text_of(snapshot.status, "version")}});
+  return state;
+}
+
+json axis_state(const json& axis) {
+  const std::string unit = text_of(axis, "unit");
+  json state = {{"unit", unit}};
+  for (const char* key : {"displacement", "target", "offset", "applied"})
+    state[std::string(key) + "_" + unit] = rounded(number_of(axis, key));
+  for (const char* key : {"driven", "at_bound", "disagrees"}) state[key] = flag_of(axis, key);
+  return state;
+}
+
+json sensor_topic_state(const json& sensor, const Snapshot& snapshot) {
+  json state = sensor_state(sensor, snapshot);
+  // The age changes with every look and says nothing that `fault` does not.
+  for (const char* key : {"name", "age_s"}) state.erase(key);
+  for (const char* key : {"raw_degC", "smoothed_degC", "trend_K_per_h"})
+    state[key] = rounded(number_of(state, key));
+  return state;
+}
+
+json alarm_json(const Alarm& alarm) {
+  return {{"name", alarm.condition.name},
+          {"text", alarm.condition.text},
+          {"remedy", alarm.condition.remedy},
+          {"since_s", rounded(alarm.since_s)}};
+}
+
+}  // namespace
+
+std::string topic_of(const std::string& machine, const std::string& kind, const std::string& name) {
+  std::string topic = "thermocomp/" + machine + "/" + kind;
+  if (name.empty()) return topic;
+  topic += '/';
+  for (const char c : name) {
+    const bool is_plain = static_cast<unsigned char>(c) > ' ' && c != '/' && c != '+' && c != '#';
+    topic += is_plain ? c : '_';
+  }
+  return topic;
+}
+
+std::string offline_payload() {
+  return R"({"state":"offline"})";
+}
+
+std::vector<TopicState> topic_states(const Snapshot& snapshot, const std::string& machine) {
+  std::vector<TopicState> list;
+  list.push_back({topic_of(machine, "status"), status_state(snapshot)});
+  if (!snapshot.is_here) return list;
+  for (const json& sensor : list_of(snapshot.sensors, "sensors"))
+    list.push_back({topic_of(machine, "sensor", text_of(sensor, "name")),
+                    sensor_topic_state(sensor, snapshot)});
+  for (const json& axis : list_of(snapshot.status, "axes"))
+    list.push_back({topic_of(machine, "axis", text_of(axis, "name")), axis_state(axis)});
+  return list;
+}
+
+json alarm_state(const std::vector<Alarm>& active, const AlarmChange* changed) {
+  json list = json::array();
+  for (const Alarm& alarm : active) list.push_back(alarm_json(alarm));
+  json state = {{"active", std::move(list)}, {"changed", nullptr}};
+  if (changed == nullptr) return state;
+  state["changed"] = alarm_json(changed->alarm);
+  state["changed"]["state"] = changed->is_raised ? "raised" : "cleared";
+  return state;
+}
+
+std::string payload_of(const json& state, double wall_s) {
+  json timed = {{"time", utc_text(wall_s)}};
+  timed.update(state);
+  return timed.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string utc_text(double wall_s) {
+  constexpr double ms_per_s = 1000.0;
+  const double ms = std::floor(std::isfinite(wall_s) && wall_s > 0.0 ? wall_s * ms_per_s : 0.0);
+  const auto seconds = static_cast<std::time_t>(ms / ms_per_s);
+  const auto rest = static_cast<int>(ms - static_cast<double>(seconds) * ms_per_s);
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &parts);
+  std::array<char, 8> fraction{};
+  std::snprintf(fraction.data(), fraction.size(), ".%03dZ", rest % 1000);
+  return std::string(text.data()) + fraction.data();
+}
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,210 @@
+#include "gateway/texts/shdr_text.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/json_fields.hpp"
+#include "cli/reason_text.hpp"
+#include "cli/troubles.hpp"
+#include "gateway/texts/mqtt_texts.hpp"
+
+namespace thermocomp::gateway {
+namespace {
+
+using cli::flag_of;
+using cli::list_of;
+using cli::number_of;
+using cli::object_of;
+using cli::text_of;
+using nlohmann::json;
+
+constexpr const char* unavailable = "UNAVAILABLE";
+constexpr const char* normal = "NORMAL||||";
+constexpr double mm_per_um = 1e-3;
+constexpr double deg_per_urad = 180.0 / std::numbers::pi * 1e-6;
+
+std::string number(double value) {
+  if (!std::isfinite(value)) return unavailable;
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.6f", value);
+  return text.data();
+}
+
+/// `|` divides fields and a line ends an entry: neither may stand in a text.
+std::string plain(std::string_view text) {
+  std::string made;
+  for (const char c : text) {
+    const bool is_control = static_cast<unsigned char>(c) < ' ' || c == 127;
+    made += is_control ? ' ' : c == '|' ? '/' : c;
+  }
+  return made;
+}
+
+std::string condition(const char* level, std::string_view code, std::string_view text) {
+  return std::string(level) + "|" + plain(code) + "|||" + plain(text);
+}
+
+bool is_condition(const std::string& item) {
+  return item == "system" || item.starts_with("sensor_") || item.starts_with("bus_");
+}
+
+/// FAULT: the machine is not compensated though it should be. WARNING: it is, or it is switched
+/// off, and something is wrong.
+std::vector<std::string> system_condition(const json& status) {
+  const cli::Verdict verdict = cli::verdict(status);
+  const bool is_fault = !verdict.compensating && !verdict.intended;
+  const char* level = is_fault ? "FAULT" : "WARNING";
+  std::vector<std::string> entries;
+  for (const json& reason : list_of(status, "reasons")) {
+    if (!reason.is_string() || reason == "cutting") continue;
+    const auto name = reason.get<std::string>();
+    entries.push_back(condition(level, name, cli::reason_text(name).meaning));
+  }
+  if (entries.empty() && is_fault)
+    entries.push_back(condition(level, text_of(status, "mode"), verdict.answer + verdict.detail));
+  if (entries.empty()) entries.emplace_back(normal);
+  return entries;
+}
+
+void add_sensors(const json& sensors, ShdrStates& states) {
+  for (const json& sensor : list_of(sensors, "sensors")) {
+    const std::string name = text_of(sensor, "name");
+    const std::string fault = text_of(sensor, "fault");
+    const bool is_good = fault == "none";
+    states[item_name("temp", name)] = {is_good ? number(number_of(sensor, "smoothed_degC"))
+                                               : unavailable};
+    std::vector<std::string>& entry = states[item_name("sensor", name)];
+    if (!is_good)
+      entry = {condition("FAULT", fault, cli::fault_text(fault).meaning)};
+    else if (!object_of(sensor, "suspected").empty())
+      entry = {condition("WARNING", "suspected", "off against its neighbours")};
+    else
+      entry = {normal};
+  }
+}
+
+/// A kind of data item in the device file.
+struct ItemKind {
+  const char* category;
+  const char* type;
+  const char* units;  ///< empty: none
+};
+
+void append_item(std::string& xml, const ItemKind& kind, const std::string& name) {
+  xml.append("        <DataItem category=\"").append(kind.category).append("\" id=\"");
+  xml.append(name).append("\" name=\"").append(name).append("\" type=\"").append(kind.type);
+  if (*kind.units != '\0') xml.append("\" units=\"").append(kind.units);
+  xml.append("\"/>\n");
+}
+
+constexpr ItemKind condition_item{"CONDITION", "SYSTEM", ""};
+
+}  // namespace
+
+std::string item_name(const std::string& kind, const std::string& name) {
+  std::string made = kind;
+  made += '_';
+  for (const char c : name) {
+    const bool is_plain =
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    made += is_plain ? c : '_';
+  }
+  return made;
+}
+
+ShdrStates shdr_states(const Snapshot& snapshot) {
+  ShdrStates states;
+  states["avail"] = {snapshot.is_here ? "AVAILABLE" : unavailable};
+  const json& status = snapshot.status;
+  states["mode"] = {plain(text_of(status, "mode"))};
+  states["system"] = system_condition(status);
+  add_sensors(snapshot.sensors, states);
+  for (const json& axis : list_of(status, "axes")) {
+    const double factor = text_of(axis, "unit") == "urad" ? deg_per_urad : mm_per_um;
+    const std::string name = text_of(axis, "name");
+    states[item_name("offset", name)] = {number(factor * number_of(axis, "offset"))};
+    states[item_name("displacement", name)] = {number(factor * number_of(axis, "displacement"))};
+  }
+  for (const json& bus : list_of(status, "buses")) {
+    const std::string entry =
+        flag_of(bus, "connected") ? normal : condition("FAULT", "away", text_of(bus, "last_error"));
+    states[item_name("bus", text_of(bus, "name"))] = {entry};
+  }
+  if (snapshot.is_here) return states;
+  for (auto& [item, entries] : states) entries = {unavailable};
+  states["system"] = {condition("FAULT", "daemon", "the daemon does not answer")};
+  return states;
+}
+
+std::string shdr_lines(const ShdrStates& before, const ShdrStates& now, double wall_s) {
+  const std::string time = utc_text(wall_s);
+  std::string values;
+  std::string lines;
+  const auto tell = [&](const std::string& item, const std::vector<std::string>& entries) {
+    if (!is_condition(item)) {
+      values.append("|").append(item).append("|").append(entries.front());
+      return;
+    }
+    // NORMAL without a code ends all that were active; then those that are.
+    const bool is_plain =
+        entries.size() == 1 && (entries[0] == normal || entries[0] == unavailable);
+    const auto line = [&](const std::string& entry) {
+      lines.append(time).append("|").append(item).append("|").append(entry).append("\n");
+    };
+    if (!is_plain) line(normal);
+    for (const std::string& entry : entries) line(entry == unavailable ? "UNAVAILABLE||||" : entry);
+  };
+  for (const auto& [item, entries] : now) {
+    const auto known = before.find(item);
+    if (known == before.end() || known->second != entries) tell(item, entries);
+  }
+  for (const auto& [item, entries] : before)
+    if (now.count(item) == 0) tell(item, {unavailable});
+  return (values.empty() ? "" : time + values + "\n") + lines;
+}
+
+std::string shdr_answer(std::string_view line, double heartbeat_s) {
+  constexpr double ms_per_s = 1000.0;
+  while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
+  if (line != "* PING") return {};
+  return "* PONG " + std::to_string(static_cast<int>(ms_per_s * heartbeat_s)) + "\n";
+}
+
+std::string device_file(const Snapshot& snapshot, const std::string& machine) {
+  std::string xml =
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+      "<MTConnectDevices xmlns=\"urn:mtconnect.org:MTConnectDevices:1.8\"\n"
+      "  xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\"\n"
+      "  xsi:schemaLocation=\"urn:mtconnect.org:MTConnectDevices:1.8 "
+      "http://schemas.mtconnect.org/schemas/MTConnectDevices_1.8.xsd\">\n"
+      "  <Header bufferSize=\"131072\" instanceId=\"1\" sender=\"localhost\" version=\"1.8\"\n"
+      "    assetBufferSize=\"1024\" assetCount=\"0\" creationTime=\"" +
+      utc_text(snapshot.wall_s) + "\"/>\n  <Devices>\n    <Device id=\"" +
+      item_name("thermocomp", machine) + "\" name=\"" + machine + "\" uuid=\"thermocomp-" +
+      machine + "\">\n      <Description>thermal compensation</Description>\n      <DataItems>\n";
+  append_item(xml, {"EVENT", "AVAILABILITY", ""}, "avail");
+  append_item(xml, {"EVENT", "FUNCTIONAL_MODE", ""}, "mode");
+  append_item(xml, condition_item, "system");
+  for (const json& sensor : list_of(snapshot.sensors, "sensors")) {
+    const std::string name = text_of(sensor, "name");
+    append_item(xml, {"SAMPLE", "TEMPERATURE", "CELSIUS"}, item_name("temp", name));
+    append_item(xml, condition_item, item_name("sensor", name));
+  }
+  for (const json& axis : list_of(snapshot.status, "axes")) {
+    const ItemKind kind = text_of(axis, "unit") == "urad"
+                              ? ItemKind{"SAMPLE", "ANGLE", "DEGREE"}
+                              : ItemKind{"SAMPLE", "DISPLACEMENT", "MILLIMETER"};
+    append_item(xml, kind, item_name("offset", text_of(axis, "name")));
+    append_item(xml, kind, item_name("displacement", text_of(axis, "name")));
+  }
+  for (const json& bus : list_of(snapshot.status, "buses"))
+    append_item(xml, {"CONDITION", "COMMUNICATIONS", ""}, item_name("bus", text_of(bus, "name")));
+  return xml + "      </DataItems>\n    </Device>\n  </Devices>\n</MTConnectDevices>\n";
+}
+
+}  // namespace thermocomp::gateway

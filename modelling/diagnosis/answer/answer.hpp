@@ -1,0 +1,87 @@
+/// What a diagnosis answers: findings with parameters and intervals, the extended model, and what
+/// knowing them gains on runs that were not used.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modelling/diagnosis/evidence/headroom.hpp"
+#include "modelling/diagnosis/hypothesis/parameter.hpp"
+#include "modelling/diagnosis/search/search.hpp"
+
+namespace thermocomp::diagnosis {
+
+struct TestGain {
+  double before_um{0.0};
+  double after_um{0.0};
+  double reduction{0.0};  ///< 1 - after / before
+  Interval ci95;          ///< of the reduction, by blocks drawn anew
+};
+
+struct Alternative {
+  std::string cause;
+  std::string subject;
+  double relative_support{0.0};
+};
+
+struct NamedFinding {
+  std::string cause;
+  std::string subject;
+  std::vector<std::string> outputs;
+  std::vector<Parameter> parameters;
+  std::optional<std::string> run;  ///< of a fault of one run: its argument
+  std::string evidence;
+  std::vector<Alternative> alternatives;
+  /// By output; empty where no test run has it or no prediction can carry it.
+  std::map<std::string, TestGain> test;
+  double probability{not_a_number};  ///< of the cause with any place of the group
+  std::string family{};
+  double family_probability{not_a_number};
+  std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
+};
+
+/// RMS of training rows that were left out in turn.
+struct LeftOutGain {
+  double before_um{0.0};
+  double after_um{0.0};
+};
+
+/// The rest that is predictable and has no name, as one `lag_bank` term.
+struct RemainderBank {
+  TermSpec term;
+  std::map<std::string, LeftOutGain> left_out;  ///< of the outputs that it serves
+  /// Beside the findings; an output that does not gain goes without it.
+  std::map<std::string, TestGain> test;
+};
+
+struct OutputFigures {
+  double train_rms_um{0.0};
+  double test_rms_um{0.0};
+  double test_peak_um{0.0};
+  double extended_test_rms_um{0.0};
+  double extended_test_peak_um{0.0};
+  double unexplained_fraction{0.0};
+  std::optional<Headroom> headroom{};
+};
+
+/// Figures named `_um` are in `unit`.
+struct Diagnosis {
+  std::string unit{"um"};  ///< "K" where temperatures were compared
+  std::string verdict;     ///< "effect", "none" or "unexplained"
+  std::vector<NamedFinding> findings;
+  std::map<std::string, OutputFigures> outputs;
+  /// With every finding that a term can carry and the test runs do not speak against.
+  ThermalModel extended;
+  std::optional<RemainderBank> remainder;  ///< its term is the extended model's last
+  std::vector<Weighed> weighed;            ///< what came into question in every round of the search
+  /// Probability of each family, whether it is named or not; empty where nothing was weighed so.
+  std::map<std::string, double> families{};
+};
+
+/// The answer as JSON (indented, a newline at the end). Numbers that are not known are null.
+/// @param weighed  adds what came into question
+[[nodiscard]] std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed = false);
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,132 @@
+#include "modelling/diagnosis/answer/gain_on_test.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "modelling/diagnosis/data/series.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr int resamples = 400;
+constexpr int test_blocks = 16;
+constexpr double turn = 6.283185307179586;
+
+/// The sine of known period and size that fits the residual best: only its phase is free.
+Column sine_in(const Column& time_s, const Column& residual, const Correction& correction) {
+  const Eigen::ArrayXd angle = turn / correction.period_s * time_s.array();
+  const Eigen::ArrayXd values = residual.array().isFinite().select(residual.array(), 0.0);
+  const double count = static_cast<double>(residual.array().isFinite().count());
+  const Eigen::ArrayXd centred = values - (count > 0 ? values.sum() / count : 0.0);
+  const double phase = std::atan2((centred * angle.cos()).sum(), (centred * angle.sin()).sum());
+  return correction.amplitude_um * (angle + phase).sin();
+}
+
+struct BlockSquares {
+  double before{0.0};
+  double after{0.0};
+};
+
+std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residuals& after) {
+  std::vector<BlockSquares> blocks;
+  Eigen::Index rows = 0;
+  for (const Column& run : before.by_run) rows += run.size();
+  const Eigen::Index length = std::max<Eigen::Index>(1, rows / test_blocks);
+  for (std::size_t i = 0; i < before.by_run.size(); ++i) {
+    for (Eigen::Index row = 0; row < before.by_run[i].size(); ++row) {
+      if (row % length == 0) blocks.emplace_back();
+      const double a = before.by_run[i][row];
+      const double b = after.by_run[i][row];
+      if (!std::isfinite(a) || !std::isfinite(b)) continue;
+      blocks.back().before += a * a;
+      blocks.back().after += b * b;
+    }
+  }
+  return blocks;
+}
+
+}  // namespace
+
+Residuals residuals(const MeasuredData& data, std::size_t output) {
+  Residuals all;
+  for (const MeasuredRun& run : data.runs)
+    all.by_run.emplace_back(
+        (run.measured_um[output] - run.model_um[output]).tail(run.rows() - run.begin));
+  return all;
+}
+
+Residuals residuals(const ThermalModel& model, const Corrections& corrections,
+                    const MeasuredData& data, std::size_t output) {
+  Residuals all;
+  for (const MeasuredRun& run : data.runs) {
+    Column predicted = model_over(model, run, data)[output];
+    const Column& measured = run.measured_um[output];
+    Eigen::Index start = 0;
+    while (start < run.rows() && !std::isfinite(measured[start])) ++start;
+    for (const Correction& correction : corrections) {
+      if (correction.output != output) continue;
+      if (correction.period_s > 0)
+        predicted += sine_in(run.time_s, measured - predicted, correction);
+      else
+        predicted = shifted(run.time_s, predicted, correction.shift_s);
+    }
+    if (start < run.rows()) predicted.array() -= double(predicted[start]);
+    all.by_run.emplace_back((measured - predicted).tail(run.rows() - run.begin));
+  }
+  return all;
+}
+
+double root_mean_square(const Residuals& residuals) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (const Column& run : residuals.by_run) {
+    for (const double value : run) {
+      if (!std::isfinite(value)) continue;
+      sum += value * value;
+      count += 1.0;
+    }
+  }
+  return count > 0 ? std::sqrt(sum / count) : not_a_number;
+}
+
+double peak(const Residuals& residuals) {
+  double largest = not_a_number;
+  for (const Column& run : residuals.by_run)
+    for (const double value : run)
+      if (std::isfinite(value) && !(std::abs(value) <= largest)) largest = std::abs(value);
+  return largest;
+}
+
+TestGain test_gain(const Residuals& before, const Residuals& after) {
+  TestGain gain{root_mean_square(before), root_mean_square(after), 0.0, {}};
+  gain.reduction = 1.0 - gain.after_um / gain.before_um;
+  const std::vector<BlockSquares> blocks = squares_by_block(before, after);
+  std::mt19937_64 random(1);  // the same answer for the same data
+  std::uniform_int_distribution<std::size_t> draw(0, blocks.size() - 1);
+  std::vector<double> reductions;
+  for (int i = 0; i < resamples; ++i) {
+    BlockSquares sum;
+    for (std::size_t j = 0; j < blocks.size(); ++j) {
+      const BlockSquares& block = blocks[draw(random)];
+      sum.before += block.before;
+      sum.after += block.after;
+    }
+    if (sum.before > 0) reductions.push_back(1.0 - std::sqrt(sum.after / sum.before));
+  }
+  if (reductions.empty()) return gain;
+  std::sort(reductions.begin(), reductions.end());
+  const auto at = [&](double share) {
+    return reductions[static_cast<std::size_t>(share * static_cast<double>(reductions.size() - 1))];
+  };
+  gain.ci95 = {at(0.025), at(0.975)};
+  return gain;
+}
+
+bool fails_on_test_runs(const NamedFinding& finding) {
+  return !finding.test.empty() &&
+         std::none_of(finding.test.begin(), finding.test.end(),
+                      [](const auto& of_output) { return of_output.second.reduction > 0; });
+}
+
+}  // namespace thermocomp::diagnosis

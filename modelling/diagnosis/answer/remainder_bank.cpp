@@ -1,0 +1,182 @@
+#include "modelling/diagnosis/answer/remainder_bank.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "modelling/identification/bank_fit.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+using identification::BankColumns;
+using identification::BankEquations;
+using identification::MeasuredTests;
+
+constexpr std::size_t blocks = 8;
+constexpr double gain_min = 0.1;
+/// Of all runs; more are thinned. The shortest low pass is many times longer than the steps then.
+constexpr Eigen::Index rows_max = 6000;
+
+/// Every n-th row.
+Eigen::VectorXd thinned(const Column& values, Eigen::Index apart) {
+  return values(Eigen::seq(0, values.size() - 1, apart));
+}
+
+bool varies(const MeasuredData& data, std::size_t signal) {
+  const double first = data.runs.front().signals[signal][0];
+  return std::any_of(data.runs.begin(), data.runs.end(), [&](const MeasuredRun& run) {
+    return (run.signals[signal].array() != first).any();
+  });
+}
+
+/// The recorded inputs as a bank wants them, without an output.
+MeasuredTests inputs_of(const MeasuredData& data, Eigen::Index apart) {
+  MeasuredTests tests;
+  tests.places = data.model.inputs;
+  tests.places.insert(tests.places.end(), data.others.begin(), data.others.end());
+  std::vector<std::size_t> moving;
+  for (std::size_t i = 0; i < data.signals.size(); ++i) {
+    if (!varies(data, i)) continue;
+    moving.push_back(i);
+    tests.signals.push_back(data.signals[i]);
+  }
+  for (const MeasuredRun& run : data.runs) {
+    identification::TestRun& test = tests.runs.emplace_back();
+    test.name = run.name;
+    test.time_s = thinned(run.time_s, apart);
+    test.begin = (run.begin + apart - 1) / apart;
+    const Eigen::Index rows = test.time_s.size();
+    test.places_K.resize(rows, std::ssize(tests.places));
+    Eigen::Index column = 0;
+    for (const auto* places : {&run.inputs_K, &run.others_K})
+      for (const Column& place : *places) test.places_K.col(column++) = thinned(place, apart);
+    test.signals.resize(rows, std::ssize(moving));
+    for (std::size_t i = 0; i < moving.size(); ++i)
+      test.signals.col(static_cast<Eigen::Index>(i)) = thinned(run.signals[moving[i]], apart);
+  }
+  return tests;
+}
+
+/// Eight blocks over all runs, at least one of each.
+void add_folds(MeasuredTests& tests) {
+  const std::size_t of_a_run = std::max<std::size_t>(1, blocks / tests.runs.size());
+  for (std::size_t run = 0; run < tests.runs.size(); ++run) {
+    const Eigen::Index begin = tests.runs[run].begin;
+    const Eigen::Index rows = tests.runs[run].time_s.size() - begin;
+    const auto edge = [&](std::size_t i) {
+      return begin + rows * static_cast<Eigen::Index>(i) / static_cast<Eigen::Index>(of_a_run);
+    };
+    for (std::size_t i = 0; i < of_a_run; ++i)
+      if (edge(i + 1) > edge(i)) tests.folds.push_back({run, edge(i), edge(i + 1)});
+  }
+}
+
+/// What is left of the output stands at the rows of the tests; NaN before the selection.
+void set_output(MeasuredTests& tests, const MeasuredData& data, const Residuals& left,
+                Eigen::Index apart) {
+  for (std::size_t run = 0; run < tests.runs.size(); ++run) {
+    Column whole = Column::Constant(data.runs[run].rows(), not_a_number);
+    whole.tail(left.by_run[run].size()) = left.by_run[run];
+    tests.runs[run].outputs_um = thinned(whole, apart);
+  }
+}
+
+/// Sums over present rows.
+struct Sums {
+  double rows{0.0};
+  double values{0.0};
+  double squares{0.0};
+
+  void add(const Eigen::VectorXd& each) {
+    const auto present = each.array().isFinite();
+    rows += static_cast<double>(present.count());
+    values += present.select(each.array(), 0.0).sum();
+    squares += present.select(each.array().square(), 0.0).sum();
+  }
+  [[nodiscard]] double about_the_mean() const {
+    return rows > 0 ? squares - values * values / rows : 0.0;
+  }
+};
+
+double total(const std::vector<Sums>& all) {
+  double sum = 0.0;
+  for (const Sums& each : all) sum += each.about_the_mean();
+  return sum;
+}
+
+struct Judged {
+  LeftOutGain gain;
+  bool helps{false};
+};
+
+/// Of noise alone the first row's is left in all others, and a bank would carry that: so what is
+/// left must fall about each run's mean too.
+Judged judged(const MeasuredTests& tests, const BankEquations& bank) {
+  std::vector<double> gains;
+  std::vector<Sums> was(tests.runs.size());
+  std::vector<Sums> is(tests.runs.size());
+  double before = 0.0;
+  double after = 0.0;
+  double rows = 0.0;
+  for (std::size_t f = 0; f < tests.folds.size(); ++f) {
+    const identification::Fold& fold = tests.folds[f];
+    const Eigen::Index count = fold.end - fold.begin;
+    const Eigen::VectorXd y = tests.runs[fold.run].outputs_um.middleRows(fold.begin, count);
+    const Eigen::VectorXd rest =
+        y - bank.rows()[fold.run].middleRows(fold.begin, count) * bank.fit(f);
+    Sums of_y;
+    Sums of_rest;
+    of_y.add(y);
+    of_rest.add(rest);
+    was[fold.run].add(y);
+    is[fold.run].add(rest);
+    before += of_y.squares;
+    after += of_rest.squares;
+    rows += of_y.rows;
+    gains.push_back(of_y.squares - of_rest.squares);
+  }
+  Judged left;
+  if (!(rows > 0) || !(before > 0)) return left;
+  left.gain = {std::sqrt(before / rows), std::sqrt(after / rows)};
+  const auto folds = static_cast<double>(gains.size());
+  const double mean = (before - after) / folds;
+  double squares = 0.0;
+  for (const double each : gains) squares += (each - mean) * (each - mean);
+  const double error = folds > 1 ? std::sqrt(squares / (folds * (folds - 1.0))) : mean;
+  constexpr double kept_squares = (1.0 - gain_min) * (1.0 - gain_min);
+  left.helps =
+      mean > error && after < kept_squares * before && total(is) < kept_squares * total(was);
+  return left;
+}
+
+}  // namespace
+
+std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
+                                            const std::vector<Residuals>& left) {
+  Eigen::Index rows = 0;
+  for (const MeasuredRun& run : train.runs) rows += run.rows();
+  const Eigen::Index apart = 1 + (rows - 1) / rows_max;
+  MeasuredTests tests = inputs_of(train, apart);
+  add_folds(tests);
+  const BankColumns columns = identification::bank_columns(tests);
+  std::vector<std::string> outputs;
+  std::vector<Eigen::VectorXd> gains;
+  RemainderBank bank;
+  for (std::size_t output = 0; output < left.size(); ++output) {
+    if (left[output].by_run.empty()) continue;
+    set_output(tests, train, left[output], apart);
+    const BankEquations equations(tests, columns);
+    const Judged of_output = judged(tests, equations);
+    if (!of_output.helps) continue;
+    outputs.push_back(train.model.outputs[output]);
+    gains.emplace_back(equations.fit(tests.folds.size()));
+    bank.left_out[outputs.back()] = of_output.gain;
+  }
+  if (outputs.empty()) return std::nullopt;
+  Eigen::MatrixXd all(std::ssize(gains.front()), std::ssize(gains));
+  for (std::size_t i = 0; i < gains.size(); ++i) all.col(static_cast<Eigen::Index>(i)) = gains[i];
+  bank.term = identification::bank_term(columns, outputs, all);
+  return bank;
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,29 @@
+/// What is left after the findings and follows from what was recorded, though no cause of the
+/// catalogue says how: carried by a bank of lags, and called that.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modelling/diagnosis/answer/gain_on_test.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// Least share of an output's variance before the findings that must be predictable without a name
+/// for a bank to be tried.
+inline constexpr double predictable_share_min = 0.1;
+
+/// A bank for each output whose left-out rows it predicts better: each of eight blocks of the
+/// training rows is left out, and what is left of them must fall by a tenth (RMS), about the
+/// run's mean too, and by more than the standard error over the blocks. Everything counts from the
+/// run's first row, as it will in use: with a free offset a run twice as many outputs get a bank,
+/// and some are worse for it. Columns, penalties and gains: identification::BankEquations.
+/// @param left  by the model with the findings, over the training runs, order of the outputs; empty
+///              where no bank is wanted
+/// @return nullopt: no output gains
+[[nodiscard]] std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
+                                                          const std::vector<Residuals>& left);
+
+}  // namespace thermocomp::diagnosis

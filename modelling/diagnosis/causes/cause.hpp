@@ -1,0 +1,142 @@
+/// What may be wrong. All that is known of a cause stands in one file, causes/NAME.cpp; it is
+/// listed once, in cause_registry.cpp.
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
+#include "modelling/diagnosis/hypothesis/material.hpp"
+#include "modelling/diagnosis/hypothesis/network_hypothesis.hpp"
+#include "modelling/diagnosis/hypothesis/parameter.hpp"
+#include "modelling/diagnosis/network/machine_file.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// A parameter as the answer names it.
+struct CauseParameter {
+  std::string_view name;
+  std::string_view unit;  ///< "s": a duration; "1": none; "?" in it: that of the subject
+  /// What is physically possible, in this unit.
+  double low{-std::numeric_limits<double>::infinity()};
+  double high{std::numeric_limits<double>::infinity()};
+  std::string_view says;  ///< before the value
+  bool of_a_jump{false};  ///< told by a jump: nothing else that a machine does looks like it
+};
+
+/// What it says to the machine's owner.
+struct CauseTexts {
+  std::string_view title;
+  std::string_view says;  ///< continues "SUBJECT: "
+  std::string_view to_do;
+};
+
+/// The experiment that tells a cause from another. Of two causes the one that stands first here
+/// says which.
+enum class Experiment {
+  of_a_network,    ///< steady state, the way there, the level
+  another_run,     ///< a fault of one run does not come back
+  standstill,      ///< one speed, then none
+  along_the_axis,  ///< both ends and the middle
+  twice_as_slow,   ///< a loop that does not close
+  up_and_down,     ///< what has memory
+  steady_levels,   ///< three temperatures held
+  other_duty,      ///< anything else
+};
+
+/// What a fit to the same rows takes into the model's coefficients.
+enum class TakenByFit {
+  in_part,      ///< of its columns what looks like the inputs
+  all,          ///< it is a sum of the inputs
+  but_a_pivot,  ///< in part; the second column is an input
+};
+
+/// What a finding changes that no term of the model file carries, in one output: a shift in time,
+/// or a sine of known period and size. The sine's phase is another one in every run and is taken
+/// from the run itself.
+struct Correction {
+  std::size_t output{0};
+  double shift_s{0.0};
+  double period_s{0.0};
+  double amplitude_um{0.0};
+};
+
+/// Error of a reading with a fault of gain 1, over all rows of the run.
+/// @param onset_s  the shape's one parameter
+using ErrorOfReading = Column (*)(const MeasuredData& data, const MeasuredRun& run,
+                                  std::size_t input, double onset_s);
+
+struct Cause {
+  std::string name;    ///< fixed: in answers and, as `kind`, in model files
+  std::string family;  ///< what belongs together for a person: structure, heat, datum, sensor
+  /// How often it is right where all else is the same, in ln (tests/diagnosis/
+  /// calibrate_posterior.py); 0 in the thermal layer, which has no probabilities.
+  double prior{0.0};
+  std::vector<CauseParameter> parameters{};  ///< in the order of the answer
+  CauseTexts texts{};
+  /// Where the subject is a signal and a place of a thermal network; none: the same.
+  std::optional<CauseTexts> texts_in_network{};
+  Experiment experiment{Experiment::other_duty};
+  std::string term{};  ///< kind of the `[[term]]` that carries it; empty: none does
+  TakenByFit taken_by_fit{TakenByFit::in_part};
+  /// What it would do to the displacement, if the subject is one that it can have. Null: it is a
+  /// cause of the thermal layer alone.
+  std::vector<Hypothesis> (*hypotheses)(const Material& material, const Subject& subject){nullptr};
+  /// Its gains as parameters; null: it has none.
+  std::vector<Parameter> (*gains)(const FoundGains& found){nullptr};
+  /// Of a cause that acts in every run and that no term carries: what is corrected in its place,
+  /// from its parameters. Null: nothing.
+  Correction (*correction)(const std::vector<Parameter>& parameters){nullptr};
+  ErrorOfReading error_of_reading{nullptr};  ///< of a fault of one reading in one run
+
+  /// What it would do to the temperatures of a thermal network. Null: the thermal layer does not
+  /// have it.
+  std::vector<NetworkHypothesis> (*in_network)(const NetworkMaterial& material,
+                                               const NetworkSubject& subject){nullptr};
+  /// Puts a finding into the machine's file. Null: no key of it carries the cause.
+  /// @return whether the file has what the finding is about
+  bool (*into_machine)(MachineFile& machine, const std::string& subject,
+                       const std::vector<Parameter>& parameters){nullptr};
+};
+
+/// The parameter of this name; null: it has none.
+[[nodiscard]] const CauseParameter* find_parameter(const Cause& cause, std::string_view name);
+
+/// In the order in which they are tried.
+[[nodiscard]] const std::vector<Cause>& all_causes();
+/// Null: there is none.
+[[nodiscard]] const Cause* find_cause(std::string_view name);
+/// @pre there is one
+[[nodiscard]] const Cause& cause_named(std::string_view name);
+
+namespace causes {
+
+Cause wrong_coefficient();
+Cause thermal_lag();
+Cause missing_temperature();
+Cause nonlinear_expansion();
+Cause position_dependence();
+Cause slow_sensor();
+Cause hysteresis();
+Cause sensor_swap();
+Cause missing_heat_source();
+Cause speed_growth();
+Cause time_shift();
+Cause periodic_disturbance();
+Cause displacement_step();
+Cause displacement_drift();
+Cause sensor_step();
+Cause sensor_drift();
+Cause sensor_loose();
+// Of the thermal layer alone: network/.
+Cause wrong_heat_source();
+Cause wrong_film_coefficient();
+Cause wrong_conductance();
+Cause wrong_heat_capacity();
+Cause wrong_ambient();
+
+}  // namespace causes
+}  // namespace thermocomp::diagnosis

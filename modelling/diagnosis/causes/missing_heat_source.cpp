@@ -1,0 +1,114 @@
+#include <algorithm>
+
+#include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+
+namespace thermocomp::diagnosis::causes {
+namespace {
+
+constexpr const char* name = "missing_heat_source";
+constexpr CauseParameter tau{"tau_s", "s", 120.0, 6 * 3600.0, "time constant"};
+constexpr CauseParameter power{"power", "1", 1.0, 2.0, "power of the signal"};
+
+void write(const Material& material, const ColumnOf& values, const Shapes& shapes, PanelPart into) {
+  Eigen::Array<bool, Eigen::Dynamic, 1> is_squared(into.cols());
+  for (std::size_t i = 0; i < shapes.size(); ++i)
+    is_squared[static_cast<Eigen::Index>(i)] = shapes[i][1] > 1.5;
+  const std::vector<double> taus_s = firsts_of(shapes);
+  material.write_stacked(into, [&](const MeasuredRun& run, PanelPart of_run) {
+    const Column& u = values(run);
+    for (Eigen::Index row = 0; row < of_run.rows(); ++row)
+      for (Eigen::Index i = 0; i < of_run.cols(); ++i)
+        of_run(row, i) = is_squared[i] ? u[row] * u[row] : u[row];
+    lag_each(run.time_s, taus_s, of_run);
+  });
+}
+
+std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
+  if (subject.kind != SubjectKind::signal) return {};
+  Hypothesis heat{name,
+                  material.name_of(subject),
+                  Form::own_gains,
+                  {{std::string(tau.name), material.lag_times_s(tau.low, tau.high, 22), true},
+                   {std::string(power.name), {power.low, power.high}, false, true}},
+                  {"gain_um_per_unit"}};
+  heat.write_columns = [&material, values = material.values_of(subject)](
+                           const Shapes& shapes, std::size_t, PanelPart into) {
+    write(material, values, shapes, into);
+  };
+  return {std::move(heat)};
+}
+
+double largest(const ThermalRuns& runs, std::size_t signal) {
+  double most = 0.0;
+  for (const ThermalRun& run : runs.runs)
+    most = std::max(most, run.signals[signal].cwiseAbs().maxCoeff());
+  return most;
+}
+
+/// A heat at a place that goes with a signal, and that the network does not have.
+std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
+                                          const NetworkSubject& subject) {
+  if (subject.kind != NetworkSubjectKind::signal_at_place) return {};
+  const std::size_t signal = subject.second;
+  const NetworkPlace& place = material.plant.places[subject.index];
+  const std::string& column = material.runs.signals[signal];
+  const auto& runs = material.runs.runs;
+  const auto& known = material.plant.source_names;
+  const bool moves = std::any_of(runs.begin(), runs.end(), [&](const ThermalRun& run) {
+    return run.signals[signal].maxCoeff() > run.signals[signal].minCoeff();
+  });
+  NetworkHypothesis heat;
+  heat.hypothesis.cause = name;
+  heat.hypothesis.subject = column + "|" + place.name;
+  if (!moves || std::find(known.begin(), known.end(), heat.hypothesis.subject) != known.end())
+    return {};
+  heat.hypothesis.form = Form::shared_gain;
+  heat.hypothesis.gains = {"heat_W"};
+  heat.hypothesis.shape = {{std::string(power.name), {power.low, power.high}, false, true}};
+  heat.hypothesis.possible = [](double gain, std::size_t) { return gain > 0.0; };
+  heat.at = largest(material.runs, signal);
+  heat.apply = [&place, &column, at = heat.at](HeatNetwork& network, const Shape& shape,
+                                               double gain) {
+    network.sources.push_back({column, gain, at, shape[0], place.inflow});
+  };
+  return {std::move(heat)};
+}
+
+bool into_machine(MachineFile& machine, const std::string& subject,
+                  const std::vector<Parameter>& parameters) {
+  machine.add_source(two_names(subject), shared_value(parameters, "heat_W"),
+                     shared_value(parameters, "at"), shared_value(parameters, "power"));
+  return true;
+}
+
+}  // namespace
+
+/// c LP(u^power): heat that no sensor sees.
+Cause missing_heat_source() {
+  Cause cause{name, "heat", 0.33};
+  cause.parameters = {
+      tau,
+      power,
+      {.name = "gain_um_per_unit", .unit = "um/?", .says = "effect"},
+      // Of the thermal layer.
+      {.name = "heat_W", .unit = "W", .low = 0.0, .says = "heat"},
+      {.name = "at", .unit = "1", .low = 0.0, .says = "at a signal of"},
+  };
+  cause.texts = {"Heat that no sensor sees",
+                 "the machine goes on moving after this signal changes: heat that no sensor sees",
+                 "Use the extended model, or put a sensor where that heat enters."};
+  cause.texts_in_network = {
+      "Heat that the thermal model does not have",
+      "this place warms with this signal: heat that the thermal model does not have",
+      "Add a [[source]] with these figures, then look which motor, bearing or pump it is."};
+  cause.experiment = Experiment::standstill;
+  cause.term = name;
+  cause.hypotheses = of;
+  cause.gains = gain_of_each_output;
+  cause.in_network = in_network;
+  cause.into_machine = into_machine;
+  return cause;
+}
+
+}  // namespace thermocomp::diagnosis::causes

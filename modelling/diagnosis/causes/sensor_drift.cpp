@@ -1,0 +1,49 @@
+#include "modelling/diagnosis/causes/reading_fault.hpp"
+
+namespace thermocomp::diagnosis::causes {
+namespace {
+
+constexpr const char* name = "sensor_drift";
+
+/// Time since the onset [h], for a gain in K/h.
+Column error_h(const MeasuredData&, const MeasuredRun& run, std::size_t, double onset_s) {
+  return ((run.time_s.array() - onset_s) / 3600.0).max(0.0);
+}
+
+std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
+  if (subject.kind != SubjectKind::input_in_run) return {};
+  Hypothesis drift =
+      of_reading_fault(material, subject, {name, "start_s", "rate_K_per_h", 0.0, 24, error_h});
+  share_columns(drift, material, subject);
+  return {std::move(drift)};
+}
+
+/// From the run's start on.
+std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
+                                          const NetworkSubject& subject) {
+  if (subject.kind != NetworkSubjectKind::sensor_in_run) return {};
+  const double first_s = material.rows.time_s[material.rows.runs[subject.second].begin];
+  return {of_reading_in_network(
+      material, subject, name, "rate_K_per_h",
+      [first_s](double time_s, const Shape&) { return (time_s - first_s) / 3600.0; })};
+}
+
+}  // namespace
+
+/// A reading creeps in a run.
+Cause sensor_drift() {
+  Cause cause{name, "sensor", -0.38};
+  cause.parameters = {{.name = "start_s", .unit = "s", .says = "creeps from"},
+                      {.name = "rate_K_per_h", .unit = "K/h", .says = "creep"}};
+  cause.texts = {"A reading creeps",
+                 "this reading creeps away from what its neighbours and the displacement say",
+                 "Replace or calibrate the sensor; leave the run out of any fit."};
+  cause.experiment = Experiment::another_run;
+  cause.hypotheses = of;
+  cause.gains = single_gain;
+  cause.in_network = in_network;
+  cause.error_of_reading = error_h;
+  return cause;
+}
+
+}  // namespace thermocomp::diagnosis::causes

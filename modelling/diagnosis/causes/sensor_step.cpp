@@ -1,0 +1,63 @@
+#include "modelling/diagnosis/causes/reading_fault.hpp"
+#include "modelling/diagnosis/data/false_reading.hpp"
+
+namespace thermocomp::diagnosis::causes {
+namespace {
+
+constexpr const char* name = "sensor_step";
+constexpr std::size_t onsets_in_network = 48;
+
+/// 1 K from the onset on.
+Column error_K(const MeasuredData&, const MeasuredRun& run, std::size_t, double onset_s) {
+  return (run.time_s.array() >= onset_s).cast<double>();
+}
+
+std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
+  if (subject.kind != SubjectKind::input_in_run) return {};
+  const MeasuredData& data = material.data();
+  Hypothesis step =
+      of_reading_fault(material, subject, {name, "at_s", "step_K", 0.02, 64, error_K});
+  // Where the reading has no more than a coefficient, many of these share one column.
+  if (!has_terms_of(data.model, subject.index))
+    step.write_columns = [&material, &data, subject](const Shapes& shapes, std::size_t output,
+                                                     PanelPart into) {
+      material.write_since(subject.run, firsts_of(shapes),
+                           -data.coefficient(data.runs[subject.run], output, subject.index), into);
+    };
+  share_columns(step, material, subject);
+  return {std::move(step)};
+}
+
+/// A jump at any of many moments.
+std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
+                                          const NetworkSubject& subject) {
+  if (subject.kind != NetworkSubjectKind::sensor_in_run) return {};
+  NetworkHypothesis step = of_reading_in_network(
+      material, subject, name, "step_K",
+      [](double time_s, const Shape& shape) { return time_s >= shape[0] ? 1.0 : 0.0; });
+  step.hypothesis.shape = {{"at_s", inner_times_s(material, subject.second, onsets_in_network)}};
+  return {std::move(step)};
+}
+
+}  // namespace
+
+/// A reading jumps in a run and stays.
+Cause sensor_step() {
+  Cause cause{name, "sensor", -0.49};
+  cause.parameters = {{.name = "at_s",
+                       .unit = "s",
+                       .says = "from the start of the recording on",
+                       .of_a_jump = true},
+                      {.name = "step_K", .unit = "K", .says = "jump", .of_a_jump = true}};
+  cause.texts = {
+      "A reading jumped", "this reading jumped and stayed",
+      "Look at the connector and the amplifier's channel; leave the run out of any fit."};
+  cause.experiment = Experiment::another_run;
+  cause.hypotheses = of;
+  cause.gains = single_gain;
+  cause.in_network = in_network;
+  cause.error_of_reading = error_K;
+  return cause;
+}
+
+}  // namespace thermocomp::diagnosis::causes

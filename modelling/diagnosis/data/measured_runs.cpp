@@ -1,0 +1,203 @@
+#include "modelling/diagnosis/data/measured_runs.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "config/model_inputs.hpp"
+#include "config/units.hpp"
+#include "estimator/model/displacement_model.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr double missing_share_max = 0.2;
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+double missing_share(const std::vector<double>& values) {
+  const auto missing =
+      std::count_if(values.begin(), values.end(), [](double x) { return !std::isfinite(x); });
+  return static_cast<double>(missing) / static_cast<double>(values.size());
+}
+
+/// The column at the rows; missing values are held at the last one, at the start at the first.
+Column taken(const std::vector<double>& values, const std::vector<std::size_t>& rows) {
+  Column column(static_cast<Eigen::Index>(rows.size()));
+  double last = first_value(values).value_or(0.0);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (std::isfinite(values[rows[i]])) last = values[rows[i]];
+    column[static_cast<Eigen::Index>(i)] = last;
+  }
+  return column;
+}
+
+Column rise_of(const Column& temps_degC, double reference_degC) {
+  return temps_degC.array() - reference_degC;
+}
+
+void take_displacements(const RunFile& file, const std::vector<std::size_t>& rows,
+                        const MeasuredData& data, MeasuredRun& run) {
+  run.model_um = model_over(data.model, run, data);
+  for (std::size_t output = 0; output < data.model.outputs.size(); ++output) {
+    Column measured = Column::Constant(run.rows(), not_a_number);
+    const auto index = file.find(data.model.outputs[output]);
+    for (std::size_t i = 0; index && i < rows.size(); ++i)
+      measured[static_cast<Eigen::Index>(i)] = file.values[*index][rows[i]];
+    Eigen::Index start = 0;
+    while (start < run.rows() && !std::isfinite(measured[start])) ++start;
+    if (start < run.rows()) {
+      measured.array() -= double(measured[start]);
+      run.model_um[output].array() -= double(run.model_um[output][start]);
+    }
+    run.measured_um.push_back(std::move(measured));
+  }
+}
+
+enum class Purpose { search, comparison };
+
+MeasuredRun measured_run(const RunFile& file, const std::string& name, const MeasuredData& data,
+                         Purpose purpose) {
+  const ModelInputs inputs = model_inputs(data.model, file);
+  std::vector<std::size_t> rows = inputs.rows;
+  rows.erase(std::lower_bound(rows.begin(), rows.end(), file.selected_end), rows.end());
+  const auto refuse = [&](const std::string& key, const std::string& rule) {
+    throw ConfigurationError({{file.name, 0, key, "(missing)", rule}});
+  };
+  MeasuredRun run;
+  run.name = name;
+  run.begin = std::lower_bound(rows.begin(), rows.end(), file.selected_begin) - rows.begin();
+  if (run.begin == static_cast<Eigen::Index>(rows.size()))
+    refuse("selection", "must have a row in which no input of the model is missing");
+  run.time_s = taken(file.time_s(), rows);
+  for (std::size_t i = 0; i < data.model.inputs.size(); ++i) {
+    Column temps_degC = taken(*inputs.temperatures[i], rows);
+    run.inputs_K.push_back(rise_of(temps_degC, inputs.reference_degC[i]));
+    if (purpose == Purpose::search) run.inputs_degC.push_back(std::move(temps_degC));
+  }
+  for (const std::string& other : data.others) {
+    const std::vector<double>& column = file.column(other);
+    Column temps_degC = taken(column, rows);
+    run.others_K.push_back(rise_of(temps_degC, first_value(column).value_or(0.0)));
+    if (purpose == Purpose::search) run.others_degC.push_back(std::move(temps_degC));
+  }
+  for (const std::string& signal : data.signals)
+    run.signals.push_back(taken(file.column(signal), rows));
+  take_displacements(file, rows, data, run);
+  const bool any = std::any_of(run.measured_um.begin(), run.measured_um.end(),
+                               [](const auto& um) { return um.array().isFinite().any(); });
+  if (!any) refuse(data.model.outputs.front(), "must have a measured value of an output");
+  return run;
+}
+
+const Column* temperature_of(const MeasuredData& data, const MeasuredRun& run,
+                             const std::string& name) {
+  const auto find = [&name](const auto& names, const auto& columns) -> const Column* {
+    const auto at = std::find(names.begin(), names.end(), name);
+    return at == names.end() ? nullptr : &columns[static_cast<std::size_t>(at - names.begin())];
+  };
+  const Column* input = find(data.model.inputs, run.inputs_K);
+  return input != nullptr ? input : find(data.others, run.others_K);
+}
+
+}  // namespace
+
+SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFile>& runs,
+                             const std::vector<RunFile>& further) {
+  SharedColumns columns;
+  const std::vector<std::string> always = [&] {
+    std::vector<std::string> names = model.temperature_columns();
+    for (const std::string& name : model.signal_columns()) names.push_back(name);
+    return names;
+  }();
+  for (const std::string& name : runs.front().columns) {
+    if (name == "time_s" || contains(model.inputs, name) || is_output(name)) continue;
+    const auto has = [&name](const RunFile& run) {
+      return run.find(name) && missing_share(run.column(name)) <= missing_share_max;
+    };
+    const bool everywhere = std::all_of(runs.begin(), runs.end(), has) &&
+                            std::all_of(further.begin(), further.end(), has);
+    if (!everywhere && !contains(always, name)) continue;
+    (is_temperature(name) ? columns.others : columns.signals).push_back(name);
+  }
+  return columns;
+}
+
+std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
+                               const MeasuredData& data) {
+  std::vector<const Column*> temperatures;
+  for (const std::string& name : model.temperature_columns())
+    temperatures.push_back(temperature_of(data, run, name));
+  std::vector<const Column*> signals;
+  for (const std::string& name : model.signal_columns()) {
+    const auto at = std::find(data.signals.begin(), data.signals.end(), name);
+    signals.push_back(at == data.signals.end()
+                          ? nullptr
+                          : &run.signals[static_cast<std::size_t>(at - data.signals.begin())]);
+  }
+  const auto missing = [](const Column* column) { return column == nullptr; };
+  if (std::any_of(temperatures.begin(), temperatures.end(), missing) ||
+      std::any_of(signals.begin(), signals.end(), missing)) {
+    throw ConfigurationError({{run.name, 0, "columns", "(missing)",
+                               "a run must have every column of the model and its terms"}});
+  }
+  DisplacementModel displacement(model);
+  std::vector<double> rise_K(temperatures.size());
+  const std::vector<double> reference_K(temperatures.size(), 0.0);
+  std::vector<double> signal_values(signals.size());
+  std::vector<double> out(model.outputs.size());
+  std::vector<Column> result(model.outputs.size(), Column(run.rows()));
+  for (Eigen::Index row = 0; row < run.rows(); ++row) {
+    for (std::size_t i = 0; i < temperatures.size(); ++i) rise_K[i] = (*temperatures[i])[row];
+    for (std::size_t i = 0; i < signals.size(); ++i) signal_values[i] = (*signals[i])[row];
+    displacement.step(time_of_row(run.time_s[row]), rise_K, reference_K, signal_values, out);
+    for (std::size_t i = 0; i < out.size(); ++i) result[i][row] = out[i];
+  }
+  return result;
+}
+
+Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
+                                 std::size_t input) const {
+  if (model.guideways.empty())
+    return Column::Constant(run.rows(), model.matrix_um_per_K[output][input]);
+  ThermalModel alone = model;
+  alone.terms.clear();
+  MeasuredRun unit = run;
+  for (Column& rise_K : unit.inputs_K) rise_K.setZero();
+  unit.inputs_K[input].setOnes();
+  return model_over(alone, unit, *this)[output];
+}
+
+namespace {
+/// A matrix that was fitted or calculated is right to a few per cent.
+constexpr double coefficient_sd = 0.03;
+
+MeasuredData data_of(const ThermalModel& model, const std::vector<RunFile>& runs,
+                     const std::vector<std::string>& names, const SharedColumns& columns,
+                     Purpose purpose) {
+  MeasuredData data{model, columns.others, columns.signals, {}, {}, coefficient_sd};
+  data.runs.reserve(runs.size());
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    data.runs.push_back(measured_run(runs[i], names[i], data, purpose));
+  return data;
+}
+}  // namespace
+
+MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
+                           const std::vector<std::string>& names, const SharedColumns& columns) {
+  return data_of(model, runs, names, columns, Purpose::comparison);
+}
+
+MeasuredData training_data(const ThermalModel& model, const std::vector<RunFile>& runs,
+                           const std::vector<std::string>& names, const SharedColumns& columns) {
+  MeasuredData data = data_of(model, runs, names, columns, Purpose::search);
+  for (MeasuredRun& run : data.runs) {
+    for (const Column& rise_K : run.inputs_K) run.calm_inputs_K.push_back(calm(run.time_s, rise_K));
+    for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));
+  }
+  return data;
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,78 @@
+/// Measured runs beside what the model says of them: the material of a diagnosis.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "config/run_file.hpp"
+#include "estimator/thermal_model.hpp"
+#include "modelling/diagnosis/data/panel.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// One run: its rows in which no input of the model is missing, from the file's first such row to
+/// the end of the selection. Missing values of other columns are held at the last one.
+struct MeasuredRun {
+  std::string name;  ///< the argument as given
+  Column time_s;
+  Eigen::Index begin{0};         ///< first selected row
+  std::vector<Column> inputs_K;  ///< rise over the reference, order of the model's inputs
+  std::vector<Column> others_K;  ///< rise of MeasuredData::others
+  std::vector<Column> signals;   ///< order of MeasuredData::signals
+  // What the search alone needs; of training runs only.
+  std::vector<Column> others_degC;
+  std::vector<Column> inputs_degC;
+  /// inputs_K and others_K without the noise of single values, as far as it can be seen.
+  std::vector<Column> calm_inputs_K;
+  std::vector<Column> calm_others_K;
+  std::vector<Column> model_um;     ///< order of the outputs, relative to the output's first row
+  std::vector<Column> measured_um;  ///< the same; NaN: missing
+  [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }
+};
+
+struct MeasuredData {
+  ThermalModel model;
+  std::vector<std::string> others;   ///< temperatures that the model does not use
+  std::vector<std::string> signals;  ///< operating signals and positions
+  std::vector<MeasuredRun> runs;
+  /// Least noise of a single value of each output, as the steps of its converter make it; empty:
+  /// nothing is known.
+  std::vector<double> least_noise_um{};
+  /// How far every coefficient of the model may be wrong without being a cause of its own: standard
+  /// deviation, as a share of the coefficient. 0: they are never doubted.
+  double coefficient_sd{0.0};
+
+  /// The model's coefficient of an input [um/K] in each row: matrix and guideways.
+  [[nodiscard]] Column coefficient(const MeasuredRun& run, std::size_t output,
+                                   std::size_t input) const;
+};
+
+/// Columns that every one of the runs and of the further ones has, in the order of the first run.
+struct SharedColumns {
+  std::vector<std::string> others;
+  std::vector<std::string> signals;
+};
+[[nodiscard]] SharedColumns shared_columns(const ThermalModel& model,
+                                           const std::vector<RunFile>& runs,
+                                           const std::vector<RunFile>& further = {});
+
+/// The model at every row of the run, in the estimator's own arithmetic; shape (outputs, rows).
+[[nodiscard]] std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
+                                             const MeasuredData& data);
+
+/// @param names  the runs' arguments as given
+/// @throws ConfigurationError when a run lacks an input or signal of the model, or has no measured
+///         value of any output
+[[nodiscard]] MeasuredData measured_data(const ThermalModel& model,
+                                         const std::vector<RunFile>& runs,
+                                         const std::vector<std::string>& names,
+                                         const SharedColumns& columns);
+/// The same with what the search needs.
+[[nodiscard]] MeasuredData training_data(const ThermalModel& model,
+                                         const std::vector<RunFile>& runs,
+                                         const std::vector<std::string>& names,
+                                         const SharedColumns& columns);
+
+}  // namespace thermocomp::diagnosis

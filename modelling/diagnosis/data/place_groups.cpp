@@ -1,0 +1,84 @@
+#include "modelling/diagnosis/data/place_groups.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr double alike_min = 0.98;
+
+struct Rises {
+  std::vector<std::string> names;
+  Eigen::MatrixXd columns;  ///< over the selected rows of all runs, the mean taken off
+};
+
+Rises rises_of(const MeasuredData& data) {
+  Rises rises{data.model.inputs, {}};
+  rises.names.insert(rises.names.end(), data.others.begin(), data.others.end());
+  Eigen::Index rows = 0;
+  for (const MeasuredRun& run : data.runs) rows += run.rows() - run.begin;
+  rises.columns.resize(rows, std::ssize(rises.names));
+  Eigen::Index at = 0;
+  for (const MeasuredRun& run : data.runs) {
+    const Eigen::Index count = run.rows() - run.begin;
+    Eigen::Index column = 0;
+    for (const auto* of : {&run.inputs_K, &run.others_K})
+      for (const Column& rise_K : *of)
+        rises.columns.col(column++).segment(at, count) = rise_K.tail(count);
+    at += count;
+  }
+  const Eigen::RowVectorXd mean = rises.columns.colwise().mean();
+  rises.columns.rowwise() -= mean;
+  return rises;
+}
+
+bool alike(const PlaceGroups& groups, const std::string& one, const std::string& other) {
+  if (one == other) return true;
+  const auto group = groups.find(one);
+  return group != groups.end() &&
+         std::find(group->second.begin(), group->second.end(), other) != group->second.end();
+}
+
+}  // namespace
+
+PlaceGroups place_groups(const MeasuredData& data) {
+  const Rises rises = rises_of(data);
+  const Eigen::MatrixXd products = rises.columns.transpose() * rises.columns;
+  PlaceGroups groups;
+  for (Eigen::Index i = 0; i < products.rows(); ++i) {
+    std::vector<std::string>& group = groups[rises.names[static_cast<std::size_t>(i)]];
+    for (Eigen::Index j = 0; j < products.rows(); ++j)
+      if (i == j || products(i, j) > alike_min * std::sqrt(products(i, i) * products(j, j)))
+        group.push_back(rises.names[static_cast<std::size_t>(j)]);
+  }
+  return groups;
+}
+
+bool same_places(const PlaceGroups& groups, const std::string& subject, const std::string& other) {
+  const SubjectColumns a = subject_columns(subject);
+  const SubjectColumns b = subject_columns(other);
+  if (a.second.empty() != b.second.empty()) return false;
+  const bool in_order =
+      alike(groups, a.first, b.first) && (a.second.empty() || alike(groups, a.second, b.second));
+  return in_order || (!a.second.empty() && alike(groups, a.first, b.second) &&
+                      alike(groups, a.second, b.first));
+}
+
+std::vector<std::string> group_of(const PlaceGroups& groups, const std::string& subject) {
+  const SubjectColumns places = subject_columns(subject);
+  std::vector<std::string> all = {places.first};
+  if (!places.second.empty()) all.push_back(places.second);
+  for (const std::string& place : {places.first, places.second}) {
+    const auto group = groups.find(place);
+    if (group == groups.end()) continue;
+    for (const std::string& name : group->second)
+      if (std::find(all.begin(), all.end(), name) == all.end()) all.push_back(name);
+  }
+  return all;
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,30 @@
+#include "modelling/diagnosis/data/room.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace thermocomp::diagnosis {
+namespace {
+
+bool named_room(const std::string& column) {
+  return column.find("room") != std::string::npos || column.find("ambient") != std::string::npos ||
+         column.find("air") != std::string::npos;
+}
+
+}  // namespace
+
+std::string room_among(const std::vector<std::string>& columns) {
+  const auto room = std::find_if(columns.begin(), columns.end(), named_room);
+  return room == columns.end() ? std::string() : *room;
+}
+
+const Column* room_degC(const MeasuredData& data, const MeasuredRun& run) {
+  const auto find = [](const auto& names, const auto& columns) -> const Column* {
+    const auto at = std::find(names.begin(), names.end(), room_among(names)) - names.begin();
+    return at == std::ssize(names) ? nullptr : &columns[static_cast<std::size_t>(at)];
+  };
+  const Column* const other = find(data.others, run.others_degC);
+  return other != nullptr ? other : find(data.model.inputs, run.inputs_degC);
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,39 @@
+/// Probabilities of what was weighed for a finding.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "modelling/diagnosis/data/place_groups.hpp"
+#include "modelling/diagnosis/evidence/evidence.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// What belongs together for a person: `structure`, `heat`, `datum` or `sensor`.
+[[nodiscard]] const std::string& family_of(const std::string& cause);
+
+struct Posterior {
+  std::vector<double> of;  ///< one an explanation, in their order
+  double none{1.0};        ///< nothing that has a name
+  std::map<std::string, double> families{};
+};
+
+/// P(h) = exp(u_h) / (exp(u_none) + sum of exp(u)), u a weighted sum of
+///
+///   - what the explanation takes of rows that it was not fitted to, -log_left,
+///   - its likelihood, sign(score) ln(1 + |score| / 20), since neighbouring rows say the same,
+///   - its place in the order of Search::choose(),
+///   - how often its cause was right where all that was the same.
+///
+/// The weights are those under which effects planted in measured and in simulated machines are
+/// likeliest (tests/diagnosis/calibrate_posterior.py).
+/// @param explanations  in the order of Search::choose()
+[[nodiscard]] Posterior posterior(const std::vector<Explanation>& explanations);
+
+/// Of a cause with any place of the group of its subject: which of them it is cannot be told.
+[[nodiscard]] double probability_of_group(const std::vector<Explanation>& explanations,
+                                          const Posterior& posterior, const PlaceGroups& groups,
+                                          std::size_t index);
+
+}  // namespace thermocomp::diagnosis

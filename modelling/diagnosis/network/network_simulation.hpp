@@ -1,0 +1,63 @@
+/// Temperatures that a thermal network gives to the sensors over a measured run.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/run_file.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
+#include "modelling/diagnosis/network/heat_network.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// What drives the network over one run, and what was read. Missing values of signals, room and
+/// coolant are held at the last one.
+struct ThermalRun {
+  std::string name;  ///< the argument as given
+  Column time_s;
+  Eigen::Index begin{0};  ///< first selected row; the simulation starts at row 0
+  Column room_degC;
+  Column coolant_degC;
+  Column coolant_flows;               ///< 0 or 1
+  std::vector<Column> signals;        ///< order of ThermalRuns::signals
+  std::vector<Column> measured_degC;  ///< order of the network's sensors; NaN: missing
+  [[nodiscard]] Eigen::Index rows() const { return time_s.size(); }
+};
+
+struct ThermalRuns {
+  std::vector<std::string> signals;  ///< operating signals that all runs have
+  std::vector<ThermalRun> runs;
+};
+
+/// @param names  the runs' arguments as given
+/// @throws ConfigurationError when a run lacks the room, a signal of the network or every sensor
+[[nodiscard]] ThermalRuns thermal_runs(const ThermalPlant& plant, const std::vector<RunFile>& files,
+                                       const std::vector<std::string>& names,
+                                       const std::vector<std::string>& signals);
+
+/// Operating signals (no positions) that every one of the files has.
+[[nodiscard]] std::vector<std::string> shared_signals(const std::vector<RunFile>& files);
+
+/// A network made ready to run: its modes are found once.
+class NetworkSimulation {
+ public:
+  /// @param like  a network that may have the same matrices, whose modes are then taken over
+  explicit NetworkSimulation(const HeatNetwork& network, const NetworkSimulation* like = nullptr);
+
+  /// Readings of the sensors, shape (sensors)(rows). Between two rows signals, room and coolant
+  /// are the mean of both; the solution within a step is exact. The start is the field that agrees
+  /// with the first readings and is otherwise in balance with room and constant sources:
+  ///
+  ///   x_0 = argmin x'Kx / 2 - q'x  with  row_s . x = reading_s of every sensor
+  [[nodiscard]] std::vector<Column> readings_degC(const ThermalRuns& runs, std::size_t run) const;
+  [[nodiscard]] const HeatNetwork& network() const noexcept { return network_; }
+
+ private:
+  struct Modes;
+  HeatNetwork network_;
+  std::shared_ptr<const Modes> dry_;
+  std::shared_ptr<const Modes> flooded_;
+};
+
+}  // namespace thermocomp::diagnosis

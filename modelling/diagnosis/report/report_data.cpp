@@ -1,0 +1,127 @@
+#include "modelling/diagnosis/report/report_data.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "config/units.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr double change_lasts_s = 600.0;
+constexpr double slope_smoothing_s = 300.0;
+/// A slope below this share of the steepest is none.
+constexpr double slope_share_min = 0.08;
+
+}  // namespace
+
+const char* phase_name(Phase phase) {
+  switch (phase) {
+    case Phase::change:
+      return "speed change";
+    case Phase::heating:
+      return "heating";
+    case Phase::cooling:
+      return "cooling";
+    case Phase::standstill:
+      return "standstill";
+    case Phase::steady:
+      break;
+  }
+  return "steady";
+}
+
+std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
+  Column mean_K = Column::Zero(run.rows());
+  for (const Column& input : run.inputs_K) mean_K += input;
+  Panel slope(run.rows(), 1);
+  slopes(run.time_s, mean_K, {slope_smoothing_s}, Column::Ones(run.rows()), {1.0}, slope);
+  const double steepest = slope.cwiseAbs().maxCoeff();
+  std::vector<Phase> phases;
+  double changed_at_s = -1e300;
+  for (Eigen::Index row = 0; row < run.rows(); ++row) {
+    bool on = false;
+    for (std::size_t i = 0; i < data.signals.size(); ++i) {
+      if (kind_of(data.signals[i]) != QuantityKind::signal) continue;
+      const Column& signal = run.signals[i];
+      on = on || std::abs(signal[row]) > 0;
+      const double range = signal.maxCoeff() - signal.minCoeff();
+      if (row > 0 && std::abs(signal[row] - signal[row - 1]) > 0.05 * range)
+        changed_at_s = run.time_s[row];
+    }
+    if (row < run.begin) continue;
+    if (run.time_s[row] - changed_at_s < change_lasts_s)
+      phases.push_back(Phase::change);
+    else if (slope(row, 0) > slope_share_min * steepest)
+      phases.push_back(Phase::heating);
+    else if (slope(row, 0) < -slope_share_min * steepest)
+      phases.push_back(Phase::cooling);
+    else
+      phases.push_back(on ? Phase::steady : Phase::standstill);
+  }
+  return phases;
+}
+
+Whiteness whiteness_of(const Column& time_s, const Column& residual) {
+  std::vector<double> values;
+  std::vector<double> times_s;
+  for (Eigen::Index row = 0; row < residual.size(); ++row) {
+    if (!std::isfinite(residual[row])) continue;
+    values.push_back(residual[row]);
+    times_s.push_back(time_s[row]);
+  }
+  Whiteness white;
+  const std::size_t n = values.size();
+  if (n < 8) return white;
+  double mean = 0.0;
+  for (const double value : values) mean += value / static_cast<double>(n);
+  double variance = 0.0;
+  for (double& value : values) {
+    value -= mean;
+    variance += value * value / static_cast<double>(n);
+  }
+  std::vector<double> bends;
+  for (std::size_t i = 1; i + 1 < n; ++i)
+    bends.push_back(std::abs(values[i + 1] - 2.0 * values[i] + values[i - 1]));
+  const auto middle = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
+  std::nth_element(bends.begin(), middle, bends.end());
+  white.noise_um = *middle / (0.6745 * std::sqrt(6.0));
+  if (!(variance > 0)) return white;
+  white.noise_share = std::min(1.0, white.noise_um * white.noise_um / variance);
+  for (std::size_t lag = 1; lag < n / 2; ++lag) {
+    double product = 0.0;
+    for (std::size_t i = 0; i + lag < n; ++i) product += values[i] * values[i + lag];
+    if (product / static_cast<double>(n - lag) > variance / std::exp(1.0)) continue;
+    white.correlation_time_s = lag == 1 ? 0.0 : times_s[lag] - times_s[0];
+    break;
+  }
+  return white;
+}
+
+void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel& model,
+              const Corrections& corrections, const MeasuredData& data, bool test) {
+  report.outputs = model.outputs;
+  report.signals = data.signals;
+  report.inputs = model.inputs;
+  const std::size_t first = report.runs.size();
+  for (const MeasuredRun& run : data.runs) {
+    const Eigen::Index rows = run.rows() - run.begin;
+    ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
+    for (const Column& measured : run.measured_um)
+      added.measured_um.emplace_back(measured.tail(rows));
+    for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
+    for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
+    report.runs.push_back(std::move(added));
+  }
+  for (std::size_t output = 0; output < model.outputs.size(); ++output) {
+    const Residuals before = residuals(data, output);
+    const Residuals after = residuals(diagnosis.extended, corrections, data, output);
+    for (std::size_t i = 0; i < data.runs.size(); ++i) {
+      report.runs[first + i].before_um.push_back(before.by_run[i]);
+      report.runs[first + i].after_um.push_back(after.by_run[i]);
+    }
+  }
+}
+
+}  // namespace thermocomp::diagnosis

@@ -1,0 +1,53 @@
+/// Small things that the readers of the structure file's sections share.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "config/toml_reader.hpp"
+#include "modelling/structure/files/structure_spec.hpp"
+
+namespace thermocomp::structure {
+
+constexpr double mm = 1e-3;
+constexpr double far_mm = 1e6;  ///< no machine is a kilometre long
+constexpr std::array<const char*, 3> range_keys{"x_mm", "y_mm", "z_mm"};
+
+[[nodiscard]] inline Range length_range() {
+  return Range::between(-far_mm, far_mm);
+}
+
+[[nodiscard]] Origin origin_of(const TomlTable& table, std::string_view key,
+                               std::string value = {});
+
+/// Three numbers, in mm in the file.
+[[nodiscard]] Vec3 read_point_m(const TomlTable& table, std::string_view key);
+
+/// `name`; a problem where `names` has it already.
+[[nodiscard]] std::string read_unique_name(const TomlTable& table, std::set<std::string>& names);
+
+/// What `key` names, as its place among `known`; a problem and 0 where there is none such.
+[[nodiscard]] Index read_index(const TomlTable& table, std::string_view key,
+                               const std::vector<std::string>& known, std::string_view what);
+
+template <class Items>
+[[nodiscard]] std::vector<std::string> names_of(const Items& items) {
+  std::vector<std::string> names;
+  names.reserve(items.size());
+  for (const auto& item : items) names.push_back(item.name);
+  return names;
+}
+
+[[nodiscard]] Region read_region(const TomlTable& parent, std::string_view key,
+                                 const std::vector<PartSpec>& parts);
+
+/// [room], [coolant], [[convection]], [[heat]], [[load_case]]; after materials, parts and joints.
+void read_heat_sections(const TomlTable& root, StructureSpec& spec);
+
+/// [placement] with its [[placement.pattern]]; after blocks.
+void read_placement_section(const TomlTable& root, StructureSpec& spec);
+
+}  // namespace thermocomp::structure

@@ -1,0 +1,67 @@
+/// What a request to the gateway may be: whatever headers and query say, a request is judged, a
+/// host that is let in is one of ours, and a stretch of history that is taken can be drawn.
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fuzz.hpp"
+#include "gateway/http/request_rules.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::gateway;
+
+namespace {
+
+/// The input's fields; a byte 0xFF, which is no part of UTF-8, divides them.
+std::vector<std::string_view> fields_of(std::string_view input) {
+  std::vector<std::string_view> fields;
+  while (fields.size() < 8) {
+    const std::size_t end = input.find('\xFF');
+    fields.push_back(input.substr(0, end));
+    if (end == std::string_view::npos) break;
+    input.remove_prefix(end + 1);
+  }
+  fields.resize(8);
+  return fields;
+}
+
+void judge(const std::vector<std::string_view>& fields) {
+  static const HostRules hosts("10.0.0.5", {"mill.example"});
+  const RequestFacts request{fields[0], fields[1],        fields[2], fields[3],
+                             fields[4], fields[5].size(), 1};
+  const std::optional<Refusal> refusal = judge_request(request, hosts);
+  if (refusal) {
+    FUZZ_PROMISE(refusal->status >= 400 && refusal->status < 500 && !refusal->text.empty());
+    return;
+  }
+  const std::optional<std::string> name = host_name(request.host);
+  FUZZ_PROMISE(name && (*name == "localhost" || *name == "127.0.0.1" || *name == "::1" ||
+                        *name == "10.0.0.5" || *name == "mill.example"));
+  FUZZ_PROMISE(request.path.front() == '/');
+  // An origin that is let through is that of the very host.
+  if (!request.origin.empty())
+    FUZZ_PROMISE(request.origin.size() == request.host.size() + 7 ||
+                 request.origin.size() == request.host.size() + 8);
+}
+
+void read_history(const std::vector<std::string_view>& fields) {
+  std::string why;
+  constexpr double now_s = 1.7e9;
+  const auto request = parse_history_request(fields[5], fields[6], fields[7], now_s, why);
+  FUZZ_PROMISE(request.has_value() != !why.empty());
+  if (!request) return;
+  FUZZ_PROMISE(std::isfinite(request->from_s) && std::isfinite(request->to_s));
+  FUZZ_PROMISE(request->from_s >= 0.0 && request->to_s > request->from_s);
+  FUZZ_PROMISE(request->points >= 2 && request->points <= 5000);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto fields = fields_of({reinterpret_cast<const char*>(data), size});
+  judge(fields);
+  read_history(fields);
+  return 0;
+}

@@ -1,0 +1,71 @@
+"""Devices of a machine made of pymodbus, software that is not ours: thermocouple modules on one port, a
+PLC on another. The machine's room is at 20 degC; a module's channels are tenths of a degree.
+
+    foreign_machine.py MODULES_PORT PLC_PORT
+
+Unit 3: a module as WAGO's 750-458 (input registers 0 to 7, 32767: broken): three thermocouples, five open
+channels. Unit 4: one without a preset, float32 with the low word first in holding registers 100 to 103.
+PLC, unit 1: docs/controllers/plc.md. It shows at input 0 and 1 what stands in holding 0 and 1 while valid
+bit 0 is set and the heartbeat changes, and a spindle speed at input 26.
+"""
+
+import asyncio
+import struct
+import sys
+
+from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext, ModbusSlaveContext
+from pymodbus.server import StartAsyncTcpServer
+
+OPEN = 32767
+
+
+def slave(inputs=None, holdings=None):
+    def block(values):
+        words = [0] * 200
+        for address, word in (values or {}).items():
+            words[address] = word
+        return ModbusSequentialDataBlock(0, words)
+
+    return ModbusSlaveContext(di=ModbusSequentialDataBlock(0, [0] * 200),
+                              co=ModbusSequentialDataBlock(0, [0] * 200), hr=block(holdings),
+                              ir=block(inputs), zero_mode=True)
+
+
+def float_low_word_first(value):
+    high, low = struct.unpack(">2H", struct.pack(">f", value))
+    return low, high
+
+
+def modules():
+    broken = {channel: OPEN for channel in range(8)}
+    wago = slave(inputs={**broken, 0: 201, 1: 203, 4: 198})
+    low, high = float_low_word_first(20.25)
+    low2, high2 = float_low_word_first(20.5)
+    other = slave(holdings={100: low, 101: high, 102: low2, 103: high2})
+    return ModbusServerContext(slaves={3: wago, 4: other}, single=False)
+
+
+async def act(plc):
+    """One turn of the PLC each 10 ms: it follows the offset, and only while the daemon lives."""
+    heartbeat, silent_turns, turn_s = None, 0, 0.01
+    while True:
+        valid, beat = plc.getValues(3, 10, 2)
+        silent_turns = silent_turns + 1 if beat == heartbeat else 0
+        if heartbeat is not None and silent_turns < 1.0 / turn_s and valid & 1:
+            plc.setValues(4, 0, plc.getValues(3, 0, 2))
+        heartbeat = beat
+        await asyncio.sleep(turn_s)
+
+
+async def main():
+    plc = slave(inputs={26: 3000})
+    ports = [int(port) for port in sys.argv[1:3]]
+    servers = [StartAsyncTcpServer(context=context, address=("127.0.0.1", port))
+               for context, port in ((modules(), ports[0]),
+                                     (ModbusServerContext(slaves={1: plc}, single=False),
+                                      ports[1]))]
+    await asyncio.gather(act(plc), *servers)
+
+
+if __name__ == "__main__":
+    asyncio.run(main())

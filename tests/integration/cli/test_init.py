@@ -1,0 +1,189 @@
+"""`thermocomp init`: from foreign devices to a daemon that compensates, without an edit by hand."""
+import contextlib
+import os
+import pathlib
+import pty
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import PROGRAM, SOURCE, run
+
+HERE = pathlib.Path(__file__).parent
+DAEMON = pathlib.Path(PROGRAM).parent / "thermocompd"
+PATIENCE_S = 60.0
+NAMES = "bed column spindle"
+
+
+def eventually(check, what):
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        if value := check():
+            return value
+        time.sleep(0.05)
+    raise AssertionError("never happened: " + what)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def listens(port):
+    with contextlib.suppress(OSError):
+        socket.create_connection(("127.0.0.1", port), timeout=1).close()
+        return True
+    return False
+
+
+@pytest.fixture(scope="module")
+def foreign():
+    """Ports of the modules and of the PLC."""
+    ports = free_port(), free_port()
+    machine = subprocess.Popen([sys.executable, HERE / "foreign_machine.py", *map(str, ports)],
+                               stderr=subprocess.DEVNULL)
+    eventually(lambda: all(map(listens, ports)), "the devices listen")
+    yield ports
+    machine.kill()
+    machine.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Short, because the socket comes into it; with the presets beside the configuration."""
+    (tmp_path / "devices").symlink_to(SOURCE / "config" / "devices")
+    return tmp_path
+
+
+def converse(arguments, answers):
+    """Runs thermocomp on a terminal and answers each question; (exit status, all that was shown)."""
+    ours, theirs = pty.openpty()
+    program = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=theirs, stdout=theirs,
+                               stderr=theirs)
+    os.close(theirs)
+    shown, waiting, end = "", list(answers), time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        if not select.select([ours], [], [], 0.5)[0]:
+            continue
+        try:
+            shown += os.read(ours, 4096).decode()
+        except OSError:  # it has ended
+            break
+        if shown.endswith(": "):
+            assert waiting, "one more question:\n" + shown
+            answer = waiting.pop(0)
+            os.write(ours, answer.encode() + b"\n")
+    assert program.wait(PATIENCE_S) is not None
+    os.close(ours)
+    assert not waiting, (waiting, shown)
+    return program.returncode, shown
+
+
+@contextlib.contextmanager
+def running(config):
+    log = (config.parent / "log").open("w")
+    daemon = subprocess.Popen([DAEMON, config], stdout=log, stderr=log)
+    try:
+        eventually(lambda: "ready: " in (config.parent / "log").read_text(), "the daemon is ready")
+        yield
+    finally:
+        daemon.send_signal(signal.SIGTERM)
+        assert daemon.wait(PATIENCE_S) == 0
+
+
+def assert_compensates(config):
+    """No edit: check, start, enable, status."""
+    answer = run("check", config)
+    assert answer.returncode == 0, answer.stderr
+    sock = config.parent / "status.sock"
+    with running(config):
+        eventually(lambda: "disabled" in run("--socket", sock, "status").stdout
+                   or "switched off" in run("--socket", sock, "status").stdout, "it waits")
+        assert run("--socket", sock, "enable").returncode == 0
+        eventually(lambda: run("--socket", sock, "status").returncode == 0, "it compensates")
+        assert run("--socket", sock, "status").stdout.startswith("Compensating    : yes")
+
+
+def test_asked_on_a_terminal(foreign, folder):
+    modules, plc = foreign
+    config = folder / "thermocompd.toml"
+    answers = [f"tcp:127.0.0.1:{modules}", "",  # one bus
+               "wago_750_458", NAMES,
+               "holding:float32/CDAB:1:100,102", "",
+               f"tcp:127.0.0.1:{plc}", "yes", "spindle_rpm=input:26:uint16", "z"]
+    begun = time.monotonic()
+    status, shown = converse(["init", config], answers)
+    assert status == 0, shown
+    assert "channel 1: 20.10 degC" in shown and "channel 3: open_circuit" in shown
+    assert f"5 sensors, {len(answers)} questions" in shown
+    text = config.read_text()
+    assert 'preset = "wago_750_458"' in text and 'name = "spindle"\ndevice = "module1"\nchannel = 5' in text
+    assert text.count("[[block]]") == 5
+    assert_compensates(config)
+    print(f"{len(answers)} questions, 0 edits, {time.monotonic() - begun:.1f} s to compensating")
+
+
+def test_by_options_without_a_terminal(foreign, folder):
+    modules, plc = foreign
+    config = folder / "thermocompd.toml"
+    arguments = ["init", config, "--bus", f"tcp:127.0.0.1:{modules}", "--module", "3=wago_750_458",
+                 "--names", "bed,column,spindle", "--controller", f"tcp:127.0.0.1:{plc}@1",
+                 "--axes", "z"]
+    answer = run(*arguments)
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert_compensates(config)
+    before = config.read_text()
+    answer = run(*arguments)
+    assert answer.returncode == 2 and "--force" in answer.stderr
+    assert config.read_text() == before
+    assert run(*arguments, "--force").returncode == 0
+
+
+def test_a_model_that_is_there_is_bound_by_the_sensors_names(foreign, folder):
+    modules, plc = foreign
+    (folder / "mill.toml").write_text(
+        'format = 1\ninputs = ["bed_degC", "spindle_degC"]\noutputs = ["y_um", "z_um"]\n'
+        'reference = "first_sample"\nmatrix_um_per_K = [[1.0, 2.0], [3.0, 4.0]]\n')
+    config = folder / "thermocompd.toml"
+    arguments = ["init", config, "--bus", f"tcp:127.0.0.1:{modules}", "--module",
+                 "3=wago_750_458", "--controller", f"tcp:127.0.0.1:{plc}", "--model",
+                 folder / "mill.toml"]
+    answer = run(*arguments, "--names", "bed,column,spindle")
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    text = config.read_text()
+    assert text.count("[[block]]") == 2 and 'output = "y_um"' in text
+    assert "in no block: column" in run("check", config).stdout
+
+
+def test_what_is_not_there_is_named(foreign, folder):
+    _, plc = foreign
+    config = folder / "thermocompd.toml"
+    answer = run("init", config, "--bus", f"tcp:127.0.0.1:{free_port()}", "--module",
+                 "3=wago_750_458:1-2", "--controller", f"tcp:127.0.0.1:{plc}", "--axes", "z")
+    assert answer.returncode == 1, answer.stdout + answer.stderr
+    assert "Not everything is there yet" in answer.stdout
+    assert run("check", config).returncode == 0
+    answer = run("init", folder / "other" / "c.toml", "--axes", "z", stdin=subprocess.DEVNULL)
+    assert answer.returncode == 2
+    assert answer.stderr.rstrip().endswith("missing: --bus --module --controller")
+
+
+@pytest.mark.parametrize("option, value, named", [
+    ("--bus", "tcp:", "tcp:HOST"), ("--bus", "rtu:/dev/x:0", "baud"),
+    ("--bus", "rtu:/dev/x:9600:maybe", "parity"), ("--bus", "tcp:h:99999", "port"),
+    ("--module", "3", "UNIT="), ("--module", "3=", "preset"), ("--module", "9/3=wago_750_458", "bus 9"),
+    ("--module", "3=input:int16:0.1", "ADDRESSES"), ("--module", "3=input:int12:0.1:0", "type"),
+    ("--module", "3=input:int16:0:0", "count"), ("--module", "3=wago_750_458:4-1", "ranges"),
+    ("--controller", "tcp:h@x", "unit"), ("--signal", "x", "NAME="),
+    ("--signal", "x=coil:0:int16", "TABLE:ADDRESS"), ("--offset", "disc:0", "holding")])
+def test_bad_use_is_named_in_one_line(folder, option, value, named):
+    answer = run("init", folder / "c.toml", "--bus", "tcp:127.0.0.1:9", option, value,
+                 stdin=subprocess.DEVNULL)
+    assert answer.returncode == 2, answer.stdout
+    assert answer.stderr.count("\n") == 1 and named in answer.stderr, answer.stderr
+    assert not list(folder.glob("*.toml")) and not list(folder.glob(".thermocomp*"))

@@ -1,0 +1,294 @@
+"""Files as people have them: `fit` and `diagnose` say line by line what they understood, and answer
+as they do on the same rows in the form that programs write. What may mean two things is asked
+for."""
+import csv
+import datetime
+import json
+import math
+import pathlib
+import random
+
+import pytest
+
+from conftest import PROGRAM, run
+
+pytestmark = pytest.mark.skipif(
+    not (pathlib.Path(PROGRAM).parent / "thermocomp-modelling").exists(),
+    reason="thermocomp-modelling is not in this build")
+
+START = datetime.datetime(2026, 3, 14, 22, 30)
+RUNS = 3
+
+
+def simulated(test):
+    """[time_s, t1, t2, rpm, z]: two bodies behind a spindle that starts and stops."""
+    chance = random.Random(test)
+    quick = slow = 0.0
+    rows = []
+    for minute in range(120):
+        speed = (1500 + 500 * test) * (minute % 50 < 35)
+        quick += (speed / 250 - quick) / 8
+        slow += (quick - slow) / 40
+        rows.append([60 * minute, round(20 + quick + chance.gauss(0, 0.02), 3),
+                     round(19 + slow + chance.gauss(0, 0.02), 3), speed,
+                     round(5 * quick - 3 * slow + chance.gauss(0, 0.1), 3)])
+    return rows
+
+
+PLAIN = ["time_s", "t1_degC", "t2_degC", "spindle_rpm", "z_um"]
+UNITS = ["Zeit in s", "T1 [°C]", "T2 (°C)", "Drehzahl [1/min]", "z (µm)"]
+NAMES_OF_UNITS = {"T1": "t1_degC", "T2": "t2_degC", "Drehzahl": "spindle_rpm", "z": "z_um"}
+
+
+def comma(value):
+    return f"{value:.3f}".replace(".", ",")
+
+
+def joined(header, rows, separator=",", end="\n", before="", behind=""):
+    lines = [separator.join(str(field) for field in row) + behind for row in [header, *rows]]
+    return before + end.join(lines) + end
+
+
+def moment(seconds):
+    return START + datetime.timedelta(seconds=seconds)
+
+
+def with_time(rows, text):
+    return [[text(row[0]), *row[1:]] for row in rows]
+
+
+def semicolons(rows):
+    return joined(UNITS, [[row[0], *map(comma, row[1:])] for row in rows], ";")
+
+
+def tabs(rows):
+    header = ["t in s", "T1 °C", "T2 / °C", "Drehzahl (rpm)", "z / µm"]
+    return joined(header, rows, "\t")
+
+
+def byte_order_mark(rows):
+    return joined(UNITS, rows, ",", "\r\n", "\ufeff")
+
+
+def iso(rows):
+    header = ["time", *UNITS[1:]]
+    return joined(header, with_time(rows, lambda s: moment(s).isoformat() + "Z"))
+
+
+def german_dates(rows):
+    header = ["Zeit", *UNITS[1:]]
+    own = with_time(rows, lambda s: moment(s).strftime("%d.%m.%Y %H:%M:%S"))
+    return joined(header, [[row[0], *map(comma, row[1:])] for row in own], ";").encode("latin-1")
+
+
+def day_fractions(rows):
+    zero = datetime.datetime(1899, 12, 30)
+    own = with_time(rows, lambda s: f"{(moment(s) - zero) / datetime.timedelta(days=1):.9f}")
+    return joined(["date", *UNITS[1:]], own)
+
+
+def row_of_units(rows):
+    header = ["Zeit", "T1", "T2", "Drehzahl", "z"]
+    return joined(header, [["s", "°C", "°C", "1/min", "µm"], *rows], ";")
+
+
+def date_and_clock(rows):
+    header = ["Datum", "Uhrzeit", *UNITS[1:]]
+    own = [[moment(row[0]).strftime("%d.%m.%Y"), moment(row[0]).strftime("%H:%M:%S"), *row[1:]]
+           for row in rows]
+    return joined(header, own, ";")
+
+
+def minutes_and_kelvin(rows):
+    header = ["t (min)", "T1 [°F]", "T2 [°C]", "Drehzahl [U/min]", "z [nm]"]
+    return joined(header, [[row[0] / 60, row[1] * 1.8 + 32, row[2], row[3], row[4] * 1000]
+                           for row in rows])
+
+
+def ends_of_lines(rows):
+    return joined(UNITS, rows, ";", "\n", "sep=;\n", ";") + ";;;;;\n"
+
+
+def quoted(rows):
+    header = [f'"{name}"' for name in UNITS]
+    return joined(header, [[f'"{comma(value)}"' for value in row] for row in rows], ",")
+
+
+def without_units(rows):
+    return joined(["Zeit", "T1", "T2", "Drehzahl", "z"], rows, ";")
+
+
+def mapped(*lines, names=True):
+    """A file of --columns; the names as the model has them."""
+    columns = [f'"{name}" = "{ours}"' for name, ours in NAMES_OF_UNITS.items()]
+    return "\n".join([*lines, "[columns]", *(columns if names else [])]) + "\n"
+
+
+NAMED = "\n".join(["[columns]"] + [f'"{name}" = "{ours}"' for name, ours in
+                                   zip(UNITS[1:], PLAIN[1:])]) + "\n"
+
+
+def named(header):
+    """A map from the names of a header to ours; the first is the time."""
+    return "[columns]\n" + "".join(f'"{name}" = "{ours}"\n'
+                                   for name, ours in zip(header, PLAIN[1:]))
+
+
+# How rows are written, the map (None: the file says everything itself), and words of what was
+# understood. A name that is not ours is mapped, so that answers can be laid beside each other.
+FORMS = {
+    "semicolons": (semicolons, NAMED, ["separator ';', decimal comma", "T1 [°C]"]),
+    "tabs": (tabs, named(["T1 °C", "T2 / °C", "Drehzahl (rpm)", "z / µm"]), ["separator 'tab'"]),
+    "byte_order_mark": (byte_order_mark, NAMED, ["separator ','", "'z (µm)' is z_um"]),
+    "iso": (iso, NAMED, ["year-month-day", "2026-03-14 22:30:00"]),
+    "german_dates": (german_dates, NAMED, ["day.month.year", "Latin-1"]),
+    "day_fractions": (day_fractions, NAMED, ["numbers [day], seconds after the first row (46095.9375)"]),
+    "row_of_units": (row_of_units, mapped(), ["'T1' is t1_degC"]),
+    "date_and_clock": (date_and_clock, NAMED, ["'Datum'", "'Uhrzeit'"]),
+    "minutes_and_kelvin": (minutes_and_kelvin,
+                           named(["T1 [°F]", "T2 [°C]", "Drehzahl [U/min]", "z [nm]"]),
+                           ["min", "°F"]),
+    "ends_of_lines": (ends_of_lines, NAMED, ["separator ';'"]),
+    "quoted": (quoted, NAMED, ["decimal comma"]),
+    "without_units": (without_units, mapped('time = "Zeit"', 'time_unit = "s"'),
+                      ["'Drehzahl' is spindle_rpm"]),
+}
+
+
+@pytest.fixture(scope="module", name="plain")
+def plain_fixture(tmp_path_factory):
+    """The rows as programs write them; what `fit` and `diagnose` answer on them."""
+    folder = tmp_path_factory.mktemp("plain")
+    files = []
+    for test in range(RUNS):
+        files.append(folder / f"run_{test}.csv")
+        with files[-1].open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([PLAIN, *simulated(test)])
+    answers = answers_of(files, folder, [])
+    for said in answers["stderr"]:
+        assert "read as follows" not in said
+    return answers
+
+
+def answers_of(files, folder, options):
+    model, found = folder / "model.toml", folder / "found.json"
+    fit = run("fit", *files, "--outputs", "z_um", "-o", model, "--json", *options)
+    assert fit.returncode == 0, fit.stderr
+    base = folder / "base.toml"
+    base.write_text('format = 1\ninputs = ["t1_degC", "t2_degC"]\noutputs = ["z_um"]\n'
+                    'reference = "first_sample"\nmatrix_um_per_K = [[5.0, 0.0]]\n',
+                    encoding="utf-8")
+    diagnose = run("diagnose", "--model", base, "--train", *files[:-1], "--test", files[-1],
+                   "--json", found, *options)
+    assert diagnose.returncode == 0, diagnose.stderr
+    return {"fit": json.loads(fit.stdout), "diagnose": json.loads(found.read_text()),
+            "stderr": [fit.stderr, diagnose.stderr]}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_file_of_another_form_is_told_and_answered_like_the_plain_one(form, plain, tmp_path):
+    write, columns, words = FORMS[form]
+    files = []
+    for test in range(RUNS):
+        text = write(simulated(test))
+        files.append(tmp_path / f"run_{test}.csv")
+        files[-1].write_bytes(text if isinstance(text, bytes) else text.encode())
+    (tmp_path / "map.toml").write_text(columns, encoding="utf-8")
+    answers = answers_of(files, tmp_path, ["--columns", tmp_path / "map.toml"])
+    for said in answers["stderr"]:
+        for file in files:
+            assert said.count(f"{file.name}: read as follows") == 1, said
+        for word in words:
+            assert word in said, said
+    mine, own = answers["fit"], plain["fit"]
+    assert mine["family"] == own["family"] and mine["inputs"] == own["inputs"]
+    assert mine["left_out_rms_um"]["z_um"] == pytest.approx(own["left_out_rms_um"]["z_um"], 1e-3)
+    mine, own = answers["diagnose"], plain["diagnose"]
+    assert mine["verdict"] == own["verdict"] == "effect"
+    assert ([(each["cause"], each["subject"]) for each in mine["findings"]] ==
+            [(each["cause"], each["subject"]) for each in own["findings"]])
+    assert (mine["baseline"]["z_um"]["test_rms_um"] ==
+            pytest.approx(own["baseline"]["z_um"]["test_rms_um"], 1e-3))
+
+
+def slashes(rows):
+    own = with_time(rows, lambda s: (START.replace(day=4, hour=1) +
+                                     datetime.timedelta(seconds=s)).strftime("%m/%d/%Y %H:%M:%S"))
+    return joined(["Zeit", *UNITS[1:]], own)
+
+
+def thousands(rows):
+    return joined(UNITS, [[row[0], "20,125", "19,250", row[3], f"{row[4]:.0f}"] for row in rows],
+                  ";")
+
+
+def two_times(rows):
+    own = [[moment(row[0]).isoformat(), moment(row[0]).isoformat(), *row[1:]] for row in rows]
+    return joined(["start", "end", *UNITS[1:]], own)
+
+
+def no_unit_of_time(rows):
+    return joined(["Zeit", *UNITS[1:]], rows)
+
+
+def no_unit(rows):
+    return joined(["Zeit in s", "T1", *UNITS[2:]], rows)
+
+
+@pytest.mark.parametrize("write, asked", [
+    (thousands, ['decimal = ","', 'thousands = ","']),
+    (slashes, ['date_order = "day.month.year" or "month.day.year"']),
+    (two_times, ["time = "]),
+    (no_unit_of_time, ["time_unit = "]),
+    (no_unit, ['"T1" = ']),
+], ids=lambda value: getattr(value, "__name__", ""))
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_what_may_mean_two_things_is_asked_for(write, asked, command, tmp_path):
+    file = tmp_path / "run.csv"
+    file.write_text(write(simulated(0)), encoding="utf-8")
+    model = tmp_path / "base.toml"
+    if command == "fit":
+        answer = run("fit", file, "--outputs", "z_um", "-o", model)
+    else:
+        model.write_text('format = 1\ninputs = ["t1_degC"]\noutputs = ["z_um"]\n'
+                         'reference = "first_sample"\nmatrix_um_per_K = [[5.0]]\n',
+                         encoding="utf-8")
+        answer = run("diagnose", "--model", model, "--train", file, "--test", file,
+                     "--json", tmp_path / "found.json")
+    assert answer.returncode == 2
+    assert "run.csv" in answer.stderr
+    for line in asked:
+        assert line in answer.stderr, answer.stderr
+
+
+def test_rows_that_judge_may_not_be_fitted(tmp_path):
+    file = tmp_path / "run.csv"
+    with file.open("w", newline="", encoding="utf-8") as text:
+        csv.writer(text).writerows([PLAIN, *simulated(0)])
+    model = tmp_path / "base.toml"
+    model.write_text('format = 1\ninputs = ["t1_degC"]\noutputs = ["z_um"]\n'
+                     'reference = "first_sample"\nmatrix_um_per_K = [[5.0]]\n', encoding="utf-8")
+    for train, test in ((file, file), (f"{file}@:4000", f"{file}@3000:"),
+                        (file, tmp_path / "." / "run.csv")):
+        answer = run("diagnose", "--model", model, "--train", train, "--test", test,
+                     "--json", tmp_path / "found.json")
+        assert answer.returncode == 2 and "run.csv" in answer.stderr, answer.stderr
+    answer = run("fit", f"{file}@:4000", f"{file}@3000:", "--outputs", "z_um", "-o", model)
+    assert answer.returncode == 2 and "given twice" in answer.stderr
+
+
+def test_readings_of_a_broken_sensor_are_not_fitted_silently(tmp_path):
+    files = []
+    for test in range(2):
+        rows = simulated(test)
+        if test == 0:
+            for row in (30, 31, 77):
+                rows[row][1] = 3276.7
+        files.append(tmp_path / f"run_{test}.csv")
+        with files[-1].open("w", newline="", encoding="utf-8") as text:
+            csv.writer(text).writerows([PLAIN, *rows])
+    answer = run("fit", *files, "--outputs", "z_um", "-o", tmp_path / "m.toml", "--json")
+    assert answer.returncode == 0, answer.stderr
+    assert "t1_degC: 3 readings are left out" in answer.stderr
+    assert math.isfinite(json.loads(answer.stdout)["left_out_rms_um"]["z_um"])
+    assert json.loads(answer.stdout)["left_out_rms_um"]["z_um"] < 2.0

@@ -1,0 +1,95 @@
+"""Fills the outputs of docs/first_machine.md with what the programs say now.
+
+    THERMOCOMP=build/release/bin/thermocomp THERMOCOMP_SOURCE=. write_first_machine.py
+
+Runs the devices of foreign_machine.py on ports 5020 and 5021 and two days of the simulated machine.
+"""
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+from conftest import PROGRAM, SOURCE, run
+from test_init import HERE, NAMES, converse, eventually, listens, running
+
+DOCUMENT = SOURCE / "docs" / "first_machine.md"
+PORTS = 5020, 5021
+
+
+def block(text):
+    plain = re.sub("\033\\[[0-9;]*m", "", text.replace("\r", ""))  # no colours on paper
+    return "```\n" + plain.rstrip() + "\n```\n"
+
+
+def said(folder, *arguments):
+    """A command as typed in the folder, and all that it printed."""
+    answer = subprocess.run([PROGRAM, *map(str, arguments)], cwd=folder, text=True, timeout=120,
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    typed = "thermocomp " + " ".join(map(str, arguments))
+    return f"$ {typed}\n{answer.stdout}"
+
+
+def first_outputs(folder):
+    config = folder / "thermocompd.toml"
+    answers = [f"tcp:127.0.0.1:{PORTS[0]}", "", "wago_750_458", NAMES,
+               "holding:float32/CDAB:1:100,102", "motor room", f"tcp:127.0.0.1:{PORTS[1]}", "",
+               "spindle_rpm=input:26:uint16", ""]
+    status, shown = converse(["init", config], answers)
+    assert status == 0, shown
+    folder_name = str(folder)
+    init = "$ thermocomp init thermocompd.toml\n" + shown.replace(folder_name + "/", "")
+    socket = ["--socket", "status.sock"]
+    with running(config):
+        first = said(folder, "check", "thermocompd.toml")
+        first += "\n$ thermocompd thermocompd.toml &\n" + said(folder, *socket, "sensors")
+        eventually(lambda: run("--socket", "status.sock", "prove", "z", "0.1",
+                                           cwd=folder).returncode == 0, "the axis is in step")
+        first += "\n" + said(folder, *socket, "prove", "z", "5")
+        first += "\n" + said(folder, *socket, "enable")
+        eventually(lambda: run(*socket, "status", cwd=folder).returncode == 0, "compensating")
+        first += "\n" + said(folder, *socket, "status")
+    return init, first.replace(folder_name + "/", "")
+
+
+def model_outputs(folder):
+    machine = SOURCE / "config" / "examples" / "machine.toml"
+    text = ""
+    for day in ("monday", "tuesday", "friday"):
+        seed = {"monday": 1, "tuesday": 2, "friday": 5}[day]
+        assert run("simulate", machine, "--seed", seed, "-o", folder / f"{day}.csv").returncode == 0
+    text += said(folder, "inspect", "monday.csv", "tuesday.csv")
+    text += "\n" + said(folder, "fit", "monday.csv", "tuesday.csv", "--outputs", "z_um", "-o",
+                        "model.toml")
+    text += "\n" + said(folder, "predict", "--model", "model.toml", "friday.csv", "-o",
+                        "predicted.csv")
+    return text
+
+
+def fill(text, name, output):
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->\n"
+    return text[:text.index(begin) + len(begin)] + block(output) + text[text.index(end):]
+
+
+def main():
+    machine = subprocess.Popen([sys.executable, HERE / "foreign_machine.py", *map(str, PORTS)],
+                               stderr=subprocess.DEVNULL)
+    try:
+        eventually(lambda: all(map(listens, PORTS)), "the devices listen")
+        with tempfile.TemporaryDirectory(prefix="tc") as name:
+            folder = pathlib.Path(name)
+            (folder / "devices").symlink_to(SOURCE / "config" / "devices")
+            init, first = first_outputs(folder)
+            model = model_outputs(folder)
+    finally:
+        machine.kill()
+        machine.wait(30)
+    text = DOCUMENT.read_text()
+    for part, output in (("init", init), ("first", first), ("model", model)):
+        text = fill(text, part, output)
+    DOCUMENT.write_text(text)
+    print(f"{DOCUMENT}: filled, by {PROGRAM}")
+
+
+if __name__ == "__main__":
+    main()

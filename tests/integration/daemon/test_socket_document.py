@@ -1,0 +1,140 @@
+"""The examples of docs/socket.md: each request is taken by a daemon, and the answer has the fields that
+the document shows. `test_socket_document.py --write` makes the examples anew."""
+
+import json
+import pathlib
+import socket
+import sys
+import tempfile
+
+from lab import SOURCE, Lab
+from plain_devices import Machine
+
+DOCUMENT = SOURCE / "docs" / "socket.md"
+BEGIN, END = "<!-- examples -->\n", "<!-- end of examples -->\n"
+READS = ("status", "sensors", "offsets", "timing", "model", "events")
+
+
+def requests():
+    """(title, method, params); in an order in which all of them can be done."""
+    asked = [(method, method, None) for method in READS]
+    asked += [("subscribe", "subscribe", {"methods": ["offsets"], "period_s": 0.5}),
+              ("measured", "measured", {"axis": "z", "value_um": 1.5}),
+              ("cycle_end", "cycle_end", None),
+              ("disable", "disable", None),
+              ("enable", "enable", None),
+              ("reference", "reference", {"force": True}),
+              ("prove", "prove", {"axis": "z", "value_um": 2.0}),
+              ("release, where nothing is latched", "release", {"axis": "z"}),
+              ("reload", "reload", None),
+              ("a method that there is not", "restart", None)]
+    return asked
+
+
+def line_of(method, params):
+    request = {"jsonrpc": "2.0", "id": 1, "method": method}
+    if params is not None:
+        request["params"] = params
+    return json.dumps(request)
+
+
+class Client:
+    def __init__(self, daemon):
+        self.link = socket.socket(socket.AF_UNIX)
+        self.link.settimeout(30)
+        self.link.connect(str(daemon.socket))
+        self.lines = self.link.makefile("r")
+
+    def send(self, line):
+        self.link.sendall(line.encode() + b"\n")
+        return json.loads(self.lines.readline())
+
+    def close(self):
+        self.lines.close()
+        self.link.close()
+
+
+def exchange(daemon, line):
+    """The answer; of a subscription the first notification too."""
+    client = Client(daemon)
+    try:
+        answers = [client.send(line)]
+        if json.loads(line)["method"] == "subscribe":
+            answers.append(json.loads(client.lines.readline()))
+        return answers
+    finally:
+        client.close()
+
+
+def examples(text):
+    """[(request line, [answer lines])] of the document."""
+    found = []
+    for line in text[text.index(BEGIN):text.index(END)].splitlines():
+        if line.startswith("    > "):
+            found.append((line[6:], []))
+        elif line.startswith("    < "):
+            found[-1][1].append(line[6:])
+    return found
+
+
+def fields(answer):
+    """The names by which a client finds what it looks for."""
+    kind = next(key for key in ("result", "error", "params") if key in answer)
+    return kind, sorted(answer[kind])
+
+
+def pruned(value):
+    """Of lists the first element, which shows what there is."""
+    if isinstance(value, dict):
+        return {key: pruned(each) for key, each in value.items()}
+    return [pruned(each) for each in value[:1]] if isinstance(value, list) else value
+
+
+def shown(answer, folder):
+    return json.dumps(pruned(answer)).replace(str(folder) + "/", "/etc/thermocomp/")
+
+
+def running(lab):
+    machine = Machine(lab)
+    daemon = machine.start()
+    machine.warm_by(3.0)
+    daemon.wait_for_offset(3.0)
+    return daemon
+
+
+def test_documented_requests_are_taken(lab):
+    documented = examples(DOCUMENT.read_text())
+    assert [json.loads(request)["method"] for request, _ in documented] == [
+        method for _, method, _ in requests()]
+    daemon = running(lab)
+    for request, told in documented:
+        answers = exchange(daemon, request)
+        assert len(answers) == len(told), request
+        for answer, text in zip(answers, told):
+            assert fields(json.loads(text)) == fields(answer), (request, answer)
+
+
+def write():
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        lab = Lab(folder)
+        try:
+            daemon = running(lab)
+            text = ""
+            for title, method, params in requests():
+                line = line_of(method, params)
+                text += f"{title}:\n\n    > {line}\n"
+                for answer in exchange(daemon, line):
+                    text += f"    < {shown(answer, folder)}\n"
+                text += "\n"
+        finally:
+            lab.end()
+    whole = DOCUMENT.read_text()
+    head, rest = whole.split(BEGIN)
+    DOCUMENT.write_text(head + BEGIN + "\n" + text + END + rest.split(END)[1])
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] != ["--write"]:
+        sys.exit("test_socket_document.py --write")
+    write()

@@ -1,0 +1,173 @@
+"""A gateway beside a daemon, for the tests: its process, its configuration, plain requests."""
+
+import contextlib
+import http.client
+import json
+import shutil
+import socket
+import ssl
+import subprocess
+
+from lab import BIN, PATIENCE_S, eventually, free_port
+
+
+class Gateway:
+    """A running thermocomp-gateway."""
+
+    def __init__(self, lab, daemon, http="", more=""):
+        self.folder = lab.folder
+        self.config = lab.folder / "gateway.toml"
+        self.log = lab.folder / "gateway.log"
+        self.context = None  # of TLS
+        self.process = None
+        self.config.write_text(f'format = 1\nmachine = "mill_3"\n[daemon]\n'
+                               f'socket = "{daemon.socket}"\n[http]\nport = 0\n{http}\n{more}\n')
+
+    def start(self):
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen([str(BIN / "thermocomp-gateway"), str(self.config)],
+                                            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                            stderr=log, text=True, cwd=self.folder)
+        line = self.process.stdout.readline()
+        assert line, "no ready line: " + self.log.read_text()
+        self.ready = json.loads(line)
+        self.port = self.ready["http"]
+        return self
+
+    def connect(self, timeout_s=PATIENCE_S):
+        if self.context:
+            return http.client.HTTPSConnection("localhost", self.port, timeout=timeout_s,
+                                               context=self.context)
+        return http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout_s)
+
+    def ask(self, path, method="GET", body=None, headers=None):
+        """(status, headers, bytes)"""
+        with contextlib.closing(self.connect()) as link:
+            link.request(method, path, body=body, headers=headers or {})
+            answer = link.getresponse()
+            return answer.status, answer.headers, answer.read()
+
+    def text(self, path, **rest):
+        status, _, body = self.ask(path, **rest)
+        assert status == 200, (path, status, body)
+        return body.decode()
+
+    def json(self, path, **rest):
+        return json.loads(self.text(path, **rest))
+
+    def raw(self, request, timeout_s=PATIENCE_S):
+        """Bytes as they are; everything that comes back until the gateway closes."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=timeout_s) as link:
+            try:
+                link.sendall(request)
+                link.shutdown(socket.SHUT_WR)
+            except TimeoutError:
+                raise
+            except OSError:
+                pass  # it has hung up at what it has read so far
+            answer = b""
+            with contextlib.suppress(ConnectionResetError):
+                while block := link.recv(65536):
+                    answer += block
+            return answer
+
+    @contextlib.contextmanager
+    def events(self, headers=None):
+        """Yields a function that waits for the next state."""
+        with contextlib.closing(self.connect()) as link:
+            link.request("GET", "/api/events", headers=headers or {})
+            answer = link.getresponse()
+            assert answer.status == 200
+            assert answer.headers["Content-Type"] == "text/event-stream"
+
+            def next_state():
+                while True:
+                    line = answer.readline()
+                    assert line, "the stream ended"
+                    if line.startswith(b"data: "):
+                        return json.loads(line[6:])
+
+            yield next_state
+
+    def wait_for(self, check, what):
+        """The first state of the stream for which check() holds."""
+        with self.events() as next_state:
+            return eventually(lambda: next(filter(check, [next_state()]), None), what)
+
+    def end(self):
+        self.process.terminate()
+        assert self.process.wait(PATIENCE_S) == 0, self.log.read_text()
+
+
+def make_certificate(folder, name="gateway", subject="localhost"):
+    """A self-signed certificate: (certificate, key)."""
+    certificate, key = folder / (name + ".crt"), folder / (name + ".key")
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                    "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj",
+                    "/CN=" + subject, "-addext", "subjectAltName=DNS:" + subject, "-keyout",
+                    str(key), "-out", str(certificate)], check=True, capture_output=True)
+    return certificate, key
+
+
+def trusting(certificate):
+    return ssl.create_default_context(cafile=str(certificate))
+
+
+def password_line(user, password):
+    return subprocess.run([str(BIN / "thermocomp-gateway"), "--password-line", user],
+                          input=password + "\n", text=True, capture_output=True,
+                          check=True).stdout
+
+
+class Broker:
+    """A real mosquitto."""
+
+    def __init__(self, folder, lines="allow_anonymous true\n", tls=""):
+        self.port = free_port()
+        self.config = folder / "mosquitto.conf"
+        self.log = folder / "mosquitto.log"
+        self.config.write_text(f"listener {self.port} 127.0.0.1\n{tls}{lines}")
+        self.process = None
+
+    def start(self):
+        program = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin")
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen([program, "-v", "-c", str(self.config)],
+                                            stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+
+        def answers():
+            with contextlib.suppress(OSError):
+                socket.create_connection(("127.0.0.1", self.port), 1).close()
+                return True
+
+        eventually(answers, "the broker listens")
+        return self
+
+    def stop(self):
+        self.process.terminate()
+        self.process.wait(PATIENCE_S)
+
+
+class Subscriber:
+    """mosquitto_sub: every message as (topic, retained, payload)."""
+
+    def __init__(self, broker, *options):
+        self.log = broker.config.parent / f"subscriber{id(self)}.txt"
+        with self.log.open("w") as out:
+            self.process = subprocess.Popen(
+                ["mosquitto_sub", "-h", "localhost", "-p", str(broker.port), "-t",
+                 "thermocomp/#", "-q", "1", "-F", "%t %r %p", *options],
+                stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
+
+    def messages(self):
+        found = []
+        for line in self.log.read_text().splitlines():
+            parts = line.split(" ", 2)
+            if len(parts) == 3 and parts[2].startswith("{"):
+                found.append((parts[0], parts[1] == "1", json.loads(parts[2])))
+        return found
+
+    def wait_for(self, check, what):
+        """The last message for which check(topic, retained, payload) holds."""
+        return eventually(lambda: next((m for m in reversed(self.messages()) if check(*m)), None),
+                          what)

@@ -1,0 +1,155 @@
+"""What the gateway answers is what the daemon says, by socket and by history."""
+
+import csv
+import json
+import subprocess
+import time
+
+
+from gateway_lab import Gateway
+from lab import eventually, run_tool
+
+
+def without_times(value):
+    """Numbers that differ from one moment to the next taken out, so that two answers compare."""
+    changing = {"age_s", "uptime_s", "mode_since_s", "cycle", "socket", "last_commit_age_s",
+                "size_MB", "round_trip_ms", "requests", "answers", "writes", "reads", "state_s",
+                "rate_K_per_h", "ended", "outside_share_24h"}
+    if isinstance(value, dict):
+        return {k: without_times(v) for k, v in value.items() if k not in changing}
+    if isinstance(value, list):
+        return [without_times(each) for each in value]
+    return value
+
+
+def test_status_and_sensors_are_the_sockets_answers(machine, gateway):
+    machine.warm_by(12.0)
+    machine.daemon.wait_for_offset(12.0)
+    for path, method in (("/api/status", "status"), ("/api/sensors", "sensors")):
+        eventually(lambda: without_times(gateway.json(path)) ==
+                   without_times(machine.daemon.call(method)), path)
+    assert gateway.json("/api/sensors")["sensors"][0]["blocks"] == ["column"]
+
+
+def test_the_stream_follows_the_machine_and_says_what_to_do(machine, gateway):
+    first = gateway.wait_for(lambda s: s["here"], "a state")
+    assert first["machine"] == "mill_3"
+    assert first["verdict"]["compensating"] and first["verdict"]["level"] == "good"
+    machine.warm_by(9.0)
+    gateway.wait_for(lambda s: abs(s["axes"][0]["offset"] - 9.0) < 0.05, "the offset is shown")
+    machine.module.stop()
+    held = gateway.wait_for(lambda s: s["here"] and s["mode"] == "holding", "the holding is told")
+    assert held["verdict"]["level"] == "bad"
+    said = machine.daemon.cli("status")[1]
+    for problem in held["problems"][:2]:
+        assert problem["what"] in said  # the very words of `thermocomp status`
+    assert held["problems"][0]["remedy"] in said
+    machine.module.start()
+    machine.warm_by(9.0)
+    again = gateway.wait_for(lambda s: s["verdict"]["level"] == "good", "it is good again")
+    assert any("lasted" in event["text"] for event in again["events"])
+
+
+def test_a_daemon_that_is_away_is_told_and_found_again(machine, gateway):
+    gateway.wait_for(lambda s: s["here"], "a state")
+    with gateway.events() as next_state:
+        next_state()
+        machine.daemon.kill()
+        gone_s = time.monotonic()
+        while next_state()["here"]:
+            pass
+        assert time.monotonic() - gone_s < 30.0
+    status, _, body = gateway.ask("/api/status")
+    assert status == 503 and "daemon" in json.loads(body)["error"]
+    assert "thermocomp_up 0\n" in gateway.text("/metrics")
+    assert "thermocomp_axis_offset" not in gateway.text("/metrics")
+    machine.daemon.start()
+    gateway.wait_for(lambda s: s["here"], "the daemon is found again")
+
+
+def test_history_is_that_of_the_export(machine, gateway, lab):
+    machine.warm_by(6.0)
+    machine.daemon.wait_for_offset(6.0)
+
+    def settled():
+        told = gateway.json("/api/history?from=-60&points=120")
+        known = [v for v in told["columns"]["z_offset_um"] if v is not None]
+        return known and abs(known[-1] - 6.0) < 0.1 and told
+
+    told = eventually(settled, "the newest mean is that of the offset")
+    columns = told["columns"]
+    assert told["chunks"] == told["chunks_read"] > 0 and told["damage"] == []
+    assert all(len(values) == 120 for values in columns.values())
+    assert {"time_s", "column_degC", "spindle_degC", "z_offset_um",
+            "z_displacement_um"} <= set(columns)
+    offsets = [v for v in columns["z_offset_um"] if v is not None]
+    # Every mean lies within what the export has of its half second.
+    assert run_tool("export", machine.daemon.history, "-o", lab.folder / "run.csv")[0] == 0
+    with (lab.folder / "run.csv").open() as text:
+        rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
+    exported = [float(row["z_offset_um"]) for row in rows if row["z_offset_um"]]
+    assert min(exported) - 1e-6 <= min(offsets) and max(offsets) <= max(exported) + 1e-6
+
+
+def test_history_questions_that_cannot_be_are_refused(gateway):
+    for query in ("from=a", "to=-1&from=-1", "from=-10&to=-20", "points=1", "points=99999",
+                  "points=2.5", "from=1e99", "from=nan"):
+        status, _, body = gateway.ask("/api/history?" + query)
+        assert status == 400 and json.loads(body)["error"], query
+
+
+def test_metrics_are_clean_and_have_every_sensor_axis_and_bus(machine, gateway):
+    gateway.wait_for(lambda s: s["here"], "a state")
+    text = gateway.text("/metrics")
+    checked = subprocess.run(["promtool", "check", "metrics"], input=text, text=True,
+                             capture_output=True)
+    assert (checked.returncode, checked.stdout + checked.stderr) == (0, "")
+    for line in ('thermocomp_up 1', 'thermocomp_compensating 1',
+                 'thermocomp_sensor_good{sensor="column",block="column"} 1',
+                 'thermocomp_axis_driven{axis="z"} 1',
+                 'thermocomp_bus_connected{bus="cabinet",kind="modbus_tcp"} 1'):
+        assert line + "\n" in text, line
+    machine.warm_by(20.0)
+    machine.daemon.wait_for_offset(20.0)
+
+    def offset_m():
+        line = next(line for line in gateway.text("/metrics").splitlines()
+                    if line.startswith('thermocomp_axis_offset_meters{axis="z"}'))
+        return float(line.split()[-1])
+
+    eventually(lambda: abs(offset_m() - 20e-6) < 0.1e-6, "the offset in meters")
+
+
+def test_check_knows_the_configuration(lab, machine, gateway):
+    status, out, _ = run_tool("check", gateway.config)
+    assert status == 0 and "gateway of machine mill_3" in out and out.endswith(": OK\n")
+    cases = {"port = 0": ("port = 70000", "http.port = 70000: must be"),
+             "[http]": ("[http]\ncolour = 1", "http.colour = 1: "),
+             'machine = "mill_3"': ('machine = "mill/3"', 'machine = "mill/3": must be'),
+             "port = 0\n": ('port = 0\naddress = "0.0.0.0"\n',
+                            'http.address = "0.0.0.0": other computers reach')}
+    text = gateway.config.read_text()
+    for old, (new, said) in cases.items():
+        wrong = lab.folder / "wrong.toml"
+        wrong.write_text(text.replace(old, new, 1))
+        status, _, err = run_tool("check", wrong)
+        assert status == 2 and said in err and f"{wrong}:" in err, (new, err)
+        started = subprocess.run([str(gateway.process.args[0]), str(wrong)], capture_output=True,
+                                 text=True, timeout=60)
+        assert started.returncode == 2 and said in started.stderr
+
+
+def test_the_example_is_complete_and_right(lab):
+    from lab import SOURCE
+    status, out, err = run_tool("check", SOURCE / "config/examples/gateway.toml")
+    assert status == 0, err
+    assert "127.0.0.1 port 8420" in out
+
+
+def test_a_port_that_is_taken_is_told(lab, machine, gateway):
+    other = Gateway(lab, machine.daemon)
+    other.config.write_text(other.config.read_text().replace("port = 0",
+                                                             f"port = {gateway.port}"))
+    done = subprocess.run([str(gateway.process.args[0]), str(other.config)], capture_output=True,
+                          text=True, timeout=60)
+    assert done.returncode == 1 and str(gateway.port) in done.stderr

@@ -1,0 +1,57 @@
+"""The command of a site is run for alarms: once each, with the words, never a flood."""
+
+from gateway_lab import Gateway
+from lab import eventually
+
+HOOK = """#!/bin/sh
+echo "$THERMOCOMP_STATE|$THERMOCOMP_ALARM|$THERMOCOMP_MACHINE|$THERMOCOMP_TEXT|$THERMOCOMP_REMEDY" \
+  >> {out}
+"""
+
+
+def start(lab, machine, script, more=""):
+    hook = lab.folder / "hook"
+    hook.write_text(script)
+    hook.chmod(0o755)
+    return lab.also_end(Gateway(lab, machine.daemon, "", f'[alarm]\ncommand = ["{hook}"]\n'
+                                f'raise_after_s = 0.3\nclear_after_s = 0.3\n{more}')).start()
+
+
+def test_each_alarm_is_told_once_raised_and_once_cleared(lab, machine):
+    out = lab.folder / "alarms.txt"
+    out.touch()
+    gateway = start(lab, machine, HOOK.format(out=out))
+    gateway.wait_for(lambda s: s["here"], "a state")
+    machine.module.stop()
+
+    def told(state):
+        return sorted(line.split("|")[1] for line in out.read_text().splitlines()
+                      if line.startswith(state))
+
+    expected = ["bus/cabinet", "compensation", "sensor/column", "sensor/spindle"]
+    eventually(lambda: told("raised") == expected, "all are raised")
+    line = next(line for line in out.read_text().splitlines() if "|sensor/column|" in line)
+    assert line.split("|")[2] == "mill_3" and line.split("|")[3].startswith("sensor column: ")
+    machine.module.start()
+    machine.module.show(20.0, 20.0)
+    eventually(lambda: told("cleared") == expected, "all are cleared")
+    assert told("raised") == expected
+
+
+def test_a_command_that_hangs_is_ended_and_the_page_goes_on(lab, machine):
+    out = lab.folder / "hung.txt"
+    gateway = start(lab, machine, f"#!/bin/sh\necho x >> {out}\nexec sleep 30\n", "command_s_max = 1")
+    machine.module.stop()
+    eventually(lambda: out.exists() and len(out.read_text().split()) >= 2,
+               "the next one gets its turn")
+    assert gateway.ask("/")[0] == 200
+    assert "is ended after 1" in gateway.log.read_text()
+
+
+def test_not_more_than_so_many_an_hour(lab, machine):
+    out = lab.folder / "alarms.txt"
+    out.touch()
+    gateway = start(lab, machine, HOOK.format(out=out), "per_hour_max = 2")
+    machine.module.stop()
+    eventually(lambda: "more than 2 in an hour" in gateway.log.read_text(), "the limit is told")
+    assert len(out.read_text().splitlines()) == 2

@@ -1,0 +1,113 @@
+"""MQTT by a real mosquitto: everything arrives, and an end of whatever kind is seen."""
+
+import subprocess
+
+import pytest
+
+from gateway_lab import Broker, Gateway, Subscriber, make_certificate
+from lab import eventually
+
+
+@pytest.fixture
+def broker(lab):
+    made = Broker(lab.folder)
+    lab.also_end(made)
+    return made.start()
+
+
+def publisher(lab, machine, broker, more=""):
+    return lab.also_end(Gateway(lab, machine.daemon, "", f'[mqtt]\nhost = "localhost"\n'
+                                f'port = {broker.port}\nperiod_s = 0.5\n{more}\n[alarm]\n'
+                                'raise_after_s = 0.5\nclear_after_s = 0.5')).start()
+
+
+def topic(rest):
+    return "thermocomp/mill_3/" + rest
+
+
+def test_values_arrive_retained_and_the_last_will_ends_them(lab, machine, broker):
+    gateway = publisher(lab, machine, broker)
+    listener = lab.also_end(Subscriber(broker))
+    machine.warm_by(9.0)
+    listener.wait_for(lambda t, _, p: t == topic("axis/z") and abs(p["offset_um"] - 9.0) < 0.1,
+                      "the offset")
+    said = listener.wait_for(lambda t, _, p: t == topic("sensor/column"), "the sensor")[2]
+    assert said["fault"] == "none" and said["blocks"] == ["column"] and said["time"].endswith("Z")
+    assert abs(said["raw_degC"] - 17.0) < 0.05
+    status = listener.wait_for(lambda t, _, p: t == topic("status") and p.get("compensating"),
+                               "the status")[2]
+    assert (status["state"], status["daemon"], status["mode"]) == ("online", "here",
+                                                                  "compensating")
+    assert listener.wait_for(lambda t, _, p: t == topic("alarm"), "alarms")[2]["active"] == []
+    # Who comes later has all of it at once.
+    late = lab.also_end(Subscriber(broker))
+    for rest in ("status", "alarm", "axis/z", "sensor/column", "sensor/spindle"):
+        late.wait_for(lambda t, retained, _, r=rest: t == topic(r) and retained, rest)
+    gateway.process.kill()
+    gateway.process.wait()
+    listener.wait_for(lambda t, _, p: t == topic("status") and p == {"state": "offline"},
+                      "the last will")
+
+
+def test_an_orderly_end_says_offline_and_alarms_come_and_go(lab, machine, broker):
+    gateway = publisher(lab, machine, broker)
+    listener = lab.also_end(Subscriber(broker))
+    listener.wait_for(lambda t, _, p: t == topic("status") and p.get("compensating"), "online")
+    machine.module.stop()
+    raised = listener.wait_for(
+        lambda t, _, p: t == topic("alarm") and
+        {a["name"] for a in p["active"]} >= {"compensation", "sensor/column", "bus/cabinet"},
+        "alarms")[2]
+    assert all(alarm["text"] and alarm["since_s"] > 1e9 for alarm in raised["active"])
+    machine.module.start()
+    machine.module.show(20.0, 20.0)
+    listener.wait_for(lambda t, _, p: t == topic("alarm") and p["active"] == [] and p["changed"] and
+                      p["changed"]["state"] == "cleared", "all is clear")
+    gateway.end()
+    listener.wait_for(lambda t, _, p: t == topic("status") and p == {"state": "offline"}, "offline")
+
+
+def test_a_broker_that_was_away_gets_what_happened_meanwhile(lab, machine, broker):
+    gateway = publisher(lab, machine, broker)
+    first = lab.also_end(Subscriber(broker))
+    first.wait_for(lambda t, _, p: t == topic("axis/z"), "an axis")
+    broker.stop()
+    eventually(lambda: "thermocomp_gateway_mqtt_connected 0\n" in gateway.text("/metrics"),
+               "the loss is noticed")
+    for offset_um in (6.0, 12.0, 3.0):
+        machine.warm_by(offset_um)
+        machine.daemon.wait_for_offset(offset_um)
+        gateway.wait_for(lambda s, o=offset_um: abs(s["axes"][0]["offset"] - o) < 0.1, "shown")
+    broker.start()
+    second = lab.also_end(Subscriber(broker))
+    second.wait_for(lambda t, _, p: t == topic("axis/z") and abs(p["offset_um"] - 3.0) < 0.1,
+                    "the newest")
+    eventually(lambda: "thermocomp_gateway_mqtt_connected 1\n" in gateway.text("/metrics"), "back")
+    assert "thermocomp_gateway_mqtt_dropped_total 0\n" in gateway.text("/metrics")
+
+
+def test_user_password_and_certificate_are_asked_for(lab, machine):
+    certificate, key = make_certificate(lab.folder, "broker")
+    passwords = lab.folder / "broker.passwords"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", str(passwords), "mill", "secret"], check=True,
+                   capture_output=True)
+    passwords.chmod(0o644)
+    lab.folder.chmod(0o755)
+    key.chmod(0o644)
+    broker = Broker(lab.folder, f"allow_anonymous false\npassword_file {passwords}\nuser root\n",
+                    f"certfile {certificate}\nkeyfile {key}\n")
+    lab.also_end(broker)
+    broker.start()
+    (lab.folder / "secret").write_text("secret\n")
+    other, _ = make_certificate(lab.folder, "other")
+
+    def connected(gateway):
+        return "thermocomp_gateway_mqtt_connected 1\n" in gateway.text("/metrics")
+
+    options = 'user = "mill"\npassword_file = "secret"\nauthority = "{}"'
+    wrong = publisher(lab, machine, broker, options.format(other))
+    eventually(lambda: "mqtt: " in wrong.log.read_text(), "a wrong certificate is refused")
+    assert not connected(wrong)
+    wrong.end()
+    gateway = publisher(lab, machine, broker, options.format(certificate))
+    eventually(lambda: connected(gateway), "connected by TLS with a password")

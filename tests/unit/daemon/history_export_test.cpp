@@ -1,0 +1,196 @@
+// What leaves a history: run files and events.
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include <catch2/catch.hpp>
+#include <sqlite3.h>
+
+#include "config/run_file.hpp"
+#include "daemon/history/recorded_event.hpp"
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+
+TEST_CASE("an export is a run file with the model's inputs as the daemon had them",
+          "[history][export]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 12);
+  machine.start();
+  machine.run(3000);
+  machine.reload(5.0);
+  machine.run(1000);
+  Report last = machine.estimator().make_report();
+  machine.estimator().report(last);
+  machine.stop();
+  std::ostringstream out;
+  const ExportSummary summary = export_run(config.file, HistoryTime{5.0, {}}, HistoryTime{20.0, {}},
+                                           out, {}, parse_test_setup);
+  const RunFile run = parse_run(out.str(), "export");
+  CHECK(run.rows() == summary.rows);
+  CHECK(run.time_s().front() == 0.0);
+  CHECK(run.time_s().back() < 15.0);
+  CHECK(run.time_s().back() > 14.0);
+  for (const char* name :
+       {"bed_in_degC", "spindle_rpm", "y_offset_um", "z_applied_um", "z_measured_um"}) {
+    CHECK(run.find(name).has_value());
+  }
+  CHECK(!run.find("bed_degC"));  // its block tells it
+
+  std::ostringstream all;
+  REQUIRE(export_run(config.file, {}, {}, all, {}, parse_test_setup).damage.empty());
+  const RunFile whole = parse_run(all.str(), "export");
+  const auto columns = machine.estimator().model().temperature_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const double told = whole.column(columns[i]).back();
+    if (last.inputs[i].good)
+      CHECK(told == last.inputs[i].temp_degC);  // to the last bit
+    else
+      CHECK(std::isnan(told));
+  }
+
+  std::ostringstream replayed;
+  replay_to_csv(config.file, replayed, {}, parse_test_setup);
+  const RunFile offsets = parse_run(replayed.str(), "replay");
+  CHECK(offsets.column("z_offset_um") == offsets.column("z_recorded_um"));
+}
+
+TEST_CASE("an export tells faults, commands, wall time and reloads by comments, with their times",
+          "[history][export]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 12);
+  machine.start();
+  machine.run(4000);
+  machine.reload(5.0);
+  machine.run(1000);
+  machine.stop();
+  std::ostringstream out;
+  export_run(config.file, {}, {}, out, {}, parse_test_setup);
+  CHECK_THAT(out.str(), Catch::Contains("# 0.000 s: wall time "));
+  CHECK_THAT(out.str(), Catch::Contains("# 0.000 s: model SHA-256 sum"));
+  CHECK_THAT(out.str(), Catch::Contains(": sensor bed: open_circuit\n"));
+  CHECK_THAT(out.str(), Catch::Contains(": sensor bed: good again\n"));
+  CHECK_THAT(out.str(), Catch::Contains(": command measured "));
+  CHECK_THAT(out.str(), Catch::Contains("reloaded or restarted with another configuration"));
+  // Nothing of what was commanded before the part that is asked for.
+  std::ostringstream part;
+  export_run(config.file, HistoryTime{49.0, {}}, {}, part, {}, parse_test_setup);
+  const auto commands = [](const std::string& text) {
+    std::size_t count = 0;
+    for (std::size_t at = text.find(": command "); at != std::string::npos;
+         at = text.find(": command ", at + 1))
+      ++count;
+    return count;
+  };
+  CHECK(commands(part.str()) < commands(out.str()));
+}
+
+TEST_CASE("with sensors an export has every sensor as read, and no input beside it",
+          "[history][export]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 12);
+  machine.start();
+  machine.run(1000);
+  machine.stop();
+  std::ostringstream out;
+  export_run(config.file, {}, {}, out, {}, parse_test_setup, ExportContent::sensors);
+  const RunFile run = parse_run(out.str(), "export");
+  CHECK(run.find("bed_degC"));
+  CHECK(!run.find("bed_in_degC"));
+}
+
+TEST_CASE("what was probed is exported as displacement, without the offset in effect",
+          "[history][export]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 12);
+  machine.start();
+  machine.run(20000);
+  machine.stop();
+  std::ostringstream out;
+  export_run(config.file, {}, {}, out, {}, parse_test_setup);
+  const RunFile run = parse_run(out.str(), "export");
+  std::size_t probed = 0;
+  for (const char* axis : {"y", "z"}) {
+    const std::string name(axis);
+    if (!run.find(name + "_um")) continue;
+    const auto said = run.column(name + "_measured_um");
+    const auto displacement = run.column(name + "_um");
+    const auto applied = run.column(name + "_applied_um");
+    for (std::size_t row = 0; row < run.rows(); ++row) {
+      CHECK(std::isnan(said[row]) == std::isnan(displacement[row]));
+      if (std::isnan(said[row]) || !std::isfinite(applied[row])) continue;
+      // What was applied may have gone on by a tenth of a second.
+      CHECK(std::abs(said[row] - applied[row] - displacement[row]) < 0.2);
+      ++probed;
+    }
+  }
+  CHECK(probed > 3);
+}
+
+TEST_CASE("events are in the history with the next commit, run by run, the newest of them",
+          "[history][events]") {
+  const TempFolder folder;
+  HistoryConfig config = history_config(folder / "h.db");
+  config.size_MB_max = 1.0;  // then some three hundred are kept
+  for (int run = 0; run < 2; ++run) {
+    HistoryWriter writer(config, {std::chrono::hours(7), std::chrono::milliseconds(10)}, "test");
+    writer.start();
+    for (int i = 1; i <= 300; ++i) {
+      RecordedEvent event;
+      event.number = i;
+      event.wall_ns = (1000 * run + i) * 1'000'000'000LL;
+      event.kind = "fault";
+      event.subject = "sensor bed";
+      event.what = "stale";
+      event.duration_ns = i == 7 ? 28'100'000'000 : -1;
+      writer.note(event);
+    }
+    writer.stop();
+    const RecordedEvents read = read_events(config.file);
+    REQUIRE(read.are_kept);
+    CHECK(read.events.size() <= 334);
+    CHECK(read.events.size() >= 300);
+    CHECK(read.events.back().run == run + 1);
+    CHECK(read.events.back().number == 300);
+    if (run == 0) CHECK(read.events[6].duration_ns == 28'100'000'000);
+  }
+  const RecordedEvents part = read_events(config.file, HistoryTime{{}, 1'290'000'000'000});
+  CHECK(part.events.size() == 11);
+}
+
+TEST_CASE("times are seconds or wall times, and anything else is refused", "[history][export]") {
+  CHECK(*parse_history_time("12.5").seconds == 12.5);
+  CHECK(*parse_history_time("1970-01-02T00:00:00Z").wall_ns == 86'400'000'000'000);
+  CHECK(*parse_history_time("1970-01-02T01:00+01:00").wall_ns == 86'400'000'000'000);
+  CHECK(parse_history_time("2026-03-01").wall_ns.has_value());
+  for (const char* text : {"", "yesterday", "nan", "2026-13-01", "2026-02-31", "2026-03-01T25:00",
+                           "2026-03-01T08:30:00+1", "12 s"}) {
+    CHECK_THROWS_AS(parse_history_time(text), std::invalid_argument);
+  }
+}
+
+TEST_CASE("what a damaged history says in its texts does not come as lines into an export",
+          "[history][export][damage]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  RecordedMachine machine(config, 12);
+  machine.start();
+  machine.run(500);
+  machine.stop();
+  sqlite3* handle = nullptr;
+  REQUIRE(sqlite3_open(config.file.c_str(), &handle) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(handle,
+                       "UPDATE setup SET model_checksum = 'a' || char(10) || '1,2,3' || char(27);"
+                       "UPDATE segment SET checksum = NULL",
+                       nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(handle);
+  std::ostringstream out;
+  const ExportSummary summary = export_run(config.file, {}, {}, out, {}, parse_test_setup);
+  CHECK(out.str().find('\033') == std::string::npos);
+  CHECK(parse_run(out.str(), "export").rows() == summary.rows);
+}

@@ -1,0 +1,186 @@
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "config/run_file.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::diagnosis;
+
+namespace {
+
+using Names = std::set<std::string>;
+
+/// What a name of a parameter in this unit ends with: "um/(K mm)" is um_per_K_mm.
+std::string suffix_of(std::string_view unit) {
+  std::string suffix;
+  for (const char each : unit) {
+    if (each == '/')
+      suffix += "_per_";
+    else if (each == '?')
+      suffix += "unit";
+    else if (each == ' ')
+      suffix += '_';
+    else if (each != '(' && each != ')' && each != '^')
+      suffix += each;
+  }
+  return suffix;
+}
+
+/// The words between backticks.
+Names in_backquotes(const std::string& text) {
+  Names names;
+  std::size_t begin = 0;
+  while ((begin = text.find('`', begin)) != std::string::npos) {
+    const std::size_t end = text.find('`', begin + 1);
+    if (end == std::string::npos) break;
+    names.insert(text.substr(begin + 1, end - begin - 1));
+    begin = end + 1;
+  }
+  return names;
+}
+
+/// The parameters that docs/diagnosis.md gives to each cause, in all of its tables of causes.
+std::map<std::string, Names> documented() {
+  std::ifstream file(THERMOCOMP_DIAGNOSIS_TEXT);
+  REQUIRE(file.good());
+  std::map<std::string, Names> causes;
+  bool in_table = false;
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("| cause | subject | parameters |", 0) == 0) in_table = true;
+    if (line.empty() || line.front() != '|') in_table = false;
+    if (!in_table) continue;
+    for (std::size_t at = 0; (at = line.find("\\|", at)) != std::string::npos;)
+      line.erase(at, 2);  // within a cell
+    std::vector<std::string> cells;
+    std::istringstream text(line);
+    for (std::string cell; std::getline(text, cell, '|');) cells.push_back(cell);
+    REQUIRE(cells.size() >= 4);
+    for (const std::string& cause : in_backquotes(cells[1].substr(0, cells[1].find(':')))) {
+      Names parameters = in_backquotes(cells[3]);
+      parameters.erase("run");  // of the finding, not of the cause
+      causes[cause].merge(parameters);
+    }
+  }
+  return causes;
+}
+
+/// A machine with everything that a cause of the displacement can act on.
+RunFile machine_run(int rows) {
+  RunFile run;
+  run.name = "run.csv";
+  run.columns = {"time_s", "t1_degC", "t2_degC", "room_degC", "spindle_rpm", "x_mm", "z_um"};
+  run.values.resize(run.columns.size());
+  for (int row = 0; row < rows; ++row) {
+    const double rise_K = 5.0 * std::sin(row / 60.0);
+    const std::vector<double> values = {60.0 * row,
+                                        20.0 + rise_K,
+                                        21.0 + 3.0 * std::sin(row / 23.0),
+                                        20.0 + std::sin(row / 200.0),
+                                        row / 50 % 2 == 0 ? 0.0 : 3000.0,
+                                        100.0 * std::sin(row / 7.0),
+                                        5.0 * rise_K};
+    for (std::size_t i = 0; i < values.size(); ++i) run.values[i].push_back(values[i]);
+  }
+  run.selected_end = run.rows();
+  return run;
+}
+
+}  // namespace
+
+TEST_CASE("every cause is complete, and none is there twice", "[diagnosis][causes]") {
+  const Names families = {"structure", "heat", "datum", "sensor"};
+  Names names;
+  for (const Cause& cause : all_causes()) {
+    INFO(cause.name);
+    CHECK(names.insert(cause.name).second);
+    CHECK(find_cause(cause.name) == &cause);
+    CHECK(families.contains(cause.family));
+    CHECK((cause.hypotheses != nullptr || cause.in_network != nullptr));
+    CHECK_FALSE(cause.texts.title.empty());
+    CHECK_FALSE(cause.texts.says.empty());
+    REQUIRE_FALSE(cause.texts.to_do.empty());
+    CHECK(cause.texts.to_do.back() == '.');
+    Names parameters;
+    for (const CauseParameter& parameter : cause.parameters) {
+      INFO(parameter.name);
+      CHECK(parameters.insert(std::string(parameter.name)).second);
+      CHECK_FALSE(parameter.says.empty());
+      REQUIRE_FALSE(parameter.unit.empty());
+      CHECK(parameter.low < parameter.high);
+      if (parameter.unit != "1") CHECK(parameter.name.ends_with(suffix_of(parameter.unit)));
+    }
+  }
+  CHECK(find_cause("unexplained") == nullptr);
+}
+
+TEST_CASE("a cause becomes the term of its name, where the daemon evaluates one",
+          "[diagnosis][causes]") {
+  for (const Cause& cause : all_causes()) {
+    INFO(cause.name);
+    bool known = false;
+    for (const TermKind& kind : term_kinds()) {
+      if (kind.name != cause.name) continue;
+      known = true;
+      for (const TermParameter& parameter : kind.parameters) {
+        INFO(parameter.name);
+        const CauseParameter* const of = find_parameter(cause, parameter.name);
+        REQUIRE(of != nullptr);
+        if (std::isfinite(of->low)) CHECK(of->low >= parameter.min);
+        if (std::isfinite(of->high)) CHECK(of->high <= parameter.max);
+      }
+    }
+    CHECK(cause.term == (known ? cause.name : ""));
+    if (cause.correction != nullptr) CHECK(cause.term.empty());
+  }
+}
+
+TEST_CASE("causes and their parameters are those of the documentation", "[diagnosis][causes]") {
+  const std::map<std::string, Names> expected = documented();
+  std::map<std::string, Names> have;
+  for (const Cause& cause : all_causes()) {
+    Names& parameters = have[cause.name];
+    for (const CauseParameter& each : cause.parameters) parameters.emplace(each.name);
+  }
+  for (const auto& [cause, parameters] : expected) {
+    INFO(cause);
+    CHECK(have[cause] == parameters);
+  }
+  CHECK(have.size() == expected.size());
+}
+
+TEST_CASE("what a cause is tried with lies within its physical range", "[diagnosis][causes]") {
+  ThermalModel model;
+  model.inputs = {"t1_degC", "t2_degC"};
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {{5.0, 1.0}};
+  const std::vector<RunFile> runs = {machine_run(900)};
+  const MeasuredData data = training_data(model, runs, {"run.csv"}, shared_columns(model, runs));
+  Names tried;
+  for (const Hypothesis& each : hypotheses(data, stacked_rows(data))) {
+    const Cause& cause = cause_named(each.cause);
+    INFO(each.cause << " of " << each.subject);
+    tried.insert(cause.name);
+    CHECK(each.columns({point_of_grid(each, 0)}, 0).allFinite());
+    CHECK((cause.gains == nullptr) == each.gains.empty());
+    CHECK((cause.error_of_reading != nullptr) == each.sensor.has_value());
+    for (const ShapeParameter& shape : each.shape) {
+      INFO(shape.name);
+      const CauseParameter* const of = find_parameter(cause, shape.name);
+      REQUIRE(of != nullptr);
+      CHECK(*std::min_element(shape.grid.begin(), shape.grid.end()) >= of->low);
+      CHECK(*std::max_element(shape.grid.begin(), shape.grid.end()) <= of->high * (1 + 1e-12));
+    }
+  }
+  for (const Cause& cause : all_causes())
+    CHECK(tried.contains(cause.name) == (cause.hypotheses != nullptr));
+}

@@ -1,0 +1,123 @@
+/// The rule of the mode, case by case.
+#include "estimator/pipeline/mode_decision.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr double hold_s = 10.0;
+
+CompensationConfig config(LossPolicy on_loss = LossPolicy::hold) {
+  CompensationConfig config;
+  config.enabled_at_first_start = true;
+  config.on_loss = on_loss;
+  config.hold_s = hold_s;
+  return config;
+}
+
+/// All that a step needs to compensate, `second` seconds after the first one.
+ModeInput working(int second) {
+  ModeInput input;
+  input.time = {std::chrono::seconds(second), 1.0, second == 0};
+  input.displacement_known = input.controller_online = input.axes_synced = true;
+  return input;
+}
+
+ModeInput lost(int second) {
+  ModeInput input = working(second);
+  input.displacement_known = false;
+  return input;
+}
+
+}  // namespace
+
+TEST_CASE("it compensates as soon as displacement, controller and what it applies are known",
+          "[mode]") {
+  ModeDecision decision(config());
+  ModeInput input = working(0);
+  bool ModeInput::*const missing = GENERATE(&ModeInput::displacement_known,
+                                            &ModeInput::controller_online, &ModeInput::axes_synced);
+  input.*missing = false;
+  CHECK(decision.step(input) == Mode::starting);
+  CHECK(decision.step(working(1)) == Mode::compensating);
+  input.time = working(2).time;
+  CHECK(decision.step(input) == Mode::holding);
+  CHECK(decision.step(working(3)) == Mode::compensating);
+}
+
+TEST_CASE("before the first data it starts, however long that takes, and never holds", "[mode]") {
+  ModeDecision decision(config());
+  for (int second = 0; second < 100; ++second) CHECK(decision.step(lost(second)) == Mode::starting);
+}
+
+TEST_CASE("after hold_s without data it goes to zero where so configured, and comes back",
+          "[mode]") {
+  ModeDecision holds(config(LossPolicy::hold));
+  ModeDecision ramps(config(LossPolicy::ramp_to_zero));
+  for (ModeDecision* decision : {&holds, &ramps}) {
+    CHECK(decision->step(working(0)) == Mode::compensating);
+    CHECK(decision->step(lost(1)) == Mode::holding);
+    CHECK(decision->step(lost(10)) == Mode::holding);  // hold_s exactly
+  }
+  CHECK(holds.step(lost(11)) == Mode::holding);
+  CHECK(ramps.step(lost(11)) == Mode::ramping_to_zero);
+  CHECK(ramps.step(working(12)) == Mode::compensating);
+  CHECK(ramps.step(lost(22)) == Mode::holding);  // counted anew
+}
+
+TEST_CASE("time without data counts from the first step where there never were any", "[mode]") {
+  ModeDecision decision(config(LossPolicy::ramp_to_zero));
+  ModeInput late = lost(1000);
+  late.time.first = true;
+  CHECK(decision.step(late) == Mode::starting);
+  CHECK(decision.step(lost(1010)) == Mode::starting);
+  CHECK(decision.step(lost(1011)) == Mode::ramping_to_zero);
+}
+
+TEST_CASE("either switch disables, whatever else holds", "[mode]") {
+  ModeDecision decision(config(LossPolicy::ramp_to_zero));
+  CHECK(decision.step(working(0)) == Mode::compensating);
+  decision.enable(false);
+  CHECK(decision.step(working(1)) == Mode::disabled);
+  CHECK(decision.step(lost(100)) == Mode::disabled);
+  decision.stop();
+  CHECK(decision.step(working(101)) == Mode::disabled);
+  decision.enable(true);
+  ModeInput by_controller = working(102);
+  by_controller.controller_disables = true;
+  CHECK(decision.step(by_controller) == Mode::disabled);
+  CHECK(decision.step(working(103)) == Mode::ramping_to_zero);  // stopping
+}
+
+TEST_CASE("a stop goes to zero with good data and without, and leaves the switch alone", "[mode]") {
+  ModeDecision decision(config());
+  CHECK(decision.step(working(0)) == Mode::compensating);
+  decision.stop();
+  CHECK(decision.step(working(1)) == Mode::ramping_to_zero);
+  CHECK(decision.step(lost(2)) == Mode::ramping_to_zero);
+  CHECK(decision.state().enabled);
+}
+
+TEST_CASE("the mode has been so since it changed", "[mode]") {
+  ModeDecision decision(config());
+  (void)decision.step(working(5));
+  (void)decision.step(working(6));
+  CHECK(decision.state().mode_since == 5s);
+  (void)decision.step(lost(7));
+  (void)decision.step(lost(8));
+  CHECK(decision.state().mode_since == 7s);
+}
+
+TEST_CASE("a reload goes on in the same mode, with the time already lost", "[mode]") {
+  ModeDecision before(config(LossPolicy::ramp_to_zero));
+  (void)before.step(working(0));
+  (void)before.step(lost(9));
+  ModeDecision after(config(LossPolicy::ramp_to_zero));
+  after.adopt(before);
+  CHECK(after.state().mode == Mode::holding);
+  CHECK(after.state().mode_since == 9s);
+  CHECK(after.step(lost(11)) == Mode::ramping_to_zero);
+}

@@ -1,0 +1,115 @@
+/// What displacement is counted from, and when that is taken.
+#include "estimator/pipeline/reference.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "small_machine.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+/// What a step hands to the reference: two columns and the spindle's speed.
+struct Moment {
+  std::vector<double> temps_degC{20.0, 21.0};
+  std::vector<std::uint8_t> good{1, 1};
+  std::vector<double> told{3000.0};
+  bool online{true};
+
+  [[nodiscard]] ReferenceState step(Reference& reference) const {
+    Temperatures temps;
+    temps.measured_degC = temps_degC;
+    temps.good = good;
+    Signals signals;
+    signals.online = online;
+    signals.of_model = told;
+    return reference.step(temps, signals);
+  }
+};
+
+ThermalModel with_numbers(std::vector<double> numbers) {
+  ThermalModel model = model_with_growth();
+  model.reference_degC = std::move(numbers);
+  return model;
+}
+
+}  // namespace
+
+TEST_CASE("without numbers each column's first good value is the reference, and stays",
+          "[reference]") {
+  Reference reference(model_with_growth());
+  Moment moment;
+  moment.good[1] = 0;
+  ReferenceState state = moment.step(reference);
+  CHECK(state.changed);
+  CHECK_FALSE(state.known);
+  CHECK(state.temps_degC[0] == 20.0);
+  CHECK(std::isnan(state.temps_degC[1]));
+
+  moment.temps_degC = {25.0, 26.0};
+  moment.good[1] = 1;
+  state = moment.step(reference);
+  CHECK(state.known);
+  CHECK(state.temps_degC[0] == 20.0);
+  CHECK(state.temps_degC[1] == 26.0);
+
+  moment.temps_degC = {30.0, 30.0};
+  state = moment.step(reference);
+  CHECK_FALSE(state.changed);
+  CHECK(state.temps_degC[1] == 26.0);
+}
+
+TEST_CASE("a sampled reference takes the signals of a controller that is there, numbers mean rest",
+          "[reference]") {
+  Reference sampled(model_with_growth());
+  Moment silent;
+  silent.online = false;
+  CHECK(std::isnan(silent.step(sampled).signals[0]));
+  CHECK(Moment{}.step(sampled).signals[0] == 3000.0);
+
+  Reference numbers(with_numbers({20.0, 20.0}));
+  const ReferenceState state = Moment{}.step(numbers);
+  CHECK(state.known);
+  CHECK_FALSE(state.changed);
+  CHECK(state.signals[0] == 0.0);
+}
+
+TEST_CASE("a commanded reference has its signals from the next step on", "[reference]") {
+  Reference reference(with_numbers({20.0, 20.0}));
+  (void)Moment{}.step(reference);
+  reference.take(std::vector<double>{24.0, 25.0});
+  CHECK(std::isnan(reference.signals()[0]));
+  const ReferenceState state = Moment{}.step(reference);
+  CHECK(state.changed);
+  CHECK(state.temps_degC[0] == 24.0);
+  CHECK(state.temps_degC[1] == 25.0);
+  CHECK(state.signals[0] == 3000.0);
+}
+
+TEST_CASE("a restart restores what is a number, by name", "[reference]") {
+  Reference reference(model_with_growth());
+  reference.restore({{"t1_degC", 18.5}, {"t2_degC", not_a_number}, {"t9_degC", 1.0}},
+                    {{"spindle_rpm", 500.0}});
+  CHECK(reference.temps_degC()[0] == 18.5);
+  CHECK(std::isnan(reference.temps_degC()[1]));
+  CHECK(reference.signals()[0] == 500.0);
+}
+
+TEST_CASE("a reload keeps the reference unless the model file has new numbers", "[reference]") {
+  const std::vector<int> columns{1, 0};  // the new file names them the other way round
+  const std::vector<int> signals{-1};
+  Reference before(with_numbers({20.0, 20.0}));
+  before.take(std::vector<double>{23.0, 24.0});
+  Reference same(with_numbers({20.0, 20.0}));
+  same.adopt(before, columns, signals);
+  CHECK(same.temps_degC()[0] == 24.0);
+  CHECK(same.temps_degC()[1] == 23.0);
+  CHECK(same.signals()[0] == 0.0);  // a signal that the other did not have
+  Reference other(with_numbers({19.0, 20.0}));
+  other.adopt(before, columns, signals);
+  CHECK(other.temps_degC()[0] == 19.0);
+  CHECK(other.temps_degC()[1] == 20.0);
+}

@@ -1,0 +1,123 @@
+#include "gateway/alarms/alarm_watch.hpp"
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "gateway/alarms/hook_limit.hpp"
+#include "gateway/mqtt/message_buffer.hpp"
+
+using namespace thermocomp::gateway;
+using nlohmann::json;
+
+namespace {
+
+const std::vector<AlarmCondition> lost{{"sensor/a", "sensor a: broken", "mend it"}};
+const std::vector<AlarmCondition> nothing;
+
+Snapshot good_snapshot() {
+  Snapshot snapshot;
+  snapshot.is_here = true;
+  snapshot.status = {{"mode", "compensating"},
+                     {"mode_since_s", 5.0},
+                     {"reasons", json::array()},
+                     {"axes", {{{"name", "z"}, {"driven", true}, {"at_bound", false}}}},
+                     {"buses", {{{"name", "cabinet"}, {"connected", true}}}},
+                     {"model", {{"outside", false}}}};
+  snapshot.sensors = {{"sensors", {{{"name", "a"}, {"fault", "none"}, {"suspected", nullptr}}}}};
+  return snapshot;
+}
+
+std::vector<std::string> names(const std::vector<AlarmCondition>& wrong) {
+  std::vector<std::string> list;
+  for (const AlarmCondition& condition : wrong) list.push_back(condition.name);
+  return list;
+}
+
+}  // namespace
+
+TEST_CASE("an alarm is raised and cleared once, and only when it lasts", "[gateway][alarm]") {
+  AlarmWatch watch(10.0, 60.0);
+  CHECK(watch.update(0.0, lost, true).empty());
+  CHECK(watch.update(9.9, lost, true).empty());
+  const auto raised = watch.update(10.0, lost, true);
+  REQUIRE(raised.size() == 1);
+  CHECK(raised[0].is_raised);
+  CHECK(raised[0].alarm.condition.text == "sensor a: broken");
+  CHECK(raised[0].alarm.since_s == 0.0);
+  CHECK(watch.update(11.0, lost, true).empty());
+  CHECK(watch.update(20.0, nothing, true).empty());
+  CHECK(watch.active().size() == 1);
+  CHECK(watch.update(79.9, nothing, true).empty());
+  const auto cleared = watch.update(80.0, nothing, true);
+  REQUIRE(cleared.size() == 1);
+  CHECK_FALSE(cleared[0].is_raised);
+  CHECK(watch.active().empty());
+}
+
+TEST_CASE("what comes and goes every second is one alarm at most", "[gateway][alarm]") {
+  AlarmWatch watch(3.0, 10.0);
+  std::size_t changes = 0;
+  for (int s = 0; s < 1000; ++s)
+    changes += watch.update(s, (s % 6) < 4 ? lost : nothing, true).size();
+  CHECK(changes == 1);
+  AlarmWatch never(3.0, 10.0);
+  for (int s = 0; s < 1000; ++s) CHECK(never.update(s, s % 2 == 0 ? lost : nothing, true).empty());
+}
+
+TEST_CASE("while the daemon is away, what was wrong is neither cleared nor forgotten",
+          "[gateway][alarm]") {
+  AlarmWatch watch(1.0, 1.0);
+  watch.update(0.0, lost, true);
+  CHECK(watch.update(1.0, lost, true).size() == 1);
+  const std::vector<AlarmCondition> away{{"daemon", "away", ""}};
+  watch.update(2.0, away, false);
+  CHECK(watch.update(100.0, away, false).size() == 1);
+  CHECK(watch.active().size() == 2);
+  watch.update(101.0, lost, true);
+  const auto back = watch.update(103.0, lost, true);
+  REQUIRE(back.size() == 1);
+  CHECK(back[0].alarm.condition.name == "daemon");
+}
+
+TEST_CASE("each thing that is wrong has its alarm", "[gateway][alarm]") {
+  Snapshot snapshot = good_snapshot();
+  CHECK(wrong_now(snapshot).empty());
+  snapshot.status["axes"][0]["at_bound"] = true;
+  snapshot.status["buses"][0]["connected"] = false;
+  snapshot.status["model"]["outside"] = true;
+  snapshot.status["mode"] = "holding";
+  snapshot.status["reasons"] = {"block_lost"};
+  snapshot.sensors["sensors"][0]["fault"] = "open_circuit";
+  snapshot.sensors["sensors"][0]["suspected"] = {{"size_K", 2.0}, {"since", 1.0}};
+  const auto wrong = wrong_now(snapshot);
+  CHECK(names(wrong) == std::vector<std::string>{"compensation", "sensor/a", "suspected/a",
+                                                 "bound/z", "domain", "bus/cabinet"});
+  for (const AlarmCondition& condition : wrong) {
+    CHECK_FALSE(condition.text.empty());
+    CHECK_FALSE(condition.remedy.empty());
+  }
+  snapshot.is_here = false;
+  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"daemon"});
+}
+
+TEST_CASE("an hour has room for so many commands", "[gateway][alarm]") {
+  HookLimit limit(2);
+  CHECK(limit.take(0.0));
+  CHECK(limit.take(1.0));
+  CHECK_FALSE(limit.take(3599.0));
+  CHECK(limit.take(3600.0));
+  CHECK_FALSE(limit.take(3600.5));
+}
+
+TEST_CASE("a full buffer keeps the newest messages, and the last of each topic",
+          "[gateway][mqtt]") {
+  MessageBuffer buffer(3);
+  buffer.push({"rare", "r"});
+  for (int i = 0; i < 5; ++i) buffer.push({"often", std::to_string(i)});
+  CHECK(buffer.size() == 3);
+  CHECK(buffer.dropped() == 3);
+  buffer.repeat_newest();
+  std::string taken;
+  while (const auto message = buffer.take()) taken += message->topic + message->payload + " ";
+  CHECK(taken == "often2 often3 often4 often4 rarer ");
+}

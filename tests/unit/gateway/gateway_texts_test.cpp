@@ -1,0 +1,171 @@
+#include <cmath>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "gateway/feed/displacement_memory.hpp"
+#include "gateway/feed/page_state.hpp"
+#include "gateway/feed/trend_watch.hpp"
+#include "gateway/texts/metrics_text.hpp"
+#include "gateway/texts/mqtt_texts.hpp"
+#include "gateway/texts/shdr_text.hpp"
+
+using namespace thermocomp::gateway;
+using Catch::Contains;
+using nlohmann::json;
+
+namespace {
+
+Snapshot snapshot_of_two_axes() {
+  Snapshot snapshot;
+  snapshot.is_here = true;
+  snapshot.wall_s = 1772353800.125;
+  snapshot.status = {
+      {"mode", "compensating"},
+      {"mode_since_s", 60.0},
+      {"reasons", json::array()},
+      {"version", "0.1\"x"},
+      {"axes",
+       {{{"name", "z"}, {"unit", "um"}, {"offset", -3.5}, {"displacement", 3.5}, {"driven", true}},
+        {{"name", "b"},
+         {"unit", "urad"},
+         {"offset", 4.0},
+         {"displacement", nullptr},
+         {"driven", true}}}},
+      {"buses", {{{"name", "cabinet"}, {"kind", "can"}, {"connected", true}}}}};
+  snapshot.sensors = {{"sensors",
+                       {{{"name", "bed front"},
+                         {"blocks", {"bed"}},
+                         {"fault", "none"},
+                         {"raw_degC", 21.25},
+                         {"smoothed_degC", 21.5}}}}};
+  return snapshot;
+}
+
+}  // namespace
+
+TEST_CASE("metrics are in base units; what is not known has no sample", "[gateway][metrics]") {
+  const std::string text = metrics_text(snapshot_of_two_axes(), {});
+  CHECK_THAT(text, Contains("thermocomp_up 1\n"));
+  CHECK_THAT(text, Contains("thermocomp_axis_offset_meters{axis=\"z\"} -3.5e-06\n"));
+  CHECK_THAT(text, Contains("thermocomp_axis_offset_radians{axis=\"b\"} 4e-06\n"));
+  CHECK_THAT(text, !Contains("thermocomp_axis_displacement_radians{axis=\"b\"}"));
+  CHECK_THAT(
+      text,
+      Contains("thermocomp_sensor_temperature_celsius{sensor=\"bed front\",block=\"bed\"} 21.5\n"));
+  CHECK_THAT(text, Contains("thermocomp_build_info{version=\"0.1\\\"x\"} 1\n"));
+  CHECK_THAT(text, !Contains("nan"));
+}
+
+TEST_CASE("metrics of a daemon that is away end, and do not stand still", "[gateway][metrics]") {
+  Snapshot snapshot = snapshot_of_two_axes();
+  snapshot.is_here = false;
+  const std::string text = metrics_text(snapshot, {});
+  CHECK_THAT(text, Contains("thermocomp_up 0\n"));
+  CHECK_THAT(text, !Contains("thermocomp_axis"));
+}
+
+TEST_CASE("metrics of any answer are lines of the format", "[gateway][metrics]") {
+  Snapshot odd;
+  odd.is_here = true;
+  odd.status = {{"axes", {1, nullptr, {{"name", 5}}}}, {"buses", "none"}, {"reasons", {1, "x\ny"}}};
+  odd.sensors = {{"sensors", {{{"name", "a\\\"\nb"}, {"smoothed_degC", 1.0}}}}};
+  const std::regex line(
+      R"re((# (HELP|TYPE) [^\n]*|[a-z_]+(\{([a-z_]+="([^"\\\n]|\\["\\n])*",?)*\})? [-+0-9.e]+))re");
+  std::istringstream lines(metrics_text(odd, {}));
+  for (std::string each; std::getline(lines, each);) {
+    INFO(each);
+    CHECK(std::regex_match(each, line));
+  }
+}
+
+TEST_CASE("topics have no character that a topic gives a meaning to", "[gateway][mqtt]") {
+  CHECK(topic_of("mill", "sensor", "bed front/+#") == "thermocomp/mill/sensor/bed_front___");
+  CHECK(topic_of("mill", "status") == "thermocomp/mill/status");
+  CHECK(utc_text(1772353800.125) == "2026-03-01T08:30:00.125Z");
+  CHECK(utc_text(std::nan("")) == "1970-01-01T00:00:00.000Z");
+  const auto states = topic_states(snapshot_of_two_axes(), "mill");
+  REQUIRE(states.size() == 4);
+  CHECK(states[2].state["offset_um"] == -3.5);
+  CHECK(states[3].state["offset_urad"] == 4.0);
+}
+
+TEST_CASE("adapter lines tell everything once, then what changes", "[gateway][shdr]") {
+  Snapshot snapshot = snapshot_of_two_axes();
+  const ShdrStates first = shdr_states(snapshot);
+  const std::string all = shdr_lines({}, first, snapshot.wall_s);
+  CHECK_THAT(all, Contains("2026-03-01T08:30:00.125Z|avail|AVAILABLE"));
+  CHECK_THAT(all, Contains("|offset_z|-0.003500"));
+  CHECK_THAT(all, Contains("|temp_bed_front|21.500000"));
+  CHECK_THAT(all, Contains("|displacement_b|UNAVAILABLE"));
+  CHECK_THAT(all, Contains("Z|system|NORMAL||||\n"));
+  CHECK(shdr_lines(first, first, snapshot.wall_s).empty());
+  snapshot.status["mode"] = "holding";
+  snapshot.status["reasons"] = {"block_lost", "signal_lost"};
+  const ShdrStates second = shdr_states(snapshot);
+  const std::string changed = shdr_lines(first, second, snapshot.wall_s);
+  CHECK(changed ==
+        "2026-03-01T08:30:00.125Z|mode|holding\n"
+        "2026-03-01T08:30:00.125Z|system|NORMAL||||\n"
+        "2026-03-01T08:30:00.125Z|system|FAULT|block_lost|||an input of the model has no good "
+        "sensor left\n"
+        "2026-03-01T08:30:00.125Z|system|FAULT|signal_lost|||a position or operating signal that "
+        "the model needs is missing\n");
+  CHECK(shdr_lines(second, first, snapshot.wall_s) ==
+        "2026-03-01T08:30:00.125Z|mode|compensating\n"
+        "2026-03-01T08:30:00.125Z|system|NORMAL||||\n");
+}
+
+TEST_CASE("only a ping is answered", "[gateway][shdr]") {
+  CHECK(shdr_answer("* PING\r", 10.0) == "* PONG 10000\n");
+  CHECK(shdr_answer("* PINGS", 10.0).empty());
+  CHECK(shdr_answer("", 10.0).empty());
+}
+
+TEST_CASE("a trend is the slope of the last minutes, once there are some", "[gateway][trend]") {
+  TrendWatch trends;
+  for (int s = 0; s < 50; ++s) trends.add("a", s, 20.0 + 0.001 * s);
+  CHECK(std::isnan(trends.per_hour("a")));
+  for (int s = 50; s < 600; ++s) trends.add("a", s, 20.0 + 0.001 * s);
+  CHECK(trends.per_hour("a") == Approx(3.6));
+  trends.add("a", 700.0, std::nan(""));
+  CHECK(trends.per_hour("a") == Approx(3.6));
+  CHECK(std::isnan(trends.per_hour("b")));
+}
+
+TEST_CASE("displacement is remembered by time, and not for other axes", "[gateway][memory]") {
+  DisplacementMemory memory;
+  const auto status = [](const char* name, double um) {
+    return json{{"axes", {{{"name", name}, {"displacement", um}}}}};
+  };
+  for (int s = 0; s < 100; ++s) memory.add(1000.0 + s, status("z", s));
+  REQUIRE(memory.axes() == std::vector<std::string>{"z"});
+  const auto values = memory.over(0, {985.0, 995.0, 1005.0, 1015.0}, 10.0);
+  CHECK(std::isnan(values[0]));
+  CHECK(std::isnan(values[1]));
+  CHECK(values[2] == Approx(0.0));
+  CHECK(values[3] == Approx(10.0));
+  memory.add(1100.0, status("y", 1.0));
+  CHECK(memory.axes() == std::vector<std::string>{"y"});
+}
+
+TEST_CASE("the page is told in the words of thermocomp status", "[gateway][page]") {
+  Snapshot snapshot = snapshot_of_two_axes();
+  json state = page_state(snapshot, "mill");
+  CHECK(state["verdict"]["answer"] == "yes");
+  CHECK(state["verdict"]["level"] == "good");
+  snapshot.status["mode"] = "holding";
+  snapshot.status["reasons"] = {"block_lost"};
+  state = page_state(snapshot, "mill");
+  CHECK(state["verdict"]["level"] == "bad");
+  CHECK(state["problems"][0]["what"] == "an input of the model has no good sensor left");
+  CHECK_FALSE(state["problems"][0]["remedy"].get<std::string>().empty());
+  snapshot.is_here = false;
+  state = page_state(snapshot, "mill");
+  CHECK_FALSE(state.contains("axes"));
+  CHECK(state["verdict"]["answer"] == "not known");
+}
