@@ -127,12 +127,30 @@ void check_two_subjects(const TomlTable& table, TermSubject kind, const SubjectC
   }
 }
 
+/// What acts, then the place that its effect depends on: their order says which is which.
+void check_column_and_temperature(const TomlTable& table, const SubjectColumns& columns) {
+  const auto temperature = [](const std::string& name) {
+    return is_column_name(name) && is_temperature(name);
+  };
+  const std::string& acts = columns.first;
+  if (!(temperature(acts) || (is_column_name(acts) && is_operating(acts))) ||
+      !temperature(columns.second)) {
+    table.problem("subject",
+                  "must be what acts (a temperature or an operating signal) and the temperature "
+                  "that its effect depends on, as \"a_rpm|room_degC\"");
+  }
+}
+
 void check_subject(const TomlTable& table, const TermKind& kind, const std::string& subject,
                    const ThermalModel& model) {
   if (subject.empty()) return;  // a problem already
   if (kind.subject == TermSubject::two_model_temperatures ||
       kind.subject == TermSubject::temperature_and_position) {
     check_two_subjects(table, kind.subject, subject_columns(subject), model);
+    return;
+  }
+  if (kind.subject == TermSubject::column_and_temperature) {
+    check_column_and_temperature(table, subject_columns(subject));
     return;
   }
   const bool is_input = contains(model.inputs, subject);

@@ -20,9 +20,10 @@ void add_columns(std::vector<std::string>& names, const TermSpec& term, bool tem
   const SubjectColumns columns = subject_columns(term.subject);
   for (const std::string& column : {columns.first, columns.second}) {
     if (column.empty()) continue;
-    const bool is_temperature = kind->subject == TermSubject::temperature_and_position
-                                    ? is_temperature_name(column)
-                                    : kind->subject != TermSubject::signal;
+    const bool mixed = kind->subject == TermSubject::temperature_and_position ||
+                       kind->subject == TermSubject::column_and_temperature;
+    const bool is_temperature =
+        mixed ? is_temperature_name(column) : kind->subject != TermSubject::signal;
     if (is_temperature == temperatures) add_once(names, column);
   }
 }

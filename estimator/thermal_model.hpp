@@ -143,6 +143,7 @@ enum class TermSubject {
   output,                    ///< an output of the model
   two_model_temperatures,    ///< "a|b", both inputs
   temperature_and_position,  ///< "a|b", any temperature and a position, in lexical order
+  column_and_temperature,    ///< "a|b": a temperature, signal or position, then a temperature
   several,                   ///< no one subject: LagBankSpec names them
 };
 struct TermKind {

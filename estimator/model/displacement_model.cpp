@@ -154,7 +154,7 @@ void DisplacementModel::step(nanoseconds now, std::span<const double> temps_degC
   Eigen::Map<Vector> out(displacement_um.data(), static_cast<Eigen::Index>(equation.outputs));
   out.noalias() = equation.matrix_um_per_K * equation.rise_K.head(equation.inputs);
   equation.add_guideways(signals, displacement_um);
-  const TermInput input{now, rise_K, signals};
+  const TermInput input{now, rise_K, signals, reference_degC};
   for (auto& term : equation.terms) term->add(input, displacement_um);
   for (auto& term : equation.terms) term->correct_displacement(displacement_um);
 }

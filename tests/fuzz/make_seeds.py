@@ -57,6 +57,13 @@ tau_s = 60.0
 kind = "sensor_swap"
 subject = "a_degC|b_degC"
 [[term]]
+kind = "start_dependence"
+subject = "speed_rpm|oil_degC"
+at_start = 1
+place0_degC = 20.0
+tau_s = 780.0
+gain_um_per_unit_K = { z_um = 0.0002 }
+[[term]]
 kind = "position_dependence"
 subject = "oil_degC|x_mm"
 p0_mm = 50.0

@@ -15,8 +15,9 @@ namespace thermocomp {
 /// What a term sees of one step.
 struct TermInput {
   nanoseconds now{};
-  std::span<const double> rise_K;   ///< temperature_columns(): T - T_ref
-  std::span<const double> signals;  ///< signal_columns()
+  std::span<const double> rise_K;            ///< temperature_columns(): T - T_ref
+  std::span<const double> signals;           ///< signal_columns()
+  std::span<const double> reference_degC{};  ///< T_ref of temperature_columns(); not in a slope
 };
 
 /// A step runs through three stages, each over all terms in the order of the model file. A term
@@ -88,5 +89,6 @@ TermRegistration output_hysteresis_registration();
 TermRegistration temperature_hysteresis_registration();
 TermRegistration sensor_swap_registration();
 TermRegistration lag_bank_registration();
+TermRegistration start_dependence_registration();
 
 }  // namespace thermocomp

@@ -39,6 +39,13 @@ SubjectIndices subject_indices(const TermSpec& spec, TermSubject subject,
       return {index_of(temperatures, place, subject_key, "must be a temperature and a position"),
               index_of(signals, position, subject_key, "must be a temperature and a position")};
     }
+    case TermSubject::column_and_temperature: {
+      const bool is_temperature = is_temperature_name(columns.first);
+      return {index_of(is_temperature ? temperatures : signals, columns.first, subject_key,
+                       "must be a temperature or a signal, then a temperature"),
+              index_of(temperatures, columns.second, subject_key,
+                       "must be a temperature or a signal, then a temperature")};
+    }
     case TermSubject::several:
       return {};
     case TermSubject::other_temperature:
@@ -92,6 +99,7 @@ const std::vector<TermRegistration>& term_registrations() {
       nonlinear_expansion_registration(), position_dependence_registration(),
       output_hysteresis_registration(),   temperature_hysteresis_registration(),
       sensor_swap_registration(),         lag_bank_registration(),
+      start_dependence_registration(),
   };
   return registrations;
 }

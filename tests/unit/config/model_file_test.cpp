@@ -69,6 +69,13 @@ gain_um_per_K2 = { z_um = 0.1 }
 kind = "wrong_coefficient"
 subject = "b_degC"
 delta_um_per_K = { c_urad = 0.4 }
+[[term]]
+kind = "start_dependence"
+subject = "speed_rpm|oil_degC"
+at_start = 1
+place0_degC = 20.0
+tau_s = 780.0
+gain_um_per_unit_K = { z_um = 0.0002 }
 )";
 
 // NOLINTNEXTLINE(readability-function-size): a table
@@ -184,6 +191,11 @@ const std::vector<Broken>& broken_terms() {
       {"square of a signal", "subject = \"oil_degC\"\ngain_um_per_K2",
        "subject = \"oil_rpm\"\ngain_um_per_K2", "subject = \"oil_rpm\"", "term[9].subject",
        "must be a temperature"},
+      {"a day that begins by a signal", "\"speed_rpm|oil_degC\"", "\"oil_degC|speed_rpm\"", "",
+       "term[11].subject", "what acts"},
+      {"what acts alone", "\"speed_rpm|oil_degC\"", "\"speed_rpm\" # one", "", "term[11].subject",
+       "what acts"},
+      {"half at the start", "at_start = 1", "at_start = 2", "", "term[11].at_start", "[0, 1]"},
   };
   return table;
 }
@@ -237,7 +249,7 @@ TEST_CASE("a model is what its file says", "[config][model]") {
 
 TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
   ThermalModel model = parse_model(with_more_terms, "model.toml");
-  REQUIRE(model.terms.size() == 10);
+  REQUIRE(model.terms.size() == 11);
   model.matrix_um_per_K = {{1.0 / 3.0, -0.0}, {5e-324, 1.7976931348623157e308}};
   model.reference_degC = {20.000000000000004, 1e-5};
   model.guideways[0].name = "slide \"one\"";

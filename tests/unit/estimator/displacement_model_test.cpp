@@ -355,7 +355,9 @@ TEST_CASE("the slope is what a small rise does in the end, whatever the terms", 
                 term("missing_temperature", "room_degC", "gain_um_per_K", -1.5),
                 term("position_dependence", "t2_degC|y_mm", "gain_um_per_K_mm", 0.01),
                 term("thermal_lag", "t2_degC", "gain_um_per_K", 0.5),
-                term("sensor_swap", "t1_degC|t2_degC", "", 0.0)};
+                term("sensor_swap", "t1_degC|t2_degC", "", 0.0),
+                term("start_dependence", "t2_degC|room_degC", "gain_um_per_unit_K", 0.02)};
+  spec.terms[6].shared = {{"at_start", 0.0}, {"place0_degC", -1.0}, {"tau_s", 60.0}};
   spec.terms[2].shared["tau_s"] = 600.0;
   spec.terms[3].shared["p0_mm"] = 20.0;
   spec.terms[4].shared["tau_s"] = 300.0;
@@ -368,6 +370,7 @@ TEST_CASE("the slope is what a small rise does in the end, whatever the terms", 
   };
   const Vector rise_K{4.0, 3.0, 2.0};
   Vector slope(3);
+  z_um(rise_K);  // a term that multiplies two values goes by those of the last step
   // The slope is taken at the rises that the structure has, which here are exchanged.
   model.slope(1, Vector{3.0, 4.0, 2.0}, signals, slope);
   for (std::size_t i = 0; i < 3; ++i) {

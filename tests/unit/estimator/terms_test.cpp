@@ -74,6 +74,50 @@ TEST_CASE("position dependence is a lever around p0, whichever column comes firs
   CHECK(with_terms({lever("a_mm|t1_degC")}).signal_columns() == std::vector<std::string>{"a_mm"});
 }
 
+TEST_CASE("a day that began otherwise has other coefficients: the published two equations",
+          "[terms]") {
+  const auto term = [](const std::string& subject, double at_start, double tau_s, double gain) {
+    return TermSpec{"start_dependence",
+                    subject,
+                    {{"at_start", at_start}, {"place0_degC", 0.0}, {"tau_s", tau_s}},
+                    {{"gain_um_per_unit_K", {{"z_um", gain}}}}};
+  };
+  // C1 = [a1 + a2 T0 + a3 T1] dTs with a1 = 2 (the matrix), a2 = 0.1, a3 = -0.03; the room at 23.
+  const double tau_s = 1800.0 / std::log(10.0);
+  DisplacementModel bed(
+      with_terms({term("t1_degC|t1_degC", 1, 0, 0.1), term("t1_degC|room_degC", 0, 0, -0.03)}));
+  CHECK(at(bed, 0s, {4.0, 0.0, 3.0})[0] == Approx((2.0 + 0.1 * 20.0 - 0.03 * 23.0) * 4.0));
+  // C2 = N [b1 + b2 T0 + b3 T1] {1 - exp(ln 0.1 t / 30)}, t in minutes since the speed was set.
+  ThermalModel spindle = with_terms({term("spindle_rpm|t1_degC", 1, tau_s, 1e-4),
+                                     term("spindle_rpm|room_degC", 0, tau_s, -2e-5)});
+  spindle.terms.push_back({"missing_heat_source",
+                           "spindle_rpm",
+                           {{"power", 1.0}, {"tau_s", tau_s}},
+                           {{"gain_um_per_unit", {{"z_um", 5e-3}}}}});
+  DisplacementModel bearing(spindle);
+  CHECK(at(bearing, 0s, {0.0, 0.0, 3.0}, {0.0})[0] == 0.0);
+  const double share = 1.0 - std::pow(0.1, 20.0 / 30.0);
+  CHECK(at(bearing, 1200s, {0.0, 0.0, 3.0}, {3000.0})[0] ==
+        Approx(3000.0 * (5e-3 + 1e-4 * 20.0 - 2e-5 * 23.0) * share));
+}
+
+TEST_CASE("how a day began is what the reference says, not where the place stands now", "[terms]") {
+  const TermSpec start{"start_dependence",
+                       "t1_degC|t2_degC",
+                       {{"at_start", 1.0}, {"place0_degC", 18.0}, {"tau_s", 0.0}},
+                       {{"gain_um_per_unit_K", {{"w_um", 0.5}}}}};
+  const ThermalModel spec = with_terms({start});
+  const auto w_um = [&spec](double began_degC, double now_degC) {
+    DisplacementModel model(spec);
+    Vector out(2);
+    model.step(0s, Vector{22.0, now_degC}, Vector{20.0, began_degC}, {}, out);
+    return out[1];
+  };
+  CHECK(w_um(18.0, 18.0) == Approx(-2.0));        // as at X0: the matrix alone
+  CHECK(w_um(20.0, 20.0) == Approx(-2.0 + 2.0));  // began 2 K warmer: 0.5 * 2 * 2
+  CHECK(w_um(20.0, 25.0) - 3.0 * 5.0 == Approx(w_um(20.0, 20.0)));
+}
+
 TEST_CASE("exchanged channels are put back before anything else sees them", "[terms]") {
   const TermSpec swap{"sensor_swap", "t1_degC|t2_degC", {}, {}};
   CHECK(at_rest({swap}, {1.0, 4.0}) == Vector{2.0 * 4.0 + 5.0, -4.0 + 3.0});
