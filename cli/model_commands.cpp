@@ -9,11 +9,13 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/course_fit.hpp"
 #include "cli/covariance_fit.hpp"
 #include "cli/output_file.hpp"
 #include "cli/prediction.hpp"
 #include "cli/run_loader.hpp"
 #include "cli/terminal.hpp"
+#include "config/daemon_config.hpp"
 #include "config/file_limits.hpp"
 #include "config/model_file.hpp"
 #include "config/printable_text.hpp"
@@ -124,6 +126,68 @@ int run_covariance(const CovarianceOptions& options) {
   return exit_success;
 }
 
+struct CourseOptions {
+  std::string config;
+  std::vector<std::string> records;
+  std::string columns;
+  std::string output;
+  double every_s{60.0};
+};
+
+int run_correction(const CourseOptions& options) {
+  const DaemonConfig config = load_daemon_config(options.config);
+  const CorrectionConfig& correction = config.estimator.correction;
+  if (correction.form == CorrectionForm::off) {
+    throw Failure(options.config + ": [correction] form is \"off\"; choose \"two_phase\" or " +
+                  "\"recursive\" and its groups: a record is made of what they learn");
+  }
+  ThermalModel model = load_model(config.model_file);
+  std::vector<RunFile> runs;
+  RunLoader loader(options.columns);
+  for (const std::string& record : options.records) runs.push_back(load_record(record, loader));
+  const CourseFit fit = fit_course(runs, model, correction, options.every_s);
+  model.course = fit.course;
+  OutputFile file(options.output);
+  file.stream() << write_model(model);
+  file.commit();
+  for (const auto& [name, points] : fit.course.outputs) {
+    std::fprintf(stderr, "%s: %zu probings taught gains, %zu kept", name.c_str(),
+                 fit.probings.at(name), points.size());
+    if (fit.left_out_rms_um.contains(name)) {
+      std::fprintf(stderr, "; a run left out: RMS %.2f um (without a record %.2f um)",
+                   fit.left_out_rms_um.at(name), fit.without_rms_um.at(name));
+    } else {
+      std::fprintf(stderr, "; one run: nothing says how it does on another");
+    }
+    std::fprintf(stderr, "\n");
+  }
+  return exit_success;
+}
+
+void add_correction_command(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<CourseOptions>();
+  CLI::App* sub = app.add_subcommand(
+      "correction",
+      "what probed courses taught about the gains of [correction], for when nothing is probed");
+  sub->add_option("RECORD", options->records,
+                  "run files with probed displacement, RUN.csv[@T0:T1], or histories")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("--config", options->config,
+                  "configuration of the daemon: its model and its [correction]")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("--columns", options->columns, columns_help)->type_name("FILE");
+  sub->add_option("--every-s", options->every_s, "a measured value counts as a probing this often")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  sub->add_option("-o,--output", options->output,
+                  "the model file with its table [course]; - is standard output")
+      ->type_name("FILE")
+      ->required();
+  sub->callback([&action, options] { action = [options] { return run_correction(*options); }; });
+}
+
 void add_covariance_command(CLI::App& app, Action& action) {
   const auto options = std::make_shared<CovarianceOptions>();
   CLI::App* sub = app.add_subcommand(
@@ -173,6 +237,7 @@ void add_model_commands(CLI::App& app, Action& action) {
   });
 
   add_covariance_command(app, action);
+  add_correction_command(app, action);
 }
 
 }  // namespace thermocomp::cli

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "config/course_table.hpp"
 #include "config/file_limits.hpp"
 #include "config/made_from.hpp"
 #include "config/toml_reader.hpp"
@@ -368,6 +369,7 @@ bool read_model(const TomlDocument& document, ThermalModel& model) {
   }
   read_covariance(root, model);
   if (root.has("made_from")) model.made_from = read_made_from(root.table("made_from"), model);
+  if (root.has("course")) model.course = read_course(root.table("course"), model);
   return true;
 }
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <string>
 
+#include "config/course_table.hpp"
 #include "config/made_from.hpp"
 #include "config/model_file.hpp"
 #include "config/toml_text.hpp"
@@ -98,6 +99,7 @@ std::string write_model(const ThermalModel& model) {
   for (const TermSpec& term : model.terms) text += term_text(term);
   if (!model.covariance_K2.empty()) text.append("\n").append(write_covariance(model));
   if (model.made_from) text.append("\n").append(write_made_from(model));
+  if (model.course) text.append("\n").append(write_course(model));
   return text;
 }
 

@@ -38,10 +38,15 @@ json reasons(const Report& report) {
 json correction(const StatusView& view, const CorrectionReport& report) {
   const CorrectionConfig& config = view.config.estimator.correction;
   json gains = json::array();
-  for (std::size_t g = 0; g < config.groups.size(); ++g)
+  for (std::size_t g = 0; g < config.groups.size(); ++g) {
     gains.push_back({{"inputs", config.groups[g]},
                      {"gain", number(report.gain[g])},
                      {"sd", number(report.gain_sd[g])}});
+    if (!report.has_record) continue;
+    gains.back()["used"] = number(report.gain_used[g]);
+    gains.back()["recorded"] = number(report.recorded[g]);
+    gains.back()["recorded_sd"] = number(report.recorded_sd[g]);
+  }
   return {{"form", config.form == CorrectionForm::two_phase ? "two_phase" : "recursive"},
           {"gains", gains},
           {"bias_um", number(report.bias_um)},

@@ -1,6 +1,7 @@
 /// The model of a machine as the model file gives it: plain data, no arithmetic.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -102,6 +103,30 @@ struct MadeFrom {
 inline constexpr std::size_t domain_features_max = 256;
 inline constexpr std::size_t domain_taus_max = 8;
 
+/// Where a machine stands in the course of its heat; see HeatPhase.
+enum class CoursePhase : std::uint8_t { heating, turned, cooling };
+inline constexpr std::size_t course_points_max = 512;  ///< of an output: what a look-up may cost
+
+/// `[course]`: what probed courses taught about the gains of a correction (`[correction]` of the
+/// daemon's file), state by state, for times when nothing is probed; see CourseLookup.
+struct RecordedCourse {
+  struct Point {
+    CoursePhase phase{};
+    double since_s{0.0};         ///< since the heat came or went
+    std::vector<double> rise_K;  ///< one an input
+    std::vector<double> gain;    ///< one a group
+    std::vector<double> sd;      ///< one a group
+
+    bool operator==(const Point& other) const = default;
+  };
+  std::vector<std::string> runs;                 ///< as given
+  std::vector<std::vector<std::string>> groups;  ///< inputs that share a gain
+  double bandwidth{0.5};                         ///< in spreads of the points
+  std::map<std::string, std::vector<Point>> outputs;
+
+  bool operator==(const RecordedCourse& other) const = default;
+};
+
 /// delta = P (T - T_ref) + guideway rows + terms. Shapes: matrix (outputs, inputs).
 struct ThermalModel {
   std::vector<std::string> inputs;   ///< temperature columns, e.g. "t1_degC"
@@ -115,6 +140,7 @@ struct ThermalModel {
   std::vector<std::vector<double>> covariance_K2;
   CovarianceGrowth covariance_growth;
   std::optional<MadeFrom> made_from;
+  std::optional<RecordedCourse> course;
 
   /// Inputs, then every further temperature that a term names, in order of first use.
   [[nodiscard]] std::vector<std::string> temperature_columns() const;

@@ -45,6 +45,8 @@ CorrectionConfig read_correction(const TomlTable& table) {
 
 void check_correction(const TomlTable& table, const CorrectionConfig& config,
                       const ThermalModel& model) {
+  if (model.course && config.form != CorrectionForm::off && model.course->groups != config.groups)
+    table.problem("group", "must be the groups of the model's [course], in its order");
   std::set<std::string> named;
   const std::vector<TomlTable> groups = table.tables("group");
   for (std::size_t i = 0; i < config.groups.size(); ++i) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "estimator/checks.hpp"
 #include "estimator/estimator_config.hpp"
@@ -13,6 +14,12 @@ namespace {
 
 /// Two refused probings that differ by less than so many standard deviations agree.
 constexpr double agreeing_sigma = 3.0;
+/// A record is asked so often: gains change within minutes.
+constexpr std::chrono::seconds look_up_period{1};
+
+bool has_course(const ThermalModel& model, std::size_t output) {
+  return model.course && model.course->outputs.contains(model.outputs[output]);
+}
 
 std::string gain_key(std::size_t group) {
   return std::string("gain").append(std::to_string(group + 1));
@@ -49,7 +56,9 @@ void CorrectionConfig::validate() const {
 
 RunningCorrection::RunningCorrection(const CorrectionConfig& config, const ThermalModel& model,
                                      std::size_t output)
-    : config_(config), groups_(config.form == CorrectionForm::off ? 0 : config.groups.size()) {
+    : config_(config),
+      groups_(config.form == CorrectionForm::off ? 0 : config.groups.size()),
+      record_(config.turn_um) {
   config.validate();
   require(config.groups.size() <= correction_groups_max, "correction.group",
           static_cast<double>(config.groups.size()), "must be at most 4 groups");
@@ -75,13 +84,72 @@ RunningCorrection::RunningCorrection(const CorrectionConfig& config, const Therm
     state_.used[g] = state_.learned[g] = 1.0;
     state_.covariance[g][g] = config.gain_sd * config.gain_sd;
   }
+  if (groups_ == 0 || !has_course(model, output)) return;
+  require(model.course->groups == config.groups, "correction.group", static_cast<double>(groups_),
+          "must be the groups of the model's [course]");
+  course_.emplace(*model.course, model, output, config.gain_sd);
+  record_.says.gain.fill(1.0);
+  record_.says.sd.fill(config.gain_sd);
 }
 
 void RunningCorrection::step(nanoseconds now, std::span<const double> rise_K,
                              bool may_change) noexcept {
   state_.now = now;
   state_.contributions_um = contributions_um(rise_K);
-  if (may_change) state_.used = state_.learned;
+  if (course_) look_up(rise_K);
+  if (may_change) state_.used = joint_gains();
+}
+
+void RunningCorrection::look_up(std::span<const double> rise_K) noexcept {
+  double sum_um = 0.0;
+  for (std::size_t g = 0; g < groups_; ++g) sum_um += state_.contributions_um[g];
+  record_.phase.step(state_.now, state_.contributions_um[0], sum_um);
+  if (record_.looked && state_.now - record_.looked_at < look_up_period) return;
+  record_.says = course_->at(record_.phase.phase(), record_.phase.since_s(), rise_K);
+  record_.looked = true;
+  record_.looked_at = state_.now;
+}
+
+double RunningCorrection::learned_variance(std::size_t group) const noexcept {
+  if (state_.taken == 0) return std::numeric_limits<double>::infinity();
+  const double drift = config_.gain_drift_per_sqrt_h * config_.gain_drift_per_sqrt_h;
+  const double probed = config_.form == CorrectionForm::recursive
+                            ? state_.covariance[group][group]
+                            : record_.probed_sd[group] * record_.probed_sd[group];
+  return probed + drift * hours_since_probing();
+}
+
+double RunningCorrection::joint_variance(std::size_t group) const noexcept {
+  return std::min(record_.says.sd[group] * record_.says.sd[group], learned_variance(group));
+}
+
+RunningCorrection::Gains RunningCorrection::joint_gains() const noexcept {
+  Gains gains = state_.learned;
+  if (!course_) return gains;
+  for (std::size_t g = 0; g < groups_; ++g) {
+    const double recorded = record_.says.sd[g] * record_.says.sd[g];
+    const double learned = learned_variance(g);
+    double share = 0.0;  // of what was learned
+    if (std::isfinite(learned))
+      share = recorded + learned > 0 ? recorded / (recorded + learned) : 1;
+    gains[g] = std::clamp(record_.says.gain[g] + share * (gains[g] - record_.says.gain[g]),
+                          config_.gain_min, config_.gain_max);
+  }
+  return gains;
+}
+
+void RunningCorrection::go_on_from_joint() noexcept {
+  Gains scale{};
+  scale[groups_] = 1.0;
+  for (std::size_t g = 0; g < groups_; ++g) {
+    const double variance = state_.covariance[g][g];
+    scale[g] = variance > 0 ? std::sqrt(joint_variance(g) / variance) : 1.0;
+    record_.probed_sd[g] = std::sqrt(joint_variance(g));
+  }
+  state_.learned = joint_gains();
+  state_.probed_at = state_.now;  // the time since then is in the variances
+  for (std::size_t i = 0; i <= groups_; ++i)
+    for (std::size_t j = 0; j <= groups_; ++j) state_.covariance[i][j] *= scale[i] * scale[j];
 }
 
 RunningCorrection::Contributions RunningCorrection::contributions_um(
@@ -107,6 +175,7 @@ void RunningCorrection::measured(double displacement_um, double model_um) noexce
     ++state_.refused;
     return;
   }
+  if (course_) go_on_from_joint();
   if (config_.form == CorrectionForm::two_phase)
     learn_two_phases(displacement_um, model_um);
   else
@@ -136,6 +205,7 @@ void RunningCorrection::learn_two_phases(double displacement_um, double model_um
     wanted[1] = 1.0 + (beyond_um - (state_.learned[0] - 1.0) * p1_um) / p2_um;
   else
     wanted[0] = config_.as_printed ? displacement_um / model_um : 1.0 + beyond_um / p1_um;
+  record_.probed_sd[state_.phase == 2 ? 1 : 0] = config_.noise_um / std::abs(denominator_um);
   move_to(wanted);
 }
 
@@ -151,7 +221,15 @@ double RunningCorrection::hours_since_probing() const noexcept {
       0.0, std::chrono::duration<double, std::ratio<3600>>(state_.now - state_.probed_at).count());
 }
 
+double RunningCorrection::joint_sd_um() const noexcept {
+  double variance = 0.0;
+  for (std::size_t g = 0; g < groups_; ++g)
+    variance += state_.contributions_um[g] * state_.contributions_um[g] * joint_variance(g);
+  return std::sqrt(variance);
+}
+
 double RunningCorrection::sd_um() const noexcept {
+  if (course_) return joint_sd_um();
   if (config_.form != CorrectionForm::recursive) return 0.0;
   const Gains h = slopes();
   const double hours = state_.taken == 0 ? 0.0 : hours_since_probing();
@@ -220,6 +298,8 @@ void RunningCorrection::restart() noexcept {
   state_.phase = 1;
   state_.extreme_um = 0.0;
   state_.doubted = false;
+  record_.phase.restart();
+  record_.looked = false;
 }
 
 CorrectionReport RunningCorrection::report() const noexcept {
@@ -236,6 +316,9 @@ CorrectionReport RunningCorrection::report() const noexcept {
   report.phase = state_.phase;
   report.taken = state_.taken;
   report.refused = state_.refused;
+  report.has_record = course_.has_value();
+  report.recorded = record_.says.gain;
+  report.recorded_sd = record_.says.sd;
   return report;
 }
 
@@ -291,6 +374,7 @@ void RunningCorrection::restore(const std::map<std::string, double>& of_all_axes
 void RunningCorrection::adopt(const RunningCorrection& previous) noexcept {
   if (config_.form != previous.config_.form || config_.groups != previous.config_.groups) return;
   state_ = previous.state_;
+  if (course_ && previous.course_) record_ = previous.record_;
 }
 
 }  // namespace thermocomp

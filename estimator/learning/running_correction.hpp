@@ -5,11 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "estimator/correction_config.hpp"
+#include "estimator/learning/heat_phase.hpp"
+#include "estimator/learning/recorded_course.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/thermal_model.hpp"
 #include "estimator/types.hpp"
@@ -28,6 +31,9 @@ struct CorrectionReport {
   std::uint8_t phase{1};       ///< two_phase: 1 or 2
   std::uint64_t taken{0};      ///< probings that changed the gains
   std::uint64_t refused{0};    ///< outliers, and those that could say nothing
+  bool has_record{false};      ///< the model has a course of this axis; then also:
+  std::array<double, correction_groups_max> recorded{};     ///< what it says of the gains now
+  std::array<double, correction_groups_max> recorded_sd{};  ///< and how surely
 };
 
 /// One axis. With contributions p_g = sum over the inputs of group g of matrix * rise, and model
@@ -42,6 +48,11 @@ struct CorrectionReport {
 /// recursive: a Kalman filter whose state is the gains (and a bias), which wander with
 /// gain_drift_per_sqrt_h; a probing further off than outlier_sigma is refused, unless the next one
 /// agrees with it.
+///
+/// With a recorded course (`[course]` of the model) the gains in use are the mean of what was
+/// learned and of what the record says at the present state, weighted by their variances; what was
+/// learned grows uncertain with gain_drift_per_sqrt_h, from noise_um / |p_g| at the last probing
+/// (two_phase) or by the filter (recursive). A probing goes on from the gains in use.
 ///
 /// A probing moves the estimate by at most step_um_max, the gains stay in [gain_min, gain_max], and
 /// nothing that was learned is used before `may_change`.
@@ -73,7 +84,10 @@ class RunningCorrection {
   /// After a reload, where the groups are the same.
   void adopt(const RunningCorrection& previous) noexcept;
 
-  void visit_state(StateArchive& archive) { archive(state_); }
+  void visit_state(StateArchive& archive) {
+    archive(state_);
+    if (course_) archive(record_);
+  }
 
  private:
   static constexpr std::size_t states_max = correction_groups_max + 1;
@@ -98,6 +112,29 @@ class RunningCorrection {
     }
   };
 
+  /// Of the look-up; there only with a course, so that the states of other machines stay as they
+  /// are.
+  struct Record {
+    explicit Record(double back_um) : phase(back_um) {}
+    HeatPhase phase;
+    RecordedGains says{};
+    bool looked{false};
+    nanoseconds looked_at{};
+    Contributions probed_sd{};  ///< of what was learned, at the last probing
+    void visit_state(StateArchive& archive) {
+      archive(phase, says.gain, says.sd, looked, looked_at, probed_sd);
+    }
+  };
+
+  void look_up(std::span<const double> rise_K) noexcept;
+  /// Variance of a learned gain now; infinite before the first probing of this life.
+  [[nodiscard]] double learned_variance(std::size_t group) const noexcept;
+  /// Variance of the gain in use: that of the surer one of both, since what was learned went on
+  /// from the record and does not add to it.
+  [[nodiscard]] double joint_variance(std::size_t group) const noexcept;
+  /// What was learned, with a course joined to what that says.
+  [[nodiscard]] Gains joint_gains() const noexcept;
+  void go_on_from_joint() noexcept;
   [[nodiscard]] Contributions contributions_um(std::span<const double> rise_K) const noexcept;
   [[nodiscard]] double correction_of(const Gains& state, const Contributions& of_um) const noexcept;
   [[nodiscard]] double correction_of(const Gains& state) const noexcept {
@@ -105,6 +142,7 @@ class RunningCorrection {
   }
   [[nodiscard]] Gains slopes() const noexcept;
   [[nodiscard]] double sd_um() const noexcept;
+  [[nodiscard]] double joint_sd_um() const noexcept;
   [[nodiscard]] double hours_since_probing() const noexcept;
   void learn_two_phases(double displacement_um, double model_um) noexcept;
   void learn_recursively(double error_um) noexcept;
@@ -114,8 +152,10 @@ class RunningCorrection {
   std::vector<std::vector<std::size_t>> inputs_;      ///< of each group
   std::vector<std::vector<double>> matrix_um_per_K_;  ///< the same shape
   const std::size_t groups_;
+  std::optional<CourseLookup> course_;
 
   State state_;
+  Record record_;
 };
 
 }  // namespace thermocomp
