@@ -4,6 +4,7 @@
 //   bench_gate_machine coefficients
 //   bench_gate_machine run RUN.csv         the first condition measured once, for `thermocomp fit`
 //   bench_gate_machine corrections MODEL   formulas' and the fitted model's, corrected or not
+//   bench_gate_machine record              gains recorded on two conditions, judged on the third
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -17,7 +18,9 @@
 #include <utility>
 #include <vector>
 
+#include "cli/course_fit.hpp"
 #include "config/model_file.hpp"
+#include "config/run_file.hpp"
 #include "estimator/learning/running_correction.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "estimator/model/terms/low_pass.hpp"
@@ -133,7 +136,7 @@ struct Left {
 
 /// What is left of the true displacement at any time.
 Left residual(const Course& course, const Measured& readings, const CorrectionConfig& config,
-              const ThermalModel& model) {
+              const ThermalModel& model, bool probed = true) {
   DisplacementModel displacement(model);
   RunningCorrection correction(config, model, 0);
   const Readings reference{room_degC, room_degC, room_degC};
@@ -149,7 +152,7 @@ Left residual(const Course& course, const Measured& readings, const CorrectionCo
     left.low = std::min(left.low, um);
     left.high = std::max(left.high, um);
     if (i > 2 * probing_every_steps) left.later_peak = std::max(left.later_peak, std::abs(um));
-    if (i > 0 && i % probing_every_steps == 0) {
+    if (probed && i > 0 && i % probing_every_steps == 0) {
       correction.measured(readings.probed_um[i], model_um);
     }
   }
@@ -285,18 +288,68 @@ void compare_corrections(const std::string& fitted_file) {
 }
 
 /// As an indicator and a logger would leave it, a row a step.
-void write_run(const char* path) {
-  const Course course = course_of(1);
-  const Measured readings = measured(course, fitted_filter_s, 11);
-  std::FILE* file = std::fopen(path, "w");
-  if (file == nullptr) throw std::runtime_error(std::string(path).append(": cannot be written"));
-  std::fputs("time_s,a_degC,b_degC,c_degC,x_um\n", file);
+std::string run_text(const Course& course, std::uint64_t seed) {
+  const Measured readings = measured(course, fitted_filter_s, seed);
+  std::string text = "time_s,a_degC,b_degC,c_degC,x_um\n";
+  std::array<char, 128> line{};
   for (std::size_t i = 0; i < course.um.size(); ++i) {
     const Readings& temps = readings.temps_degC[i];
-    std::fprintf(file, "%g,%.4f,%.4f,%.4f,%.3f\n", static_cast<double>(i) * step_s, temps[0],
-                 temps[1], temps[2], readings.probed_um[i]);
+    std::snprintf(line.data(), line.size(), "%g,%.4f,%.4f,%.4f,%.3f\n",
+                  static_cast<double>(i) * step_s, temps[0], temps[1], temps[2],
+                  readings.probed_um[i]);
+    text += line.data();
   }
+  return text;
+}
+
+void write_run(const char* path) {
+  std::FILE* file = std::fopen(path, "w");
+  if (file == nullptr) throw std::runtime_error(std::string(path).append(": cannot be written"));
+  std::fputs(run_text(course_of(1), 11).c_str(), file);
   std::fclose(file);
+}
+
+/// Without a correction, by the record of the other two conditions alone, by probings alone, and by
+/// both; greatest residual of the condition left out. Two sides in one group, as published.
+void compare_record() {
+  const std::array<Course, 3> courses{course_of(1), course_of(2), course_of(3)};
+  const CorrectionConfig correction = recursive(false, 0.1, 0.0);
+  CorrectionConfig off = correction;
+  off.form = CorrectionForm::off;
+  std::array<double, 4> peaks{};
+  for (const auto& [ki_share, kc_share] : {std::pair{1.2, 0.8}, std::pair{1.0, 1.0}}) {
+    ThermalModel model = formula_model(ki_share, kc_share);
+    std::printf(
+        "Ki times %g, Kc times %g: residual of the condition left out, um\n"
+        "  condition  none              record            probings          both\n",
+        ki_share, kc_share);
+    for (std::size_t left_out = 0; left_out < courses.size(); ++left_out) {
+      std::vector<RunFile> runs;
+      for (std::size_t i = 0; i < courses.size(); ++i)
+        if (i != left_out)
+          runs.push_back(parse_run(run_text(courses[i], 20 + i), "condition " + std::to_string(i)));
+      ThermalModel recorded = model;
+      recorded.course =
+          cli::fit_course(runs, model, correction, step_s * probing_every_steps).course;
+      const Measured readings = measured(courses[left_out], fitted_filter_s, left_out + 1);
+      const auto left = [&](const CorrectionConfig& config, const ThermalModel& by, bool probed) {
+        return residual(courses[left_out], readings, config, by, probed);
+      };
+      const std::array<Left, 4> all{left(off, model, false), left(correction, recorded, false),
+                                    left(correction, model, true),
+                                    left(correction, recorded, true)};
+      std::printf("  %zu        ", left_out + 1);
+      for (std::size_t k = 0; k < all.size(); ++k) {
+        std::printf("  %+6.1f .. %+5.1f", all[k].low, all[k].high);
+        if (ki_share > 1.0) peaks[k] = std::max(peaks[k], all[k].peak());
+      }
+      std::printf("\n");
+    }
+  }
+  std::printf(
+      "left_out_none %.2f um\nleft_out_record %.2f um\nleft_out_probings %.2f um\n"
+      "left_out_both %.2f um\n",
+      peaks[0], peaks[1], peaks[2], peaks[3]);
 }
 
 }  // namespace
@@ -310,8 +363,10 @@ int main(int argc, char** argv) {
       write_run(argv[2]);
     else if (what == "corrections" && argc == 3)
       compare_corrections(argv[2]);
+    else if (what == "record" && argc == 2)
+      compare_record();
     else
-      throw std::runtime_error("coefficients, run RUN.csv or corrections MODEL.toml");
+      throw std::runtime_error("coefficients, run RUN.csv, corrections MODEL.toml or record");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_gate_machine: %s\n", error.what());
     return 2;

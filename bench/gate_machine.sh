@@ -11,5 +11,6 @@ trap 'rm -rf "$out"' EXIT
 "$bin/thermocomp-modelling" fit "$out/condition_1.csv" --outputs x_um --terms 3 --lags \
   -o "$out/model.toml" > "$out/said"
 "$bin/bench_gate_machine" corrections "$out/model.toml"
+"$bin/bench_gate_machine" record
 here=$(cd "$(dirname "$0")" && pwd)
 python3 "$here/gate_experiment.py" "$bin" "$here/../config/gate_machine" "$out/experiment"

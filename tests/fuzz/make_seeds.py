@@ -126,6 +126,15 @@ def toml_seeds():
           'format = 1\ninputs = ["\\u00e4 b.c_degC"]\noutputs = ["\\"z_um"]\n'
           'reference = "first_sample"\nmatrix_um_per_K = [[1.0]]\n')
     write("model_file", "every_term.toml", EVERY_TERM)
+    write("model_file", "course.toml",
+          'format = 1\ninputs = ["a_degC", "b_degC"]\noutputs = ["z_um"]\n'
+          'reference = "first_sample"\nmatrix_um_per_K = [[1.0, 2.0]]\n'
+          '[course]\nruns = ["day.csv"]\nbandwidth = 0.25\n'
+          '[[course.group]]\ninputs = ["a_degC"]\n[[course.group]]\ninputs = ["b_degC"]\n'
+          '[course.output.z_um]\nphase = ["heating", "turned", "cooling"]\n'
+          'since_s = [60.0, 1e3, 2e3]\nrise_K = [[0.1, 0.3], [2.0, 1.0], [1.0, 1.0]]\n'
+          'gain = [[1.1, 1.0], [1.2, 0.9], [1.2, 0.8]]\n'
+          'gain_sd = [[0.1, 0.3], [0.1, 0.05], [0.1, 0.05]]\n')
     # In the daemon, the terms of the sensors and outputs that the short example has.
     parts = re.split(r"(?=^\[)", EVERY_TERM, flags=re.M)
     own = "".join(part for part in parts
@@ -490,7 +499,7 @@ def dictionaries():
     DICTIONARIES.mkdir(exist_ok=True)
     toml = {"[[", "]]", " = ", "true", "false", "nan", "-inf", "1e300", '"""', "0x", "{ ", " }", "\n[",
             "\\u0000", "1979-05-27T07:32:00Z"}
-    model = literals("config/model_file.cpp", "estimator/model/terms/*.cpp", "config/units.cpp")
+    model = literals("config/model_file.cpp", "config/course_table.cpp", "estimator/model/terms/*.cpp", "config/units.cpp")
     dictionary("model_file", toml | model)
     dictionary("daemon_config", toml | model | {"#### model\n"} |
                literals("config/daemon_config.cpp", "config/sections/*.cpp"))

@@ -269,6 +269,49 @@ TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
   CHECK(write_model(back) == write_model(model));
 }
 
+namespace {
+
+const char* const with_course =
+    "format = 1\ninputs = [\"a_degC\", \"b_degC\"]\noutputs = [\"z_um\"]\n"
+    "reference = \"first_sample\"\nmatrix_um_per_K = [[1.0, 2.0]]\n[course]\nruns = [\"day.csv\"]\n"
+    "bandwidth = 0.25\n[[course.group]]\ninputs = [\"a_degC\"]\n[[course.group]]\n"
+    "inputs = [\"b_degC\"]\n[course.output.z_um]\nphase = [\"heating\", \"cooling\"]\n"
+    "since_s = [60.0, 1e3]\nrise_K = [[0.1, 0.3333333333333333], [2.0, 1.0]]\n"
+    "gain = [[1.1, 1.0], [1.2, 0.9]]\ngain_sd = [[0.1, 0.3], [0.1, 0.05]]\n";
+
+}  // namespace
+
+TEST_CASE("a recorded course is read and written bit for bit", "[config][model]") {
+  const ThermalModel model = parse_model(with_course, "model.toml");
+  REQUIRE(model.course);
+  CHECK(model.course->bandwidth == 0.25);
+  REQUIRE(model.course->outputs.at("z_um").size() == 2);
+  CHECK(model.course->outputs.at("z_um")[1].phase == CoursePhase::cooling);
+  CHECK(model.course->outputs.at("z_um")[0].rise_K == std::vector<double>{0.1, 1.0 / 3.0});
+  const ThermalModel back = parse_model(write_model(model), "written");
+  CHECK(back.course == model.course);
+  CHECK(write_model(back) == write_model(model));
+}
+
+TEST_CASE("a broken course is named by key and rule", "[config][model]") {
+  const auto [from, to, said] = GENERATE(table<std::string, std::string, std::string>(
+      {{"\"cooling\"", "\"cold\"", "must be \"heating\", \"turned\" or \"cooling\""},
+       {"since_s = [60.0, 1e3]", "since_s = [60.0]", "must have one value a point (2)"},
+       {"[1.2, 0.9]", "[1.2, 1e308]", "must be in [0, 10]"},
+       {"[2.0, 1.0]]", "[2.0]]", "must have 2"},
+       {"[0.1, 0.05]]", "[0.1, nan]]", "finite"},
+       {"inputs = [\"b_degC\"]", "inputs = [\"a_degC\"]", "is named already"},
+       {"output.z_um", "output.y_um", "must be an output of the model"},
+       {"bandwidth = 0.25", "bandwidth = 0.0", "bandwidth"},
+       {"[[course.group]]\ninputs = [\"a_degC\"]\n[[course.group]]\ninputs = [\"b_degC\"]\n", "",
+        "must be 1 to 4 groups"}}));
+  std::string text = with_course;
+  const auto at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  text.replace(at, from.size(), to);
+  CHECK_THROWS_WITH(parse_model(text, "model.toml"), Catch::Contains(said));
+}
+
 TEST_CASE("how estimates grow uncertain is read and written bit for bit", "[config][model]") {
   const std::string text =
       "format = 1\ninputs = [\"a_degC\", \"b_degC\"]\noutputs = [\"z_um\"]\n"
