@@ -181,10 +181,26 @@ std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& o
   return results;
 }
 
-Family simplest_as_good(const std::vector<FamilyResult>& results) {
-  const auto total = [](const FamilyResult& result) {
-    return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
+double total(const FamilyResult& result) {
+  return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
+}
+
+/// The family whose left-out RMS, as geometric mean of the outputs, is least: a factor counts alike
+/// in an output that moves little. For stretches of few runs: how much they differ from each other
+/// says nothing of how surely one family is better, so there is no standard error to give away.
+Family least_left(const std::vector<FamilyResult>& results) {
+  const auto left = [](const FamilyResult& result) {
+    double sum = 0.0;
+    for (const double rms_um : result.left_out_rms_um) sum += std::log(std::max(rms_um, 1e-30));
+    return sum;
   };
+  const FamilyResult* best = &results[0];
+  for (const FamilyResult& result : results)
+    if (result.answers && left(result) < left(*best)) best = &result;
+  return best->family;
+}
+
+Family simplest_as_good(const std::vector<FamilyResult>& results) {
   const FamilyResult* best = &results[0];
   for (const FamilyResult& result : results)
     if (result.answers && total(result) < total(*best)) best = &result;
@@ -320,10 +336,12 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
   fit.results = judged(tests, options, bank, done);
   if (forced)
     fit.chosen = *forced;
-  else if (choosing.folds.empty())
+  else if (tests.runs.size() >= runs_that_choose)
     fit.chosen = simplest_as_good(fit.results);
+  else if (choosing.folds.empty())
+    fit.chosen = least_left(fit.results);
   else
-    fit.chosen = simplest_as_good(without_runaways(
+    fit.chosen = least_left(without_runaways(
         judged(choosing, options, BankEquations(choosing, columns), done), fit.results));
   fit.chosen_by_stretches = !choosing.folds.empty();
   if (!fit.chosen_result().answers)
