@@ -11,10 +11,6 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double offset_sd_um = 1e4;
-/// Displacement counts from the first row, so that a run's level is that row's noise with its sign
-/// turned. Of it three standard deviations are allowed, since one row can be a bad one (1, 3 and 10
-/// named the same of 160 planted cases but for one).
-constexpr double level_sd_rows = 3.0;
 constexpr double accepted_sd_um = 1e4;
 constexpr Eigen::Index measured_rows_min = 8;
 /// A noise that is below the least digit anybody measures would make every misfit significant.
@@ -192,9 +188,7 @@ OutputEvidence::OutputEvidence(const MeasuredData& data, const StackedRows& rows
     present_.segment(block.begin, count) = residual.array().isFinite();
     measured_residual_.segment(block.begin, count) =
         residual.array().isFinite().select(residual, 0.0);
-    offsets_.block(block.begin, static_cast<Eigen::Index>(i), count, 1) =
-        present_.segment(block.begin, count).cast<double>().matrix();
-    level_known_.push_back(run.begin == 0);
+    offsets_.block(block.begin, static_cast<Eigen::Index>(i), count, 1).setOnes();
   }
   measured_ = present_.count() > measured_rows_min;
   complete_ = present_.all();
@@ -280,14 +274,9 @@ void OutputEvidence::add_settings() {
       Eigen::VectorXd::Constant(common.cols(), variance / (accepted_sd_um * accepted_sd_um));
   precision.head(offsets_.cols()).setConstant(variance / (offset_sd_um * offset_sd_um));
   right_ = {};
-  for (const NoiseShape& shape : noise_shapes(centred_rms(residual_), noise_um_)) {
-    for (std::size_t run = 0; run < level_known_.size(); ++run)
-      if (level_known_[run])
-        precision[static_cast<Eigen::Index>(run)] =
-            1.0 / (level_sd_rows * level_sd_rows * (1.0 + shape.ratio));
+  for (const NoiseShape& shape : noise_shapes(centred_rms(residual_), noise_um_))
     right_.settings.push_back(
         std::make_unique<Setting>(shape, rows_, present_, residual_, common, precision));
-  }
   right_.find_likeliest();
 }
 
@@ -302,18 +291,6 @@ void OutputEvidence::add_doubted_settings() {
   doubted_.find_likeliest();
 }
 
-void OutputEvidence::count_from_first_row(Panel& columns) const {
-  for (std::size_t i = 0; i < rows_.runs.size(); ++i) {
-    const Block& run = rows_.runs[i];
-    Eigen::Index first = run.begin;
-    while (first < run.end && !present_[first]) ++first;
-    if (!level_known_[i] || first == run.end) continue;
-    const Eigen::RowVectorXd there = columns.row(first);
-    if (there.isZero(0.0)) continue;
-    columns.middleRows(run.begin, run.end - run.begin).rowwise() -= there;
-  }
-}
-
 void OutputEvidence::clear_missing(Panel& columns) const {
   if (complete_) return;
   for (Eigen::Index row = 0; row < columns.rows(); ++row)
@@ -323,7 +300,6 @@ void OutputEvidence::clear_missing(Panel& columns) const {
 Panel columns_of(const Hypothesis& hypothesis, const Shapes& shapes,
                  const OutputEvidence& evidence) {
   Panel columns = hypothesis.columns(shapes, evidence.output());
-  evidence.count_from_first_row(columns);
   evidence.clear_missing(columns);
   return columns;
 }

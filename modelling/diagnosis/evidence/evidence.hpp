@@ -1,5 +1,5 @@
-/// How much a hypothesis explains: likelihood of the residuals with wandering noise and levels of
-/// runs that are known as well as their first rows.
+/// How much a hypothesis explains: likelihood of the residuals with wandering noise and free
+/// offsets a run.
 #pragma once
 
 #include <memory>
@@ -106,16 +106,11 @@ class OutputEvidence {
   [[nodiscard]] bool complete() const noexcept { return complete_; }
   /// Makes columns zero where the output has no value.
   void clear_missing(Panel& columns) const;
-  /// Columns as displacement is counted: zero in the first row with a value of every run whose level
-  /// is known.
-  void count_from_first_row(Panel& columns) const;
   /// RMS of values over the stacked rows where the output has one, each run's mean taken off.
   [[nodiscard]] double centred_rms(const Column& values) const;
   /// Columns of the accepted explanations that are fitted anew each time, shape (rows, m): common
   /// columns of every setting after the runs' offsets.
   [[nodiscard]] const Eigen::MatrixXd& free_columns() const noexcept { return free_columns_; }
-  /// 1 in the rows of a run, shape (rows, runs): the first of the common columns of every setting.
-  [[nodiscard]] const Eigen::MatrixXd& offsets() const noexcept { return offsets_; }
   /// Whether the model's coefficients may all be a little wrong. The settings of both stances stay
   /// until something is accepted.
   void doubt_coefficients(bool doubted);
@@ -151,7 +146,6 @@ class OutputEvidence {
   Column measured_residual_;  ///< measured - model; 0 where missing
   Column residual_;           ///< explanations without a gain subtracted
   Eigen::MatrixXd offsets_;
-  std::vector<bool> level_known_;  ///< of each run: its first row is the file's
   Eigen::MatrixXd free_columns_;
   Eigen::MatrixXd coefficient_columns_;
   Eigen::MatrixXd no_columns_;

@@ -57,22 +57,40 @@ struct Squares {
 /// The same as columns.
 using Left = std::array<Column, 4>;
 
+/// Squares in a block when each run's mean outside of it is taken off.
 /// @param left  0 in rows without a value
-Squares squares_in_block(const Left& left, const Block& block) {
-  const auto sum = [&](std::size_t i) {
-    return left[i].segment(block.begin, block.end - block.begin).squaredNorm();
+Squares squares_in_block(const OutputEvidence& evidence, const Left& left, const StackedRows& rows,
+                         const Block& block) {
+  std::array<double, 4> sum{};
+  const Eigen::Index length = block.end - block.begin;
+  const auto present_in = [&](const Block& of) {
+    return evidence.complete() ? of.end - of.begin
+                               : evidence.present().segment(of.begin, of.end - of.begin).count();
   };
-  return {sum(0), sum(1), sum(2), sum(3)};
+  for (const Block& run : rows.runs) {
+    if (block.begin < run.begin || block.begin >= run.end) continue;
+    const bool alone = block.begin == run.begin && block.end == run.end;
+    const Eigen::Index inside = present_in(block);
+    const Eigen::Index count = present_in(run) - (alone ? 0 : inside);
+    if (count == 0) continue;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      const auto of_block = left[i].segment(block.begin, length).array();
+      const double of_run = left[i].segment(run.begin, run.end - run.begin).sum();
+      const double mean_um = (of_run - (alone ? 0.0 : of_block.sum())) / static_cast<double>(count);
+      sum[i] += (of_block - mean_um).square().sum() -
+                static_cast<double>(length - inside) * mean_um * mean_um;
+    }
+  }
+  return {sum[0], sum[1], sum[2], sum[3]};
 }
 
-/// What levels of runs and the common gains of accepted explanations leave of the residual, and
-/// what those of wrong coefficients leave of that.
+/// What the common gains of accepted explanations leave of the residual, and what those of wrong
+/// coefficients leave of that.
 std::array<Column, 2> left_by(const OutputEvidence& evidence, const Eigen::VectorXd& common) {
   const Eigen::MatrixXd& accepted = evidence.free_columns();
   const Eigen::MatrixXd& coefficients = evidence.coefficient_columns();
   const Eigen::Index first = common.size() - coefficients.cols() - accepted.cols();
-  const Column left = evidence.residual() - accepted * common.segment(first, accepted.cols()) -
-                      evidence.offsets() * common.head(evidence.offsets().cols());
+  const Column left = evidence.residual() - accepted * common.segment(first, accepted.cols());
   return {left, left - coefficients * common.tail(coefficients.cols())};
 }
 
@@ -253,7 +271,8 @@ double LeftOut::log_left_without(std::size_t output) {
   Squares sum;
   for (std::size_t block = 0; block < rows_.blocks.size(); ++block) {
     const auto without = left_by(evidence, common[block].carried);
-    sum += squares_in_block({without[0], without[1], without[1], without[1]}, rows_.blocks[block]);
+    sum += squares_in_block(evidence, {without[0], without[1], without[1], without[1]}, rows_,
+                            rows_.blocks[block]);
   }
   return log_ratio(sum.after, sum.measured);
 }
@@ -264,8 +283,8 @@ double LeftOut::log_left_by_accepted(std::size_t output) {
   Squares sum;
   for (std::size_t block = 0; block < rows_.blocks.size(); ++block) {
     const auto left = left_by(evidence, common[block].carried);
-    sum += squares_in_block({evidence.measured_residual(), left[0], left[1], left[1]},
-                            rows_.blocks[block]);
+    sum += squares_in_block(evidence, {evidence.measured_residual(), left[0], left[1], left[1]},
+                            rows_, rows_.blocks[block]);
   }
   return log_ratio(sum.after, sum.measured);
 }
@@ -287,7 +306,7 @@ LeftOutGain LeftOut::gain_on_left_out_blocks(const Explanation& explanation) {
           best.columns[i].middleCols(width * static_cast<Eigen::Index>(fit.shape), width) *
           fit.gains[i];
       const Left left = left_of(evidence, explained, fit.common[i], without[block].carried);
-      sums[i] += squares_in_block(left, rows_.blocks[block]);
+      sums[i] += squares_in_block(evidence, left, rows_, rows_.blocks[block]);
     }
   }
   return gain_of(sums);
@@ -323,7 +342,7 @@ LeftOutGain LeftOut::gain_on_fitted_rows(const Explanation& explanation) {
       for (std::size_t k = 0; k < left.size(); ++k)
         left[k].segment(of.begin, of.end - of.begin) = part[k].segment(of.begin, of.end - of.begin);
     }
-    for (const Block& run : rows_.runs) sums[i] += squares_in_block(left, run);
+    for (const Block& run : rows_.runs) sums[i] += squares_in_block(evidence, left, rows_, run);
   }
   return gain_of(sums);
 }
