@@ -343,6 +343,7 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
   else
     fit.chosen = least_left(without_runaways(
         judged(choosing, options, BankEquations(choosing, columns), done), fit.results));
+  fit.chosen_as_asked = forced.has_value();
   fit.chosen_by_stretches = !choosing.folds.empty();
   if (!fit.chosen_result().answers)
     throw std::runtime_error(std::string(to_string(fit.chosen)) + ": " +

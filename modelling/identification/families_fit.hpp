@@ -36,6 +36,7 @@ struct FamilyResult {
 struct FamiliesFit {
   std::vector<FamilyResult> results;  ///< order of all_families
   Family chosen{Family::none};
+  bool chosen_as_asked{false};
   bool chosen_by_stretches{false};  ///< of two or three runs; `results` are of whole runs
   ThermalModel model;               ///< of the chosen family, on all rows, with [made_from]
   std::optional<Fit> few;           ///< the equation, where it is one of few sensors

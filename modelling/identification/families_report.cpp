@@ -72,6 +72,13 @@ std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom
                  output.left_out_rms_um, output.remainder_rms_um, output.no_model_rms_um);
 }
 
+const char* why(const MeasuredTests& tests, const FamiliesFit& fit) {
+  if (fit.chosen_as_asked) return "as asked for";
+  if (tests.runs.size() < 2) return "which leaves least";
+  if (fit.chosen_by_stretches) return "which leaves least of stretches of the few runs";
+  return "the simplest within one standard error of the best";
+}
+
 }  // namespace
 
 std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
@@ -86,9 +93,7 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   text += "   of none's squares\n";
   for (const FamilyResult& result : fit.results)
     text += line_of(result, result.family == fit.chosen);
-  text += printed("chosen: %s, the simplest within one standard error of the best%s\n",
-                  std::string(to_string(fit.chosen)).c_str(),
-                  fit.chosen_by_stretches ? " on stretches of the few runs" : "");
+  text += printed("chosen: %s, %s\n", std::string(to_string(fit.chosen)).c_str(), why(tests, fit));
   if (one_run) text += "judged within one run: not valid for other days\n";
   if (fit.chosen != Family::none) {
     const MadeFrom& made_from = *fit.model.made_from;
@@ -96,8 +101,12 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
       text += claim_text(tests.runs.size(), name, made_from, output);
   }
   if (fit.few) text += equation_text(tests, *fit.few);
+  const auto told = [&](const std::string& warning) {
+    return fit.few && std::find(fit.few->warnings.begin(), fit.few->warnings.end(), warning) !=
+                          fit.few->warnings.end();
+  };
   for (const std::string& warning : fit.warnings)
-    text.append("warning: ").append(warning).append("\n");
+    if (!told(warning)) text.append("warning: ").append(warning).append("\n");
   return text;
 }
 

@@ -124,10 +124,10 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
       ->delimiter(',')
       ->type_name("NAME");
   sub->add_option("-o", options->model, "model file for the daemon; - is the output")->required();
-  sub->add_option(
-         "--family", options->family,
-         "none, static_few, lagged_few, physical or lag_bank; else the simplest within one "
-         "standard error of the best")
+  sub->add_option("--family", options->family,
+                  "none, static_few, lagged_few, physical or lag_bank; else of one to three runs "
+                  "what leaves "
+                  "least, of more the simplest within one standard error of the best")
       ->check(CLI::IsMember({"none", "static_few", "lagged_few", "physical", "lag_bank"}));
   const CLI::Option* terms =
       sub->add_option("--terms", options->terms,

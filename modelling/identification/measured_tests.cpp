@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "config/number_text.hpp"
 #include "config/run_overlap.hpp"
 #include "config/units.hpp"
+#include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -115,7 +117,9 @@ std::vector<std::string> usable_places(const std::vector<RunFile>& runs,
   return places;
 }
 
-/// Operating signals and positions without a gap, of all runs, that vary in some.
+/// Operating signals and positions that all runs have, mostly, and that vary in some. Rows in which
+/// one is missing go as those without a temperature do: `predict` and the daemon have no value
+/// there.
 std::vector<std::string> usable_signals(const std::vector<RunFile>& runs,
                                         std::vector<std::string>& notes) {
   std::vector<std::string> signals;
@@ -125,19 +129,18 @@ std::vector<std::string> usable_signals(const std::vector<RunFile>& runs,
       notes.push_back(std::string(column).append(" is left out: not every run has it"));
       continue;
     }
-    const bool whole = std::all_of(runs.begin(), runs.end(), [&](const RunFile& run) {
-      return share_present(run, run.column(column)) == 1.0;
+    const bool sparse = std::any_of(runs.begin(), runs.end(), [&](const RunFile& run) {
+      return share_present(run, run.column(column)) < share_present_min;
     });
-    if (!whole) {
-      notes.push_back(std::string(column).append(" is left out: values are missing"));
+    if (sparse) {
+      notes.push_back(std::string(column).append(" is left out: most of its values are missing"));
       continue;
     }
-    const double first = runs.front().column(column).front();
-    const bool varies = std::any_of(runs.begin(), runs.end(), [&](const RunFile& run) {
-      const std::vector<double>& values = run.column(column);
-      return std::any_of(values.begin(), values.end(), [&](double each) { return each != first; });
-    });
-    if (varies) signals.push_back(column);
+    std::set<double> values;
+    for (const RunFile& run : runs)
+      for (const double each : run.column(column))
+        if (std::isfinite(each) && values.size() < 2) values.insert(each);
+    if (values.size() > 1) signals.push_back(column);
   }
   return signals;
 }
@@ -148,10 +151,12 @@ TestRun make_run(const RunFile& run, const std::vector<std::string>& places,
   columns.reserve(places.size() + outputs.size());
   for (const auto& name : places) columns.push_back(&run.column(name));
   for (const auto& name : outputs) columns.push_back(&run.column(name));
+  std::vector<const std::vector<double>*> needed = columns;
+  for (const auto& name : signals) needed.push_back(&run.column(name));
   std::vector<std::size_t> rows;
   std::size_t begin = 0;
   for (std::size_t row = 0; row < run.selected_end; ++row) {
-    if (!std::all_of(columns.begin(), columns.end(),
+    if (!std::all_of(needed.begin(), needed.end(),
                      [&](const auto* column) { return std::isfinite((*column)[row]); }))
       continue;
     if (row < run.selected_begin) ++begin;
@@ -256,8 +261,9 @@ std::string MeasuredTests::fold_name(std::size_t fold) const {
   std::string text = runs[each.run].name;
   if (runs.size() > 1) return text;
   const Eigen::VectorXd& time_s = runs[each.run].time_s;
-  text.append("@").append(number_text(time_s[each.begin])).append(":");
-  if (each.end < time_s.size()) text.append(number_text(time_s[each.end]));
+  const auto second = [](double value) { return printed("%.10g", value); };
+  text.append("@").append(second(time_s[each.begin])).append(":");
+  if (each.end < time_s.size()) text.append(second(time_s[each.end]));
   return text;
 }
 

@@ -110,7 +110,7 @@ TEST_CASE("of two runs that are not alike the family is chosen by stretches of b
   CHECK(fit.chosen_by_stretches);
   CHECK(fit.chosen != Family::none);
   CHECK(fit.results.front().fold_um[0].size() == 2);  // what is told is of whole runs
-  CHECK(families_text(tests, fit).find("on stretches of the few runs") != std::string::npos);
+  CHECK(families_text(tests, fit).find("least of stretches of the few runs") != std::string::npos);
 }
 
 TEST_CASE("one temperature is enough for an answer", "[families]") {
@@ -250,4 +250,22 @@ TEST_CASE("the bank's columns are the low passes of what was recorded, from 0", 
   const Eigen::MatrixXd bank = bank_of(tests.runs[0], tests, columns);
   CHECK(bank.row(0).norm() == 0.0);
   CHECK(bank.col(0).isApprox(tests.runs[0].places_K.col(0)));
+}
+
+TEST_CASE("a signal that lacks a few values costs those rows, not the signal", "[families]") {
+  const auto moved = [](double quick, double, double, double rpm) {
+    return 5.0 * quick + 2e-3 * rpm;
+  };
+  std::vector<RunFile> files{machine_run("a", 1, moved), machine_run("b", 2, moved)};
+  files[0].values[3][0] = not_a_number;  // as a daemon's export begins
+  files[1].values[3][100] = not_a_number;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  const MeasuredTests tests = measured_tests(files, options);
+  CHECK(tests.signals == std::vector<std::string>{"spindle_rpm"});
+  CHECK(tests.runs[0].time_s.size() == 60 * hours - 1);
+  CHECK(tests.runs[0].time_s[0] == 60.0);
+  CHECK(tests.runs[1].time_s.size() == 60 * hours - 1);
+  for (const TestRun& run : tests.runs) CHECK(run.signals.allFinite());
 }
