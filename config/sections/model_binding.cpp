@@ -7,6 +7,9 @@
 namespace thermocomp::sections {
 namespace {
 
+constexpr const char* like_hint =
+    " (`thermocomp fit --like OLD_MODEL.toml` keeps inputs and outputs that a fit does not use)";
+
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
@@ -24,7 +27,8 @@ void check_blocks(const BindingTables& tables, const EstimatorConfig& config,
     const std::string& input = config.blocks[i].input;
     if (!is_temperature(input)) continue;  // a problem already
     if (!contains(columns, input)) {
-      tables.blocks[i].problem("input", "must be a temperature of the model: " + joined(columns));
+      tables.blocks[i].problem(
+          "input", "must be a temperature of the model: " + joined(columns) + like_hint);
     } else if (contains(bound, input)) {
       tables.blocks[i].problem("input", "is bound by another block already");
     }
@@ -51,7 +55,8 @@ void check_binding(const BindingTables& tables, const EstimatorConfig& config,
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     const std::string& output = config.axes[i].output;
     if (!is_output(output) || contains(model.outputs, output)) continue;
-    tables.axes[i].problem("output", "must be an output of the model: " + joined(model.outputs));
+    tables.axes[i].problem("output",
+                           "must be an output of the model: " + joined(model.outputs) + like_hint);
   }
 }
 

@@ -15,6 +15,7 @@
 #include "config/model_file.hpp"
 #include "modelling/identification/families.hpp"
 #include "modelling/identification/fit.hpp"
+#include "modelling/identification/model_frame.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -32,6 +33,7 @@ struct Options {
   double threshold{-1.0};
   double sensor_error_K{-1.0};  ///< negative: left out
   std::string family;
+  std::string like;
   std::string model;
   std::string report;
   bool json{false};
@@ -67,10 +69,16 @@ void write(const std::string& destination, const std::string& text) {
   file.commit();
 }
 
+/// In the frame of --like where that was given.
+std::string model_text(const Options& options, const ThermalModel& fitted) {
+  if (options.like.empty()) return write_model(fitted);
+  return write_model(in_frame(fitted, load_model(options.like)));
+}
+
 /// One equation of few sensors, as JP7689460B2 has it.
 int run_few(const Options& options, const MeasuredTests& tests, const FitOptions& fit_options) {
   const Fit fit = fit_equation(tests, fit_options);
-  write(options.model, write_model(model_of(tests, fit)));
+  write(options.model, model_text(options, model_of(tests, fit)));
   if (!options.report.empty()) write(options.report, fit_html(tests, fit));
   // A model on the output is not to be mixed with anything.
   if (options.model == "-") return 0;
@@ -86,7 +94,7 @@ int run_families(const Options& options, const MeasuredTests& tests,
   const FamiliesFit fit =
       fit_families(tests, fit_options, forced, [&](double share) { progress->update(share); });
   progress.reset();
-  write(options.model, write_model(fit.model));
+  write(options.model, model_text(options, fit.model));
   if (!options.report.empty()) write(options.report, families_html(tests, fit));
   if (options.model == "-") return 0;
   write("-", options.json ? families_json(tests, fit) : families_text(tests, fit));
@@ -124,6 +132,11 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
       ->delimiter(',')
       ->type_name("NAME");
   sub->add_option("-o", options->model, "model file for the daemon; - is the output")->required();
+  sub->add_option(
+         "--like", options->like,
+         "a model whose inputs and outputs the new one gets, with 0 where the fit uses none: "
+         "the daemon's, so that its blocks and axes stay; may be the file of -o")
+      ->type_name("MODEL.toml");
   sub->add_option("--family", options->family,
                   "none, static_few, lagged_few, physical or lag_bank; else of one to three runs "
                   "what leaves "
