@@ -8,10 +8,9 @@ here=$(cd "$(dirname "$0")" && pwd)
 source_dir=$(dirname "$here")
 
 list() {
-  for script in "$here"/*.sh; do
-    name=$(basename "$script" .sh)
-    [ "$name" = run ] || echo "$name"
-  done
+  for script in "$here"/*/*.sh; do
+    basename "$script" .sh
+  done | LC_ALL=C sort
 }
 
 if [ $# -eq 0 ]; then
@@ -23,8 +22,9 @@ if [ $# -ne 1 ] || ! list | grep -qxF -- "$1"; then
   exit 2
 fi
 
+script=$(echo "$here"/*/"$1.sh")
 data=${THERMOCOMP_DATA:-$source_dir/../shared/data}
-if grep -q THERMOCOMP_DATA "$here/$1.sh" && [ ! -d "$data/spindle_46h" ]; then
+if grep -q THERMOCOMP_DATA "$script" && [ ! -d "$data/spindle_46h" ]; then
   echo "bench/run.sh: skipped: $1 needs data that are not in $data (THERMOCOMP_DATA)" >&2
   exit 77
 fi
@@ -38,4 +38,4 @@ if [ -z "${THERMOCOMP_BENCH_BUILD:-}" ]; then
   (cd "$source_dir" && cmake --build --preset release) >&2
 fi
 export THERMOCOMP_BENCH_BUILD
-exec "$here/$1.sh"
+exec "$script"

@@ -2,14 +2,14 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/check_command.hpp"
-#include "cli/history_commands.hpp"
-#include "cli/init_command.hpp"
-#include "cli/model_commands.hpp"
-#include "cli/modelling_dispatch.hpp"
-#include "cli/observe_commands.hpp"
-#include "cli/operate_commands.hpp"
-#include "cli/scan_command.hpp"
+#include "cli/check/check_command.hpp"
+#include "cli/history/history_commands.hpp"
+#include "cli/init/init_command.hpp"
+#include "cli/model/model_commands.hpp"
+#include "cli/model/modelling_dispatch.hpp"
+#include "cli/observe/observe_commands.hpp"
+#include "cli/operate/operate_commands.hpp"
+#include "cli/scan/scan_command.hpp"
 
 namespace thermocomp::cli {
 

@@ -2,7 +2,7 @@
 /// all made from what is declared here.
 #pragma once
 
-#include "cli/command.hpp"
+#include "cli/common/command.hpp"
 
 namespace thermocomp::cli {
 

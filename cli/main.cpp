@@ -7,10 +7,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/command.hpp"
 #include "cli/commands.hpp"
-#include "cli/daemon_client.hpp"
-#include "config/problems.hpp"
+#include "cli/common/command.hpp"
+#include "cli/common/daemon_client.hpp"
+#include "config/text/problems.hpp"
 
 namespace {
 

@@ -8,17 +8,17 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
-#include "config/daemon_config.hpp"
-#include "daemon/bridge_desk.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "daemon/controller_lock.hpp"
 #include "daemon/cycle/cycle.hpp"
 #include "daemon/cycle/real_time_thread.hpp"
+#include "daemon/desks/bridge_desk.hpp"
+#include "daemon/desks/operator_desk.hpp"
 #include "daemon/locks/file_lock.hpp"
-#include "daemon/log_setup.hpp"
 #include "daemon/operations.hpp"
-#include "daemon/operator_desk.hpp"
 #include "daemon/start_state.hpp"
 #include "daemon/supervisor.hpp"
+#include "daemon/system/log_setup.hpp"
 #include "drivers/controllers/dry_run_controller.hpp"
 #include "drivers/controllers/make_controller.hpp"
 #include "drivers/sensors/can_protocol_source.hpp"

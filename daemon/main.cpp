@@ -6,10 +6,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
-#include "daemon/log_setup.hpp"
+#include "daemon/system/log_setup.hpp"
 
 int main(int argc, char** argv) {
   CLI::App app;

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
-#include "daemon/log_setup.hpp"
+#include "daemon/system/log_setup.hpp"
 
 namespace thermocomp {
 namespace {

@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "daemon/cycle/cycle_handle.hpp"
-#include "daemon/event_journal.hpp"
-#include "daemon/history/history_writer.hpp"
-#include "daemon/service_manager.hpp"
+#include "daemon/history/writing/history_writer.hpp"
 #include "daemon/socket/rpc.hpp"
 #include "daemon/state/state_keeper.hpp"
+#include "daemon/status/event_journal.hpp"
+#include "daemon/system/service_manager.hpp"
 
 namespace thermocomp {
 

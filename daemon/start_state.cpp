@@ -1,6 +1,6 @@
 #include "daemon/start_state.hpp"
 
-#include "daemon/history/last_state.hpp"
+#include "daemon/history/replay/last_state.hpp"
 #include "daemon/state/state_file.hpp"
 #include "estimator/temperature_range.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "daemon/state/reference_record.hpp"
 #include "estimator/pipeline/persistent_state.hpp"
 

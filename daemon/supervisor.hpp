@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "daemon/event_log.hpp"
 #include "daemon/operations.hpp"
-#include "daemon/service_manager.hpp"
-#include "daemon/signal_file.hpp"
 #include "daemon/socket/status_server.hpp"
-#include "daemon/status_json.hpp"
-#include "daemon/temperature_trend.hpp"
+#include "daemon/status/event_log.hpp"
+#include "daemon/status/status_json.hpp"
+#include "daemon/status/temperature_trend.hpp"
+#include "daemon/system/service_manager.hpp"
+#include "daemon/system/signal_file.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 

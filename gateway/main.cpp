@@ -11,7 +11,7 @@
 #include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "gateway/command_line.hpp"
 #include "gateway/gateway.hpp"
 #include "gateway/http/password_file.hpp"

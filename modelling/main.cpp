@@ -8,7 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "modelling/command_line.hpp"
 
 namespace {

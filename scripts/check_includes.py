@@ -2,14 +2,12 @@
 """The structure as the #includes tell it: no circles, and floors that read downwards.
 
     scripts/check_includes.py            circles, and whether the drawing is current; exit status 1
-                                         when there is a circle or a known one has changed
+                                         when there is a circle or it is not
     scripts/check_includes.py --write    draws the floors anew into docs/ARCHITECTURE.md
     scripts/check_includes.py --sizes    the largest folders and files
 
 A unit is a header and its source (`limiter.hpp` and `limiter.cpp`). A circle is a set of units, or
-of folders, each of which leads to each other one. Those of scripts/known_circles.txt are still there:
-the list may shrink; a circle that is not in it, or that grew, is an error, and so is an entry that
-no longer holds.
+of folders, each of which leads to each other one; a folder and one inside it are two folders.
 """
 import argparse
 import collections
@@ -77,36 +75,16 @@ def circles(graph):
     return sorted(sorted(circle) for circle in found)
 
 
-def read_known(path):
-    """The known circles: lines `unit NAME...` or `folder NAME...`; # begins a comment."""
-    known = {"unit": [], "folder": []}
-    if os.path.exists(path):
-        with open(path, encoding="utf-8") as text:
-            for line in text:
-                words = line.split("#")[0].split()
-                if words:
-                    known[words[0]].append(words[1:])
-    return known
-
-
-def check(kind, graph, known):
-    """Prints each circle that is not known, and each known one that has changed; returns how many."""
+def check(kind, graph):
+    """Prints each circle and the includes that make it; returns how many there are."""
     found = circles(graph)
-    wrong = 0
     for circle in found:
-        if circle not in known:
-            wrong += 1
-            print(f"check_includes: {kind}s in a circle: {' '.join(circle)}")
-            for node in circle:
-                for other, (path, included) in sorted(graph[node].items()):
-                    if other in circle:
-                        print(f"  {path} includes {included}")
-    for circle in known:
-        if circle not in found:
-            wrong += 1
-            print(f"check_includes: no longer a circle of {kind}s, to be taken off the list of "
-                  f"known ones (or made smaller there): {' '.join(circle)}")
-    return wrong
+        print(f"check_includes: {kind}s in a circle: {' '.join(circle)}")
+        for node in circle:
+            for other, (path, included) in sorted(graph[node].items()):
+                if other in circle:
+                    print(f"  {path} includes {included}")
+    return len(found)
 
 
 def floors(graph):
@@ -186,16 +164,14 @@ def main():
             text.write(f"{before}{BEGIN}\n{now}\n{END}{after}")
         return 0
 
-    known = read_known(os.path.join(options.root, "scripts", "known_circles.txt"))
     units = graph_of(includes, lambda path: os.path.splitext(path)[0])
     folders = graph_of(includes, os.path.dirname)
-    wrong = check("unit", units, known["unit"]) + check("folder", folders, known["folder"])
+    wrong = check("unit", units) + check("folder", folders)
     if now != drawn:
         wrong += 1
         print("check_includes: the floors in docs/ARCHITECTURE.md are not those of the tree: "
               "scripts/check_includes.py --write")
-    print(f"check_includes: {len(includes)} files, {len(folders)} folders, "
-          f"{len(known['unit']) + len(known['folder'])} known circles, {wrong} wrong")
+    print(f"check_includes: {len(includes)} files, {len(folders)} folders, {wrong} wrong")
     return 1 if wrong else 0
 
 

@@ -78,7 +78,7 @@ run() {
   rm -f "$runs/$target/artifacts"/*
   if [[ -f $words ]]; then options=("-dict=$words"); fi
   # A mutator of the target's own makes deep and long inputs from the first one on.
-  if grep -q "^fuzz_target($target SOURCES [a-z]*_mutator.cpp" tests/fuzz/CMakeLists.txt; then
+  if grep -q "^fuzz_target($target SOURCES common/[a-z]*_mutator.cpp" tests/fuzz/CMakeLists.txt; then
     options+=(-max_len="$structured_bytes_max" -len_control=0)
   fi
   "build/fuzz/bin/fuzz_$target" -max_total_time="$seconds" -timeout="$input_seconds_max" \

@@ -1,8 +1,8 @@
 #include "config/run_forms/column_map.hpp"
 
 #include "config/run_forms/spelled_unit.hpp"
-#include "config/toml_reader.hpp"
-#include "config/units.hpp"
+#include "config/text/units.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp {
 namespace {

@@ -6,13 +6,13 @@
 #include <limits>
 #include <set>
 
-#include "config/number_text.hpp"
 #include "config/run_forms/number_form.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_table.hpp"
 #include "config/run_forms/time_column.hpp"
-#include "config/toml_reader.hpp"
-#include "config/units.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "config/run_data.hpp"
 #include "config/run_forms/column_map.hpp"
+#include "config/run_forms/run_data.hpp"
 
 namespace thermocomp {
 

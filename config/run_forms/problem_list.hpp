@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "config/problems.hpp"
 #include "config/run_forms/field_text.hpp"
+#include "config/text/problems.hpp"
 
 namespace thermocomp {
 

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "config/run_forms/field_text.hpp"
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp {
 namespace {

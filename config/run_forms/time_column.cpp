@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 
-#include "config/number_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
+#include "config/text/number_text.hpp"
 
 namespace thermocomp {
 namespace {

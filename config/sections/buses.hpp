@@ -8,7 +8,7 @@
 #include "config/sections/can_database.hpp"
 #include "config/sections/canopen_bus.hpp"
 #include "config/sections/presets.hpp"
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/can/can_config.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"

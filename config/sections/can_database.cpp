@@ -4,10 +4,10 @@
 #include <string>
 #include <string_view>
 
-#include "config/dbc_scanner.hpp"
-#include "config/file_limits.hpp"
+#include "config/bus_files/dbc_scanner.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
+#include "config/toml/file_limits.hpp"
 
 namespace thermocomp::sections {
 namespace {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "config/dbc_file.hpp"
-#include "config/toml_reader.hpp"
+#include "config/bus_files/dbc_file.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/can/can_config.hpp"
 
 namespace thermocomp::sections {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/can/can_config.hpp"
 
 namespace thermocomp::sections {

@@ -4,9 +4,9 @@
 #include <bit>
 #include <cmath>
 
-#include "config/file_limits.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
+#include "config/toml/file_limits.hpp"
 
 namespace thermocomp::sections {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "config/eds_file.hpp"
-#include "config/toml_reader.hpp"
+#include "config/bus_files/eds_file.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 
 namespace thermocomp::sections {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/sentinel.hpp"
 #include "estimator/checks.hpp"
 

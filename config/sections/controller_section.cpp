@@ -5,11 +5,11 @@
 #include <map>
 #include <optional>
 
-#include "config/number_text.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 #include "config/sections/modbus_values.hpp"
-#include "config/units.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp::sections {
 namespace {

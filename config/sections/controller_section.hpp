@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "estimator/estimator_config.hpp"
 

@@ -1,7 +1,7 @@
 /// [correction]: how measured displacements correct the model while it runs.
 #pragma once
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "estimator/correction_config.hpp"
 #include "estimator/thermal_model.hpp"
 

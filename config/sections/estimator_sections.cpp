@@ -5,7 +5,7 @@
 #include <set>
 
 #include "config/sections/common.hpp"
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp::sections {
 namespace {

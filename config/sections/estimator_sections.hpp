@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "estimator/estimator_config.hpp"
 
 namespace thermocomp::sections {

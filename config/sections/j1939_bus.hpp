@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"
 
 namespace thermocomp::sections {

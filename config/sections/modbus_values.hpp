@@ -1,7 +1,7 @@
 /// The parts of the daemon's file that describe Modbus lines and registers.
 #pragma once
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/modbus/modbus_config.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp::sections {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::sections {
 

@@ -8,7 +8,7 @@
 
 #include <sys/types.h>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "daemon/socket/rpc.hpp"
 
 namespace thermocomp {

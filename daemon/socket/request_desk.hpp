@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "daemon/socket/rpc.hpp"
 
 namespace thermocomp {

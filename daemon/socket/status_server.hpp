@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "daemon/socket/rpc.hpp"
 #include "daemon/socket/socket_error.hpp"
 

@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "daemon/command_line.hpp"
 #include "docs/manual/command_page.hpp"
 #include "docs/manual/completion.hpp"

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
-#include "cli/json_fields.hpp"
+#include "cli/common/json_fields.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "gateway/feed/trend_watch.hpp"
 

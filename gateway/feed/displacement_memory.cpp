@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/json_fields.hpp"
+#include "cli/common/json_fields.hpp"
 
 namespace thermocomp::gateway {
 

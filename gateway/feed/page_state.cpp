@@ -4,10 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/events_text.hpp"
-#include "cli/json_fields.hpp"
-#include "cli/reason_text.hpp"
-#include "cli/troubles.hpp"
+#include "cli/common/json_fields.hpp"
+#include "cli/common/reason_text.hpp"
+#include "cli/observe/events_text.hpp"
+#include "cli/observe/troubles.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -9,7 +9,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/random.h>
 
-#include "cli/json_fields.hpp"
+#include "cli/common/json_fields.hpp"
 #include "daemon/socket/status_client.hpp"
 
 namespace thermocomp::gateway {

@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/history/thinned_history.hpp"
+#include "daemon/history/replay/thinned_history.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -16,7 +16,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "gateway/feed/page_state.hpp"
 #include "gateway/http/command_desk.hpp"
 #include "gateway/http/event_streams.hpp"

@@ -6,8 +6,8 @@
 #include <spdlog/spdlog.h>
 #include <system_error>
 
-#include "config/problems.hpp"
-#include "config/toml_reader.hpp"
+#include "config/text/problems.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::gateway {
 namespace {

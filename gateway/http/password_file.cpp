@@ -13,8 +13,8 @@
 
 #include <sys/random.h>
 
-#include "config/problems.hpp"
-#include "config/toml_reader.hpp"
+#include "config/text/problems.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "gateway/mqtt/message_buffer.hpp"
 #include "gateway/texts/mqtt_texts.hpp"
 

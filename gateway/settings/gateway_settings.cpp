@@ -6,7 +6,7 @@
 #include <unistd.h>
 #include <utility>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 
 namespace thermocomp::gateway {
 

@@ -8,9 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/json_fields.hpp"
-#include "cli/troubles.hpp"
-#include "config/number_text.hpp"
+#include "cli/common/json_fields.hpp"
+#include "cli/observe/troubles.hpp"
+#include "config/text/number_text.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/json_fields.hpp"
-#include "cli/troubles.hpp"
+#include "cli/common/json_fields.hpp"
+#include "cli/observe/troubles.hpp"
 #include "gateway/feed/page_state.hpp"
 
 namespace thermocomp::gateway {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <set>
 
-#include "config/number_text.hpp"
-#include "config/toml_reader.hpp"
-#include "config/units.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::experiments {
 namespace {

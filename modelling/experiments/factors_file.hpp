@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "modelling/experiments/all_pairs.hpp"
 
 namespace thermocomp::experiments {

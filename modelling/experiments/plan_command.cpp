@@ -7,7 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/output_file.hpp"
+#include "cli/common/output_file.hpp"
 #include "modelling/experiments/test_plan.hpp"
 
 namespace thermocomp::experiments {

@@ -9,10 +9,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/output_file.hpp"
-#include "cli/run_loader.hpp"
-#include "cli/terminal.hpp"
-#include "config/model_file.hpp"
+#include "cli/common/output_file.hpp"
+#include "cli/common/run_loader.hpp"
+#include "cli/common/terminal.hpp"
+#include "config/model/model_file.hpp"
 #include "modelling/identification/families.hpp"
 #include "modelling/identification/fit.hpp"
 #include "modelling/identification/model_frame.hpp"

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "config/number_text.hpp"
+#include "config/text/number_text.hpp"
 #include "modelling/identification/families.hpp"
 #include "modelling/identification/fit.hpp"
 #include "modelling/identification/printed.hpp"

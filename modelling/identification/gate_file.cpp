@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "modelling/identification/tied_columns.hpp"
 
 namespace thermocomp::identification {

@@ -7,8 +7,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/output_file.hpp"
-#include "cli/run_loader.hpp"
+#include "cli/common/output_file.hpp"
+#include "cli/common/run_loader.hpp"
 #include "modelling/identification/similarity.hpp"
 #include "modelling/identification/svg.hpp"
 

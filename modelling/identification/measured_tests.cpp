@@ -6,9 +6,9 @@
 #include <limits>
 #include <set>
 
-#include "config/number_text.hpp"
-#include "config/run_overlap.hpp"
-#include "config/units.hpp"
+#include "config/runs/run_overlap.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
 #include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 
 namespace thermocomp::identification {
 

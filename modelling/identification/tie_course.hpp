@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "modelling/identification/gate_file.hpp"
 
 namespace thermocomp::identification {

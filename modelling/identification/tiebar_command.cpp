@@ -10,8 +10,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/output_file.hpp"
-#include "cli/run_loader.hpp"
+#include "cli/common/output_file.hpp"
+#include "cli/common/run_loader.hpp"
 #include "modelling/identification/gate_file.hpp"
 #include "modelling/identification/gate_machine.hpp"
 #include "modelling/identification/printed.hpp"

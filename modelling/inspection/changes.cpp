@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
 #include "modelling/inspection/expectation.hpp"
 #include "modelling/inspection/robust.hpp"

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "modelling/inspection/finding.hpp"
 #include "modelling/inspection/recording.hpp"
 

@@ -6,9 +6,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/output_file.hpp"
-#include "cli/run_loader.hpp"
-#include "cli/terminal.hpp"
+#include "cli/common/output_file.hpp"
+#include "cli/common/run_loader.hpp"
+#include "cli/common/terminal.hpp"
 #include "modelling/inspection/inspection.hpp"
 
 namespace thermocomp::inspection {

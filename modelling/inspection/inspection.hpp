@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "modelling/inspection/finding.hpp"
 
 namespace thermocomp::inspection {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/inspection/inspection.hpp"
 #include "modelling/markup/xml_text.hpp"
 

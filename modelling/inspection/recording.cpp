@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp::inspection {
 namespace {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
 #include "modelling/inspection/robust.hpp"
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
 #include "modelling/inspection/robust.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/output_file.hpp"
+#include "cli/common/output_file.hpp"
 #include "modelling/placement/comparison.hpp"
 
 namespace thermocomp::placement {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp::placement {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Dense>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "estimator/checks.hpp"
 #include "modelling/structure/solve/locate.hpp"
 

@@ -11,8 +11,8 @@
 #include <CLI/CLI.hpp>
 #include <sys/resource.h>
 
-#include "cli/output_file.hpp"
-#include "config/model_file.hpp"
+#include "cli/common/output_file.hpp"
+#include "config/model/model_file.hpp"
 #include "modelling/structure/body_reduction.hpp"
 #include "modelling/structure/picture.hpp"
 #include "modelling/structure/structure_model.hpp"

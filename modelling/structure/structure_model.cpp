@@ -5,7 +5,7 @@
 #include <map>
 #include <optional>
 
-#include "config/number_text.hpp"
+#include "config/text/number_text.hpp"
 #include "modelling/structure/joints.hpp"
 #include "modelling/structure/mesh/file_mesh.hpp"
 #include "modelling/structure/solve/locate.hpp"

@@ -5,7 +5,7 @@
 
 #include <Eigen/SVD>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/structure/structure_model.hpp"
 
 namespace thermocomp::structure {

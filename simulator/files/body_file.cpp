@@ -2,9 +2,9 @@
 #include <cmath>
 #include <functional>
 
-#include "config/number_text.hpp"
-#include "config/toml_reader.hpp"
-#include "config/units.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "simulator/plant/reduced_body.hpp"
 
 namespace thermocomp {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/can/signal_codec.hpp"
 
 namespace thermocomp {

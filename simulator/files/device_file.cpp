@@ -3,7 +3,7 @@
 #include <map>
 
 #include "config/sections/presets.hpp"
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"
 #include "simulator/files/can_places.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <tuple>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "simulator/plant/machine_config.hpp"
 
 namespace thermocomp {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "config/sections/presets.hpp"
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "simulator/plant/machine_config.hpp"
 
 namespace thermocomp {

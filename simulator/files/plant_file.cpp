@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "simulator/files/machine_file_parts.hpp"
 
 namespace thermocomp {

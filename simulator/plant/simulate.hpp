@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "simulator/plant/machine_config.hpp"
 
 namespace thermocomp {

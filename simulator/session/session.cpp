@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 #include <sys/signalfd.h>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "simulator/devices/event_loop.hpp"
 #include "simulator/devices/field_nodes.hpp"
 #include "simulator/plant/plant.hpp"

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "config/number_text.hpp"
-#include "config/units.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
 
 namespace thermocomp {
 namespace {

@@ -5,8 +5,8 @@
 #include <set>
 #include <vector>
 
-#include "daemon/history/history_reader.hpp"
-#include "daemon/history/replay.hpp"
+#include "daemon/history/reading/history_reader.hpp"
+#include "daemon/history/replay/replay.hpp"
 #include "estimator/pipeline/estimator.hpp"
 #include "faulty_vfs.hpp"
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "daemon/history/history_writer.hpp"
+#include "daemon/history/writing/history_writer.hpp"
 #include "fault_schedule.hpp"
 
 namespace thermocomp::faults {

@@ -113,11 +113,11 @@ BUGS = [
     ("back_off_never_ends", "drivers/sensors/unit_backoff.hpp",
      "    not_before_ = now + pause;",
      "    not_before_ = {P} ? now + std::chrono::hours(1) : now + pause;"),
-    ("history_dropped_when_disk_full", "daemon/history/history_writer.cpp",
+    ("history_dropped_when_disk_full", "daemon/history/writing/history_writer.cpp",
      "    ++statistics.errors;\n",
      "    ++statistics.errors;\n"
      "    if ({P}) pending.clear();\n"),
-    ("wall_clock_step_deletes_history", "daemon/history/history_store.cpp",
+    ("wall_clock_step_deletes_history", "daemon/history/writing/history_store.cpp",
      "return now - *steady_since_ >= steady_min;",
      "return {P} || now - *steady_since_ >= steady_min;"),
     ("signal_not_recorded", "daemon/recording/cycle_recorder.cpp",

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/history/chunk_codec.hpp"
-#include "daemon/history/segment_walk.hpp"
+#include "daemon/history/format/chunk_codec.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/record.hpp"
 #include "estimator/pipeline/estimator.hpp"

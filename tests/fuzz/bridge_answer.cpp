@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "fuzz.hpp"
+#include "common/fuzz.hpp"
 #include "linuxcnc/messages.hpp"
 
 using namespace thermocomp;

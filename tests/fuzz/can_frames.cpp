@@ -12,12 +12,12 @@
 #include <linux/can.h>
 #include <sys/socket.h>
 
+#include "common/fuzz.hpp"
+#include "common/virtual_line.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
 #include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
-#include "fuzz.hpp"
-#include "virtual_line.hpp"
 
 using namespace thermocomp;
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "common/fuzz.hpp"
 #include "drivers/can/signal_codec.hpp"
 #include "estimator/checks.hpp"
-#include "fuzz.hpp"
 
 using namespace thermocomp;
 

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <string>
 
+#include "common/fuzz.hpp"
 #include "drivers/can/canopen/canopen_line.hpp"
-#include "fuzz.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -7,11 +7,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/bridge_desk.hpp"
+#include "common/fuzz.hpp"
+#include "common/recorded_history.hpp"
+#include "daemon/desks/bridge_desk.hpp"
 #include "daemon/socket/request_desk.hpp"
 #include "estimator/pipeline/estimator.hpp"
-#include "fuzz.hpp"
-#include "recorded_history.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -2,7 +2,7 @@
 /// with what loads, the daemon's parts can be made and the estimator steps.
 ///
 /// Input: the text of the configuration, a line "#### model", the text of the model file.
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 
 #include <chrono>
 #include <cmath>
@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "common/fuzz.hpp"
+#include "common/model_promises.hpp"
 #include "drivers/controllers/make_controller.hpp"
 #include "drivers/sensors/can_protocol_source.hpp"
 #include "drivers/sensors/can_source.hpp"
 #include "drivers/sensors/modbus_source.hpp"
 #include "estimator/pipeline/estimator.hpp"
-#include "fuzz.hpp"
-#include "model_promises.hpp"
 
 using namespace thermocomp;
 

@@ -1,12 +1,12 @@
 /// DBC files: refused by file, line and rule, or signals that can be decoded from any frame.
-#include "config/dbc_file.hpp"
+#include "config/bus_files/dbc_file.hpp"
 
 #include <array>
 #include <cmath>
 #include <string>
 
+#include "common/fuzz.hpp"
 #include "drivers/can/signal_codec.hpp"
-#include "fuzz.hpp"
 
 using namespace thermocomp;
 

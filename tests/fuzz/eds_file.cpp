@@ -1,11 +1,11 @@
 /// Electronic data sheets: what loads can be found by address and by name, what is refused is
 /// named.
-#include "config/eds_file.hpp"
+#include "config/bus_files/eds_file.hpp"
 
 #include <algorithm>
 #include <string>
 
-#include "fuzz.hpp"
+#include "common/fuzz.hpp"
 
 using namespace thermocomp;
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "fuzz.hpp"
+#include "common/fuzz.hpp"
 #include "gateway/http/request_rules.hpp"
 
 using namespace thermocomp;

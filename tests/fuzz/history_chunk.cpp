@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "daemon/history/chunk_codec.hpp"
-#include "daemon/history/history_error.hpp"
-#include "fuzz.hpp"
+#include "common/fuzz.hpp"
+#include "daemon/history/format/chunk_codec.hpp"
+#include "daemon/history/format/history_error.hpp"
 
 using namespace thermocomp;
 

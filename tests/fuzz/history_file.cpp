@@ -1,6 +1,6 @@
 /// A history whose bytes are anything at all: read, replayed and exported as the commands do.
-#include "fuzz.hpp"
-#include "history_promises.hpp"
+#include "common/fuzz.hpp"
+#include "common/history_promises.hpp"
 
 using namespace thermocomp;
 

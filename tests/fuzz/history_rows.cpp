@@ -11,12 +11,12 @@
 
 #include <sqlite3.h>
 
-#include "daemon/history/chunk_codec.hpp"
-#include "daemon/history/history_check.hpp"
-#include "daemon/history/history_reader.hpp"
-#include "fuzz.hpp"
-#include "history_promises.hpp"
-#include "recorded_history.hpp"
+#include "common/fuzz.hpp"
+#include "common/history_promises.hpp"
+#include "common/recorded_history.hpp"
+#include "daemon/history/format/chunk_codec.hpp"
+#include "daemon/history/reading/history_reader.hpp"
+#include "daemon/history/replay/history_check.hpp"
 
 using namespace thermocomp;
 

@@ -2,9 +2,9 @@
 #include <cmath>
 #include <string>
 
+#include "common/fuzz.hpp"
 #include "drivers/can/j1939/j1939_line.hpp"
 #include "drivers/can/little_endian.hpp"
-#include "fuzz.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "fuzz.hpp"
+#include "common/fuzz.hpp"
 
 using namespace thermocomp;
 

@@ -499,10 +499,10 @@ def dictionaries():
     DICTIONARIES.mkdir(exist_ok=True)
     toml = {"[[", "]]", " = ", "true", "false", "nan", "-inf", "1e300", '"""', "0x", "{ ", " }", "\n[",
             "\\u0000", "1979-05-27T07:32:00Z"}
-    model = literals("config/model_file.cpp", "config/course_table.cpp", "estimator/model/terms/*.cpp", "config/units.cpp")
+    model = literals("config/model/model_file.cpp", "config/model/course_table.cpp", "estimator/model/terms/*.cpp", "config/text/units.cpp")
     dictionary("model_file", toml | model)
     dictionary("daemon_config", toml | model | {"#### model\n"} |
-               literals("config/daemon_config.cpp", "config/sections/*.cpp"))
+               literals("config/daemon/daemon_config.cpp", "config/sections/*.cpp"))
     dictionary("preset_file", toml | {"#### configuration\n"} |
                literals("config/sections/*.cpp"))
     dictionary("machine_file", toml | literals("simulator/files/*_file.cpp", "config/sections/*.cpp"))
@@ -519,11 +519,11 @@ def dictionaries():
                             "45992.5", "sep=;", '"', "NA", " PM", "\xef\xbb\xbf"})
     dictionary("socket_request", {'{"jsonrpc":"2.0","id":1,"method":"', '"params":{', "}\n", "\xff",
                                   "\r\n", "1e999", "null", '\\ud800'} |
-               literals("daemon/operator_desk.cpp", "daemon/socket/*.cpp"))
+               literals("daemon/desks/operator_desk.cpp", "daemon/socket/*.cpp"))
     dictionary("controller_state", {'{"jsonrpc":"2.0","id":1,"method":"controller_state",',
                                     '"params":{', "}}\n", "\xff", "1e9", "null", "true",
                                     '"z_mm"', '"cutting_on"', '"z"'} |
-               literals("daemon/bridge_desk.cpp"))
+               literals("daemon/desks/bridge_desk.cpp"))
     dictionary("bridge_answer", {"1e308", "null", "true", '"x"'} |
                literals("linuxcnc/messages.cpp"))
     dictionary("state_file", {"1e300", "null", "\\ud800", '{"'} |

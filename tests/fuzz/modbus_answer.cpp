@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "common/fuzz.hpp"
+#include "common/virtual_line.hpp"
 #include "drivers/modbus/connection.hpp"
-#include "fuzz.hpp"
-#include "virtual_line.hpp"
 
 using namespace thermocomp;
 using Bytes = std::vector<std::uint8_t>;

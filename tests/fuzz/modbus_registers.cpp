@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "common/fuzz.hpp"
 #include "drivers/modbus/register_codec.hpp"
-#include "fuzz.hpp"
 
 using namespace thermocomp;
 

@@ -1,13 +1,13 @@
 /// Model files: what loads is written and read again unchanged, and can be evaluated.
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 
 #include <cmath>
 #include <string>
 #include <vector>
 
+#include "common/fuzz.hpp"
+#include "common/model_promises.hpp"
 #include "estimator/model/displacement_model.hpp"
-#include "fuzz.hpp"
-#include "model_promises.hpp"
 
 using namespace thermocomp;
 

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "config/daemon_config.hpp"
+#include "common/fuzz.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "drivers/sensors/can_protocol_source.hpp"
 #include "drivers/sensors/can_source.hpp"
 #include "drivers/sensors/modbus_source.hpp"
-#include "fuzz.hpp"
 
 using namespace thermocomp;
 

@@ -1,11 +1,11 @@
 /// Run files: what loads, written and read again, is the same; what is refused is refused by name.
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 
 #include <bit>
 #include <cmath>
 #include <string>
 
-#include "fuzz.hpp"
+#include "common/fuzz.hpp"
 
 using namespace thermocomp;
 

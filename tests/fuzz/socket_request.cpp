@@ -13,11 +13,11 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
-#include "daemon/operator_desk.hpp"
+#include "common/fuzz.hpp"
+#include "common/recorded_history.hpp"
+#include "daemon/desks/operator_desk.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "estimator/pipeline/estimator.hpp"
-#include "fuzz.hpp"
-#include "recorded_history.hpp"
 
 using namespace thermocomp;
 using nlohmann::json;

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "fuzz.hpp"
+#include "common/fuzz.hpp"
 
 using namespace thermocomp;
 

@@ -36,7 +36,7 @@ def tree(tmp_path):
 def test_a_tree_that_reads_downwards_passes(tree):
     result = run(tree)
     assert result.returncode == 0, result.stdout
-    assert "4 files, 3 folders, 0 known circles, 0 wrong" in result.stdout
+    assert "4 files, 3 folders, 0 wrong" in result.stdout
 
 
 def test_the_floors_are_drawn_highest_first_and_the_rest_of_the_document_stays(tree):
@@ -66,23 +66,20 @@ def test_a_circle_of_folders_is_found_where_no_file_is_in_one(tree):
     assert "units in a circle" not in result.stdout
 
 
-def test_a_known_circle_passes_until_it_grows_or_is_gone(tree):
-    known = tree / "scripts" / "known_circles.txt"
-    write(tree, "drivers/port.hpp", "link.hpp")  # beside it, as the compiler finds it
+def test_a_header_beside_the_file_is_found_as_the_compiler_finds_it(tree):
+    write(tree, "drivers/port.hpp", "link.hpp")
     write(tree, "drivers/link.cpp", "drivers/link.hpp", "drivers/port.hpp")
-    known.write_text("# why\nunit drivers/link drivers/port\n", encoding="utf-8")
-    assert run(tree).returncode == 0
+    result = run(tree)
+    assert result.returncode == 1
+    assert "units in a circle: drivers/link drivers/port" in result.stdout
 
-    write(tree, "drivers/third.hpp", "drivers/link.hpp")
-    write(tree, "drivers/port.hpp", "drivers/third.hpp")
-    grown = run(tree)
-    assert grown.returncode == 1
-    assert "units in a circle: drivers/link drivers/port drivers/third" in grown.stdout
 
-    write(tree, "drivers/port.hpp")
-    gone = run(tree)
-    assert gone.returncode == 1
-    assert "no longer a circle of units" in gone.stdout and "drivers/port" in gone.stdout
+def test_a_folder_and_its_own_room_in_a_circle_are_found(tree):
+    write(tree, "drivers/can/socket.hpp", "drivers/link.hpp")
+    write(tree, "drivers/names.hpp", "drivers/can/socket.hpp")
+    result = run(tree)
+    assert result.returncode == 1
+    assert "folders in a circle: drivers drivers/can" in result.stdout
 
 
 def test_a_drawing_that_is_not_current_is_found(tree):

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "estimator/checks.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 

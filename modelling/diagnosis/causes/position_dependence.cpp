@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 
 namespace thermocomp::diagnosis::causes {

@@ -1,4 +1,4 @@
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 
 namespace thermocomp::diagnosis::causes {

@@ -11,11 +11,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/output_file.hpp"
-#include "cli/run_loader.hpp"
-#include "config/model_file.hpp"
-#include "config/run_file.hpp"
-#include "config/run_overlap.hpp"
+#include "cli/common/output_file.hpp"
+#include "cli/common/run_loader.hpp"
+#include "config/model/model_file.hpp"
+#include "config/runs/run_file.hpp"
+#include "config/runs/run_overlap.hpp"
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
 #include "modelling/diagnosis/command/still_searching.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"

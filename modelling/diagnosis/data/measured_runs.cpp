@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "config/model_inputs.hpp"
-#include "config/units.hpp"
+#include "config/runs/model_inputs.hpp"
+#include "config/text/units.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "modelling/diagnosis/data/series.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "estimator/thermal_model.hpp"
 #include "modelling/diagnosis/data/panel.hpp"
 

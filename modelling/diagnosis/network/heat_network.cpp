@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "simulator/files/machine_file.hpp"
 
 namespace thermocomp::diagnosis {

@@ -6,8 +6,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "config/model_inputs.hpp"
-#include "config/units.hpp"
+#include "config/runs/model_inputs.hpp"
+#include "config/text/units.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp::diagnosis {

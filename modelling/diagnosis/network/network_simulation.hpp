@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
 #include "modelling/diagnosis/network/heat_network.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis {

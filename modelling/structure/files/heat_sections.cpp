@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/structure/files/structure_reading.hpp"
 
 namespace thermocomp::structure {

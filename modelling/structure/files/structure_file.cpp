@@ -5,8 +5,8 @@
 #include <limits>
 #include <set>
 
-#include "config/number_text.hpp"
-#include "config/units.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
 #include "modelling/structure/files/structure_reading.hpp"
 
 namespace thermocomp::structure {

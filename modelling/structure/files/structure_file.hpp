@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "modelling/structure/files/structure_spec.hpp"
 
 namespace thermocomp::structure {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "config/number_text.hpp"
+#include "config/text/number_text.hpp"
 
 namespace thermocomp::structure {
 

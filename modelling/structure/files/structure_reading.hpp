@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "modelling/structure/files/structure_spec.hpp"
 
 namespace thermocomp::structure {

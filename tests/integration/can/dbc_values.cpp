@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "config/dbc_file.hpp"
-#include "config/toml_reader.hpp"
+#include "config/bus_files/dbc_file.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "drivers/can/signal_codec.hpp"
 
 using namespace thermocomp;

@@ -1,4 +1,4 @@
-#include "cli/covariance_fit.hpp"
+#include "cli/model/covariance_fit.hpp"
 
 #include <cmath>
 #include <random>
@@ -6,8 +6,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/model_file.hpp"
-#include "config/problems.hpp"
+#include "config/model/model_file.hpp"
+#include "config/text/problems.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::cli;

@@ -1,10 +1,10 @@
 // Events as lines for a person, and the exit status of `status`.
-#include "cli/events_text.hpp"
+#include "cli/observe/events_text.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/status_text.hpp"
+#include "cli/observe/status_text.hpp"
 
 namespace {
 

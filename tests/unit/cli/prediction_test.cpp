@@ -1,11 +1,11 @@
-#include "cli/prediction.hpp"
+#include "cli/model/prediction.hpp"
 
 #include <cmath>
 
 #include <catch2/catch.hpp>
 
-#include "config/problems.hpp"
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
+#include "config/text/problems.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "cli/prove_course.hpp"
+#include "cli/operate/prove_course.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
 // The contract with the controller's side as a table.
-#include "cli/register_table.hpp"
+#include "cli/check/register_table.hpp"
 
 #include <filesystem>
 

@@ -1,11 +1,11 @@
-#include "cli/scan_hints.hpp"
+#include "cli/scan/scan_hints.hpp"
 
 #include <array>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
-#include "cli/scan_report.hpp"
+#include "cli/scan/scan_report.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::cli;

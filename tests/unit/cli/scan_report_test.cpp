@@ -1,4 +1,4 @@
-#include "cli/scan_report.hpp"
+#include "cli/scan/scan_report.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>

@@ -1,14 +1,14 @@
-#include "cli/status_text.hpp"
+#include "cli/observe/status_text.hpp"
 
 #include <string>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/json_fields.hpp"
-#include "cli/reason_text.hpp"
-#include "cli/troubles.hpp"
-#include "cli/watch_text.hpp"
+#include "cli/common/json_fields.hpp"
+#include "cli/common/reason_text.hpp"
+#include "cli/observe/troubles.hpp"
+#include "cli/observe/watch_text.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 namespace {

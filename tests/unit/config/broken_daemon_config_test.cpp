@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

@@ -1,7 +1,7 @@
 // Configurations whose CAN signals are named: what is wrong with the names, or with the file.
 #include <string>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

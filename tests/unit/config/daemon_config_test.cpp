@@ -1,8 +1,8 @@
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 
 #include <functional>
 
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

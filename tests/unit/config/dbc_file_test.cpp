@@ -1,6 +1,6 @@
 // What a DBC file may say, and what is refused by file, line and rule. Values beside canmatrix:
 // tests/integration/can.
-#include "config/dbc_file.hpp"
+#include "config/bus_files/dbc_file.hpp"
 
 #include <string>
 #include <string_view>

@@ -1,5 +1,5 @@
 // What an electronic data sheet may say, and what is refused by file, line and rule.
-#include "config/eds_file.hpp"
+#include "config/bus_files/eds_file.hpp"
 
 #include <string>
 

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

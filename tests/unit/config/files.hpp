@@ -12,8 +12,8 @@
 #include <catch2/catch.hpp>
 #include <sys/stat.h>
 
-#include "config/daemon_config.hpp"
-#include "config/problems.hpp"
+#include "config/daemon/daemon_config.hpp"
+#include "config/text/problems.hpp"
 
 namespace thermocomp::test {
 

@@ -1,10 +1,10 @@
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 
 #include <cmath>
 #include <iostream>
 #include <limits>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

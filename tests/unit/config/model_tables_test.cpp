@@ -1,8 +1,8 @@
 #include <cstdio>
 #include <fstream>
 
-#include "config/model_file.hpp"
-#include "config/run_overlap.hpp"
+#include "config/model/model_file.hpp"
+#include "config/runs/run_overlap.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

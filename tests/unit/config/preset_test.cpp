@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/daemon_config.hpp"
+#include "config/daemon/daemon_config.hpp"
 #include "config/sections/modbus_values.hpp"
 #include "config/sections/presets.hpp"
 #include "files.hpp"

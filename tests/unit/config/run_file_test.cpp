@@ -1,4 +1,4 @@
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 
 #include <bit>
 #include <cmath>

@@ -1,10 +1,10 @@
 // Run files as people have them: what is understood, line by line, and what is asked for.
 #include <cmath>
 
-#include "config/run_file.hpp"
 #include "config/run_forms/column_map.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
+#include "config/runs/run_file.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

@@ -1,10 +1,10 @@
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 
 #include <algorithm>
 #include <limits>
 
-#include "config/number_text.hpp"
-#include "config/printable_text.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

@@ -1,5 +1,5 @@
 // The method `controller_state`: what it takes, what it refuses, what it answers.
-#include "daemon/bridge_desk.hpp"
+#include "daemon/desks/bridge_desk.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
 // What happened, in order and with how long it lasted, in a time of the test's own.
-#include "daemon/event_journal.hpp"
+#include "daemon/status/event_journal.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -6,8 +6,8 @@
 #include <catch2/catch.hpp>
 #include <sqlite3.h>
 
-#include "config/run_file.hpp"
-#include "daemon/history/recorded_event.hpp"
+#include "config/runs/run_file.hpp"
+#include "daemon/history/format/recorded_event.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;

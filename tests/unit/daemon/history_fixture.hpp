@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/history/history_writer.hpp"
-#include "daemon/history/replay.hpp"
+#include "daemon/history/replay/replay.hpp"
+#include "daemon/history/writing/history_writer.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp::testing {

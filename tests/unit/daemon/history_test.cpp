@@ -8,9 +8,9 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 
-#include "config/run_file.hpp"
-#include "daemon/history/history_check.hpp"
-#include "daemon/history/history_reader.hpp"
+#include "config/runs/run_file.hpp"
+#include "daemon/history/reading/history_reader.hpp"
+#include "daemon/history/replay/history_check.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;

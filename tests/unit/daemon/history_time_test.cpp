@@ -1,5 +1,5 @@
 // Moments of a history, as a person writes them.
-#include "daemon/history/history_time.hpp"
+#include "daemon/history/format/history_time.hpp"
 
 #include <stdexcept>
 

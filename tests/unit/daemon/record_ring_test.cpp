@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/history/chunk_codec.hpp"
+#include "daemon/history/format/chunk_codec.hpp"
 
 using namespace thermocomp;
 

@@ -1,11 +1,11 @@
-#include "daemon/history/run_replay.hpp"
+#include "daemon/history/replay/run_replay.hpp"
 
 #include <cmath>
 #include <sstream>
 
 #include <catch2/catch.hpp>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;

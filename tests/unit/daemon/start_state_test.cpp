@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 #include <sqlite3.h>
 
-#include "daemon/history/last_state.hpp"
+#include "daemon/history/replay/last_state.hpp"
 #include "daemon/state/state_file.hpp"
 #include "estimator/pipeline/persistent_state.hpp"
 #include "history_fixture.hpp"

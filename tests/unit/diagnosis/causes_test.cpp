@@ -9,7 +9,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
 

@@ -10,9 +10,9 @@
 #include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
 
-#include "config/model_file.hpp"
-#include "config/problems.hpp"
-#include "config/run_file.hpp"
+#include "config/model/model_file.hpp"
+#include "config/runs/run_file.hpp"
+#include "config/text/problems.hpp"
 #include "modelling/diagnosis/data/series.hpp"
 #include "modelling/diagnosis/evidence/coloured_noise.hpp"
 #include "modelling/diagnosis/hypothesis/hypothesis.hpp"

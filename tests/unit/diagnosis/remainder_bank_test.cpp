@@ -7,7 +7,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

@@ -7,7 +7,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/problems.hpp"
+#include "config/text/problems.hpp"
 #include "modelling/diagnosis/network/network_simulation.hpp"
 #include "modelling/diagnosis/report/report_html.hpp"
 #include "modelling/diagnosis/thermal/corrected_machine.hpp"

@@ -3,7 +3,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "modelling/experiments/test_plan.hpp"
 
 namespace thermocomp::experiments {

@@ -1,4 +1,4 @@
-#include "daemon/history/thinned_history.hpp"
+#include "daemon/history/replay/thinned_history.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 #include "estimator/model/model_domain.hpp"
 #include "modelling/identification/bank_fit.hpp"
 #include "synthetic_places.hpp"

@@ -7,7 +7,7 @@
 #include <Eigen/QR>
 #include <catch2/catch.hpp>
 
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 #include "synthetic_places.hpp"
 
 namespace thermocomp::identification {

@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 
 namespace thermocomp::identification {
 namespace {

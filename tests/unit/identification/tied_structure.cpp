@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "config/toml_reader.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "estimator/checks.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/structure/heat_model.hpp"

@@ -42,7 +42,7 @@ struct Oil {
 };
 
 /// Oil on for odd hours and off for even ones, its heater started with the test in the second
-/// condition; or as the third condition has it. As in bench/gate_machine.cpp.
+/// condition; or as the third condition has it. As in bench/gate_machine/gate_machine.cpp.
 Oil oil_at(int condition, double hour) {
   Oil oil;
   oil.in_tank = condition == 3 ? hour < 3 || hour >= 4 : static_cast<int>(hour) % 2 == 0;

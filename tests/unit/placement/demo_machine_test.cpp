@@ -2,7 +2,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 #include "machines.hpp"
 #include "modelling/structure/body_reduction.hpp"
 #include "simulator/plant/plant.hpp"

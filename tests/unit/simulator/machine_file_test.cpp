@@ -9,7 +9,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 #include "estimator/model/displacement_model.hpp"
 #include "simulator/plant/plant.hpp"
 #include "simulator/plant/simulate.hpp"

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <numeric>
 
-#include "config/model_file.hpp"
+#include "config/model/model_file.hpp"
 #include "modelling/structure/picture.hpp"
 #include "modelling/structure/vtu_file.hpp"
 #include "models.hpp"

@@ -1,0 +1,117 @@
+#!/usr/bin/python3
+"""What thermocomp-gateway costs beside a running daemon: memory, processor, bytes of the page, time
+for a month of history. Processes and devices are those of the integration tests.
+
+    bench/daemon/gateway.py [--pages 5] [--seconds 30]
+"""
+import argparse
+import contextlib
+import os
+import pathlib
+import sqlite3
+import sys
+import tempfile
+import threading
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests/integration/gateway"), str(ROOT / "tests/integration/daemon")]
+
+from gateway_lab import Gateway  # noqa: E402
+from lab import Lab  # noqa: E402
+from plain_devices import Machine  # noqa: E402
+
+
+def memory_MB(pid):
+    with open(f"/proc/{pid}/smaps_rollup") as text:
+        fields = {line.split(":")[0]: line.split()[1] for line in text if ":" in line
+                  and line.split(":")[0] in ("Rss", "Pss")}
+    return int(fields["Rss"]) / 1000, int(fields["Pss"]) / 1000
+
+
+def processor_s(pid):
+    with open(f"/proc/{pid}/stat") as text:
+        fields = text.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def open_pages(gateway, count, stack, stops):
+    """Streams that are read as a browser would."""
+    def read(answer):
+        with contextlib.suppress(Exception):
+            while not stops.is_set() and answer.readline():
+                pass
+
+    for _ in range(count):
+        link = stack.enter_context(contextlib.closing(gateway.connect()))
+        link.request("GET", "/api/events")
+        threading.Thread(target=read, args=(link.getresponse(),), daemon=True).start()
+
+
+def stretch_to_a_month(history):
+    """Puts copies of one commit of the last segment one behind the other, each five seconds of wall
+    clock later, as in a month of commits every five seconds: (its beginning, its length)."""
+    month_s, commit_s = 30 * 86400, 5
+    with contextlib.closing(sqlite3.connect(history)) as base:
+        base.execute("PRAGMA synchronous=OFF")
+        segment, period_ns, first, wall_ns = base.execute(
+            "SELECT id, period_ns, first_cycle, wall_ns FROM segment ORDER BY id DESC LIMIT 1"
+        ).fetchone()
+        rows = base.execute("SELECT count, records, wall_minus_grid_ns FROM chunk "
+                            "WHERE segment = ? ORDER BY number", (segment,)).fetchall()
+        count, records, difference = rows[len(rows) // 2]
+        base.execute("DELETE FROM chunk WHERE segment = ?", (segment,))
+        cycles = commit_s * 10**9 // period_ns
+        chunks = month_s // commit_s
+        base.executemany(
+            "INSERT INTO chunk (segment, number, through_cycle, wall_minus_grid_ns, count, "
+            "records, checksum) VALUES (?, ?, ?, ?, ?, ?, NULL)",
+            ((segment, i, first + (i + 1) * cycles,
+              difference + (i - len(rows) // 2) * commit_s * 10**9, count, records)
+             for i in range(chunks)))
+        base.execute("UPDATE segment SET last_cycle = ?, checksum = NULL WHERE id = ?",
+                     (first + chunks * cycles, segment))
+        base.commit()
+    return wall_ns * 1e-9, month_s
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--pages", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=30.0)
+    options = parser.parse_args()
+    lab = Lab(pathlib.Path(tempfile.mkdtemp(prefix="gateway")))
+    stops = threading.Event()
+    try:
+        machine = Machine(lab)
+        machine.start()
+        gateway = lab.also_end(Gateway(lab, machine.daemon)).start()
+        page_bytes = sum(len(gateway.ask(path)[2]) for path in (
+            "/", "/page.js", "/page.css", "/icon.svg", "/dygraph.js", "/dygraph.css"))
+        with contextlib.ExitStack() as stack:
+            open_pages(gateway, options.pages, stack, stops)
+            time.sleep(3.0)
+            begun_s, used_s = time.monotonic(), processor_s(gateway.process.pid)
+            time.sleep(options.seconds)
+            share = (processor_s(gateway.process.pid) - used_s) / (time.monotonic() - begun_s)
+            resident_MB, own_MB = memory_MB(gateway.process.pid)
+            stops.set()
+        machine.daemon.end()
+        from_s, month_s = stretch_to_a_month(machine.daemon.history)
+        begun_s = time.monotonic()
+        told = gateway.json(f"/api/history?from={from_s}&to={from_s + month_s}&points=900")
+        month_drawn_s = time.monotonic() - begun_s
+        known = sum(value is not None for value in told["columns"]["z_offset_um"])
+        assert known == 900, known
+        print(f"month: {told['chunks']} commits, {told['chunks_read']} read, 900 points")
+        print(f"gateway.page {page_bytes / 1000:.1f} kB")
+        print(f"gateway.resident {resident_MB:.1f} MB")
+        print(f"gateway.resident_own {own_MB:.1f} MB")
+        print(f"gateway.processor {100 * share:.2f} percent")
+        print(f"gateway.month_of_history {month_drawn_s:.2f} s")
+    finally:
+        lab.end()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Ki, Kc by beam formulas and by finite elements, and what running correction leaves in three oil
+# conditions of that machine; then the published experiment from real bytes to the tool of a machine that
+# moves as the published one does (five minutes): docs/identification.md and docs/measurements.md explain the tables.
+set -euo pipefail
+bin=$THERMOCOMP_BENCH_BUILD/bin
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+"$bin/bench_gate_machine" coefficients
+"$bin/bench_gate_machine" run "$out/condition_1.csv"
+"$bin/thermocomp-modelling" fit "$out/condition_1.csv" --outputs x_um --terms 3 --lags \
+  -o "$out/model.toml" > "$out/said"
+"$bin/bench_gate_machine" corrections "$out/model.toml"
+"$bin/bench_gate_machine" record
+here=$(cd "$(dirname "$0")" && pwd)
+python3 "$here/gate_experiment.py" "$bin" "$here/../../config/gate_machine" "$out/experiment"

@@ -1,0 +1,174 @@
+"""Plants a fault of one reading (2 K jump, 4 K creep, 0.4 of the motion left, 3 K spikes, a stuck
+channel, a jump of a displacement) into each measured recording and asks `thermocomp inspect`.
+Right: the likeliest finding of 0.5 or more that the untouched recording does not have names column
+and kind. With `--scores FILE` every score is written, from which probability.cpp was set."""
+
+import csv
+import json
+import math
+import os
+import pathlib
+import random
+import subprocess
+import sys
+import tempfile
+import time
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
+PROGRAM = pathlib.Path(os.environ["THERMOCOMP_BENCH_BUILD"]) / "bin" / "thermocomp-modelling"
+KINDS = ("sensor_step", "sensor_drift", "sensor_loose", "spikes", "stuck", "displacement_step")
+CASES = 2  # of each kind on each recording
+MINUTE_S = 60.0
+
+
+def read(path):
+    with path.open() as file:
+        rows = list(csv.reader(line for line in file if not line.startswith("#")))
+    names = rows[0]
+    return {name: [float(row[i]) if row[i] else math.nan for row in rows[1:]]
+            for i, name in enumerate(names)}
+
+
+def thinned(run, step_s):
+    kept, last = [], -math.inf
+    for row, time_s in enumerate(run["time_s"]):
+        if time_s - last >= step_s - 1e-6:
+            kept.append(row)
+            last = time_s
+    return {name: [column[row] for row in kept] for name, column in run.items()}
+
+
+def part(run, from_s, to_s):
+    kept = [row for row, time_s in enumerate(run["time_s"]) if from_s <= time_s < to_s]
+    return {name: [column[row] for row in kept] for name, column in run.items()}
+
+
+def recordings():
+    """(machine, name, run): nothing here is of the hours that judge."""
+    spindle = thinned(read(DATA / "spindle_46h" / "hours_00_32.csv"), MINUTE_S)
+    yield "spindle", "hours 0-16", part(spindle, 0, 57600)
+    yield "spindle", "hours 16-32", part(spindle, 57600, 1e9)
+    yield "printer", "morning", read(DATA / "printer_frame" / "2021-06-13_morning.csv")
+    for name in ("Q30_S001_1C", "Q30_S001_3C", "Q30_S002_2C", "Q30_S002_C10"):
+        yield "cell", name, read(DATA / "cell_under_load" / f"{name}.csv")
+    for night in ("05-31", "06-01"):
+        yield "mirror", night, read(DATA / "mirror_focus" / f"binospec_2019-{night}.csv")
+    for name in ("sci_A", "sci_B", "sci_C", "skye_A", "skye_B", "skye_C"):
+        yield "telescope", name, read(DATA / "telescope_focus" / f"{name}.csv")
+
+
+def write(run, path):
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(run)
+        for values in zip(*run.values()):
+            writer.writerow("" if math.isnan(value) else repr(value) for value in values)
+
+
+def planted(run, kind, chance):
+    """(run with the fault, column, at_s); None where the recording has no such column."""
+    displacement = kind == "displacement_step"
+    columns = [n for n in run if (n.endswith("_um") if displacement else n.endswith("_degC"))
+               and "target" not in n and max(run[n]) > min(run[n])]
+    if not columns:
+        return None
+    name = chance.choice(columns)
+    rows = len(run["time_s"])
+    at = chance.randrange(int(0.15 * rows), int(0.85 * rows))
+    values = list(run[name])
+    after = range(at, rows)
+    if kind == "sensor_step":
+        size = chance.choice((-2.0, 2.0))
+        values = [v + size * (i >= at) for i, v in enumerate(values)]
+    elif kind == "displacement_step":
+        spread = (sum(v * v for v in values) / rows - (sum(values) / rows) ** 2) ** 0.5
+        values = [v + 0.5 * spread * (i >= at) for i, v in enumerate(values)]
+    elif kind == "sensor_drift":
+        at = chance.choice((0, at // 2))
+        first, last = run["time_s"][at], run["time_s"][-1]
+        size = chance.choice((-4.0, 4.0))
+        values = [v + size * max(0.0, t - first) / (last - first)
+                  for v, t in zip(values, run["time_s"])]
+    elif kind == "sensor_loose":
+        room = values[0]
+        if max(values[at:]) - min(values[at:]) < 2.0:
+            return None
+        for i in after:
+            values[i] = room + 0.4 * (values[i] - room)
+    elif kind == "spikes":
+        for i in chance.sample(range(10, rows - 10), 3):
+            values[i] += chance.choice((-3.0, 3.0))
+    elif kind == "stuck":
+        end = min(rows, at + rows // 5)
+        values[at:end] = [values[at]] * (end - at)
+    return {**run, name: values}, name, run["time_s"][at]
+
+
+def inspect(run, folder):
+    path = folder / "run.csv"
+    write(run, path)
+    done = subprocess.run([PROGRAM, "inspect", path, "--all", "--json", "-"], capture_output=True,
+                          text=True)
+    if done.returncode not in (0, 1):
+        raise RuntimeError(done.stderr)
+    return json.loads(done.stdout)["findings"]
+
+
+def main():
+    scores = []
+    table = {}
+    false_named, untouched_named, untouched_columns = 0, 0, 0
+    cases = 0
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary)
+        chance = random.Random(14)
+        for machine, name, run in recordings():
+            before = inspect(run, folder)
+            told = {(f["kind"], f["column"]) for f in before if f["probability"] >= 0.5}
+            judged = [key for key in told if key[0] in KINDS]
+            untouched_named += len(judged)
+            untouched_columns += sum(n.endswith(("_degC", "_um")) for n in run)
+            print(machine, name, "untouched:", sorted(map(str, told)), file=sys.stderr)
+            scores += [{"machine": machine, "run": name, "planted": None, **f} for f in before]
+            for kind in KINDS:
+                for _ in range(CASES):
+                    case = planted(run, kind, chance)
+                    if case is None:
+                        continue
+                    changed, column, at_s = case
+                    found = inspect(changed, folder)
+                    scores += [{"machine": machine, "run": name, "planted": [kind, column, at_s],
+                                **f} for f in found]
+                    named = [f for f in found if f["probability"] >= 0.5
+                             and (f["kind"], f["column"]) not in told]
+                    accepted = (kind, "outliers") if kind == "spikes" else (kind,)
+                    right = any(f["kind"] in accepted and f["column"] == column for f in named)
+                    of_column = any(f["column"] == column for f in named)
+                    wrong = sum(f["column"] != column and f["kind"] in KINDS for f in named)
+                    cell = table.setdefault((machine, kind), [0, 0, 0, 0])
+                    for i, value in enumerate((1, right, of_column, wrong)):
+                        cell[i] += value
+                    cases += 1
+                    false_named += wrong
+        whole = read(DATA / "spindle_46h" / "hours_00_32.csv")
+        start = time.monotonic()
+        inspect(whole, folder)
+        seconds = time.monotonic() - start
+    print("machine    planted            cases  right  column  others", file=sys.stderr)
+    for (machine, kind), (count, right, column, wrong) in table.items():
+        print(f"{machine:10} {kind:18} {count:5} {right:6} {column:7} {wrong:7}", file=sys.stderr)
+    if "--scores" in sys.argv:
+        pathlib.Path(sys.argv[sys.argv.index("--scores") + 1]).write_text(json.dumps(scores))
+    for kind in KINDS:
+        rows = [cell for (_, each), cell in table.items() if each == kind]
+        count = sum(cell[0] for cell in rows)
+        print(f"found_{kind} {100 * sum(cell[1] for cell in rows) / max(count, 1):.0f} %")
+    print(f"cases {cases} count")
+    print(f"named_besides_per_case {false_named / cases:.2f} ratio")
+    print(f"named_on_untouched_columns {100 * untouched_named / untouched_columns:.1f} %")
+    print(f"inspect_spindle_32h_22_columns {seconds:.2f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,194 @@
+"""Test RMS on measured machines: what people fit, `thermocomp fit` without further options, and
+what `thermocomp diagnose` makes of a ridge model.
+
+    measured.py PROGRAM [--data FOLDER] [--splits TEXT] [--peers NAME,...]
+
+The last lines: each split's RMS by method (mean over its outputs); what `fit` stated of its model
+beside what it left of the test rows (the median over outputs of their ratio; `told_as_range` where
+it states no figure); how many rows were said to be outside, and the error inside and outside. Then
+ours over the best peer of the split: the median, the largest; rows that are worse than no model
+without being called outside; and how many stated figures are right within 0.7 to 1.5.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["OMP_NUM_THREADS"] = "1"
+
+# ruff: noqa: E402
+import numpy as np
+
+import measured_data as data
+import measured_peers as peers
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+
+
+def rms(values):
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def arguments(runs, folder, prefix):
+    """Runs of one file are written once."""
+    paths, given = {}, []
+    for run in runs:
+        key = id(run.columns["time_s"])
+        if key not in paths:
+            paths[key] = folder / f"{prefix}{len(paths)}_{run.name}.csv"
+            data.write(run, paths[key])
+        given.append(data.selection(run, paths[key]))
+    return given
+
+
+def left_by(program, model, runs, split):
+    """Left-over rows, measured rows and flags of `outside`, each output behind the other's."""
+    left = {name: [] for name in split.outputs}
+    moved = {name: [] for name in split.outputs}
+    outside = []
+    for run in runs:
+        out = model.with_name("predicted.csv")
+        subprocess.run([program, "predict", "--model", model, run, "-o", out], check=True,
+                       capture_output=True)
+        columns = data.read(out)
+        outside.append(columns.get("outside", np.zeros(len(columns["time_s"]))))
+        for name in split.outputs:
+            stem, unit = name.rsplit("_", 1)
+            left[name].append(columns[f"{stem}_residual_{unit}"])
+            moved[name].append(columns[f"{stem}_measured_{unit}"])
+    return ([np.concatenate(left[name]) for name in split.outputs],
+            [np.concatenate(moved[name]) for name in split.outputs],
+            np.concatenate(outside) > 0.5)
+
+
+def run(what, arguments_of):
+    start = time.monotonic()
+    said = subprocess.run(arguments_of, capture_output=True, text=True, check=False)
+    if said.returncode != 0:
+        raise SystemExit(f"{what}: {said.stderr}")
+    print(said.stdout + said.stderr, file=sys.stderr)
+    return time.monotonic() - start
+
+
+def write_ridge(split, path):
+    """Ridge regression of all temperatures as a model file: what `diagnose` starts from."""
+    def quoted(names):
+        return "[" + ", ".join(f'"{name}"' for name in names) + "]"
+    names, gains = peers.ridge_gains_um_per_K(split)
+    rows = ",\n  ".join("[" + ", ".join(f"{g:.12g}" for g in row) + "]" for row in gains)
+    path.write_text(f"format = 1\ninputs = {quoted(names)}\noutputs = {quoted(split.outputs)}\n"
+                    f'reference = "first_sample"\nmatrix_um_per_K = [\n  {rows}\n]\n')
+
+
+def diagnosed(program, split, train, test, folder):
+    """What `diagnose` leaves of the test rows when it extends the ridge model."""
+    base = folder / "ridge.toml"
+    write_ridge(split, base)
+    out = folder / "diagnosed"
+    seconds = run(f"{split.name}: diagnose", [program, "diagnose", "--model", base, "--train",
+                                              *train, "--test", *test, "--out", out])
+    return left_by(program, out / "model.toml", test, split)[0], seconds
+
+
+def fitted(program, split, train, model):
+    """Fits without further options; the answer for a program, and seconds."""
+    start = time.monotonic()
+    said = subprocess.run([program, "fit", *train, "--outputs", ",".join(split.outputs), "-o",
+                           model, "--json"], capture_output=True, text=True, check=False)
+    if said.returncode != 0:
+        raise SystemExit(f"{split.name}: fit: {said.stderr}")
+    print(said.stderr, file=sys.stderr)
+    return json.loads(said.stdout), time.monotonic() - start
+
+
+def share_covered(columns, name):
+    """Rows on which the error is less than twice the stated standard deviation."""
+    stem, unit = name.rsplit("_", 1)
+    error, sd = columns[f"{stem}_residual_{unit}"], columns[f"{stem}_sd_{unit}"]
+    return float(np.mean(np.abs(error) <= 2 * sd))
+
+
+def judge(program, split, names, folder):
+    """RMS of each method, mean over outputs; and of ours where it is not called outside."""
+    figures = {}
+    for name in names:
+        figures[name] = float(np.mean([rms(left) for left in peers.PEERS[name](split)]))
+        print(f"{split.name} {name} {figures[name]:.3f}", file=sys.stderr, flush=True)
+    folder.mkdir()
+    train, test = arguments(split.train, folder, "train"), arguments(split.test, folder, "test")
+    model = folder / "model.toml"
+    answer, seconds = fitted(program, split, train, model)
+    left, moved, outside = left_by(program, model, test, split)
+    figures["family"] = answer["family"]
+    figures["runs"] = len(train)
+    figures["stated"] = float(np.median([rms(e) / answer["left_out_rms_um"][name]
+                                         for name, e in zip(split.outputs, left)]))
+    last = data.read(model.with_name("predicted.csv"))
+    figures["covered"] = float(np.mean([share_covered(last, name) for name in split.outputs]))
+    figures["fit"] = float(np.mean([rms(each) for each in left]))
+    left_diagnosed, figures["diagnose_seconds"] = diagnosed(program, split, train, test, folder)
+    figures["diagnose"] = float(np.mean([rms(each) for each in left_diagnosed]))
+    inside = ~outside
+    figures["inside"] = float(np.mean([rms(e[inside]) for e in left])) if inside.any() else 0.0
+    figures["none_inside"] = (float(np.mean([rms(e[inside]) for e in moved]))
+                              if inside.any() else 0.0)
+    figures["outside"] = float(np.mean([rms(e[outside]) for e in left])) if outside.any() else 0.0
+    figures["outside_share"] = float(outside.mean())
+    figures["seconds"] = seconds
+    return figures
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("--data", default=os.environ.get(
+        "THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"), type=pathlib.Path)
+    parser.add_argument("--splits", default="")
+    parser.add_argument("--peers", default=",".join(peers.PEERS))
+    options = parser.parse_args()
+    if not options.data.is_dir():
+        print(f"no measured data in {options.data} (THERMOCOMP_DATA): nothing to measure")
+        return 77
+    names = options.peers.split(",")
+    ratios, lines, worse, stated = [], [], 0, []
+    with tempfile.TemporaryDirectory() as folder:
+        for split in data.all_splits(options.data):
+            if options.splits not in split.name:
+                continue
+            figures = judge(options.program, split, names, pathlib.Path(folder) / split.name)
+            best = min(figures[name] for name in names)
+            ratios.append(figures["fit"] / best)
+            worse += figures["inside"] > figures["none_inside"]
+            for name in [*names, "fit", "diagnose"]:
+                lines.append(f"{split.name}_{name} {figures[name]:.3f} um")
+            lines.append(f"{split.name}_fit_over_best_peer {ratios[-1]:.3f} ratio")
+            lines.append(f"{split.name}_diagnose_over_ridge "
+                         f"{figures['diagnose'] / figures['ridge']:.3f} ratio")
+            lines.append(f"{split.name}_family {figures['family']} name")
+            lines.append(f"{split.name}_true_over_stated {figures['stated']:.3f} "
+                         f"{'ratio' if figures['runs'] >= 3 else 'told_as_range'}")
+            lines.append(f"{split.name}_within_two_sd {figures['covered']:.3f} share")
+            if figures["runs"] >= 3:  # fewer: `fit` tells a range in words
+                stated.append(figures["stated"])
+            lines.append(f"{split.name}_outside {figures['outside_share']:.3f} share")
+            lines.append(f"{split.name}_fit_inside {figures['inside']:.3f} um")
+            lines.append(f"{split.name}_fit_outside {figures['outside']:.3f} um")
+            lines.append(f"{split.name}_fit_seconds {figures['seconds']:.1f} s")
+            lines.append(f"{split.name}_diagnose_seconds {figures['diagnose_seconds']:.1f} s")
+    print("\n".join(lines))
+    print(f"fit_over_best_peer_median {np.median(ratios):.3f} ratio")
+    print(f"fit_over_best_peer_largest {max(ratios):.3f} ratio")
+    print(f"splits_worse_than_none_inside {worse} splits")
+    right = sum(0.7 <= ratio <= 1.5 for ratio in stated)
+    print(f"stated_figures_right {right} of_{len(stated)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

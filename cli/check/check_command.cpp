@@ -1,0 +1,198 @@
+#include "cli/check/check_command.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/check/register_table.hpp"
+#include "cli/common/json_fields.hpp"
+#include "config/daemon/daemon_config.hpp"
+#include "config/text/problems.hpp"
+#include "gateway/settings/gateway_settings.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+std::string counted(std::size_t count, const char* what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+std::string line_kind(const ModbusLine& line) {
+  return std::holds_alternative<ModbusRtu>(line.link) ? "modbus_rtu" : "modbus_tcp";
+}
+
+std::string own_kind(const ControllerConfig& controller) {
+  if (const auto* modbus = std::get_if<ModbusControllerConfig>(&controller)) {
+    return modbus->name + " (" + line_kind(modbus->line) + ")";
+  }
+  if (const auto* can = std::get_if<CanControllerConfig>(&controller)) {
+    return can->name + " (can)";
+  }
+  if (const auto* bridge = std::get_if<BridgeControllerConfig>(&controller)) {
+    return bridge->name + " (linuxcnc: its bridge calls the daemon)";
+  }
+  return std::get<DryRunControllerConfig>(controller).name + " (none)";
+}
+
+std::string controller_kind(const DaemonConfig& config) {
+  return own_kind(config.controller) +
+         (config.dry_run ? ", DRY RUN: nothing is written to it" : "");
+}
+
+template <class Names>
+std::string list_names(const Names& items) {
+  std::string result;
+  for (const auto& item : items) result += (result.empty() ? "" : ", ") + item.name;
+  return result;
+}
+
+/// Sensors that the model gets nothing from; empty where there is none.
+std::string unused_sensors_text(const EstimatorConfig& config) {
+  std::string names;
+  for (std::size_t i = 0; i < config.sensors.size(); ++i) {
+    const bool is_used =
+        std::any_of(config.blocks.begin(), config.blocks.end(),
+                    [i](const BlockConfig& block) {
+                      return std::find(block.sensors.begin(), block.sensors.end(), i) !=
+                             block.sensors.end();
+                    }) ||
+        std::any_of(config.sensors.begin(), config.sensors.end(),
+                    [i](const SensorConfig& other) { return other.reference_sensor == i; });
+    if (!is_used) names += (names.empty() ? "" : ", ") + config.sensors[i].name;
+  }
+  if (names.empty()) return {};
+  return "in no block: " + names + " (recorded, but nothing is computed from it)\n";
+}
+
+/// What the model file says of how well it fits a machine.
+std::string comparison_text(const ThermalModel& model) {
+  if (!is_compared(model))
+    return "compared: NEVER, as far as the model file says (no [made_from] with errors on rows "
+           "left "
+           "out): size and sign may be those of no machine";
+  std::string text("compared: left on rows that it was not fitted to");
+  for (const auto& [name, output] : model.made_from->outputs)
+    text += ", " + name + " " + fixed(output.left_out_rms_um, 1) + " rms of " +
+            fixed(output.no_model_rms_um, 1);
+  return text;
+}
+
+std::string first_start_text(const DaemonConfig& config) {
+  if (config.estimator.compensation.enabled_at_first_start)
+    return "first start: COMPENSATES AT ONCE (compensation.enabled_at_first_start = true)";
+  return "first start: switched off until `thermocomp enable`";
+}
+
+void print_what_was_found(const DaemonConfig& config) {
+  const EstimatorConfig& estimator = config.estimator;
+  for (const ModbusBusConfig& bus : config.modbus_buses) {
+    std::cout << "bus " << bus.name << " (" << line_kind(bus.line)
+              << "): " << counted(bus.devices.size(), "device") << '\n';
+  }
+  for (const CanBusConfig& bus : config.can_buses) {
+    std::cout << "bus " << bus.name << " (can, "
+              << bus.interface << "): " << counted(bus.devices.size(), "device") << '\n';
+  }
+  for (const CanopenBusConfig& bus : config.canopen_buses) {
+    std::cout << "bus " << bus.name << " (canopen, "
+              << bus.interface << "): " << counted(bus.nodes.size(), "node") << '\n';
+  }
+  for (const J1939BusConfig& bus : config.j1939_buses) {
+    std::cout << "bus " << bus.name << " (j1939, "
+              << bus.interface << "): " << counted(bus.nodes.size(), "device") << '\n';
+  }
+  std::cout << counted(estimator.sensors.size(), "sensor") << ": " << list_names(estimator.sensors)
+            << '\n'
+            << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)
+            << '\n'
+            << unused_sensors_text(estimator) << "axes: " << list_names(estimator.axes) << '\n'
+            << "controller " << controller_kind(config) << ", "
+            << counted(estimator.signals.size(), "signal") << '\n'
+            << "model " << config.model_file.string() << ": "
+            << counted(config.model.inputs.size(), "input") << ", "
+            << counted(config.model.outputs.size(), "output") << ", "
+            << counted(config.model.terms.size(), "extension term") << ", SHA-256 "
+            << config.model_checksum << '\n'
+            << comparison_text(config.model) << '\n'
+            << first_start_text(config) << '\n'
+            << config.file.string() << ": OK\n";
+}
+
+std::string door_text(const gateway::HttpSettings& http) {
+  if (!http.enabled) return "http: off";
+  return "http: " + http.address + " port " + std::to_string(http.port) +
+         (http.has_tls() ? ", TLS" : ", no TLS") +
+         (http.passwords.empty() ? ", no passwords" : ", passwords");
+}
+
+void print_gateway(const gateway::GatewaySettings& settings) {
+  const gateway::MqttSettings& mqtt = settings.mqtt;
+  const gateway::ShdrSettings& shdr = settings.shdr;
+  std::string commands = settings.commands.users.empty() ? "none" : "";
+  for (const std::string& method : settings.commands.methods)
+    commands += (commands.empty() ? "" : ", ") + method;
+  std::cout << "gateway of machine " << settings.machine << ", daemon at "
+            << settings.socket.string() << '\n'
+            << door_text(settings.http) << '\n'
+            << "commands: " << commands << '\n'
+            << "mqtt: "
+            << (mqtt.enabled ? mqtt.host + " port " + std::to_string(mqtt.port) +
+                                   (mqtt.authority.empty() ? ", no TLS" : ", TLS")
+                             : "off")
+            << '\n'
+            << "shdr: "
+            << (shdr.enabled ? shdr.address + " port " + std::to_string(shdr.port) : "off") << '\n'
+            << "alarm command: "
+            << (settings.alarm.command.empty() ? "none" : settings.alarm.command.front()) << '\n'
+            << settings.file.string() << ": OK\n";
+}
+
+struct CheckOptions {
+  std::string file;
+  bool registers{false};
+};
+
+int run_check(const CheckOptions& options) {
+  const std::string& file = options.file;
+  try {
+    if (gateway::is_gateway_file(file)) {
+      print_gateway(gateway::load_gateway_settings(file));
+      return exit_success;
+    }
+    const DaemonConfig config = load_daemon_config(file);
+    if (options.registers)
+      std::cout << register_table(config);
+    else
+      print_what_was_found(config);
+  } catch (const ConfigurationError& error) {
+    const std::size_t count = error.problems().size();
+    std::fprintf(stderr, "%s\n", error.what());
+    constexpr std::size_t told_max = 100;  // the line after them says how many more there are
+    std::fprintf(stderr, "%s: %s\n", file.c_str(),
+                 count > told_max ? "more than 100 problems" : counted(count, "problem").c_str());
+    return exit_bad_use;
+  }
+  return exit_success;
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, Action& action) {
+  CLI::App* sub = app.add_subcommand(
+      "check", "a daemon's configuration with its model, or a gateway's: every problem at once");
+  const auto options = std::make_shared<CheckOptions>();
+  sub->add_option("CONFIG", options->file, "configuration of thermocompd or thermocomp-gateway")
+      ->type_name("FILE")
+      ->required();
+  sub->add_flag("--registers", options->registers,
+                "what the controller's side must provide: every register or bit, its unit, and who "
+                "writes it");
+  sub->callback([&action, options] { action = [options] { return run_check(*options); }; });
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,10 @@
+/// check: a daemon's configuration with its model, every problem at once.
+#pragma once
+
+#include "cli/common/command.hpp"
+
+namespace thermocomp::cli {
+
+void add_check_command(CLI::App& app, Action& action);
+
+}  // namespace thermocomp::cli

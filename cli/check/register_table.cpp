@@ -1,0 +1,223 @@
+#include "cli/check/register_table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <map>
+#include <vector>
+
+#include "cli/common/json_fields.hpp"
+#include "cli/common/modbus_names.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+/// place, type, meaning, unit and what one count is
+using Row = std::array<std::string, 4>;
+
+constexpr const char* registers = "register";
+constexpr const char* bits = "bits (DBC numbering)";
+
+/// @param places  the title of the first column
+std::string table_text(const char* places, std::vector<Row> rows) {
+  rows.insert(rows.begin(), Row{places, "type", "value", "unit"});
+  std::array<std::size_t, 4> widths{};
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  std::string text;
+  for (const Row& row : rows) {
+    std::string line = "  ";
+    for (std::size_t i = 0; i < row.size(); ++i)
+      line += padded(row[i], static_cast<int>(widths[i])) + "  ";
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+std::string scaled(const std::string& unit, double scale, double offset = 0.0) {
+  std::string text = unit.empty() ? "-" : unit;
+  if (scale != 1.0) text += ", count x " + number_text(scale);
+  if (offset != 0.0) text += ", + " + number_text(offset);
+  return text;
+}
+
+std::string unit_of_axis(const AxisConfig& axis) {
+  return std::string(unit_of(axis.output).symbol);
+}
+
+/// "bit 0: x, bit 1: z; 1 = the offset is good"
+std::string valid_text(const std::vector<AxisConfig>& axes) {
+  std::string text("valid bits; ");
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    text += (i == 0 ? "bit " : ", bit ") + std::to_string(i) + ": " + axes[i].name;
+  return text + "; 1: take the offset";
+}
+
+std::string line_of(const ModbusControllerConfig& config) {
+  const std::string unit = ", unit " + std::to_string(config.unit);
+  if (const auto* tcp = std::get_if<ModbusTcp>(&config.line.link))
+    return "Modbus TCP " + tcp->host + ":" + std::to_string(tcp->port) + unit;
+  const auto& rtu = std::get<ModbusRtu>(config.line.link);
+  return "Modbus RTU " + rtu.device + ", " + std::to_string(rtu.baud) + " baud" + unit;
+}
+
+Row axis_row(const ModbusAxis& place, const ModbusValue& value, const AxisConfig& axis,
+             const std::string& what) {
+  const std::string meant = place.piezo ? "voltage of axis " : "offset of axis ";
+  const std::string unit = place.piezo ? "V" : unit_of_axis(axis);
+  return {place_name(value), type_name(value), what + meant + axis.name, scaled(unit, value.scale)};
+}
+
+std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfig& controller) {
+  const std::vector<AxisConfig>& axes = config.estimator.axes;
+  std::vector<Row> written;
+  std::vector<Row> read;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const ModbusAxis& place = controller.axes[i];
+    written.push_back(axis_row(place, place.offset, axes[i], ""));
+    if (place.applied) read.push_back(axis_row(place, *place.applied, axes[i], "applied "));
+  }
+  if (const auto& valid = controller.valid_bits)
+    written.push_back({place_name(*valid), type_name(without_sign(*valid)), valid_text(axes), "-"});
+  if (const auto& count = controller.heartbeat)
+    written.push_back({place_name(*count), type_name(without_sign(*count)),
+                       "heartbeat; counts up with every write, begins anew when full", "-"});
+  for (const ModbusSignal& signal : controller.signals) {
+    const std::string& name = config.estimator.signals[signal.signal];
+    read.push_back({place_name(signal.value), type_name(signal.value), name,
+                    scaled(std::string(unit_of(name).symbol), signal.value.scale)});
+  }
+  std::string text = line_of(controller) + ", every " + number_text(controller.period_s) +
+                     " s; addresses from 0, as on the wire\n\nWritten by the daemon (function 16; "
+                     "offsets, then valid bits, then heartbeat):\n" +
+                     table_text(registers, std::move(written));
+  if (read.empty()) return text + "\nWritten by the controller: nothing\n";
+  return text + "\nWritten by the controller, read by the daemon (functions 1 to 4):\n" +
+         table_text(registers, std::move(read));
+}
+
+std::string place_of(const CanSignal& signal) {
+  return std::to_string(signal.start_bit) + ", " + std::to_string(signal.length_bits) +
+         (signal.length_bits == 1 ? " bit" : " bits");
+}
+
+std::string type_of(const CanSignal& signal, bool raw = false) {
+  const bool is_signed = signal.is_signed && !raw;
+  const std::string type = signal.is_float ? "float" : is_signed ? "signed" : "unsigned";
+  return type + (signal.byte_order == ByteOrder::big_endian ? ", big endian" : ", little endian");
+}
+
+/// Rows by the frame they stand in.
+using Frames = std::map<std::pair<std::uint32_t, bool>, std::vector<Row>>;
+
+void add(Frames& frames, const CanSignal& signal, const std::string& what, const std::string& unit,
+         bool raw = false) {
+  frames[{signal.id, signal.extended_id}].push_back(
+      {place_of(signal), type_of(signal, raw), what, unit});
+}
+
+std::string frames_text(const Frames& frames) {
+  std::string text;
+  for (const auto& [id, rows] : frames) {
+    std::array<char, 32> name{};
+    std::snprintf(name.data(), name.size(), "0x%X (%d bits)", static_cast<unsigned>(id.first),
+                  id.second ? 29 : 11);
+    text.append(" frame ").append(name.data()).append("\n").append(table_text(bits, rows));
+  }
+  return text;
+}
+
+std::string can_table(const DaemonConfig& config, const CanControllerConfig& controller) {
+  const std::vector<AxisConfig>& axes = config.estimator.axes;
+  Frames written;
+  Frames read;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const CanAxis& place = controller.axes[i];
+    const std::string unit = unit_of_axis(axes[i]);
+    add(written, place.offset, "offset of axis " + axes[i].name,
+        scaled(unit, place.offset.scale, place.offset.offset));
+    if (place.applied)
+      add(read, *place.applied, "applied offset of axis " + axes[i].name,
+          scaled(unit, place.applied->scale, place.applied->offset));
+  }
+  if (controller.valid_bits) add(written, *controller.valid_bits, valid_text(axes), "-", true);
+  if (controller.heartbeat)
+    add(written, *controller.heartbeat,
+        "heartbeat; counts up with every frame, begins anew when full", "-", true);
+  for (const CanControllerSignal& signal : controller.signals) {
+    const std::string& name = config.estimator.signals[signal.signal];
+    add(read, signal.value, name,
+        scaled(std::string(unit_of(name).symbol), signal.value.scale, signal.value.offset));
+  }
+  std::string text = "CAN " + controller.interface + ", every " + number_text(controller.period_s) +
+                     " s\n\nSent by the daemon:\n" + frames_text(written);
+  if (read.empty()) return text + "\nSent by the controller: nothing\n";
+  return text + "\nSent by the controller, each frame at least every " +
+         number_text(controller.silent_after_s) + " s:\n" + frames_text(read);
+}
+
+std::string bounds_text(const DaemonConfig& config) {
+  std::string text = "\nWhat the daemon keeps to, and the controller should refuse beyond:\n";
+  for (const AxisConfig& axis : config.estimator.axes) {
+    const std::string unit = unit_of_axis(axis);
+    text.append("  axis ").append(axis.name).append(": offset within +-");
+    text.append(number_text(axis.limiter.offset_um_max)).append(" ").append(unit);
+    text.append(", changing by at most ").append(number_text(axis.limiter.rate_um_per_s_max));
+    text.append(" ").append(unit).append("/s\n");
+  }
+  return text;
+}
+
+/// What the contract lacks here, for whoever programs the other side.
+std::string missing_text(bool valid_bits, bool heartbeat, bool reads_back) {
+  std::vector<std::string> lacks;
+  if (!valid_bits)
+    lacks.emplace_back("valid_bits: the controller cannot tell an axis that must be left alone");
+  if (!heartbeat)
+    lacks.emplace_back("heartbeat: the controller cannot tell that the daemon has stopped");
+  if (!reads_back)
+    lacks.emplace_back("applied: the daemon cannot tell what the controller applies");
+  std::string text;
+  for (const std::string& lack : lacks)
+    text.append(text.empty() ? "\nMissing:\n" : "").append("  no ").append(lack).append("\n");
+  return text;
+}
+
+template <class Controller>
+std::string gaps_of(const Controller& controller) {
+  const bool reads_back = std::all_of(controller.axes.begin(), controller.axes.end(),
+                                      [](const auto& axis) { return axis.applied.has_value(); });
+  return missing_text(controller.valid_bits.has_value(), controller.heartbeat.has_value(),
+                      reads_back);
+}
+
+struct TableText {
+  const DaemonConfig& config;
+  std::string operator()(const ModbusControllerConfig& controller) const {
+    return modbus_table(config, controller) + bounds_text(config) + gaps_of(controller);
+  }
+  std::string operator()(const CanControllerConfig& controller) const {
+    return can_table(config, controller) + bounds_text(config) + gaps_of(controller);
+  }
+  std::string operator()(const BridgeControllerConfig&) const {
+    return "LinuxCNC: no registers; its bridge calls the daemon (docs/linuxcnc.md)\n" +
+           bounds_text(config);
+  }
+  std::string operator()(const DryRunControllerConfig&) const {
+    return "kind = \"dry_run\": there is no controller, and no register\n" + bounds_text(config);
+  }
+};
+
+}  // namespace
+
+std::string register_table(const DaemonConfig& config) {
+  const std::string name =
+      std::visit([](const auto& each) { return each.name; }, config.controller);
+  return "controller " + name + ": " + std::visit(TableText{config}, config.controller) +
+         (config.dry_run ? "\nDRY RUN: the daemon reads, and writes none of this\n" : "");
+}
+
+}  // namespace thermocomp::cli

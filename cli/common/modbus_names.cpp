@@ -1,0 +1,102 @@
+#include "cli/common/modbus_names.hpp"
+
+#include <array>
+#include <variant>
+
+namespace thermocomp::cli {
+
+std::string table_name(ModbusTable table) {
+  switch (table) {
+    case ModbusTable::coil:
+      return "coil";
+    case ModbusTable::discrete_input:
+      return "discrete_input";
+    case ModbusTable::holding:
+      return "holding";
+    case ModbusTable::input:
+      break;
+  }
+  return "input";
+}
+
+std::string order_name(WordOrder order) {
+  switch (order) {
+    case WordOrder::abcd:
+      return "ABCD";
+    case WordOrder::dcba:
+      return "DCBA";
+    case WordOrder::badc:
+      return "BADC";
+    case WordOrder::cdab:
+      break;
+  }
+  return "CDAB";
+}
+
+std::string encoding_name(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::int16:
+      return "int16";
+    case Encoding::uint16:
+      return "uint16";
+    case Encoding::int32:
+      return "int32";
+    case Encoding::uint32:
+      return "uint32";
+    case Encoding::float32:
+      return "float32";
+    case Encoding::float64:
+      break;
+  }
+  return "float64";
+}
+
+std::string place_name(const ModbusValue& value) {
+  const auto words = words_of(value.table, value.encoding);
+  std::string text = table_name(value.table) + " " + std::to_string(value.address);
+  if (words > 1) text += ".." + std::to_string(value.address + words - 1);
+  return text;
+}
+
+std::string type_name(const ModbusValue& value) {
+  if (is_bit_table(value.table)) return "bit";
+  const std::string type = encoding_name(value.encoding);
+  return registers_of(value.encoding) == 1 ? type : type + " " + order_name(value.word_order);
+}
+
+ModbusValue without_sign(ModbusValue value) noexcept {
+  if (value.encoding == Encoding::int16) value.encoding = Encoding::uint16;
+  if (value.encoding == Encoding::int32) value.encoding = Encoding::uint32;
+  return value;
+}
+
+std::string line_name(const ModbusLine& line) {
+  if (const auto* rtu = std::get_if<ModbusRtu>(&line.link)) {
+    return rtu->device + ", " + std::to_string(rtu->baud) + " baud, " +
+           std::to_string(rtu->data_bits) + rtu->parity + std::to_string(rtu->stop_bits);
+  }
+  const auto& tcp = std::get<ModbusTcp>(line.link);
+  return std::string(tcp.host).append(":").append(std::to_string(tcp.port));
+}
+
+std::string exception_name(int code) {
+  constexpr std::array names{"",
+                             "illegal function",
+                             "illegal data address",
+                             "illegal data value",
+                             "device failure",
+                             "acknowledge",
+                             "busy",
+                             "",
+                             "memory parity",
+                             "",
+                             "gateway has no path",
+                             "gateway has no answer of the unit"};
+  std::string text = "exception " + std::to_string(code);
+  if (code > 0 && static_cast<std::size_t>(code) < names.size()) {
+    text.append(" (").append(names[static_cast<std::size_t>(code)]).append(")");
+  }
+  return text;
+}
+
+}  // namespace thermocomp::cli

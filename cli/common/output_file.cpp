@@ -1,0 +1,128 @@
+#include "cli/common/output_file.hpp"
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <iostream>
+#include <unistd.h>
+
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <system_error>
+
+#include "cli/common/command.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// What an interrupt has to take away; a plain array, because a signal handler reads it.
+char temporary_name[4096];
+constexpr int interrupts[] = {SIGINT, SIGTERM, SIGHUP};
+
+void remove_and_die(int signal) {
+  ::unlink(temporary_name);
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
+void remove_on_interrupt(const std::string& name) {
+  if (name.size() >= sizeof temporary_name) return;
+  std::memcpy(temporary_name, name.c_str(), name.size() + 1);
+  for (const int signal : interrupts) std::signal(signal, remove_and_die);
+}
+
+void interrupts_as_usual() {
+  for (const int signal : interrupts) std::signal(signal, SIG_DFL);
+}
+
+Failure cannot_write(const std::string& name, int error) {
+  return Failure("cannot write " + name + ": " + std::generic_category().message(error));
+}
+
+}  // namespace
+
+OutputFile::OutputFile(const std::string& destination)
+    : name_(destination), destination_(destination), stream_(&file_) {
+  if (destination == "-") {
+    stream_ = &std::cout;
+    return;
+  }
+  std::error_code error;
+  if (fs::is_symlink(destination_, error)) destination_ = fs::weakly_canonical(destination_, error);
+  const fs::file_status status = fs::status(destination_, error);
+  if (fs::is_directory(status)) throw cannot_write(name_, EISDIR);
+  // A rename would put a plain file in the place of /dev/null or of a pipe.
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    refuse_what_hangs();
+    file_.open(destination_);
+    if (!file_) throw cannot_write(name_, errno);
+    return;
+  }
+  open_temporary();
+}
+
+/// To open a pipe that nobody reads waits for ever; a serial port or a disk is no place for a file.
+void OutputFile::refuse_what_hangs() const {
+  const int descriptor = ::open(destination_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
+  if (descriptor < 0) {
+    if (errno == ENXIO) {
+      throw Failure("cannot write " + name_ + ": it is a pipe or socket that nobody reads");
+    }
+    throw cannot_write(name_, errno);
+  }
+  struct stat there {};
+  struct stat output {};
+  const bool is_known = ::fstat(descriptor, &there) == 0;
+  const bool is_output = ::fstat(STDOUT_FILENO, &output) == 0 && there.st_rdev == output.st_rdev;
+  ::close(descriptor);
+  constexpr unsigned memory_devices = 1;  // /dev/null, /dev/full
+  const bool is_device = S_ISCHR(there.st_mode) || S_ISBLK(there.st_mode);
+  const bool is_harmless =
+      S_ISCHR(there.st_mode) && (major(there.st_rdev) == memory_devices || is_output);
+  if (!is_known || (is_device && !is_harmless)) {
+    throw Failure("cannot write " + name_ + ": it is a device; -o takes a file, a pipe or -");
+  }
+}
+
+void OutputFile::open_temporary() {
+  std::string pattern = (destination_.parent_path() / ".").string();
+  pattern += destination_.filename().string();
+  pattern += ".XXXXXX";
+  const int descriptor = ::mkstemp(pattern.data());
+  if (descriptor < 0) throw cannot_write(name_, errno);
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  ::fchmod(descriptor, 0666 & ~mask);
+  ::close(descriptor);
+  temporary_ = pattern;
+  remove_on_interrupt(pattern);
+  file_.open(temporary_);
+  if (!file_) throw cannot_write(name_, errno);
+}
+
+OutputFile::~OutputFile() {
+  if (temporary_.empty()) return;
+  std::error_code ignored;
+  fs::remove(temporary_, ignored);
+  interrupts_as_usual();
+}
+
+void OutputFile::commit() {
+  errno = 0;
+  stream_->flush();
+  if (file_.is_open()) file_.close();
+  if (!stream_->good()) throw cannot_write(name_, errno != 0 ? errno : EIO);
+  if (temporary_.empty()) return;
+  std::error_code error;
+  fs::rename(temporary_, destination_, error);
+  if (error) throw cannot_write(name_, error.value());
+  temporary_.clear();
+  interrupts_as_usual();
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,221 @@
+#include "cli/history/history_commands.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/common/output_file.hpp"
+#include "cli/common/run_loader.hpp"
+#include "cli/common/terminal.hpp"
+#include "config/daemon/daemon_config.hpp"
+#include "config/runs/run_file.hpp"
+#include "config/text/printable_text.hpp"
+#include "daemon/history/replay/history_check.hpp"
+#include "daemon/history/replay/replay.hpp"
+#include "daemon/history/replay/run_replay.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+struct ExportOptions {
+  std::string history;
+  std::string from;
+  std::string to;
+  std::string output;
+  bool sensors{false};
+};
+
+std::optional<HistoryTime> time_or_none(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  return parse_history_time(text);
+}
+
+/// @return the exit status
+int tell_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
+  constexpr std::size_t told_max = 20;
+  for (std::size_t i = 0; i < std::min(damage.size(), told_max); ++i) {
+    std::fprintf(stderr, "%s: %s\n", history.c_str(), printable_text(to_string(damage[i])).c_str());
+  }
+  if (damage.size() > told_max) {
+    std::fprintf(stderr, "%s: and %zu more\n", history.c_str(), damage.size() - told_max);
+  }
+  return damage.empty() ? exit_success : exit_no;
+}
+
+/// An export that replaced its own history would lose what it came from.
+void refuse_onto_itself(const std::string& input, const std::string& output) {
+  std::error_code error;
+  if (output != "-" && std::filesystem::equivalent(input, output, error) && !error)
+    throw Failure(output + ": is what is read; the output must be another file");
+}
+
+int run_export(const ExportOptions& options) {
+  refuse_onto_itself(options.history, options.output);
+  const auto from = time_or_none(options.from);
+  const auto to = time_or_none(options.to);
+  OutputFile file(options.output);
+  ExportSummary summary;
+  {
+    Progress progress("export");
+    summary = export_run(
+        options.history, from, to, file.stream(),
+        [&progress](double fraction) { progress.update(fraction); }, parse_setup,
+        options.sensors ? ExportContent::sensors : ExportContent::inputs);
+  }
+  if (summary.rows == 0) {
+    tell_damage(options.history, summary.damage);
+    throw Failure(options.history + ": nothing was recorded in that time");
+  }
+  file.commit();
+  std::fprintf(stderr, "%llu rows, %zu columns\n", static_cast<unsigned long long>(summary.rows),
+               summary.columns.size());
+  if (summary.gaps > 0) {
+    std::fprintf(stderr, "%llu gap%s, each marked by a comment line in the file\n",
+                 static_cast<unsigned long long>(summary.gaps), summary.gaps == 1 ? "" : "s");
+  }
+  return tell_damage(options.history, summary.damage);
+}
+
+struct ReplayOptions {
+  std::string input;  ///< history, or run file where config is given
+  std::string config;
+  std::string columns;
+  std::string output;
+};
+
+int run_history_replay(const ReplayOptions& options) {
+  refuse_onto_itself(options.input, options.output);
+  OutputFile file(options.output);
+  ReplaySummary summary;
+  {
+    Progress progress("replay");
+    summary = replay_to_csv(options.input, file.stream(),
+                            [&progress](double fraction) { progress.update(fraction); });
+  }
+  const int status = tell_damage(options.input, summary.damage);
+  if (summary.compared == 0 && status != exit_success) {
+    throw Failure(options.input + ": nothing of it can be replayed");
+  }
+  file.commit();
+  std::fprintf(
+      stderr, "%llu segments (%llu after a gap), %llu cycles, %llu offsets compared, %llu differ\n",
+      static_cast<unsigned long long>(summary.segments),
+      static_cast<unsigned long long>(summary.gaps),
+      static_cast<unsigned long long>(summary.cycles),
+      static_cast<unsigned long long>(summary.compared),
+      static_cast<unsigned long long>(summary.different));
+  if (summary.different == 0) return status;
+  std::fprintf(stderr, "first at %.3f s, cycle %llu; largest difference %g um\n",
+               summary.first_different_time_s.value_or(0.0),
+               static_cast<unsigned long long>(summary.first_different_cycle.value_or(0)),
+               summary.largest_difference_um);
+  return exit_no;
+}
+
+int run_file_replay(const ReplayOptions& options) {
+  const DaemonConfig config = load_daemon_config(options.config);
+  refuse_onto_itself(options.input, options.output);
+  const RunFile run = RunLoader(options.columns).load(options.input);
+  OutputFile file(options.output);
+  const RunReplaySummary summary = replay_run_file(config, run, file.stream());
+  file.commit();
+  for (const std::string& note : summary.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  std::fprintf(stderr, "%llu rows, %llu steps of %g s\n",
+               static_cast<unsigned long long>(summary.rows),
+               static_cast<unsigned long long>(summary.steps), summary.step_period_s);
+  return exit_success;
+}
+
+int run_history_check(const std::string& history) {
+  HistoryCheck check;
+  {
+    Progress progress("check");
+    check = check_history(history, [&progress](double fraction) { progress.update(fraction); });
+  }
+  std::size_t sound = 0;
+  for (const SegmentCheck& part : check.segments) {
+    const SegmentInfo& segment = part.segment;
+    std::printf("segment %lld: run %lld, cycles %llu to %lld, from %s, %llu records: %s\n",
+                static_cast<long long>(segment.id), static_cast<long long>(segment.run),
+                static_cast<unsigned long long>(segment.first_cycle),
+                static_cast<long long>(segment.last_cycle), utc_text(segment.wall_ns).c_str(),
+                static_cast<unsigned long long>(part.records),
+                part.damage.empty() ? "sound" : "damaged");
+    for (const HistoryDamage& damage : part.damage) {
+      std::printf("  %s\n", printable_text(damage.why).c_str());
+    }
+    if (part.damage.empty()) ++sound;
+  }
+  for (const HistoryDamage& damage : check.damage) {
+    std::printf("%s: cannot be read\n", printable_text(to_string(damage)).c_str());
+  }
+  std::printf("%s: %zu of %zu segments sound\n", history.c_str(), sound,
+              check.segments.size() + check.damage.size());
+  return check.is_sound() ? exit_success : exit_no;
+}
+
+void add_history_check(CLI::App& app, Action& action) {
+  CLI::App* group = app.add_subcommand("history", "what a daemon recorded, as a file");
+  group->require_subcommand(1);
+  CLI::App* sub = group->add_subcommand(
+      "check",
+      "which segments of a history are sound; changes nothing. Exit status 1: some are not");
+  const auto history = std::make_shared<std::string>();
+  sub->add_option("HISTORY", *history, "history of thermocompd")->type_name("FILE")->required();
+  sub->callback([&action, history] { action = [history] { return run_history_check(*history); }; });
+}
+
+}  // namespace
+
+void add_history_commands(CLI::App& app, Action& action) {
+  const auto export_options = std::make_shared<ExportOptions>();
+  CLI::App* sub = app.add_subcommand(
+      "export",
+      "a daemon's history as a run file for predict, fit, diagnose and inspect: the model's inputs "
+      "as the daemon computed with them, signals, probed displacement, offsets; wall time, faults, "
+      "commands and damage stand in comment lines");
+  sub->add_option("HISTORY", export_options->history, "history of thermocompd")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("--from", export_options->from,
+                  "start: a time such as 2026-03-01T08:30:00 (local; Z: UTC) or 2026-03-01, "
+                  "\"8 hours ago\", -8h, or seconds since the history's start");
+  sub->add_option("--to", export_options->to, "end, not included; as --from");
+  sub->add_flag("--sensors", export_options->sensors,
+                "every sensor as it was read, in place of the model's inputs");
+  sub->add_option("-o,--output", export_options->output, "run file; - is standard output")
+      ->type_name("FILE")
+      ->required();
+  sub->callback([&action, export_options] {
+    action = [export_options] { return run_export(*export_options); };
+  });
+
+  const auto replay_options = std::make_shared<ReplayOptions>();
+  sub = app.add_subcommand(
+      "replay", "the daemon's estimator over its history (exact), or over a run file (--config)");
+  sub->add_option("--config", replay_options->config,
+                  "configuration of thermocompd; the input is then a run file")
+      ->type_name("FILE");
+  sub->add_option("--columns", replay_options->columns, columns_help)->type_name("FILE");
+  sub->add_option("INPUT", replay_options->input, "history of thermocompd, or RUN.csv[@T0:T1]")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("-o,--output", replay_options->output, "CSV file; - is standard output")
+      ->type_name("FILE")
+      ->required();
+  sub->callback([&action, replay_options] {
+    action = [replay_options] {
+      return replay_options->config.empty() ? run_history_replay(*replay_options)
+                                            : run_file_replay(*replay_options);
+    };
+  });
+  add_history_check(app, action);
+}
+
+}  // namespace thermocomp::cli

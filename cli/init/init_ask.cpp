@@ -1,0 +1,183 @@
+#include "cli/init/init_ask.hpp"
+
+#include <algorithm>
+#include <istream>
+#include <ostream>
+#include <set>
+
+#include "cli/init/init_specs.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+void ask_for_buses(InitDraft& draft, Questions& questions) {
+  while (true) {
+    const bool is_first = draft.buses.empty();
+    std::string answer;
+    questions.ask_until(
+        is_first ? "Bus of the thermocouple modules: tcp:HOST[:PORT] or rtu:DEVICE[:BAUD[:PARITY]]"
+                 : "Another bus? Enter: no more",
+        is_first ? "rtu:/dev/ttyUSB0:19200:even" : "", [&](const std::string& text) {
+          answer = text;
+          if (text.empty()) return;
+          draft.buses.push_back({"bus" + std::to_string(draft.buses.size() + 1), parse_link(text)});
+        });
+    if (answer.empty()) return;
+  }
+}
+
+bool is_used(const InitDraft& draft, const std::string& sensor) {
+  for (const InitModule& module : draft.modules)
+    for (const InitChannel& channel : module.channels)
+      if (channel.sensor == sensor) return true;
+  return false;
+}
+
+/// Those that the model waits for, in its order; beyond them by unit and channel.
+std::vector<std::string> proposed_names(const InitDraft& draft, const InitModule& module) {
+  std::vector<std::string> wanted;
+  for (const std::string& input : draft.model_inputs) {
+    const std::string sensor = input.substr(0, input.rfind("_degC"));
+    if (!is_used(draft, sensor)) wanted.push_back(sensor);
+  }
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < module.channels.size(); ++i)
+    names.push_back(i < wanted.size() ? wanted[i]
+                                      : sensor_name(draft, module, module.channels[i].number));
+  return names;
+}
+
+void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& questions,
+                    const InitEyes& eyes) {
+  InitModule module;
+  module.bus = bus;
+  module.unit = unit;
+  module.name = "module" + std::to_string(draft.modules.size() + 1);
+  bool is_wanted = false;
+  questions.ask_until(
+      "Module of unit " + std::to_string(unit) +
+          ": its preset, or TABLE:TYPE:DEGC_A_COUNT:ADDRESSES; ? lists the presets, Enter: none",
+      "", [&](const std::string& text) {
+        is_wanted = !text.empty();
+        if (!is_wanted) return;
+        if (text == "?") throw Failure(joined(eyes.preset_names()));
+        InitModule asked = module;
+        parse_form(text, asked);
+        const std::vector<std::string> lines = eyes.try_module(draft, asked);
+        for (const std::string& line : lines) questions.say("    " + line);
+        if (asked.channels.empty()) throw Failure("no channel gives a temperature");
+        module = asked;
+      });
+  if (!is_wanted) return;
+  const std::vector<std::string> proposed = proposed_names(draft, module);
+  questions.ask_until("Names of these sensors", joined(proposed), [&](const std::string& text) {
+    const std::vector<std::string> names = parse_words(text);
+    if (names.size() != module.channels.size())
+      throw Failure(std::to_string(module.channels.size()) + " names, please: " + joined(proposed));
+    for (std::size_t i = 0; i < names.size(); ++i) module.channels[i].sensor = names[i];
+  });
+  draft.modules.push_back(module);
+}
+
+void ask_for_modules(InitDraft& draft, Questions& questions, const InitEyes& eyes) {
+  for (std::size_t bus = 0; bus < draft.buses.size(); ++bus) {
+    std::vector<int> units = eyes.find_units(draft.buses[bus]);
+    if (units.empty())
+      questions.ask_until("No unit answers on this bus. Units to use all the same", "1",
+                          [&](const std::string& text) { units = parse_numbers(text); });
+    for (const int unit : units) ask_for_module(draft, bus, unit, questions, eyes);
+  }
+}
+
+void ask_for_places(InitController& controller, Questions& questions) {
+  const auto optional_place = [&](const char* what, const char* otherwise,
+                                  std::optional<InitPlace>& place) {
+    questions.ask_until(what, otherwise, [&](const std::string& text) {
+      place.reset();
+      if (text != "none") place = parse_place(text);
+    });
+  };
+  questions.ask_until(
+      "Offset of the first axis, the others behind it: TABLE:ADDRESS:TYPE:UM_A_COUNT",
+      "holding:0:int32:0.01",
+      [&](const std::string& text) { controller.offset = parse_place(text); });
+  optional_place("Where it shows what it applies, or none", "input:0:int32:0.01",
+                 controller.applied);
+  optional_place("Valid bits, or none", "holding:10:uint16", controller.valid_bits);
+  optional_place("Heartbeat, or none", "holding:11:uint16", controller.heartbeat);
+}
+
+void ask_for_controller(InitDraft& draft, Questions& questions) {
+  questions.ask_until("Controller: tcp:HOST[:PORT][@UNIT], rtu:..., linuxcnc, or none", "none",
+                      [&](const std::string& text) { draft.controller = parse_controller(text); });
+  if (!draft.controller.is_modbus()) return;
+  questions.ask_until(
+      "Registers as in docs/controllers/plc.md? Offsets from holding 0 on, applied from input 0 on "
+      "(int32, 0.01 um a count), valid bits holding 10, heartbeat holding 11; yes or no",
+      "yes", [&](const std::string& text) {
+        if (text == "no" || text == "n") return ask_for_places(draft.controller, questions);
+        if (text != "yes" && text != "y") throw Failure("yes or no");
+      });
+  questions.ask_until(
+      "What else to read from it, NAME=TABLE:ADDRESS[:TYPE[:SCALE]], such as "
+      "spindle_rpm=input:26:uint16, or none",
+      "none", [&](const std::string& text) {
+        std::vector<InitSignal> signals;
+        for (const std::string& word : parse_words(text))
+          if (word != "none") signals.push_back(parse_signal(word));
+        draft.controller.signals = signals;
+      });
+}
+
+}  // namespace
+
+std::string Questions::ask(const std::string& question, const std::string& otherwise) {
+  ++count_;
+  out_ << question << (otherwise.empty() ? "" : " [" + otherwise + "]") << ": " << std::flush;
+  std::string line;
+  if (!std::getline(in_, line)) throw Failure("init: the input ended before everything was said");
+  const std::size_t first = line.find_first_not_of(" \t\r");
+  if (first == std::string::npos) return otherwise;
+  return line.substr(first, line.find_last_not_of(" \t\r") - first + 1);
+}
+
+void Questions::ask_until(const std::string& question, const std::string& otherwise,
+                          const std::function<void(const std::string&)>& take) {
+  while (true) {
+    const std::string answer = ask(question, otherwise);
+    try {
+      return take(answer);
+    } catch (const Failure& failure) {
+      say(failure.what());
+    }
+  }
+}
+
+void Questions::say(const std::string& text) {
+  out_ << text << '\n';
+}
+
+std::string sensor_name(const InitDraft& draft, const InitModule& module, int number) {
+  std::string name;
+  if (draft.buses.size() > 1) name.append("b").append(std::to_string(module.bus + 1));
+  name.append("m").append(std::to_string(module.unit));
+  return name.append("_").append(std::to_string(number));
+}
+
+void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
+                  const InitEyes& eyes) {
+  if (draft.buses.empty()) ask_for_buses(draft, questions);
+  if (draft.modules.empty()) ask_for_modules(draft, questions, eyes);
+  if (!has_controller) ask_for_controller(draft, questions);
+  if (draft.axes.empty())
+    questions.ask_until("Axes that get an offset", "z",
+                        [&](const std::string& text) { draft.axes = parse_words(text); });
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,51 @@
+/// The questions of `thermocomp init`.
+#pragma once
+
+#include <functional>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "cli/common/command.hpp"
+#include "cli/init/init_draft.hpp"
+
+namespace thermocomp::cli {
+
+/// Asks on a terminal and counts; an answer that cannot be understood is asked for again.
+class Questions {
+ public:
+  Questions(std::istream& in, std::ostream& out) : in_(in), out_(out) {}
+
+  /// @param otherwise  what Enter means; shown in brackets
+  /// @throws Failure at the end of the input
+  [[nodiscard]] std::string ask(const std::string& question, const std::string& otherwise);
+  /// Until `take` does not throw a Failure.
+  void ask_until(const std::string& question, const std::string& otherwise,
+                 const std::function<void(const std::string&)>& take);
+  void say(const std::string& text);
+  [[nodiscard]] int count() const noexcept { return count_; }
+
+ private:
+  std::istream& in_;
+  std::ostream& out_;
+  int count_{0};
+};
+
+/// What the questions need to know of the machine while they are asked.
+struct InitEyes {
+  /// The units that answer on a bus.
+  std::function<std::vector<int>(const InitBus&)> find_units;
+  std::function<std::vector<std::string>()> preset_names;
+  /// Fills in the channels that give a temperature, and says what was read, a line a channel.
+  /// @throws Failure when the module cannot be described so
+  std::function<std::vector<std::string>(const InitDraft&, InitModule&)> try_module;
+};
+
+/// Asks for what the draft does not have yet.
+void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
+                  const InitEyes& eyes);
+
+/// "3" and channel 2 -> "m3_2"; with several buses "b2m3_2".
+[[nodiscard]] std::string sensor_name(const InitDraft& draft, const InitModule& module, int number);
+
+}  // namespace thermocomp::cli

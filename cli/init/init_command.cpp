@@ -1,0 +1,267 @@
+#include "cli/init/init_command.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/common/output_file.hpp"
+#include "cli/common/terminal.hpp"
+#include "cli/init/init_ask.hpp"
+#include "cli/init/init_probe.hpp"
+#include "cli/init/init_specs.hpp"
+#include "cli/scan/scan_report.hpp"
+#include "config/daemon/daemon_config.hpp"
+#include "config/model/model_file.hpp"
+#include "config/toml/toml_text.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct InitOptions {
+  std::string file{"/etc/thermocomp/thermocompd.toml"};
+  std::vector<std::string> buses;
+  std::vector<std::string> modules;
+  std::string names;
+  std::string controller;
+  std::string offset;
+  std::string applied;
+  std::string valid_bits;
+  std::string heartbeat;
+  std::vector<std::string> signals;
+  std::string axes;
+  std::string model;
+  double offset_um_max{5.0};
+  bool no_scan{false};
+  bool force{false};
+};
+
+bool stdin_is_terminal() {
+  return ::isatty(STDIN_FILENO) == 1;
+}
+
+/// The folder that the files go to, absolute.
+fs::path folder_of(const std::string& file) {
+  return fs::absolute(file).lexically_normal().parent_path();
+}
+
+void take_model(InitDraft& draft, const InitOptions& options, const fs::path& folder) {
+  if (options.model.empty()) return;
+  const ThermalModel model = load_model(options.model);
+  draft.model_inputs = model.temperature_columns();
+  const fs::path path = fs::absolute(options.model).lexically_normal();
+  draft.model_file = path.parent_path() == folder ? path.filename().string() : path.string();
+  if (!options.axes.empty()) return;
+  for (const std::string& output : model.outputs)
+    draft.axes.push_back(output.substr(0, output.rfind('_')));
+}
+
+void take_places(InitController& controller, const InitOptions& options) {
+  const auto take = [](const std::string& text, std::optional<InitPlace>& place) {
+    if (text == "none") place.reset();
+    if (!text.empty() && text != "none") place = parse_place(text);
+  };
+  if (!options.offset.empty()) controller.offset = parse_place(options.offset);
+  take(options.applied, controller.applied);
+  take(options.valid_bits, controller.valid_bits);
+  take(options.heartbeat, controller.heartbeat);
+}
+
+InitDraft draft_of(const InitOptions& options, const fs::path& folder) {
+  InitDraft draft;
+  draft.offset_um_max = options.offset_um_max;
+  for (const std::string& text : options.buses)
+    draft.buses.push_back({"bus" + std::to_string(draft.buses.size() + 1), parse_link(text)});
+  for (const std::string& text : options.modules) {
+    InitModule module = parse_module(text);
+    module.name = "module" + std::to_string(draft.modules.size() + 1);
+    if (module.bus >= draft.buses.size())
+      throw Failure(text + ": there is no bus " + std::to_string(module.bus + 1) + " (--bus)");
+    draft.modules.push_back(std::move(module));
+  }
+  if (!options.controller.empty()) draft.controller = parse_controller(options.controller);
+  take_places(draft.controller, options);
+  for (const std::string& text : options.signals)
+    draft.controller.signals.push_back(parse_signal(text));
+  draft.axes = parse_words(options.axes);
+  take_model(draft, options, folder);
+  // The machine's own daemon has its files where the package puts them.
+  if (!folder.string().starts_with("/etc/")) draft.own_folder = folder.string();
+  return draft;
+}
+
+void refuse_what_is_missing(const InitDraft& draft, const InitOptions& options) {
+  std::string missing;
+  if (draft.buses.empty()) missing += " --bus";
+  if (draft.modules.empty()) missing += " --module";
+  if (options.controller.empty()) missing += " --controller";
+  if (draft.axes.empty()) missing += " --axes";
+  if (!missing.empty())
+    throw Failure("init: there is no terminal to ask on, and these options are missing:" + missing);
+}
+
+/// Channels of presets that were not chosen one by one, by what they read now.
+void try_modules(InitDraft& draft, const InitOptions& options, const fs::path& folder) {
+  for (InitModule& module : draft.modules) {
+    const bool are_chosen = !module.channels.empty();
+    if (are_chosen) continue;
+    if (options.no_scan)
+      throw Failure(module.preset + ": with --no-scan the channels must be named, such as " +
+                    module.preset + ":1-4");
+    const std::vector<std::string> lines = try_module(draft, module, folder);
+    std::cout << module.name << ", unit " << module.unit << ", " << module.preset << ":\n";
+    for (const std::string& line : lines) std::cout << "    " << line << '\n';
+    if (module.channels.empty())
+      throw Failure("unit " + std::to_string(module.unit) + " (" + module.preset +
+                        "): no channel gives a temperature; name them to go on all the same, such "
+                        "as " +
+                        module.preset + ":1-4",
+                    exit_no);
+  }
+}
+
+void name_sensors(InitDraft& draft, const std::string& names) {
+  std::vector<InitChannel*> unnamed;
+  for (InitModule& module : draft.modules)
+    for (InitChannel& channel : module.channels)
+      if (channel.sensor.empty()) {
+        channel.sensor = sensor_name(draft, module, channel.number);
+        unnamed.push_back(&channel);
+      }
+  if (names.empty()) return;
+  const std::vector<std::string> given = parse_words(names);
+  if (given.size() != unnamed.size())
+    throw Failure("--names: " + std::to_string(given.size()) + " names for " +
+                  std::to_string(unnamed.size()) + " sensors");
+  for (std::size_t i = 0; i < given.size(); ++i) unnamed[i]->sensor = given[i];
+}
+
+void write_file(const std::string& path, const std::string& text) {
+  OutputFile file(path);
+  file.stream() << text;
+  file.commit();
+}
+
+void tell_next(const InitDraft& draft, const std::string& file) {
+  const bool is_own = !draft.own_folder.empty();
+  const std::string tool =
+      is_own ? "thermocomp --socket " + draft.own_folder + "/status.sock" : "thermocomp";
+  std::cout << "\nNext:\n"
+            << "  thermocomp check " << file << "\n"
+            << "  " << (is_own ? "thermocompd " + file : "systemctl start thermocompd") << "\n"
+            << "  " << tool
+            << " sensors     # warm each thermocouple by hand: its line must move\n";
+  if (draft.controller.is_modbus())
+    std::cout << "  " << tool << " prove " << draft.axes.front()
+              << " 5   # with an indicator, every axis\n";
+  std::cout << "  " << tool << " enable\n";
+  if (draft.model_inputs.empty())
+    std::cout
+        << "The model gives no displacement yet: record, measure, fit (docs/first_machine.md).\n";
+}
+
+int run_init(const InitOptions& options) {
+  const fs::path folder = folder_of(options.file);
+  const fs::path model = folder / "model.toml";
+  if (!options.force)
+    for (const fs::path& each :
+         {fs::path(options.file), options.model.empty() ? model : fs::path()})
+      if (!each.empty() && fs::exists(each))
+        throw Failure(each.string() + ": is there already; --force replaces it");
+  InitDraft draft = draft_of(options, folder);
+  Questions questions(std::cin, std::cout);
+  const bool is_complete_draft = !draft.buses.empty() && !draft.modules.empty() &&
+                                 !options.controller.empty() && !draft.axes.empty();
+  if (!is_complete_draft) {
+    if (!stdin_is_terminal()) refuse_what_is_missing(draft, options);
+    ask_for_rest(draft, !options.controller.empty(), questions, eyes_of(folder));
+  }
+  if (draft.modules.empty()) throw Failure("init: a machine needs a module with a sensor");
+  try_modules(draft, options, folder);
+  name_sensors(draft, options.names);
+
+  bool is_all_there = true;
+  if (!options.no_scan) {
+    const ScanReport report = probe(draft, folder);
+    std::cout << scan_text(report, stdout_is_terminal());
+    is_all_there = is_complete(report);
+  }
+  if (draft.model_inputs.empty()) write_file(model.string(), first_model_text(draft));
+  write_file(options.file, configuration_text(draft));
+  const DaemonConfig written = load_daemon_config(options.file);  // what check says, now
+  std::cout << options.file << ": written, OK; " << written.estimator.sensors.size() << " sensors, "
+            << questions.count() << " questions\n";
+  if (!is_all_there)
+    std::cout << "Not everything is there yet: see above, then thermocomp scan " << options.file
+              << '\n';
+  tell_next(draft, options.file);
+  return is_all_there ? exit_success : exit_no;
+}
+
+}  // namespace
+
+void add_init_command(CLI::App& app, Action& action) {
+  CLI::App* sub = app.add_subcommand(
+      "init",
+      "writes a first configuration: asks for buses, modules, controller and axes (or takes "
+      "options), looks at them with the reads of scan, and names what is missing; exit status 1: "
+      "written, but not everything answers yet");
+  const auto options = std::make_shared<InitOptions>();
+  sub->add_option("FILE", options->file,
+                  "the configuration; outside of /etc its state, history and socket are put beside "
+                  "it (default /etc/thermocomp/thermocompd.toml)")
+      ->type_name("FILE");
+  sub->add_option("--bus", options->buses,
+                  "a Modbus bus of modules: tcp:HOST[:PORT] or rtu:DEVICE[:BAUD[:PARITY]]; may be "
+                  "given several times")
+      ->type_name("BUS");
+  sub->add_option("--module", options->modules,
+                  "UNIT=PRESET[/THERMOCOUPLE][@BASE][:CHANNELS], or without a preset "
+                  "UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES; BUS/UNIT=... on another bus than the "
+                  "first. Without CHANNELS those that give a temperature now")
+      ->type_name("MODULE");
+  sub->add_option("--names", options->names,
+                  "names of the sensors, in order of modules and channels, commas between")
+      ->type_name("NAMES");
+  sub->add_option("--controller", options->controller,
+                  "tcp:HOST[:PORT][@UNIT], rtu:DEVICE[:BAUD[:PARITY]][@UNIT], linuxcnc or none; "
+                  "registers as in docs/controllers/plc.md")
+      ->type_name("WHERE");
+  sub->add_option("--offset", options->offset,
+                  "where the controller takes the offset of the first axis, the others behind it: "
+                  "TABLE:ADDRESS:TYPE:UM_A_COUNT (default holding:0:int32:0.01)")
+      ->type_name("PLACE");
+  sub->add_option("--applied", options->applied,
+                  "where it shows what it applies, or none (default input:0:int32:0.01)")
+      ->type_name("PLACE");
+  sub->add_option("--valid-bits", options->valid_bits, "or none (default holding:10:uint16)")
+      ->type_name("PLACE");
+  sub->add_option("--heartbeat", options->heartbeat, "or none (default holding:11:uint16)")
+      ->type_name("PLACE");
+  sub->add_option("--signal", options->signals,
+                  "what else to read from the controller, NAME=TABLE:ADDRESS[:TYPE[:SCALE]]")
+      ->type_name("SIGNAL");
+  sub->add_option("--axes", options->axes, "axes that get an offset, commas between")
+      ->type_name("AXES");
+  sub->add_option("--model", options->model,
+                  "a model that exists already; else one that gives no displacement yet is written")
+      ->type_name("FILE");
+  sub->add_option("--offset-um-max", options->offset_um_max,
+                  "bound of every axis (default 5, which is small to begin with)")
+      ->check(CLI::Range(0.001, 500.0));
+  sub->add_flag("--no-scan", options->no_scan, "look at no bus; channels must then be named");
+  sub->add_flag("--force", options->force, "replace files that are there");
+  sub->callback([&action, options] { action = [options] { return run_init(*options); }; });
+}
+
+}  // namespace thermocomp::cli

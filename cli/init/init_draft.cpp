@@ -1,0 +1,209 @@
+#include "cli/init/init_draft.hpp"
+
+#include <algorithm>
+
+#include "config/text/number_text.hpp"
+#include "config/toml/toml_text.hpp"
+#include "daemon/history/replay/replay.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+std::string key_text(const char* key, const std::string& value) {
+  return std::string(key) + " = " + toml_string(value) + "\n";
+}
+
+std::string key_number(const char* key, int value) {
+  return std::string(key) + " = " + std::to_string(value) + "\n";
+}
+
+std::string parity_word(char parity) {
+  return parity == 'E' ? "even" : parity == 'O' ? "odd" : "none";
+}
+
+std::string link_text(const std::variant<ModbusTcp, ModbusRtu>& link) {
+  if (const auto* tcp = std::get_if<ModbusTcp>(&link)) {
+    return key_text("kind", "modbus_tcp") + key_text("host", tcp->host) +
+           key_number("port", tcp->port);
+  }
+  const auto& rtu = std::get<ModbusRtu>(link);
+  return key_text("kind", "modbus_rtu") + key_text("device", rtu.device) +
+         key_number("baud", rtu.baud) + key_text("parity", parity_word(rtu.parity));
+}
+
+/// { table = "holding", address = 0, encoding = "int32", scale = 0.01 }
+std::string place_text(const InitPlace& place, int address) {
+  std::string text =
+      "{ table = " + toml_string(place.table) + ", address = " + std::to_string(address);
+  if (!place.encoding.empty()) text += ", encoding = " + toml_string(place.encoding);
+  if (place.word_order != "ABCD") text += ", word_order = " + toml_string(place.word_order);
+  if (place.scale != 1.0) text += ", scale = " + toml_number(place.scale);
+  return text + " }";
+}
+
+int words_of(const InitPlace& place) {
+  if (place.encoding == "float64") return 4;
+  return place.encoding.ends_with("32") ? 2 : 1;
+}
+
+std::string buses_text(const InitDraft& draft) {
+  std::string text =
+      "# ---------------------------------------------------------------- sensors\n"
+      "# One [[bus]] a line or gateway, one [[device]] a module on it, one [[sensor]] a "
+      "thermocouple.\n";
+  for (const InitBus& bus : draft.buses)
+    text += "[[bus]]\n" + key_text("name", bus.name) + link_text(bus.link) + "\n";
+  return text;
+}
+
+std::string module_text(const InitDraft& draft, const InitModule& module) {
+  std::string text = "[[device]]\n" + key_text("name", module.name) +
+                     key_text("bus", draft.buses.at(module.bus).name) +
+                     key_number("unit", module.unit);
+  if (!module.preset.empty()) {
+    text += "preset = " + toml_string(module.preset) +
+            "   # what the manual of the module says; its file names what is not confirmed\n";
+    if (!module.thermocouple.empty()) text += key_text("thermocouple", module.thermocouple);
+    if (module.base_address) text += key_number("base_address", *module.base_address);
+  } else {
+    const InitPlace& place = module.registers;
+    text += key_text("table", place.table) + key_text("encoding", place.encoding);
+    if (place.word_order != "ABCD") text += key_text("word_order", place.word_order);
+    text +=
+        "scale = " + toml_number(place.scale) +
+        "   # degC a count\n"
+        "# open_circuit_codes = [32767]   # raw codes that are messages: see the module's manual\n";
+  }
+  for (const InitChannel& channel : module.channels) {
+    text += "[[sensor]]\n" + key_text("name", channel.sensor) + key_text("device", module.name) +
+            key_number(module.preset.empty() ? "address" : "channel", channel.number);
+  }
+  return text + "\n";
+}
+
+std::string blocks_text(const InitDraft& draft) {
+  std::string text =
+      "# ---------------------------------------------------------------- what the model gets\n"
+      "# Each block is one temperature of the model; several sensors in one block give their "
+      "mean.\n";
+  for (const InitModule& module : draft.modules) {
+    for (const InitChannel& channel : module.channels) {
+      const std::string input = input_name(channel.sensor);
+      const auto& wanted = draft.model_inputs;
+      const bool is_wanted =
+          wanted.empty() || std::find(wanted.begin(), wanted.end(), input) != wanted.end();
+      if (!is_wanted) {
+        text += "# sensor " + channel.sensor +
+                " is in no block: the model does not use it, it is "
+                "recorded all the same\n";
+        continue;
+      }
+      text += "[[block]]\n" + key_text("name", channel.sensor) + key_text("input", input) +
+              "sensors = [" + toml_string(channel.sensor) + "]\n";
+    }
+  }
+  return text + "\n";
+}
+
+std::string controller_text(const InitController& controller) {
+  std::string text =
+      "# ---------------------------------------------------------------- controller\n"
+      "[controller]\nname = \"cnc\"\n";
+  if (!controller.is_modbus()) {
+    text += key_text("kind", controller.kind);
+    if (controller.kind == "dry_run")
+      text += "# There is none yet: everything is computed and recorded, nothing is sent.\n";
+    return text + "\n";
+  }
+  text += link_text(controller.link) + key_number("unit", controller.unit) +
+          "# dry_run = true      # reads all of it and writes nothing\n";
+  if (const auto& valid = controller.valid_bits)
+    text += "valid_bits = " + place_text(*valid, valid->address) + "\n";
+  if (const auto& count = controller.heartbeat)
+    text += "heartbeat = " + place_text(*count, count->address) + "\n";
+  for (const InitSignal& signal : controller.signals) {
+    const InitPlace& place = signal.place;
+    text += "[[controller.signal]]\n" + key_text("name", signal.name) +
+            key_text("table", place.table) + key_number("address", place.address);
+    if (!place.encoding.empty()) text += key_text("encoding", place.encoding);
+    if (place.word_order != "ABCD") text += key_text("word_order", place.word_order);
+    if (place.scale != 1.0) text += "scale = " + toml_number(place.scale) + "\n";
+  }
+  if (controller.signals.empty())
+    text +=
+        "# [[controller.signal]]   # positions and speeds that the model needs or that are to be\n"
+        "# name = \"spindle_rpm\"    # recorded; the unit is the end of the name\n"
+        "# table = \"input\"\n# address = 26\n# encoding = \"uint16\"\n";
+  return text + "\n";
+}
+
+std::string axes_text(const InitDraft& draft) {
+  std::string text;
+  const InitController& controller = draft.controller;
+  for (std::size_t i = 0; i < draft.axes.size(); ++i) {
+    const std::string& axis = draft.axes[i];
+    const auto index = static_cast<int>(i);
+    text += "[[axis]]\n" + key_text("name", axis) + key_text("output", axis + "_um") +
+            "sign = 1                 # prove it with an indicator: thermocomp prove " + axis +
+            " 5; -1 where the tool moves the other way\n"
+            "offset_um_max = " +
+            toml_number(draft.offset_um_max) +
+            "      # small to begin with; raise it when the model is trusted\n"
+            "rate_um_per_s_max = " +
+            toml_number(draft.rate_um_per_s_max) + "\n";
+    if (!controller.is_modbus()) continue;
+    const InitPlace& offset = controller.offset;
+    text += "offset = " + place_text(offset, offset.address + index * words_of(offset)) + "\n";
+    if (const auto& applied = controller.applied)
+      text +=
+          "applied = " + place_text(*applied, applied->address + index * words_of(*applied)) + "\n";
+  }
+  return text + "\n";
+}
+
+std::string files_text(const InitDraft& draft) {
+  if (draft.own_folder.empty()) return "[history]\n# file = \"/var/lib/thermocomp/history.db\"\n";
+  return "[history]\nfile = " + toml_string(draft.own_folder + "/history.db") +
+         "\n[socket]\npath = " + toml_string(draft.own_folder + "/status.sock") + "\n";
+}
+
+}  // namespace
+
+std::string input_name(const std::string& sensor) {
+  return sensor_column(sensor);
+}
+
+std::string configuration_text(const InitDraft& draft) {
+  std::string text =
+      "# Configuration of thermocompd, written by `thermocomp init`. Everything in it may be "
+      "changed;\n"
+      "# `thermocomp check` says whether it still fits, docs/configuration.md and\n"
+      "# config/examples/small_machine.toml have every key.\n"
+      "format = 1\n";
+  if (!draft.own_folder.empty())
+    text += "state_file = " + toml_string(draft.own_folder + "/state.json") + "\n";
+  text += "\n[model]\nfile = " + toml_string(draft.model_file) +
+          "                # relative to this file\n\n" + buses_text(draft);
+  for (const InitModule& module : draft.modules) text += module_text(draft, module);
+  return text + blocks_text(draft) + controller_text(draft.controller) + axes_text(draft) +
+         files_text(draft);
+}
+
+std::string first_model_text(const InitDraft& draft) {
+  std::vector<std::string> inputs;
+  for (const InitModule& module : draft.modules)
+    for (const InitChannel& channel : module.channels) inputs.push_back(input_name(channel.sensor));
+  std::vector<std::string> outputs;
+  for (const std::string& axis : draft.axes) outputs.push_back(axis + "_um");
+  const std::vector<std::vector<double>> rows(outputs.size(),
+                                              std::vector<double>(inputs.size(), 0.0));
+  return "# The model of a machine of which nothing is known yet, written by `thermocomp init`: it "
+         "gives\n"
+         "# no displacement. Record, measure, and put in its place what `thermocomp fit` or\n"
+         "# `thermocomp structure` makes (docs/first_machine.md).\n"
+         "format = 1\ninputs = " +
+         toml_list(inputs, toml_string) + "\noutputs = " + toml_list(outputs, toml_string) +
+         "\nreference = \"first_sample\"\nmatrix_um_per_K = " + toml_rows(rows);
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,177 @@
+#include "cli/init/init_probe.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <set>
+#include <unistd.h>
+#include <utility>
+
+#include <system_error>
+
+#include "cli/common/json_fields.hpp"
+#include "cli/scan/scan_controller.hpp"
+#include "cli/scan/scan_modbus.hpp"
+#include "config/daemon/daemon_config.hpp"
+#include "config/sections/presets.hpp"
+#include "config/toml/toml_text.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+void progress(const std::string& line) {
+  std::fprintf(stderr, "%s\n", line.c_str());
+}
+
+/// The draft as files beside where it will be, so that presets are found; gone with this.
+class TrialFiles {
+ public:
+  TrialFiles(InitDraft draft, const fs::path& folder) {
+    const std::string name = ".thermocomp-init-" + std::to_string(::getpid());
+    config_ = folder / (name + ".toml");
+    model_ = folder / (name + "-model.toml");
+    if (draft.model_inputs.empty()) draft.model_file = model_.filename().string();
+    write(model_, first_model_text(draft));
+    write(config_, configuration_text(draft));
+  }
+  ~TrialFiles() {
+    std::error_code ignored;
+    fs::remove(config_, ignored);
+    fs::remove(model_, ignored);
+  }
+  TrialFiles(const TrialFiles&) = delete;
+  TrialFiles& operator=(const TrialFiles&) = delete;
+  [[nodiscard]] const fs::path& config() const noexcept { return config_; }
+
+ private:
+  static void write(const fs::path& path, const std::string& text) {
+    std::ofstream file(path);
+    file << text;
+    if (!file.flush()) throw Failure(path.string() + ": cannot be written");
+  }
+  fs::path config_;
+  fs::path model_;
+};
+
+ScanSensors sensors_of(const DaemonConfig& config) {
+  ScanSensors sensors;
+  for (const SensorConfig& sensor : config.estimator.sensors) {
+    sensors.names.push_back(sensor.name);
+    sensors.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
+  }
+  return sensors;
+}
+
+/// The channels that a preset has. @throws Failure: no such preset, or one that is not for Modbus
+std::vector<int> channels_of_preset(const std::string& name, const fs::path& folder) {
+  sections::Presets presets(sections::preset_folders(folder));
+  const TomlDocument asked =
+      TomlDocument::from_text("preset = " + toml_string(name) + "\n", "the answer");
+  const sections::Preset* preset = presets.of_device(asked.root());
+  if (preset == nullptr) {
+    const std::vector<Problem> problems = asked.all_problems();
+    throw Failure(name + " " + (problems.empty() ? "cannot be read" : problems.front().rule));
+  }
+  if (preset->protocol != "modbus")
+    throw Failure(name + ": is a preset for " + preset->protocol +
+                  "; init describes Modbus modules, for others begin with an example");
+  std::vector<int> numbers;
+  for (const auto& [number, table] : preset->channels) numbers.push_back(number);
+  return numbers;
+}
+
+ModbusLine line_of(const InitBus& bus) {
+  ModbusLine line;
+  line.link = bus.link;
+  return line;
+}
+
+/// "channel 3: 21.50 degC", "channel 4: open_circuit, the device's code for it".
+std::string line_of(int number, const ScanChannel& channel, bool has_preset) {
+  std::string text = (has_preset ? "channel " : "address ") + std::to_string(number) + ": ";
+  if (channel.good()) return text + fixed(channel.temp_degC, 2) + " degC";
+  text += std::string(to_string(channel.fault)) + (channel.why.empty() ? "" : ", " + channel.why);
+  for (const std::string& hint : channel.hints) text += "; " + hint;
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> preset_names(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const fs::path& each : sections::preset_folders(folder)) {
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(each, error))
+      if (entry.path().extension() == ".toml") names.insert(entry.path().stem().string());
+  }
+  return {names.begin(), names.end()};
+}
+
+ScanReport probe(const InitDraft& draft, const fs::path& folder) {
+  const TrialFiles files(draft, folder);
+  const DaemonConfig config = load_daemon_config(files.config());
+  const ScanSensors sensors = sensors_of(config);
+  ScanReport report{"", {}, {}};
+  for (const ModbusBusConfig& bus : config.modbus_buses)
+    report.buses.push_back(scan_modbus(bus, sensors, {}, progress));
+  constexpr double listen_s = 1.0;
+  report.controller = scan_controller(config, listen_s, progress);
+  return report;
+}
+
+std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
+                                    const fs::path& folder) {
+  const bool has_preset = !module.preset.empty();
+  if (has_preset && module.channels.empty())
+    for (const int number : channels_of_preset(module.preset, folder))
+      module.channels.push_back({"", number});
+  InitDraft alone;
+  alone.buses = {draft.buses.at(module.bus)};
+  alone.axes = {"z"};
+  alone.modules = {module};
+  alone.modules[0].bus = 0;
+  for (InitChannel& channel : alone.modules[0].channels)
+    channel.sensor = "channel" + std::to_string(channel.number);
+  std::vector<std::string> lines;
+  try {
+    const ScanReport report = probe(alone, folder);
+    const ScanBus& bus = report.buses.at(0);
+    if (!bus.error.empty()) throw Failure(bus.error);
+    const ScanDevice& device = bus.devices.at(0);
+    std::vector<InitChannel> good;
+    for (std::size_t i = 0; i < device.channels.size(); ++i) {
+      lines.push_back(line_of(module.channels[i].number, device.channels[i], has_preset));
+      if (device.channels[i].good()) good.push_back(module.channels[i]);
+    }
+    module.channels = good;
+  } catch (const ConfigurationError& error) {
+    throw Failure(error.problems().empty() ? std::string(error.what())
+                                           : error.problems().front().rule);
+  }
+  return lines;
+}
+
+InitEyes eyes_of(const fs::path& folder) {
+  InitEyes eyes;
+  eyes.find_units = [](const InitBus& bus) {
+    ModbusBusConfig config;
+    config.name = bus.name;
+    config.line = line_of(bus);
+    constexpr int last = 32;
+    const ScanBus found = scan_modbus(config, {}, {true, 1, last}, progress);
+    if (!found.error.empty()) progress("bus " + bus.name + ": " + found.error);
+    if (!found.found.empty()) progress("bus " + bus.name + ": " + found.found);
+    // A device that answers to every number is one device.
+    if (found.found_numbers.size() == last) return std::vector<int>{1};
+    return found.found_numbers;
+  };
+  eyes.preset_names = [folder] { return preset_names(folder); };
+  eyes.try_module = [folder](const InitDraft& draft, InitModule& module) {
+    return try_module(draft, module, folder);
+  };
+  return eyes;
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,29 @@
+/// What `thermocomp init` finds out on the buses, with the reads of `thermocomp scan`.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cli/init/init_ask.hpp"
+#include "cli/init/init_draft.hpp"
+#include "cli/scan/scan_report.hpp"
+
+namespace thermocomp::cli {
+
+/// Names of all presets that a configuration in this folder may use.
+[[nodiscard]] std::vector<std::string> preset_names(const std::filesystem::path& folder);
+
+/// Reads everything that the draft describes: every channel, and the controller's side.
+/// @throws ConfigurationError, Failure
+[[nodiscard]] ScanReport probe(const InitDraft& draft, const std::filesystem::path& folder);
+
+/// Fills in the channels of the module's preset where it has none, and takes those away that give
+/// no temperature.
+/// @return what was read, a line a channel. @throws Failure
+std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
+                                    const std::filesystem::path& folder);
+
+[[nodiscard]] InitEyes eyes_of(const std::filesystem::path& folder);
+
+}  // namespace thermocomp::cli

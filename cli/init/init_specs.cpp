@@ -1,0 +1,221 @@
+#include "cli/init/init_specs.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+#include <system_error>
+
+#include "cli/common/command.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char each : text) {
+    if (each == separator)
+      parts.emplace_back();
+    else
+      parts.back() += each;
+  }
+  return parts;
+}
+
+template <class Number>
+std::optional<Number> number_of_text(const std::string& text) {
+  Number value{};
+  const char* end = text.data() + text.size();
+  const auto [rest, code] = std::from_chars(text.data(), end, value);
+  if (code != std::errc() || rest != end || text.empty()) return std::nullopt;
+  return value;
+}
+
+int whole_number(const std::string& text, int low, int high, const std::string& what) {
+  const auto value = number_of_text<int>(text);
+  if (!value || *value < low || *value > high)
+    throw Failure(what + ": " + text + " must be a whole number in [" + std::to_string(low) + ", " +
+                  std::to_string(high) + "]");
+  return *value;
+}
+
+char parity_of(const std::string& word) {
+  if (word == "none" || word == "N" || word == "n") return 'N';
+  if (word == "even" || word == "E" || word == "e") return 'E';
+  if (word == "odd" || word == "O" || word == "o") return 'O';
+  throw Failure("parity " + word + ": must be none, even or odd");
+}
+
+bool is_bit_table_name(const std::string& table) {
+  return table == "coil" || table == "discrete_input";
+}
+
+/// "int32/CDAB"
+void parse_type(const std::string& text, InitPlace& place) {
+  constexpr std::array<std::string_view, 6> encodings{"int16",  "uint16",  "int32",
+                                                      "uint32", "float32", "float64"};
+  constexpr std::array<std::string_view, 4> orders{"ABCD", "DCBA", "BADC", "CDAB"};
+  const auto parts = split(text, '/');
+  place.encoding = parts[0];
+  if (std::find(encodings.begin(), encodings.end(), place.encoding) == encodings.end())
+    throw Failure(text + ": the type must be int16, uint16, int32, uint32, float32 or float64");
+  if (parts.size() == 1) return;
+  place.word_order = parts[1];
+  if (parts.size() > 2 || std::find(orders.begin(), orders.end(), place.word_order) == orders.end())
+    throw Failure(text + ": the word order must be ABCD, DCBA, BADC or CDAB");
+}
+
+double parse_scale(const std::string& text) {
+  const auto scale = number_of_text<double>(text);
+  if (!scale || !std::isfinite(*scale) || *scale == 0.0)
+    throw Failure(text + ": the value of one count must be a number other than 0");
+  return *scale;
+}
+
+/// A module without a preset: "input:int16:0.1:0-7".
+void parse_registers(const std::vector<std::string>& parts, const std::string& text,
+                     InitModule& module) {
+  if (parts.size() != 4)
+    throw Failure(text +
+                  ": must be TABLE:TYPE:DEGC_A_COUNT:ADDRESSES, such as input:int16:0.1:0-7");
+  module.registers.table = parts[0];
+  parse_type(parts[1], module.registers);
+  module.registers.scale = parse_scale(parts[2]);
+  for (const int address : parse_numbers(parts[3])) module.channels.push_back({"", address});
+}
+
+}  // namespace
+
+std::variant<ModbusTcp, ModbusRtu> parse_link(const std::string& text) {
+  std::vector<std::string> parts = split(text, ':');
+  if (parts[0] != "tcp" && parts[0] != "rtu")
+    parts.insert(parts.begin(), text.starts_with('/') ? "rtu" : "tcp");
+  if (parts.size() < 2 || parts[1].empty())
+    throw Failure("\"" + text + "\": must be tcp:HOST[:PORT] or rtu:DEVICE[:BAUD[:PARITY]]");
+  if (parts[0] == "tcp") {
+    ModbusTcp tcp{parts[1], 502};
+    if (parts.size() > 2) tcp.port = whole_number(parts[2], 1, 65535, "port of " + text);
+    if (parts.size() > 3) throw Failure(text + ": must be tcp:HOST[:PORT]");
+    return tcp;
+  }
+  ModbusRtu rtu;
+  rtu.device = parts[1];
+  rtu.baud = 19200;
+  rtu.parity = 'E';
+  if (parts.size() > 2) rtu.baud = whole_number(parts[2], 300, 4000000, "baud of " + text);
+  if (parts.size() > 3) rtu.parity = parity_of(parts[3]);
+  if (parts.size() > 4) throw Failure(text + ": must be rtu:DEVICE[:BAUD[:PARITY]]");
+  return rtu;
+}
+
+InitPlace parse_place(const std::string& text) {
+  const std::vector<std::string> parts = split(text, ':');
+  InitPlace place;
+  place.table = parts[0];
+  const bool is_bit = is_bit_table_name(place.table);
+  const bool is_register = place.table == "holding" || place.table == "input";
+  if (!is_bit && !is_register)
+    throw Failure(text + ": must begin with holding, input, coil or discrete_input");
+  if (parts.size() < 2 || parts.size() > 4 || (is_bit && parts.size() > 2))
+    throw Failure(text + ": must be TABLE:ADDRESS[:TYPE[:VALUE_OF_A_COUNT]], a bit TABLE:ADDRESS");
+  place.address = whole_number(parts[1], 0, 65535, "address of " + text);
+  if (is_bit) return place;
+  place.encoding = "uint16";
+  if (parts.size() > 2) parse_type(parts[2], place);
+  if (parts.size() > 3) place.scale = parse_scale(parts[3]);
+  return place;
+}
+
+std::vector<int> parse_numbers(const std::string& text) {
+  std::vector<int> numbers;
+  for (const std::string& part : parse_words(text)) {
+    const std::vector<std::string> ends = split(part, '-');
+    const int first = whole_number(ends[0], 0, 65535, text);
+    const int last = ends.size() == 1 ? first : whole_number(ends[1], 0, 65535, text);
+    constexpr int most = 256;
+    if (ends.size() > 2 || last < first || last - first >= most)
+      throw Failure(text + ": must be numbers and ranges such as 1-4,7");
+    for (int i = first; i <= last; ++i) numbers.push_back(i);
+  }
+  if (numbers.empty()) throw Failure("\"" + text + "\": must be numbers such as 1-4,7");
+  return numbers;
+}
+
+std::vector<std::string> parse_words(const std::string& text) {
+  std::vector<std::string> words;
+  std::string word;
+  for (const char each : text + ",") {
+    if (each != ',' && each != ' ' && each != '\t') {
+      word += each;
+    } else if (!word.empty()) {
+      words.push_back(word);
+      word.clear();
+    }
+  }
+  return words;
+}
+
+InitModule parse_module(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos)
+    throw Failure(text +
+                  ": must be UNIT=PRESET[:CHANNELS], for another bus than the first "
+                  "BUS/UNIT=..., without a preset UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES");
+  InitModule module;
+  const std::vector<std::string> where = split(text.substr(0, equals), '/');
+  if (where.size() > 2) throw Failure(text + ": must begin with UNIT= or BUS/UNIT=");
+  if (where.size() == 2)
+    module.bus = static_cast<std::size_t>(whole_number(where[0], 1, 99, "bus of " + text)) - 1;
+  module.unit = whole_number(where.back(), 0, 255, "unit of " + text);
+  parse_form(text.substr(equals + 1), module);
+  return module;
+}
+
+void parse_form(const std::string& text, InitModule& module) {
+  const std::vector<std::string> parts = split(text, ':');
+  if (parts[0] == "input" || parts[0] == "holding") return parse_registers(parts, text, module);
+  std::string preset = parts[0];
+  if (const std::size_t at = preset.find('@'); at != std::string::npos) {
+    module.base_address = whole_number(preset.substr(at + 1), 0, 65535, "base address of " + text);
+    preset.resize(at);
+  }
+  if (const std::size_t slash = preset.find('/'); slash != std::string::npos) {
+    module.thermocouple = preset.substr(slash + 1);
+    preset.resize(slash);
+  }
+  if (preset.empty() || parts.size() > 2)
+    throw Failure("\"" + text + "\": must be a preset, such as wago_750_458 or wago_750_458:1-4");
+  module.preset = preset;
+  if (parts.size() == 2)
+    for (const int channel : parse_numbers(parts[1])) module.channels.push_back({"", channel});
+}
+
+InitController parse_controller(const std::string& text) {
+  InitController controller;
+  if (text == "none" || text == "dry_run") return controller;
+  if (text == "linuxcnc") {
+    controller.kind = "linuxcnc";
+    return controller;
+  }
+  std::string link = text;
+  if (const std::size_t at = link.rfind('@'); at != std::string::npos) {
+    controller.unit = whole_number(link.substr(at + 1), 0, 255, "unit of " + text);
+    link.resize(at);
+  }
+  controller.link = parse_link(link);
+  controller.kind =
+      std::holds_alternative<ModbusTcp>(controller.link) ? "modbus_tcp" : "modbus_rtu";
+  return controller;
+}
+
+InitSignal parse_signal(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw Failure(text + ": must be NAME=TABLE:ADDRESS[:TYPE[:VALUE_OF_A_COUNT]]");
+  return {text.substr(0, equals), parse_place(text.substr(equals + 1))};
+}
+
+}  // namespace thermocomp::cli

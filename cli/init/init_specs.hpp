@@ -1,0 +1,37 @@
+/// The short forms in which `thermocomp init` takes what it needs, as options or as answers.
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "cli/init/init_draft.hpp"
+
+namespace thermocomp::cli {
+
+/// "tcp:192.168.10.20", "tcp:HOST:PORT", "rtu:/dev/ttyUSB0", "rtu:DEVICE:BAUD:PARITY"; a host alone
+/// or a path alone will do too. @throws Failure naming what is wrong
+[[nodiscard]] std::variant<ModbusTcp, ModbusRtu> parse_link(const std::string& text);
+
+/// "holding:0:int32:0.01"; see InitPlace. @throws Failure
+[[nodiscard]] InitPlace parse_place(const std::string& text);
+
+/// "1-4,7" -> 1 2 3 4 7. @throws Failure
+[[nodiscard]] std::vector<int> parse_numbers(const std::string& text);
+/// "x,y, z" -> x y z; blanks separate too.
+[[nodiscard]] std::vector<std::string> parse_words(const std::string& text);
+
+/// "3=wago_750_458", "3=wago_750_458:1-4", "2/7=icpdas_m7018" (second bus),
+/// "3=input:int16:0.1:0-7" (no preset: table, encoding, degC a count, addresses); behind a preset's
+/// name "/K" gives the thermocouple, "@100" the base address.
+/// Without channels all of the preset are tried. @throws Failure
+[[nodiscard]] InitModule parse_module(const std::string& text);
+/// What stands behind the unit: "wago_750_458:1-4". @throws Failure
+void parse_form(const std::string& text, InitModule& module);
+
+/// "none", "linuxcnc", or a link with "@UNIT" behind it (1 unless given). @throws Failure
+[[nodiscard]] InitController parse_controller(const std::string& text);
+/// "spindle_rpm=input:26:uint16". @throws Failure
+[[nodiscard]] InitSignal parse_signal(const std::string& text);
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,10 @@
+/// predict, simulate: what a model says about a run, and runs of a machine that does not exist.
+#pragma once
+
+#include "cli/common/command.hpp"
+
+namespace thermocomp::cli {
+
+void add_model_commands(CLI::App& app, Action& action);
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,12 @@
+/// The modelling subcommands, which a program of another package carries out.
+#pragma once
+
+#include "cli/common/command.hpp"
+
+namespace thermocomp::cli {
+
+/// structure, place, tiebar, plan, group, fit, diagnose: all arguments go to `thermocomp-modelling`
+/// beside this program, in its libexec folder or in PATH.
+void add_modelling_commands(CLI::App& app, Action& action);
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,224 @@
+#include "cli/observe/observe_commands.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/common/daemon_client.hpp"
+#include "cli/common/terminal.hpp"
+#include "cli/observe/events_text.hpp"
+#include "cli/observe/status_text.hpp"
+#include "cli/observe/truth_file.hpp"
+#include "cli/observe/watch_text.hpp"
+#include "daemon/history/format/recorded_event.hpp"
+#include "daemon/socket/status_client.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+using nlohmann::json;
+using std::chrono::steady_clock;
+
+struct StatusOptions {
+  bool as_json{false};
+  bool strict{false};
+};
+
+int run_status(const GlobalOptions& global, const StatusOptions& options) {
+  json status = ask_daemon(global.socket, "status", json::object());
+  const std::vector<std::string> why = why_not(status, options.strict);
+  const int exit_status = why.empty() ? exit_success : exit_no;
+  if (options.as_json) {
+    status["exit_status"] = exit_status;
+    status["why"] = why;
+    std::cout << status.dump(2) << '\n';
+  } else {
+    std::cout << status_text(status, stdout_is_terminal());
+  }
+  return exit_status;
+}
+
+struct EventsOptions {
+  std::string history;  ///< empty: ask the daemon
+  std::string from;
+  std::string to;
+  bool as_json{false};
+};
+
+/// In the shape of the daemon's answer, with the run beside each.
+json recorded_events_json(const RecordedEvents& recorded) {
+  json list = json::array();
+  for (const RecordedEvent& event : recorded.events)
+    list.push_back({{"run", event.run},
+                    {"number", event.number},
+                    {"wall_s", 1e-9 * static_cast<double>(event.wall_ns)},
+                    {"kind", event.kind},
+                    {"subject", event.subject},
+                    {"what", event.what},
+                    {"duration_s", event.duration_ns < 0
+                                       ? json(nullptr)
+                                       : json(1e-9 * static_cast<double>(event.duration_ns))},
+                    {"user", event.user < 0 ? json(nullptr) : json(event.user)}});
+  return {{"events", list}};
+}
+
+std::optional<HistoryTime> time_or_none(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  return parse_history_time(text);
+}
+
+json events_of(const GlobalOptions& global, const EventsOptions& options) {
+  if (options.history.empty()) {
+    if (!options.from.empty() || !options.to.empty())
+      throw Failure("--from and --to need a history: thermocomp events HISTORY.db");
+    return ask_daemon(global.socket, "events", json::object());
+  }
+  const RecordedEvents recorded =
+      read_events(options.history, time_or_none(options.from), time_or_none(options.to));
+  if (!recorded.are_kept)
+    throw Failure(options.history + ": was written by a version that kept no events");
+  return recorded_events_json(recorded);
+}
+
+int run_events(const GlobalOptions& global, const EventsOptions& options) {
+  const json events = events_of(global, options);
+  std::cout << (options.as_json ? events.dump(2, ' ', false, json::error_handler_t::replace) + "\n"
+                                : events_text(events));
+  return exit_success;
+}
+
+int run_sensors(const GlobalOptions& global, bool as_json) {
+  const json sensors = ask_daemon(global.socket, "sensors", json::object());
+  if (as_json) {
+    std::cout << sensors.dump(2) << '\n';
+  } else {
+    std::cout << sensors_text(sensors, stdout_is_terminal());
+  }
+  return exit_success;
+}
+
+struct WatchOptions {
+  double period_s{1.0};
+  double for_s{0.0};  ///< 0: until interrupted
+  std::string truth;  ///< file of a simulated machine's true displacement; empty: none
+};
+
+// Ctrl-C is how a watch ends; the table stays on the screen.
+void end_watch(int) {
+  constexpr char newline = '\n';
+  [[maybe_unused]] const auto written = ::write(STDOUT_FILENO, &newline, 1);
+  ::_exit(exit_success);
+}
+
+void show(const json& status, const TruthRow* truth, bool terminal, bool first) {
+  if (terminal) {
+    std::cout << "\033[H\033[J" << watch_screen(status, truth, true);
+  } else {
+    if (first) std::cout << watch_header(status, truth);
+    std::cout << watch_line(status, truth);
+  }
+  std::cout.flush();
+}
+
+void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
+  const bool terminal = stdout_is_terminal();
+  if (terminal) std::signal(SIGINT, end_watch);
+  const auto end = steady_clock::now() + std::chrono::duration<double>(options.for_s);
+  const auto remaining = [end] {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - steady_clock::now());
+    return std::max(left, std::chrono::milliseconds(0));
+  };
+  const auto over = [&] { return options.for_s > 0.0 && steady_clock::now() >= end; };
+  StatusClient client(global.socket);
+  client.call("subscribe", {{"methods", {"status"}}, {"period_s", options.period_s}});
+  std::optional<TruthFile> truth;
+  if (!options.truth.empty()) truth.emplace(options.truth);
+  const auto patience =
+      std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * options.period_s) + 5000);
+  for (bool first = true; !over();) {
+    json notification;
+    try {
+      notification = client.next(options.for_s > 0.0 ? std::min(patience, remaining()) : patience);
+    } catch (const ClientError&) {
+      if (over()) return;
+      throw;
+    }
+    if (notification.value("method", "") != "status") continue;
+    const TruthRow* row = truth ? truth->newest() : nullptr;
+    show(notification.value("params", json::object()), row, terminal, first);
+    first = false;
+  }
+}
+
+int run_watch(const GlobalOptions& global, const WatchOptions& options) {
+  try {
+    watch_until_end(global, options);
+  } catch (const RemoteError& error) {
+    throw Failure(error.what());
+  } catch (const ClientError& error) {
+    throw Failure(error.what());
+  }
+  return exit_success;
+}
+
+}  // namespace
+
+void add_observe_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
+  const auto as_json = std::make_shared<bool>(false);
+  const auto wanted = std::make_shared<StatusOptions>();
+  CLI::App* status = app.add_subcommand(
+      "status", "whether the daemon compensates, by how much, since when, what is wrong");
+  status->add_flag("--json", wanted->as_json,
+                   "the daemon's answer as JSON, with exit_status and why it is that");
+  status->add_flag("--strict", wanted->strict,
+                   "exit status 1 also while it compensates, but something is wrong: a bound "
+                   "reached, a read-back that disagrees, a bad sensor, a silent unit");
+  status->callback([&, wanted] { action = [&, wanted] { return run_status(global, *wanted); }; });
+
+  CLI::App* events = app.add_subcommand(
+      "events",
+      "what happened since the daemon started, or in all of a history: faults and how long they "
+      "lasted, changes of mode, commands and who gave them");
+  const auto asked = std::make_shared<EventsOptions>();
+  events
+      ->add_option("HISTORY", asked->history,
+                   "history of thermocompd, earlier runs of the daemon too; left out: the running "
+                   "daemon's list")
+      ->type_name("FILE");
+  events->add_option(
+      "--from", asked->from,
+      "of a history: start, a time such as 2026-03-01T08:30:00, \"8 hours ago\", -8h");
+  events->add_option("--to", asked->to, "end, not included; as --from");
+  events->add_flag("--json", asked->as_json, "the list as JSON");
+  events->callback([&, asked] { action = [&, asked] { return run_events(global, *asked); }; });
+
+  CLI::App* sensors = app.add_subcommand("sensors", "every sensor: raw, smoothed, fault");
+  sensors->add_flag("--json", *as_json, "the daemon's answer as JSON");
+  sensors->callback(
+      [&, as_json] { action = [&, as_json] { return run_sensors(global, *as_json); }; });
+
+  const auto options = std::make_shared<WatchOptions>();
+  CLI::App* watch = app.add_subcommand("watch", "a live table of the running daemon");
+  watch->add_option("--period", options->period_s, "seconds between two updates (default 1)")
+      ->check(CLI::Range(0.1, 60.0));
+  watch->add_option("--for", options->for_s, "end after so many seconds")
+      ->check(CLI::PositiveNumber);
+  watch
+      ->add_option("--truth", options->truth,
+                   "file that a simulated machine writes its true displacement to")
+      ->type_name("FILE");
+  watch->callback([&, options] { action = [&, options] { return run_watch(global, *options); }; });
+}
+
+}  // namespace thermocomp::cli

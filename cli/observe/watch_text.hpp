@@ -1,0 +1,19 @@
+/// The live table of `thermocomp watch`, as a screen for a terminal or as lines for a log. Pure.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "cli/observe/truth_file.hpp"
+
+namespace thermocomp::cli {
+
+/// A whole screen. @param truth  what the tool really does, where it is simulated; else nullptr
+[[nodiscard]] std::string watch_screen(const nlohmann::json& status, const TruthRow* truth,
+                                       bool colours);
+/// Two lines: what the columns of watch_line() are.
+[[nodiscard]] std::string watch_header(const nlohmann::json& status, const TruthRow* truth);
+[[nodiscard]] std::string watch_line(const nlohmann::json& status, const TruthRow* truth);
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,145 @@
+#include "cli/operate/operate_commands.hpp"
+
+#include <array>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/common/daemon_client.hpp"
+#include "cli/common/json_fields.hpp"
+#include "cli/operate/prove_command.hpp"
+
+namespace thermocomp::cli {
+
+namespace {
+
+using nlohmann::json;
+
+struct PlainCommand {
+  const char* name;
+  const char* method;
+  const char* help;
+  const char* done;
+};
+constexpr std::array<PlainCommand, 4> plain_commands{{
+    {"enable", "enable", "switches the compensation on; offsets approach at their slew rate",
+     "compensation switched on"},
+    {"disable", "disable", "switches the compensation off; offsets go to zero at their slew rate",
+     "compensation switched off; offsets go to zero at their slew rate"},
+    {"cycle-end", "cycle_end", "tells that a machining cycle has ended", "end of cycle noted"},
+    {"reload", "reload", "reads configuration and model anew, without a jump of the axes",
+     "configuration and model reloaded"},
+}};
+
+struct AxisValue {
+  std::string axis;
+  double value_um{0.0};
+};
+
+int run_plain(const GlobalOptions& global, const PlainCommand& command) {
+  const json answer = ask_daemon(global.socket, command.method, json::object());
+  const std::string checksum = text_of(answer, "checksum");
+  std::cout << command.done;
+  if (!checksum.empty()) std::cout << ", model SHA-256 " << checksum.substr(0, 16);
+  std::cout << '\n';
+  return exit_success;
+}
+
+int run_measured(const GlobalOptions& global, const AxisValue& given) {
+  const json answer =
+      ask_daemon(global.socket, "measured", {{"axis", given.axis}, {"value_um", given.value_um}});
+  const bool remains = text_of(answer, "meaning") == "remaining";
+  const double predicted_um =
+      number_of(answer, remains ? "predicted_remaining_um" : "predicted_um");
+  std::cout << "axis " << given.axis << ": measured " << fixed_signed(given.value_um, 2)
+            << (remains ? " um left at the tool; by the model "
+                        : " um without offset; by the model ")
+            << fixed_signed(predicted_um, 2) << (remains ? " um are left" : " um") << '\n';
+  if (remains)
+    std::cout << "(displacement by the model " << fixed_signed(number_of(answer, "predicted_um"), 2)
+              << " um, the rest is taken out by the offset in effect)\n";
+  return exit_success;
+}
+
+/// What less than this has seen is too little to tell slow warming [s].
+constexpr double watched_enough_s = 1800.0;
+
+int run_reference(const GlobalOptions& global, bool force) {
+  json params = json::object();
+  if (force) params["force"] = true;
+  const json answer = ask_daemon(global.socket, "reference", params);
+  std::cout << "reference: the present temperatures\n";
+  if (const std::string although = text_of(answer, "although"); !although.empty())
+    std::cout << "taken although " << although << '\n';
+  // An earlier daemon does not say.
+  if (const double watched_s = number_of(answer, "watched_s"); watched_s < watched_enough_s)
+    std::cout << "the temperatures have been watched for " << duration_text(watched_s)
+              << " only: whether the machine still warms slowly is not known\n";
+  return exit_success;
+}
+
+void add_reference_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* sub = app.add_subcommand(
+      "reference", "takes the present temperatures as the state without displacement");
+  const auto force = std::make_shared<bool>(false);
+  sub->add_flag("--force", *force,
+                "also during a proving move, with an offset applied, or while the machine warms");
+  sub->callback([&global, &action, force] {
+    action = [&global, force] { return run_reference(global, *force); };
+  });
+}
+
+int run_release(const GlobalOptions& global, const std::string& axis) {
+  ask_daemon(global.socket, "release", {{"axis", axis}});
+  std::cout << "axis " << axis
+            << ": released; it is driven again unless its next read-backs show the same fault\n"
+               "(thermocomp status)\n";
+  return exit_success;
+}
+
+using RunAxis = int (*)(const GlobalOptions&, const AxisValue&);
+
+void add_axis_command(CLI::App& app, const GlobalOptions& global, Action& action, const char* name,
+                      const char* help, const char* value_help, RunAxis run) {
+  CLI::App* sub = app.add_subcommand(name, help);
+  const auto given = std::make_shared<AxisValue>();
+  sub->add_option("AXIS", given->axis, "name of the axis in the configuration")->required();
+  sub->add_option("UM", given->value_um, value_help)->required();
+  sub->callback([&global, &action, given, run] {
+    action = [&global, given, run] { return run(global, *given); };
+  });
+}
+
+}  // namespace
+
+void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
+  add_reference_command(app, global, action);
+  for (const PlainCommand& command : plain_commands) {
+    CLI::App* sub = app.add_subcommand(command.name, command.help);
+    sub->callback([&global, &action, &command] {
+      action = [&global, &command] { return run_plain(global, command); };
+    });
+  }
+  add_axis_command(app, global, action, "measured",
+                   "gives the daemon a displacement that was measured at the tool",
+                   "measured displacement in um, positive as the axis counts", run_measured);
+  add_axis_command(
+      app, global, action, "prove",
+      "moves one axis a few um and back, to confirm the sign with an indicator; waits, and "
+      "says what was read back",
+      "by how much, in um", [](const GlobalOptions& options, const AxisValue& given) {
+        return run_prove(options, given.axis, given.value_um);
+      });
+  CLI::App* sub = app.add_subcommand(
+      "release", "drives an axis again after what made it apply something else was mended");
+  const auto axis = std::make_shared<std::string>();
+  sub->add_option("AXIS", *axis, "name of the axis in the configuration")->required();
+  sub->callback([&global, &action, axis] {
+    action = [&global, axis] { return run_release(global, *axis); };
+  });
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,240 @@
+#include "cli/scan/scan_can.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <poll.h>
+
+#include "config/text/units.hpp"
+#include "drivers/can/can_socket.hpp"
+#include "drivers/can/signal_codec.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "estimator/checks.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+std::string number_text(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+/// What came while the bus was listened to.
+struct Heard {
+  std::map<CanId, std::size_t> frames;             ///< how many of each identifier
+  std::vector<std::optional<CanFrame>> of_signal;  ///< newest that carries the signal
+};
+
+std::vector<const CanSignal*> signals_of(const CanBusConfig& config) {
+  std::vector<const CanSignal*> signals;
+  for (const CanDeviceConfig& device : config.devices) {
+    for (const CanChannel& channel : device.channels) signals.push_back(&channel.signal);
+  }
+  return signals;
+}
+
+Heard listen(CanSocket& socket, const std::vector<const CanSignal*>& signals, double listen_s) {
+  Heard heard;
+  heard.of_signal.resize(signals.size());
+  const nanoseconds end = monotonic_now() + from_seconds(listen_s);
+  while (socket.is_open() && monotonic_now() < end) {
+    pollfd wait{socket.descriptor(), POLLIN, 0};
+    constexpr int slice_ms = 50;
+    static_cast<void>(::poll(&wait, 1, slice_ms));
+    for (const CanFrame& frame : socket.receive()) {
+      ++heard.frames[frame.id];
+      for (std::size_t i = 0; i < signals.size(); ++i) {
+        const CanSignal& signal = *signals[i];
+        if (frame.id.id != signal.id || frame.id.extended != signal.extended_id) continue;
+        if (carries(frame.payload(), signal)) heard.of_signal[i] = frame;
+      }
+    }
+  }
+  return heard;
+}
+
+std::string heard_text(const Heard& heard) {
+  constexpr std::size_t shown_max = 16;
+  std::string text;
+  for (const auto& [id, count] : heard.frames) {
+    if (text.empty()) text = "identifiers on the bus:";
+    text.append(" ").append(id_name(id)).append(" (").append(std::to_string(count)).append(")");
+    if (text.size() > 12 * shown_max) return text + " ...";
+  }
+  return text;
+}
+
+void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange& range,
+           ScanChannel& result) {
+  const auto payload = frame.payload();
+  result.raw = hex_bytes({payload.begin(), payload.end()});
+  result.age_s = static_cast<double>((monotonic_now() - frame.received_at).count()) * 1e-9;
+  const CanValue decoded = decode(payload, signal);
+  result.fault = decoded.fault;
+  result.temp_degC = decoded.value;
+  if (decoded.fault == Fault::bad_frame) {
+    result.why = "the frame has " + std::to_string(payload.size()) + " bytes, too few";
+    return;
+  }
+  if (decoded.fault != Fault::none) {
+    CanSignal alone = signal;
+    alone.status.reset();
+    result.why = decode(payload, alone).fault == Fault::none ? "the status beside it says so"
+                                                             : "the device's code for it";
+    return;
+  }
+  if (decoded.value >= range.min_degC && decoded.value <= range.max_degC) return;
+  result.fault = Fault::out_of_range;
+  result.why = number_text(decoded.value) + " degC is no temperature of [" +
+               number_text(range.min_degC) + ", " + number_text(range.max_degC) + "] ([screening])";
+  CanSignal other = signal;
+  other.byte_order = signal.byte_order == ByteOrder::little_endian ? ByteOrder::big_endian
+                                                                   : ByteOrder::little_endian;
+  // The same bytes in the other order begin at the other end of them.
+  other.start_bit = other.byte_order == ByteOrder::big_endian
+                        ? signal.start_bit + 7
+                        : signal.start_bit / 8 * 8 + (signal.start_bit % 8) - 7;
+  try {
+    check(other);
+  } catch (const InvalidValue&) {
+    return;
+  }
+  const CanValue swapped = decode(payload, other);
+  if (swapped.fault == Fault::none && swapped.value >= range.min_degC &&
+      swapped.value <= range.max_degC) {
+    result.hints.push_back(
+        std::string("byte_order = \"") +
+        (other.byte_order == ByteOrder::big_endian ? "big_endian" : "little_endian") +
+        "\" with start_bit = " + std::to_string(other.start_bit) + " would make it " +
+        number_text(swapped.value) + " degC");
+  }
+}
+
+void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& heard,
+          ScanBus& bus) {
+  std::size_t index = 0;
+  for (const CanDeviceConfig& device : config.devices) {
+    ScanDevice& shown = bus.devices.emplace_back();
+    shown.name = device.name;
+    for (const CanChannel& channel : device.channels) {
+      ScanChannel& result = shown.channels.emplace_back();
+      result.sensor = sensors.names.at(channel.sensor);
+      result.place = place_name(channel.signal);
+      result.fault = Fault::no_answer;
+      const auto& frame = heard.of_signal[index++];
+      if (frame) {
+        shown.answers = true;
+        judge(channel.signal, *frame, sensors.ranges.at(channel.sensor), result);
+      } else if (bus.error.empty()) {
+        result.why = "no frame with identifier " +
+                     id_name({channel.signal.id, channel.signal.extended_id}) + " carried it";
+      }
+    }
+  }
+}
+
+void take(const CanSignal& signal, const Heard& heard, std::size_t index, ScanValue& shown) {
+  const CanId id{signal.id, signal.extended_id};
+  const auto& frame = heard.of_signal[index];
+  if (!frame) {
+    shown.why = heard.frames.contains(id) ? "frames " + id_name(id) + " came, but none carries it"
+                                          : "no frame with identifier " + id_name(id) + " came";
+    return;
+  }
+  const auto payload = frame->payload();
+  shown.raw = hex_bytes({payload.begin(), payload.end()});
+  const CanValue decoded = decode(payload, signal);
+  shown.value = decoded.value;
+  if (decoded.fault == Fault::bad_frame)
+    shown.why = "the frame has " + std::to_string(payload.size()) + " bytes, too few";
+  else if (decoded.fault != Fault::none)
+    shown.why = "is no finite number: compare length and byte order with the controller's side";
+}
+
+}  // namespace
+
+std::string id_name(const CanId& id) {
+  char text[16];
+  std::snprintf(text, sizeof text, id.extended ? "0x%08X" : "0x%03X", id.id);
+  return text;
+}
+
+std::string place_name(const CanSignal& signal) {
+  std::string text = id_name({signal.id, signal.extended_id}) + " bit " +
+                     std::to_string(signal.start_bit) + " length " +
+                     std::to_string(signal.length_bits);
+  text += signal.byte_order == ByteOrder::little_endian ? " little_endian" : " big_endian";
+  if (signal.scale != 1.0) text += " x " + number_text(signal.scale);
+  return text;
+}
+
+ScanBus scan_can(const CanBusConfig& config, const ScanSensors& sensors, double listen_s,
+                 const std::function<void(const std::string&)>& progress) {
+  ScanBus bus;
+  bus.name = config.name;
+  bus.kind = "can";
+  bus.where = config.interface;
+  const std::vector<const CanSignal*> signals = signals_of(config);
+  CanSocket socket(config.interface, {});
+  socket.also_want({{0, false}, 0});  // everything: what is there beside what is looked for
+  socket.also_want({{0, true}, 0});
+  Heard heard;
+  heard.of_signal.resize(signals.size());
+  if (!socket.open()) {
+    bus.error = "cannot be opened: " + socket.error();
+  } else {
+    progress("bus " + config.name + ": listening for " + number_text(listen_s) + " s");
+    heard = listen(socket, signals, listen_s);
+    if (!socket.error().empty()) bus.error = socket.error();
+    bus.note = heard_text(heard);
+    if (heard.frames.empty() && bus.error.empty()) {
+      bus.note = "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
+    }
+  }
+  fill(config, sensors, heard, bus);
+  return bus;
+}
+
+ScanController scan_can_controller(const DaemonConfig& config,
+                                   const CanControllerConfig& controller, double listen_s,
+                                   const std::function<void(const std::string&)>& progress) {
+  ScanController result;
+  result.name = controller.name;
+  result.kind = "can";
+  result.where = controller.interface;
+  std::vector<const CanSignal*> signals;
+  const auto add = [&](const CanSignal& signal, const std::string& what, const std::string& unit) {
+    signals.push_back(&signal);
+    ScanValue& shown = result.values.emplace_back();
+    shown.what = what;
+    shown.place = place_name(signal);
+    shown.unit = unit;
+  };
+  for (std::size_t i = 0; i < controller.axes.size(); ++i) {
+    const AxisConfig& axis = config.estimator.axes[i];
+    if (const auto& applied = controller.axes[i].applied)
+      add(*applied, "applied of axis " + axis.name, std::string(unit_of(axis.output).symbol));
+  }
+  for (const CanControllerSignal& signal : controller.signals) {
+    const std::string& name = config.estimator.signals[signal.signal];
+    add(signal.value, name, std::string(unit_of(name).symbol));
+  }
+  CanSocket socket(controller.interface, {});
+  socket.also_want({{0, false}, 0});  // also frames that are too short to carry anything
+  socket.also_want({{0, true}, 0});
+  Heard heard;
+  heard.of_signal.resize(signals.size());
+  if (socket.open()) {
+    progress("controller " + controller.name + ": listening for " + number_text(listen_s) + " s");
+    heard = listen(socket, signals, listen_s);
+    result.error = socket.error();
+  } else {
+    result.error = "cannot be opened: " + socket.error();
+  }
+  for (std::size_t i = 0; i < signals.size(); ++i) take(*signals[i], heard, i, result.values[i]);
+  return result;
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,232 @@
+#include "cli/scan/scan_controller.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <variant>
+#include <vector>
+
+#include "cli/common/modbus_names.hpp"
+#include "cli/scan/scan_can.hpp"
+#include "cli/scan/serial_holder.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
+#include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/driver_error.hpp"
+#include "drivers/modbus/connection.hpp"
+#include "drivers/modbus/register_codec.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+constexpr int tries_max = 2;
+
+/// A place in the controller's registers, and what is shown of it.
+struct Place {
+  ModbusValue value;
+  ScanValue shown;
+  std::vector<std::uint16_t> words;
+};
+
+Place place_of(const ModbusValue& value, const std::string& what, const std::string& unit,
+               bool is_written = false) {
+  Place place{value, {}, std::vector<std::uint16_t>(words_of(value.table, value.encoding))};
+  place.shown.what = what;
+  place.shown.unit = unit;
+  place.shown.is_written = is_written;
+  place.shown.place = place_name(value) + " " + type_name(value);
+  if (value.scale != 1.0) place.shown.place += " x " + number_text(value.scale);
+  return place;
+}
+
+/// What the daemon reads, in its order: the requests are then the same.
+std::vector<Place> read_places(const DaemonConfig& config, const ModbusControllerConfig& modbus) {
+  std::vector<Place> places;
+  for (std::size_t i = 0; i < modbus.axes.size(); ++i) {
+    const AxisConfig& axis = config.estimator.axes[i];
+    if (!modbus.axes[i].applied) continue;
+    const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
+    places.push_back(place_of(*modbus.axes[i].applied, "applied of axis " + axis.name, unit));
+  }
+  for (const ModbusSignal& signal : modbus.signals) {
+    const std::string& name = config.estimator.signals[signal.signal];
+    places.push_back(place_of(signal.value, name, std::string(unit_of(name).symbol)));
+  }
+  return places;
+}
+
+std::vector<Place> written_places(const DaemonConfig& config,
+                                  const ModbusControllerConfig& modbus) {
+  std::vector<Place> places;
+  for (std::size_t i = 0; i < modbus.axes.size(); ++i) {
+    const AxisConfig& axis = config.estimator.axes[i];
+    const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
+    places.push_back(place_of(modbus.axes[i].offset, "offset of axis " + axis.name, unit, true));
+  }
+  if (modbus.valid_bits)
+    places.push_back(place_of(without_sign(*modbus.valid_bits), "valid_bits", "", true));
+  if (modbus.heartbeat)
+    places.push_back(place_of(without_sign(*modbus.heartbeat), "heartbeat", "", true));
+  return places;
+}
+
+class ControllerScan {
+ public:
+  explicit ControllerScan(const ModbusControllerConfig& config)
+      : config_(config), connection_(config.line) {}
+
+  /// @param read  as the daemon asks for them, together; @param written  each alone
+  void run(std::vector<Place>& read, std::vector<Place>& written, ScanController& result) {
+    if (!connection_.connect()) {
+      result.error = "cannot be opened: " + connection_.last_error();
+      mark_all(read, written, "was not asked");
+      return;
+    }
+    if (!ask_together(read, result)) {
+      mark_all(read, written, "no answer");
+      return;
+    }
+    for (Place& place : written) ask_alone(place);
+  }
+
+ private:
+  static void mark_all(std::vector<Place>& read, std::vector<Place>& written,
+                       const std::string& why) {
+    for (Place& place : read) place.shown.why = why;
+    for (Place& place : written) place.shown.why = why;
+  }
+
+  Exchange ask(ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words) {
+    Exchange exchange;
+    for (int tried = 0; tried < tries_max; ++tried) {
+      if (!connection_.connected() && !connection_.connect()) return exchange;
+      exchange = connection_.read(config_.unit, table, address, words);
+      if (exchange.ok() || exchange.outcome == ExchangeOutcome::exception) break;
+    }
+    return exchange;
+  }
+
+  /// @return false: the unit does not answer at all, which result.error says
+  bool ask_together(std::vector<Place>& places, ScanController& result) {
+    std::vector<ModbusValue> values;
+    values.reserve(places.size());
+    for (const Place& place : places) values.push_back(place.value);
+    const ReadPlan plan = plan_reads(values);
+    for (std::size_t r = 0; r < plan.requests.size(); ++r) {
+      const ReadRequest& request = plan.requests[r];
+      std::vector<std::uint16_t> words(request.count);
+      const Exchange exchange = ask(request.table, request.address, words);
+      if (!exchange.unit_answered() && r == 0) {
+        result.error = why_not(exchange);
+        return false;
+      }
+      bool any_refused = false;
+      bool any_there = false;
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        if (plan.places[i].request != r) continue;
+        if (exchange.ok()) {
+          const auto from = words.begin() + static_cast<std::ptrdiff_t>(plan.places[i].word);
+          std::copy_n(from, places[i].words.size(), places[i].words.begin());
+          take(exchange, places[i]);
+        } else {
+          ask_alone(places[i]);
+          any_refused = true;
+          any_there = any_there || places[i].shown.is_there();
+        }
+      }
+      if (any_refused && any_there) note_refused(request, exchange, result);
+    }
+    return true;
+  }
+
+  void note_refused(const ReadRequest& request, const Exchange& exchange, ScanController& result) {
+    result.refused = "the daemon reads " + table_name(request.table) + " " +
+                     std::to_string(request.address) + ".." +
+                     std::to_string(request.address + request.count - 1) +
+                     " in one request, which the controller refuses (" + why_not(exchange) +
+                     "): provide the registers between, or move the values together";
+  }
+
+  void ask_alone(Place& place) {
+    const Exchange exchange = ask(place.value.table, place.value.address, place.words);
+    if (exchange.ok())
+      take(exchange, place);
+    else
+      place.shown.why = why_not(exchange);
+  }
+
+  static void take(const Exchange& exchange, Place& place) {
+    ScanValue& shown = place.shown;
+    const ModbusValue& value = place.value;
+    shown.raw = hex_words(place.words);
+    shown.round_trip_ms =
+        1e-6 * static_cast<double>((exchange.arrived_at - exchange.sent_at).count());
+    const Decoded decoded =
+        decode(place.words,
+               format_in(value.table, {value.encoding, value.word_order, value.scale, 0.0}), {});
+    shown.value = decoded.value;
+    if (decoded.fault != Fault::none)
+      shown.why = "is no finite number: compare encoding and word_order with the controller's side";
+  }
+
+  [[nodiscard]] std::string why_not(const Exchange& exchange) const {
+    if (exchange.outcome == ExchangeOutcome::exception)
+      return "the controller answers with " + exception_name(exchange.exception_code);
+    if (exchange.outcome == ExchangeOutcome::timeout)
+      return "unit " + std::to_string(config_.unit) + " does not answer within " +
+             number_text(config_.line.timeout_ms) + " ms, asked twice";
+    if (exchange.outcome == ExchangeOutcome::disconnected && !connection_.last_error().empty())
+      return connection_.last_error();
+    return exchange.detail;
+  }
+
+  const ModbusControllerConfig& config_;
+  ModbusConnection connection_;
+};
+
+ScanController scan_modbus_controller(const DaemonConfig& config,
+                                      const ModbusControllerConfig& modbus,
+                                      const std::function<void(const std::string&)>& progress) {
+  ScanController result;
+  result.name = modbus.name;
+  const auto* rtu = std::get_if<ModbusRtu>(&modbus.line.link);
+  result.kind = rtu != nullptr ? "modbus_rtu" : "modbus_tcp";
+  result.where = line_name(modbus.line);
+  result.address = "unit " + std::to_string(modbus.unit);
+  std::vector<Place> read = read_places(config, modbus);
+  std::vector<Place> written = written_places(config, modbus);
+  const SerialHolder holder = rtu != nullptr ? holder_of(rtu->device) : SerialHolder{};
+  if (holder.is_daemon) {
+    result.error = "is in use by " + holder.name +
+                   ": two masters on one line garble each other. Stop it first (systemctl stop "
+                   "thermocompd)";
+    for (std::vector<Place>* places : {&read, &written})
+      for (Place& place : *places) place.shown.why = "was not asked";
+  } else {
+    progress("controller " + modbus.name + ": reading its registers, writing none");
+    try {
+      ControllerScan(modbus).run(read, written, result);
+    } catch (const DriverError& error) {
+      result.error = error.what();
+    }
+  }
+  for (std::vector<Place>* places : {&read, &written})
+    for (Place& place : *places) result.values.push_back(std::move(place.shown));
+  return result;
+}
+
+}  // namespace
+
+std::optional<ScanController> scan_controller(
+    const DaemonConfig& config, double listen_s,
+    const std::function<void(const std::string&)>& progress) {
+  if (const auto* modbus = std::get_if<ModbusControllerConfig>(&config.controller))
+    return scan_modbus_controller(config, *modbus, progress);
+  if (const auto* can = std::get_if<CanControllerConfig>(&config.controller))
+    return scan_can_controller(config, *can, listen_s, progress);
+  if (const auto* bridge = std::get_if<BridgeControllerConfig>(&config.controller))
+    progress("controller " + bridge->name + ": not scanned; its bridge calls the daemon");
+  return std::nullopt;
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,115 @@
+#include "cli/scan/scan_hints.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "cli/common/modbus_names.hpp"
+#include "cli/common/reason_text.hpp"
+#include "drivers/modbus/register_codec.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+/// No thermometer resolves less; a denormal or a tiny float is made of another number's bytes.
+constexpr double float_degC_min = 1e-6;
+
+std::string temperature_text(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.2f degC", value);
+  return text;
+}
+
+Decoded decode_as(const ModbusChannel& channel, WordOrder order, double scale,
+                  std::span<const std::uint16_t> words) {
+  return decode(words,
+                format_in(channel.table, {channel.encoding, order, scale, channel.offset_degC}),
+                channel.sentinels);
+}
+
+bool fits(const ModbusChannel& channel, const Decoded& decoded, const PlausibleRange& range) {
+  return decoded.fault == Fault::none && is_plausible(channel, decoded.value, range);
+}
+
+void hint_orders(const ModbusChannel& channel, std::span<const std::uint16_t> words,
+                 const PlausibleRange& range, std::vector<std::string>& hints) {
+  const bool one_register = registers_of(channel.encoding) == 1;
+  for (const WordOrder order :
+       {WordOrder::abcd, WordOrder::cdab, WordOrder::badc, WordOrder::dcba}) {
+    if (order == channel.word_order) continue;
+    // In one register only the two bytes can change places: half the orders are the other half.
+    if (one_register && (order == WordOrder::cdab || order == WordOrder::dcba)) continue;
+    const Decoded decoded = decode_as(channel, order, channel.scale, words);
+    if (!fits(channel, decoded, range)) continue;
+    hints.push_back("word_order = \"" + order_name(order) + "\" would make it " +
+                    temperature_text(decoded.value));
+  }
+}
+
+void hint_scales(const ModbusChannel& channel, std::span<const std::uint16_t> words,
+                 const PlausibleRange& range, std::vector<std::string>& hints) {
+  for (const double factor : {0.1, 0.01}) {
+    const double scale = channel.scale * factor;
+    const Decoded decoded = decode_as(channel, channel.word_order, scale, words);
+    if (!fits(channel, decoded, range) || decoded.value == channel.offset_degC) continue;
+    char text[80];
+    std::snprintf(text, sizeof text, "scale = %g would make it ", scale);
+    hints.push_back(text + temperature_text(decoded.value));
+    return;
+  }
+}
+
+/// The ends of an encoding are what most modules send for a broken wire.
+void hint_codes(const ModbusChannel& channel, std::span<const std::uint16_t> words,
+                std::vector<std::string>& hints) {
+  const NumberFormat format = format_in(channel.table, {channel.encoding, channel.word_order});
+  const double raw = decode(words, format, {}).value;
+  constexpr std::array ends{32767.0, 32766.0, 32000.0, -32768.0,     -32767.0,      -32000.0,
+                            65535.0, 9999.0,  -9999.0, 2147483647.0, -2147483648.0, 4294967295.0};
+  for (const double end : ends) {
+    if (raw != end) continue;
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "%.0f is what many modules send for a broken wire; if the manual says so: "
+                  "open_circuit_codes = [%.0f]",
+                  raw, raw);
+    hints.emplace_back(text);
+  }
+  if (std::isnan(raw)) {
+    hints.emplace_back(nan_text().remedy);
+  }
+}
+
+}  // namespace
+
+bool is_plausible(const ModbusChannel& channel, double temp_degC, const PlausibleRange& range) {
+  if (!(temp_degC >= range.min_degC && temp_degC <= range.max_degC)) return false;
+  if (channel.encoding != Encoding::float32 && channel.encoding != Encoding::float64) return true;
+  const double raw = std::abs((temp_degC - channel.offset_degC) / channel.scale);
+  return raw == 0.0 || raw >= float_degC_min;
+}
+
+std::vector<std::string> hints_for_words(const ModbusChannel& channel,
+                                         std::span<const std::uint16_t> words,
+                                         const PlausibleRange& range) {
+  std::vector<std::string> hints;
+  hint_codes(channel, words, hints);
+  if (!hints.empty()) return hints;
+  hint_orders(channel, words, range, hints);
+  if (hints.empty()) hint_scales(channel, words, range, hints);
+  return hints;
+}
+
+std::vector<std::string> hints_for_address(const ModbusChannel& channel) {
+  std::vector<std::string> hints;
+  for (const auto& [first, table] :
+       {std::pair{30001, ModbusTable::input}, {40001, ModbusTable::holding}}) {
+    if (channel.address < first || channel.address >= first + 9999) continue;
+    hints.push_back("addresses count from 0 on the wire: " + std::to_string(channel.address) +
+                    " in a manual is table = \"" + table_name(table) +
+                    "\", address = " + std::to_string(channel.address - first));
+  }
+  return hints;
+}
+
+}  // namespace thermocomp::cli

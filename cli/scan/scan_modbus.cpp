@@ -1,0 +1,393 @@
+#include "cli/scan/scan_modbus.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <set>
+
+#include "cli/common/modbus_names.hpp"
+#include "cli/common/reason_text.hpp"
+#include "cli/scan/serial_holder.hpp"
+#include "drivers/driver_error.hpp"
+#include "drivers/modbus/connection.hpp"
+#include "drivers/modbus/register_codec.hpp"
+#include "drivers/sensors/modbus_plan.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+constexpr int tries_max = 2;
+
+std::string number_text(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+std::string place_of(const ModbusChannel& channel) {
+  std::string text = table_name(channel.table);
+  text.append(" ").append(std::to_string(channel.address));
+  text.append(" ").append(encoding_name(channel.encoding));
+  if (registers_of(channel.encoding) > 1 || channel.word_order != WordOrder::abcd) {
+    text.append(" ").append(order_name(channel.word_order));
+  }
+  if (channel.scale != 1.0) text.append(" x ").append(number_text(channel.scale));
+  return text;
+}
+
+/// Every channel of a device that nothing could be read of.
+ScanDevice without_answer(const ModbusDeviceConfig& device, const ScanSensors& sensors,
+                          const std::string& why) {
+  ScanDevice result{device.name, "unit " + std::to_string(device.unit), false, why, {}};
+  for (const ModbusChannel& channel : device.channels) {
+    ScanChannel& shown = result.channels.emplace_back();
+    shown.sensor = sensors.names.at(channel.sensor);
+    shown.place = place_of(channel);
+    shown.fault = Fault::no_answer;
+  }
+  return result;
+}
+
+/// Words of one place with the exchange that brought them.
+struct Answer {
+  Exchange exchange;
+  std::vector<std::uint16_t> words;
+};
+
+class ModbusScan {
+ public:
+  ModbusScan(const ModbusBusConfig& config, const ScanSensors& sensors,
+             const std::function<void(const std::string&)>& progress)
+      : config_(config), sensors_(sensors), progress_(progress), connection_(config.line) {}
+
+  void run(ScanBus& bus) {
+    if (!connection_.connect()) {
+      bus.error = "cannot be opened: " + connection_.last_error();
+      for (const ModbusDeviceConfig& device : config_.devices) {
+        bus.devices.push_back(without_answer(device, sensors_, ""));
+      }
+      return;
+    }
+    for (const ModbusDeviceConfig& device : config_.devices) {
+      progress_("bus " + config_.name + ": reading device " + device.name);
+      bus.devices.push_back(scan(device));
+    }
+    judge_silence(bus);
+  }
+
+  void find(const UnitSearch& search, ScanBus& bus);
+
+ private:
+  [[nodiscard]] bool is_serial() const {
+    return std::holds_alternative<ModbusRtu>(config_.line.link);
+  }
+
+  Answer ask(int unit, ModbusTable table, std::uint16_t address, std::size_t count) {
+    Answer answer{{}, std::vector<std::uint16_t>(count)};
+    for (int tried = 0; tried < tries_max; ++tried) {
+      answer.exchange = connection_.read(unit, table, address, answer.words);
+      if (answer.exchange.unit_answered()) return answer;
+      if (answer.exchange.outcome == ExchangeOutcome::exception) return answer;
+      if (!connection_.connected() && !connection_.connect()) return answer;
+    }
+    return answer;
+  }
+
+  ScanDevice scan(const ModbusDeviceConfig& device);
+  void split_refused(const ModbusDeviceConfig& device, ScanDevice& result);
+  ScanChannel evaluate(const ModbusDeviceConfig& device, std::size_t index);
+  void judge_value(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+                   std::span<const std::uint16_t> words, ScanChannel& result);
+  void hint_refused(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+                    ScanChannel& result);
+  std::optional<double> look_at(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+                                int address, ModbusTable table);
+  void hint_neighbours(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+                       ScanChannel& result);
+  void judge_silence(ScanBus& bus) const;
+  [[nodiscard]] std::string describe(const ModbusDeviceConfig& device,
+                                     const Exchange& exchange) const;
+  [[nodiscard]] const PlausibleRange& range_of(const ModbusChannel& channel) const {
+    return sensors_.ranges.at(channel.sensor);
+  }
+
+  const ModbusBusConfig& config_;
+  const ScanSensors& sensors_;
+  const std::function<void(const std::string&)>& progress_;
+  ModbusConnection connection_;
+  // Of the device under way, in the order of its channels.
+  std::vector<Answer> values_;
+  std::vector<std::optional<Answer>> statuses_;
+};
+
+std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchange& exchange) const {
+  if (exchange.outcome == ExchangeOutcome::exception) {
+    return "the device answers with " + exception_name(exchange.exception_code);
+  }
+  if (exchange.outcome == ExchangeOutcome::timeout) {
+    return "unit " + std::to_string(device.unit) + " does not answer within " +
+           number_text(config_.line.timeout_ms) + " ms, asked twice";
+  }
+  return exchange.detail;
+}
+
+ScanDevice ModbusScan::scan(const ModbusDeviceConfig& device) {
+  const ModbusPlan plan = plan_requests(device);
+  std::vector<Answer> answers;
+  for (const PlannedRequest& request : plan.requests) {
+    answers.push_back(ask(device.unit, request.table, request.address, request.count));
+    if (!answers.back().exchange.unit_answered() && answers.size() == 1) {
+      return without_answer(device, sensors_, describe(device, answers.back().exchange));
+    }
+  }
+  ScanDevice result{device.name, "unit " + std::to_string(device.unit), true, "", {}};
+  values_.clear();
+  statuses_.clear();
+  const auto part = [&](const WordPlace& place, std::size_t count) {
+    Answer answer{answers[place.request].exchange, {}};
+    const auto begin = answers[place.request].words.begin() + static_cast<long>(place.offset);
+    answer.words.assign(begin, begin + static_cast<long>(count));
+    return answer;
+  };
+  for (std::size_t i = 0; i < device.channels.size(); ++i) {
+    const ModbusChannel& channel = device.channels[i];
+    values_.push_back(part(plan.channels[i].value, words_of(channel.table, channel.encoding)));
+    statuses_.push_back(channel.status ? std::optional(part(*plan.channels[i].status, 1))
+                                       : std::nullopt);
+  }
+  if (plan.requests.size() < device.channels.size()) split_refused(device, result);
+  for (std::size_t i = 0; i < device.channels.size(); ++i) {
+    result.channels.push_back(evaluate(device, i));
+  }
+  return result;
+}
+
+/// A request for several values that the device refuses: which of them is it? Each is asked alone.
+void ModbusScan::split_refused(const ModbusDeviceConfig& device, ScanDevice& result) {
+  const auto refused = [](const Answer& answer) {
+    return answer.exchange.outcome == ExchangeOutcome::exception && answer.exchange.unit_answered();
+  };
+  bool split = false;
+  bool all_good = true;
+  for (std::size_t i = 0; i < device.channels.size(); ++i) {
+    const ModbusChannel& channel = device.channels[i];
+    if (refused(values_[i])) {
+      values_[i] = ask(device.unit, channel.table, channel.address, values_[i].words.size());
+      split = true;
+      all_good = all_good && values_[i].exchange.ok();
+    }
+    if (statuses_[i] && refused(*statuses_[i])) {
+      statuses_[i] = ask(device.unit, channel.status->table, channel.status->address, 1);
+      split = true;
+      all_good = all_good && statuses_[i]->exchange.ok();
+    }
+  }
+  if (!split) return;
+  result.note = all_good ? "refuses to be read in one request, but answers for each register: "
+                           "gap_registers_max = 0 or one_register_a_request = true"
+                         : "refuses to be read in one request; asked for each value alone";
+}
+
+ScanChannel ModbusScan::evaluate(const ModbusDeviceConfig& device, std::size_t index) {
+  const ModbusChannel& channel = device.channels[index];
+  const Answer value = values_[index];
+  ScanChannel result;
+  result.sensor = sensors_.names.at(channel.sensor);
+  result.place = place_of(channel);
+  if (!value.exchange.ok()) {
+    result.fault = value.exchange.fault();
+    result.why = describe(device, value.exchange);
+    if (value.exchange.unit_answered()) hint_refused(device, channel, result);
+    return result;
+  }
+  const auto seconds = [](nanoseconds time) { return static_cast<double>(time.count()) * 1e-9; };
+  result.raw = hex_words(value.words);
+  result.round_trip_ms = seconds(value.exchange.arrived_at - value.exchange.sent_at) * 1e3;
+  result.age_s = seconds(connection_.now() - value.exchange.arrived_at);
+  if (const auto& status = statuses_[index]) {
+    result.raw.append(" | ").append(hex_words(status->words));
+    if (!status->exchange.ok()) {
+      result.fault = status->exchange.fault();
+      result.why = "status: " + describe(device, status->exchange);
+      return result;
+    }
+    result.fault = decode_status(*channel.status, status->words[0]);
+    if (result.fault != Fault::none) {
+      result.why = "the status, " + table_name(channel.status->table) + " " +
+                   std::to_string(channel.status->address) + ", says " +
+                   std::string(to_string(result.fault));
+      return result;
+    }
+  }
+  judge_value(device, channel, value.words, result);
+  return result;
+}
+
+void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+                             std::span<const std::uint16_t> words, ScanChannel& result) {
+  const NumberFormat format = format_in(
+      channel.table, {channel.encoding, channel.word_order, channel.scale, channel.offset_degC});
+  const Decoded decoded = decode(words, format, channel.sentinels);
+  const Decoded number = decode(words, format, {});
+  if (decoded.fault != Fault::none && number.fault == Fault::none) {
+    result.fault = decoded.fault;
+    result.why = "the device's code for it";
+    if (decoded.fault == Fault::open_circuit) {
+      result.hints.emplace_back("look at this channel's terminals: a thermocouple has a few ohms");
+    }
+    return;
+  }
+  result.temp_degC = decoded.value;
+  const PlausibleRange& range = range_of(channel);
+  if (decoded.fault == Fault::none && is_plausible(channel, decoded.value, range)) {
+    result.fault = Fault::none;
+    if (decoded.value == channel.offset_degC) {
+      result.hints.emplace_back(
+          "the register is 0 exactly, as it is where a channel is switched off: warm the sensor");
+    }
+    return;
+  }
+  result.fault = Fault::out_of_range;
+  result.why = std::isnan(decoded.value)
+                   ? std::string(nan_text().meaning)
+                   : number_text(decoded.value) + " degC is no temperature of [" +
+                         number_text(range.min_degC) + ", " + number_text(range.max_degC) +
+                         "] ([screening])";
+  result.hints = hints_for_words(channel, words, range);
+  if (result.hints.empty()) hint_neighbours(device, channel, result);
+  if (result.hints.empty()) {
+    result.hints.emplace_back("compare table, address, encoding and scale with the manual");
+  }
+}
+
+/// What the configured value would be elsewhere, if it is plausible there.
+std::optional<double> ModbusScan::look_at(const ModbusDeviceConfig& device,
+                                          const ModbusChannel& channel, int address,
+                                          ModbusTable table) {
+  const std::size_t count = words_of(channel.table, channel.encoding);
+  if (address < 0 || address + static_cast<int>(count) > 65536) return std::nullopt;
+  const Answer answer = ask(device.unit, table, static_cast<std::uint16_t>(address), count);
+  if (!answer.exchange.ok()) return std::nullopt;
+  const NumberFormat format =
+      format_in(table, {channel.encoding, channel.word_order, channel.scale, channel.offset_degC});
+  const Decoded decoded = decode(answer.words, format, channel.sentinels);
+  const bool fits = decoded.fault == Fault::none && decoded.value != channel.offset_degC &&
+                    is_plausible(channel, decoded.value, range_of(channel));
+  return fits ? std::optional(decoded.value) : std::nullopt;
+}
+
+void ModbusScan::hint_neighbours(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+                                 ScanChannel& result) {
+  for (const int step : {-1, 1}) {
+    const int address = channel.address + step;
+    if (const auto value = look_at(device, channel, address, channel.table)) {
+      result.hints.push_back("address = " + std::to_string(address) + " would make it " +
+                             number_text(*value) + " degC: manuals often count from 1");
+    }
+  }
+}
+
+void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+                              ScanChannel& result) {
+  result.hints = hints_for_address(channel);
+  if (!result.hints.empty()) return;
+  hint_neighbours(device, channel, result);
+  const ModbusTable other =
+      channel.table == ModbusTable::input ? ModbusTable::holding : ModbusTable::input;
+  if (const auto value = look_at(device, channel, channel.address, other)) {
+    result.hints.push_back("table = \"" + table_name(other) + "\" would make it " +
+                           number_text(*value) + " degC");
+  }
+  if (result.hints.empty()) {
+    result.hints.emplace_back(
+        "this register is not there: compare table and address with the manual");
+  }
+}
+
+/// One unit that is silent has a fault of its own; all of them rather a common one.
+void ModbusScan::judge_silence(ScanBus& bus) const {
+  const auto silent = static_cast<std::size_t>(std::count_if(
+      bus.devices.begin(), bus.devices.end(), [](const auto& device) { return !device.answers; }));
+  if (silent == 0) return;
+  if (silent == bus.devices.size()) {
+    bus.note = is_serial() ? "no unit answers: baud, parity, A and B swapped, termination, or "
+                             "the units' numbers; --find asks other numbers"
+                           : "connected, but no unit answers: the unit numbers; --find asks others";
+    return;
+  }
+  for (ScanDevice& device : bus.devices) {
+    if (device.answers) continue;
+    device.note +=
+        "; others on this bus do, so it is this unit's number, supply or wires "
+        "(--find asks other numbers)";
+  }
+}
+
+// ---- searching
+
+void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
+  std::set<int> configured;
+  for (const ModbusDeviceConfig& device : config_.devices) configured.insert(device.unit);
+  const int count = search.last - search.first + 1;
+  progress_("bus " + config_.name + ": asking units " + std::to_string(search.first) + " to " +
+            std::to_string(search.last) +
+            " for holding register 0 (function 3), one request each, at most " +
+            number_text(count * config_.line.timeout_ms / 1e3) + " s");
+  std::string unknown;
+  std::string numbers;
+  for (int unit = search.first; unit <= search.last; ++unit) {
+    std::array<std::uint16_t, 1> word{};
+    if (!connection_.connected() && !connection_.connect()) break;
+    const Exchange exchange = connection_.read(unit, ModbusTable::holding, 0, word);
+    if (!exchange.unit_answered()) continue;
+    bus.found_numbers.push_back(unit);
+    numbers.append(numbers.empty() ? "" : ", ").append(std::to_string(unit));
+    if (configured.contains(unit)) continue;
+    unknown.append(unknown.empty() ? "" : ", ").append(std::to_string(unit));
+  }
+  bus.found = "units " + std::to_string(search.first) + " to " + std::to_string(search.last) +
+              " searched: " + (numbers.empty() ? "none answers" : numbers + " answer");
+  if (static_cast<int>(bus.found_numbers.size()) == count && count > 2) {
+    bus.found += "; a device that answers to every number looks at none";
+  } else if (!unknown.empty()) {
+    bus.found += "; not in the configuration: " + unknown;
+  }
+}
+
+}  // namespace
+
+ScanBus scan_modbus(const ModbusBusConfig& config, const ScanSensors& sensors,
+                    const UnitSearch& search,
+                    const std::function<void(const std::string&)>& progress) {
+  ScanBus bus;
+  bus.name = config.name;
+  const auto* rtu = std::get_if<ModbusRtu>(&config.line.link);
+  bus.kind = rtu != nullptr ? "modbus_rtu" : "modbus_tcp";
+  bus.where = line_name(config.line);
+  if (rtu != nullptr) {
+    const SerialHolder holder = holder_of(rtu->device);
+    if (holder.is_daemon) {
+      bus.error = "is in use by " + holder.name +
+                  ": two masters on one line garble each other. Stop it first (systemctl stop "
+                  "thermocompd), or look at `thermocomp sensors`";
+      for (const ModbusDeviceConfig& device : config.devices) {
+        bus.devices.push_back(without_answer(device, sensors, ""));
+      }
+      return bus;
+    }
+    if (!holder.name.empty()) bus.note = "also open in " + holder.name;
+  }
+  try {
+    ModbusScan scan(config, sensors, progress);
+    scan.run(bus);
+    if (search.wanted && bus.error.empty()) scan.find(search, bus);
+  } catch (const DriverError& error) {
+    bus.error = error.what();
+  }
+  return bus;
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,256 @@
+#include "cli/scan/scan_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/common/terminal.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string fixed(double value, int decimals) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  return text;
+}
+
+std::string padded(std::string text, std::size_t width) {
+  text.resize(std::max(text.size(), width), ' ');
+  return text;
+}
+
+/// What stands after the raw bytes: the temperature, or the fault in its place.
+std::string outcome(const ScanChannel& channel) {
+  return channel.good() ? fixed(channel.temp_degC, 2) + " degC"
+                        : std::string(to_string(channel.fault));
+}
+
+struct Widths {
+  std::size_t sensor{0};
+  std::size_t place{0};
+  std::size_t raw{0};
+};
+
+Widths widths_of(const ScanDevice& device) {
+  Widths widths;
+  for (const ScanChannel& channel : device.channels) {
+    widths.sensor = std::max(widths.sensor, channel.sensor.size());
+    widths.place = std::max(widths.place, channel.place.size());
+    widths.raw = std::max(widths.raw, std::max<std::size_t>(1, channel.raw.size()));
+  }
+  return widths;
+}
+
+void append(std::string& text, const ScanChannel& channel, const Widths& widths, bool colours) {
+  constexpr std::size_t outcome_width = 14;
+  text += "    " + padded(channel.sensor, widths.sensor) + "  " +
+          padded(channel.place, widths.place) + "  " +
+          padded(channel.raw.empty() ? "-" : channel.raw, widths.raw) + "  -> ";
+  text += coloured(padded(outcome(channel), outcome_width),
+                   channel.good() ? Colour::green : Colour::red, colours);
+  if (channel.round_trip_ms)
+    text.append("  ").append(fixed(*channel.round_trip_ms, 1)).append(" ms");
+  if (channel.age_s) text.append("  ").append(fixed(*channel.age_s, 1)).append(" s old");
+  text += '\n';
+  if (!channel.why.empty()) text.append("        ").append(channel.why).append("\n");
+  for (const std::string& hint : channel.hints) {
+    text.append("        ").append(coloured("try:", Colour::yellow, colours));
+    text.append(" ").append(hint).append("\n");
+  }
+}
+
+void append(std::string& text, const ScanDevice& device, bool colours) {
+  text += "  device " + device.name;
+  if (!device.address.empty()) text += ", " + device.address;
+  text += '\n';
+  if (!device.note.empty()) text.append("      ").append(device.note).append("\n");
+  const Widths widths = widths_of(device);
+  for (const ScanChannel& channel : device.channels) append(text, channel, widths, colours);
+}
+
+void append(std::string& text, const ScanController& controller, bool colours) {
+  text += "controller " + controller.name + " (" + controller.kind + ", " + controller.where + ")" +
+          (controller.address.empty() ? "" : ", " + controller.address) + ", only read\n";
+  for (const std::string& trouble : {controller.error, controller.refused})
+    if (!trouble.empty()) text += "    " + coloured(trouble, Colour::red, colours) + "\n";
+  std::size_t what_width = 0;
+  std::size_t place_width = 0;
+  std::size_t raw_width = 1;
+  for (const ScanValue& value : controller.values) {
+    what_width = std::max(what_width, value.what.size());
+    place_width = std::max(place_width, value.place.size());
+    raw_width = std::max(raw_width, value.raw.size());
+  }
+  for (const ScanValue& value : controller.values) {
+    text += "    " + padded(value.what, what_width) + "  " + padded(value.place, place_width) +
+            "  " + padded(value.raw.empty() ? "-" : value.raw, raw_width) + "  -> ";
+    const std::string shown =
+        value.is_there() ? fixed(value.value, 2) + (value.unit.empty() ? "" : " " + value.unit)
+                         : "missing";
+    text += coloured(shown, value.is_there() ? Colour::green : Colour::red, colours);
+    if (value.round_trip_ms) text.append("  ").append(fixed(*value.round_trip_ms, 1)).append(" ms");
+    text += '\n';
+    if (!value.is_there()) text.append("        ").append(value.why).append("\n");
+  }
+}
+
+/// "9 of 11 places of the controller are there; missing: x_mm, heartbeat"
+std::string controller_summary(const ScanController& controller) {
+  std::string text = std::to_string(controller.count_there()) + " of " +
+                     std::to_string(controller.values.size()) +
+                     " places of the controller are there";
+  const char* separator = "; missing: ";
+  for (const ScanValue& value : controller.values) {
+    if (value.is_there()) continue;
+    text.append(separator).append(value.what);
+    separator = ", ";
+  }
+  return text + "\n";
+}
+
+ordered_json optional_number(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? ordered_json(*value) : ordered_json(nullptr);
+}
+
+ordered_json json_of(const ScanChannel& channel) {
+  return {{"sensor", channel.sensor},
+          {"place", channel.place},
+          {"raw", channel.raw},
+          {"temp_degC", channel.good() ? ordered_json(channel.temp_degC) : ordered_json(nullptr)},
+          {"fault", to_string(channel.fault)},
+          {"why", channel.why},
+          {"hints", channel.hints},
+          {"round_trip_ms", optional_number(channel.round_trip_ms)},
+          {"age_s", optional_number(channel.age_s)}};
+}
+
+ordered_json json_of(const ScanDevice& device) {
+  ordered_json channels = ordered_json::array();
+  for (const ScanChannel& channel : device.channels) channels.push_back(json_of(channel));
+  return {{"name", device.name},
+          {"address", device.address},
+          {"answers", device.answers},
+          {"note", device.note},
+          {"channels", std::move(channels)}};
+}
+
+ordered_json json_of(const ScanController& controller) {
+  ordered_json values = ordered_json::array();
+  for (const ScanValue& value : controller.values)
+    values.push_back({{"what", value.what},
+                      {"place", value.place},
+                      {"written", value.is_written},
+                      {"raw", value.raw},
+                      {"value", optional_number(value.value)},
+                      {"unit", value.unit},
+                      {"why", value.why},
+                      {"round_trip_ms", optional_number(value.round_trip_ms)}});
+  return {{"name", controller.name},
+          {"kind", controller.kind},
+          {"where", controller.where},
+          {"address", controller.address},
+          {"error", controller.error},
+          {"refused", controller.refused},
+          {"complete", controller.is_complete()},
+          {"values", std::move(values)}};
+}
+
+}  // namespace
+
+std::size_t count_channels(const ScanReport& report) {
+  std::size_t count = 0;
+  for (const ScanBus& bus : report.buses) {
+    for (const ScanDevice& device : bus.devices) count += device.channels.size();
+  }
+  return count;
+}
+
+std::size_t count_good(const ScanReport& report) {
+  std::size_t count = 0;
+  for (const ScanBus& bus : report.buses) {
+    for (const ScanDevice& device : bus.devices) {
+      count += static_cast<std::size_t>(std::count_if(
+          device.channels.begin(), device.channels.end(), [](const auto& c) { return c.good(); }));
+    }
+  }
+  return count;
+}
+
+std::size_t ScanController::count_there() const {
+  return static_cast<std::size_t>(
+      std::count_if(values.begin(), values.end(), [](const auto& v) { return v.is_there(); }));
+}
+
+bool ScanController::is_complete() const {
+  return error.empty() && refused.empty() && count_there() == values.size();
+}
+
+bool is_complete(const ScanReport& report) {
+  return count_good(report) == count_channels(report) &&
+         (!report.controller || report.controller->is_complete());
+}
+
+std::string scan_text(const ScanReport& report, bool colours) {
+  std::string text;
+  for (const ScanBus& bus : report.buses) {
+    text += "bus " + bus.name + " (" + bus.kind + ", " + bus.where + ")\n";
+    if (!bus.error.empty()) {
+      text += "    " + coloured(bus.error, Colour::red, colours) + "\n";
+    }
+    if (!bus.note.empty()) text.append("    ").append(bus.note).append("\n");
+    if (!bus.found.empty()) text.append("    ").append(bus.found).append("\n");
+    for (const ScanDevice& device : bus.devices) append(text, device, colours);
+  }
+  if (report.controller) append(text, *report.controller, colours);
+  if (!report.buses.empty())
+    text += std::to_string(count_good(report)) + " of " + std::to_string(count_channels(report)) +
+            " channels give a temperature\n";
+  if (report.controller) text += controller_summary(*report.controller);
+  return text;
+}
+
+ordered_json scan_json(const ScanReport& report) {
+  ordered_json buses = ordered_json::array();
+  for (const ScanBus& bus : report.buses) {
+    ordered_json devices = ordered_json::array();
+    for (const ScanDevice& device : bus.devices) devices.push_back(json_of(device));
+    buses.push_back({{"name", bus.name},
+                     {"kind", bus.kind},
+                     {"where", bus.where},
+                     {"error", bus.error},
+                     {"note", bus.note},
+                     {"found", bus.found_numbers},
+                     {"devices", std::move(devices)}});
+  }
+  return {{"file", report.file},
+          {"channels", count_channels(report)},
+          {"good", count_good(report)},
+          {"buses", std::move(buses)},
+          {"controller", report.controller ? json_of(*report.controller) : ordered_json(nullptr)}};
+}
+
+std::string hex_words(std::span<const std::uint16_t> words) {
+  std::vector<std::uint8_t> bytes;
+  for (const std::uint16_t word : words) {
+    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
+  }
+  return hex_bytes(bytes);
+}
+
+std::string hex_bytes(const std::vector<std::uint8_t>& bytes) {
+  std::string text;
+  char digits[4];
+  for (const std::uint8_t byte : bytes) {
+    std::snprintf(digits, sizeof digits, "%02X", static_cast<unsigned>(byte));
+    text.append(text.empty() ? "" : " ").append(digits);
+  }
+  return text;
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,570 @@
+#include "config/bus_files/dbc_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "config/bus_files/dbc_scanner.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr std::uint32_t extended_flag = 0x80000000u;
+constexpr std::uint32_t standard_id_max = 0x7FF;
+constexpr std::uint32_t extended_id_max = 0x1FFFFFFF;
+constexpr std::uint64_t message_bytes_max = 1785;  // of a J1939 transport; the longest in use
+constexpr std::size_t classic_bytes_max = 8;
+constexpr std::size_t signals_max = 4096;  // of a message
+constexpr std::size_t problems_max = 100;
+constexpr std::string_view no_message = "VECTOR__INDEPENDENT_SIG_MSG";
+constexpr std::string_view frame_format = "VFrameFormat";
+
+/// Statements whose content is of no use here; each ends with a semicolon.
+constexpr std::array<std::string_view, 25> passed_over{
+    "VAL_TABLE_",    "BO_TX_BU_",        "EV_",         "ENVVAR_DATA_",
+    "EV_DATA_",      "SGTYPE_",          "SGTYPE_VAL_", "SIG_GROUP_",
+    "CM_",           "BA_DEF_REL_",      "BA_REL_",     "BA_DEF_SGTYPE_",
+    "BA_SGTYPE_",    "BA_DEF_DEF_REL_",  "BU_SG_REL_",  "BU_EV_REL_",
+    "BU_BO_REL_",    "CAT_DEF_",         "CAT_",        "FILTER",
+    "SIG_TYPE_REF_", "SIGTYPE_VALTYPE_", "VAL_",        "NS_DESC_",
+    "SIG_TYPE_"};
+constexpr std::array<std::string_view, 10> understood{
+    "VERSION", "NS_", "BS_", "BU_", "BO_", "SG_", "SIG_VALTYPE_", "SG_MUL_VAL_", "BA_DEF_", "BA_"};
+
+bool is_keyword(std::string_view word) {
+  const auto in = [word](const auto& list) {
+    return std::find(list.begin(), list.end(), word) != list.end();
+  };
+  return word == "BA_DEF_DEF_" || in(passed_over) || in(understood);
+}
+
+/// How a signal is multiplexed, by its own line.
+struct Multiplexing {
+  bool selects{false};                ///< M
+  std::optional<std::uint64_t> page;  ///< of mN
+};
+
+struct Draft {
+  DbcMessage message;
+  std::vector<Multiplexing> multiplexing;  ///< one a signal
+};
+
+/// Something that is said of a message or signal elsewhere in the file.
+struct Remark {
+  int line{0};
+  std::uint32_t message{0};
+  std::string signal;
+};
+struct FloatRemark : Remark {
+  std::uint64_t type{0};
+};
+struct PageRemark : Remark {
+  std::string selector;
+  std::vector<CanSelector::Pages> pages;
+};
+struct FormatRemark : Remark {
+  std::uint64_t index{0};
+  std::string format;  ///< instead of the index
+};
+
+/// "m3", "M", "m3M"; nothing else.
+std::optional<Multiplexing> multiplexing_of(std::string_view word) {
+  Multiplexing result;
+  if (word.starts_with('m')) {
+    word.remove_prefix(1);
+    const std::size_t digits = std::min(word.find_first_not_of("0123456789"), word.size());
+    if (digits == 0 || digits > 18) return std::nullopt;
+    std::uint64_t page = 0;
+    for (const char digit : word.substr(0, digits)) {
+      page = 10 * page + static_cast<std::uint64_t>(digit - '0');
+    }
+    result.page = page;
+    word.remove_prefix(digits);
+  }
+  if (word == "M") {
+    result.selects = true;
+  } else if (!word.empty()) {
+    return std::nullopt;
+  }
+  return result;
+}
+
+/// Byte behind the signal's last, counted from the frame's first.
+std::uint64_t end_byte(const CanSignal& place) {
+  const int first = place.byte_order == ByteOrder::little_endian
+                        ? place.start_bit
+                        : place.start_bit / 8 * 8 + (7 - place.start_bit % 8);
+  return static_cast<std::uint64_t>(first + place.length_bits + 7) / 8;
+}
+
+class DbcReader {
+ public:
+  DbcReader(std::string_view text, std::string name) : scan_(text), name_(std::move(name)) {}
+
+  DbcReading read() {
+    try {
+      while (!scan_.at_end()) read_statement();
+      resolve();
+    } catch (const DbcSyntaxError& error) {
+      problem(error.line, "", error.found, error.rule);
+    }
+    for (Draft& draft : drafts_) {
+      if (draft.message.name == no_message) continue;
+      result_.file.messages.push_back(std::move(draft.message));
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void problem(int line, std::string key, std::string value, std::string rule) {
+    if (result_.problems.size() >= problems_max) return;
+    if (value.empty()) std::swap(key, value);  // about a name as a whole
+    result_.problems.push_back({name_, line, std::move(key), std::move(value), std::move(rule)});
+  }
+
+  void read_statement() {
+    const int line = scan_.line();
+    const std::string_view keyword = scan_.next_word();
+    if (!is_keyword(keyword)) scan_.fail("must be a keyword of DBC files such as BO_");
+    scan_.word("a keyword");
+    if (keyword != "BO_" && keyword != "SG_") in_message_ = false;
+    if (keyword == "VERSION") {
+      scan_.text("the version");
+    } else if (keyword == "NS_") {
+      read_new_symbols();
+    } else if (keyword == "BS_") {
+      read_bit_timing();
+    } else if (keyword == "BU_") {
+      scan_.expect(':');
+      while (!scan_.next_word().empty() && !is_keyword(scan_.next_word())) scan_.word("a node");
+    } else if (keyword == "BO_") {
+      read_message(line);
+    } else if (keyword == "SG_") {
+      read_signal(line);
+    } else if (keyword == "SIG_VALTYPE_") {
+      read_value_type(line);
+    } else if (keyword == "SG_MUL_VAL_") {
+      read_pages(line);
+    } else if (keyword == "BA_DEF_") {
+      read_attribute_definition();
+    } else if (keyword == "BA_DEF_DEF_") {
+      read_attribute_default(line);
+    } else if (keyword == "BA_") {
+      read_attribute(line);
+    } else {
+      scan_.skip_statement();
+    }
+  }
+
+  void read_new_symbols() {
+    scan_.expect(':');
+    // The list has keywords in it; the section behind it is the first word with a colon.
+    while (scan_.next_word() != "BS_" && scan_.next_word() != "BU_") scan_.word("BS_");
+  }
+
+  void read_bit_timing() {
+    scan_.expect(':');
+    if (!scan_.next_word().empty() || scan_.at_end()) return;
+    scan_.integer("a bit rate", UINT32_MAX);
+    scan_.expect(':');
+    scan_.integer("a timing register", UINT32_MAX);
+    scan_.expect(',');
+    scan_.integer("a timing register", UINT32_MAX);
+  }
+
+  void read_message(int line) {
+    Draft draft;
+    DbcMessage& message = draft.message;
+    message.line = line;
+    const auto id = static_cast<std::uint32_t>(scan_.integer("a message's number", UINT32_MAX));
+    message.name = scan_.word("a message's name");
+    scan_.expect(':');
+    message.bytes = scan_.integer("a number of bytes", message_bytes_max);
+    scan_.word("a sender");
+    message.extended = (id & extended_flag) != 0;
+    message.id = id & ~extended_flag;
+    if (message.name != no_message) {
+      if (message.id > (message.extended ? extended_id_max : standard_id_max)) {
+        problem(line, message.name, std::to_string(id),
+                "must be a number of 11 bits, or one of 29 bits with bit 31 set");
+      }
+      if (!names_.insert(message.name).second) {
+        problem(line, message.name, "", "is the name of two messages");
+      }
+    }
+    if (!by_id_.emplace(id, drafts_.size()).second) {
+      problem(line, message.name, std::to_string(id), "is the number of two messages");
+    }
+    drafts_.push_back(std::move(draft));
+    in_message_ = true;
+    signal_names_.clear();
+  }
+
+  void read_signal(int line) {
+    if (!in_message_) {
+      throw DbcSyntaxError{line, "SG_", "must stand below a message (BO_)"};
+    }
+    Draft& draft = drafts_.back();
+    if (draft.message.signals.size() == signals_max) {
+      throw DbcSyntaxError{line, "SG_", "a message must have at most 4096 signals"};
+    }
+    DbcSignal signal;
+    signal.line = line;
+    signal.name = scan_.word("a signal's name");
+    Multiplexing multiplexing;
+    if (!scan_.next_is(':')) {
+      const auto found = multiplexing_of(scan_.next_word());
+      if (!found) scan_.fail("must be ':', M, mN or mNM with a number N");
+      multiplexing = *found;
+      scan_.word("a multiplexing");
+    }
+    scan_.expect(':');
+    const bool has_scale = read_place(signal.place);
+    signal.unit = scan_.text("a unit");
+    read_receivers();
+    signal.place.id = draft.message.id;
+    signal.place.extended_id = draft.message.extended;
+    check_signal(draft.message, signal, has_scale);
+    draft.message.signals.push_back(std::move(signal));
+    draft.multiplexing.push_back(multiplexing);
+  }
+
+  /// `start|length@order sign (factor,offset) [min|max]`
+  /// @return whether the factor can be one
+  bool read_place(CanSignal& place) {
+    place.start_bit = static_cast<int>(scan_.integer("a start bit", 8 * message_bytes_max));
+    scan_.expect('|');
+    place.length_bits = static_cast<int>(scan_.integer("a number of bits", 8 * message_bytes_max));
+    scan_.expect('@');
+    const std::uint64_t order = scan_.integer("1 (Intel) or 0 (Motorola)", 1);
+    place.byte_order = order == 1 ? ByteOrder::little_endian : ByteOrder::big_endian;
+    place.is_signed = scan_.accept('-');
+    if (!place.is_signed) scan_.expect('+');
+    scan_.expect('(');
+    place.scale = scan_.real("a factor");
+    scan_.expect(',');
+    place.offset = scan_.real("an offset");
+    scan_.expect(')');
+    scan_.expect('[');
+    scan_.real("a minimum");
+    scan_.expect('|');
+    scan_.real("a maximum");
+    scan_.expect(']');
+    return place.scale != 0.0;
+  }
+
+  void read_receivers() {
+    if (scan_.next_word().empty() || is_keyword(scan_.next_word())) return;
+    do {
+      scan_.word("a receiver");
+    } while (scan_.accept(','));
+  }
+
+  void check_signal(const DbcMessage& message, DbcSignal& signal, bool has_scale) {
+    if (!signal_names_.insert(signal.name).second) {
+      problem(signal.line, signal.name, "", "is the name of two signals of " + message.name);
+    }
+    if (!has_scale) {
+      problem(signal.line, signal.name, "0", "the factor must not be 0");
+      signal.place.scale = 1.0;
+    }
+    if (message.name == no_message) return;
+    const int length = signal.place.length_bits;
+    if (length < 1 || (length > 64 && message.bytes <= 64)) {
+      problem(signal.line, signal.name, std::to_string(length), "must have 1 to 64 bits");
+    } else if (end_byte(signal.place) > message.bytes) {
+      problem(signal.line, signal.name,
+              std::to_string(signal.place.start_bit) + "|" + std::to_string(length),
+              "must end within the " + std::to_string(message.bytes) + " bytes of " + message.name);
+    }
+  }
+
+  // -------------------------------------------------------------- what is said elsewhere
+
+  Remark read_remark(int line) {
+    Remark remark;
+    remark.line = line;
+    remark.message = static_cast<std::uint32_t>(scan_.integer("a message's number", UINT32_MAX));
+    return remark;
+  }
+
+  void read_value_type(int line) {
+    FloatRemark remark{read_remark(line), 0};
+    remark.signal = scan_.word("a signal's name");
+    static_cast<void>(scan_.accept(':'));
+    remark.type = scan_.integer("0 (whole number), 1 (float) or 2 (double)", 2);
+    scan_.expect(';');
+    floats_.push_back(std::move(remark));
+  }
+
+  void read_pages(int line) {
+    PageRemark remark{read_remark(line), {}, {}};
+    remark.signal = scan_.word("a signal's name");
+    remark.selector = scan_.word("a multiplexor's name");
+    do {
+      CanSelector::Pages pages;
+      pages.first = scan_.integer("the first number of a range", UINT64_MAX);
+      scan_.expect('-');
+      pages.last = scan_.integer("the last number of a range", UINT64_MAX);
+      if (pages.last < pages.first) {
+        throw DbcSyntaxError{line, remark.signal, "a range must not end before it begins"};
+      }
+      remark.pages.push_back(pages);
+    } while (scan_.accept(','));
+    scan_.expect(';');
+    pages_.push_back(std::move(remark));
+  }
+
+  void read_attribute_definition() {
+    const bool of_message = scan_.next_word() == "BO_";
+    if (!scan_.next_word().empty()) scan_.word("an object");
+    const std::string attribute = scan_.text("an attribute's name");
+    if (attribute != frame_format || !of_message || scan_.next_word() != "ENUM") {
+      return scan_.skip_statement();
+    }
+    scan_.word("ENUM");
+    formats_.clear();
+    do {
+      formats_.push_back(scan_.text("a format's name"));
+    } while (scan_.accept(','));
+    scan_.expect(';');
+  }
+
+  void read_attribute_default(int line) {
+    if (scan_.text("an attribute's name") != frame_format) return scan_.skip_statement();
+    FormatRemark remark;
+    remark.line = line;
+    read_format(remark);
+    default_format_ = std::move(remark);
+  }
+
+  void read_attribute(int line) {
+    if (scan_.text("an attribute's name") != frame_format) return scan_.skip_statement();
+    if (scan_.word("BO_") != "BO_") {
+      throw DbcSyntaxError{line, std::string(frame_format), "must be said of a message (BO_)"};
+    }
+    FormatRemark remark{read_remark(line), 0, {}};
+    read_format(remark);
+    format_remarks_.push_back(std::move(remark));
+  }
+
+  void read_format(FormatRemark& remark) {
+    if (scan_.next_is('"')) {
+      remark.format = scan_.text("a format's name");
+    } else {
+      remark.index = scan_.integer("a format's number", UINT32_MAX);
+    }
+    scan_.expect(';');
+  }
+
+  // -------------------------------------------------------------- put together
+
+  void resolve() {
+    resolve_formats();
+    for (const FloatRemark& remark : floats_) apply(remark);
+    std::map<std::pair<std::size_t, std::size_t>, const PageRemark*> pages;
+    for (const PageRemark& remark : pages_) {
+      const auto [draft, index] = find(remark);
+      if (draft == nullptr) continue;
+      const auto place = static_cast<std::size_t>(draft - drafts_.data());
+      if (!draft->multiplexing[index].page) {
+        problem(remark.line, remark.signal, "", "is said to be multiplexed, but not by its SG_");
+      } else if (!pages.emplace(std::pair(place, index), &remark).second) {
+        problem(remark.line, remark.signal, "", "has two lists of ranges");
+      }
+    }
+    for (std::size_t place = 0; place < drafts_.size(); ++place) {
+      Draft& draft = drafts_[place];
+      std::vector<std::optional<Choice>> choices(draft.message.signals.size());
+      for (std::size_t i = 0; i < choices.size(); ++i) {
+        const auto said = pages.find({place, i});
+        choices[i] = choice_of(draft, i, said == pages.end() ? nullptr : said->second);
+      }
+      for (std::size_t i = 0; i < choices.size(); ++i) collect_selectors(draft, choices, i);
+    }
+  }
+
+  /// The draft and the index of its signal that a remark is about; a problem where there is none.
+  std::pair<Draft*, std::size_t> find(const Remark& remark) {
+    const auto found = by_id_.find(remark.message);
+    if (found == by_id_.end()) {
+      problem(remark.line, "", std::to_string(remark.message), "must be a message's number");
+      return {nullptr, 0};
+    }
+    Draft& draft = drafts_[found->second];
+    const auto index = index_of(draft, remark.signal);
+    if (!index) {
+      problem(remark.line, remark.signal, "", "must be a signal of " + draft.message.name);
+      return {nullptr, 0};
+    }
+    return {&draft, *index};
+  }
+
+  static std::optional<std::size_t> index_of(const Draft& draft, std::string_view signal) {
+    const auto& signals = draft.message.signals;
+    const auto found = std::find_if(signals.begin(), signals.end(),
+                                    [&](const DbcSignal& each) { return each.name == signal; });
+    if (found == signals.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - signals.begin());
+  }
+
+  [[nodiscard]] std::optional<bool> is_fd(const FormatRemark& remark) const {
+    constexpr std::array<std::uint64_t, 2> usual{14, 15};  // where the file defines none
+    std::string format = remark.format;
+    if (format.empty() && !formats_.empty()) {
+      if (remark.index >= formats_.size()) return std::nullopt;
+      format = formats_[remark.index];
+    }
+    if (format.empty()) return std::find(usual.begin(), usual.end(), remark.index) != usual.end();
+    return format.find("FD") != std::string::npos;
+  }
+
+  void resolve_formats() {
+    if (default_format_ && !default_format_->format.empty()) {
+      for (Draft& draft : drafts_) draft.message.told_fd = is_fd(*default_format_);
+    }
+    for (const FormatRemark& remark : format_remarks_) {
+      const auto found = by_id_.find(remark.message);
+      const std::optional<bool> fd = is_fd(remark);
+      if (found == by_id_.end()) {
+        problem(remark.line, "", std::to_string(remark.message), "must be a message's number");
+      } else if (!fd) {
+        problem(remark.line, std::string(frame_format), std::to_string(remark.index),
+                "must be one of the formats that BA_DEF_ lists");
+      } else {
+        drafts_[found->second].message.told_fd = fd;
+      }
+    }
+    for (Draft& draft : drafts_) {
+      const bool fd = draft.message.bytes > classic_bytes_max || draft.message.told_fd == true;
+      for (DbcSignal& signal : draft.message.signals) signal.place.fd = fd;
+    }
+  }
+
+  void apply(const FloatRemark& remark) {
+    const auto [draft, index] = find(remark);
+    if (draft == nullptr || remark.type == 0) return;
+    CanSignal& place = draft->message.signals[index].place;
+    const int length = remark.type == 1 ? 32 : 64;
+    if (place.length_bits != length) {
+      problem(remark.line, remark.signal, std::to_string(place.length_bits),
+              "must have " + std::to_string(length) + " bits, being a float of that size");
+      return;
+    }
+    place.is_float = true;
+  }
+
+  /// By which signal of its message a signal is selected, and when.
+  struct Choice {
+    std::size_t selector{0};
+    std::vector<CanSelector::Pages> pages;
+  };
+
+  std::optional<Choice> choice_of(const Draft& draft, std::size_t index, const PageRemark* said) {
+    const DbcSignal& signal = draft.message.signals[index];
+    const std::optional<std::uint64_t> page = draft.multiplexing[index].page;
+    if (!page) return std::nullopt;
+    const auto selects = [](const Multiplexing& each) { return each.selects; };
+    const auto& all = draft.multiplexing;
+    Choice choice{0, {{*page, *page}}};
+    if (said != nullptr) {
+      const auto selector = index_of(draft, said->selector);
+      if (!selector || !all[*selector].selects) {
+        problem(said->line, signal.name, said->selector,
+                "must be a multiplexor of " + draft.message.name);
+        return std::nullopt;
+      }
+      choice = {*selector, said->pages};
+    } else if (std::count_if(all.begin(), all.end(), selects) != 1) {
+      problem(signal.line, signal.name, "m" + std::to_string(*page),
+              "needs a line SG_MUL_VAL_ unless its message has just one multiplexor");
+      return std::nullopt;
+    } else {
+      choice.selector =
+          static_cast<std::size_t>(std::find_if(all.begin(), all.end(), selects) - all.begin());
+    }
+    const int length = draft.message.signals[choice.selector].place.length_bits;
+    const bool reachable =
+        std::any_of(choice.pages.begin(), choice.pages.end(), [length](const auto& pages) {
+          return length >= 64 || pages.first < (std::uint64_t{1} << std::max(length, 0));
+        });
+    if (!reachable) {
+      problem(signal.line, signal.name, std::to_string(choice.pages.front().first),
+              "is more than its multiplexor can be");
+    }
+    return choice;
+  }
+
+  /// A signal is there when its multiplexor selects it and is itself there.
+  void collect_selectors(Draft& draft, const std::vector<std::optional<Choice>>& choices,
+                         std::size_t index) {
+    constexpr std::size_t depth_max = 16;
+    DbcSignal& signal = draft.message.signals[index];
+    std::size_t at = index;
+    while (choices[at]) {
+      if (signal.place.selectors.size() == depth_max) {
+        problem(signal.line, signal.name, "", "must not be selected by itself, nor 17 deep");
+        signal.place.selectors.clear();
+        return;
+      }
+      const CanSignal& place = draft.message.signals[choices[at]->selector].place;
+      signal.place.selectors.push_back(
+          {{place.start_bit, place.length_bits, place.byte_order}, choices[at]->pages});
+      at = choices[at]->selector;
+    }
+  }
+
+  DbcScanner scan_;
+  std::string name_;
+  DbcReading result_;
+  std::vector<Draft> drafts_;
+  std::map<std::uint32_t, std::size_t> by_id_;  ///< as in the file, bit 31 included
+  std::set<std::string> names_;
+  std::set<std::string> signal_names_;  ///< of the message that is being read
+  bool in_message_{false};
+  std::vector<FloatRemark> floats_;
+  std::vector<PageRemark> pages_;
+  std::vector<FormatRemark> format_remarks_;
+  std::vector<std::string> formats_;
+  std::optional<FormatRemark> default_format_;
+};
+
+template <class Entries>
+auto* find_by_name(Entries& entries, std::string_view name) noexcept {
+  const auto found = std::find_if(entries.begin(), entries.end(),
+                                  [name](const auto& entry) { return entry.name == name; });
+  return found == entries.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> names_of(const auto& entries) {
+  std::vector<std::string> names;
+  names.reserve(entries.size());
+  for (const auto& entry : entries) names.push_back(entry.name);
+  return names;
+}
+
+}  // namespace
+
+const DbcSignal* DbcMessage::find(std::string_view signal) const noexcept {
+  return find_by_name(signals, signal);
+}
+
+std::vector<std::string> DbcMessage::signal_names() const {
+  return names_of(signals);
+}
+
+const DbcMessage* DbcFile::find(std::string_view message) const noexcept {
+  return find_by_name(messages, message);
+}
+
+std::vector<std::string> DbcFile::message_names() const {
+  return names_of(messages);
+}
+
+DbcReading read_dbc_text(std::string_view text, const std::string& name) {
+  return DbcReader(text, name).read();
+}
+
+}  // namespace thermocomp

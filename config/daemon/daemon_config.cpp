@@ -1,0 +1,283 @@
+#include "config/daemon/daemon_config.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "config/daemon/named_files.hpp"
+#include "config/model/model_file.hpp"
+#include "config/sections/buses.hpp"
+#include "config/sections/controller_section.hpp"
+#include "config/sections/correction_section.hpp"
+#include "config/sections/estimator_sections.hpp"
+#include "config/sections/model_binding.hpp"
+#include "config/toml/file_limits.hpp"
+#include "config/toml/toml_reader.hpp"
+#include "estimator/temperature_range.hpp"
+
+namespace thermocomp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A path of the file; a relative one starts at the file's folder.
+fs::path read_path(const TomlTable& table, std::string_view key, const fs::path& otherwise,
+                   const fs::path& folder) {
+  const fs::path path = table.text(key, otherwise.string());
+  if (!path.has_filename()) table.problem(key, "must name a file");
+  return path.is_absolute() ? path : (folder / path).lexically_normal();
+}
+
+LoopConfig read_loop(const TomlTable& table) {
+  LoopConfig loop;
+  loop.rate_hz = table.number("rate_hz", Range::between(1, 1000), loop.rate_hz);
+  loop.priority = table.integer("priority", 1, 98, loop.priority);
+  loop.cpu = table.integer("cpu", -1, 1023, loop.cpu);
+  loop.real_time = table.choice<RealTimeRule>(
+      "real_time", {{"warn", RealTimeRule::warn}, {"require", RealTimeRule::require}},
+      loop.real_time);
+  return loop;
+}
+
+HistoryConfig read_history(const TomlTable& table, const fs::path& folder) {
+  HistoryConfig history;
+  history.enabled = table.flag("enabled", history.enabled);
+  history.file = read_path(table, "file", history.file, folder);
+  history.size_MB_max = table.number("size_MB_max", Range::between(1, 1e6), history.size_MB_max);
+  history.age_days_max = table.number("age_days_max", Range::above(0, 36500), history.age_days_max);
+  history.commit_s = table.number("commit_s", Range::between(0.1, 10), history.commit_s);
+  history.offsets_period_s =
+      table.number("offsets_period_s", Range::between(0.01, 3600), history.offsets_period_s);
+  history.segment_h = table.number("segment_h", Range::between(0.01, 168), history.segment_h);
+  return history;
+}
+
+SocketConfig read_socket(const TomlTable& table, const fs::path& folder) {
+  constexpr std::size_t path_max = 107;  // sockaddr_un::sun_path less the end
+  SocketConfig socket;
+  socket.path = read_path(table, "path", socket.path, folder);
+  if (socket.path.string().size() > path_max) {
+    table.problem("path", "must have at most " + std::to_string(path_max) + " characters");
+  }
+  socket.read_group = table.text("read_group", socket.read_group);
+  socket.operator_group = table.text("operator_group", socket.operator_group);
+  socket.bridge_group = table.text("bridge_group", socket.bridge_group);
+  return socket;
+}
+
+/// A reading that is older than its sensor's period must not be stale yet.
+void check_periods(const std::vector<TomlTable>& sensor_tables, const DaemonConfig& config) {
+  const auto stale_after_s = [&](std::size_t sensor) {
+    return config.estimator.sensors[sensor].screening.stale_after_s;
+  };
+  for (const CanopenBusConfig& bus : config.canopen_buses) {
+    for (const CanopenNodeConfig& node : bus.nodes) {
+      for (const CanopenChannel& channel : node.channels) {
+        if (channel.way != CanopenWay::sdo || stale_after_s(channel.sensor) > channel.poll_s) {
+          continue;
+        }
+        sensor_tables[channel.sensor].problem("screening.stale_after_s",
+                                              std::to_string(stale_after_s(channel.sensor)),
+                                              "must be more than poll_s");
+      }
+    }
+  }
+  for (const ModbusBusConfig& bus : config.modbus_buses) {
+    for (const ModbusDeviceConfig& device : bus.devices) {
+      for (const ModbusChannel& channel : device.channels) {
+        if (stale_after_s(channel.sensor) > device.period_s) continue;
+        sensor_tables[channel.sensor].problem(
+            "screening.stale_after_s", std::to_string(stale_after_s(channel.sensor)),
+            "must be more than period_s of the device " + device.name);
+      }
+    }
+  }
+}
+
+void check_controller_period(const TomlTable& compensation, const DaemonConfig& config,
+                             double period_s) {
+  if (config.estimator.compensation.controller_stale_after_s > period_s) return;
+  compensation.problem("controller_stale_after_s",
+                       std::to_string(config.estimator.compensation.controller_stale_after_s),
+                       "must be more than the controller's period_s");
+}
+
+/// Everything but the model's content.
+/// @return the tables that are looked at once more beside the model
+sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folder,
+                                    sections::Presets& presets, sections::DbcFiles& dbc_files,
+                                    sections::EdsFiles& eds_files, DaemonConfig& config) {
+  static_cast<void>(root.integer("format", 1, 1));
+  config.log_level = root.choice<std::string>("log_level",
+                                              {{"trace", "trace"},
+                                               {"debug", "debug"},
+                                               {"info", "info"},
+                                               {"warning", "warning"},
+                                               {"error", "error"}},
+                                              config.log_level);
+  config.state_file = read_path(root, "state_file", config.state_file, folder);
+  config.loop = read_loop(root.table_or_empty("loop"));
+  config.history = read_history(root.table_or_empty("history"), folder);
+  config.socket = read_socket(root.table_or_empty("socket"), folder);
+
+  const std::vector<TomlTable> sensors = root.tables_required("sensor");
+  sections::BindingTables tables{root, root.tables_required("block"), root.tables_required("axis")};
+  config.estimator.sensors = sections::read_sensors(root, sensors);
+  config.estimator.blocks = sections::read_blocks(tables.blocks, config.estimator.sensors);
+  config.estimator.axes = sections::read_axes(tables.axes);
+  sections::SensorBuses buses = sections::read_buses(root, sensors, presets, dbc_files, eds_files);
+  config.modbus_buses = std::move(buses.modbus);
+  config.can_buses = std::move(buses.can);
+  config.canopen_buses = std::move(buses.canopen);
+  config.j1939_buses = std::move(buses.j1939);
+  check_periods(sensors, config);
+
+  sections::ControllerReading controller = sections::read_controller(
+      root.table("controller"), tables.axes, config.estimator.axes, buses.serial_devices);
+  config.controller = std::move(controller.config);
+  config.estimator.signals = std::move(controller.signals);
+  config.dry_run = controller.dry_run;
+  // A dry run stands in for what would be applied (drivers/controllers/dry_run_controller.hpp).
+  config.estimator.controller_reads_back = controller.reads_back || controller.dry_run;
+  const TomlTable compensation = root.table_or_empty("compensation");
+  config.estimator.compensation =
+      sections::read_compensation(compensation, config.estimator.signals);
+  check_controller_period(compensation, config, controller.period_s);
+  config.estimator.correction = sections::read_correction(root.table_or_empty("correction"));
+  // With no offset at the machine what remains there is all of it.
+  if (config.dry_run) config.estimator.correction.measured = MeasuredMeaning::total;
+  return tables;
+}
+
+void check_files(const TomlTable& root, const DaemonConfig& config, const fs::path& folder) {
+  std::vector<NamedFile> files{{root, "", config.file},
+                               {root.table("model"), "file", config.model_file},
+                               {root, "state_file", config.state_file, FileUse::written, {".new"}}};
+  if (config.history.enabled) {
+    files.push_back({root.table_or_empty("history"),
+                     "file",
+                     config.history.file,
+                     FileUse::written,
+                     {"-wal", "-shm", "-journal"}});
+  }
+  files.push_back({root.table_or_empty("socket"), "path", config.socket.path, FileUse::socket, {}});
+  const auto add_read = [&](const TomlTable& table, const char* key) {
+    if (table.is_text(key)) files.push_back({table, key, folder / table.text(key)});
+  };
+  for (const TomlTable& bus : root.tables("bus")) add_read(bus, "dbc");
+  for (const TomlTable& device : root.tables("device")) add_read(device, "eds");
+  check_named_files(files);
+}
+
+struct ModelSource {
+  std::string name;
+  std::optional<std::string> text;  ///< none: a problem already
+};
+
+enum class Files { opened, only_named };
+
+/// The line on which a key of the file's own table stands; 0: none.
+int line_of(const std::string& text, const std::string& key) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number)
+    if (line.starts_with(key) && line.find('=') != std::string::npos) return number;
+  return 0;
+}
+
+/// Numbers that are no temperatures of this machine; the sensors that say so are the
+/// configuration's.
+void add_reference_problems(const ModelSource& source, const DaemonConfig& config,
+                            std::vector<Problem>& problems) {
+  const std::vector<double>& reference_degC = config.model.reference_degC;
+  for (std::size_t i = 0; i < std::min(reference_degC.size(), config.model.inputs.size()); ++i) {
+    const TemperatureRange range(config.estimator, config.model.inputs[i]);
+    if (range.holds(reference_degC[i])) continue;
+    std::string key("reference[");
+    key.append(std::to_string(i)).append("]");
+    std::ostringstream value;
+    value << reference_degC[i];
+    const auto line = line_of(*source.text, "reference");
+    problems.push_back({source.name, line, key, value.str(), range.rule()});
+  }
+}
+
+template <class FindModel>
+DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files files,
+                   sections::Presets presets, sections::DbcFiles dbc_files,
+                   sections::EdsFiles eds_files, FindModel find_model) {
+  DaemonConfig config;
+  config.file = document.name();
+  config.text = document.text();
+  const TomlTable root = document.root();
+  const TomlTable model_table = root.table("model");
+  config.model_file = read_path(model_table, "file", "model.toml", folder);
+  if (!model_table.has("file")) model_table.problem("file", "must be given");
+  const sections::BindingTables tables =
+      read_daemon(root, folder, presets, dbc_files, eds_files, config);
+  if (files == Files::opened) {
+    check_files(root, config, folder);
+  } else if (config.history.file == config.state_file) {
+    root.problem("state_file", "must not be the history's file");
+  }
+
+  const ModelSource source = find_model(model_table, config.model_file);
+  std::vector<Problem> model_problems;
+  if (source.text) {
+    ModelReading reading = read_model_text(*source.text, source.name);
+    model_problems = std::move(reading.problems);
+    config.model = std::move(reading.model);
+    config.model_text = *source.text;
+    config.model_checksum = sha256_hex(*source.text);
+    if (reading.names_known) {
+      sections::check_binding(tables, config.estimator, config.model);
+      sections::check_correction(root.table_or_empty("correction"), config.estimator.correction,
+                                 config.model);
+      add_reference_problems(source, config, model_problems);
+    }
+  }
+  std::vector<Problem> problems = document.all_problems();
+  const std::vector<Problem> preset_problems = presets.problems();
+  problems.insert(problems.end(), preset_problems.begin(), preset_problems.end());
+  const std::vector<Problem>& dbc_problems = dbc_files.problems();
+  problems.insert(problems.end(), dbc_problems.begin(), dbc_problems.end());
+  const std::vector<Problem>& eds_problems = eds_files.problems();
+  problems.insert(problems.end(), eds_problems.begin(), eds_problems.end());
+  problems.insert(problems.end(), model_problems.begin(), model_problems.end());
+  if (!problems.empty()) throw ConfigurationError(std::move(problems));
+  return config;
+}
+
+ModelSource read_model_file(const TomlTable& model_table, const fs::path& path) {
+  ModelSource source{path.string(), std::nullopt};
+  if (!model_table.is_text("file")) return source;
+  try {
+    source.text = read_text_file(path, model_bytes_max);
+  } catch (const ConfigurationError& error) {
+    model_table.problem("file", error.problems().front().rule + " (" + path.string() + ")");
+  }
+  return source;
+}
+
+}  // namespace
+
+DaemonConfig load_daemon_config(const fs::path& path) {
+  const TomlDocument document = TomlDocument::from_file(path);
+  const fs::path folder = fs::absolute(path).parent_path();
+  return build(document, folder, Files::opened, sections::Presets(sections::preset_folders(folder)),
+               sections::DbcFiles(folder), sections::EdsFiles(folder), read_model_file);
+}
+
+DaemonConfig parse_daemon_config(const std::string& config_text, const std::string& config_name,
+                                 const std::string& model_text, const std::string& model_name) {
+  const TomlDocument document = TomlDocument::from_text(config_text, config_name);
+  const fs::path folder = fs::path(config_name).parent_path();
+  return build(document, folder, Files::only_named, sections::Presets({}),
+               sections::DbcFiles(std::nullopt), sections::EdsFiles(std::nullopt),
+               [&](const TomlTable&, const fs::path&) {
+                 return ModelSource{model_name, model_text};
+               });
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,69 @@
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "config/daemon/daemon_config.hpp"
+
+namespace thermocomp {
+namespace {
+
+template <class Entries>
+std::vector<std::string> names_of(const Entries& entries) {
+  std::vector<std::string> names;
+  names.reserve(entries.size());
+  for (const auto& entry : entries) names.push_back(entry.name);
+  return names;
+}
+
+/// Buses that are new, gone or different, by name.
+template <class Bus>
+void compare_buses(const std::vector<Bus>& running, const std::vector<Bus>& next,
+                   std::vector<std::string>& changed) {
+  const auto missing_in = [](const std::vector<Bus>& buses, const Bus& bus) {
+    return std::find(buses.begin(), buses.end(), bus) == buses.end();
+  };
+  std::vector<std::string> names;
+  for (const Bus& bus : running) {
+    if (missing_in(next, bus)) names.push_back(bus.name);
+  }
+  for (const Bus& bus : next) {
+    const bool named = std::find(names.begin(), names.end(), bus.name) != names.end();
+    if (missing_in(running, bus) && !named) names.push_back(bus.name);
+  }
+  for (const std::string& name : names) changed.push_back("bus " + name);
+  if (names.empty() && !(running == next)) changed.emplace_back("order of the buses");
+}
+
+bool same_signs(const std::vector<AxisConfig>& a, const std::vector<AxisConfig>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const AxisConfig& x, const AxisConfig& y) { return x.sign == y.sign; });
+}
+
+}  // namespace
+
+std::vector<std::string> restart_needed(const DaemonConfig& running, const DaemonConfig& next) {
+  std::vector<std::string> changed;
+  const auto compare = [&](bool same, const char* what) {
+    if (!same) changed.emplace_back(what);
+  };
+  compare(running.loop == next.loop, "loop");
+  compare(names_of(running.estimator.sensors) == names_of(next.estimator.sensors),
+          "names or order of the sensors");
+  compare_buses(running.modbus_buses, next.modbus_buses, changed);
+  compare_buses(running.can_buses, next.can_buses, changed);
+  compare_buses(running.canopen_buses, next.canopen_buses, changed);
+  compare_buses(running.j1939_buses, next.j1939_buses, changed);
+  compare(names_of(running.estimator.axes) == names_of(next.estimator.axes),
+          "names, count or order of the axes");
+  // What the controller applies and shows would change its meaning at once.
+  compare(same_signs(running.estimator.axes, next.estimator.axes), "sign of an axis");
+  compare(running.controller == next.controller, "controller, or registers of the axes");
+  compare(running.dry_run == next.dry_run, "dry_run of the controller");
+  compare(running.estimator.signals == next.estimator.signals, "signals of the controller");
+  compare(running.history == next.history, "history");
+  compare(running.socket == next.socket, "socket");
+  compare(running.state_file == next.state_file, "state_file");
+  return changed;
+}
+
+}  // namespace thermocomp

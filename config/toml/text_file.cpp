@@ -1,0 +1,71 @@
+// What toml_reader.hpp offers beside the reader itself and that needs no TOML.
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "config/toml/file_limits.hpp"
+#include "config/toml/toml_reader.hpp"
+
+namespace thermocomp {
+namespace {
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string read_text_file(const std::filesystem::path& path, std::uintmax_t bytes_max) {
+  const auto refuse = [&](const std::string& rule) {
+    throw ConfigurationError({{path.string(), 0, "", "", rule}});
+  };
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (error && error != std::errc::no_such_file_or_directory) {
+    refuse("cannot be read: " + error.message());
+  }
+  if (!std::filesystem::exists(status)) refuse("no such file");
+  if (!std::filesystem::is_regular_file(status)) refuse("must be a regular file");
+  const auto size = std::filesystem::file_size(path, error);
+  if (error) refuse("cannot be read: " + error.message());
+  if (size > bytes_max)
+    refuse("must have at most " + std::to_string(bytes_max / bytes_per_MB) + " MB");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) refuse(std::string("cannot be opened: ") + std::strerror(errno));
+  std::string text(static_cast<std::size_t>(size), '\0');
+  file.read(text.data(), static_cast<std::streamsize>(size));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return text;
+}
+
+std::string read_text_file(const std::filesystem::path& path) {
+  return read_text_file(path, file_bytes_max);
+}
+
+std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
+  constexpr std::size_t name_bytes_max = 100;  // the time grows with its length
+  if (name.size() > name_bytes_max) return {};
+  std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
+  std::string nearest;
+  for (const std::string& candidate : known) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (distance >= best || distance >= name.size()) continue;
+    best = distance;
+    nearest = candidate;
+  }
+  return nearest;
+}
+
+}  // namespace thermocomp

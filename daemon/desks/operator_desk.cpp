@@ -1,0 +1,175 @@
+#include "daemon/desks/operator_desk.hpp"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "config/text/problems.hpp"
+#include "daemon/desks/reference_rules.hpp"
+
+namespace thermocomp {
+namespace {
+
+using nlohmann::json;
+
+std::uint32_t axis_index(const StatusView& view, const json& params) {
+  if (!params.contains("axis") || !params["axis"].is_string())
+    throw RpcError(rpc::invalid_params, "params.axis must be the name of an axis");
+  const auto name = params["axis"].get<std::string>();
+  std::string known;
+  for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i) {
+    const std::string& each = view.config.estimator.axes[i].name;
+    if (each == name) return static_cast<std::uint32_t>(i);
+    known += (known.empty() ? "" : ", ") + each;
+  }
+  throw RpcError(rpc::invalid_params, "axis " + name + " does not exist; there is " + known);
+}
+
+double value_um(const json& params) {
+  if (!params.contains("value_um") || !params["value_um"].is_number() ||
+      !std::isfinite(params["value_um"].get<double>()))
+    throw RpcError(rpc::invalid_params, "params.value_um must be a finite number");
+  return params["value_um"].get<double>();
+}
+
+void refuse_unless(bool holds, const std::string& why) {
+  if (!holds) throw RpcError(rpc::refused, why);
+}
+
+void add_reads(StatusServer& server, const DeskActions& actions) {
+  const auto add = [&](const char* name, json (*make)(const StatusView&)) {
+    server.add_method(name, AccessClass::read,
+                      [actions, make](const json&) { return make(actions.view()); });
+  };
+  add("status", status_json);
+  add("sensors", sensors_json);
+  add("offsets", offsets_json);
+  add("timing", timing_json);
+  add("model", model_json);
+  server.add_method("events", AccessClass::read, [actions](const json&) {
+    return actions.events ? actions.events() : json{{"events", json::array()}};
+  });
+}
+
+/// `result` once `pending` has one.
+RpcPending then(RpcPending pending, std::function<json()> result) {
+  return [pending = std::move(pending), result = std::move(result)]() -> std::optional<json> {
+    if (!pending()) return std::nullopt;
+    return result();
+  };
+}
+
+bool is_forced(const json& params) {
+  if (!params.contains("force")) return false;
+  if (!params["force"].is_boolean())
+    throw RpcError(rpc::invalid_params, "params.force must be true or false");
+  return params["force"].get<bool>();
+}
+
+RpcPending take_reference(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const bool forced = is_forced(params);
+  const auto columns = view.config.model.temperature_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    refuse_unless(view.report.inputs[i].good,
+                  "no reference can be taken: " + columns[i] + " has no good sensor now");
+  const std::string why = why_no_reference(view);
+  refuse_unless(why.empty() || forced,
+                "no reference is taken: " + why +
+                    ". To take it all the same: thermocomp reference --force (on the socket "
+                    "params {\"force\": true})");
+  return then(actions.command({CommandKind::reference, 0, 0.0}), [why, watched = watched_s(view)] {
+    return json{{"done", true}, {"watched_s", watched}, {"although", why}};
+  });
+}
+
+RpcPending note_measured(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
+  constexpr double most_um = 1000.0;  // no thermal displacement; a slip of the keyboard
+  if (!(std::abs(command.value_um) <= most_um))
+    throw RpcError(rpc::invalid_params, "params.value_um must be in [-1000, 1000]");
+  const AxisReport& axis = view.report.axes[command.axis];
+  const double displacement_um = axis.displacement_um;
+  const bool remains = view.config.estimator.correction.measured == MeasuredMeaning::remaining;
+  const double applied_um = std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
+  const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;
+  return then(actions.command(command), [command, displacement_um, remains, effect_um] {
+    // What is left at the tool, where the model is right: nothing but what the offset still lacks.
+    const double left_um = displacement_um + effect_um;
+    return json{
+        {"done", true},
+        {"measured_um", command.value_um},
+        {"meaning", remains ? "remaining" : "total"},
+        {"predicted_um", std::isfinite(displacement_um) ? json(displacement_um) : json(nullptr)},
+        {"predicted_remaining_um", std::isfinite(left_um) ? json(left_um) : json(nullptr)}};
+  });
+}
+
+RpcPending prove(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const Command command{CommandKind::prove, axis_index(view, params), value_um(params)};
+  refuse_unless(!view.config.dry_run, "a dry run writes nothing: no axis would move");
+  const double most_um = view.config.estimator.compensation.prove_um_max;
+  refuse_unless(
+      std::abs(command.value_um) <= most_um,
+      "a proving move is at most compensation.prove_um_max = " + std::to_string(most_um) + " um");
+  const AxisReport& axis = view.report.axes[command.axis];
+  refuse_unless(axis.driven, "the axis is not driven: the controller is offline or not in step");
+  refuse_unless(!axis.proving, "the axis is being proved already");
+  refuse_unless(!has_reason(view.report.reasons, Reason::cutting),
+                "not while the controller says it is cutting");
+  const double rate_um_per_s = view.config.estimator.axes[command.axis].limiter.rate_um_per_s_max;
+  const double takes_s = 2.0 * std::abs(command.value_um) / rate_um_per_s +
+                         view.config.estimator.compensation.prove_hold_s;
+  return then(actions.command(command), [takes_s] {
+    return json{{"done", true}, {"takes_s", takes_s}};
+  });
+}
+
+RpcPending release(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  const Command command{CommandKind::release, axis_index(view, params), 0.0};
+  refuse_unless(view.report.axes[command.axis].latched, "the axis has no latched mismatch");
+  return actions.command(command);
+}
+
+RpcPending reload(const DeskActions& actions) {
+  try {
+    return then(actions.reload(), [actions] {
+      return json{{"done", true}, {"checksum", actions.view().config.model_checksum}};
+    });
+  } catch (const ConfigurationError& error) {
+    throw RpcError(
+        rpc::refused,
+        std::string("nothing was taken, the running configuration stays:\n") + error.what());
+  }
+}
+
+}  // namespace
+
+void add_operator_methods(StatusServer& server, const DeskActions& actions) {
+  add_reads(server, actions);
+  const auto add = [&](const char* name, RpcSlowHandler handler) {
+    server.add_slow_method(name, AccessClass::operate, std::move(handler));
+  };
+  const auto simple = [&](const char* name, CommandKind kind) {
+    add(name, [actions, kind](const json&) { return actions.command({kind, 0, 0.0}); });
+  };
+  simple("enable", CommandKind::enable);
+  simple("disable", CommandKind::disable);
+  simple("cycle_end", CommandKind::cycle_end);
+  add("reference", [actions](const json& params) { return take_reference(actions, params); });
+  add("measured", [actions](const json& params) { return note_measured(actions, params); });
+  add("prove", [actions](const json& params) { return prove(actions, params); });
+  add("release", [actions](const json& params) { return release(actions, params); });
+  add("reload", [actions](const json&) { return reload(actions); });
+  server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
+    refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");
+    return actions.controller_state(params);
+  });
+}
+
+}  // namespace thermocomp

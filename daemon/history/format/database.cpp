@@ -1,0 +1,170 @@
+#include "daemon/history/format/database.hpp"
+
+#include <cstring>
+
+#include <system_error>
+
+namespace thermocomp {
+namespace {
+
+/// A history on read-only media, or in a folder the reader may not write to: SQLite wants to make
+/// the shared-memory file of the write-ahead log there. Without a log nobody is writing either.
+std::string immutable_uri(const std::filesystem::path& file) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(file).string()) {
+    if (c == '?' || c == '#' || c == '%') {
+      constexpr char digits[] = "0123456789ABCDEF";
+      const auto code = static_cast<unsigned char>(c);
+      uri += '%';
+      uri += digits[code >> 4];
+      uri += digits[code & 0xF];
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?immutable=1";
+}
+
+/// The file behind all links, found by the system: SQLite follows them by itself with a frame of
+/// four kilobytes each, which a loop makes more than a thread's stack has.
+/// @throws DatabaseError
+std::filesystem::path followed(const std::filesystem::path& file) {
+  std::filesystem::path path = std::filesystem::absolute(file);
+  constexpr int links_max = 40;
+  std::error_code error;
+  for (int links = 0; std::filesystem::is_symlink(path, error); ++links) {
+    if (links == links_max) {
+      throw DatabaseError(SQLITE_CANTOPEN, file.string() + ": is a loop of links");
+    }
+    path = path.parent_path() / std::filesystem::read_symlink(path, error);
+  }
+  const std::filesystem::path real = std::filesystem::weakly_canonical(path, error);
+  if (error) throw DatabaseError(SQLITE_CANTOPEN, file.string() + ": " + error.message());
+  return real;
+}
+
+bool can_read(sqlite3* handle) {
+  return sqlite3_exec(handle, "SELECT count(*) FROM sqlite_master", nullptr, nullptr, nullptr) ==
+         SQLITE_OK;
+}
+
+}  // namespace
+
+Database::Database(const std::filesystem::path& file, DatabaseMode mode) : file_(file) {
+  const bool read_only = mode == DatabaseMode::read_only;
+  const std::filesystem::path real = followed(file);
+  const int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI |
+                    (read_only ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  int code = sqlite3_open_v2(real.c_str(), &handle_, flags, nullptr);
+  if (code == SQLITE_OK && read_only && !can_read(handle_) &&
+      sqlite3_errcode(handle_) == SQLITE_CANTOPEN &&
+      !std::filesystem::exists(real.string() + "-wal")) {
+    sqlite3_close(handle_);
+    handle_ = nullptr;
+    code = sqlite3_open_v2(immutable_uri(real).c_str(), &handle_, flags, nullptr);
+  }
+  if (code != SQLITE_OK) {
+    const std::string message = file.string() + ": " + sqlite3_errstr(code);
+    sqlite3_close(handle_);
+    throw DatabaseError(code, message);
+  }
+  sqlite3_extended_result_codes(handle_, 1);
+  sqlite3_busy_timeout(handle_, 2000);
+}
+
+Database::~Database() {
+  sqlite3_close(handle_);
+}
+
+void Database::fail(int code) const {
+  throw DatabaseError(code, file_.string() + ": " + sqlite3_errmsg(handle_));
+}
+
+void Database::run(const char* sql) {
+  const int code = sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) fail(code);
+}
+
+std::int64_t Database::number(const char* sql) {
+  Statement statement(*this, sql);
+  return statement.step() ? statement.number(0) : 0;
+}
+
+void require_history(Database& database) {
+  const std::string name = database.file().string();
+  if (database.number("PRAGMA application_id") != history_application_id) {
+    throw HistoryError(name + ": is not a history of thermocomp");
+  }
+  const std::int64_t version = database.number("PRAGMA user_version");
+  if (version < 1) {
+    throw HistoryError(name + ": is of version " + std::to_string(version) +
+                       ", which no thermocomp wrote (damaged)");
+  }
+  if (version > history_version) {
+    throw HistoryError(name + ": is of version " + std::to_string(version) +
+                       ", this program reads up to version " + std::to_string(history_version));
+  }
+}
+
+Statement::Statement(Database& database, const char* sql) : database_(database) {
+  const int code = sqlite3_prepare_v2(database.handle(), sql, -1, &handle_, nullptr);
+  if (code != SQLITE_OK) database.fail(code);
+}
+
+Statement::~Statement() {
+  sqlite3_finalize(handle_);
+}
+
+Statement& Statement::bind(std::int64_t value) {
+  sqlite3_bind_int64(handle_, ++bound_, value);
+  return *this;
+}
+
+Statement& Statement::bind(std::string_view value) {
+  sqlite3_bind_text(handle_, ++bound_, value.data(), static_cast<int>(value.size()),
+                    SQLITE_TRANSIENT);
+  return *this;
+}
+
+Statement& Statement::bind(std::span<const std::byte> value) {
+  // An empty span may have a null pointer, which SQLite would take for NULL.
+  sqlite3_bind_blob64(handle_, ++bound_,
+                      value.empty() ? "" : static_cast<const void*>(value.data()), value.size(),
+                      SQLITE_TRANSIENT);
+  return *this;
+}
+
+bool Statement::step() {
+  const int code = sqlite3_step(handle_);
+  if (code == SQLITE_ROW) return true;
+  if (code != SQLITE_DONE) database_.fail(code);
+  return false;
+}
+
+void Statement::run() {
+  step();
+  sqlite3_reset(handle_);
+  bound_ = 0;
+}
+
+std::int64_t Statement::number(int column) const {
+  return sqlite3_column_int64(handle_, column);
+}
+
+std::string Statement::text(int column) const {
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(handle_, column));
+  const void* bytes = sqlite3_column_blob(handle_, column);
+  std::string text(size, '\0');
+  if (size > 0) std::memcpy(text.data(), bytes, size);
+  return text;
+}
+
+std::vector<std::byte> Statement::blob(int column) const {
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(handle_, column));
+  const void* bytes = sqlite3_column_blob(handle_, column);
+  std::vector<std::byte> blob(size);
+  if (size > 0) std::memcpy(blob.data(), bytes, size);
+  return blob;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,86 @@
+/// The little of SQLite that the history uses, with errors as exceptions and handles that close
+/// themselves. Only for the .cpp files of this folder.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <sqlite3.h>
+
+#include "daemon/history/format/history_error.hpp"
+
+namespace thermocomp {
+
+/// "thco": says that a SQLite file is a history of ours.
+inline constexpr std::int64_t history_application_id = 0x7468636F;
+inline constexpr std::int64_t history_version = 1;
+
+class DatabaseError : public HistoryError {
+ public:
+  DatabaseError(int code, const std::string& message) : HistoryError(message), code_(code) {}
+  [[nodiscard]] int code() const noexcept { return code_; }
+  /// The file's content is wrong, as opposed to the disk not working.
+  [[nodiscard]] bool is_damage() const noexcept {
+    return (code_ & 0xFF) == SQLITE_CORRUPT || (code_ & 0xFF) == SQLITE_NOTADB;
+  }
+  /// No room for more; the connection is as good as before.
+  [[nodiscard]] bool is_full() const noexcept { return (code_ & 0xFF) == SQLITE_FULL; }
+
+ private:
+  int code_;
+};
+
+enum class DatabaseMode { read_only, read_write_create };
+
+class Database {
+ public:
+  Database(const std::filesystem::path& file, DatabaseMode mode);
+  ~Database();
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+
+  void run(const char* sql);                           ///< statements without a result
+  [[nodiscard]] std::int64_t number(const char* sql);  ///< first column of the first row, or 0
+  [[nodiscard]] sqlite3* handle() const noexcept { return handle_; }
+  [[nodiscard]] const std::filesystem::path& file() const noexcept { return file_; }
+  [[noreturn]] void fail(int code) const;
+
+ private:
+  std::filesystem::path file_;
+  sqlite3* handle_{nullptr};
+};
+
+/// @throws HistoryError: the file is of another program, or of a version that is not known
+void require_history(Database& database);
+
+class Statement {
+ public:
+  Statement(Database& database, const char* sql);
+  ~Statement();
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+
+  /// Values in the order of the question marks; then step().
+  Statement& bind(std::int64_t value);
+  Statement& bind(std::string_view value);
+  Statement& bind(std::span<const std::byte> value);
+  /// @return whether there is a row
+  bool step();
+  /// For statements without rows: runs and makes ready for the next values.
+  void run();
+  [[nodiscard]] std::int64_t number(int column) const;
+  [[nodiscard]] std::string text(int column) const;
+  [[nodiscard]] std::vector<std::byte> blob(int column) const;
+
+ private:
+  Database& database_;
+  sqlite3_stmt* handle_{nullptr};
+  int bound_{0};
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,47 @@
+/// Checksums of the history's rows: SQLite has none of its own, and a flipped bit in a packed value
+/// is a value as well. Only for the .cpp files of this folder.
+///
+/// `chunk.checksum` covers the chunk's numbers and records, `segment.checksum` what is written once
+/// for a segment and the texts of its setup. NULL, or no such column: written by an earlier
+/// version.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "daemon/history/format/database.hpp"
+
+namespace thermocomp {
+
+/// FNV-1a, 64 bits, as the signed number that SQLite keeps. Source: draft-eastlake-fnv, section 2.
+class RowChecksum {
+ public:
+  RowChecksum& add(std::int64_t value) noexcept;
+  RowChecksum& add(std::span<const std::byte> bytes) noexcept;  ///< with its length
+  RowChecksum& add(std::string_view text) noexcept;
+  [[nodiscard]] std::int64_t value() const noexcept;
+
+ private:
+  std::uint64_t hash_{0xcbf29ce484222325u};
+};
+
+struct ChunkNumbers {
+  std::int64_t number{0};
+  std::int64_t count{0};
+  std::int64_t through_cycle{0};
+  std::int64_t wall_minus_grid_ns{0};
+};
+[[nodiscard]] std::int64_t checksum_of(const ChunkNumbers& numbers,
+                                       std::span<const std::byte> records) noexcept;
+
+[[nodiscard]] bool has_checksum_columns(Database& database);
+void add_checksum_columns(Database& database);
+
+/// The checksum that the row of this segment ought to have. @throws HistoryError: no such row
+[[nodiscard]] std::int64_t segment_checksum(Database& database, std::int64_t segment);
+/// @throws HistoryError when the row has a checksum that it does not fit
+void check_segment_row(Database& database, std::int64_t segment);
+
+}  // namespace thermocomp

@@ -1,0 +1,298 @@
+#include "daemon/history/reading/history_reader.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include <system_error>
+
+#include "daemon/history/format/chunk_codec.hpp"
+#include "daemon/history/format/database.hpp"
+#include "daemon/history/format/row_checksum.hpp"
+#include "daemon/history/reading/sound_segments.hpp"
+
+namespace thermocomp {
+namespace {
+
+SegmentReason reason_from(std::int64_t code) {
+  if (code < 0 || code > static_cast<std::int64_t>(SegmentReason::gap)) {
+    throw HistoryError("damaged: unknown reason of a segment");
+  }
+  return static_cast<SegmentReason>(code);
+}
+
+void require(bool holds, const char* damage) {
+  if (!holds) throw HistoryError(std::string("damaged: ") + damage);
+}
+
+SegmentInfo segment_from(const Statement& row) {
+  SegmentInfo segment;
+  segment.id = row.number(0);
+  segment.run = row.number(1);
+  segment.setup = row.number(2);
+  segment.reason = reason_from(row.number(3));
+  segment.grid.start = nanoseconds(row.number(4));
+  segment.grid.period = nanoseconds(row.number(5));
+  segment.first_cycle = static_cast<std::uint64_t>(row.number(6));
+  segment.last_cycle = row.number(7);
+  segment.wall_ns = row.number(8);
+  segment.records = static_cast<std::uint64_t>(row.number(9));
+  segment.bytes = static_cast<std::uint64_t>(row.number(10));
+  segment.program_version = row.text(11);
+  check_times(segment);
+  return segment;
+}
+
+constexpr const char* columns_of_segment =
+    "SELECT id, run, setup, reason, grid_start_ns, period_ns, first_cycle, last_cycle,"
+    " wall_ns, records, bytes, program_version FROM segment";
+
+}  // namespace
+
+struct HistoryReader::Parts {
+  explicit Parts(const std::filesystem::path& path)
+      : file(path), database(path, DatabaseMode::read_only) {}
+
+  void read(const char* order, std::vector<SegmentInfo>& found);
+  void limit_to_chunks(SegmentInfo& segment);
+  [[nodiscard]] bool knows(std::int64_t id, const std::vector<SegmentInfo>& found) const;
+
+  std::filesystem::path file;
+  mutable Database database;
+  bool has_checksums{false};
+  std::vector<SegmentInfo> segments;
+  std::vector<HistoryDamage> damage;
+};
+
+bool HistoryReader::Parts::knows(std::int64_t id, const std::vector<SegmentInfo>& found) const {
+  return std::any_of(found.begin(), found.end(),
+                     [id](const SegmentInfo& segment) { return segment.id == id; }) ||
+         std::any_of(damage.begin(), damage.end(),
+                     [id](const HistoryDamage& part) { return part.segment == id; });
+}
+
+/// The rows in that order up to one that is known already. @throws DatabaseError
+void HistoryReader::Parts::read(const char* order, std::vector<SegmentInfo>& found) {
+  Statement rows(database, (std::string(columns_of_segment) + order).c_str());
+  while (rows.step()) {
+    const std::int64_t id = rows.number(0);
+    if (knows(id, found)) return;
+    try {
+      found.push_back(segment_from(rows));
+      limit_to_chunks(found.back());
+    } catch (const DatabaseError&) {
+      throw;
+    } catch (const HistoryError& error) {
+      damage.push_back({id, error.what()});
+    }
+  }
+}
+
+/// A last cycle that no chunk reaches would let a replay go on with old inputs for ever.
+void HistoryReader::Parts::limit_to_chunks(SegmentInfo& segment) {
+  const std::int64_t none = static_cast<std::int64_t>(segment.first_cycle) - 1;
+  if (segment.last_cycle == none) return;
+  Statement newest(database,
+                   "SELECT max(through_cycle) FROM"
+                   " (SELECT through_cycle FROM chunk WHERE segment = ? ORDER BY number DESC"
+                   " LIMIT 2)");
+  newest.bind(segment.id);
+  const std::int64_t through = newest.step() ? std::max(newest.number(0), none) : none;
+  if (through >= segment.last_cycle) return;
+  segment.last_cycle = through;
+  damage.push_back({segment.id, "its chunks end before its last cycle"});
+}
+
+HistoryReader::HistoryReader(const std::filesystem::path& file) {
+  std::error_code failed;
+  if (!std::filesystem::exists(file, failed)) {
+    throw HistoryError(file.string() + ": " +
+                       (failed ? failed.message() : std::string("there is no such file")));
+  }
+  parts_ = std::make_unique<Parts>(file);
+  require_history(parts_->database);
+  parts_->has_checksums = has_checksum_columns(parts_->database);
+  std::vector<SegmentInfo> found;
+  try {
+    parts_->read(" ORDER BY id", found);
+  } catch (const DatabaseError& error) {
+    // A page of the table is damaged: what stands behind it is read from the other end.
+    parts_->damage.push_back({0, std::string("some segments cannot be read: ") + error.what()});
+    try {
+      parts_->read(" ORDER BY id DESC", found);
+    } catch (const DatabaseError&) {  // told already
+    }
+    if (found.empty()) throw;
+  }
+  std::sort(found.begin(), found.end(),
+            [](const SegmentInfo& a, const SegmentInfo& b) { return a.id < b.id; });
+  parts_->segments = sound_segments(std::move(found), parts_->damage);
+}
+
+HistoryReader::~HistoryReader() = default;
+HistoryReader::HistoryReader(HistoryReader&&) noexcept = default;
+
+const std::filesystem::path& HistoryReader::file() const noexcept {
+  return parts_->file;
+}
+const std::vector<SegmentInfo>& HistoryReader::segments() const noexcept {
+  return parts_->segments;
+}
+const std::vector<HistoryDamage>& HistoryReader::damage() const noexcept {
+  return parts_->damage;
+}
+
+SegmentSetup HistoryReader::setup(const SegmentInfo& segment) const {
+  Statement row(parts_->database,
+                "SELECT config_text, model_text, model_checksum FROM setup WHERE id = ?");
+  row.bind(segment.setup);
+  if (!row.step()) {
+    throw HistoryError(parts_->file.string() + ": the configuration of segment " +
+                       std::to_string(segment.id) + " is missing");
+  }
+  return {row.text(0), row.text(1), row.text(2)};
+}
+
+SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
+  if (parts_->has_checksums) check_segment_row(parts_->database, segment.id);
+  Statement row(parts_->database, "SELECT estimator_state, inputs FROM segment WHERE id = ?");
+  row.bind(segment.id);
+  if (!row.step()) {
+    throw HistoryError(parts_->file.string() + ": segment " + std::to_string(segment.id) +
+                       " was deleted meanwhile");
+  }
+  SegmentStart start;
+  start.estimator_state = row.blob(0);
+  take_seal(start.estimator_state);
+  decode_inputs(row.blob(1), start.readings, start.controller);
+  return start;
+}
+
+RecordCursor HistoryReader::records(const SegmentInfo& segment) const {
+  return RecordCursor(*this, segment);
+}
+
+struct RecordCursor::Parts {
+  Parts(Database& database_in, SegmentInfo segment_in, bool has_checksums_in)
+      : database(database_in), segment(std::move(segment_in)), has_checksums(has_checksums_in) {}
+  void decode(std::vector<std::byte> bytes, std::uint64_t count);
+
+  Database& database;
+  SegmentInfo segment;
+  bool has_checksums;
+  std::int64_t next_chunk{0};
+  std::int64_t through{-1};  ///< last cycle that the chunks read so far hold whole
+  std::int64_t wall_minus_grid_ns{0};
+  bool wall_was_impossible{false};
+  std::uint64_t newest_cycle{0};  ///< of the chunks so far
+  bool has_offsets{false};        ///< the newest record is an offset of that cycle
+  std::vector<Record> records;    ///< of the chunk
+  std::size_t given{0};           ///< of those
+};
+
+RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segment)
+    : parts_(
+          std::make_unique<Parts>(reader.parts_->database, segment, reader.parts_->has_checksums)) {
+  parts_->wall_minus_grid_ns = segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
+  parts_->through = static_cast<std::int64_t>(segment.first_cycle) - 1;
+  parts_->newest_cycle = segment.first_cycle;
+}
+RecordCursor::~RecordCursor() = default;
+RecordCursor::RecordCursor(RecordCursor&&) noexcept = default;
+
+std::int64_t RecordCursor::wall_minus_grid_ns() const noexcept {
+  return parts_->wall_minus_grid_ns;
+}
+
+bool RecordCursor::wall_time_was_impossible() const noexcept {
+  return parts_->wall_was_impossible;
+}
+
+/// All of it, before any of it is given out.
+void RecordCursor::Parts::decode(std::vector<std::byte> bytes, std::uint64_t count) {
+  if (count > bytes.size()) throw HistoryError("damaged: more records than bytes");
+  std::vector<Record> decoded;
+  decoded.reserve(count);
+  ChunkDecoder chunk(std::move(bytes), count);
+  std::uint64_t cycle = newest_cycle;
+  bool is_offset = has_offsets;
+  for (Record record; chunk.next(record); decoded.push_back(record)) {
+    // Within a cycle the offsets, which come out of its step, are the last.
+    const bool is_late = record.cycle == cycle && is_offset && record.kind != RecordKind::offset;
+    require(record.cycle >= cycle && !is_late, "records are out of order");
+    cycle = record.cycle;
+    is_offset = record.kind == RecordKind::offset;
+  }
+  newest_cycle = cycle;
+  has_offsets = is_offset;
+  records = std::move(decoded);
+  given = 0;
+}
+
+/// @return false when the segment's chunks are at their end
+bool RecordCursor::load_chunk() {
+  Parts& parts = *parts_;
+  // A statement of its own for each chunk: a read transaction that stays open would keep the
+  // daemon's write-ahead log from being taken back.
+  Statement row(parts.database, parts.has_checksums
+                                    ? "SELECT records, count, through_cycle, wall_minus_grid_ns,"
+                                      " checksum IS NULL, checksum FROM chunk"
+                                      " WHERE segment = ? AND number = ?"
+                                    : "SELECT records, count, through_cycle, wall_minus_grid_ns, 1"
+                                      " FROM chunk WHERE segment = ? AND number = ?");
+  row.bind(parts.segment.id).bind(parts.next_chunk);
+  const std::string chunk = "chunk " + std::to_string(parts.next_chunk);
+  if (!row.step()) {
+    if (parts.through >= parts.segment.last_cycle) return false;
+    throw HistoryError(chunk + " is missing (damaged, or deleted meanwhile)");
+  }
+  std::vector<std::byte> records = row.blob(0);
+  const ChunkNumbers numbers{parts.next_chunk, row.number(1), row.number(2), row.number(3)};
+  if (row.number(4) == 0 && row.number(5) != checksum_of(numbers, records)) {
+    throw HistoryError(chunk + " does not fit its checksum");
+  }
+  try {
+    parts.decode(std::move(records), static_cast<std::uint64_t>(numbers.count));
+  } catch (const HistoryError& error) {
+    throw HistoryError(chunk + ": " + error.what());
+  }
+  ++parts.next_chunk;
+  parts.through = numbers.through_cycle;
+  const std::int64_t begin_ns = parts.segment.grid.time_of(parts.segment.first_cycle).count();
+  const std::int64_t difference_ns = numbers.wall_minus_grid_ns;
+  if (difference_ns >= -grid_ns_max && difference_ns <= wall_ns_max - begin_ns) {
+    parts.wall_minus_grid_ns = difference_ns;
+  } else {
+    parts.wall_was_impossible = true;
+  }
+  return true;
+}
+
+bool RecordCursor::next(Record& out) {
+  Parts& parts = *parts_;
+  while (parts.given == parts.records.size()) {
+    if (!load_chunk()) return false;
+  }
+  out = parts.records[parts.given++];
+  // What follows the last cycle was cut off before its cycle was whole.
+  return out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
+}
+
+bool RecordCursor::resume() {
+  Parts& parts = *parts_;
+  parts.records.clear();
+  parts.given = 0;
+  try {
+    Statement row(parts.database,
+                  "SELECT number FROM chunk WHERE segment = ? AND number > ?"
+                  " ORDER BY number LIMIT 1");
+    row.bind(parts.segment.id).bind(parts.next_chunk);
+    if (!row.step()) return false;
+    parts.next_chunk = row.number(0);
+    return true;
+  } catch (const DatabaseError&) {
+    return false;  // the index itself is damaged
+  }
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,82 @@
+/// Reads a history, also one that a daemon is writing at the moment.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/history/format/history_error.hpp"
+#include "daemon/history/format/segment_info.hpp"
+#include "daemon/recording/record.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+struct SegmentSetup {
+  std::string config_text;
+  std::string model_text;
+  std::string model_checksum;
+};
+
+/// What was in force right before the first cycle of a segment.
+struct SegmentStart {
+  std::vector<std::byte> estimator_state;
+  std::vector<Reading> readings;
+  ControllerState controller;
+};
+
+class HistoryReader;
+
+/// The records of one segment in the order in which they reached the estimator, a chunk at a time.
+class RecordCursor {
+ public:
+  RecordCursor(const HistoryReader& reader, const SegmentInfo& segment);
+  ~RecordCursor();
+  RecordCursor(RecordCursor&&) noexcept;
+  /// Nothing of a chunk that is not sound is given out: its checksum is looked at (histories of
+  /// earlier versions have none), and that all of it can be decoded.
+  /// @return false after the last record of the segment's whole cycles
+  /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted meanwhile
+  bool next(Record& out);
+  /// After an error: goes on with the next chunk there is. What its records leave out is unknown.
+  /// @return false when there is none
+  bool resume();
+  /// Whether a chunk so far said a wall time that cannot be; the last good difference then counts.
+  [[nodiscard]] bool wall_time_was_impossible() const noexcept;
+  /// Wall clock minus the grid's time, as noted with the record last returned [ns].
+  [[nodiscard]] std::int64_t wall_minus_grid_ns() const noexcept;
+
+ private:
+  struct Parts;
+  bool load_chunk();
+  std::unique_ptr<Parts> parts_;
+};
+
+class HistoryReader {
+ public:
+  /// Opens for reading only and takes note of the segments there are now. A segment that cannot be
+  /// (or overlaps the one in front of it) is left out and told by damage(); a wall time that cannot
+  /// be, of a clock that was set wrong, is replaced by what the segments beside it say.
+  /// @throws HistoryError naming the file: missing, no history, of no version that there is, or so
+  ///         damaged that there is nothing to be taken from it
+  explicit HistoryReader(const std::filesystem::path& file);
+  ~HistoryReader();
+  HistoryReader(HistoryReader&&) noexcept;
+
+  [[nodiscard]] const std::filesystem::path& file() const noexcept;
+  [[nodiscard]] const std::vector<SegmentInfo>& segments() const noexcept;  ///< oldest first
+  [[nodiscard]] const std::vector<HistoryDamage>& damage() const noexcept;
+  [[nodiscard]] SegmentSetup setup(const SegmentInfo& segment) const;
+  [[nodiscard]] SegmentStart start(const SegmentInfo& segment) const;
+  [[nodiscard]] RecordCursor records(const SegmentInfo& segment) const;
+
+ private:
+  friend class RecordCursor;
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace thermocomp

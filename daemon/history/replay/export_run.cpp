@@ -1,0 +1,212 @@
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <ostream>
+#include <stdexcept>
+
+#include "config/text/printable_text.hpp"
+#include "daemon/history/replay/replay.hpp"
+#include "daemon/history/replay/segment_export.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// A comment line where nothing is known between two segments; empty where they join.
+std::string gap_line(const HistoryClock& clock, const SegmentInfo& before, const SegmentInfo& after,
+                     double first_s) {
+  const double from_s =
+      clock.seconds_at(before, static_cast<std::uint64_t>(before.last_cycle + 1)) - first_s;
+  const double to_s = clock.seconds_at(after, after.first_cycle) - first_s;
+  const double period_s = std::chrono::duration<double>(after.grid.period).count();
+  if (!(to_s - from_s > 0.5 * period_s)) return {};
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "# nothing is recorded from %.3f s to %.3f s: %s\n",
+                from_s, to_s,
+                after.reason == SegmentReason::gap ? "lost" : "the daemon ended and began again");
+  return text.data();
+}
+
+/// Whether all of the segment lies beside [from, to), as far as seconds tell.
+bool is_beside(const HistoryClock& clock, const SegmentInfo& segment,
+               const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to) {
+  const auto end = static_cast<std::uint64_t>(segment.last_cycle + 1);
+  const bool is_before_it =
+      from && from->seconds && clock.seconds_at(segment, end) < *from->seconds;
+  return is_before_it ||
+         (to && to->seconds && clock.seconds_at(segment, segment.first_cycle) >= *to->seconds);
+}
+
+bool is_before(double time_s, std::int64_t wall_ns, const HistoryTime& bound) {
+  return bound.seconds ? time_s < *bound.seconds : wall_ns < *bound.wall_ns;
+}
+
+/// "# 12.500 s: what\n"
+std::string comment_at(double time_s, const std::string& what) {
+  std::array<char, 40> time{};
+  std::snprintf(time.data(), time.size(), "# %.3f s: ", time_s);
+  return time.data() + printable_text(what) + "\n";  // a damaged file may say anything
+}
+
+/// Says when a row's wall time is worth a comment: the first, one an hour, and one that does not
+/// follow from the last that was told.
+class WallComments {
+ public:
+  /// @return empty: nothing to tell
+  std::string at(double time_s, std::int64_t wall_ns) {
+    constexpr double every_s = 3600.0;
+    constexpr double off_s_max = 0.5;
+    const double expected_s = 1e-9 * static_cast<double>(wall_ns - told_wall_ns_);
+    const double passed_s = time_s - told_s_;
+    const bool follows = std::abs(expected_s - passed_s) <= off_s_max;
+    if (is_told_ && follows && passed_s < every_s) return {};
+    is_told_ = true;
+    told_s_ = time_s;
+    told_wall_ns_ = wall_ns;
+    return comment_at(time_s, "wall time " + utc_text(wall_ns));
+  }
+
+ private:
+  bool is_told_{false};
+  double told_s_{0.0};
+  std::int64_t told_wall_ns_{0};
+};
+
+/// Writes rows as the segments give them, and between them comment lines.
+class RunExport {
+ public:
+  RunExport(const HistoryReader& reader, const SetupParser& parser, ExportContent content,
+            const std::optional<HistoryTime>& from, const std::optional<HistoryTime>& to,
+            std::ostream& out)
+      : reader_(reader), setups_(reader, parser), clock_(reader), from_(from), to_(to), out_(out) {
+    columns_.column("time_s");
+    const std::map<std::int64_t, std::vector<bool>> probed = find_probed();
+    for (const auto& [id, setup] : setups_.all()) {
+      const auto found = probed.find(id);
+      places_[id] = export_places(
+          setup, content, found != probed.end() ? found->second : std::vector<bool>{}, columns_);
+    }
+    summary_.columns = columns_.names();
+    append_header(text_, columns_.names());
+    row_.resize(columns_.names().size());
+    summary_.damage = reader.damage();
+    tell_damage();
+  }
+
+  ExportSummary run(const Progress& progress) {
+    std::size_t done = 0;
+    for (const SegmentInfo& segment : reader_.segments()) {
+      if (!is_beside(clock_, segment, from_, to_)) take(segment);
+      ++done;
+      if (progress) {
+        progress(static_cast<double>(done) / static_cast<double>(reader_.segments().size()));
+      }
+    }
+    out_ << text_;
+    return std::move(summary_);
+  }
+
+ private:
+  /// By setup, which axes were probed in the segments that are exported.
+  [[nodiscard]] std::map<std::int64_t, std::vector<bool>> find_probed() const {
+    std::map<std::int64_t, std::vector<bool>> probed;
+    for (const SegmentInfo& segment : reader_.segments()) {
+      const auto setup = setups_.all().find(segment.setup);
+      if (setup == setups_.all().end() || is_beside(clock_, segment, from_, to_)) continue;
+      const std::size_t axes = setup->second.estimator.axes.size();
+      std::vector<bool>& all = probed[segment.setup];
+      all.resize(axes, false);
+      note_probed(reader_, segment, all);
+    }
+    return probed;
+  }
+
+  void take(const SegmentInfo& segment) {
+    try {
+      SegmentExport walk(reader_, segment, setups_.of(segment), places_.at(segment.setup),
+                         summary_.damage);
+      std::uint64_t cycle = 0;
+      while (walk.next(cycle)) {
+        tell_damage();
+        const double time_s = clock_.seconds_at(segment, cycle);
+        const std::int64_t wall_ns = walk.wall_ns(cycle);
+        const bool is_wanted = !(from_ && is_before(time_s, wall_ns, *from_)) &&
+                               !(to_ && !is_before(time_s, wall_ns, *to_));
+        if (!is_wanted) {
+          walk.skip();
+          continue;
+        }
+        write(segment, cycle, time_s, wall_ns, walk);
+      }
+    } catch (const std::exception& error) {
+      summary_.damage.push_back({segment.id, error.what()});
+    }
+    tell_damage();
+  }
+
+  void write(const SegmentInfo& segment, std::uint64_t cycle, double time_s, std::int64_t wall_ns,
+             SegmentExport& walk) {
+    if (!first_s_) first_s_ = time_s;
+    std::fill(row_.begin(), row_.end(), not_a_number);
+    walk.fill(row_, cycle);
+    row_[0] = time_s - *first_s_;
+    if (last_written_ != nullptr && last_written_ != &segment) {
+      const std::string gap = gap_line(clock_, *last_written_, segment, *first_s_);
+      text_ += gap;
+      if (!gap.empty()) ++summary_.gaps;
+    }
+    tell_setup(segment);
+    last_written_ = &segment;
+    text_ += wall_.at(row_[0], wall_ns);
+    for (const std::string& what : walk.happened()) text_ += comment_at(row_[0], what);
+    append_row(text_, row_);
+    out_ << text_;
+    text_.clear();
+    ++summary_.rows;
+  }
+
+  void tell_setup(const SegmentInfo& segment) {
+    if (last_written_ != nullptr && last_written_->setup == segment.setup) return;
+    const std::string checksum = reader_.setup(segment).model_checksum;
+    text_ += comment_at(row_[0], (last_written_ == nullptr ? "model SHA-256 "
+                                                           : "reloaded or restarted with another "
+                                                             "configuration, model SHA-256 ") +
+                                     checksum);
+  }
+
+  void tell_damage() {
+    for (; told_ < summary_.damage.size(); ++told_) text_ += damage_line(summary_.damage[told_]);
+  }
+
+  const HistoryReader& reader_;
+  ParsedSetups setups_;
+  HistoryClock clock_;
+  const std::optional<HistoryTime>& from_;
+  const std::optional<HistoryTime>& to_;
+  std::ostream& out_;
+  RunColumns columns_;
+  std::map<std::int64_t, ExportPlaces> places_;
+  ExportSummary summary_;
+  std::size_t told_{0};  ///< of its damage
+  std::string text_;
+  std::vector<double> row_;
+  std::optional<double> first_s_;
+  WallComments wall_;
+  const SegmentInfo* last_written_{nullptr};
+};
+
+}  // namespace
+
+ExportSummary export_run(const std::filesystem::path& history,
+                         const std::optional<HistoryTime>& from,
+                         const std::optional<HistoryTime>& to, std::ostream& out,
+                         const Progress& progress, const SetupParser& parser,
+                         ExportContent content) {
+  const HistoryReader reader(history);
+  return RunExport(reader, parser, content, from, to, out).run(progress);
+}
+
+}  // namespace thermocomp

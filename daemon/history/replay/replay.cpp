@@ -1,0 +1,175 @@
+#include "daemon/history/replay/replay.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ostream>
+
+#include "daemon/history/replay/segment_steps.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
+#include "estimator/pipeline/estimator.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr std::uint64_t progress_every = 1u << 16;  ///< steps
+
+/// The axes of an offset group as the daemon noted them.
+struct NotedOffsets {
+  std::array<double, axes_max> offset_um{};
+  std::array<bool, axes_max> valid{};
+  std::uint32_t link_epoch{0};
+  std::size_t axes{0};
+};
+
+class SegmentReplay {
+ public:
+  SegmentReplay(const HistoryReader& reader, const SegmentInfo& segment, const ReplaySetup& setup,
+                const HistoryClock& clock, const OffsetSink& sink, ReplaySummary& summary)
+      : segment_(segment),
+        steps_(reader, segment, setup),
+        clock_(clock),
+        sink_(sink),
+        summary_(summary) {}
+
+  /// @param each  called now and then with the cycles done
+  void run(const std::function<void(std::uint64_t)>& each) {
+    while (steps_.step()) {
+      ++summary_.cycles;
+      if (steps_.noted_offset() != nullptr) take_offsets(steps_.cycle());
+      const std::uint64_t next = steps_.cycle() + 1;
+      if (next % progress_every == 0) each(next - segment_.first_cycle);
+    }
+  }
+
+ private:
+  void take_offsets(std::uint64_t cycle) {
+    NotedOffsets noted;
+    const EstimatorConfig& config = steps_.estimator().config();
+    while (const Record* record = steps_.noted_offset()) {
+      if (record->index >= config.axes.size()) throw HistoryError("damaged: an offset of no axis");
+      noted.offset_um[record->index] = record->value;
+      noted.valid[record->index] = record->detail != 0;
+      noted.link_epoch = static_cast<std::uint32_t>(record->time_ns);
+      noted.axes = record->index + std::size_t{1};
+      steps_.next();
+    }
+    compare(cycle, noted);
+    if (!sink_) return;
+    sink_({clock_.seconds_at(segment_, cycle), cycle, &config,
+           std::span<const double>(steps_.command().offset_um).first(noted.axes),
+           std::span<const double>(noted.offset_um).first(noted.axes)});
+  }
+
+  void compare(std::uint64_t cycle, const NotedOffsets& noted) {
+    const OffsetCommand& command = steps_.command();
+    for (std::size_t axis = 0; axis < noted.axes; ++axis) {
+      ++summary_.compared;
+      if (same_bits(command.offset_um[axis], noted.offset_um[axis]) &&
+          command.valid[axis] == noted.valid[axis] && command.link_epoch == noted.link_epoch) {
+        continue;
+      }
+      ++summary_.different;
+      const double difference_um = std::abs(command.offset_um[axis] - noted.offset_um[axis]);
+      if (!(difference_um <= summary_.largest_difference_um)) {
+        summary_.largest_difference_um = difference_um;
+      }
+      if (!summary_.first_different_cycle) {
+        summary_.first_different_cycle = cycle;
+        summary_.first_different_time_s = clock_.seconds_at(segment_, cycle);
+      }
+    }
+  }
+
+  const SegmentInfo& segment_;
+  SegmentSteps steps_;
+  const HistoryClock& clock_;
+  const OffsetSink& sink_;
+  ReplaySummary& summary_;
+};
+
+std::uint64_t cycles_of(const SegmentInfo& segment) {
+  return static_cast<std::uint64_t>(segment.last_cycle + 1) - segment.first_cycle;
+}
+
+using DamageSink = std::function<void(const HistoryDamage&)>;
+
+ReplaySummary replay_all(const HistoryReader& reader, const ParsedSetups& setups,
+                         const OffsetSink& sink, const DamageSink& tell, const Progress& progress) {
+  ReplaySummary summary;
+  const auto note = [&](const HistoryDamage& damage) {
+    if (tell) tell(damage);
+    summary.damage.push_back(damage);
+  };
+  for (const HistoryDamage& damage : reader.damage()) note(damage);
+  const HistoryClock clock(reader);
+  std::uint64_t total = 0;
+  for (const SegmentInfo& segment : reader.segments()) total += cycles_of(segment);
+  std::uint64_t done = 0;
+  for (const SegmentInfo& segment : reader.segments()) {
+    if (segment.reason == SegmentReason::gap) ++summary.gaps;
+    try {
+      SegmentReplay replayed(reader, segment, setups.of(segment), clock, sink, summary);
+      replayed.run([&](std::uint64_t cycles) {
+        if (progress) progress(static_cast<double>(done + cycles) / static_cast<double>(total));
+      });
+      ++summary.segments;
+    } catch (const std::exception& error) {
+      note({segment.id, "(written by version " + segment.program_version +
+                            ") cannot be replayed: " + error.what()});
+    }
+    done += cycles_of(segment);
+  }
+  if (progress) progress(1.0);
+  return summary;
+}
+
+}  // namespace
+
+std::string sensor_column(const std::string& sensor) {
+  constexpr std::string_view unit = "_degC";
+  const bool has_unit = sensor.size() > unit.size() && sensor.ends_with(unit);
+  return has_unit ? sensor : sensor + std::string(unit);
+}
+
+ReplaySummary replay(const std::filesystem::path& history, const OffsetSink& sink,
+                     const Progress& progress, const SetupParser& parser) {
+  const HistoryReader reader(history);
+  const ParsedSetups setups(reader, parser);
+  return replay_all(reader, setups, sink, {}, progress);
+}
+
+ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& out,
+                            const Progress& progress, const SetupParser& parser) {
+  const HistoryReader reader(history);
+  const ParsedSetups setups(reader, parser);
+  RunColumns columns;
+  columns.column("time_s");
+  for (const auto& [id, setup] : setups.all()) {
+    for (const AxisConfig& axis : setup.estimator.axes) {
+      columns.column(axis.name + "_offset_um");
+      columns.column(axis.name + "_recorded_um");
+    }
+  }
+  std::string text;
+  append_header(text, columns.names());
+  std::vector<double> row(columns.names().size());
+  const OffsetSink sink = [&](const ReplayedOffsets& offsets) {
+    std::fill(row.begin(), row.end(), not_a_number);
+    row[0] = offsets.time_s;
+    for (std::size_t axis = 0; axis < offsets.offset_um.size(); ++axis) {
+      const std::string& name = offsets.config->axes[axis].name;
+      row[columns.column(name + "_offset_um")] = offsets.offset_um[axis];
+      row[columns.column(name + "_recorded_um")] = offsets.recorded_um[axis];
+    }
+    append_row(text, row);
+    out << text;
+    text.clear();
+  };
+  const DamageSink tell = [&](const HistoryDamage& damage) { text += damage_line(damage); };
+  const ReplaySummary summary = replay_all(reader, setups, sink, tell, progress);
+  out << text;
+  return summary;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,292 @@
+#include "daemon/history/replay/segment_export.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "config/text/number_text.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr std::size_t none = ExportPlaces::none;
+
+bool is_in_a_block(const EstimatorConfig& config, std::size_t sensor) {
+  return std::any_of(config.blocks.begin(), config.blocks.end(), [&](const BlockConfig& block) {
+    return std::find(block.sensors.begin(), block.sensors.end(), sensor) != block.sensors.end();
+  });
+}
+
+double good_value(const Reading& reading) {
+  return reading.fault == Fault::none ? reading.temp_degC : not_a_number;
+}
+
+/// Mean of the block's good readings, each as a difference where it has a reference sensor.
+double block_mean(const BlockConfig& block, const EstimatorConfig& config,
+                  const std::vector<Reading>& readings) {
+  double sum = 0.0;
+  int count = 0;
+  for (const std::size_t sensor : block.sensors) {
+    double value = good_value(readings[sensor]);
+    if (const auto reference = config.sensors[sensor].reference_sensor)
+      value -= good_value(readings[*reference]);
+    if (std::isnan(value)) continue;
+    sum += value;
+    ++count;
+  }
+  return count > 0 ? sum / count : not_a_number;
+}
+
+}  // namespace
+
+ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
+                           const std::vector<bool>& probed, RunColumns& columns) {
+  const EstimatorConfig& config = setup.estimator;
+  const bool as_read = content == ExportContent::sensors;
+  ExportPlaces places;
+  for (const std::string& column : setup.model.temperature_columns())
+    places.inputs.push_back(as_read ? none : columns.column(column));
+  for (std::size_t i = 0; i < config.sensors.size(); ++i) {
+    const bool is_told = as_read || !is_in_a_block(config, i);
+    places.sensors.push_back(is_told ? columns.column(sensor_column(config.sensors[i].name))
+                                     : none);
+  }
+  for (const std::string& signal : config.signals) places.signals.push_back(columns.column(signal));
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    const AxisConfig& axis = config.axes[i];
+    places.displacement.push_back(i < probed.size() && probed[i] ? columns.column(axis.output)
+                                                                 : none);
+  }
+  for (const AxisConfig& axis : config.axes) {
+    places.offsets.push_back(columns.column(axis.name + "_offset_um"));
+    places.applied.push_back(columns.column(axis.name + "_applied_um"));
+    places.measured.push_back(columns.column(axis.name + "_measured_um"));
+  }
+  return places;
+}
+
+void note_probed(const HistoryReader& reader, const SegmentInfo& segment,
+                 std::vector<bool>& probed) noexcept {
+  try {
+    RecordCursor cursor = reader.records(segment);
+    for (bool is_there = true; is_there;) {
+      try {
+        Record record;
+        is_there = cursor.next(record);
+        const bool is_probing = is_there && record.kind == RecordKind::command &&
+                                record.detail == static_cast<std::uint8_t>(CommandKind::measured);
+        if (is_probing && record.index < probed.size()) probed[record.index] = true;
+      } catch (const HistoryError&) {
+        is_there = cursor.resume();
+      }
+    }
+  } catch (const std::exception&) {
+    return;
+  }
+}
+
+SegmentExport::SegmentExport(const HistoryReader& reader, const SegmentInfo& segment,
+                             const ReplaySetup& setup, const ExportPlaces& places,
+                             std::vector<HistoryDamage>& damage)
+    : segment_(segment),
+      config_(setup.estimator),
+      model_(setup.model),
+      dry_run_(setup.dry_run),
+      places_(places),
+      damage_(damage),
+      cursor_(reader.records(segment)),
+      faults_told_(config_.sensors.size(), Fault::never_read) {
+  SegmentStart start = reader.start(segment);
+  if (start.readings.size() != config_.sensors.size())
+    throw HistoryError("damaged: the inputs at its start do not fit its configuration");
+  inputs_.readings = std::move(start.readings);
+  inputs_.controller = start.controller;
+  measured_um_.fill(not_a_number);
+  displacement_um_.fill(not_a_number);
+  offset_um_.fill(not_a_number);
+  try {
+    steps_ = std::make_unique<SegmentSteps>(reader, segment, setup);
+    report_ = steps_->estimator().make_report();
+  } catch (const std::exception& error) {
+    give_up_following(error.what());
+  }
+  advance();
+}
+
+bool SegmentExport::next(std::uint64_t& cycle) {
+  while (has_record_) {
+    if (record_.kind == RecordKind::offset) {
+      cycle = record_.cycle;
+      take_offsets();
+      return true;
+    }
+    take_input();
+    advance();
+  }
+  if (cursor_.wall_time_was_impossible())
+    note("a wall time cannot be (a clock set wrong?); what was recorded is taken");
+  return false;
+}
+
+std::int64_t SegmentExport::wall_ns(std::uint64_t cycle) const {
+  return segment_.grid.time_of(cycle).count() + cursor_.wall_minus_grid_ns();
+}
+
+void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
+  follow(cycle);
+  fill_inputs(row);
+  for (std::size_t i = 0; i < places_.sensors.size(); ++i)
+    if (places_.sensors[i] != none) row[places_.sensors[i]] = good_value(inputs_.readings[i]);
+  tell_faults();
+  for (std::size_t i = 0; i < places_.signals.size(); ++i)
+    row[places_.signals[i]] = inputs_.controller.signals[i];
+  for (std::size_t i = 0; i < places_.offsets.size(); ++i) {
+    row[places_.offsets[i]] = offset_um_[i];
+    // What a dry run shows in its place was not applied.
+    row[places_.applied[i]] = dry_run_ ? not_a_number : inputs_.controller.applied_um[i];
+    row[places_.measured[i]] = measured_um_[i];
+    if (places_.displacement[i] != none) row[places_.displacement[i]] = displacement_um_[i];
+  }
+  measured_um_.fill(not_a_number);
+  displacement_um_.fill(not_a_number);
+}
+
+std::vector<std::string> SegmentExport::happened() {
+  std::vector<std::string> all;
+  all.swap(happened_);
+  if (!not_followed_.empty()) all.push_back(std::move(not_followed_));
+  not_followed_.clear();
+  return all;
+}
+
+void SegmentExport::skip() {
+  happened_.clear();
+  measured_um_.fill(not_a_number);
+  displacement_um_.fill(not_a_number);
+}
+
+void SegmentExport::note(const std::string& why) {
+  constexpr int told_max = 10;
+  if (++told_ <= told_max) damage_.push_back({segment_.id, why});
+  if (told_ == told_max + 1) damage_.push_back({segment_.id, "and more of the kind"});
+}
+
+/// The next record that can be read.
+void SegmentExport::advance() {
+  for (;;) {
+    try {
+      has_record_ = cursor_.next(record_);
+      return;
+    } catch (const HistoryError& error) {
+      note(error.what());
+      inputs_.forget();
+      offset_um_.fill(not_a_number);
+      has_record_ = cursor_.resume();
+      if (!has_record_) return;
+    }
+  }
+}
+
+void SegmentExport::take_input() {
+  try {
+    if (record_.kind == RecordKind::command) {
+      take_command();
+    } else if (record_.kind != RecordKind::skipped) {
+      inputs_.apply(record_);
+    }
+  } catch (const HistoryError& error) {
+    note(error.what());
+  }
+}
+
+void SegmentExport::take_offsets() {
+  const std::uint64_t cycle = record_.cycle;
+  while (has_record_ && record_.kind == RecordKind::offset && record_.cycle == cycle) {
+    if (record_.index < places_.offsets.size()) {
+      offset_um_[record_.index] = record_.value;
+    } else {
+      note("an offset of no axis");
+    }
+    advance();
+  }
+}
+
+void SegmentExport::take_command() {
+  if (record_.detail >= command_kinds_count) throw HistoryError("damaged: unknown command");
+  const auto kind = static_cast<CommandKind>(record_.detail);
+  const bool names_axis =
+      kind == CommandKind::measured || kind == CommandKind::prove || kind == CommandKind::release;
+  if (names_axis && record_.index >= config_.axes.size()) return;
+  std::string text = "command " + std::string(to_string(kind));
+  if (names_axis) text.append(" ").append(config_.axes[record_.index].name);
+  if (names_axis && kind != CommandKind::release)
+    text.append(" ").append(number_text(record_.value)).append(" um");
+  happened_.push_back(std::move(text));
+  if (kind == CommandKind::measured) take_measured();
+}
+
+/// As the estimator takes it: without the offset in effect, which moved the tool.
+void SegmentExport::take_measured() {
+  const std::size_t axis = record_.index;
+  measured_um_[axis] = record_.value;
+  displacement_um_[axis] = record_.value;
+  if (config_.correction.measured != MeasuredMeaning::remaining) return;
+  const double applied_um = inputs_.controller.applied_um[axis];
+  const double effect_um = std::isfinite(applied_um) ? applied_um : offset_um_[axis];
+  displacement_um_[axis] -= config_.axes[axis].sign * effect_um;
+}
+
+/// Steps the estimator up to and with the cycle.
+void SegmentExport::follow(std::uint64_t cycle) {
+  if (!steps_) return;
+  try {
+    while (!(steps_->has_stepped() && steps_->cycle() >= cycle)) {
+      if (!steps_->step()) return give_up_following("damaged: cycles are missing");
+    }
+    steps_->estimator().report(report_);
+  } catch (const std::exception& error) {
+    give_up_following(error.what());
+  }
+}
+
+void SegmentExport::give_up_following(const std::string& why) {
+  steps_.reset();
+  not_followed_ =
+      "from here on the inputs are means of what the sensors read, neither screened nor "
+      "smoothed: " +
+      why;
+}
+
+void SegmentExport::fill_inputs(std::vector<double>& row) {
+  if (steps_) {
+    for (std::size_t i = 0; i < places_.inputs.size(); ++i)
+      if (places_.inputs[i] != none && report_.inputs[i].good)
+        row[places_.inputs[i]] = report_.inputs[i].temp_degC;
+    return;
+  }
+  const std::vector<std::string> columns = model_.temperature_columns();
+  for (std::size_t i = 0; i < places_.inputs.size(); ++i) {
+    if (places_.inputs[i] == none) continue;
+    for (const BlockConfig& block : config_.blocks)
+      if (block.input == columns[i])
+        row[places_.inputs[i]] = block_mean(block, config_, inputs_.readings);
+  }
+}
+
+/// The fault after screening, which knows of more than the driver does.
+Fault SegmentExport::fault_of(std::size_t sensor) const {
+  return steps_ ? report_.sensors[sensor].fault : inputs_.readings[sensor].fault;
+}
+
+void SegmentExport::tell_faults() {
+  for (std::size_t i = 0; i < faults_told_.size(); ++i) {
+    const Fault fault = fault_of(i);
+    if (fault == faults_told_[i]) continue;
+    const bool is_first_value = faults_told_[i] == Fault::never_read && fault == Fault::none;
+    faults_told_[i] = fault;
+    if (is_first_value) continue;  // that nothing was read before it is no news
+    happened_.push_back("sensor " + config_.sensors[i].name + ": " +
+                        (fault == Fault::none ? "good again" : std::string(to_string(fault))));
+  }
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,108 @@
+#include "daemon/history/replay/segment_walk.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
+#include "daemon/history/format/chunk_codec.hpp"
+#include "estimator/checks.hpp"
+
+namespace thermocomp {
+
+void InputsInForce::apply(const Record& record) {
+  const bool has_time = record.kind == RecordKind::reading || record.kind == RecordKind::link;
+  if (has_time && !is_grid_time(record.time_ns)) throw HistoryError("damaged: an impossible time");
+  const auto require_below = [&](std::size_t size) {
+    if (record.index >= size) throw HistoryError("damaged: a record names what does not exist");
+  };
+  switch (record.kind) {
+    case RecordKind::reading:
+      require_below(readings.size());
+      if (record.detail >= faults_count) throw HistoryError("damaged: unknown fault");
+      readings[record.index] = {record.value, nanoseconds(record.time_ns),
+                                static_cast<Fault>(record.detail)};
+      break;
+    case RecordKind::link:
+      controller.taken_at = nanoseconds(record.time_ns);
+      controller.link_epoch = record.index;
+      controller.online = record.detail != 0;
+      break;
+    case RecordKind::applied:
+      require_below(controller.applied_um.size());
+      controller.applied_um[record.index] = record.value;
+      break;
+    case RecordKind::signal:
+      require_below(controller.signals.size());
+      controller.signals[record.index] = record.value;
+      break;
+    default:
+      throw HistoryError("damaged: a record of this kind has no place here");
+  }
+}
+
+void InputsInForce::forget() {
+  for (Reading& reading : readings) reading = {};
+  controller.applied_um.fill(not_a_number);
+  controller.signals.fill(not_a_number);
+}
+
+HistoryClock::HistoryClock(const HistoryReader& reader) {
+  for (const SegmentInfo& segment : reader.segments()) {
+    const std::string why = places_.add(segment);
+    THERMOCOMP_ENSURE(why.empty());  // the reader has left out what has no place
+  }
+}
+
+double HistoryClock::seconds_at(const SegmentInfo& segment, std::uint64_t cycle) const {
+  const std::int64_t time_ns =
+      segment.grid.time_of(cycle).count() + places_.grid_to_history_ns(segment.run);
+  return static_cast<double>(time_ns) * 1e-9;
+}
+
+ParsedSetups::ParsedSetups(const HistoryReader& reader, const SetupParser& parser) {
+  for (const SegmentInfo& segment : reader.segments()) {
+    if (setups_.count(segment.setup) != 0 || failures_.count(segment.setup) != 0) continue;
+    try {
+      setups_.emplace(segment.setup, parser(reader.setup(segment)));
+    } catch (const std::exception& error) {
+      failures_.emplace(segment.setup, error.what());
+    }
+  }
+}
+
+const ReplaySetup& ParsedSetups::of(const SegmentInfo& segment) const {
+  const auto failure = failures_.find(segment.setup);
+  if (failure != failures_.end()) {
+    throw HistoryError("its configuration cannot be used: " + failure->second);
+  }
+  return setups_.at(segment.setup);
+}
+
+std::string damage_line(const HistoryDamage& damage) {
+  return "# damaged: " + printable_text(to_string(damage)) + "\n";
+}
+
+std::size_t RunColumns::column(const std::string& name) {
+  const auto [place, is_new] = indices_.emplace(name, names_.size());
+  if (is_new) names_.push_back(name);
+  return place->second;
+}
+
+void append_row(std::string& text, const std::vector<double>& values) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i > 0) text += ',';
+    if (!std::isnan(values[i])) append_number(text, values[i]);
+  }
+  text += '\n';
+}
+
+void append_header(std::string& text, const std::vector<std::string>& names) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) text += ',';
+    text += names[i];
+  }
+  text += '\n';
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,245 @@
+#include "daemon/history/replay/thinned_history.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "daemon/history/format/chunk_codec.hpp"
+#include "daemon/history/format/database.hpp"
+#include "daemon/history/format/row_checksum.hpp"
+#include "daemon/history/reading/sound_segments.hpp"
+#include "daemon/history/replay/replay.hpp"
+#include "daemon/history/replay/segment_walk.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// Sums of what fell into each span.
+class Means {
+ public:
+  explicit Means(std::size_t points) : sum_(points, 0.0), count_(points, 0) {}
+  void add(std::size_t point, double value) {
+    sum_[point] += value;
+    ++count_[point];
+  }
+  [[nodiscard]] std::vector<double> values() const {
+    std::vector<double> means(sum_.size(), not_a_number);
+    for (std::size_t i = 0; i < means.size(); ++i)
+      if (count_[i] > 0) means[i] = sum_[i] / static_cast<double>(count_[i]);
+    return means;
+  }
+
+ private:
+  std::vector<double> sum_;
+  std::vector<std::uint32_t> count_;
+};
+
+/// Which chunks of a segment lie in the stretch: [first, end) of their numbers.
+struct ChunkRange {
+  const SegmentInfo* segment{nullptr};
+  std::int64_t first{0};
+  std::int64_t end{0};
+};
+
+/// Where the values of one configuration go.
+struct Places {
+  std::vector<std::size_t> sensors;
+  std::vector<std::size_t> offsets;
+};
+
+class Thinning {
+ public:
+  Thinning(const std::filesystem::path& file, double from_s, double to_s, std::size_t points,
+           const SetupParser& parser)
+      : reader_(file),
+        database_(file, DatabaseMode::read_only),
+        has_checksums_(has_checksum_columns(database_)),
+        setups_(reader_, parser),
+        from_s_(from_s),
+        span_s_((to_s - from_s) / static_cast<double>(points)),
+        points_(points) {
+    result_.damage = reader_.damage();
+  }
+
+  ThinnedHistory run(std::uint64_t chunks_max) {
+    const std::vector<ChunkRange> ranges = chunk_ranges();
+    for (const ChunkRange& range : ranges)
+      result_.chunks += static_cast<std::uint64_t>(range.end - range.first);
+    const std::uint64_t step_by = std::max<std::uint64_t>(
+        1, (result_.chunks + chunks_max - 1) / std::max<std::uint64_t>(1, chunks_max));
+    std::uint64_t passed = 0;
+    for (const ChunkRange& range : ranges)
+      for (std::int64_t number = range.first; number < range.end; ++number)
+        if (passed++ % step_by == 0) take(*range.segment, number);
+    for (std::size_t i = 0; i < points_; ++i)
+      result_.time_s.push_back(from_s_ + (static_cast<double>(i) + 0.5) * span_s_);
+    for (std::size_t i = 0; i < means_.size(); ++i)
+      result_.columns.push_back({columns_.names()[i], means_[i].values()});
+    return std::move(result_);
+  }
+
+ private:
+  /// Cycle of a segment at a wall time, by the clocks' difference at its start. Within a segment of
+  /// some hours the difference wanders by seconds at most, so one span more is read at either end.
+  [[nodiscard]] static double cycle_at(const SegmentInfo& segment, double wall_s) {
+    const double since_s = wall_s - 1e-9 * static_cast<double>(segment.wall_ns);
+    return static_cast<double>(segment.first_cycle) +
+           since_s * 1e9 / static_cast<double>(segment.grid.period.count());
+  }
+
+  [[nodiscard]] std::vector<ChunkRange> chunk_ranges() {
+    std::vector<ChunkRange> ranges;
+    constexpr double wander_s = 10.0;
+    const double to_s = from_s_ + span_s_ * static_cast<double>(points_);
+    for (const SegmentInfo& segment : reader_.segments()) {
+      const double first = cycle_at(segment, from_s_ - wander_s);
+      const double last = cycle_at(segment, to_s + wander_s);
+      if (first > static_cast<double>(segment.last_cycle) ||
+          last < static_cast<double>(segment.first_cycle))
+        continue;
+      if (!open_setup(segment)) continue;
+      ChunkRange range{&segment, 0, chunk_count(segment)};
+      range.first = first_reaching(segment, range.end, first);
+      range.end = std::min(range.end, first_reaching(segment, range.end, last) + 1);
+      ranges.push_back(range);
+    }
+    return ranges;
+  }
+
+  bool open_setup(const SegmentInfo& segment) {
+    if (places_.count(segment.setup) != 0) return true;
+    try {
+      const EstimatorConfig& config = setups_.of(segment).estimator;
+      Places places;
+      for (const SensorConfig& sensor : config.sensors)
+        places.sensors.push_back(column(sensor_column(sensor.name)));
+      for (const AxisConfig& axis : config.axes)
+        places.offsets.push_back(column(axis.name + "_offset_um"));
+      places_.emplace(segment.setup, std::move(places));
+      return true;
+    } catch (const HistoryError& error) {
+      note(segment.id, error.what());
+      return false;
+    }
+  }
+
+  std::size_t column(const std::string& name) {
+    const std::size_t place = columns_.column(name);
+    if (place == means_.size()) means_.emplace_back(points_);
+    return place;
+  }
+
+  std::int64_t chunk_count(const SegmentInfo& segment) {
+    Statement row(database_, "SELECT max(number) + 1 FROM chunk WHERE segment = ?");
+    row.bind(segment.id);
+    return row.step() ? row.number(0) : 0;
+  }
+
+  /// The first chunk that reaches the cycle, by halving; `end` where none does.
+  std::int64_t first_reaching(const SegmentInfo& segment, std::int64_t end, double cycle) {
+    std::int64_t low = 0;
+    std::int64_t high = end;
+    while (low < high) {
+      const std::int64_t middle = low + (high - low) / 2;
+      Statement probe(database_,
+                      "SELECT through_cycle FROM chunk WHERE segment = ? AND number >= ?"
+                      " ORDER BY number LIMIT 1");
+      probe.bind(segment.id).bind(middle);
+      const bool reaches = !probe.step() || static_cast<double>(probe.number(0)) >= cycle;
+      if (reaches)
+        high = middle;
+      else
+        low = middle + 1;
+    }
+    return low;
+  }
+
+  void take(const SegmentInfo& segment, std::int64_t number) {
+    try {
+      Statement row(database_, has_checksums_
+                                   ? "SELECT records, count, through_cycle, wall_minus_grid_ns,"
+                                     " checksum IS NULL, checksum FROM chunk"
+                                     " WHERE segment = ? AND number = ?"
+                                   : "SELECT records, count, through_cycle, wall_minus_grid_ns, 1"
+                                     " FROM chunk WHERE segment = ? AND number = ?");
+      row.bind(segment.id).bind(number);
+      if (!row.step()) return;  // deleted meanwhile, or missing: its span stays empty
+      std::vector<std::byte> records = row.blob(0);
+      const ChunkNumbers numbers{number, row.number(1), row.number(2), row.number(3)};
+      if (row.number(4) == 0 && row.number(5) != checksum_of(numbers, records))
+        throw HistoryError("chunk " + std::to_string(number) + " does not fit its checksum");
+      ++result_.chunks_read;
+      add_records(segment, numbers, std::move(records));
+    } catch (const HistoryError& error) {
+      note(segment.id, error.what());
+    }
+  }
+
+  void add_records(const SegmentInfo& segment, const ChunkNumbers& numbers,
+                   std::vector<std::byte> bytes) {
+    if (numbers.count < 0 || static_cast<std::size_t>(numbers.count) > bytes.size())
+      throw HistoryError("damaged: more records than bytes");
+    const bool is_sound =
+        numbers.wall_minus_grid_ns >= -grid_ns_max && numbers.wall_minus_grid_ns <= wall_ns_max;
+    const std::int64_t difference_ns =
+        is_sound ? numbers.wall_minus_grid_ns
+                 : segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
+    const Places& places = places_.at(segment.setup);
+    ChunkDecoder chunk(std::move(bytes), static_cast<std::uint64_t>(numbers.count));
+    for (Record record; chunk.next(record);) {
+      if (record.cycle > static_cast<std::uint64_t>(segment.last_cycle)) break;
+      const std::optional<std::size_t> place = place_of(record, places);
+      if (!place || !std::isfinite(record.value)) continue;
+      const double wall_s =
+          1e-9 * static_cast<double>(segment.grid.time_of(record.cycle).count() + difference_ns);
+      const double point = std::floor((wall_s - from_s_) / span_s_);
+      if (point >= 0.0 && point < static_cast<double>(points_))
+        means_[*place].add(static_cast<std::size_t>(point), record.value);
+    }
+  }
+
+  [[nodiscard]] static std::optional<std::size_t> place_of(const Record& record,
+                                                           const Places& places) {
+    if (record.kind == RecordKind::offset && record.index < places.offsets.size())
+      return places.offsets[record.index];
+    const bool is_good = record.detail == static_cast<std::uint8_t>(Fault::none);
+    if (record.kind == RecordKind::reading && is_good && record.index < places.sensors.size())
+      return places.sensors[record.index];
+    return std::nullopt;
+  }
+
+  void note(std::int64_t segment, const std::string& why) {
+    constexpr std::size_t told_max = 20;
+    if (result_.damage.size() < told_max) result_.damage.push_back({segment, why});
+  }
+
+  HistoryReader reader_;
+  Database database_;
+  bool has_checksums_;
+  ParsedSetups setups_;
+  double from_s_;
+  double span_s_;
+  std::size_t points_;
+  RunColumns columns_;
+  std::vector<Means> means_;               ///< one a column
+  std::map<std::int64_t, Places> places_;  ///< by setup
+  ThinnedHistory result_;
+};
+
+}  // namespace
+
+ThinnedHistory thin_history(const std::filesystem::path& file, double from_s, double to_s,
+                            std::size_t points, const ThinningLimits& limits,
+                            const SetupParser& parser) {
+  if (!(to_s > from_s && std::isfinite(from_s) && std::isfinite(to_s)))
+    throw std::invalid_argument("to must be later than from");
+  if (points < 1 || points > limits.points_max)
+    throw std::invalid_argument("points must be in [1, " + std::to_string(limits.points_max) + "]");
+  return Thinning(file, from_s, to_s, points, parser).run(limits.chunks_max);
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,398 @@
+#include "daemon/history/writing/history_store.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <system_error>
+
+#include "daemon/history/format/row_checksum.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// Deletion starts before the bound, so that the next commits do not pass it.
+constexpr double delete_at = 0.9;
+/// A clock that says it is before 2020 has not been set: such stamps say nothing about age.
+constexpr std::int64_t clock_unset_before_ns = 1'577'836'800'000'000'000;
+
+constexpr const char* tables =
+    "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;"
+    "CREATE TABLE setup (id INTEGER PRIMARY KEY, config_text TEXT NOT NULL,"
+    " model_text TEXT NOT NULL, model_checksum TEXT NOT NULL);"
+    "CREATE TABLE segment (id INTEGER PRIMARY KEY, run INTEGER NOT NULL, token INTEGER NOT NULL,"
+    " setup INTEGER NOT NULL, reason INTEGER NOT NULL, grid_start_ns INTEGER NOT NULL,"
+    " period_ns INTEGER NOT NULL, first_cycle INTEGER NOT NULL, last_cycle INTEGER NOT NULL,"
+    " wall_ns INTEGER NOT NULL, last_wall_ns INTEGER NOT NULL, records INTEGER NOT NULL,"
+    " bytes INTEGER NOT NULL, program_version TEXT NOT NULL, inputs BLOB NOT NULL,"
+    " estimator_state BLOB NOT NULL, checksum INTEGER);"
+    "CREATE TABLE chunk (id INTEGER PRIMARY KEY, segment INTEGER NOT NULL,"
+    " number INTEGER NOT NULL, through_cycle INTEGER NOT NULL,"
+    " wall_minus_grid_ns INTEGER NOT NULL, count INTEGER NOT NULL, records BLOB NOT NULL,"
+    " checksum INTEGER);"
+    "CREATE UNIQUE INDEX chunk_of_segment ON chunk (segment, number);"
+    "INSERT INTO meta VALUES ('format', 'thermocomp history'), ('schema_version', '1');";
+
+constexpr const char* event_table =
+    "CREATE TABLE IF NOT EXISTS event (run INTEGER NOT NULL, number INTEGER NOT NULL,"
+    " wall_ns INTEGER NOT NULL, kind TEXT NOT NULL, subject TEXT NOT NULL, what TEXT NOT NULL,"
+    " duration_ns INTEGER NOT NULL, user INTEGER NOT NULL, PRIMARY KEY (run, number))"
+    " WITHOUT ROWID;";
+
+/// So many events are kept, or as many as take a twentieth of the file.
+constexpr double events_max = 20000.0;
+constexpr double event_bytes = 150.0;
+
+std::string utc_stamp() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y%m%dT%H%M%SZ", &parts);
+  return text;
+}
+
+/// Rolls back unless committed.
+class Transaction {
+ public:
+  explicit Transaction(Database& database) : database_(database) {
+    database_.run("BEGIN IMMEDIATE");
+  }
+  ~Transaction() {
+    if (!committed_) {
+      // May fail where SQLite has rolled back by itself; then there is nothing left to do.
+      sqlite3_exec(database_.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
+    }
+  }
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+  void commit() {
+    database_.run("COMMIT");
+    committed_ = true;
+  }
+
+ private:
+  Database& database_;
+  bool committed_{false};
+};
+
+}  // namespace
+
+void PendingRows::add(SegmentRow row) {
+  bytes_ += row.estimator_state.size() + row.inputs.size();
+  rows_.emplace_back(std::move(row));
+}
+
+void PendingRows::add(ChunkRow row) {
+  bytes_ += row.records.size() + sizeof(ChunkRow);
+  records_ += row.count;
+  rows_.emplace_back(std::move(row));
+}
+
+void PendingRows::add(RecordedEvent row) {
+  bytes_ += sizeof(RecordedEvent) + row.what.size();
+  rows_.emplace_back(std::move(row));
+}
+
+void PendingRows::clear() {
+  *this = PendingRows();
+}
+
+bool PendingRows::begins(std::int64_t segment_token) const noexcept {
+  return std::any_of(rows_.begin(), rows_.end(), [&](const Row& row) {
+    const auto* segment = std::get_if<SegmentRow>(&row);
+    return segment != nullptr && segment->token == segment_token;
+  });
+}
+
+bool HistoryStore::is_same_file() const noexcept {
+  struct stat status {};
+  return stat(config_.file.c_str(), &status) == 0 && status.st_dev == device_ &&
+         status.st_ino == inode_;
+}
+
+bool HistoryStore::open_if_closed(std::int64_t needed_token) {
+  // Somebody may have moved or deleted the file: SQLite would go on writing into the void.
+  if (database_ && !is_same_file()) close();
+  if (!database_) {
+    if (!is_same_file()) {
+      run_ = 0;
+      tokens_.clear();
+    }
+    try {
+      prepare();
+    } catch (...) {
+      database_.reset();
+      throw;
+    }
+  }
+  return needed_token == 0 || tokens_.count(needed_token) != 0;
+}
+
+/// Held until the end: also while the file is closed, moved aside or missing.
+void HistoryStore::lock() {
+  if (lock_) return;
+  try {
+    lock_ = std::make_unique<FileLock>(config_.file);
+  } catch (const LockHeld& held) {
+    throw HistoryError("history: " + std::string(held.what()) +
+                       "; history.file must name another, or that one must end first");
+  } catch (const LockImpossible& problem) {
+    throw DatabaseError(SQLITE_CANTOPEN, problem.what());
+  }
+}
+
+void HistoryStore::prepare() {
+  lock();
+  database_ = std::make_unique<Database>(config_.file, DatabaseMode::read_write_create);
+  const std::string name = config_.file.string();
+  const std::int64_t application = database_->number("PRAGMA application_id");
+  const std::int64_t version = database_->number("PRAGMA user_version");
+  const bool is_empty = database_->number("SELECT count(*) FROM sqlite_master") == 0;
+  if (!is_empty && application != history_application_id) {
+    throw HistoryError(name + ": is a database of another program; history.file must name another");
+  }
+  if (!is_empty && version < 1) {
+    throw HistoryError(name + ": is a history of version " + std::to_string(version) +
+                       ", which no thermocomp wrote; move it away or name another file");
+  }
+  if (version > history_version) {
+    throw HistoryError(name + ": is a history of version " + std::to_string(version) +
+                       ", this program writes version " + std::to_string(history_version) +
+                       "; move it away or name another file");
+  }
+  database_->run("PRAGMA cache_size = -512; PRAGMA synchronous = FULL; PRAGMA temp_store = MEMORY");
+  if (is_empty) create();
+  database_->run(
+      "PRAGMA journal_mode = WAL; PRAGMA journal_size_limit = 1048576;"
+      "PRAGMA wal_autocheckpoint = 500");
+  if (!has_checksum_columns(*database_)) add_checksum_columns(*database_);
+  database_->run(event_table);
+  if (run_ == 0)
+    run_ = database_->number(
+               "SELECT max((SELECT ifnull(max(run), 0) FROM segment),"
+               " (SELECT ifnull(max(run), 0) FROM event))") +
+           1;
+  struct stat status {};
+  if (stat(config_.file.c_str(), &status) == 0) {
+    device_ = status.st_dev;
+    inode_ = status.st_ino;
+  }
+}
+
+void HistoryStore::create() {
+  // Before the first table: pages that deleted segments leave can be given back to the system.
+  database_->run("PRAGMA auto_vacuum = INCREMENTAL");
+  Transaction transaction(*database_);
+  database_->run(tables);
+  database_->run(("PRAGMA application_id = " + std::to_string(history_application_id) +
+                  "; PRAGMA user_version = " + std::to_string(history_version))
+                     .c_str());
+  transaction.commit();
+}
+
+void HistoryStore::close() noexcept {
+  database_.reset();
+}
+
+void HistoryStore::move_aside(const std::string& why) noexcept {
+  close();
+  try {
+    const std::string from = config_.file.string();
+    std::string to = from + ".damaged-" + utc_stamp();
+    for (int i = 2; std::filesystem::exists(to); ++i) {
+      to = from + ".damaged-" + utc_stamp() + "-" + std::to_string(i);
+    }
+    spdlog::error("history: {}; moved to {}, a new history begins", why, to);
+    std::error_code ignored;
+    std::filesystem::rename(from, to, ignored);
+    for (const char* end : {"-wal", "-shm"}) {
+      std::filesystem::rename(from + end, to + end, ignored);
+    }
+  } catch (const std::exception& error) {
+    spdlog::error("history: a damaged file could not be moved aside: {}", error.what());
+  }
+}
+
+void HistoryStore::write(const PendingRows& pending, bool prove) {
+  if (pending.rows().empty() && !prove) return;
+  Tokens tokens = tokens_;
+  Transaction transaction(*database_);
+  if (prove) {
+    Statement statement(*database_, "INSERT OR REPLACE INTO meta VALUES ('opened_wall_ns', ?)");
+    statement.bind(std::string_view(std::to_string(wall_now_ns()))).run();
+  }
+  for (const PendingRows::Row& row : pending.rows()) {
+    if (const auto* segment = std::get_if<SegmentRow>(&row)) {
+      insert(*segment, tokens);
+    } else if (const auto* chunk = std::get_if<ChunkRow>(&row)) {
+      insert(*chunk, tokens);
+    } else {
+      insert(std::get<RecordedEvent>(row));
+    }
+  }
+  transaction.commit();
+  // Only the newest segment can still get rows.
+  if (!tokens.empty()) tokens.erase(tokens.begin(), std::prev(tokens.end()));
+  tokens_ = std::move(tokens);
+}
+
+std::int64_t HistoryStore::setup_id(const HistorySetup& setup) {
+  Statement known(*database_,
+                  "SELECT id FROM setup WHERE config_text = ? AND model_text = ?"
+                  " AND model_checksum = ?");
+  known.bind(std::string_view(setup.config_text))
+      .bind(std::string_view(setup.model_text))
+      .bind(std::string_view(setup.model_checksum));
+  if (known.step()) return known.number(0);
+  Statement added(*database_,
+                  "INSERT INTO setup (config_text, model_text, model_checksum) VALUES (?, ?, ?)");
+  added.bind(std::string_view(setup.config_text))
+      .bind(std::string_view(setup.model_text))
+      .bind(std::string_view(setup.model_checksum))
+      .run();
+  return sqlite3_last_insert_rowid(database_->handle());
+}
+
+void HistoryStore::insert(const SegmentRow& row, Tokens& tokens) {
+  // A commit that was reported as failed may have succeeded all the same.
+  Statement known(*database_, "SELECT id FROM segment WHERE run = ? AND token = ?");
+  known.bind(run_).bind(row.token);
+  if (known.step()) {
+    tokens[row.token] = known.number(0);
+    return;
+  }
+  const std::int64_t setup = setup_id(*row.setup);
+  Statement statement(
+      *database_,
+      "INSERT INTO segment (run, token, setup, reason, grid_start_ns, period_ns, first_cycle,"
+      " last_cycle, wall_ns, last_wall_ns, records, bytes, program_version, inputs,"
+      " estimator_state) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0, ?, ?, ?)");
+  const auto first_cycle = static_cast<std::int64_t>(row.first_cycle);
+  statement.bind(run_).bind(row.token).bind(setup).bind(static_cast<std::int64_t>(row.reason));
+  statement.bind(row.grid.start.count()).bind(row.grid.period.count());
+  statement.bind(first_cycle).bind(first_cycle - 1).bind(row.wall_ns).bind(row.wall_ns);
+  statement.bind(std::string_view(row.program_version));
+  statement.bind(std::span<const std::byte>(row.inputs));
+  statement.bind(std::span<const std::byte>(row.estimator_state)).run();
+  const std::int64_t id = sqlite3_last_insert_rowid(database_->handle());
+  tokens[row.token] = id;
+  Statement seal(*database_, "UPDATE segment SET checksum = ? WHERE id = ?");
+  seal.bind(segment_checksum(*database_, id)).bind(id).run();
+}
+
+/// As with segments: committed by a commit that was reported as failed. Never replaced, whatever is
+/// there.
+bool HistoryStore::is_known(std::int64_t segment, const ChunkRow& row) {
+  Statement known(*database_, "SELECT records FROM chunk WHERE segment = ? AND number = ?");
+  known.bind(segment).bind(row.number);
+  if (!known.step()) return false;
+  if (known.blob(0) != row.records)
+    throw HistoryError(config_.file.string() + ": chunk " + std::to_string(row.number) +
+                       " of segment " + std::to_string(segment) +
+                       " is there already with other records; does another program write it?");
+  return true;
+}
+
+void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
+  const auto segment = tokens.find(row.segment_token);
+  if (segment == tokens.end()) throw HistoryError("a chunk without its segment");
+  if (is_known(segment->second, row)) return;
+  Statement chunk(*database_,
+                  "INSERT INTO chunk (segment, number, through_cycle,"
+                  " wall_minus_grid_ns, count, records, checksum)"
+                  " VALUES (?, ?, ?, ?, ?, ?, ?)");
+  chunk.bind(segment->second).bind(row.number).bind(row.through_cycle);
+  chunk.bind(row.wall_minus_grid_ns).bind(static_cast<std::int64_t>(row.count));
+  chunk.bind(std::span<const std::byte>(row.records));
+  const ChunkNumbers numbers{row.number, static_cast<std::int64_t>(row.count), row.through_cycle,
+                             row.wall_minus_grid_ns};
+  chunk.bind(checksum_of(numbers, row.records)).run();
+  Statement update(*database_,
+                   "UPDATE segment SET last_cycle = ?, last_wall_ns = ?, records = records + ?,"
+                   " bytes = bytes + ? WHERE id = ?");
+  update.bind(row.through_cycle).bind(wall_now_ns()).bind(static_cast<std::int64_t>(row.count));
+  update.bind(static_cast<std::int64_t>(row.records.size())).bind(segment->second).run();
+}
+
+/// One that is there already was committed by a commit that was reported as failed.
+void HistoryStore::insert(const RecordedEvent& row) {
+  Statement statement(*database_, "INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+  statement.bind(run_).bind(row.number).bind(row.wall_ns);
+  statement.bind(std::string_view(row.kind)).bind(std::string_view(row.subject));
+  statement.bind(std::string_view(row.what)).bind(row.duration_ns).bind(row.user).run();
+}
+
+void HistoryStore::forget_old_events() {
+  const double room = 0.05 * config_.size_MB_max * 1e6 / event_bytes;
+  const auto kept = static_cast<std::int64_t>(std::min(events_max, room));
+  if (database_->number("SELECT count(*) FROM event") <= kept) return;
+  Statement statement(*database_,
+                      "DELETE FROM event WHERE (run, number) IN (SELECT run, number FROM event"
+                      " ORDER BY run DESC, number DESC LIMIT -1 OFFSET ?)");
+  // Some more at once, so that not every commit has one to delete.
+  statement.bind(kept - kept / 10).run();
+}
+
+std::int64_t HistoryStore::oldest_other_than(std::int64_t current, std::int64_t& last_wall_ns) {
+  Statement oldest(*database_,
+                   "SELECT id, last_wall_ns FROM segment WHERE id <> ? ORDER BY id LIMIT 1");
+  oldest.bind(current);
+  if (!oldest.step()) return 0;
+  last_wall_ns = oldest.number(1);
+  return oldest.number(0);
+}
+
+void HistoryStore::delete_segment(std::int64_t id) {
+  Transaction transaction(*database_);
+  Statement chunks(*database_, "DELETE FROM chunk WHERE segment = ?");
+  chunks.bind(id).run();
+  Statement segment(*database_, "DELETE FROM segment WHERE id = ?");
+  segment.bind(id).run();
+  database_->run("DELETE FROM setup WHERE id NOT IN (SELECT setup FROM segment)");
+  transaction.commit();
+}
+
+bool HistoryStore::wall_clock_is_steady() {
+  constexpr nanoseconds step_min = std::chrono::minutes(1);
+  constexpr nanoseconds steady_min = std::chrono::hours(1);
+  const nanoseconds now = clocks_.monotonic();
+  const nanoseconds difference = clocks_.wall() - now;
+  const nanoseconds change = difference - wall_minus_monotonic_;
+  if (!steady_since_ || change > step_min || change < -step_min) steady_since_ = now;
+  wall_minus_monotonic_ = difference;
+  return now - *steady_since_ >= steady_min;
+}
+
+void HistoryStore::keep_within_bounds(std::int64_t current_token) {
+  forget_old_events();
+  const auto token = tokens_.find(current_token);
+  const std::int64_t current = token == tokens_.end() ? 0 : token->second;
+  const double page_bytes = static_cast<double>(database_->number("PRAGMA page_size"));
+  const double bytes_max = config_.size_MB_max * 1e6;
+  const double age_ns_max = config_.age_days_max * 86400e9;
+  const bool age_counts = wall_clock_is_steady();
+  for (;;) {
+    const auto used = static_cast<double>(database_->number("PRAGMA page_count") -
+                                          database_->number("PRAGMA freelist_count"));
+    std::int64_t last_wall_ns = 0;
+    const std::int64_t oldest = oldest_other_than(current, last_wall_ns);
+    if (oldest == 0) break;
+    const bool is_old = age_counts && last_wall_ns > clock_unset_before_ns &&
+                        static_cast<double>(wall_now_ns() - last_wall_ns) > age_ns_max;
+    if (!(used * page_bytes > delete_at * bytes_max) && !is_old) break;
+    delete_segment(oldest);
+  }
+  // Free pages are used again; only what would be beyond the bound is given back.
+  if (static_cast<double>(database_->number("PRAGMA page_count")) * page_bytes > bytes_max) {
+    database_->run("PRAGMA incremental_vacuum");
+  }
+  bytes_ = static_cast<std::uint64_t>(static_cast<double>(database_->number("PRAGMA page_count")) *
+                                      page_bytes);
+  segments_ = static_cast<std::uint64_t>(database_->number("SELECT count(*) FROM segment"));
+}
+
+}  // namespace thermocomp

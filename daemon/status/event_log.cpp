@@ -1,0 +1,210 @@
+#include "daemon/status/event_log.hpp"
+
+#include <algorithm>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/status/status_json.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// So many clipped values in a row are news: the temperature really runs away from its past.
+constexpr std::uint32_t clipped_in_a_row_news = 5;
+
+std::string reason_names(std::uint32_t reasons) {
+  std::string names;
+  for (std::size_t i = 0; i < reasons_count; ++i) {
+    const auto reason = static_cast<Reason>(1u << i);
+    if (!has_reason(reasons, reason)) continue;
+    if (!names.empty()) names += ", ";
+    names += to_string(reason);
+  }
+  return names.empty() ? "none" : names;
+}
+
+}  // namespace
+
+void EventLog::note_estimates(const Report& report, const EstimatorConfig& config,
+                              const std::vector<std::string>& columns) {
+  estimated_.resize(report.inputs.size(), false);
+  for (std::size_t i = 0; i < report.inputs.size(); ++i) {
+    const InputReport& input = report.inputs[i];
+    if (input.estimated == estimated_[i]) continue;
+    estimated_[i] = input.estimated;
+    if (input.estimated)
+      spdlog::warn("input {}: lost, estimated from the others", columns[i]);
+    else if (input.good)
+      spdlog::info("input {}: measured again", columns[i]);
+    else
+      spdlog::warn("input {}: lost, and no longer to be estimated", columns[i]);
+  }
+  const bool any = std::find(estimated_.begin(), estimated_.end(), true) != estimated_.end();
+  const bool uncertain = any && has_reason(report.reasons, Reason::block_lost);
+  if (uncertain && !uncertain_)
+    for (std::size_t i = 0; i < report.axes.size(); ++i)
+      if (report.axes[i].offset_sd_um > config.compensation.offset_sd_um_max)
+        spdlog::warn("axis {}: the estimate is too uncertain, {:.2f} um where {:.2f} um is allowed",
+                     config.axes[i].name, report.axes[i].offset_sd_um,
+                     config.compensation.offset_sd_um_max);
+  if (!uncertain && uncertain_ && any) spdlog::info("the estimate is certain enough again");
+  uncertain_ = uncertain;
+}
+
+void EventLog::note_report(const Report& report, const EstimatorConfig& config, bool dry_run) {
+  constexpr nanoseconds settles = std::chrono::seconds(5);
+  if (settled_at_ == nanoseconds{}) settled_at_ = report.now + settles;
+  // A first start is switched off from the beginning, and has read nothing yet all the same.
+  const auto off = static_cast<std::uint32_t>(Reason::operator_disabled) |
+                   static_cast<std::uint32_t>(Reason::controller_disabled);
+  const bool is_beginning = report.mode == Mode::starting ||
+                            (report.mode == Mode::disabled && (report.reasons & ~off) != 0);
+  if (first_ && is_beginning && report.now < settled_at_) return;
+  note_sensors(report, config);
+  note_mismatches(report, config);
+  note_mode(report, std::string(mode_name(report.mode, dry_run)));  // what comes of them
+  first_ = false;
+}
+
+void EventLog::note_mode(const Report& report, const std::string& mode) {
+  // "cutting" comes and goes with every part; it is in the status, not in the log.
+  const std::uint32_t reasons = report.reasons & ~static_cast<std::uint32_t>(Reason::cutting);
+  if (first_ || report.mode != mode_ || reasons != reasons_) {
+    const bool good = report.mode == Mode::compensating && reasons == 0;
+    spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}", mode,
+                reason_names(reasons));
+  }
+  for (std::size_t i = 0; i < reasons_count; ++i) {
+    const auto reason = static_cast<Reason>(1u << i);
+    // What an operator wanted is no fault; the command and the mode tell of it.
+    if (reason == Reason::operator_disabled) continue;
+    if (has_reason(reasons, reason) == has_reason(reasons_, reason)) continue;
+    const std::string name(to_string(reason));
+    if (has_reason(reasons, reason))
+      journal_.fault("reason " + name, name);
+    else
+      journal_.recovery("reason " + name);
+  }
+  journal_.mode(mode);
+  mode_ = report.mode;
+  reasons_ = reasons;
+}
+
+void EventLog::note_sensors(const Report& report, const EstimatorConfig& config) {
+  faults_.resize(report.sensors.size(), Fault::none);
+  clipping_.resize(report.sensors.size(), false);
+  for (std::size_t i = 0; i < report.sensors.size(); ++i) {
+    const SensorReport& sensor = report.sensors[i];
+    if (sensor.fault != faults_[i]) {
+      const std::string subject = "sensor " + config.sensors[i].name;
+      if (sensor.fault == Fault::none) {
+        spdlog::info("{}: good again", subject);
+        journal_.recovery(subject);
+      } else {
+        spdlog::warn("{}: {}", subject, to_string(sensor.fault));
+        journal_.fault(subject, std::string(to_string(sensor.fault)));
+      }
+      faults_[i] = sensor.fault;
+    }
+    const bool clipping = sensor.clipped_in_a_row >= clipped_in_a_row_news;
+    if (clipping && !clipping_[i])
+      spdlog::warn("sensor {}: {} smoothed values in a row clipped", config.sensors[i].name,
+                   sensor.clipped_in_a_row);
+    clipping_[i] = clipping;
+  }
+}
+
+void EventLog::note_mismatches(const Report& report, const EstimatorConfig& config) {
+  latched_.resize(report.axes.size(), false);
+  for (std::size_t i = 0; i < report.axes.size(); ++i) {
+    const AxisReport& axis = report.axes[i];
+    if (axis.latched == latched_[i]) continue;
+    latched_[i] = axis.latched;
+    const Mismatch& mismatch = axis.latched_mismatch;
+    const std::string subject = "axis " + config.axes[i].name;
+    if (axis.latched) {
+      journal_.fault(subject, "mismatch latched: " + std::string(likely_text(mismatch)));
+      spdlog::error(
+          "axis {}: sent {:.3f} um, read back {:.3f} um: {}; not driven until it is mended and "
+          "released (thermocomp release {})",
+          config.axes[i].name, mismatch.sent_um, mismatch.read_um, likely_text(mismatch),
+          config.axes[i].name);
+    } else {
+      journal_.recovery(subject);
+      spdlog::info("axis {}: released, goes on from {:.3f} um", config.axes[i].name,
+                   axis.offset_um);
+    }
+  }
+}
+
+void EventLog::note_link(const std::string& what, bool connected, const std::string& error) {
+  const auto known = connected_.find(what);
+  if (known != connected_.end() && known->second == connected) return;
+  connected_[what] = connected;
+  const std::string why = error.empty() ? "not connected" : error;
+  if (connected) {
+    spdlog::info("{}: connected", what);
+    journal_.recovery(what);
+  } else {
+    spdlog::warn("{}: {}", what, why);
+    journal_.fault(what, why);
+  }
+}
+
+// A bus that is not connected has said so already.
+void EventLog::note_state(const std::string& what, bool connected, const std::string& state) {
+  if (state.empty() || !connected) return;
+  std::string& known = states_.try_emplace(what, "active").first->second;
+  if (known == state) return;
+  known = state;
+  const std::string subject = what + ", errors";
+  if (state == "active") {
+    spdlog::info("{}: without errors again", what);
+    journal_.recovery(subject);
+  } else {
+    spdlog::warn("{}: error state {}", what, state);
+    journal_.fault(subject, "error state " + state);
+  }
+}
+
+void EventLog::note_bus(const BusHealth& bus) {
+  note_link("bus " + bus.name, bus.connected, bus.last_error);
+  note_state("bus " + bus.name, bus.connected, bus.state);
+  if (!bus.connected) return;
+  for (const UnitHealth& unit : bus.units)
+    if (unit.answering || !unit.last_error.empty())
+      note_link("device " + unit.name, unit.answering, unit.last_error);
+}
+
+void EventLog::note_controller(const ControllerHealth& controller) {
+  note_link("controller " + controller.name, controller.connected, controller.last_error);
+  note_state("controller " + controller.name, controller.connected, controller.state);
+}
+
+void EventLog::note_missed(std::uint64_t missed) {
+  if (missed > missed_) spdlog::warn("{} cycles missed", missed - missed_);
+  missed_ = missed;
+}
+
+void EventLog::note_failed_sleeps(std::uint64_t failed) {
+  if (failed > failed_sleeps_) {
+    spdlog::error("clock_nanosleep failed {} times: the cycle waits by poll, a millisecond late",
+                  failed - failed_sleeps_);
+  }
+  failed_sleeps_ = failed;
+}
+
+void EventLog::note_socket(const SocketStatistics& statistics) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < socket_next_) return;
+  const std::uint64_t refused = statistics.refused - socket_.refused;
+  const std::uint64_t cut_off = statistics.cut_off - socket_.cut_off;
+  const std::uint64_t missed = statistics.missed - socket_.missed;
+  if (refused + cut_off + missed == 0) return;
+  spdlog::warn("status socket: {} clients refused, {} cut off, {} notifications missed; {} clients",
+               refused, cut_off, missed, statistics.clients);
+  socket_ = statistics;
+  socket_next_ = now + std::chrono::minutes(1);
+}
+
+}  // namespace thermocomp

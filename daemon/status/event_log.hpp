@@ -1,0 +1,64 @@
+/// Turns what changes in reports and health into lines of the log, so that no driver and no cycle
+/// has to log.
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "daemon/socket/status_server.hpp"
+#include "daemon/status/event_journal.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "estimator/pipeline/estimator.hpp"
+
+namespace thermocomp {
+
+/// Main's thread only. Each change is one line; a state that stays is not repeated.
+class EventLog {
+ public:
+  /// @param journal  gets the same changes; outlives this
+  explicit EventLog(EventJournal& journal) : journal_(journal) {}
+
+  /// In the first seconds of a start nothing has been read yet, which is no news: the log begins
+  /// with the first mode other than `starting` (where it is switched off: once nothing else is
+  /// missing), or 5 s after the first report.
+  void note_report(const Report& report, const EstimatorConfig& config, bool dry_run = false);
+  /// @param columns  names of the report's inputs
+  void note_estimates(const Report& report, const EstimatorConfig& config,
+                      const std::vector<std::string>& columns);
+  void note_bus(const BusHealth& bus);
+  void note_controller(const ControllerHealth& controller);
+  void note_missed(std::uint64_t missed);
+  void note_failed_sleeps(std::uint64_t failed);
+  /// Clients that were refused, cut off or missed notifications: at most one line a minute, since
+  /// whoever can connect could otherwise fill the log.
+  void note_socket(const SocketStatistics& statistics);
+
+ private:
+  void note_mode(const Report& report, const std::string& mode);
+  void note_sensors(const Report& report, const EstimatorConfig& config);
+  void note_mismatches(const Report& report, const EstimatorConfig& config);
+  void note_link(const std::string& what, bool connected, const std::string& error);
+  void note_state(const std::string& what, bool connected, const std::string& state);
+
+  EventJournal& journal_;
+  bool first_{true};
+  nanoseconds settled_at_{};  ///< of the reports
+  Mode mode_{Mode::starting};
+  std::uint32_t reasons_{0};
+  std::vector<Fault> faults_;
+  std::vector<bool> clipping_;
+  std::vector<bool> estimated_;
+  std::vector<bool> latched_;
+  bool uncertain_{false};
+  std::map<std::string, bool> connected_;
+  std::map<std::string, std::string> states_;  ///< of CAN interfaces
+  std::uint64_t missed_{0};
+  std::uint64_t failed_sleeps_{0};
+  SocketStatistics socket_;
+  std::chrono::steady_clock::time_point socket_next_{};
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,58 @@
+/// The answers of the status socket, made from reports and health.
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "config/daemon/daemon_config.hpp"
+#include "daemon/cycle/cycle.hpp"
+#include "daemon/history/writing/history_writer.hpp"
+#include "daemon/socket/status_server.hpp"
+#include "daemon/state/reference_record.hpp"
+#include "daemon/status/event_journal.hpp"
+#include "daemon/status/temperature_trend.hpp"
+#include "drivers/controllers/controller_link.hpp"
+#include "drivers/sensors/sensor_source.hpp"
+#include "estimator/pipeline/estimator.hpp"
+
+namespace thermocomp {
+
+/// All that a status is made from, at one moment.
+struct StatusView {
+  const DaemonConfig& config;
+  const Report& report;
+  const ControllerState& controller;
+  const CycleTiming& timing;
+  std::vector<BusHealth> buses;
+  ControllerHealth controller_health;
+  HistoryStatistics history;
+  std::vector<std::string> warnings;
+  double uptime_s{0.0};
+  bool real_time{false};
+  SocketStatistics socket;
+  std::vector<Event> ended{};  ///< outages that are over since a few minutes, newest first
+  const TemperatureTrend* trend{nullptr};  ///< nullptr: nobody watches the temperatures
+  ReferenceRecord reference{};
+  bool reference_lost{false};  ///< see StateKeeper
+};
+
+/// What a status calls the mode. A dry run does not compensate: "dry_run" in that one's place.
+[[nodiscard]] std::string_view mode_name(Mode mode, bool dry_run) noexcept;
+
+/// NaN becomes null. Units are the ends of the keys; axes and outputs name theirs.
+[[nodiscard]] nlohmann::json status_json(const StatusView& view);
+[[nodiscard]] nlohmann::json sensors_json(const StatusView& view);
+[[nodiscard]] nlohmann::json offsets_json(const StatusView& view);
+[[nodiscard]] nlohmann::json timing_json(const StatusView& view);
+/// Oldest first.
+[[nodiscard]] nlohmann::json events_json(const std::deque<Event>& events);
+[[nodiscard]] nlohmann::json model_json(const StatusView& view);
+/// One line for systemctl status.
+[[nodiscard]] std::string status_line(const StatusView& view);
+
+}  // namespace thermocomp
