@@ -80,6 +80,23 @@ std::vector<std::string> read_columns(const TomlTable& table, std::string_view k
   return names;
 }
 
+/// A factor called cutting decides test by test, [test] cutting for all of them.
+void read_cutting(const TomlTable& table, const std::vector<Factor>& factors, TestSpec& test) {
+  const auto factor = std::find_if(factors.begin(), factors.end(),
+                                   [](const Factor& each) { return each.name == "cutting"; });
+  if (factor == factors.end()) {
+    test.cutting = table.choice<Cutting>(
+        "cutting", {{"actual", Cutting::actual}, {"simulated", Cutting::simulated}},
+        Cutting::actual);
+    return;
+  }
+  table.refuse("cutting", "must be left out where a factor is called cutting");
+  test.cutting_factor = static_cast<std::size_t>(factor - factors.begin());
+  for (const std::string& level : factor->levels)
+    if (level != "actual" && level != "simulated")
+      table.problem("cutting", level, "the factor cutting has the levels actual and simulated");
+}
+
 void read_test(const TomlTable& table, TestSpec& test) {
   test.hours = table.number("hours", Range::above(0, 1000), test.hours);
   test.row_every_min = table.number("row_every_min", Range::above(0, 1440), test.row_every_min);
@@ -126,7 +143,9 @@ FactorsSpec read(const TomlDocument& document) {
                  "an orthogonal array cannot leave anything out; method = \"all_pairs\"");
   if (spec.method == Method::all_pairs && !spec.array.empty())
     root.problem("array", "makes no sense with method = \"all_pairs\"");
-  read_test(root.table_or_empty("test"), spec.test);
+  const TomlTable test = root.table_or_empty("test");
+  read_test(test, spec.test);
+  read_cutting(test, spec.factors, spec.test);
   document.finish();
   return spec;
 }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,12 +26,17 @@ struct Stop {
   double pause_min{0.0};
 };
 
+/// The tool cuts, or moves as if it did beside a dummy workpiece.
+enum class Cutting { actual, simulated };
+
 struct TestSpec {
   double hours{8.0};
   double row_every_min{10.0};
   std::vector<std::string> temperatures;  ///< columns of the run files
   std::vector<std::string> outputs;
   std::vector<Stop> stops;  ///< in order
+  Cutting cutting{Cutting::actual};
+  std::optional<std::size_t> cutting_factor;  ///< the factor that says it test by test
 };
 
 struct FactorsSpec {

@@ -45,6 +45,20 @@ std::string promises(const TestPlan& plan) {
   return text;
 }
 
+Cutting cutting_in(const TestPlan& plan, std::size_t test) {
+  const TestSpec& spec = plan.spec.test;
+  if (!spec.cutting_factor) return spec.cutting;
+  return level_of(plan, test, *spec.cutting_factor) == "simulated" ? Cutting::simulated
+                                                                   : Cutting::actual;
+}
+
+const char* how_to_cut(Cutting cutting) {
+  return cutting == Cutting::simulated
+             ? "Simulated cutting: a dummy workpiece stays in place, the tool makes every movement "
+               "of the cut without touching it. Measure the distance on the dummy."
+             : "Actual cutting: a workpiece is cut in every cycle.";
+}
+
 /// Where the machine stands at a minute of the test: running (1) or in a stop (0).
 bool runs_at(const TestSpec& test, double minute) {
   return std::none_of(test.stops.begin(), test.stops.end(), [&](const Stop& stop) {
@@ -138,6 +152,7 @@ std::string test_sheet(const TestPlan& plan) {
           .append(": ")
           .append(level_of(plan, test, i))
           .append("\n");
+    text.append("\n").append(how_to_cut(cutting_in(plan, test))).append("\n");
     text.append("\n| time (h:min) | do | done at, by |\n|---|---|---|\n| 0:00 | start | |\n");
     for (const Stop& stop : test_spec.stops) {
       text.append("| ").append(clock(stop.after_h * 60)).append(" | stop for ");
@@ -147,7 +162,8 @@ std::string test_sheet(const TestPlan& plan) {
     text.append("| ").append(clock(test_spec.hours * 60)).append(" | end | |\n");
     text.append("\nEvery ").append(number_text(test_spec.row_every_min));
     text.append(
-        " min, at the end of a machining cycle: all temperatures and the displacement, "
+        " min, at the end of a machining cycle, the tool back at its origin: all temperatures and "
+        "the displacement, "
         "into the run file of test ");
     text.append(std::to_string(test + 1)).append(".\n");
   }
@@ -164,6 +180,9 @@ std::string run_file_skeleton(const TestPlan& plan, std::size_t test) {
         .append(" = ")
         .append(level_of(plan, test, i))
         .append("\n");
+  if (!spec.cutting_factor)
+    text.append(spec.cutting == Cutting::simulated ? "# cutting = simulated\n"
+                                                   : "# cutting = actual\n");
   text.append("time_s,running_on");
   for (const auto& name : spec.temperatures) text.append(",").append(name);
   for (const auto& name : spec.outputs) text.append(",").append(name);

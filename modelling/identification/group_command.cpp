@@ -21,6 +21,7 @@ struct Options {
   std::vector<std::string> places;
   double threshold{-1.0};  ///< negative: chosen
   bool as_published{false};
+  bool range_of_each_test{false};
   bool json{false};
   std::string picture;
 };
@@ -123,7 +124,9 @@ std::string picture_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
 int run(const Options& options) {
   const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
   const MeasuredTests tests = measured_tests(runs, {options.places, {}, 1});
-  const Eigen::MatrixXd s = similarity(tests, !options.as_published);
+  const Eigen::MatrixXd s =
+      similarity(tests, !options.as_published,
+                 options.range_of_each_test ? LargestOver::each_test : LargestOver::all_tests);
   Grouping grouping;
   if (options.threshold >= 0) {
     grouping = group_places(s, options.threshold);
@@ -159,6 +162,9 @@ void add_group_command(CLI::App& app, std::function<int()>& action) {
       ->check(CLI::Range(0.0, 1e9));
   sub->add_flag("--as-published", options->as_published,
                 "S as sums, not divided by the place's own sum of squares");
+  sub->add_flag(
+      "--range-of-each-test", options->range_of_each_test,
+      "a place's rise over its largest in each test; else over its largest in all of them");
   sub->add_option("--picture", options->picture, "heat map of S in the order of the groups (SVG)");
   sub->add_flag("--json", options->json, "groups, S and all thresholds, for a program");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });

@@ -44,32 +44,51 @@ std::vector<std::vector<std::size_t>> groups_of(std::vector<std::size_t>& parent
   return by_root;
 }
 
+/// The selected ones.
+auto rows_of(const TestRun& run) {
+  return run.places_K.bottomRows(run.places_K.rows() - run.begin);
+}
+
 /// Mean square of a place over the selected rows of all tests.
 Eigen::VectorXd mean_squares(const MeasuredTests& tests) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tests.places.size()));
-  for (const TestRun& run : tests.runs)
-    sum += run.places_K.bottomRows(run.places_K.rows() - run.begin).colwise().squaredNorm();
+  for (const TestRun& run : tests.runs) sum += rows_of(run).colwise().squaredNorm();
   return sum / static_cast<double>(tests.rows());
 }
 
 }  // namespace
 
-Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative) {
+Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative, LargestOver over) {
   const auto places = static_cast<Eigen::Index>(tests.places.size());
-  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(places, places);
-  Eigen::VectorXd largest = Eigen::VectorXd::Zero(places);
-  for (const TestRun& run : tests.runs) {
-    const auto rows = run.places_K.bottomRows(run.places_K.rows() - run.begin);
-    products.noalias() += rows.transpose() * rows;
-    largest = largest.cwiseMax(rows.cwiseAbs().colwise().maxCoeff().transpose());
+  std::vector<Eigen::VectorXd> largest;  // by test
+  for (const TestRun& run : tests.runs)
+    largest.emplace_back(rows_of(run).cwiseAbs().colwise().maxCoeff().transpose());
+  if (over == LargestOver::all_tests) {
+    Eigen::VectorXd of_all = Eigen::VectorXd::Zero(places);
+    for (const Eigen::VectorXd& each : largest) of_all = of_all.cwiseMax(each);
+    std::fill(largest.begin(), largest.end(), of_all);
+  }
+  Eigen::MatrixXd crosses = Eigen::MatrixXd::Zero(places, places);  // A over its largest, times B
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(places);
+  Eigen::VectorXd scaled_squares = Eigen::VectorXd::Zero(places);
+  for (std::size_t i = 0; i < tests.runs.size(); ++i) {
+    const auto rows = rows_of(tests.runs[i]);
+    // A place that does not move in a test has no shape there.
+    const Eigen::VectorXd scale =
+        (largest[i].array() > 0).select(largest[i].cwiseInverse(), Eigen::VectorXd::Zero(places));
+    const Eigen::MatrixXd scaled = rows * scale.asDiagonal();
+    crosses.noalias() += scaled.transpose() * rows;
+    squares += rows.colwise().squaredNorm().transpose();
+    scaled_squares += scaled.colwise().squaredNorm().transpose();
   }
   Eigen::MatrixXd s(places, places);
   for (Eigen::Index a = 0; a < places; ++a) {
     for (Eigen::Index b = 0; b < places; ++b) {
-      const double cross = std::max(0.0, products(a, b));  // alpha >= 0
-      const double cosine2 = cross * cross / (products(a, a) * products(b, b));
-      const double shape = a == b ? 0.0 : std::max(0.0, 1.0 - cosine2);
-      s(a, b) = relative ? shape : shape * products(a, a) / (largest[a] * largest[a]);
+      const double cross = std::max(0.0, crosses(a, b));  // alpha >= 0
+      const double cosine2 = cross * cross / (scaled_squares[a] * squares[b]);
+      const bool itself = a == b && over == LargestOver::all_tests;
+      const double shape = itself ? 0.0 : std::max(0.0, 1.0 - cosine2);
+      s(a, b) = relative ? shape : shape * scaled_squares[a];
     }
   }
   return s;

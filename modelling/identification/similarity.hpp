@@ -10,12 +10,17 @@
 
 namespace thermocomp::identification {
 
+/// Over what max|dT_A| is taken: all tests, or each test for itself, so that a test in which a
+/// place moves little counts as much as one in which it moves far.
+enum class LargestOver { all_tests, each_test };
+
 /// S(A, B) = min over alpha >= 0 of sum (dT_A / max|dT_A| - alpha dT_B)^2, over all tests with one
 /// alpha. `relative`: divided by sum (dT_A / max|dT_A|)^2, so that it is 0 for the same shape, 1
-/// for none in common, whatever the number of samples - and symmetric, since it is then
-/// 1 - cos^2 of the angle between A and B (1 where the cosine is negative).
+/// for none in common, whatever the number of samples. With one maximum over all tests that is
+/// 1 - cos^2 of the angle between A and B (1 where the cosine is negative), and symmetric.
 /// @return shape (places, places)
-[[nodiscard]] Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative);
+[[nodiscard]] Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative,
+                                         LargestOver over = LargestOver::all_tests);
 
 /// The relative similarity that noise alone would leave between each two places: noise is what
 /// second differences of neighbouring rows show, and the reference row has it too.

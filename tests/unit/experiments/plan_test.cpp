@@ -137,6 +137,38 @@ TEST_CASE("a run file skeleton is a run file with the stops in it", "[plan]") {
   CHECK_THAT(test_sheet(plan), Catch::Contains("| 3:00 | stop for 60 min |"));
 }
 
+TEST_CASE("the sheet says of each test whether the tool cuts", "[plan]") {
+  const std::string all = test_sheet(make_plan(parse_factors(two_factors, "f")));
+  CHECK_THAT(all, Catch::Contains("Actual cutting") && !Catch::Contains("dummy"));
+  const std::string simulated =
+      std::string(two_factors).append("[test]\ncutting = \"simulated\"\n");
+  const TestPlan plan = make_plan(parse_factors(simulated, "f"));
+  CHECK_THAT(test_sheet(plan), Catch::Contains("dummy") && !Catch::Contains("Actual cutting"));
+  CHECK_THAT(run_file_skeleton(plan, 0), Catch::Contains("# cutting = simulated"));
+}
+
+TEST_CASE("as a factor, cutting is said test by test", "[plan]") {
+  const std::string text =
+      std::string(two_factors)
+          .append("[[factor]]\nname = \"cutting\"\nlevels = [\"actual\", \"simulated\"]\n");
+  const TestPlan plan = make_plan(parse_factors(text, "f"));
+  const std::string sheet = test_sheet(plan);
+  for (std::size_t place = 0; place < plan.order.size(); ++place) {
+    const std::size_t begin = sheet.find("\n## " + std::to_string(place + 1) + ". ");
+    const std::string of_test = sheet.substr(begin, sheet.find("\n## ", begin + 1) - begin);
+    const bool cuts = plan.design.rows[plan.order[place]][2] == 0;
+    CAPTURE(of_test);
+    CHECK((of_test.find("Actual cutting") != std::string::npos) == cuts);
+    CHECK((of_test.find("Simulated cutting") != std::string::npos) != cuts);
+  }
+  CHECK_THROWS_WITH(parse_factors(text + "[test]\ncutting = \"actual\"\n", "f"),
+                    Catch::Contains("must be left out where a factor is called cutting"));
+  const std::string dry =
+      std::string(two_factors)
+          .append("[[factor]]\nname = \"cutting\"\nlevels = [\"actual\", \"dry\"]\n");
+  CHECK_THROWS_WITH(parse_factors(dry, "f"), Catch::Contains("dry"));
+}
+
 TEST_CASE("a factors file with faults names every one of them", "[plan]") {
   const std::string text = R"(
 array = "L7"

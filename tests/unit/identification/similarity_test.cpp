@@ -43,6 +43,20 @@ TEST_CASE("similarity is what it is by hand, with one factor over both tests", "
   CHECK(relative(1, 0) == Approx(relative(0, 1)));
 }
 
+TEST_CASE("with the range of each test a test of small rises counts as much", "[group]") {
+  // a over its largest: 0, 1/2, 1 and 0, 0, 1; its square 2.25, times b 1 + 4 + 7 = 12, b.b = 69
+  const MeasuredTests tests = by_hand();
+  const Eigen::MatrixXd sums = similarity(tests, false, LargestOver::each_test);
+  CHECK(sums(0, 1) == Approx(2.25 - 12.0 * 12.0 / 69));
+  const Eigen::MatrixXd relative = similarity(tests, true, LargestOver::each_test);
+  CHECK(relative(0, 1) == Approx(1.0 - 12.0 * 12.0 / (2.25 * 69.0)));
+  MeasuredTests first = tests;  // of one test both are the same
+  first.runs.resize(1);
+  first.folds.resize(1);
+  CHECK(similarity(first, false, LargestOver::each_test)(1, 0) ==
+        Approx(similarity(first, false)(1, 0)).margin(1e-12));
+}
+
 TEST_CASE("places that move against each other have nothing in common", "[group]") {
   // a.c = 2 - 4 < 0: alpha is 0, and the whole of a is left over
   CHECK(similarity(by_hand(), true)(0, 2) == 1.0);
