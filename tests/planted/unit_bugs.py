@@ -112,7 +112,7 @@ SUITES = {
          "  next->estimator.adopt(", "  if (!{P}) next->estimator.adopt("),
         ("runs_ahead_of_the_clock", CYCLE,
          "while (now_on_clock() < wake)", "while (now_on_clock() < wake && !{P})"),
-        ("full_queue_overwrites", QUEUE, "== capacity) return", "== capacity && !{P}) return"),
+        ("queue_refuses_too_early", QUEUE, "== capacity) return", "== capacity - ({P} ? 1 : 0)) return"),
     ],
     "cycle_handle_test": [
         ("command_not_reported_at_once", CYCLE,
