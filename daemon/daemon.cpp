@@ -21,9 +21,7 @@
 #include "daemon/system/log_setup.hpp"
 #include "drivers/controllers/dry_run_controller.hpp"
 #include "drivers/controllers/make_controller.hpp"
-#include "drivers/sensors/can_protocol_source.hpp"
-#include "drivers/sensors/can_source.hpp"
-#include "drivers/sensors/modbus_source.hpp"
+#include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
@@ -39,12 +37,8 @@ Grid make_grid(const LoopConfig& loop) {
 
 std::vector<std::unique_ptr<SensorSource>> make_sources(const DaemonConfig& config) {
   std::vector<std::unique_ptr<SensorSource>> sources;
-  for (const ModbusBusConfig& bus : config.modbus_buses)
-    sources.push_back(std::make_unique<ModbusSource>(bus));
-  for (const CanBusConfig& bus : config.can_buses)
-    sources.push_back(std::make_unique<CanSource>(bus));
-  for (const CanopenBusConfig& bus : config.canopen_buses) sources.push_back(make_source(bus));
-  for (const J1939BusConfig& bus : config.j1939_buses) sources.push_back(make_source(bus));
+  sources.reserve(config.buses.size());
+  for (const BusConfig& bus : config.buses) sources.push_back(make_source(bus));
   return sources;
 }
 

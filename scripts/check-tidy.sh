@@ -15,7 +15,8 @@ sed -e 's/ -Winvalid-pch//; s/ -fpch-preprocess//; s/ -include [^ ]*cmake_pch\.h
 
 folders=("$@")
 if ((${#folders[@]} == 0)); then
-  folders=(config modelling drivers estimator daemon simulator cli linuxcnc docs bench tests)
+  folders=(estimator drivers config daemon simulator cli gateway linuxcnc modelling docs bench
+    tests)
 fi
 pattern="$PWD/($(IFS='|' && echo "${folders[*]%/}"))(/.*\.cpp)?$"
 

@@ -12,6 +12,7 @@
 #include "cli/common/json_fields.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/problems.hpp"
+#include "drivers/sensors/make_source.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 
 namespace thermocomp::cli {
@@ -90,21 +91,11 @@ std::string first_start_text(const DaemonConfig& config) {
 
 void print_what_was_found(const DaemonConfig& config) {
   const EstimatorConfig& estimator = config.estimator;
-  for (const ModbusBusConfig& bus : config.modbus_buses) {
-    std::cout << "bus " << bus.name << " (" << line_kind(bus.line)
-              << "): " << counted(bus.devices.size(), "device") << '\n';
-  }
-  for (const CanBusConfig& bus : config.can_buses) {
-    std::cout << "bus " << bus.name << " (can, "
-              << bus.interface << "): " << counted(bus.devices.size(), "device") << '\n';
-  }
-  for (const CanopenBusConfig& bus : config.canopen_buses) {
-    std::cout << "bus " << bus.name << " (canopen, "
-              << bus.interface << "): " << counted(bus.nodes.size(), "node") << '\n';
-  }
-  for (const J1939BusConfig& bus : config.j1939_buses) {
-    std::cout << "bus " << bus.name << " (j1939, "
-              << bus.interface << "): " << counted(bus.nodes.size(), "device") << '\n';
+  for (const BusConfig& bus : config.buses) {
+    const BusOutline outline = outline_of(bus);
+    std::cout << "bus " << name_of(bus) << " (" << outline.kind
+              << (outline.interface.empty() ? "" : ", ")
+              << outline.interface << "): " << counted(outline.units, outline.unit_called) << '\n';
   }
   std::cout << counted(estimator.sensors.size(), "sensor") << ": " << list_names(estimator.sensors)
             << '\n'

@@ -12,8 +12,8 @@
 #include "cli/common/json_fields.hpp"
 #include "cli/scan/scan_controller.hpp"
 #include "cli/scan/scan_modbus.hpp"
+#include "config/buses/presets.hpp"
 #include "config/daemon/daemon_config.hpp"
-#include "config/sections/presets.hpp"
 #include "config/toml/toml_text.hpp"
 
 namespace thermocomp::cli {
@@ -114,8 +114,8 @@ ScanReport probe(const InitDraft& draft, const fs::path& folder) {
   const DaemonConfig config = load_daemon_config(files.config());
   const ScanSensors sensors = sensors_of(config);
   ScanReport report{"", {}, {}};
-  for (const ModbusBusConfig& bus : config.modbus_buses)
-    report.buses.push_back(scan_modbus(bus, sensors, {}, progress));
+  for (const BusConfig& bus : config.buses)
+    report.buses.push_back(scan_modbus(std::get<ModbusBusConfig>(bus), sensors, {}, progress));
   constexpr double listen_s = 1.0;
   report.controller = scan_controller(config, listen_s, progress);
   return report;

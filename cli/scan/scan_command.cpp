@@ -1,6 +1,7 @@
 #include "cli/scan/scan_command.hpp"
 
 #include <cstdio>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -55,30 +56,37 @@ std::string controller_name(const DaemonConfig& config) {
   return std::visit([](const auto& each) { return each.name; }, config.controller);
 }
 
+struct BusScanner {
+  const ScanOptions& options;
+  const ScanSensors& sensors;
+  const std::function<void(const std::string&)>& progress;
+
+  ScanBus operator()(const ModbusBusConfig& bus) const {
+    return scan_modbus(bus, sensors, options.search, progress);
+  }
+  ScanBus operator()(const CanBusConfig& bus) const {
+    return scan_can(bus, sensors, options.listen_s, progress);
+  }
+  ScanBus operator()(const CanopenBusConfig& bus) const {
+    return scan_canopen(bus, sensors, options.listen_s, options.search.wanted, progress);
+  }
+  ScanBus operator()(const J1939BusConfig& bus) const {
+    return scan_j1939(bus, sensors, options.listen_s, progress);
+  }
+};
+
 ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
   const ScanSensors sensors = sensors_of(config);
-  const auto progress = [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
+  const std::function<void(const std::string&)> progress = [](const std::string& line) {
+    std::fprintf(stderr, "%s\n", line.c_str());
+  };
   const auto wanted = [&](const std::string& name) {
     return options.bus.empty() || options.bus == name;
   };
   ScanReport report{options.file, {}, {}};
-  for (const ModbusBusConfig& bus : config.modbus_buses) {
-    if (!wanted(bus.name)) continue;
-    report.buses.push_back(scan_modbus(bus, sensors, options.search, progress));
-  }
-  for (const CanBusConfig& bus : config.can_buses) {
-    if (!wanted(bus.name)) continue;
-    report.buses.push_back(scan_can(bus, sensors, options.listen_s, progress));
-  }
-  for (const CanopenBusConfig& bus : config.canopen_buses) {
-    if (!wanted(bus.name)) continue;
-    report.buses.push_back(
-        scan_canopen(bus, sensors, options.listen_s, options.search.wanted, progress));
-  }
-  for (const J1939BusConfig& bus : config.j1939_buses) {
-    if (!wanted(bus.name)) continue;
-    report.buses.push_back(scan_j1939(bus, sensors, options.listen_s, progress));
-  }
+  for (const BusConfig& bus : config.buses)
+    if (wanted(name_of(bus)))
+      report.buses.push_back(std::visit(BusScanner{options, sensors, progress}, bus));
   if (wanted(controller_name(config)))
     report.controller = scan_controller(config, options.listen_s, progress);
   if (report.buses.empty() && !report.controller) {

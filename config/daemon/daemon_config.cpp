@@ -5,9 +5,9 @@
 #include <sstream>
 #include <utility>
 
+#include "config/buses/buses.hpp"
 #include "config/daemon/named_files.hpp"
 #include "config/model/model_file.hpp"
-#include "config/sections/buses.hpp"
 #include "config/sections/controller_section.hpp"
 #include "config/sections/correction_section.hpp"
 #include "config/sections/estimator_sections.hpp"
@@ -66,35 +66,6 @@ SocketConfig read_socket(const TomlTable& table, const fs::path& folder) {
   return socket;
 }
 
-/// A reading that is older than its sensor's period must not be stale yet.
-void check_periods(const std::vector<TomlTable>& sensor_tables, const DaemonConfig& config) {
-  const auto stale_after_s = [&](std::size_t sensor) {
-    return config.estimator.sensors[sensor].screening.stale_after_s;
-  };
-  for (const CanopenBusConfig& bus : config.canopen_buses) {
-    for (const CanopenNodeConfig& node : bus.nodes) {
-      for (const CanopenChannel& channel : node.channels) {
-        if (channel.way != CanopenWay::sdo || stale_after_s(channel.sensor) > channel.poll_s) {
-          continue;
-        }
-        sensor_tables[channel.sensor].problem("screening.stale_after_s",
-                                              std::to_string(stale_after_s(channel.sensor)),
-                                              "must be more than poll_s");
-      }
-    }
-  }
-  for (const ModbusBusConfig& bus : config.modbus_buses) {
-    for (const ModbusDeviceConfig& device : bus.devices) {
-      for (const ModbusChannel& channel : device.channels) {
-        if (stale_after_s(channel.sensor) > device.period_s) continue;
-        sensor_tables[channel.sensor].problem(
-            "screening.stale_after_s", std::to_string(stale_after_s(channel.sensor)),
-            "must be more than period_s of the device " + device.name);
-      }
-    }
-  }
-}
-
 void check_controller_period(const TomlTable& compensation, const DaemonConfig& config,
                              double period_s) {
   if (config.estimator.compensation.controller_stale_after_s > period_s) return;
@@ -126,15 +97,12 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.sensors = sections::read_sensors(root, sensors);
   config.estimator.blocks = sections::read_blocks(tables.blocks, config.estimator.sensors);
   config.estimator.axes = sections::read_axes(tables.axes);
-  sections::SensorBuses buses = sections::read_buses(root, sensors, presets, dbc_files, eds_files);
-  config.modbus_buses = std::move(buses.modbus);
-  config.can_buses = std::move(buses.can);
-  config.canopen_buses = std::move(buses.canopen);
-  config.j1939_buses = std::move(buses.j1939);
-  check_periods(sensors, config);
+  sections::BusFiles bus_files{dbc_files, eds_files, {}};
+  config.buses =
+      sections::read_buses(root, {sensors, config.estimator.sensors}, presets, bus_files);
 
   sections::ControllerReading controller = sections::read_controller(
-      root.table("controller"), tables.axes, config.estimator.axes, buses.serial_devices);
+      root.table("controller"), tables.axes, config.estimator.axes, bus_files.serial_devices);
   config.controller = std::move(controller.config);
   config.estimator.signals = std::move(controller.signals);
   config.dry_run = controller.dry_run;

@@ -6,11 +6,8 @@
 #include <vector>
 
 #include "config/text/problems.hpp"
-#include "drivers/can/can_config.hpp"
-#include "drivers/can/canopen/canopen_config.hpp"
-#include "drivers/can/j1939/j1939_config.hpp"
 #include "drivers/controllers/controller_config.hpp"
-#include "drivers/modbus/modbus_config.hpp"
+#include "drivers/sensors/bus_config.hpp"
 #include "estimator/estimator_config.hpp"
 #include "estimator/thermal_model.hpp"
 
@@ -52,10 +49,7 @@ struct DaemonConfig {
   std::string log_level{"info"};
   LoopConfig loop;
   EstimatorConfig estimator;
-  std::vector<ModbusBusConfig> modbus_buses;
-  std::vector<CanBusConfig> can_buses;
-  std::vector<CanopenBusConfig> canopen_buses;
-  std::vector<J1939BusConfig> j1939_buses;
+  std::vector<BusConfig> buses;  ///< by kind, those of one kind as in the file
   ControllerConfig controller;
   bool dry_run{false};  ///< the controller is read and nothing is written to it
   HistoryConfig history;

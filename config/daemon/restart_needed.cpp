@@ -16,19 +16,18 @@ std::vector<std::string> names_of(const Entries& entries) {
 }
 
 /// Buses that are new, gone or different, by name.
-template <class Bus>
-void compare_buses(const std::vector<Bus>& running, const std::vector<Bus>& next,
+void compare_buses(const std::vector<BusConfig>& running, const std::vector<BusConfig>& next,
                    std::vector<std::string>& changed) {
-  const auto missing_in = [](const std::vector<Bus>& buses, const Bus& bus) {
+  const auto missing_in = [](const std::vector<BusConfig>& buses, const BusConfig& bus) {
     return std::find(buses.begin(), buses.end(), bus) == buses.end();
   };
   std::vector<std::string> names;
-  for (const Bus& bus : running) {
-    if (missing_in(next, bus)) names.push_back(bus.name);
+  for (const BusConfig& bus : running) {
+    if (missing_in(next, bus)) names.push_back(name_of(bus));
   }
-  for (const Bus& bus : next) {
-    const bool named = std::find(names.begin(), names.end(), bus.name) != names.end();
-    if (missing_in(running, bus) && !named) names.push_back(bus.name);
+  for (const BusConfig& bus : next) {
+    const bool named = std::find(names.begin(), names.end(), name_of(bus)) != names.end();
+    if (missing_in(running, bus) && !named) names.push_back(name_of(bus));
   }
   for (const std::string& name : names) changed.push_back("bus " + name);
   if (names.empty() && !(running == next)) changed.emplace_back("order of the buses");
@@ -49,10 +48,7 @@ std::vector<std::string> restart_needed(const DaemonConfig& running, const Daemo
   compare(running.loop == next.loop, "loop");
   compare(names_of(running.estimator.sensors) == names_of(next.estimator.sensors),
           "names or order of the sensors");
-  compare_buses(running.modbus_buses, next.modbus_buses, changed);
-  compare_buses(running.can_buses, next.can_buses, changed);
-  compare_buses(running.canopen_buses, next.canopen_buses, changed);
-  compare_buses(running.j1939_buses, next.j1939_buses, changed);
+  compare_buses(running.buses, next.buses, changed);
   compare(names_of(running.estimator.axes) == names_of(next.estimator.axes),
           "names, count or order of the axes");
   // What the controller applies and shows would change its meaning at once.

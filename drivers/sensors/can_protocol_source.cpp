@@ -1,7 +1,5 @@
 #include "drivers/sensors/can_protocol_source.hpp"
 
-#include "drivers/can/canopen/canopen_line.hpp"
-#include "drivers/can/j1939/j1939_line.hpp"
 #include "drivers/monotonic_clock.hpp"
 
 namespace thermocomp {
@@ -57,18 +55,6 @@ void CanProtocolSource::write_readings(std::vector<Reading>& readings) {
 
 std::vector<UnitHealth> CanProtocolSource::units(nanoseconds now) {
   return protocol_->health(now);
-}
-
-std::unique_ptr<SensorSource> make_source(const CanopenBusConfig& config) {
-  return std::make_unique<CanProtocolSource>(config.name, "canopen", config.interface,
-                                             config.reconnect_s,
-                                             std::make_unique<CanopenLine>(config));
-}
-
-std::unique_ptr<SensorSource> make_source(const J1939BusConfig& config) {
-  return std::make_unique<CanProtocolSource>(config.name, "j1939", config.interface,
-                                             config.reconnect_s,
-                                             std::make_unique<J1939Line>(config));
 }
 
 }  // namespace thermocomp

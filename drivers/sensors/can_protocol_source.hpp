@@ -6,8 +6,6 @@
 #include <vector>
 
 #include "drivers/can/can_protocol.hpp"
-#include "drivers/can/canopen/canopen_config.hpp"
-#include "drivers/can/j1939/j1939_config.hpp"
 #include "drivers/sensors/can_interface_source.hpp"
 
 namespace thermocomp {
@@ -32,9 +30,5 @@ class CanProtocolSource final : public CanInterfaceSource {
 
   std::unique_ptr<CanProtocol> protocol_;
 };
-
-/// @throws InvalidValue for a configuration that cannot work
-[[nodiscard]] std::unique_ptr<SensorSource> make_source(const CanopenBusConfig& config);
-[[nodiscard]] std::unique_ptr<SensorSource> make_source(const J1939BusConfig& config);
 
 }  // namespace thermocomp

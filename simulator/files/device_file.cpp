@@ -2,7 +2,7 @@
 #include <functional>
 #include <map>
 
-#include "config/sections/presets.hpp"
+#include "config/buses/presets.hpp"
 #include "config/text/units.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"

@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "config/sections/canopen_bus.hpp"
-#include "config/sections/j1939_bus.hpp"
+#include "config/buses/canopen_bus.hpp"
+#include "config/buses/j1939_bus.hpp"
 #include "simulator/files/fault_codes.hpp"
 #include "simulator/files/machine_file_parts.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "config/sections/presets.hpp"
+#include "config/buses/presets.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "simulator/plant/machine_config.hpp"
 

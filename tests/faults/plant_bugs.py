@@ -1,13 +1,12 @@
-"""Copies of the product's sources with bugs planted in them, each switched on by its number.
+"""Bugs that whole lives of a machine must find, in copies of the product's sources.
 
     plant_bugs.py SOURCE_FOLDER OUTPUT_FOLDER
-
-The product's own files have no trace of this. A place that is not found exactly once is an error,
-so that the bugs stay where they were meant to be when the code changes. {P} stands for "this bug
-is switched on".
 """
 import pathlib
 import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "planted"))
+from planting import write_copies, write_if_new  # noqa: E402
 
 # (name, file, what stands there, what stands there instead)
 BUGS = [
@@ -141,33 +140,10 @@ BUGS = [
      "  if ({P}) return displacement.axis_um;\n  return state_.axis_um;"),
 ]
 
-DECLARATION = "namespace thermocomp {\nextern int planted_bug;\n}\n"
-
-
-def with_bugs(file, text):
-    for number, (name, of_file, old, new) in enumerate(BUGS, start=1):
-        if of_file != file:
-            continue
-        if text.count(old) != 1:
-            raise SystemExit(f"plant_bugs: {name}: found {text.count(old)} times in {file}: {old}")
-        switch = f"(::thermocomp::planted_bug == {number})"
-        text = text.replace(old, new.replace("{P}", switch))
-    if "#pragma once\n" in text:
-        return text.replace("#pragma once\n", "#pragma once\n" + DECLARATION, 1)
-    return DECLARATION + text
-
-
-def write_if_new(path, text):
-    if path.exists() and path.read_text() == text:
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
-
 
 def main():
     source, output = map(pathlib.Path, sys.argv[1:3])
-    for file in sorted({file for _, file, _, _ in BUGS}):
-        write_if_new(output / file, with_bugs(file, (source / file).read_text()))
+    write_copies(BUGS, source, output)
     names = "".join(f'    "{name}",\n' for name, _, _, _ in BUGS)
     write_if_new(output / "plants.cpp", '#include "tests/faults/plants.hpp"\n\n#include <array>\n\n'
                  "namespace thermocomp {\nint planted_bug = 0;\n}\n\nnamespace thermocomp::faults {\n"

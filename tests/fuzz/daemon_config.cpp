@@ -13,9 +13,7 @@
 #include "common/fuzz.hpp"
 #include "common/model_promises.hpp"
 #include "drivers/controllers/make_controller.hpp"
-#include "drivers/sensors/can_protocol_source.hpp"
-#include "drivers/sensors/can_source.hpp"
-#include "drivers/sensors/modbus_source.hpp"
+#include "drivers/sensors/make_source.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 using namespace thermocomp;
@@ -27,19 +25,8 @@ constexpr const char* config_name = "/etc/thermocompd.toml";
 constexpr const char* model_name = "/etc/model.toml";
 
 void make_parts(const DaemonConfig& config) {
-  for (const ModbusBusConfig& bus : config.modbus_buses) {
-    const ModbusSource source(bus);
-    FUZZ_PROMISE(source.health().units.size() == bus.devices.size());
-  }
-  for (const CanBusConfig& bus : config.can_buses) {
-    const CanSource source(bus);
-    FUZZ_PROMISE(source.health().units.size() == bus.devices.size());
-  }
-  for (const CanopenBusConfig& bus : config.canopen_buses) {
-    FUZZ_PROMISE(make_source(bus)->health().units.size() == bus.nodes.size());
-  }
-  for (const J1939BusConfig& bus : config.j1939_buses) {
-    FUZZ_PROMISE(make_source(bus)->health().units.size() == bus.nodes.size());
+  for (const BusConfig& bus : config.buses) {
+    FUZZ_PROMISE(make_source(bus)->health().units.size() == outline_of(bus).units);
   }
   FUZZ_PROMISE(make_controller(config.controller) != nullptr);
 }

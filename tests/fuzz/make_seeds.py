@@ -502,10 +502,10 @@ def dictionaries():
     model = literals("config/model/model_file.cpp", "config/model/course_table.cpp", "estimator/model/terms/*.cpp", "config/text/units.cpp")
     dictionary("model_file", toml | model)
     dictionary("daemon_config", toml | model | {"#### model\n"} |
-               literals("config/daemon/daemon_config.cpp", "config/sections/*.cpp"))
+               literals("config/daemon/daemon_config.cpp", "config/buses/*.cpp", "config/buses/bus_section.hpp", "config/sections/*.cpp"))
     dictionary("preset_file", toml | {"#### configuration\n"} |
-               literals("config/sections/*.cpp"))
-    dictionary("machine_file", toml | literals("simulator/files/*_file.cpp", "config/sections/*.cpp"))
+               literals("config/buses/*.cpp", "config/buses/bus_section.hpp", "config/sections/*.cpp"))
+    dictionary("machine_file", toml | literals("simulator/files/*_file.cpp", "config/buses/*.cpp", "config/buses/bus_section.hpp", "config/sections/*.cpp"))
     dictionary("dbc_file", {'BA_ "VFrameFormat" BO_ ', 'BA_DEF_ BO_ "VFrameFormat" ENUM ', "@1+",
                             "BO_ 385 NODE: 8 A\n", "BS_:", "BU_:", "CM_ ", "NS_ :", "VAL_ ", "@0-",
                             "SG_MUL_VAL_ 385 T P 0-1;", "SIG_VALTYPE_ 385 T : 1;", "4294967295",

@@ -7,9 +7,7 @@
 
 #include "common/fuzz.hpp"
 #include "config/daemon/daemon_config.hpp"
-#include "drivers/sensors/can_protocol_source.hpp"
-#include "drivers/sensors/can_source.hpp"
-#include "drivers/sensors/modbus_source.hpp"
+#include "drivers/sensors/make_source.hpp"
 
 using namespace thermocomp;
 
@@ -43,17 +41,8 @@ struct Files {
 };
 
 void make_sources(const DaemonConfig& config) {
-  for (const ModbusBusConfig& bus : config.modbus_buses) {
-    FUZZ_PROMISE(ModbusSource(bus).health().units.size() == bus.devices.size());
-  }
-  for (const CanBusConfig& bus : config.can_buses) {
-    FUZZ_PROMISE(CanSource(bus).health().units.size() == bus.devices.size());
-  }
-  for (const CanopenBusConfig& bus : config.canopen_buses) {
-    FUZZ_PROMISE(make_source(bus)->health().units.size() == bus.nodes.size());
-  }
-  for (const J1939BusConfig& bus : config.j1939_buses) {
-    FUZZ_PROMISE(make_source(bus)->health().units.size() == bus.nodes.size());
+  for (const BusConfig& bus : config.buses) {
+    FUZZ_PROMISE(make_source(bus)->health().units.size() == outline_of(bus).units);
   }
 }
 

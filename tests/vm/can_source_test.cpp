@@ -13,7 +13,7 @@
 #include "../unit/controllers/cycle_stub.hpp"
 #include "can_bus.hpp"
 #include "drivers/can/can_socket.hpp"
-#include "drivers/sensors/can_protocol_source.hpp"
+#include "drivers/sensors/make_source.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

@@ -33,11 +33,13 @@ def predict(files, run_argument="run.csv", output="out.csv"):
 def test_help_succeeds_and_bad_use_is_status_2():
     assert run("--help").returncode == 0
     assert run("predict", "--help").returncode == 0
-    for arguments in ([], ["nosuch"], ["predict"], ["measured", "z"], ["measured", "z", "much"],
-                      ["check", "a", "b"], ["watch", "--for", "-1"]):
+    for arguments, said in (
+            ([], "subcommand"), (["nosuch"], "subcommand"), (["predict"], "required"),
+            (["measured", "z"], "required"), (["measured", "z", "much"], "much"),
+            (["check", "a", "b"], "b"), (["watch", "--for", "-1"], "-1")):
         answer = run(*arguments)
         assert answer.returncode == 2, arguments
-        assert answer.stderr, arguments
+        assert said in answer.stderr, (arguments, answer.stderr)
 
 
 @pytest.mark.parametrize("name", ["small_machine", "modbus_tcp", "modbus_rtu", "can"])
@@ -137,8 +139,10 @@ def test_bad_input_is_refused_by_name_and_leaves_no_output(files, name, text):
 
 
 def test_output_that_cannot_be_written_is_status_2(files):
-    assert predict(files, output="nosuch/out.csv").returncode == 2
-    assert predict(files, output="/dev/full").returncode == 2
+    for output, said in (("nosuch/out.csv", "No such file"), ("/dev/full", "No space left")):
+        answer = predict(files, output=output)
+        assert answer.returncode == 2
+        assert output in answer.stderr and said in answer.stderr, answer.stderr
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no measured data at {DATA} (THERMOCOMP_DATA)")

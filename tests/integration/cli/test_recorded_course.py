@@ -109,5 +109,5 @@ def test_a_course_of_other_groups_is_refused_by_check(lab):
                       .replace('inputs = ["column_degC"]', 'inputs = ["spindle_degC"]')
                       .replace('inputs = ["s"]', 'inputs = ["column_degC"]'))
     answer = run("check", config)
-    assert answer.returncode == 2 or answer.returncode == 1
+    assert answer.returncode == 2
     assert "must be the groups of the model's [course]" in answer.stderr + answer.stdout

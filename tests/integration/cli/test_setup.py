@@ -67,4 +67,6 @@ def test_without_a_network_one_line_says_what_to_do(system):
 
 
 def test_bad_use_is_status_2(system):
-    assert set_up(system, "nosuch").returncode == 2
+    answer = set_up(system, "nosuch")
+    assert answer.returncode == 2
+    assert answer.stderr == "usage: setup.sh build|modelling|petsc|demo|test|bench\n"

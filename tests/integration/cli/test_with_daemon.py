@@ -130,5 +130,5 @@ def test_watch_prints_plain_lines_when_it_is_no_terminal(daemon):
 def test_watch_shows_what_comes(daemon):
     # The connection stays silent after three notifications: the watch ends as unreachable.
     answer = run("--socket", daemon.path, "watch", "--period", "0.1")
-    assert answer.returncode == 2
+    assert answer.returncode == 2 and daemon.path in answer.stderr, answer.stderr
     assert answer.stdout.count("compensating") == 3

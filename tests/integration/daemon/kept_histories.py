@@ -17,7 +17,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).parent
-TESTS = ("test_spindle_replay.py", "test_exact_replay.py", "test_probing.py",
+TESTS = ("history/test_spindle_replay.py", "history/test_exact_replay.py", "test_probing.py",
          "test_lost_sensors.py", "test_extended_model.py", "test_reloads.py")
 
 

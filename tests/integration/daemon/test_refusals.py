@@ -77,7 +77,7 @@ def test_a_missing_file_and_wrong_options_are_bad_use(tmp_path):
     assert status == 2 and "nosuch.toml" in said
     done = subprocess.run([str(BIN / "thermocompd"), "--nosuch"], capture_output=True, text=True,
                           timeout=60)
-    assert done.returncode == 2
+    assert done.returncode == 2 and "--nosuch" in done.stderr
     done = subprocess.run([str(BIN / "thermocompd"), "--version"], capture_output=True, text=True,
                           timeout=60)
     assert done.returncode == 0 and done.stdout.strip()

@@ -69,7 +69,8 @@ TEST_CASE("a named signal in no unit of temperature is refused, one in degF is t
   folder.edit("can_dbc.dbc", "(0.1,0) [-100|400] \"bar\"",
               "(1,32) [0|0] \"\xB0"
               "F\"");
-  const CanSignal signal = folder.load().can_buses.at(0).devices.at(0).channels.at(0).signal;
+  const CanSignal signal =
+      std::get<CanBusConfig>(folder.load().buses.at(0)).devices.at(0).channels.at(0).signal;
   CHECK(100.0 * signal.scale + signal.offset == Approx(100.0 * 5 / 9));
 }
 

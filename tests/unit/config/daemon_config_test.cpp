@@ -42,24 +42,26 @@ TEST_CASE("the small machine is what its file says", "[config]") {
   CHECK(config.text == example("small_machine.toml"));
   CHECK(config.model_text == example("small_machine_model.toml"));
   CHECK(config.model_checksum == sha256_hex(config.model_text));
-  REQUIRE(config.modbus_buses.size() == 2);
-  const ModbusDeviceConfig& bed = config.modbus_buses[0].devices.at(0);
+  REQUIRE(config.buses.size() == 2);
+  const auto& over_tcp = std::get<ModbusBusConfig>(config.buses[0]);
+  const auto& serial = std::get<ModbusBusConfig>(config.buses[1]);
+  const ModbusDeviceConfig& bed = over_tcp.devices.at(0);
   REQUIRE(bed.channels.size() == 4);
   CHECK(bed.channels[1].sensor == 1);
   CHECK(bed.channels[1].scale == 0.1);
   REQUIRE(bed.channels[1].sentinels.size() == 1);
   CHECK(bed.channels[1].sentinels[0].code == 32767);
   CHECK(bed.channels[1].sentinels[0].fault == Fault::open_circuit);
-  const ModbusDeviceConfig& column = config.modbus_buses[1].devices.at(0);
+  const ModbusDeviceConfig& column = serial.devices.at(0);
   REQUIRE(column.channels.size() == 4);
   CHECK(column.channels[3].sensor == 7);
   CHECK(column.channels[3].address == 6);
   CHECK(column.channels[3].encoding == Encoding::float32);
   CHECK(column.channels[3].word_order == WordOrder::cdab);
-  const auto& line = config.modbus_buses[1].line;
+  const auto& line = serial.line;
   CHECK(std::get<ModbusRtu>(line.link).parity == 'E');
   CHECK(line.inter_frame_delay_ms == 2.0);
-  CHECK(config.modbus_buses[0].line.inter_frame_delay_ms < 0);
+  CHECK(over_tcp.line.inter_frame_delay_ms < 0);
 }
 
 TEST_CASE("a sensor's own keys stand above those for every sensor", "[config]") {
@@ -90,8 +92,8 @@ TEST_CASE("axes, blocks and signals keep their order and places", "[config]") {
 
 TEST_CASE("the CAN example is what its file says", "[config][can]") {
   const DaemonConfig config = load_daemon_config(examples / "can.toml");
-  REQUIRE(config.can_buses.size() == 1);
-  const auto& channels = config.can_buses[0].devices.at(0).channels;
+  REQUIRE(config.buses.size() == 1);
+  const auto& channels = std::get<CanBusConfig>(config.buses[0]).devices.at(0).channels;
   REQUIRE(channels.size() == 2);
   CHECK(channels[1].signal.id == 0x181);
   CHECK(channels[1].signal.start_bit == 16);
@@ -105,7 +107,7 @@ TEST_CASE("the CAN example is what its file says", "[config][can]") {
 
 TEST_CASE("sensors of a CAN bus are named by its DBC file", "[config][can][dbc]") {
   const DaemonConfig config = load_daemon_config(examples / "can_dbc.toml");
-  const auto& channels = config.can_buses.at(0).devices.at(0).channels;
+  const auto& channels = std::get<CanBusConfig>(config.buses.at(0)).devices.at(0).channels;
   REQUIRE(channels.size() == 2);
   CHECK(channels[0].signal.id == 0x181);
   CHECK(channels[0].signal.scale == 0.1);
@@ -210,7 +212,7 @@ TEST_CASE("everything behind \"default\" may be left out and is then the same", 
   const DaemonConfig a = parse(full);
   const DaemonConfig b = parse(text);
   CHECK(a.loop == b.loop);
-  CHECK(a.modbus_buses == b.modbus_buses);
+  CHECK(a.buses == b.buses);
   CHECK(a.controller == b.controller);
   CHECK(a.socket == b.socket);
   CHECK(a.history == b.history);

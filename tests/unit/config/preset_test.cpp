@@ -2,9 +2,9 @@
 
 #include <catch2/catch.hpp>
 
+#include "config/buses/presets.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/sections/modbus_values.hpp"
-#include "config/sections/presets.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;
@@ -129,6 +129,6 @@ reference = [20.0]
 matrix_um_per_K = [[1.0]]
 )";
   const DaemonConfig config = parse_daemon_config(text, "c.toml", model, "m.toml");
-  CHECK(config.modbus_buses.empty());
+  CHECK(config.buses.empty());
   CHECK(config.estimator.sensors.size() == 1);
 }

@@ -276,6 +276,21 @@ TEST_CASE("mappings are asked for and objects found in them", "[canopen][node]")
   }
 }
 
+TEST_CASE("an object of another length than its type has is not the one that is meant",
+          "[canopen][node]") {
+  std::vector<CanopenChannel> channels(1);
+  channels[0].way = CanopenWay::pdo_object;
+  channels[0].object = {0x2400, 1};
+  channels[0].signal.length_bits = 16;
+  CHECK(place_channels({0x181, {{{0x2400, 1}, 32}}}, channels).empty());
+  CHECK(channels[0].signal.id == 0);
+  const std::vector<std::size_t> placed =
+      place_channels({0x182, {{{0x2400, 2}, 8}, {{0x2400, 1}, 16}}}, channels);
+  CHECK(placed == std::vector<std::size_t>{0});
+  CHECK(channels[0].signal.id == 0x182);
+  CHECK(channels[0].signal.start_bit == 8);
+}
+
 TEST_CASE("a configured mapping needs no question", "[canopen][node]") {
   CanopenNodeConfig node = node_5({object_channel(CanopenWay::pdo_object, {0x7130, 2})});
   node.mappings = {{0x285, {{{0x0005, 0}, 8}, {{0x7130, 1}, 16}, {{0x7130, 2}, 16}}}};

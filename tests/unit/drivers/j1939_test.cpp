@@ -238,6 +238,17 @@ TEST_CASE("BAM: a group of several packets", "[j1939][transport]") {
   CHECK(bus.sent().empty());
 }
 
+TEST_CASE("BAM: what pads the last packet is no content", "[j1939][transport]") {
+  J1939Parameter parameter = oil();
+  parameter.pgn = 0xFF10;
+  parameter.start_byte = 8;  // bytes 9 and 10 of a group that says it has 9
+  Bus bus(bus_of(parameter));
+  bus.put(0x1CECFF80, {32, 9, 0, 2, 0xFF, 0x10, 0xFF, 0x00});
+  bus.put(0x1CEBFF80, {1, 0, 1, 2, 3, 4, 5, 6});
+  bus.put(0x1CEBFF80, {2, 7, 0x00, 0x25, 0xFF, 0xFF, 0xFF, 0xFF});
+  CHECK(bus.reading().fault == Fault::bad_frame);
+}
+
 TEST_CASE("an announcement whose numbers disagree begins nothing", "[j1939][transport]") {
   TransportReceiver receiver({0xFF10});
   const J1939Id id = read_identifier(0x1CECFF80);

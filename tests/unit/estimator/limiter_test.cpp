@@ -76,9 +76,9 @@ TEST_CASE("an offset outside the bound comes in at the slew rate, target or not"
 }
 
 TEST_CASE("bounds that have no meaning are refused", "[limiter]") {
-  CHECK_THROWS(Limiter(bounds(0, 1)));
-  CHECK_THROWS(Limiter(bounds(501, 1)));
-  CHECK_THROWS(Limiter(bounds(not_a_number, 1)));
-  CHECK_THROWS(Limiter(bounds(50, 0)));
-  CHECK_THROWS(Limiter(bounds(50, not_a_number)));
+  CHECK_THROWS_WITH(Limiter(bounds(0, 1)), Catch::Contains("offset_um_max"));
+  CHECK_THROWS_WITH(Limiter(bounds(501, 1)), Catch::Contains("offset_um_max"));
+  CHECK_THROWS_WITH(Limiter(bounds(not_a_number, 1)), Catch::Contains("offset_um_max"));
+  CHECK_THROWS_WITH(Limiter(bounds(50, 0)), Catch::Contains("rate_um_per_s_max"));
+  CHECK_THROWS_WITH(Limiter(bounds(50, not_a_number)), Catch::Contains("rate_um_per_s_max"));
 }

@@ -406,15 +406,15 @@ TEST_CASE("a smoother that loads another's state goes on as that one, bit for bi
 }
 
 TEST_CASE("smoothing refuses a configuration that has no meaning", "[smoothing]") {
-  const auto broken = [](auto change) {
+  const auto broken = [](const char* key, auto change) {
     SmoothingConfig config;
     change(config);
-    CHECK_THROWS(Smoother(config));
+    CHECK_THROWS_WITH(Smoother(config), Catch::Contains(key));
   };
-  broken([](SmoothingConfig& config) { config.samples = 2; });
-  broken([](SmoothingConfig& config) { config.samples = 33; });
-  broken([](SmoothingConfig& config) { config.half_width_K = 0; });
-  broken([](SmoothingConfig& config) { config.half_width_K = not_a_number; });
-  broken([](SmoothingConfig& config) { config.period_s = -1; });
-  broken([](SmoothingConfig& config) { config.outage_s = 0; });
+  broken("samples", [](SmoothingConfig& config) { config.samples = 2; });
+  broken("samples", [](SmoothingConfig& config) { config.samples = 33; });
+  broken("half_width_K", [](SmoothingConfig& config) { config.half_width_K = 0; });
+  broken("half_width_K", [](SmoothingConfig& config) { config.half_width_K = not_a_number; });
+  broken("period_s", [](SmoothingConfig& config) { config.period_s = -1; });
+  broken("outage_s", [](SmoothingConfig& config) { config.outage_s = 0; });
 }

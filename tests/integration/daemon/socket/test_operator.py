@@ -160,7 +160,7 @@ def test_only_a_latched_axis_is_released(machine, lab):
     daemon = machine.start()
     status, _, said = daemon.cli("release", "z")
     assert status == 1 and "no latched mismatch" in said
-    with pytest.raises(Refused):
+    with pytest.raises(Refused, match="nosuch"):
         daemon.call("release", axis="nosuch")
     machine.warm_by(6.0)
     daemon.wait_for_offset(6.0, 0.05)
@@ -184,7 +184,7 @@ def test_measured_and_cycle_end_are_noted(machine, lab):
     assert daemon.axis()["measured"] == 3.25
     assert daemon.cli("cycle-end")[0] == 0
     assert daemon.status()["cycle_ends"] == 1
-    with pytest.raises(Refused):
+    with pytest.raises(Refused, match="nosuch"):
         daemon.call("measured", axis="nosuch", value_um=1.0)
     recorded(machine, lab)
 

@@ -1,4 +1,4 @@
-#include "config/sections/can_database.hpp"
+#include "config/buses/can_database.hpp"
 
 #include <array>
 #include <string>

@@ -1,12 +1,12 @@
-#include "config/sections/canopen_bus.hpp"
+#include "config/buses/canopen_bus.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "config/buses/bus_section.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
-#include "config/toml/file_limits.hpp"
 
 namespace thermocomp::sections {
 namespace {
@@ -219,23 +219,6 @@ void read_way(const TomlTable& sensor, const TomlTable& device, const CanopenDev
 
 }  // namespace
 
-std::shared_ptr<const EdsFile> EdsFiles::read(const TomlTable& device) {
-  if (!device.has("eds")) return nullptr;
-  const std::filesystem::path named = device.text("eds");
-  if (!folder_ || named.empty()) return nullptr;
-  const std::filesystem::path path = *folder_ / named;
-  if (const auto known = read_.find(path); known != read_.end()) return known->second;
-  std::shared_ptr<const EdsFile>& file = read_[path];
-  try {
-    EdsReading reading = read_eds_text(read_text_file(path, bus_table_bytes_max), path.string());
-    problems_.insert(problems_.end(), reading.problems.begin(), reading.problems.end());
-    if (reading.problems.empty()) file = std::make_shared<EdsFile>(std::move(reading.file));
-  } catch (const ConfigurationError& error) {
-    device.problem("eds", error.problems().front().rule);
-  }
-  return file;
-}
-
 EmergencyForm read_emergency_form(const TomlTable& device) {
   return device.choice<EmergencyForm>(
       "emergency", {{"generic", EmergencyForm::generic}, {"jumo_cantrans", EmergencyForm::jumo}},
@@ -372,6 +355,44 @@ void check_canopen_channel(const TomlTable& sensor, const CanopenBusConfig& bus,
                    "is the COB-ID of a TPDO of the device " + other.name + " already");
     return;
   }
+}
+
+namespace {
+
+class CanopenSection final : public BusSection {
+ public:
+  CanopenSection(const TomlTable& table, const std::string& name, EdsFiles& eds_files)
+      : bus_(read_canopen_bus(table, name)), eds_files_(eds_files) {}
+
+  void read_device(const TomlTable& table, const std::string& name) override {
+    devices_.push_back(read_canopen_device(table, name, eds_files_));
+    check_canopen_node(table, bus_, devices_.back().node);
+    bus_.nodes.push_back(devices_.back().node);
+  }
+
+  void read_channel(const ChannelTables& tables, std::size_t device) override {
+    auto channel = read_canopen_channel(tables.sensor, tables.device, devices_[device], eds_files_);
+    if (!channel) return;
+    channel->sensor = tables.index;
+    check_canopen_channel(tables.sensor, bus_, device, *channel);
+    if (channel->way == CanopenWay::sdo) tables.check_period(channel->poll_s, "poll_s");
+    bus_.nodes[device].channels.push_back(std::move(*channel));
+  }
+
+  [[nodiscard]] bool has_devices() const override { return !bus_.nodes.empty(); }
+  [[nodiscard]] BusConfig take() override { return std::move(bus_); }
+
+ private:
+  CanopenBusConfig bus_;
+  EdsFiles& eds_files_;
+  std::vector<CanopenDevice> devices_;
+};
+
+}  // namespace
+
+std::unique_ptr<BusSection> open_canopen(const TomlTable& bus, const std::string& name,
+                                         BusFiles& files) {
+  return std::make_unique<CanopenSection>(bus, name, files.eds);
 }
 
 }  // namespace thermocomp::sections

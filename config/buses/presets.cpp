@@ -1,4 +1,4 @@
-#include "config/sections/presets.hpp"
+#include "config/buses/presets.hpp"
 
 #include <algorithm>
 #include <set>

@@ -1,8 +1,9 @@
-#include "config/sections/j1939_bus.hpp"
+#include "config/buses/j1939_bus.hpp"
 
 #include <charconv>
 #include <optional>
 
+#include "config/buses/bus_section.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 
@@ -116,6 +117,36 @@ J1939Channel read_j1939_channel(const TomlTable& sensor, const TomlTable& device
   parameter.error = read_meaning(sensor, device, "error_means");
   parameter.not_available = read_meaning(sensor, device, "not_available_means");
   return channel;
+}
+
+namespace {
+
+class J1939Section final : public BusSection {
+ public:
+  J1939Section(const TomlTable& table, const std::string& name)
+      : bus_(read_j1939_bus(table, name)) {}
+
+  void read_device(const TomlTable& table, const std::string& name) override {
+    bus_.nodes.push_back(read_j1939_device(table, name, bus_));
+  }
+
+  void read_channel(const ChannelTables& tables, std::size_t device) override {
+    J1939Channel channel = read_j1939_channel(tables.sensor, tables.device);
+    channel.sensor = tables.index;
+    bus_.nodes[device].channels.push_back(std::move(channel));
+  }
+
+  [[nodiscard]] bool has_devices() const override { return !bus_.nodes.empty(); }
+  [[nodiscard]] BusConfig take() override { return std::move(bus_); }
+
+ private:
+  J1939BusConfig bus_;
+};
+
+}  // namespace
+
+std::unique_ptr<BusSection> open_j1939(const TomlTable& bus, const std::string& name, BusFiles&) {
+  return std::make_unique<J1939Section>(bus, name);
 }
 
 }  // namespace thermocomp::sections

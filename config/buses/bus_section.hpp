@@ -1,0 +1,69 @@
+/// One bus of the daemon's file while it is read, of whatever kind. A kind is a file NAME_bus.cpp
+/// that opens such sections, and its line in bus_kinds.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "config/buses/can_database.hpp"
+#include "config/buses/eds_files.hpp"
+#include "config/toml/toml_reader.hpp"
+#include "drivers/sensors/bus_config.hpp"
+
+namespace thermocomp::sections {
+
+/// What the buses of a configuration share.
+struct BusFiles {
+  DbcFiles& dbc;
+  EdsFiles& eds;
+  std::set<std::string> serial_devices;  ///< used by a bus; the controller must not use them
+};
+
+/// A [[sensor]] on a device of the bus.
+struct ChannelTables {
+  TomlTable own;         ///< as it stands in the file
+  TomlTable sensor;      ///< over its channel of the preset, if the device has one
+  TomlTable device;      ///< as read_device() was given it
+  std::size_t index{0};  ///< of the sensor in the configuration
+  double stale_after_s{0.0};
+
+  /// That a reading as old as its period is not stale yet. @param period  the key, for the rule
+  void check_period(double period_s, const std::string& period) const;
+};
+
+class BusSection {
+ public:
+  BusSection() = default;
+  BusSection(const BusSection&) = delete;
+  BusSection& operator=(const BusSection&) = delete;
+  virtual ~BusSection() = default;
+
+  /// @param table  the [[device]], over its preset if it has one
+  virtual void read_device(const TomlTable& table, const std::string& name) = 0;
+  /// @param device  counted in the order of read_device()
+  virtual void read_channel(const ChannelTables& tables, std::size_t device) = 0;
+  [[nodiscard]] virtual bool has_devices() const = 0;
+  /// Afterwards the section is empty.
+  [[nodiscard]] virtual BusConfig take() = 0;
+};
+
+/// Opens the section of a [[bus]] whose keys name, kind are read.
+using OpenBus = std::unique_ptr<BusSection>(const TomlTable& bus, const std::string& name,
+                                            BusFiles& files);
+OpenBus open_modbus_tcp, open_modbus_rtu, open_can, open_canopen, open_j1939;
+
+struct BusKind {
+  const char* name;      ///< in the key `kind`
+  const char* protocol;  ///< what a preset must have been written for
+  OpenBus* open;
+};
+/// In the order in which the message about a wrong kind names them.
+inline constexpr std::array bus_kinds{
+    BusKind{"modbus_tcp", "modbus", open_modbus_tcp},
+    BusKind{"modbus_rtu", "modbus", open_modbus_rtu}, BusKind{"can", "can", open_can},
+    BusKind{"canopen", "canopen", open_canopen}, BusKind{"j1939", "j1939", open_j1939}};
+
+}  // namespace thermocomp::sections

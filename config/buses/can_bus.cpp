@@ -1,0 +1,53 @@
+#include "config/buses/bus_section.hpp"
+#include "config/sections/can_signals.hpp"
+#include "config/sections/common.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+class CanSection final : public BusSection {
+ public:
+  CanSection(const TomlTable& table, const std::string& name, DbcFiles& dbc_files) {
+    bus_.name = name;
+    bus_.interface = read_interface(table);
+    // Looking for an interface costs nothing, and a bus that is back shall be read within 2 s.
+    bus_.reconnect_s = table.number("reconnect_s", Range::between(0.01, 1), bus_.reconnect_s);
+    refuse_all(table,
+               {"host", "port", "device", "baud", "parity", "data_bits", "stop_bits", "rs485",
+                "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},
+               "makes no sense for kind = \"can\"");
+    database_ = dbc_files.read(table);
+  }
+
+  void read_device(const TomlTable& table, const std::string& name) override {
+    refuse_all(table,
+               {"unit", "period_s", "registers_per_request_max", "gap_registers_max",
+                "one_register_a_request", "renewal", "table", "encoding", "word_order"},
+               "makes no sense on a CAN bus");
+    bus_.devices.push_back({name, {}});
+  }
+
+  void read_channel(const ChannelTables& tables, std::size_t device) override {
+    refuse_all(tables.sensor, {"table", "address", "encoding", "word_order"},
+               "makes no sense on a CAN bus");
+    CanChannel channel = read_can_channel(tables.sensor, tables.device, database_);
+    channel.sensor = tables.index;
+    bus_.devices[device].channels.push_back(std::move(channel));
+  }
+
+  [[nodiscard]] bool has_devices() const override { return !bus_.devices.empty(); }
+  [[nodiscard]] BusConfig take() override { return std::move(bus_); }
+
+ private:
+  CanBusConfig bus_;
+  CanDatabase database_;
+};
+
+}  // namespace
+
+std::unique_ptr<BusSection> open_can(const TomlTable& bus, const std::string& name,
+                                     BusFiles& files) {
+  return std::make_unique<CanSection>(bus, name, files.dbc);
+}
+
+}  // namespace thermocomp::sections

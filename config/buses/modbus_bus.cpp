@@ -1,0 +1,75 @@
+#include "config/buses/bus_section.hpp"
+#include "config/sections/common.hpp"
+#include "config/sections/modbus_values.hpp"
+
+namespace thermocomp::sections {
+namespace {
+
+class ModbusSection final : public BusSection {
+ public:
+  ModbusSection(const TomlTable& table, const std::string& name, bool is_tcp, BusFiles& files)
+      : is_tcp_(is_tcp) {
+    bus_.name = name;
+    bus_.line = read_modbus_line(table, is_tcp);
+    refuse_all(table, {"interface", "dbc"}, "makes no sense on a Modbus bus");
+    if (const auto* rtu = std::get_if<ModbusRtu>(&bus_.line.link)) {
+      if (!rtu->device.empty() && !files.serial_devices.insert(rtu->device).second) {
+        table.problem("device", "is used by two buses");
+      }
+    }
+  }
+
+  void read_device(const TomlTable& table, const std::string& name) override {
+    ModbusDeviceConfig device;
+    device.name = name;
+    device.unit = read_unit(table, is_tcp_);
+    device.period_s = table.number("period_s", Range::between(0.01, 3600), device.period_s);
+    device.registers_per_request_max =
+        table.integer("registers_per_request_max", 1, 125, device.registers_per_request_max);
+    device.gap_registers_max = table.integer("gap_registers_max", 0, 124, device.gap_registers_max);
+    device.one_register_a_request =
+        table.flag("one_register_a_request", device.one_register_a_request);
+    if (table.has("renewal")) device.renewal = read_modbus_renewal(table.table("renewal"));
+    bus_.devices.push_back(std::move(device));
+  }
+
+  void read_channel(const ChannelTables& tables, std::size_t device) override {
+    ModbusDeviceConfig& on = bus_.devices[device];
+    ModbusChannel channel = read_modbus_channel(tables.sensor, tables.device);
+    channel.sensor = tables.index;
+    check_request(tables.sensor, channel, on);
+    tables.check_period(on.period_s, "period_s of the device " + on.name);
+    on.channels.push_back(std::move(channel));
+  }
+
+  [[nodiscard]] bool has_devices() const override { return !bus_.devices.empty(); }
+  [[nodiscard]] BusConfig take() override { return std::move(bus_); }
+
+ private:
+  /// A value is read in one request, or it could be half old and half new.
+  static void check_request(const TomlTable& sensor, const ModbusChannel& channel,
+                            const ModbusDeviceConfig& device) {
+    const auto count = static_cast<int>(words_of(channel.table, channel.encoding));
+    if (count > device.registers_per_request_max) {
+      sensor.problem("address", "the value takes " + std::to_string(count) +
+                                    " registers, more than registers_per_request_max");
+    }
+  }
+
+  bool is_tcp_;
+  ModbusBusConfig bus_;
+};
+
+}  // namespace
+
+std::unique_ptr<BusSection> open_modbus_tcp(const TomlTable& bus, const std::string& name,
+                                            BusFiles& files) {
+  return std::make_unique<ModbusSection>(bus, name, true, files);
+}
+
+std::unique_ptr<BusSection> open_modbus_rtu(const TomlTable& bus, const std::string& name,
+                                            BusFiles& files) {
+  return std::make_unique<ModbusSection>(bus, name, false, files);
+}
+
+}  // namespace thermocomp::sections

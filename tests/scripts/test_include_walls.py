@@ -1,0 +1,64 @@
+"""A header of a library that is not linked cannot be included: planted includes must not compile."""
+import json
+import os
+import pathlib
+import shlex
+import subprocess
+
+import pytest
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(os.environ["THERMOCOMP_BUILD"])
+COMMANDS = BUILD / "compile_commands.json"
+
+
+@pytest.fixture(scope="module")
+def commands():
+    if not COMMANDS.exists():
+        pytest.skip("this build tells no compile commands")
+    return {each["file"]: each for each in json.loads(COMMANDS.read_text(encoding="utf-8"))}
+
+
+def compile_beside(commands, file, header, folder):
+    """Compiles a file that includes `header` with the include folders that `file` is compiled with."""
+    words = shlex.split(commands[str(SOURCE / file)]["command"])
+    compiler = next(word for word in words if word.endswith(("c++", "g++", "clang++")))
+    kept, takes_next = [], False
+    for word in words:
+        if takes_next or word.startswith(("-I", "-std=")):
+            kept.append(word)
+        elif word == "-isystem":
+            kept.append(word)
+        takes_next = word == "-isystem"
+    planted = folder / "planted.cpp"
+    planted.write_text(f'#include "{header}"\n', encoding="utf-8")
+    return subprocess.run([compiler, *kept, "-fsyntax-only", planted], capture_output=True,
+                          text=True, timeout=120, check=False)
+
+
+@pytest.mark.parametrize("file, header", [
+    ("estimator/axes/limiter.cpp", "drivers/driver_error.hpp"),
+    ("drivers/modbus/connection.cpp", "drivers/can/can_socket.hpp"),
+    ("drivers/sensors/can_source.cpp", "drivers/modbus/connection.hpp"),
+    ("drivers/can/canopen/canopen_node.cpp", "drivers/can/j1939/j1939_line.hpp"),
+    ("config/daemon/daemon_config.cpp", "drivers/sensors/make_source.hpp"),
+    ("daemon/cycle/cycle.cpp", "config/daemon/daemon_config.hpp"),
+    ("daemon/history/reading/history_reader.cpp", "daemon/history/writing/history_store.hpp"),
+    ("daemon/socket/status_client.cpp", "daemon/cycle/cycle.hpp"),
+    ("simulator/plant/simulate.cpp", "daemon/cycle/cycle.hpp"),
+])
+def test_a_header_of_a_library_that_is_not_linked_is_not_found(commands, tmp_path, file, header):
+    assert (SOURCE / header).exists()
+    result = compile_beside(commands, file, header, tmp_path)
+    assert result.returncode == 1
+    assert f"{header}: No such file" in result.stderr or f"'{header}' file not found" in result.stderr
+
+
+@pytest.mark.parametrize("file, header", [
+    ("estimator/axes/limiter.cpp", "estimator/types.hpp"),
+    ("drivers/sensors/can_source.cpp", "drivers/can/can_socket.hpp"),
+    ("daemon/cycle/cycle.cpp", "drivers/sensors/sensor_source.hpp"),
+])
+def test_one_that_is_linked_is_found(commands, tmp_path, file, header):
+    result = compile_beside(commands, file, header, tmp_path)
+    assert result.returncode == 0, result.stderr
