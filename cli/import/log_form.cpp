@@ -61,9 +61,11 @@ bool is_bare_numbers(std::string_view text) {
 std::string with_unit(const std::string& name, std::string unit) {
   for (const char* celsius : {"Deg C", "DegC", "Deg_C", "deg_C", "degc"})
     if (unit == celsius) unit = "degC";
-  std::string header = name;
-  if (!unit.empty() && spelled_name(name).known == nullptr) header += " [" + unit + "]";
-  return "\"" + header + "\"";
+  std::string header("\"");
+  header.append(name);
+  if (!unit.empty() && spelled_name(name).known == nullptr)
+    header.append(" [").append(unit).append("]");
+  return header.append("\"");
 }
 
 /// A table's rows with the fields of `left_out` taken away.
@@ -138,7 +140,8 @@ PlainTable plain_kw_watcher(std::string_view text, const std::string& name) {
              "must have as many as the first line, " + std::to_string(columns));
   PlainTable table;
   table.text = "\"Date\",\"Time\"";
-  for (std::size_t i = 2; i < columns; ++i) table.text += "," + with_unit(head[1][i], head[6][i]);
+  for (std::size_t i = 2; i < columns; ++i)
+    table.text.append(",").append(with_unit(head[1][i], head[6][i]));
   table.text += '\n';
   append_rows(text, 7, name, columns, std::vector<bool>(columns, false), table.text);
   table.said.emplace_back("KW Watcher: names in line 2, units in line 7");

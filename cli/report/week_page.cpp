@@ -16,12 +16,12 @@ constexpr std::array<const char*, 8> colours = {"#2b6cb0", "#c05621", "#2f855a",
                                                 "#b7791f", "#97266d", "#285e61", "#4a5568"};
 constexpr std::size_t named_max = 8;
 
-std::string local_text(double wall_s, const char* form = "%Y-%m-%d %H:%M") {
+std::string local_text(double wall_s) {
   const auto seconds = static_cast<std::time_t>(wall_s);
   std::tm parts{};
   localtime_r(&seconds, &parts);
   std::array<char, 40> text{};
-  std::strftime(text.data(), text.size(), form, &parts);
+  std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M", &parts);
   return text.data();
 }
 

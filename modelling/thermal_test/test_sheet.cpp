@@ -61,12 +61,13 @@ double speed_at(const std::vector<SheetStep>& steps, double minute) {
 std::vector<std::string> what_to_do(const SheetOptions& options) {
   std::vector<std::string> lines;
   if (options.kind == TestKind::axis) {
-    std::string first("Axis ");
-    first.push_back(static_cast<char>(options.moving - 'a' + 'A'));
-    first.append(
-        "  moves between two ends of its travel, with probes at either (positions 1 and 2) and a "
-        "test sphere or a block in the spindle. Spindle at rest.");
-    lines.push_back(std::move(first));
+    char first[200];
+    std::snprintf(
+        first, sizeof first,
+        "Axis %c moves between two ends of its travel, with probes at either (positions 1 "
+        "and 2) and a test sphere or a block in the spindle. Spindle at rest.",
+        options.moving - 'a' + 'A');
+    lines.emplace_back(first);
     lines.emplace_back(
         "Between two readings the axis goes to and fro between them at the feed of "
         "its row; at a reading it stops at 1, then at 2.");

@@ -282,9 +282,9 @@ TEST_CASE("a sheet that was filled in is read as it is", "[thermal_test]") {
     at = end + 1;
     if (!line.starts_with('#') && !line.starts_with("time")) {
       while (line.ends_with(',')) line.pop_back();
-      for (int i = 0; i < 8; ++i) line += "," + std::to_string(20 + 0.1 * ++row);
+      for (int i = 0; i < 8; ++i) line.append(",").append(std::to_string(20 + 0.1 * ++row));
     }
-    filled += line + "\n";
+    filled.append(line).append("\n");
   }
   const TestData data = test_data(parse_run(filled, "sheet.csv"), options_of(TestKind::spindle));
   CHECK(data.phases.running_from_s == Approx(10.0 * 60.0));
