@@ -117,26 +117,30 @@ void take_axis(Coverage& coverage, const AxisFigures& axis, const std::vector<do
 TEST_CASE("figures of a noisy test are within their intervals of the machine without noise",
           "[thermal_test]") {
   Coverage coverage;
+  Coverage of_z;  // which moves by much more than its noise
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     const RunFile truth = simulated(0.0, seed);
     const TestFigures figures =
         figures_of(test_data(simulated(0.4, seed), options_of(TestKind::spindle)));
     const auto& time_s = truth.time_s();
     take_axis(coverage, axis_called(figures, "X"), time_s, truth.column("x1_um"));
-    take_axis(coverage, axis_called(figures, "Z"), time_s, truth.column("z_um"));
+    take_axis(of_z, axis_called(figures, "Z"), time_s, truth.column("z_um"));
     take_axis(coverage, axis_called(figures, "B"), time_s, tilt_of(truth));
     CHECK(axis_called(figures, "Z").noise == Approx(0.4).epsilon(0.1));
     CHECK(axis_called(figures, "B").noise == Approx(0.4 * std::sqrt(2.0) * 10.0).epsilon(0.1));
   }
-  INFO(coverage.within << " of " << coverage.figures << " within, mean width "
-                       << coverage.width_share / coverage.figures);
+  INFO(coverage.within + of_z.within << " of " << coverage.figures + of_z.figures
+                                     << " within; of Z, mean width by value "
+                                     << of_z.width_share / of_z.figures);
   CHECK(coverage.within >= 0.95 * coverage.figures);
+  CHECK(of_z.within >= 0.95 * of_z.figures);
   // An interval that says nothing would hold everything.
-  CHECK(coverage.width_share / coverage.figures < 0.2);
+  CHECK(of_z.width_share / of_z.figures < 0.2);
 }
 
 TEST_CASE("after by before, and the combined drift, are within their intervals", "[thermal_test]") {
   Coverage ratios;
+  Coverage of_z;
   Coverage together;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const RunFile before = simulated(0.0, seed);
@@ -150,8 +154,9 @@ TEST_CASE("after by before, and the combined drift, are within their intervals",
     for (const AxisRatio& ratio : answer.ratios) {
       const std::string column = ratio.name == "X" ? "x1_um" : "z_um";
       if (ratio.name == "B") continue;
-      ratios.take(ratio.until_end, true_range(time_s, after.column(column), from_s, to_s) /
-                                       true_range(time_s, before.column(column), from_s, to_s));
+      Coverage& coverage = ratio.name == "Z" ? of_z : ratios;
+      coverage.take(ratio.until_end, true_range(time_s, after.column(column), from_s, to_s) /
+                                         true_range(time_s, before.column(column), from_s, to_s));
     }
     double farthest = 0.0;
     const auto& x = before.column("x1_um");
@@ -162,9 +167,9 @@ TEST_CASE("after by before, and the combined drift, are within their intervals",
           farthest = std::max(farthest, std::hypot(x[i] - x[j], z[i] - z[j]));
     together.take(answer.before_figures.combined_until_end, farthest);
   }
-  CHECK(ratios.within >= 0.95 * ratios.figures);
+  CHECK(ratios.within + of_z.within >= 0.95 * (ratios.figures + of_z.figures));
   CHECK(together.within == together.figures);
-  CHECK(ratios.width_share / ratios.figures < 0.3);
+  CHECK(of_z.width_share / of_z.figures < 0.3);
 }
 
 TEST_CASE("whether a machine has settled follows the shares of its last hour", "[thermal_test]") {

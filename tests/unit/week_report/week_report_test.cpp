@@ -127,8 +127,10 @@ TEST_CASE("a recorded machine: offsets and probings as replay has them", "[week]
   RecordedMachine machine(config, 11, 65536, clocks);
   machine.start();
   machine.run(12000);  // two minutes
-  auto at = [&](double since_s, const char* kind, const char* subject, const char* what) {
+  std::int64_t number = 0;
+  const auto at = [&](double since_s, const char* kind, const char* subject, const char* what) {
     RecordedEvent event = event_at(0, kind, subject, what);
+    event.number = ++number;
     event.wall_ns = std::llround((zero_s + since_s) * 1e9);
     machine.writer().note(event);
   };
