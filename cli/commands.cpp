@@ -4,11 +4,13 @@
 
 #include "cli/check/check_command.hpp"
 #include "cli/history/history_commands.hpp"
+#include "cli/import/import_command.hpp"
 #include "cli/init/init_command.hpp"
 #include "cli/model/model_commands.hpp"
 #include "cli/model/modelling_dispatch.hpp"
 #include "cli/observe/observe_commands.hpp"
 #include "cli/operate/operate_commands.hpp"
+#include "cli/report/report_command.hpp"
 #include "cli/scan/scan_command.hpp"
 
 namespace thermocomp::cli {
@@ -28,6 +30,8 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
   add_observe_commands(app, global, action);
   add_operate_commands(app, global, action);
   add_history_commands(app, action);
+  add_report_command(app, action);
+  add_import_command(app, action);
   add_model_commands(app, action);
   add_modelling_commands(app, action);
 }

@@ -14,6 +14,7 @@
 #include "modelling/placement/place_command.hpp"
 #include "modelling/structure/structure_command.hpp"
 #endif
+#include "modelling/thermal_test/thermal_test_command.hpp"
 
 namespace thermocomp {
 namespace {
@@ -62,6 +63,7 @@ void declare_modelling_command_line(CLI::App& app, std::function<int()>& action)
   identification::add_group_command(app, action);
   identification::add_fit_command(app, action);
   identification::add_tiebar_command(app, action);
+  thermal_test::add_thermal_test_command(app, action);
   name_files(app);
 }
 

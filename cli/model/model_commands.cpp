@@ -2,26 +2,22 @@
 
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <optional>
-#include <sstream>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/common/output_file.hpp"
 #include "cli/common/run_loader.hpp"
-#include "cli/common/terminal.hpp"
 #include "cli/model/course_fit.hpp"
 #include "cli/model/covariance_fit.hpp"
 #include "cli/model/prediction.hpp"
+#include "cli/records/record_loader.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
-#include "config/text/printable_text.hpp"
 #include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
-#include "daemon/history/replay/replay.hpp"
 #include "simulator/files/machine_file.hpp"
 #include "simulator/plant/simulate.hpp"
 
@@ -82,25 +78,6 @@ struct CovarianceOptions {
   std::string columns;
   std::string output;
 };
-
-/// A run file, or a daemon's history as one.
-RunFile load_record(const std::string& argument, RunLoader& loader) {
-  constexpr std::string_view sqlite = "SQLite format 3";
-  if (!std::filesystem::is_regular_file(argument)) return load_run(parse_selection(argument));
-  std::string head(sqlite.size(), ' ');
-  std::ifstream file(argument, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  if (!file || head != sqlite) return loader.load(argument);
-  std::ostringstream text;
-  Progress progress("reading " + argument);
-  const ExportSummary summary =
-      export_run(argument, std::nullopt, std::nullopt, text,
-                 [&progress](double fraction) { progress.update(fraction); });
-  for (const HistoryDamage& damage : summary.damage) {
-    std::fprintf(stderr, "%s: %s\n", argument.c_str(), printable_text(to_string(damage)).c_str());
-  }
-  return parse_run(text.str(), argument);
-}
 
 int run_covariance(const CovarianceOptions& options) {
   const std::string text = read_text_file(options.model, model_bytes_max);

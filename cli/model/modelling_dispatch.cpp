@@ -24,7 +24,7 @@ struct ModellingCommand {
   const char* name;
   const char* help;
 };
-constexpr std::array<ModellingCommand, 8> commands{{
+constexpr std::array<ModellingCommand, 9> commands{{
     {"structure", "block matrix of a structure, by finite elements"},
     {"place", "sensor positions of a structure"},
     {"tiebar", "the coefficients of a gate-shaped machine with tie bars"},
@@ -33,6 +33,7 @@ constexpr std::array<ModellingCommand, 8> commands{{
     {"group", "similarity groups of measured temperatures"},
     {"fit", "sensor choice and model from measured runs"},
     {"diagnose", "what a model gets wrong in measured runs, and why"},
+    {"thermal-test", "tests of thermal behaviour after ISO 230-3: a plan, and what one showed"},
 }};
 
 std::vector<fs::path> places_to_look() {

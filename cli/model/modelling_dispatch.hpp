@@ -5,8 +5,8 @@
 
 namespace thermocomp::cli {
 
-/// structure, place, tiebar, plan, group, fit, diagnose: all arguments go to `thermocomp-modelling`
-/// beside this program, in its libexec folder or in PATH.
+/// structure, place, tiebar, plan, inspect, group, fit, diagnose, thermal-test: all arguments go to
+/// `thermocomp-modelling` beside this program, in its libexec folder or in PATH.
 void add_modelling_commands(CLI::App& app, Action& action);
 
 }  // namespace thermocomp::cli

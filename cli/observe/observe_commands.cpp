@@ -16,6 +16,7 @@
 
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/terminal.hpp"
+#include "cli/observe/axis_trends.hpp"
 #include "cli/observe/events_text.hpp"
 #include "cli/observe/status_text.hpp"
 #include "cli/observe/truth_file.hpp"
@@ -121,9 +122,10 @@ void end_watch(int) {
   ::_exit(exit_success);
 }
 
-void show(const json& status, const TruthRow* truth, bool terminal, bool first) {
+void show(const json& status, const TruthRow* truth, const AxisTrends& trends, bool terminal,
+          bool first) {
   if (terminal) {
-    std::cout << "\033[H\033[J" << watch_screen(status, truth, true);
+    std::cout << "\033[H\033[J" << watch_screen(status, truth, true, &trends);
   } else {
     if (first) std::cout << watch_header(status, truth);
     std::cout << watch_line(status, truth);
@@ -142,6 +144,7 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
   const auto over = [&] { return options.for_s > 0.0 && steady_clock::now() >= end; };
   StatusClient client(global.socket);
   client.call("subscribe", {{"methods", {"status"}}, {"period_s", options.period_s}});
+  AxisTrends trends(terminal_is_wide());
   std::optional<TruthFile> truth;
   if (!options.truth.empty()) truth.emplace(options.truth);
   const auto patience =
@@ -156,7 +159,9 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
     }
     if (notification.value("method", "") != "status") continue;
     const TruthRow* row = truth ? truth->newest() : nullptr;
-    show(notification.value("params", json::object()), row, terminal, first);
+    const json status = notification.value("params", json::object());
+    trends.add(status);
+    show(status, row, trends, terminal, first);
     first = false;
   }
 }

@@ -61,7 +61,8 @@ ToolError tool_error(const TruthRow& truth, const std::string& axis) {
   return {truth.change(axis + "_um"), truth.value(axis + "_error_um")};
 }
 
-std::string axes_table(const json& status, const TruthRow* truth, bool colours) {
+std::string axes_table(const json& status, const TruthRow* truth, bool colours,
+                       const AxisTrends* trends) {
   std::string result =
       coloured("axis      displacement   target   offset  applied", Colour::bold, colours);
   if (truth != nullptr) {
@@ -80,6 +81,7 @@ std::string axes_table(const json& status, const TruthRow* truth, bool colours) 
       result += fixed_signed(error.uncompensated_um, 2, 28) +
                 coloured(fixed_signed(error.compensated_um, 2, 13), Colour::green, colours);
     }
+    if (trends != nullptr) result += "   " + trends->text(name);
     result += '\n';
   }
   return result;
@@ -131,14 +133,15 @@ std::string right(const std::string& text, int width) {
 
 }  // namespace
 
-std::string watch_screen(const json& status, const TruthRow* truth, bool colours) {
+std::string watch_screen(const json& status, const TruthRow* truth, bool colours,
+                         const AxisTrends* trends) {
   std::string result = first_line(status, colours);
   const std::string reasons = reasons_text(status);
   result += coloured(reasons.empty() ? "nothing wrong" : reasons,
                      reasons.empty() ? Colour::none : Colour::yellow, colours) +
             "\n\n";
-  return result + axes_table(status, truth, colours) + '\n' + inputs_table(status, colours) + '\n' +
-         signals_text(status);
+  return result + axes_table(status, truth, colours, trends) + '\n' +
+         inputs_table(status, colours) + '\n' + signals_text(status);
 }
 
 std::string watch_header(const json& status, const TruthRow* truth) {

@@ -5,13 +5,15 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "cli/observe/axis_trends.hpp"
 #include "cli/observe/truth_file.hpp"
 
 namespace thermocomp::cli {
 
 /// A whole screen. @param truth  what the tool really does, where it is simulated; else nullptr
+/// @param trends  how the offsets went; nullptr: not shown
 [[nodiscard]] std::string watch_screen(const nlohmann::json& status, const TruthRow* truth,
-                                       bool colours);
+                                       bool colours, const AxisTrends* trends = nullptr);
 /// Two lines: what the columns of watch_line() are.
 [[nodiscard]] std::string watch_header(const nlohmann::json& status, const TruthRow* truth);
 [[nodiscard]] std::string watch_line(const nlohmann::json& status, const TruthRow* truth);

@@ -56,6 +56,17 @@ class ForeignReader {
     run_.name = name;
   }
 
+  std::optional<WallZero> read_wall_zero() {
+    problems_.throw_any();
+    read_units();
+    form_ = number_form(table_, map_, problems_);
+    const auto time = find_time(table_, map_, units_, problems_);
+    problems_.throw_any();
+    const RunTime run_time = read_time(table_, *time, map_, units_, form_, problems_);
+    problems_.throw_any();
+    return run_time.wall_zero;
+  }
+
   RunFile read() {
     problems_.throw_any();
     read_units();
@@ -300,6 +311,11 @@ bool is_own_form(std::string_view header) {
 
 RunFile read_foreign_run(std::string_view text, const std::string& name, const ColumnMap* map) {
   return ForeignReader(text, name, map).read();
+}
+
+std::optional<WallZero> wall_zero(std::string_view text, const std::string& name,
+                                  const ColumnMap* map) {
+  return ForeignReader(text, name, map).read_wall_zero();
 }
 
 }  // namespace thermocomp

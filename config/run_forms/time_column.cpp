@@ -148,6 +148,8 @@ class TimeReader {
       run_.time_s.push_back(std::round((at - first + days) * 1e6) / 1e6);
     }
     if (problems_.empty()) say_stamps(stamps.front(), order, first);
+    if (stamps.front().has_date)
+      run_.wall_zero = WallZero{first, stamps.front().zone_s.has_value()};
   }
 
   std::optional<TimeStamp> joined(std::size_t row, TimeStamp date) const {

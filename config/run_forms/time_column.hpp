@@ -24,9 +24,16 @@ struct TimeColumns {
                                                    const std::vector<std::string>& units,
                                                    ProblemList& problems);
 
+/// When time_s was 0, by the clock that wrote the file.
+struct WallZero {
+  double seconds{0.0};  ///< since 1970, of UTC or of the zone that the writer had
+  bool is_utc{false};
+};
+
 struct RunTime {
-  std::vector<double> time_s;  ///< increasing
-  std::string said;            ///< what was understood
+  std::vector<double> time_s;         ///< increasing
+  std::string said;                   ///< what was understood
+  std::optional<WallZero> wall_zero;  ///< where the rows have dates
 };
 
 /// Dates, times of the clock and days count from the first row, other numbers from their own zero.

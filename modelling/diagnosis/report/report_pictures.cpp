@@ -4,9 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <span>
 
 #include "modelling/diagnosis/report/report_words.hpp"
-#include "modelling/diagnosis/report/svg_plot.hpp"
+#include "modelling/markup/svg_plot.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -21,6 +22,10 @@ constexpr const char* model_colour = "#c53030";
 constexpr const char* extended_colour = "#2b6cb0";
 constexpr std::array<const char*, 8> colours = {"#2b6cb0", "#c05621", "#2f855a", "#6b46c1",
                                                 "#b7791f", "#97266d", "#285e61", "#718096"};
+
+std::span<const double> all_of(const Column& column) {
+  return {column.data(), static_cast<std::size_t>(column.size())};
+}
 
 /// Correlation of two columns over the rows in which both have values.
 double correlation(const Column& a, const Column& b) {
@@ -45,7 +50,7 @@ PlotPanel temperatures_panel(const ReportRun& run, const ReportData& report) {
   for (std::size_t i = 0; i < run.inputs_K.size(); ++i)
     panel.lines.push_back(
         {run.inputs_K.size() <= named_max ? name_of_column(report.inputs[i]) : std::string(),
-         colours[i % colours.size()], &run.inputs_K[i]});
+         colours[i % colours.size()], all_of(run.inputs_K[i])});
   return panel;
 }
 
@@ -59,22 +64,22 @@ std::string course_picture(const ReportRun& run, const ReportData& report, std::
   std::vector<PlotPanel> panels;
   panels.push_back({name,
                     unit,
-                    {{"measured", measured_colour, &run.measured_um[output]},
-                     {"model", model_colour, &model},
-                     {"extended model", extended_colour, &extended}},
+                    {{"measured", measured_colour, all_of(run.measured_um[output])},
+                     {"model", model_colour, all_of(model)},
+                     {"extended model", extended_colour, all_of(extended)}},
                     170.0});
   panels.push_back({"error of " + name,
                     unit,
-                    {{"model", model_colour, &run.before_um[output]},
-                     {"extended model", extended_colour, &run.after_um[output]}},
+                    {{"model", model_colour, all_of(run.before_um[output])},
+                     {"extended model", extended_colour, all_of(run.after_um[output])}},
                     110.0});
   for (std::size_t i = 0; i < std::min(signals_max, run.signals.size()); ++i)
     panels.push_back({name_of_column(report.signals[i]),
                       unit_of(report.signals[i]),
-                      {{"", "#444", &run.signals[i]}},
+                      {{"", "#444", all_of(run.signals[i])}},
                       signal_height});
   if (!run.inputs_K.empty()) panels.push_back(temperatures_panel(run, report));
-  return panels_plot(run.time_s, panels);
+  return panels_plot(all_of(run.time_s), panels);
 }
 
 std::string scatter_pictures(const ReportRun& run, const ReportData& report, std::size_t output,
@@ -89,7 +94,8 @@ std::string scatter_pictures(const ReportRun& run, const ReportData& report, std
     char title[80];
     std::snprintf(title, sizeof title, "%.40s, correlation %.2f",
                   name_of_column(report.inputs[input]).c_str(), -order[i].first);
-    html += scatter_plot({title, &run.inputs_K[input], "rise, K", &run.before_um[output], unit});
+    html += scatter_plot(
+        {title, all_of(run.inputs_K[input]), "rise, K", all_of(run.before_um[output]), unit});
   }
   return html + "</div>\n";
 }

@@ -9,7 +9,7 @@
 #include "modelling/diagnosis/report/report_html.hpp"
 #include "modelling/diagnosis/report/report_texts.hpp"
 #include "modelling/diagnosis/report/report_words.hpp"
-#include "modelling/diagnosis/report/svg_plot.hpp"
+#include "modelling/markup/svg_plot.hpp"
 #include "modelling/markup/xml_text.hpp"
 
 using namespace thermocomp;

@@ -1,17 +1,24 @@
 /// Pictures as SVG, for a page that needs nothing else.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/data/measured_runs.hpp"
-
-namespace thermocomp::diagnosis {
+namespace thermocomp {
 
 struct PlotLine {
   std::string label;  ///< empty: not in the legend
   std::string colour;
-  const Column* values{nullptr};  ///< NaN leaves a gap
+  std::span<const double> values;  ///< as many as there are times; NaN leaves a gap
+  bool as_dots{false};             ///< single values, not joined by a line
+};
+
+/// A stretch of time behind all panels, shaded and named at its top.
+struct PlotSpan {
+  std::string label;
+  double from_s{0.0};
+  double to_s{0.0};
 };
 
 /// Lines over the axis of time that all panels share.
@@ -24,14 +31,16 @@ struct PlotPanel {
 
 /// Panels one above the other, with ticks, grid and units; long columns are thinned to what a
 /// screen shows when the picture is made wider.
-[[nodiscard]] std::string panels_plot(const Column& time_s, const std::vector<PlotPanel>& panels);
+[[nodiscard]] std::string panels_plot(std::span<const double> time_s,
+                                      const std::vector<PlotPanel>& panels,
+                                      const std::vector<PlotSpan>& spans = {});
 
 /// Dots of y over x.
 struct PlotDots {
   std::string title;
-  const Column* x{nullptr};
+  std::span<const double> x;
   std::string x_unit;
-  const Column* y{nullptr};
+  std::span<const double> y;
   std::string y_unit;
 };
 [[nodiscard]] std::string scatter_plot(const PlotDots& dots);
@@ -52,4 +61,4 @@ struct NamedBar {
 /// About `wanted` round numbers (1, 2 or 5 times a power of ten apart) within the range.
 [[nodiscard]] std::vector<double> round_ticks(double low, double high, int wanted);
 
-}  // namespace thermocomp::diagnosis
+}  // namespace thermocomp

@@ -1,4 +1,4 @@
-#include "modelling/diagnosis/report/svg_plot.hpp"
+#include "modelling/markup/svg_plot.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "modelling/markup/xml_text.hpp"
 
-namespace thermocomp::diagnosis {
+namespace thermocomp {
 namespace {
 
 constexpr double width = 860.0;
@@ -22,8 +22,8 @@ constexpr double bar_left = 120.0;
 constexpr double share_written_min = 0.06;
 /// Of all lines of a panel together, and of one.
 constexpr std::size_t panel_points_max = 8000;
-constexpr Eigen::Index points_max = 2000;
-constexpr Eigen::Index dots_max = 300;
+constexpr std::size_t points_max = 2000;
+constexpr std::size_t dots_max = 300;
 
 struct Range {
   double low{0.0};
@@ -31,10 +31,12 @@ struct Range {
   [[nodiscard]] double share(double value) const { return (value - low) / (high - low); }
 };
 
-Range range_of(const std::vector<const Column*>& columns) {
+using Values = std::span<const double>;
+
+Range range_of(const std::vector<Values>& columns) {
   Range range{1e300, -1e300};
-  for (const Column* column : columns) {
-    for (const double value : *column) {
+  for (const Values column : columns) {
+    for (const double value : column) {
       if (!std::isfinite(value)) continue;
       range.low = std::min(range.low, value);
       range.high = std::max(range.high, value);
@@ -121,23 +123,36 @@ std::string horizontal_axis(const Box& box, const Range& range, const std::strin
   return svg + label(box.x + box.width, box.y + box.height + 28, unit, "text-anchor=\"end\"");
 }
 
-std::string curve(const Box& box, const Range& x, const Range& y, const Column& time,
-                  const PlotLine& line, Eigen::Index points) {
+std::string curve(const Box& box, const Range& x, const Range& y, Values time, const PlotLine& line,
+                  std::size_t points) {
   std::string svg = "<path fill=\"none\" stroke=\"";
-  svg.append(line.colour).append("\" d=\"");
-  const Eigen::Index stride = 1 + (time.size() - 1) / points;
+  svg.append(line.colour);
+  if (line.as_dots) svg.append("\" stroke-width=\"5\" stroke-linecap=\"round");
+  svg.append("\" d=\"");
+  const std::size_t stride = 1 + (time.size() - 1) / points;
   bool pen_down = false;
-  for (Eigen::Index row = 0; row < time.size(); row += stride) {
-    const double value = (*line.values)[row];
+  for (std::size_t row = 0; row < time.size(); row += stride) {
+    const double value = line.values[row];
     if (!std::isfinite(value)) continue;
     svg.append(pen_down ? "L" : "M").append(place(box.across(x, time[row]), box.up(y, value)));
-    pen_down = true;
+    if (line.as_dots) svg.append("h0");
+    pen_down = !line.as_dots;
   }
   return svg + "\"/>";
 }
 
-std::string panel_svg(const PlotPanel& panel, const Box& box, const Column& time, const Range& x) {
-  std::vector<const Column*> columns;
+std::string span_svg(const PlotSpan& span, const Box& box, const Range& hours, bool named) {
+  const double from = box.across(hours, std::max(hours.low, span.from_s / 3600.0));
+  const double to = box.across(hours, std::min(hours.high, span.to_s / 3600.0));
+  if (!(to > from)) return "";
+  std::string svg = "<path class=\"span\" d=\"M";
+  svg.append(place(from, box.y)).append(way('h', to - from)).append(way('v', box.height));
+  svg.append(way('h', from - to)).append("z\"/>");
+  return named ? svg + label(from + 3, box.y + 12, span.label, "class=\"note\"") : svg;
+}
+
+std::string panel_svg(const PlotPanel& panel, const Box& box, Values time, const Range& x) {
+  std::vector<Values> columns;
   columns.reserve(panel.lines.size());
   for (const PlotLine& line : panel.lines) columns.push_back(line.values);
   const Range y = range_of(columns);
@@ -151,9 +166,8 @@ std::string panel_svg(const PlotPanel& panel, const Box& box, const Column& time
     svg += label(legend, box.y - 6, line.label, "text-anchor=\"end\" fill=\"" + line.colour + "\"");
     legend -= 14.0 + 6.6 * static_cast<double>(line.label.size());
   }
-  const auto points = std::min<Eigen::Index>(
-      points_max,
-      static_cast<Eigen::Index>(panel_points_max / std::max<std::size_t>(1, panel.lines.size())));
+  const auto points =
+      std::min(points_max, panel_points_max / std::max<std::size_t>(1, panel.lines.size()));
   for (const PlotLine& line : panel.lines) svg += curve(box, x, y, time, line, points);
   return svg;
 }
@@ -176,15 +190,18 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
   return ticks;
 }
 
-std::string panels_plot(const Column& time_s, const std::vector<PlotPanel>& panels) {
+std::string panels_plot(Values time_s, const std::vector<PlotPanel>& panels,
+                        const std::vector<PlotSpan>& spans) {
   double height = axis_height;
   for (const PlotPanel& panel : panels) height += title_height + panel.height + gap;
   std::string svg = begin(width, height);
-  const Column hours = time_s / 3600.0;
-  const Range x = range_of({&hours});
+  std::vector<double> hours(time_s.begin(), time_s.end());
+  for (double& hour : hours) hour /= 3600.0;
+  const Range x = range_of({hours});
   double top = title_height;
   for (const PlotPanel& panel : panels) {
     const Box box{left, top, width - left - right, panel.height};
+    for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
     svg += panel_svg(panel, box, hours, x);
     if (&panel == &panels.back()) svg += horizontal_axis(box, x, "time, h", 10);
     top += panel.height + gap + title_height;
@@ -200,10 +217,10 @@ std::string scatter_plot(const PlotDots& dots) {
   std::string svg = begin(small_width, small_height) + label(4, 14, dots.title, "class=\"title\"");
   svg += vertical_axis(box, up, 4) + horizontal_axis(box, across, dots.x_unit, 3);
   svg += "<path class=\"dots\" d=\"";
-  const Eigen::Index stride = 1 + (dots.x->size() - 1) / dots_max;
-  for (Eigen::Index row = 0; row < dots.x->size(); row += stride) {
-    const double x = (*dots.x)[row];
-    const double y = (*dots.y)[row];
+  const std::size_t stride = 1 + (dots.x.size() - 1) / dots_max;
+  for (std::size_t row = 0; row < dots.x.size(); row += stride) {
+    const double x = dots.x[row];
+    const double y = dots.y[row];
     if (!std::isfinite(x) || !std::isfinite(y)) continue;
     svg.append("M").append(place(box.across(across, x), box.up(up, y))).append("h1");
   }
@@ -239,4 +256,4 @@ std::string bars_plot(const std::vector<NamedBar>& bars) {
   return svg + "</svg>\n";
 }
 
-}  // namespace thermocomp::diagnosis
+}  // namespace thermocomp

@@ -1,0 +1,38 @@
+#include "cli/records/record_loader.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <string_view>
+
+#include "cli/common/terminal.hpp"
+#include "config/text/printable_text.hpp"
+#include "daemon/history/replay/replay.hpp"
+
+namespace thermocomp::cli {
+
+bool is_history(const std::string& file) {
+  constexpr std::string_view sqlite = "SQLite format 3";
+  if (!std::filesystem::is_regular_file(file)) return false;
+  std::string head(sqlite.size(), ' ');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return stream && head == sqlite;
+}
+
+RunFile load_record(const std::string& argument, RunLoader& loader) {
+  if (!is_history(argument)) return loader.load(argument);
+  std::ostringstream text;
+  Progress progress("reading " + argument);
+  const ExportSummary summary =
+      export_run(argument, std::nullopt, std::nullopt, text,
+                 [&progress](double fraction) { progress.update(fraction); });
+  for (const HistoryDamage& damage : summary.damage) {
+    std::fprintf(stderr, "%s: %s\n", argument.c_str(), printable_text(to_string(damage)).c_str());
+  }
+  return parse_run(text.str(), argument);
+}
+
+}  // namespace thermocomp::cli

@@ -1,0 +1,19 @@
+/// A recording as a run file, whether it is a file of numbers or a daemon's history.
+#pragma once
+
+#include <string>
+
+#include "cli/common/run_loader.hpp"
+#include "config/runs/run_file.hpp"
+
+namespace thermocomp::cli {
+
+/// Whether a file is a database as thermocompd writes its history.
+[[nodiscard]] bool is_history(const std::string& file);
+
+/// RUN.csv[@T0:T1] by `loader`, or a history as `thermocomp export` gives it; what of it is damaged
+/// is told on stderr.
+/// @throws ConfigurationError, HistoryError
+[[nodiscard]] RunFile load_record(const std::string& argument, RunLoader& loader);
+
+}  // namespace thermocomp::cli

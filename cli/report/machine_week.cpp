@@ -1,0 +1,360 @@
+#include "cli/report/machine_week.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+
+#include "daemon/history/replay/replay_setup.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+constexpr double s_per_ns = 1e-9;
+constexpr std::size_t points_max = 4000;
+constexpr double point_s_min = 10.0;
+/// Of the bound, from which on an offset counts as standing at it.
+constexpr double at_bound_share = 0.995;
+/// Around a probing: offsets change by a fraction of a micrometre in that time.
+constexpr double probing_half_s = 2.0;
+
+double wall_s(const RecordedEvent& event) {
+  return s_per_ns * static_cast<double>(event.wall_ns);
+}
+
+double end_s(const SegmentInfo& segment) {
+  const double cycles =
+      static_cast<double>(segment.last_cycle + 1) - static_cast<double>(segment.first_cycle);
+  return s_per_ns * (static_cast<double>(segment.wall_ns) +
+                     cycles * static_cast<double>(segment.grid.period.count()));
+}
+
+std::vector<WallSpan> recorded_spans(const std::vector<SegmentInfo>& segments) {
+  std::vector<WallSpan> spans;
+  for (const SegmentInfo& segment : segments)
+    spans.push_back({s_per_ns * static_cast<double>(segment.wall_ns), end_s(segment)});
+  return spans;
+}
+
+const std::vector<double>* column_of(const ThinnedHistory& course, const std::string& name) {
+  for (const ThinnedColumn& column : course.columns)
+    if (column.name == name) return &column.values;
+  return nullptr;
+}
+
+/// "measured z 1.5 um"
+bool parse_measured(const std::string& what, std::string& axis, double& value_um) {
+  char name[64];
+  if (std::sscanf(what.c_str(), "measured %63s %lf um", name, &value_um) != 2) return false;
+  axis = name;
+  return true;
+}
+
+/// The setup in force at a moment: that of the last segment that began before it.
+class Setups {
+ public:
+  Setups(const HistoryReader& reader, const SetupParser& parser, std::vector<HistoryDamage>& damage)
+      : segments_(reader.segments()) {
+    for (const SegmentInfo& segment : segments_) {
+      if (setups_.contains(segment.setup)) continue;
+      try {
+        setups_.emplace(segment.setup, parser(reader.setup(segment)));
+      } catch (const std::exception& error) {
+        damage.push_back({segment.id, error.what()});
+      }
+    }
+  }
+
+  [[nodiscard]] const ReplaySetup* at(double moment_s) const {
+    const ReplaySetup* setup = nullptr;
+    for (const SegmentInfo& segment : segments_) {
+      if (s_per_ns * static_cast<double>(segment.wall_ns) > moment_s && setup != nullptr) break;
+      const auto found = setups_.find(segment.setup);
+      if (found != setups_.end()) setup = &found->second;
+    }
+    return setup;
+  }
+
+ private:
+  const std::vector<SegmentInfo>& segments_;
+  std::map<std::int64_t, ReplaySetup> setups_;
+};
+
+AxisWeek axis_week(const AxisConfig& axis, const ThinnedHistory& course) {
+  AxisWeek week;
+  week.name = axis.name;
+  week.unit = axis.output.ends_with("_urad") ? "urad" : "um";
+  week.bound_um = axis.limiter.offset_um_max;
+  const auto* offsets = column_of(course, axis.name + "_offset_um");
+  if (offsets == nullptr) return week;
+  double count = 0.0;
+  double sizes = 0.0;
+  double bound = 0.0;
+  for (const double offset : *offsets) {
+    if (!std::isfinite(offset)) continue;
+    week.low_um = std::fmin(week.low_um, offset);
+    week.high_um = std::fmax(week.high_um, offset);
+    sizes += std::abs(offset);
+    count += 1.0;
+    if (std::abs(offset) >= at_bound_share * week.bound_um) bound += 1.0;
+  }
+  if (count > 0.0) {
+    week.mean_size_um = sizes / count;
+    week.at_bound_share = bound / count;
+  }
+  return week;
+}
+
+/// What was taken out right then is what the model claimed, as far as slew and bound let it.
+double offset_at(const std::filesystem::path& history, double moment_s, const std::string& axis,
+                 const SetupParser& parser) {
+  const ThinnedHistory there = thin_history(history, moment_s - probing_half_s,
+                                            moment_s + probing_half_s, 1, ThinningLimits{}, parser);
+  const auto* offsets = column_of(there, axis + "_offset_um");
+  return offsets == nullptr || offsets->empty() ? std::nan("") : offsets->front();
+}
+
+ProbingWeek probing_of(const std::filesystem::path& history, const ReplaySetup& setup,
+                       double moment_s, const std::string& axis, double value_um,
+                       const SetupParser& parser) {
+  ProbingWeek probing{moment_s, axis, std::nan(""), value_um};
+  const auto& axes = setup.estimator.axes;
+  const auto of = std::find_if(axes.begin(), axes.end(),
+                               [&](const AxisConfig& one) { return one.name == axis; });
+  if (of == axes.end()) return probing;
+  const double taken_um =
+      setup.dry_run ? 0.0 : -offset_at(history, moment_s, axis, parser) * of->sign;
+  probing.claimed_um = taken_um;
+  // Given as a whole, what the offset takes out is still in it.
+  if (setup.estimator.correction.measured == MeasuredMeaning::total)
+    probing.left_um = value_um - taken_um;
+  return probing;
+}
+
+struct Line {
+  double slope{0.0};
+  double slope_sd{0.0};
+};
+
+/// Drift of a difference over the stretch beside what follows from the neighbour's own course:
+/// least squares on one, neighbour and time; its error counts six hours as one independent value.
+Line drift_of(const std::vector<double>& time_s, const std::vector<double>& sensor,
+              const std::vector<double>& neighbour) {
+  double sums[3][4] = {};
+  double count = 0.0;
+  double mean_n = 0.0;
+  double mean_t = 0.0;
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    if (!std::isfinite(sensor[i] + neighbour[i])) continue;
+    mean_n += neighbour[i];
+    mean_t += time_s[i];
+    count += 1.0;
+  }
+  if (count < 30.0) return {0.0, std::nan("")};
+  mean_n /= count;
+  mean_t /= count;
+  const double length_s = time_s.back() - time_s.front();
+  std::vector<std::array<double, 4>> rows;
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    if (!std::isfinite(sensor[i] + neighbour[i])) continue;
+    rows.push_back(
+        {1.0, neighbour[i] - mean_n, (time_s[i] - mean_t) / length_s, sensor[i] - neighbour[i]});
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t b = 0; b < 4; ++b) sums[a][b] += rows.back()[a] * rows.back()[b];
+  }
+  // The constant is apart from the other two, which were centred.
+  const double determinant = sums[1][1] * sums[2][2] - sums[1][2] * sums[1][2];
+  if (!(determinant > 1e-9 * sums[1][1] * sums[2][2])) return {0.0, std::nan("")};
+  const double gain = (sums[1][3] * sums[2][2] - sums[2][3] * sums[1][2]) / determinant;
+  const double slope = (sums[2][3] * sums[1][1] - sums[1][3] * sums[1][2]) / determinant;
+  const double constant = sums[0][3] / count;
+  double squares = 0.0;
+  for (const auto& row : rows)
+    squares += std::pow(row[3] - constant - gain * row[1] - slope * row[2], 2);
+  constexpr double independent_s = 6.0 * 3600.0;
+  const double independent = std::max(1.0, length_s / independent_s);
+  const double variance = squares / count;
+  return {slope, std::sqrt(variance * count / independent * sums[1][1] / determinant)};
+}
+
+double correlation(const std::vector<double>& a, const std::vector<double>& b) {
+  double n = 0.0;
+  double sums[5] = {};
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!std::isfinite(a[i] + b[i])) continue;
+    const double x = a[i] - 20.0;
+    const double y = b[i] - 20.0;
+    n += 1.0;
+    sums[0] += x;
+    sums[1] += y;
+    sums[2] += x * x;
+    sums[3] += y * y;
+    sums[4] += x * y;
+  }
+  if (n < 30.0) return 0.0;
+  const double xx = sums[2] / n - sums[0] * sums[0] / n / n;
+  const double yy = sums[3] / n - sums[1] * sums[1] / n / n;
+  const double xy = sums[4] / n - sums[0] * sums[1] / n / n;
+  return xx > 0.0 && yy > 0.0 ? xy / std::sqrt(xx * yy) : 0.0;
+}
+
+std::size_t recorded_points(const ThinnedHistory& course) {
+  std::size_t points = 0;
+  for (std::size_t i = 0; i < course.time_s.size(); ++i)
+    for (const ThinnedColumn& column : course.columns)
+      if (std::isfinite(column.values[i])) {
+        ++points;
+        break;
+      }
+  return points;
+}
+
+}  // namespace
+
+WallSpan WallSpan::within(const WallSpan& other) const noexcept {
+  return {std::max(from_s, other.from_s), std::min(to_s, other.to_s)};
+}
+
+double MachineWeek::mode_s(const std::string& mode) const {
+  double sum = 0.0;
+  for (const ModeSpell& spell : modes)
+    if (spell.mode == mode) sum += spell.span.length_s();
+  return sum;
+}
+
+std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& span) {
+  std::vector<ModeSpell> spells;
+  const auto& list = events.events;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (list[i].kind != "mode") continue;
+    const auto end = events.run_ends_s.find(list[i].run);
+    double until_s = end == events.run_ends_s.end() ? span.to_s : end->second;
+    for (std::size_t j = i + 1; j < list.size(); ++j) {
+      if (list[j].run != list[i].run) break;
+      if (list[j].kind != "mode") continue;
+      until_s = wall_s(list[j]);
+      break;
+    }
+    const WallSpan within = WallSpan{wall_s(list[i]), until_s}.within(span);
+    if (within.length_s() > 0.0) spells.push_back({within, list[i].what});
+  }
+  return spells;
+}
+
+std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) {
+  std::map<std::string, Outages> found;
+  const auto& list = events.events;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (list[i].kind != "fault") continue;
+    const auto end = events.run_ends_s.find(list[i].run);
+    double until_s = end == events.run_ends_s.end() ? span.to_s : end->second;
+    bool ended = false;
+    for (std::size_t j = i + 1; j < list.size(); ++j) {
+      if (list[j].run != list[i].run) break;
+      if (list[j].subject != list[i].subject) continue;
+      until_s = wall_s(list[j]);  // recovery, or another fault of the same subject
+      ended = true;
+      break;
+    }
+    const WallSpan within = WallSpan{wall_s(list[i]), until_s}.within(span);
+    if (!(within.to_s >= within.from_s)) continue;
+    Outages& outages = found[list[i].subject];
+    outages.subject = list[i].subject;
+    outages.what = list[i].what;
+    ++outages.count;
+    outages.lasted_s += within.length_s();
+    outages.lasts = !ended && until_s >= span.to_s - 1.0;
+  }
+  std::vector<Outages> sorted;
+  for (auto& [subject, outages] : found) sorted.push_back(std::move(outages));
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Outages& a, const Outages& b) { return a.lasted_s > b.lasted_s; });
+  return sorted;
+}
+
+std::vector<SensorWeek> sensors_of(const ThinnedHistory& course) {
+  constexpr double alike_min = 0.8;
+  std::vector<SensorWeek> sensors;
+  const auto points = static_cast<double>(recorded_points(course));
+  for (const ThinnedColumn& column : course.columns) {
+    if (!column.name.ends_with("_degC")) continue;
+    SensorWeek sensor;
+    sensor.name = column.name.substr(0, column.name.size() - 5);
+    double there = 0.0;
+    for (const double value : column.values) {
+      if (!std::isfinite(value)) continue;
+      sensor.low_degC = std::fmin(sensor.low_degC, value);
+      sensor.high_degC = std::fmax(sensor.high_degC, value);
+      there += 1.0;
+    }
+    sensor.missing_share = points > 0.0 ? 1.0 - there / points : 0.0;
+    double best = alike_min;
+    for (const ThinnedColumn& other : course.columns) {
+      if (&other == &column || !other.name.ends_with("_degC")) continue;
+      const double alike = correlation(column.values, other.values);
+      if (!(alike > best)) continue;
+      best = alike;
+      sensor.neighbour = other.name.substr(0, other.name.size() - 5);
+      const Line drift = drift_of(course.time_s, column.values, other.values);
+      sensor.drift_K = drift.slope;
+      sensor.drift_sd_K = drift.slope_sd;
+    }
+    sensors.push_back(std::move(sensor));
+  }
+  return sensors;
+}
+
+WallSpan recorded_span(const std::filesystem::path& history) {
+  const HistoryReader reader(history);
+  WallSpan span{1e300, -1e300};
+  for (const WallSpan& one : recorded_spans(reader.segments())) {
+    span.from_s = std::min(span.from_s, one.from_s);
+    span.to_s = std::max(span.to_s, one.to_s);
+  }
+  if (!(span.to_s > span.from_s)) throw HistoryError(history.string() + ": nothing is recorded");
+  return span;
+}
+
+MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& span,
+                         const SetupParser& parser) {
+  const HistoryReader reader(history);
+  MachineWeek week;
+  week.history = history.string();
+  week.span = span;
+  week.damage = reader.damage();
+  WeekEvents events{read_events(history).events, {}};
+  for (const SegmentInfo& segment : reader.segments()) {
+    double& end = events.run_ends_s[segment.run];
+    end = std::max(end, end_s(segment));
+  }
+  for (const WallSpan& one : recorded_spans(reader.segments()))
+    week.recorded_s += one.within(span).length_s();
+  const auto points = static_cast<std::size_t>(
+      std::clamp(span.length_s() / point_s_min, 60.0, static_cast<double>(points_max)));
+  week.course = thin_history(history, span.from_s, span.to_s, points, ThinningLimits{}, parser);
+  week.modes = mode_spells(events, span);
+  week.outages = outages_of(events, span);
+  week.sensors = sensors_of(week.course);
+  const Setups setups(reader, parser, week.damage);
+  if (const ReplaySetup* setup = setups.at(span.to_s)) {
+    week.dry_run = setup->dry_run;
+    for (const AxisConfig& axis : setup->estimator.axes)
+      week.axes.push_back(axis_week(axis, week.course));
+  }
+  for (const RecordedEvent& event : events.events) {
+    const double at_s = wall_s(event);
+    if (at_s < span.from_s || at_s >= span.to_s) continue;
+    if (event.kind == "daemon" && event.what.starts_with("started")) ++week.starts;
+    if (event.kind != "command") continue;
+    week.commands.push_back(event);
+    std::string axis;
+    double value_um = 0.0;
+    const ReplaySetup* setup = setups.at(at_s);
+    if (setup != nullptr && parse_measured(event.what, axis, value_um))
+      week.probings.push_back(probing_of(history, *setup, at_s, axis, value_um, parser));
+  }
+  return week;
+}
+
+}  // namespace thermocomp::cli

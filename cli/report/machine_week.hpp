@@ -1,0 +1,103 @@
+/// What a history says about a stretch of a machine's life, for its owner.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "daemon/history/format/recorded_event.hpp"
+#include "daemon/history/reading/history_reader.hpp"
+#include "daemon/history/replay/replay_setup.hpp"
+#include "daemon/history/replay/thinned_history.hpp"
+
+namespace thermocomp::cli {
+
+/// Times of the wall clock, seconds since 1970, in all that follows.
+struct WallSpan {
+  double from_s{0.0};
+  double to_s{0.0};
+  [[nodiscard]] double length_s() const noexcept { return to_s > from_s ? to_s - from_s : 0.0; }
+  [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept;
+};
+
+struct ModeSpell {
+  WallSpan span;
+  std::string mode;  ///< "compensating", "holding", ...
+};
+
+/// Faults of one subject ("sensor bed", "bus cabinet", "reason controller_offline").
+struct Outages {
+  std::string subject;
+  std::string what;  ///< the last one
+  std::size_t count{0};
+  double lasted_s{0.0};
+  bool lasts{false};  ///< at the end of the stretch
+};
+
+struct AxisWeek {
+  std::string name;
+  std::string unit;  ///< "um", "urad"
+  double bound_um{0.0};
+  double low_um{std::numeric_limits<double>::quiet_NaN()};
+  double high_um{std::numeric_limits<double>::quiet_NaN()};
+  double mean_size_um{std::numeric_limits<double>::quiet_NaN()};  ///< of |offset|
+  double at_bound_share{0.0};                                     ///< of the time with an offset
+};
+
+struct ProbingWeek {
+  double wall_s{0.0};
+  std::string axis;
+  double claimed_um{std::numeric_limits<double>::quiet_NaN()};  ///< displacement that was taken out
+  double left_um{std::numeric_limits<double>::quiet_NaN()};     ///< at the tool, with the offset
+};
+
+/// A sensor beside the one that moved most like it.
+struct SensorWeek {
+  std::string name;
+  std::string neighbour;  ///< empty: none moved alike
+  double low_degC{std::numeric_limits<double>::quiet_NaN()};
+  double high_degC{std::numeric_limits<double>::quiet_NaN()};
+  double missing_share{0.0};                                    ///< of the recorded time
+  double drift_K{std::numeric_limits<double>::quiet_NaN()};     ///< against the neighbour
+  double drift_sd_K{std::numeric_limits<double>::quiet_NaN()};  ///< of that figure
+};
+
+struct MachineWeek {
+  std::string history;
+  WallSpan span;
+  double recorded_s{0.0};        ///< the daemon ran
+  std::vector<ModeSpell> modes;  ///< within the span, in order
+  std::vector<Outages> outages;  ///< longest first
+  std::vector<AxisWeek> axes;
+  std::vector<ProbingWeek> probings;
+  std::vector<SensorWeek> sensors;
+  std::vector<RecordedEvent> commands;  ///< oldest first
+  std::size_t starts{0};                ///< of the daemon
+  bool dry_run{false};
+  std::vector<HistoryDamage> damage;
+  ThinnedHistory course;
+
+  [[nodiscard]] double mode_s(const std::string& mode) const;
+};
+
+/// The same from the parts, for a test.
+struct WeekEvents {
+  std::vector<RecordedEvent> events;          ///< of the whole history, oldest first
+  std::map<std::int64_t, double> run_ends_s;  ///< of each start of the daemon: its last record
+};
+[[nodiscard]] std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& span);
+[[nodiscard]] std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span);
+[[nodiscard]] std::vector<SensorWeek> sensors_of(const ThinnedHistory& course);
+
+/// @throws HistoryError when nothing can be taken from the file
+[[nodiscard]] MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& span,
+                                       const SetupParser& parser = parse_setup);
+
+/// From the first to the last record. @throws HistoryError
+[[nodiscard]] WallSpan recorded_span(const std::filesystem::path& history);
+
+}  // namespace thermocomp::cli

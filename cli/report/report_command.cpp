@@ -1,0 +1,85 @@
+#include "cli/report/report_command.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/common/output_file.hpp"
+#include "cli/report/machine_week.hpp"
+#include "cli/report/week_page.hpp"
+#include "config/text/printable_text.hpp"
+#include "daemon/history/format/history_time.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+constexpr double week_s = 7.0 * 86400.0;
+
+struct ReportOptions {
+  std::string history;
+  std::string from;
+  std::string to;
+  std::string output;
+};
+
+/// A wall time, or seconds since the history's start.
+double moment_of(const std::string& text, double otherwise_s, const WallSpan& recorded) {
+  if (text.empty()) return otherwise_s;
+  const HistoryTime time = parse_history_time(text);
+  if (time.wall_ns) return 1e-9 * static_cast<double>(*time.wall_ns);
+  return recorded.from_s + time.seconds.value_or(0.0);
+}
+
+int run_report(const ReportOptions& options) {
+  if (options.output.ends_with(".pdf"))
+    throw Failure(options.output +
+                  ": a report is written as HTML; a browser prints it: chromium --headless "
+                  "--print-to-pdf=" +
+                  options.output + " REPORT.html");
+  std::error_code error;
+  if (options.output != "-" &&
+      std::filesystem::equivalent(options.history, options.output, error) && !error)
+    throw Failure(options.output + ": is what is read; the output must be another file");
+  const WallSpan recorded = recorded_span(options.history);
+  WallSpan span;
+  span.to_s = moment_of(options.to, recorded.to_s, recorded);
+  span.from_s = moment_of(options.from, std::max(recorded.from_s, span.to_s - week_s), recorded);
+  if (!(span.to_s > span.from_s)) throw Failure("--from must be before --to");
+  if (!(span.within(recorded).length_s() > 0.0))
+    throw Failure(options.history + ": nothing was recorded in that time");
+  const MachineWeek week = machine_week(options.history, span);
+  OutputFile file(options.output);
+  file.stream() << week_html(week);
+  file.commit();
+  for (const HistoryDamage& damage : week.damage)
+    std::fprintf(stderr, "%s: %s\n", options.history.c_str(),
+                 printable_text(to_string(damage)).c_str());
+  return exit_success;
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<ReportOptions>();
+  CLI::App* sub = app.add_subcommand(
+      "report",
+      "the last week of a machine for its owner, as a page: hours compensated and why not more, "
+      "displacement taken out, probings, sensors, buses, what to do");
+  sub->add_option("HISTORY", options->history, "history of thermocompd")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("--from", options->from,
+                  "start, default a week before the end: a time such as 2026-03-01T08:30:00, "
+                  "\"8 days ago\", -3d");
+  sub->add_option("--to", options->to, "end, not included, default the last record; as --from");
+  sub->add_option("-o,--output", options->output, "page (HTML); - is standard output")
+      ->type_name("FILE")
+      ->required();
+  sub->callback([&action, options] { action = [options] { return run_report(*options); }; });
+}
+
+}  // namespace thermocomp::cli

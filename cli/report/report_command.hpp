@@ -1,0 +1,10 @@
+/// `thermocomp report HISTORY.db -o REPORT.html`
+#pragma once
+
+#include "cli/common/command.hpp"
+
+namespace thermocomp::cli {
+
+void add_report_command(CLI::App& app, Action& action);
+
+}  // namespace thermocomp::cli

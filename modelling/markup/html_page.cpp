@@ -1,0 +1,89 @@
+#include "modelling/markup/html_page.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+#include "modelling/markup/xml_text.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr const char* style =
+    "body{font:16px/1.5 sans-serif;max-width:900px;margin:1.5em auto;padding:0 1em;color:#1a202c;"
+    "background:#fff}h1{font-size:1.6em;line-height:1.2}h2{font-size:1.2em;margin:1.6em 0 .3em}"
+    ".wide{overflow-x:auto}table{border-collapse:collapse;margin:.5em 0}"
+    "td,th{border:1px solid #cbd5e0;padding:.25em .6em;text-align:right;vertical-align:top}"
+    "td:first-child,th:first-child{text-align:left}th{background:#edf2f7;font-weight:600}"
+    ".text td{text-align:left}figure{margin:.6em 0;overflow-x:auto}"
+    "figcaption{color:#4a5568;font-size:.9em}svg{width:100%;min-width:560px;height:auto}"
+    "svg text{font:13px sans-serif}svg .title{font-weight:bold}"
+    "svg .note{fill:#4a5568}.zero{stroke:#718096}"
+    ".grid{stroke:#e2e8f0}.axis{stroke:#718096}.span{fill:#2b6cb0;fill-opacity:.07}"
+    ".small{font-size:.85em;color:#4a5568}.good{color:#22543d}.bad{color:#9b2c2c}"
+    "@media print{body{margin:0;max-width:none}svg{min-width:0}}";
+
+std::string row(const std::vector<std::string>& cells, const char* tag) {
+  std::string html = "<tr>";
+  for (const std::string& cell : cells) {
+    html.append("<").append(tag).append(">").append(xml_text(cell));
+    html.append("</").append(tag).append(">");
+  }
+  return html + "</tr>\n";
+}
+
+}  // namespace
+
+std::string html_begin(const std::string& title) {
+  std::string html =
+      "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width,initial-scale=1\"><title>";
+  html.append(xml_text(title)).append("</title><style>").append(style);
+  html.append("</style></head><body>\n<h1>").append(xml_text(title));
+  return html.append("</h1>\n");
+}
+
+std::string html_end() {
+  return "</body></html>\n";
+}
+
+std::string html_paragraph(const std::string& text, const std::string& kind) {
+  std::string html = kind.empty() ? "<p>" : "<p class=\"" + kind + "\">";
+  return html.append(xml_text(text)).append("</p>\n");
+}
+
+std::string html_heading(const std::string& text) {
+  return "<h2>" + xml_text(text) + "</h2>\n";
+}
+
+std::string html_list(const std::vector<std::string>& items) {
+  if (items.empty()) return "";
+  std::string html = "<ul>\n";
+  for (const std::string& item : items) html += "<li>" + xml_text(item) + "</li>\n";
+  return html + "</ul>\n";
+}
+
+std::string html_table(const std::vector<std::vector<std::string>>& rows) {
+  if (rows.size() < 2) return "";
+  std::string html = "<div class=\"wide\"><table>\n" + row(rows.front(), "th");
+  for (std::size_t i = 1; i < rows.size(); ++i) html += row(rows[i], "td");
+  return html + "</table></div>\n";
+}
+
+std::string html_figure(const std::string& svg, const std::string& caption) {
+  std::string html = "<figure>" + svg;
+  if (!caption.empty()) html += "<figcaption>" + xml_text(caption) + "</figcaption>";
+  return html + "</figure>\n";
+}
+
+std::string figure_text(double value) {
+  if (!std::isfinite(value)) return "-";
+  const double size = std::abs(value);
+  const int digits = size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2;
+  char text[48];
+  std::snprintf(text, sizeof text, "%.*f", digits, value);
+  // A rounded zero has no sign.
+  const std::string result(text);
+  return result.find_first_not_of("-0.") == std::string::npos ? std::string("0.00") : result;
+}
+
+}  // namespace thermocomp

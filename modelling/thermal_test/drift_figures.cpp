@@ -1,0 +1,271 @@
+#include "modelling/thermal_test/drift_figures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <random>
+
+namespace thermocomp::thermal_test {
+namespace {
+
+constexpr double hour_s = 3600.0;
+constexpr int draws_count = 400;
+constexpr double draws_quantile = 0.975;
+constexpr double normal_975 = 1.96;
+constexpr std::uint64_t seed = 230;
+/// Of the largest hour: how far apart those lie that are looked at.
+constexpr double hours_step_s = 300.0;
+constexpr std::size_t combined_points = 240;
+
+/// Rows [begin, end) of a smoothed course.
+struct Stretch {
+  std::size_t begin{0};
+  std::size_t end{0};
+  [[nodiscard]] bool has_range() const noexcept { return end > begin + 1; }
+};
+
+/// From the last value at or before `from_s` (the first one there is) to the last at or before
+/// `to_s`: what is displaced is displaced from the state before.
+Stretch stretch_between(const std::vector<double>& time_s, double from_s, double to_s) {
+  const auto begin = std::upper_bound(time_s.begin(), time_s.end(), from_s);
+  const auto end = std::upper_bound(time_s.begin(), time_s.end(), to_s);
+  const auto at = [&](auto place) { return static_cast<std::size_t>(place - time_s.begin()); };
+  return {begin == time_s.begin() ? 0 : at(begin) - 1, at(end)};
+}
+
+double range_of(const std::vector<double>& values, Stretch stretch) {
+  if (!stretch.has_range()) return std::nan("");
+  const auto from = values.begin() + static_cast<std::ptrdiff_t>(stretch.begin);
+  const auto to = values.begin() + static_cast<std::ptrdiff_t>(stretch.end);
+  const auto [low, high] = std::minmax_element(from, to);
+  return *high - *low;
+}
+
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  const double place = share * static_cast<double>(values.size() - 1);
+  return values[static_cast<std::size_t>(std::lround(place))];
+}
+
+/// A range of course and noise is at most that of the course and that of the noise together; and at
+/// least the difference of the two moments that the course itself has farthest apart.
+Figure with_interval(double value, std::vector<double> noise_ranges, double noise_left) {
+  Figure figure;
+  if (!std::isfinite(value)) return figure;
+  figure.value = value;
+  figure.low = std::max(0.0, value - quantile(std::move(noise_ranges), draws_quantile));
+  figure.high = value + normal_975 * std::sqrt(2.0) * noise_left;
+  return figure;
+}
+
+enum class Part { whole, first_hour, last_hour, until_end, cooling, largest_hour };
+
+/// The stretches of a part; of the largest hour all hours that are looked at.
+std::vector<Stretch> stretches_of(Part part, const std::vector<double>& time_s,
+                                  const TestPhases& phases, double running_to_s) {
+  const double from_s = phases.running_from_s;
+  switch (part) {
+    case Part::whole:
+      return {{0, time_s.size()}};
+    case Part::first_hour:
+      if (!phases.runs || running_to_s - from_s < hour_s) return {};
+      return {stretch_between(time_s, from_s, from_s + hour_s)};
+    case Part::last_hour:
+      if (!phases.runs || running_to_s - from_s < 2.0 * hour_s) return {};
+      return {stretch_between(time_s, running_to_s - hour_s, running_to_s)};
+    case Part::until_end:
+      if (!phases.runs) return {};
+      return {stretch_between(time_s, from_s, running_to_s)};
+    case Part::cooling:
+      if (!phases.runs || !(phases.to_s > phases.running_to_s)) return {};
+      return {stretch_between(time_s, phases.running_to_s, phases.to_s)};
+    case Part::largest_hour:
+      break;
+  }
+  std::vector<Stretch> hours;
+  if (phases.runs || phases.to_s - phases.from_s < hour_s) return hours;
+  for (double from = phases.from_s; from + hour_s <= phases.to_s; from += hours_step_s)
+    hours.push_back(stretch_between(time_s, from, from + hour_s));
+  return hours;
+}
+
+double largest_range(const std::vector<double>& values, const std::vector<Stretch>& stretches) {
+  double largest = std::nan("");
+  for (const Stretch stretch : stretches) largest = std::fmax(largest, range_of(values, stretch));
+  return largest;
+}
+
+constexpr Part parts[] = {Part::whole,     Part::first_hour, Part::last_hour,
+                          Part::until_end, Part::cooling,    Part::largest_hour};
+
+std::map<Part, Figure> ranges_of(const SmoothCourse& course, const TestPhases& phases,
+                                 double running_to_s) {
+  std::map<Part, std::vector<Stretch>> stretches;
+  std::map<Part, std::vector<double>> noise;
+  for (const Part part : parts)
+    stretches[part] = stretches_of(part, course.time_s(), phases, running_to_s);
+  std::mt19937_64 random(seed);
+  for (int draw = 0; draw < draws_count; ++draw) {
+    const std::vector<double> drawn = course.noise_draw(random);
+    for (const Part part : parts) {
+      const double range = largest_range(drawn, stretches[part]);
+      noise[part].push_back(std::isfinite(range) ? range : 0.0);
+    }
+  }
+  std::map<Part, Figure> figures;
+  for (const Part part : parts)
+    figures[part] = with_interval(largest_range(course.value(), stretches[part]), noise[part],
+                                  course.noise_left());
+  return figures;
+}
+
+std::optional<bool> is_settled(const AxisFigures& axis) {
+  if (!axis.last_by_first.is_there() || !(axis.first_hour.low > 0.0)) return std::nullopt;
+  if (axis.last_by_first.high < settled_share) return true;
+  if (axis.last_by_first.low > settled_share) return false;
+  return std::nullopt;
+}
+
+AxisFigures axis_figures(const TestAxis& axis, const SmoothCourse& course, const TestData& data,
+                         double running_to_s) {
+  AxisFigures figures;
+  figures.name = axis.name;
+  figures.unit = axis.unit;
+  figures.noise = course.noise();
+  figures.smoothed = course.is_smoothed();
+  figures.values = axis.measured.value.size();
+  std::map<Part, Figure> ranges = ranges_of(course, data.phases, running_to_s);
+  figures.whole = ranges[Part::whole];
+  figures.first_hour = ranges[Part::first_hour];
+  figures.until_end = ranges[Part::until_end];
+  figures.cooling = ranges[Part::cooling];
+  figures.largest_hour = ranges[Part::largest_hour];
+  figures.last_by_first = ratio_of(ranges[Part::last_hour], figures.first_hour);
+  figures.settled = is_settled(figures);
+  const double zero_s = data.phases.runs ? data.phases.running_from_s : data.phases.from_s;
+  const std::size_t zero = stretch_between(course.time_s(), zero_s, zero_s).begin;
+  for (std::size_t i = 0; i < course.value().size(); ++i) {
+    figures.time_s.push_back(course.time_s()[i] - zero_s);
+    figures.course.push_back(course.value()[i] - course.value()[zero]);
+  }
+  return figures;
+}
+
+double interpolated(const std::vector<double>& time_s, const std::vector<double>& values,
+                    double at_s) {
+  const auto after = std::lower_bound(time_s.begin(), time_s.end(), at_s);
+  if (after == time_s.begin()) return values.front();
+  if (after == time_s.end()) return values.back();
+  const auto i = static_cast<std::size_t>(after - time_s.begin());
+  const double share = (at_s - time_s[i - 1]) / (time_s[i] - time_s[i - 1]);
+  return values[i - 1] + share * (values[i] - values[i - 1]);
+}
+
+/// Largest distance between two of the places that the axes together go through.
+double largest_distance(const std::vector<const SmoothCourse*>& courses,
+                        const std::vector<std::vector<double>>& values, double from_s,
+                        double to_s) {
+  std::vector<std::vector<double>> places(combined_points);
+  for (std::size_t point = 0; point < combined_points; ++point) {
+    const double share = static_cast<double>(point) / static_cast<double>(combined_points - 1);
+    for (std::size_t axis = 0; axis < courses.size(); ++axis)
+      places[point].push_back(
+          interpolated(courses[axis]->time_s(), values[axis], from_s + share * (to_s - from_s)));
+  }
+  double largest = 0.0;
+  for (std::size_t i = 0; i < combined_points; ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      double squares = 0.0;
+      for (std::size_t axis = 0; axis < courses.size(); ++axis)
+        squares += (places[i][axis] - places[j][axis]) * (places[i][axis] - places[j][axis]);
+      largest = std::max(largest, squares);
+    }
+  return std::sqrt(largest);
+}
+
+Figure combined(const std::vector<const SmoothCourse*>& courses, double from_s, double to_s) {
+  if (courses.empty() || !(to_s > from_s)) return {};
+  std::vector<std::vector<double>> values;
+  double noise_left = 0.0;
+  for (const SmoothCourse* course : courses) {
+    values.push_back(course->value());
+    noise_left = std::max(noise_left, course->noise_left());
+  }
+  const double distance = largest_distance(courses, values, from_s, to_s);
+  std::mt19937_64 random(seed);
+  std::vector<double> noise;
+  for (int draw = 0; draw < draws_count / 4; ++draw) {
+    for (std::size_t axis = 0; axis < courses.size(); ++axis)
+      values[axis] = courses[axis]->noise_draw(random);
+    noise.push_back(largest_distance(courses, values, from_s, to_s));
+  }
+  return with_interval(distance, std::move(noise), noise_left);
+}
+
+TemperatureFigures temperature_figures(const TestTemperature& temperature,
+                                       const TestPhases& phases) {
+  TemperatureFigures figures;
+  figures.name = temperature.name;
+  figures.is_room = temperature.is_room;
+  figures.range_K = range_of(temperature.temp_degC, {0, temperature.temp_degC.size()});
+  if (!std::isfinite(figures.range_K)) figures.range_K = 0.0;
+  const double from_s = phases.runs ? phases.running_from_s : phases.from_s;
+  const double to_s = phases.runs ? phases.running_to_s : phases.to_s;
+  figures.at_start_degC = interpolated(temperature.time_s, temperature.temp_degC, from_s);
+  figures.change_K =
+      interpolated(temperature.time_s, temperature.temp_degC, to_s) - figures.at_start_degC;
+  return figures;
+}
+
+TestFigures figures_with_end(const TestData& data, double running_to_s) {
+  TestFigures figures;
+  figures.file = data.file;
+  figures.phases = data.phases;
+  std::vector<SmoothCourse> courses;
+  courses.reserve(data.axes.size());
+  for (const TestAxis& axis : data.axes) {
+    courses.emplace_back(axis.measured, data.breaks_s,
+                         axis.noise >= 0.0 ? axis.noise : std::nan(""));
+    figures.axes.push_back(axis_figures(axis, courses.back(), data, running_to_s));
+  }
+  std::vector<const SmoothCourse*> linear;
+  for (std::size_t i = 0; i < courses.size(); ++i)
+    if (data.axes[i].is_place) linear.push_back(&courses[i]);
+  figures.combined_axes = linear.size();
+  if (linear.size() > 1) {
+    figures.combined_whole = combined(linear, data.phases.from_s, data.phases.to_s);
+    if (data.phases.runs)
+      figures.combined_until_end = combined(linear, data.phases.running_from_s, running_to_s);
+  }
+  for (const TestTemperature& temperature : data.temperatures)
+    figures.temperatures.push_back(temperature_figures(temperature, data.phases));
+  return figures;
+}
+
+}  // namespace
+
+TestFigures figures_of(const TestData& data) {
+  return figures_with_end(data, data.phases.running_to_s);
+}
+
+TestFigures figures_until(const TestData& data, double running_s) {
+  return figures_with_end(data, data.phases.running_from_s + running_s);
+}
+
+Figure ratio_of(const Figure& after, const Figure& before) {
+  Figure ratio;
+  if (!after.is_there() || !before.is_there() || !(before.value > 0.0)) return ratio;
+  ratio.value = after.value / before.value;
+  const auto share = [](double error, double of) { return of > 0.0 ? error / of : 0.0; };
+  const double down = std::hypot(share(after.value - after.low, after.value),
+                                 share(before.high - before.value, before.value));
+  const double up = std::hypot(share(after.high - after.value, after.value),
+                               share(before.value - before.low, before.value));
+  ratio.low = std::max(0.0, ratio.value * (1.0 - down));
+  // A range before that may be nothing at all bounds no ratio.
+  ratio.high = before.low > 0.0 ? ratio.value / std::max(0.05, 1.0 - up) : ratio.high;
+  return ratio;
+}
+
+}  // namespace thermocomp::thermal_test

@@ -1,0 +1,85 @@
+#include <algorithm>
+#include <cmath>
+
+#include "modelling/thermal_test/test_report.hpp"
+
+namespace thermocomp::thermal_test {
+namespace {
+
+/// Running or record times that differ by less are the same.
+constexpr double same_length_share = 0.05;
+constexpr double room_difference_K = 1.0;
+
+double length_s(const TestPhases& phases) {
+  return phases.runs ? phases.running_to_s - phases.running_from_s : phases.to_s - phases.from_s;
+}
+
+double room_range_K(const TestFigures& figures) {
+  double range = std::nan("");
+  for (const TemperatureFigures& temperature : figures.temperatures)
+    if (temperature.is_room) range = std::fmax(range, temperature.range_K);
+  return range;
+}
+
+double mean_speed(const TestData& data) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < data.speed.size(); ++i) {
+    if (data.speed_time_s[i] < data.phases.running_from_s) continue;
+    if (data.speed_time_s[i] > data.phases.running_to_s) break;
+    sum += std::abs(data.speed[i]);
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : std::nan("");
+}
+
+void add_notes(TestAnswer& answer) {
+  const double before_s = length_s(answer.before.phases);
+  const double after_s = length_s(answer.after->phases);
+  if (std::abs(before_s - after_s) > same_length_share * std::max(before_s, after_s))
+    answer.notes.emplace_back(
+        answer.kind == TestKind::environment
+            ? "The two records are not of the same length; ranges grow with it, so the ratio "
+              "says little."
+            : "The two tests did not run for the same time; both were compared until the shorter "
+              "one ended.");
+  const double speed_before = mean_speed(answer.before);
+  const double speed_after = mean_speed(*answer.after);
+  if (std::abs(speed_before - speed_after) > same_length_share * speed_before)
+    answer.notes.emplace_back(
+        "The mean speeds of the two tests differ by more than 5 %: what they show is not the same "
+        "load.");
+  const double room_before = room_range_K(answer.before_figures);
+  const double room_after = room_range_K(*answer.after_figures);
+  if (std::abs(room_before - room_after) > room_difference_K)
+    answer.notes.emplace_back(
+        "The room changed by more than 1 K more in one test than in the other.");
+}
+
+}  // namespace
+
+TestAnswer answer_of(TestData before, std::optional<TestData> after) {
+  TestAnswer answer;
+  answer.kind = before.kind;
+  answer.before_figures = figures_of(before);
+  answer.before = std::move(before);
+  if (!after) return answer;
+  answer.after_figures = figures_of(*after);
+  answer.after = std::move(after);
+  const double running_s = std::min(length_s(answer.before.phases), length_s(answer.after->phases));
+  const TestFigures first =
+      answer.before.phases.runs ? figures_until(answer.before, running_s) : answer.before_figures;
+  const TestFigures second =
+      answer.before.phases.runs ? figures_until(*answer.after, running_s) : *answer.after_figures;
+  for (const AxisFigures& axis : first.axes)
+    for (const AxisFigures& other : second.axes) {
+      if (other.name != axis.name || other.unit != axis.unit) continue;
+      answer.ratios.push_back({axis.name, ratio_of(other.first_hour, axis.first_hour),
+                               ratio_of(other.until_end, axis.until_end),
+                               ratio_of(other.whole, axis.whole)});
+    }
+  add_notes(answer);
+  return answer;
+}
+
+}  // namespace thermocomp::thermal_test

@@ -1,0 +1,260 @@
+#include "modelling/thermal_test/test_data.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "config/text/problems.hpp"
+#include "config/text/units.hpp"
+#include "modelling/thermal_test/axis_binding.hpp"
+
+namespace thermocomp::thermal_test {
+namespace {
+
+/// Of the largest speed: less is standing still, and no change.
+constexpr double speed_share = 0.02;
+constexpr double moved_mm = 0.01;
+constexpr double urad_per_um_per_mm = 1000.0;
+
+[[noreturn]] void refuse(const RunFile& run, const std::string& key, const std::string& value,
+                         std::string rule) {
+  throw ConfigurationError({Problem{run.name, 0, key, value, std::move(rule)}});
+}
+
+std::string hours_text(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f h", seconds / 3600.0);
+  return text;
+}
+
+MeasuredCourse course_of(const RunFile& run, const AxisBinding& binding) {
+  const auto& time_s = run.time_s();
+  const auto& first = run.column(binding.column);
+  const auto* second = binding.less.empty() ? nullptr : &run.column(binding.less);
+  MeasuredCourse course;
+  for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
+    double value = first[row];
+    if (second != nullptr)
+      value = (value - (*second)[row]) / binding.distance_mm * urad_per_um_per_mm;
+    if (!std::isfinite(value)) continue;
+    course.time_s.push_back(time_s[row]);
+    course.value.push_back(value);
+  }
+  return course;
+}
+
+TestAxis axis_of(const RunFile& run, const AxisBinding& binding, const TestOptions& options) {
+  const bool tilts = !binding.less.empty() || kind_of(binding.column) == QuantityKind::tilt;
+  const bool is_second = binding.axis.size() > 1 && binding.axis[1] == '2';
+  TestAxis axis{axis_words(binding.axis), binding.column,   tilts ? "urad" : "um",
+                !tilts && !is_second,     options.noise_um, course_of(run, binding)};
+  if (!binding.less.empty()) {
+    char text[48];
+    std::snprintf(text, sizeof text, ", %g mm apart", binding.distance_mm);
+    axis.from.append(" less ").append(binding.less).append(text);
+    // Two probes, each with its noise.
+    if (axis.noise >= 0.0) axis.noise *= std::sqrt(2.0) * urad_per_um_per_mm / binding.distance_mm;
+  } else if (tilts) {
+    axis.noise = -1.0;
+  }
+  if (axis.measured.value.size() < 2)
+    refuse(run, binding.column, "(missing)", "has fewer than two values in the rows selected");
+  return axis;
+}
+
+/// Of a linear axis measured at two positions: how the distance between them grows.
+void add_growths(const RunFile& run, const std::vector<AxisBinding>& bindings,
+                 const TestOptions& options, std::vector<TestAxis>& axes) {
+  if (options.kind != TestKind::axis) return;
+  for (const AxisBinding& second : bindings) {
+    if (second.axis.size() < 2 || second.axis[1] != '2') continue;
+    for (const AxisBinding& first : bindings) {
+      if (first.axis != second.axis.substr(0, 1) + "1") continue;
+      // Over a thousand millimetres a difference of micrometres has the same figure in
+      // microradians.
+      AxisBinding growth{second.axis, second.column, first.column, urad_per_um_per_mm};
+      TestAxis axis = axis_of(run, growth, options);
+      axis.name = axis_words(second.axis.substr(0, 1)) + ", growth from position 1 to 2";
+      axis.from = second.column + " less " + first.column;
+      axis.unit = "um";
+      axes.push_back(std::move(axis));
+    }
+  }
+}
+
+std::optional<std::string> column_of_unit(const RunFile& run, std::string_view suffix) {
+  std::string found;
+  for (const std::string& column : run.columns) {
+    if (unit_of(column).suffix != suffix) continue;
+    if (!found.empty())
+      refuse(run, "--running", found + " or " + column,
+             "both may say when it ran: say which, --running " + found);
+    found = column;
+  }
+  if (found.empty()) return std::nullopt;
+  return found;
+}
+
+/// Whether something ran, row by row; a missing value is what was before.
+std::vector<bool> active_rows(const RunFile& run, const std::string& column) {
+  const auto& values = run.column(column);
+  const bool moves = kind_of(column) == QuantityKind::position;
+  double largest = 0.0;
+  for (const double value : values)
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  std::vector<bool> active;
+  bool now = false;
+  double last = std::nan("");
+  for (const double value : values) {
+    if (std::isfinite(value)) {
+      now = moves ? std::abs(value - last) > moved_mm : std::abs(value) > speed_share * largest;
+      last = value;
+    }
+    active.push_back(now);
+  }
+  return active;
+}
+
+double number_or_refuse(const RunFile& run, const std::string& whole, const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    refuse(run, "--running", whole, "must be a column of the file, or T0:T1 in seconds");
+  return value;
+}
+
+void phases_from_times(const RunFile& run, const std::string& running, TestPhases& phases) {
+  const std::size_t colon = running.find(':');
+  phases.running_from_s = number_or_refuse(run, running, running.substr(0, colon));
+  phases.running_to_s = number_or_refuse(run, running, running.substr(colon + 1));
+  if (!(phases.from_s <= phases.running_from_s && phases.running_from_s < phases.running_to_s &&
+        phases.running_to_s <= phases.to_s))
+    refuse(run, "--running", running,
+           "must lie in the record, which is " + std::to_string(phases.from_s) + ":" +
+               std::to_string(phases.to_s));
+  phases.said = "ran from " + hours_text(phases.running_from_s) + " to " +
+                hours_text(phases.running_to_s) + ", as --running says";
+}
+
+void phases_from_column(const RunFile& run, const std::string& column, TestPhases& phases) {
+  const auto& time_s = run.time_s();
+  const std::vector<bool> active = active_rows(run, column);
+  std::size_t first = run.selected_begin;
+  while (first < run.selected_end && !active[first]) ++first;
+  if (first == run.selected_end)
+    refuse(run, column, "(0)", "never runs in the rows selected: name another, --running COLUMN");
+  std::size_t last = run.selected_end - 1;
+  while (!active[last]) --last;
+  phases.running_from_s = time_s[first > run.selected_begin ? first - 1 : first];
+  phases.running_to_s = time_s[last];
+  if (!(phases.running_to_s > phases.running_from_s))
+    refuse(run, column, "(one row)", "says that it ran for one row alone");
+  phases.said = "ran from " + hours_text(phases.running_from_s) + " to " +
+                hours_text(phases.running_to_s) + ", as " + column + " says";
+}
+
+/// The column that says when it ran; empty: times say it.
+std::string running_column(const RunFile& run, const TestOptions& options) {
+  if (!options.running.empty()) {
+    if (run.find(options.running)) return options.running;
+    if (options.running.find(':') != std::string::npos) return "";
+    refuse(run, "--running", options.running, "must be a column of the file, or T0:T1 in seconds");
+  }
+  const bool spindle = options.kind == TestKind::spindle;
+  auto column = column_of_unit(run, spindle ? "_rpm" : "_mm_per_min");
+  if (!column && !spindle) column = column_of_unit(run, "_mm");
+  if (!column)
+    refuse(run, "--running", "(missing)",
+           std::string("no column in ") + (spindle ? "rpm" : "mm/min or mm") +
+               " says when it ran: say it, --running COLUMN or --running T0:T1 in seconds");
+  return *column;
+}
+
+void read_speed(const RunFile& run, const std::string& column, TestData& data) {
+  const auto& time_s = run.time_s();
+  const auto& values = run.column(column);
+  data.speed_name = column;
+  double largest = 0.0;
+  for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
+    if (!std::isfinite(values[row])) continue;
+    data.speed_time_s.push_back(time_s[row]);
+    data.speed.push_back(values[row]);
+    largest = std::max(largest, std::abs(values[row]));
+  }
+  if (data.speed.empty() || kind_of(column) == QuantityKind::position) return;
+  double stands_at = data.speed.front();
+  for (std::size_t i = 1; i < data.speed.size(); ++i) {
+    if (!(std::abs(data.speed[i] - stands_at) > speed_share * largest)) continue;
+    stands_at = data.speed[i];
+    data.breaks_s.push_back(data.speed_time_s[i]);
+  }
+}
+
+bool is_called_like_a_room(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* word : {"room", "ambient", "air", "raum", "luft", "umgebung", "hall"})
+    if (name.find(word) != std::string::npos) return true;
+  return false;
+}
+
+std::vector<TestTemperature> temperatures_of(const RunFile& run, const std::string& room) {
+  if (!room.empty() && !(run.find(room) && unit_of(room).suffix == "_degC"))
+    refuse(run, "--room", room, "must be a column of the file in degC");
+  std::vector<TestTemperature> temperatures;
+  for (const std::string& column : run.columns) {
+    if (unit_of(column).suffix != "_degC") continue;
+    TestTemperature temperature{column.substr(0, column.size() - 5), {}, {}, false};
+    temperature.is_room = room.empty() ? is_called_like_a_room(column) : column == room;
+    const auto& values = run.column(column);
+    for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
+      if (!std::isfinite(values[row])) continue;
+      temperature.time_s.push_back(run.time_s()[row]);
+      temperature.temp_degC.push_back(values[row]);
+    }
+    if (!temperature.time_s.empty()) temperatures.push_back(std::move(temperature));
+  }
+  return temperatures;
+}
+
+}  // namespace
+
+std::string to_string(TestKind kind) {
+  if (kind == TestKind::environment) return "environment";
+  return kind == TestKind::spindle ? "spindle" : "axis";
+}
+
+TestData test_data(const RunFile& run, const TestOptions& options) {
+  TestData data;
+  data.kind = options.kind;
+  data.file = run.name;
+  data.phases.from_s = run.time_s()[run.selected_begin];
+  data.phases.to_s = run.time_s()[run.selected_end - 1];
+  const std::vector<AxisBinding> bindings = bind_axes(run, options);
+  for (const AxisBinding& binding : bindings) data.axes.push_back(axis_of(run, binding, options));
+  add_growths(run, bindings, options, data.axes);
+  for (const TestAxis& axis : data.axes)
+    data.said.push_back(axis.name + " is " + axis.from + ", " +
+                        std::to_string(axis.measured.value.size()) + " values");
+  data.temperatures = temperatures_of(run, options.room);
+  if (options.kind == TestKind::environment) {
+    if (!options.running.empty())
+      refuse(run, "--running", options.running, "nothing runs in the test of the environment");
+    if (const auto speed = run.find("spindle_rpm")) read_speed(run, "spindle_rpm", data);
+    return data;
+  }
+  data.phases.runs = true;
+  const std::string column = running_column(run, options);
+  if (column.empty()) {
+    phases_from_times(run, options.running, data.phases);
+    data.breaks_s = {data.phases.running_from_s, data.phases.running_to_s};
+  } else {
+    phases_from_column(run, column, data.phases);
+    read_speed(run, column, data);
+  }
+  data.said.push_back(data.phases.said);
+  return data;
+}
+
+}  // namespace thermocomp::thermal_test

@@ -1,0 +1,184 @@
+#include "modelling/thermal_test/thermal_test_command.hpp"
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/common/command.hpp"
+#include "cli/common/output_file.hpp"
+#include "cli/common/run_loader.hpp"
+#include "cli/records/record_loader.hpp"
+#include "modelling/thermal_test/test_data.hpp"
+#include "modelling/thermal_test/test_report.hpp"
+#include "modelling/thermal_test/test_sheet.hpp"
+
+namespace thermocomp::thermal_test {
+namespace {
+
+const std::map<std::string, TestKind> kinds{{"spindle", TestKind::spindle},
+                                            {"environment", TestKind::environment},
+                                            {"axis", TestKind::axis}};
+
+void write(const std::string& destination, const std::string& text) {
+  cli::OutputFile file(destination);
+  file.stream() << text;
+  file.commit();
+}
+
+CLI::Option* add_kind(CLI::App& sub, std::string& kind) {
+  return sub
+      .add_option("--test", kind,
+                  "what warms the machine: environment (only its surroundings), spindle, axis")
+      ->check(CLI::IsMember({"environment", "spindle", "axis"}))
+      ->type_name("TEST")
+      ->required();
+}
+
+struct ReportOptions {
+  std::string before;
+  std::string after;
+  std::string kind;
+  TestOptions test;
+  std::string columns;
+  std::string output;
+  std::string json;
+};
+
+/// Lines for a terminal: the sentences of the page.
+std::string sentences(const TestFigures& figures) {
+  std::string text = figures.file + "\n";
+  for (const AxisFigures& axis : figures.axes)
+    text += "  " + axis_sentence(axis, figures.phases) + "\n";
+  return text;
+}
+
+int run_report(ReportOptions options) {
+  options.test.kind = kinds.at(options.kind);
+  cli::RunLoader loader(options.columns);
+  TestData before = test_data(cli::load_record(options.before, loader), options.test);
+  std::optional<TestData> after;
+  if (!options.after.empty())
+    after = test_data(cli::load_record(options.after, loader), options.test);
+  const TestAnswer answer = answer_of(std::move(before), std::move(after));
+  write(options.output, report_html(answer));
+  if (!options.json.empty()) write(options.json, report_json(answer));
+  if (options.output != "-" && options.json != "-") {
+    std::string text = sentences(answer.before_figures);
+    if (answer.after_figures) text += sentences(*answer.after_figures);
+    std::fputs(text.c_str(), stdout);
+  }
+  return cli::exit_success;
+}
+
+struct PlanOptions {
+  std::string kind;
+  SheetOptions sheet;
+  std::string moving{"x"};
+  std::string speed{"constant"};
+  std::string output;
+  double hours{0.0};
+};
+
+int run_plan(PlanOptions options) {
+  options.sheet.kind = kinds.at(options.kind);
+  options.sheet.steps = options.speed == "steps";
+  options.sheet.moving = options.moving.front();
+  const bool surroundings = options.sheet.kind == TestKind::environment;
+  options.sheet.hours = options.hours > 0.0 ? options.hours : surroundings ? 24.0 : 4.0;
+  if (surroundings && options.sheet.every_min == SheetOptions{}.every_min)
+    options.sheet.every_min = 15.0;
+  const bool page = options.output.ends_with(".html");
+  if (!page && !options.output.ends_with(".csv") && options.output != "-")
+    throw cli::Failure(options.output + ": must end with .csv or .html, which says what is made");
+  write(options.output, page ? sheet_html(options.sheet) : sheet_csv(options.sheet));
+  return cli::exit_success;
+}
+
+void add_report(CLI::App& group, std::function<int()>& action) {
+  const auto options = std::make_shared<ReportOptions>();
+  CLI::App* sub = group.add_subcommand(
+      "report", "the figures of one test, or of one before and one after, as a page");
+  sub->add_option("BEFORE", options->before, "RUN.csv[@T0:T1], or a history with probed values")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("AFTER", options->after, "the same test of the compensated machine")
+      ->type_name("FILE");
+  add_kind(*sub, options->kind);
+  sub->add_option("--axis", options->test.axes,
+                  "which column an axis is: z=ch5_um; a tilt from two probes and their distance: "
+                  "a=ch3_um-ch4_um/150mm; left out: columns called x_um ... c_urad, x1_um, x2_um")
+      ->type_name("AXIS=COLUMN");
+  sub->add_option("--distance-mm", options->test.distance_mm,
+                  "between the probes x1 and x2, y1 and y2: gives the tilts B and A")
+      ->check(CLI::PositiveNumber)
+      ->type_name("MM");
+  sub->add_option("--running", options->test.running,
+                  "column that is not 0 while it runs, or T0:T1 in seconds; left out: the column "
+                  "in rpm (spindle), in mm/min or mm (axis)")
+      ->type_name("COLUMN");
+  sub->add_option("--room", options->test.room, "column of the room's temperature")
+      ->type_name("COLUMN");
+  sub->add_option("--noise-um", options->test.noise_um,
+                  "standard deviation of one value of the probe; left out: from the values")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("UM");
+  sub->add_option("--columns", options->columns, cli::columns_help)->type_name("FILE");
+  sub->add_option("-o,--output", options->output, "page (HTML); - is standard output")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("--json", options->json, "the figures as JSON; - is standard output")
+      ->type_name("FILE");
+  sub->callback([options, &action] { action = [options] { return run_report(*options); }; });
+}
+
+void add_plan(CLI::App& group, std::function<int()>& action) {
+  const auto options = std::make_shared<PlanOptions>();
+  CLI::App* sub = group.add_subcommand(
+      "plan", "a sheet of a test: what to do, and a row for each reading, to be filled in");
+  add_kind(*sub, options->kind);
+  sub->add_option("--hours", options->hours,
+                  "of running, default 4; of the whole environment's test, default 24")
+      ->check(CLI::PositiveNumber)
+      ->type_name("H");
+  sub->add_option("--cooling-hours", options->sheet.cooling_h, "recorded after running, default 2")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("H");
+  sub->add_option("--every-min", options->sheet.every_min,
+                  "minutes between two readings, default 5 (environment: 15)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("MIN");
+  sub->add_option("--rpm-max", options->sheet.rpm_max, "largest speed of the spindle")
+      ->check(CLI::PositiveNumber)
+      ->type_name("RPM");
+  sub->add_option("--speed", options->speed,
+                  "constant (75 % of the largest) or steps (half an hour each)")
+      ->check(CLI::IsMember({"constant", "steps"}))
+      ->type_name("HOW");
+  sub->add_option("--feed", options->sheet.feed_mm_per_min, "at which the axis moves")
+      ->check(CLI::PositiveNumber)
+      ->type_name("MM_PER_MIN");
+  sub->add_option("--moving", options->moving, "the axis that moves, default x")
+      ->check(CLI::IsMember({"x", "y", "z"}))
+      ->type_name("AXIS");
+  sub->add_option("-o,--output", options->output,
+                  "SHEET.csv to type into, or SHEET.html for paper; - is standard output (CSV)")
+      ->type_name("FILE")
+      ->required();
+  sub->callback([options, &action] { action = [options] { return run_plan(*options); }; });
+}
+
+}  // namespace
+
+void add_thermal_test_command(CLI::App& app, std::function<int()>& action) {
+  CLI::App* group = app.add_subcommand(
+      "thermal-test", "tests of thermal behaviour after ISO 230-3: a plan, and what one showed");
+  group->require_subcommand(1);
+  add_report(*group, action);
+  add_plan(*group, action);
+}
+
+}  // namespace thermocomp::thermal_test
