@@ -55,15 +55,6 @@ class TrialFiles {
   fs::path model_;
 };
 
-ScanSensors sensors_of(const DaemonConfig& config) {
-  ScanSensors sensors;
-  for (const SensorConfig& sensor : config.estimator.sensors) {
-    sensors.names.push_back(sensor.name);
-    sensors.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
-  }
-  return sensors;
-}
-
 /// The channels that a preset has. @throws Failure: no such preset, or one that is not for Modbus
 std::vector<int> channels_of_preset(const std::string& name, const fs::path& folder) {
   sections::Presets presets(sections::preset_folders(folder));
@@ -112,7 +103,7 @@ std::vector<std::string> preset_names(const fs::path& folder) {
 ScanReport probe(const InitDraft& draft, const fs::path& folder) {
   const TrialFiles files(draft, folder);
   const DaemonConfig config = load_daemon_config(files.config());
-  const ScanSensors sensors = sensors_of(config);
+  const ScanSensors sensors = scan_sensors(config.estimator.sensors);
   ScanReport report{"", {}, {}};
   for (const ModbusBusConfig& bus : config.modbus_buses)
     report.buses.push_back(scan_modbus(bus, sensors, {}, progress));

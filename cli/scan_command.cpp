@@ -42,21 +42,12 @@ void read_units(const std::string& text, UnitSearch& search) {
   search.last = last;
 }
 
-ScanSensors sensors_of(const DaemonConfig& config) {
-  ScanSensors sensors;
-  for (const SensorConfig& sensor : config.estimator.sensors) {
-    sensors.names.push_back(sensor.name);
-    sensors.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
-  }
-  return sensors;
-}
-
 std::string controller_name(const DaemonConfig& config) {
   return std::visit([](const auto& each) { return each.name; }, config.controller);
 }
 
 ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
-  const ScanSensors sensors = sensors_of(config);
+  const ScanSensors sensors = scan_sensors(config.estimator.sensors);
   const auto progress = [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
   const auto wanted = [&](const std::string& name) {
     return options.bus.empty() || options.bus == name;

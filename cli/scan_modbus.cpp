@@ -359,6 +359,15 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
 
 }  // namespace
 
+ScanSensors scan_sensors(std::span<const SensorConfig> sensors) {
+  ScanSensors known;
+  for (const SensorConfig& sensor : sensors) {
+    known.names.push_back(sensor.name);
+    known.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
+  }
+  return known;
+}
+
 ScanBus scan_modbus(const ModbusBusConfig& config, const ScanSensors& sensors,
                     const UnitSearch& search,
                     const std::function<void(const std::string&)>& progress) {
