@@ -257,6 +257,7 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
                          number_text(range.min_degC) + ", " + number_text(range.max_degC) +
                          "] ([screening])";
   result.hints = hints_for_words(channel, words, range);
+  result.likely_open_code = likely_open_code(channel, words);
   if (result.hints.empty()) hint_neighbours(device, channel, result);
   if (result.hints.empty()) {
     result.hints.emplace_back("compare table, address, encoding and scale with the manual");
