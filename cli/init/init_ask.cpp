@@ -62,7 +62,8 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
   bool is_wanted = false;
   questions.ask_until(
       "Module of unit " + std::to_string(unit) +
-          ": its preset, or TABLE:TYPE:DEGC_A_COUNT:ADDRESSES; ? lists the presets, Enter: none",
+          ": its preset, or TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES]; ? lists the "
+          "presets, Enter: none",
       "", [&](const std::string& text) {
         is_wanted = !text.empty();
         if (!is_wanted) return;
@@ -115,7 +116,11 @@ void ask_for_places(InitController& controller, Questions& questions) {
 
 void ask_for_controller(InitDraft& draft, Questions& questions) {
   questions.ask_until("Controller: tcp:HOST[:PORT][@UNIT], rtu:..., linuxcnc, or none", "none",
-                      [&](const std::string& text) { draft.controller = parse_controller(text); });
+                      [&](const std::string& text) {
+                        const bool dry_run = draft.controller.dry_run;
+                        draft.controller = parse_controller(text);
+                        draft.controller.dry_run = dry_run;
+                      });
   if (!draft.controller.is_modbus()) return;
   questions.ask_until(
       "Registers as in docs/controllers/plc.md? Offsets from holding 0 on, applied from input 0 on "

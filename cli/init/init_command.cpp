@@ -42,6 +42,7 @@ struct InitOptions {
   std::string axes;
   std::string model;
   double offset_um_max{5.0};
+  bool dry_run{false};
   bool no_scan{false};
   bool force{false};
 };
@@ -93,6 +94,7 @@ InitDraft draft_of(const InitOptions& options, const fs::path& folder) {
   take_places(draft.controller, options);
   for (const std::string& text : options.signals)
     draft.controller.signals.push_back(parse_signal(text));
+  draft.controller.dry_run = options.dry_run;
   draft.axes = parse_words(options.axes);
   take_model(draft, options, folder);
   // The machine's own daemon has its files where the package puts them.
@@ -161,6 +163,9 @@ void tell_next(const InitDraft& draft, const std::string& file) {
             << "  " << (is_own ? "thermocompd " + file : "systemctl start thermocompd") << "\n"
             << "  " << tool
             << " sensors     # warm each thermocouple by hand: its line must move\n";
+  if (draft.controller.dry_run && draft.controller.kind != "dry_run")
+    std::cout << "then, to let it move an axis: dry_run = false in " << file
+              << ", start it anew,\n";
   if (draft.controller.is_modbus())
     std::cout << "  " << tool << " prove " << draft.axes.front()
               << " 5   # with an indicator, every axis\n";
@@ -227,8 +232,8 @@ void add_init_command(CLI::App& app, Action& action) {
       ->type_name("BUS");
   sub->add_option("--module", options->modules,
                   "UNIT=PRESET[/THERMOCOUPLE][@BASE][:CHANNELS], or without a preset "
-                  "UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES; BUS/UNIT=... on another bus than the "
-                  "first. Without CHANNELS those that give a temperature now")
+                  "UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES]; BUS/UNIT=... on "
+                  "another bus than the first. Without CHANNELS those that give a temperature now")
       ->type_name("MODULE");
   sub->add_option("--names", options->names,
                   "names of the sensors, in order of modules and channels, commas between")
@@ -259,6 +264,8 @@ void add_init_command(CLI::App& app, Action& action) {
   sub->add_option("--offset-um-max", options->offset_um_max,
                   "bound of every axis (default 5, which is small to begin with)")
       ->check(CLI::Range(0.001, 500.0));
+  sub->add_flag("--dry-run", options->dry_run,
+                "with dry_run = true: the controller is read and nothing is written to it");
   sub->add_flag("--no-scan", options->no_scan, "look at no bus; channels must then be named");
   sub->add_flag("--force", options->force, "replace files that are there");
   sub->callback([&action, options] { action = [options] { return run_init(*options); }; });

@@ -56,6 +56,14 @@ std::string buses_text(const InitDraft& draft) {
   return text;
 }
 
+std::string codes_text(const std::vector<std::int64_t>& codes) {
+  constexpr const char* what = "   # raw codes that are messages: see the module's manual\n";
+  if (codes.empty()) return std::string("# open_circuit_codes = [32767]") + what;
+  std::string text;
+  for (const std::int64_t code : codes) text += (text.empty() ? "" : ", ") + std::to_string(code);
+  return "open_circuit_codes = [" + text + "]" + what;
+}
+
 std::string module_text(const InitDraft& draft, const InitModule& module) {
   std::string text = "[[device]]\n" + key_text("name", module.name) +
                      key_text("bus", draft.buses.at(module.bus).name) +
@@ -69,10 +77,8 @@ std::string module_text(const InitDraft& draft, const InitModule& module) {
     const InitPlace& place = module.registers;
     text += key_text("table", place.table) + key_text("encoding", place.encoding);
     if (place.word_order != "ABCD") text += key_text("word_order", place.word_order);
-    text +=
-        "scale = " + toml_number(place.scale) +
-        "   # degC a count\n"
-        "# open_circuit_codes = [32767]   # raw codes that are messages: see the module's manual\n";
+    text += "scale = " + toml_number(place.scale) + "   # degC a count\n" +
+            codes_text(module.open_circuit_codes);
   }
   for (const InitChannel& channel : module.channels) {
     text += "[[sensor]]\n" + key_text("name", channel.sensor) + key_text("device", module.name) +
@@ -105,6 +111,12 @@ std::string blocks_text(const InitDraft& draft) {
   return text + "\n";
 }
 
+std::string dry_run_text(const InitController& controller) {
+  return controller.dry_run
+             ? "dry_run = true        # reads all of it and writes nothing; false: writes offsets\n"
+             : "# dry_run = true      # reads all of it and writes nothing\n";
+}
+
 std::string controller_text(const InitController& controller) {
   std::string text =
       "# ---------------------------------------------------------------- controller\n"
@@ -113,10 +125,12 @@ std::string controller_text(const InitController& controller) {
     text += key_text("kind", controller.kind);
     if (controller.kind == "dry_run")
       text += "# There is none yet: everything is computed and recorded, nothing is sent.\n";
+    else
+      text += dry_run_text(controller);
     return text + "\n";
   }
-  text += link_text(controller.link) + key_number("unit", controller.unit) +
-          "# dry_run = true      # reads all of it and writes nothing\n";
+  text +=
+      link_text(controller.link) + key_number("unit", controller.unit) + dry_run_text(controller);
   if (const auto& valid = controller.valid_bits)
     text += "valid_bits = " + place_text(*valid, valid->address) + "\n";
   if (const auto& count = controller.heartbeat)

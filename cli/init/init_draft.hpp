@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
@@ -39,6 +40,8 @@ struct InitModule {
   std::string thermocouple;  ///< where the preset asks for the type
   std::optional<int> base_address;
   InitPlace registers;  ///< its address is that of no channel
+  /// Beside `registers`: raw values that are no temperatures.
+  std::vector<std::int64_t> open_circuit_codes;
   std::vector<InitChannel> channels;
 };
 
@@ -56,6 +59,7 @@ struct InitController {
   std::optional<InitPlace> valid_bits{InitPlace{"holding", 10, "uint16", "ABCD", 1.0}};
   std::optional<InitPlace> heartbeat{InitPlace{"holding", 11, "uint16", "ABCD", 1.0}};
   std::vector<InitSignal> signals;
+  bool dry_run{false};  ///< of a Modbus controller: all of it is read and nothing is written
   [[nodiscard]] bool is_modbus() const { return kind == "modbus_tcp" || kind == "modbus_rtu"; }
 };
 

@@ -55,15 +55,6 @@ class TrialFiles {
   fs::path model_;
 };
 
-ScanSensors sensors_of(const DaemonConfig& config) {
-  ScanSensors sensors;
-  for (const SensorConfig& sensor : config.estimator.sensors) {
-    sensors.names.push_back(sensor.name);
-    sensors.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
-  }
-  return sensors;
-}
-
 /// The channels that a preset has. @throws Failure: no such preset, or one that is not for Modbus
 std::vector<int> channels_of_preset(const std::string& name, const fs::path& folder) {
   sections::Presets presets(sections::preset_folders(folder));
@@ -97,6 +88,18 @@ std::string line_of(int number, const ScanChannel& channel, bool has_preset) {
   return text;
 }
 
+/// Codes that channels show now: out of every range either way, but with the code the fault has its
+/// right name.
+void take_codes(const ScanDevice& device, InitModule& module, std::vector<std::string>& lines) {
+  std::set<std::int64_t> codes;
+  for (const ScanChannel& channel : device.channels)
+    if (channel.likely_open_code) codes.insert(*channel.likely_open_code);
+  for (const std::int64_t code : codes) {
+    module.open_circuit_codes.push_back(code);
+    lines.push_back("open_circuit_codes: " + std::to_string(code) + " is written down as one");
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> preset_names(const fs::path& folder) {
@@ -112,7 +115,7 @@ std::vector<std::string> preset_names(const fs::path& folder) {
 ScanReport probe(const InitDraft& draft, const fs::path& folder) {
   const TrialFiles files(draft, folder);
   const DaemonConfig config = load_daemon_config(files.config());
-  const ScanSensors sensors = sensors_of(config);
+  const ScanSensors sensors = scan_sensors(config.estimator.sensors);
   ScanReport report{"", {}, {}};
   for (const BusConfig& bus : config.buses)
     report.buses.push_back(scan_modbus(std::get<ModbusBusConfig>(bus), sensors, {}, progress));
@@ -146,9 +149,11 @@ std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
       if (device.channels[i].good()) good.push_back(module.channels[i]);
     }
     module.channels = good;
+    if (!has_preset) take_codes(device, module, lines);
   } catch (const ConfigurationError& error) {
-    throw Failure(error.problems().empty() ? std::string(error.what())
-                                           : error.problems().front().rule);
+    if (error.problems().empty()) throw Failure(error.what());
+    const Problem& first = error.problems().front();
+    throw Failure((first.key.empty() ? "" : first.key + ": ") + first.rule);
   }
   return lines;
 }

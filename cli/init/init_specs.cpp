@@ -75,16 +75,30 @@ double parse_scale(const std::string& text) {
   return *scale;
 }
 
-/// A module without a preset: "input:int16:0.1:0-7".
+/// "32767,-9999"
+std::vector<std::int64_t> parse_codes(const std::string& text) {
+  std::vector<std::int64_t> codes;
+  for (const std::string& word : parse_words(text)) {
+    const auto code = number_of_text<std::int64_t>(word);
+    if (!code) throw Failure(text + ": codes must be whole numbers such as 32767,-9999");
+    codes.push_back(*code);
+  }
+  return codes;
+}
+
+/// A module without a preset: "input:int16:0.1:0-7", "input:int16:0.1:0-7:32767".
 void parse_registers(const std::vector<std::string>& parts, const std::string& text,
                      InitModule& module) {
-  if (parts.size() != 4)
+  if (parts.size() != 4 && parts.size() != 5)
     throw Failure(text +
-                  ": must be TABLE:TYPE:DEGC_A_COUNT:ADDRESSES, such as input:int16:0.1:0-7");
+                  ": must be TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:CODES], such as "
+                  "input:int16:0.1:0-7 or, with the code of an open circuit, "
+                  "input:int16:0.1:0-7:32767");
   module.registers.table = parts[0];
   parse_type(parts[1], module.registers);
   module.registers.scale = parse_scale(parts[2]);
   for (const int address : parse_numbers(parts[3])) module.channels.push_back({"", address});
+  if (parts.size() == 5) module.open_circuit_codes = parse_codes(parts[4]);
 }
 
 }  // namespace

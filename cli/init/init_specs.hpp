@@ -22,7 +22,8 @@ namespace thermocomp::cli {
 [[nodiscard]] std::vector<std::string> parse_words(const std::string& text);
 
 /// "3=wago_750_458", "3=wago_750_458:1-4", "2/7=icpdas_m7018" (second bus),
-/// "3=input:int16:0.1:0-7" (no preset: table, encoding, degC a count, addresses); behind a preset's
+/// "3=input:int16:0.1:0-7:32767" (no preset: table, encoding, degC a count, addresses and, where it
+/// has them, the codes of an open circuit); behind a preset's
 /// name "/K" gives the thermocouple, "@100" the base address.
 /// Without channels all of the preset are tried. @throws Failure
 [[nodiscard]] InitModule parse_module(const std::string& text);

@@ -43,15 +43,6 @@ void read_units(const std::string& text, UnitSearch& search) {
   search.last = last;
 }
 
-ScanSensors sensors_of(const DaemonConfig& config) {
-  ScanSensors sensors;
-  for (const SensorConfig& sensor : config.estimator.sensors) {
-    sensors.names.push_back(sensor.name);
-    sensors.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
-  }
-  return sensors;
-}
-
 std::string controller_name(const DaemonConfig& config) {
   return std::visit([](const auto& each) { return each.name; }, config.controller);
 }
@@ -76,7 +67,7 @@ struct BusScanner {
 };
 
 ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
-  const ScanSensors sensors = sensors_of(config);
+  const ScanSensors sensors = scan_sensors(config.estimator.sensors);
   const std::function<void(const std::string&)> progress = [](const std::string& line) {
     std::fprintf(stderr, "%s\n", line.c_str());
   };

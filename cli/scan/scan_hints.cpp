@@ -59,28 +59,33 @@ void hint_scales(const ModbusChannel& channel, std::span<const std::uint16_t> wo
   }
 }
 
-/// The ends of an encoding are what most modules send for a broken wire.
+double raw_value(const ModbusChannel& channel, std::span<const std::uint16_t> words) {
+  return decode(words, format_in(channel.table, {channel.encoding, channel.word_order}), {}).value;
+}
+
 void hint_codes(const ModbusChannel& channel, std::span<const std::uint16_t> words,
                 std::vector<std::string>& hints) {
-  const NumberFormat format = format_in(channel.table, {channel.encoding, channel.word_order});
-  const double raw = decode(words, format, {}).value;
-  constexpr std::array ends{32767.0, 32766.0, 32000.0, -32768.0,     -32767.0,      -32000.0,
-                            65535.0, 9999.0,  -9999.0, 2147483647.0, -2147483648.0, 4294967295.0};
-  for (const double end : ends) {
-    if (raw != end) continue;
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "%.0f is what many modules send for a broken wire; if the manual says so: "
-                  "open_circuit_codes = [%.0f]",
-                  raw, raw);
-    hints.emplace_back(text);
+  if (const auto code = likely_open_code(channel, words)) {
+    const std::string number = std::to_string(*code);
+    hints.push_back(number +
+                    " is what many modules send for a broken wire; if the manual says so: "
+                    "open_circuit_codes = [" +
+                    number + "]");
   }
-  if (std::isnan(raw)) {
-    hints.emplace_back(nan_text().remedy);
-  }
+  if (std::isnan(raw_value(channel, words))) hints.emplace_back(nan_text().remedy);
 }
 
 }  // namespace
+
+std::optional<std::int64_t> likely_open_code(const ModbusChannel& channel,
+                                             std::span<const std::uint16_t> words) {
+  constexpr std::array ends{32767.0, 32766.0, 32000.0, -32768.0,     -32767.0,      -32000.0,
+                            65535.0, 9999.0,  -9999.0, 2147483647.0, -2147483648.0, 4294967295.0};
+  const double raw = raw_value(channel, words);
+  for (const double end : ends)
+    if (raw == end) return static_cast<std::int64_t>(raw);
+  return std::nullopt;
+}
 
 bool is_plausible(const ModbusChannel& channel, double temp_degC, const PlausibleRange& range) {
   if (!(temp_degC >= range.min_degC && temp_degC <= range.max_degC)) return false;

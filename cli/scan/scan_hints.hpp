@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,6 +21,10 @@ struct PlausibleRange {
 /// the bytes of another number in a wrong order make it.
 [[nodiscard]] bool is_plausible(const ModbusChannel& channel, double temp_degC,
                                 const PlausibleRange& range);
+
+/// The raw value, where it is one that most modules send for a broken wire: an end of the encoding.
+[[nodiscard]] std::optional<std::int64_t> likely_open_code(const ModbusChannel& channel,
+                                                           std::span<const std::uint16_t> words);
 
 /// For registers of which the temperature is not plausible: the word orders, scales and codes with
 /// which they would be, each a sentence. @param words  of the channel's value

@@ -257,6 +257,7 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
                          number_text(range.min_degC) + ", " + number_text(range.max_degC) +
                          "] ([screening])";
   result.hints = hints_for_words(channel, words, range);
+  result.likely_open_code = likely_open_code(channel, words);
   if (result.hints.empty()) hint_neighbours(device, channel, result);
   if (result.hints.empty()) {
     result.hints.emplace_back("compare table, address, encoding and scale with the manual");
@@ -358,6 +359,15 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
 }
 
 }  // namespace
+
+ScanSensors scan_sensors(std::span<const SensorConfig> sensors) {
+  ScanSensors known;
+  for (const SensorConfig& sensor : sensors) {
+    known.names.push_back(sensor.name);
+    known.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
+  }
+  return known;
+}
 
 ScanBus scan_modbus(const ModbusBusConfig& config, const ScanSensors& sensors,
                     const UnitSearch& search,

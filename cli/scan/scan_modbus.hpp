@@ -2,12 +2,14 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "cli/scan/scan_hints.hpp"
 #include "cli/scan/scan_report.hpp"
 #include "drivers/modbus/modbus_config.hpp"
+#include "estimator/estimator_config.hpp"
 
 namespace thermocomp::cli {
 
@@ -16,6 +18,8 @@ struct ScanSensors {
   std::vector<std::string> names;
   std::vector<PlausibleRange> ranges;
 };
+
+[[nodiscard]] ScanSensors scan_sensors(std::span<const SensorConfig> sensors);
 
 /// Units to look for besides those of the configuration.
 struct UnitSearch {

@@ -21,6 +21,9 @@ struct ScanChannel {
   Fault fault{Fault::never_read};
   std::string why;                 ///< empty when good
   std::vector<std::string> hints;  ///< what it may be instead, and what to do
+  /// A raw value that most modules send for a broken wire, and that the configuration does not
+  /// know.
+  std::optional<std::int64_t> likely_open_code;
   std::optional<double> round_trip_ms;
   std::optional<double> age_s;
   [[nodiscard]] bool good() const noexcept { return fault == Fault::none; }

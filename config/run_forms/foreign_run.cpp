@@ -157,7 +157,9 @@ class ForeignReader {
       if (count == 1) return;
       std::string rule = count > 1 ? "stands twice in " : "is no column of ";
       rule += run_.name;
-      const std::string near = nearest_name(header, table_.header);
+      std::string near = nearest_name(header, table_.header);
+      for (const std::string& each : table_.header)
+        if (spelled_name(each).base == header) near = each;  // all but the unit
       if (count == 0 && !near.empty()) rule += "; '" + near + "' is";
       problems_.add({map_->file, 0, key, header, rule});
     };

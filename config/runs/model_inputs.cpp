@@ -18,7 +18,8 @@ Columns columns_of(const RunFile& run, const std::vector<std::string>& names,
     if (index)
       columns.push_back(&run.values[*index]);
     else
-      problems.push_back({run.name, 0, name, "(missing)", "the model needs this column"});
+      problems.push_back({run.name, 0, name, "(missing)",
+                          "the model needs this column (--columns gives one another name)"});
   }
   return columns;
 }

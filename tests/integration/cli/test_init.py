@@ -160,6 +160,43 @@ def test_a_model_that_is_there_is_bound_by_the_sensors_names(foreign, folder):
     assert "in no block: column" in run("check", config).stdout
 
 
+def test_the_code_of_an_open_circuit_is_taken_without_an_edit(foreign, folder):
+    modules, plc = foreign
+    config = folder / "thermocompd.toml"
+    answer = run("init", config, "--bus", f"tcp:127.0.0.1:{modules}", "--module",
+                 "3=input:int16:0.1:0-2:32767,-9999", "--names", "bed,column,table",
+                 "--controller", f"tcp:127.0.0.1:{plc}", "--axes", "z")
+    assert answer.returncode == 1, answer.stdout + answer.stderr  # the third channel is open
+    assert "open_circuit" in answer.stdout and "the device's code for it" in answer.stdout
+    assert "\nopen_circuit_codes = [32767, -9999]" in config.read_text()
+
+
+def test_a_code_that_a_channel_shows_is_written_down(foreign, folder):
+    modules, plc = foreign
+    config = folder / "thermocompd.toml"
+    status, shown = converse(["init", config], [
+        f"tcp:127.0.0.1:{modules}", "", "input:int16:0.1:0-4", NAMES, "",
+        f"tcp:127.0.0.1:{plc}", "yes", "none", "z"])
+    assert status == 0, shown
+    assert "open_circuit_codes: 32767 is written down as one" in shown
+    assert "\nopen_circuit_codes = [32767]" in config.read_text()
+
+
+def test_a_dry_run_from_the_first_start_on(foreign, folder):
+    modules, plc = foreign
+    config = folder / "thermocompd.toml"
+    arguments = ["init", config, "--bus", f"tcp:127.0.0.1:{modules}", "--module",
+                 "3=wago_750_458", "--controller", f"tcp:127.0.0.1:{plc}", "--axes", "z"]
+    answer = run(*arguments, "--dry-run")
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert "dry_run = false in " in answer.stdout
+    with running(config):
+        shown = run("--socket", config.parent / "status.sock", "status")
+        assert shown.returncode == 1 and "DRY RUN" in shown.stdout
+    run(*arguments, "--force")
+    assert "\n# dry_run = true" in config.read_text()
+
+
 def test_what_is_not_there_is_named(foreign, folder):
     _, plc = foreign
     config = folder / "thermocompd.toml"
@@ -178,7 +215,8 @@ def test_what_is_not_there_is_named(foreign, folder):
     ("--bus", "rtu:/dev/x:9600:maybe", "parity"), ("--bus", "tcp:h:99999", "port"),
     ("--module", "3", "UNIT="), ("--module", "3=", "preset"), ("--module", "9/3=wago_750_458", "bus 9"),
     ("--module", "3=input:int16:0.1", "ADDRESSES"), ("--module", "3=input:int12:0.1:0", "type"),
-    ("--module", "3=input:int16:0:0", "count"), ("--module", "3=wago_750_458:4-1", "ranges"),
+    ("--module", "3=input:int16:0:0", "count"), ("--module", "3=input:int16:1:0:no", "codes"),
+    ("--module", "3=input:int16:1:0:1:1", "CODES"), ("--module", "3=wago_750_458:4-1", "ranges"),
     ("--controller", "tcp:h@x", "unit"), ("--signal", "x", "NAME="),
     ("--signal", "x=coil:0:int16", "TABLE:ADDRESS"), ("--offset", "disc:0", "holding")])
 def test_bad_use_is_named_in_one_line(folder, option, value, named):

@@ -53,12 +53,11 @@ def first_outputs(folder):
 
 
 def model_outputs(folder):
-    machine = SOURCE / "config" / "examples" / "machine.toml"
+    (folder / "machine.toml").symlink_to(SOURCE / "config" / "examples" / "machine.toml")
     text = ""
-    for day in ("monday", "tuesday", "friday"):
-        seed = {"monday": 1, "tuesday": 2, "friday": 5}[day]
-        assert run("simulate", machine, "--seed", seed, "-o", folder / f"{day}.csv").returncode == 0
-    text += said(folder, "inspect", "monday.csv", "tuesday.csv")
+    for day, seed in {"monday": 1, "tuesday": 2, "friday": 5}.items():
+        text += said(folder, "simulate", "machine.toml", "--seed", seed, "-o", f"{day}.csv")
+    text += "\n" + said(folder, "inspect", "monday.csv", "tuesday.csv")
     text += "\n" + said(folder, "fit", "monday.csv", "tuesday.csv", "--outputs", "z_um", "-o",
                         "model.toml")
     text += "\n" + said(folder, "predict", "--model", "model.toml", "friday.csv", "-o",

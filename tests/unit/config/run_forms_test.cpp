@@ -247,6 +247,15 @@ TEST_CASE("a map is read strictly", "[config][run]") {
   }
 }
 
+TEST_CASE("a map that leaves a unit out is told the name with it", "[config][run]") {
+  const auto problems = problems_of([&] {
+    return read("Time [s];Temp. t1 [°C];Temp. t7 [°C]\n0;20,5;21\n",
+                "[columns]\n\"Temp. t7\" = \"t7_degC\"");
+  });
+  REQUIRE(!problems.empty());
+  CHECK_THAT(problems.front().rule, Catch::Contains("'Temp. t7 [°C]' is"));
+}
+
 TEST_CASE("a displacement that is asked for and stands there in mm is told of", "[config][run]") {
   const RunFile run = read("Time [s];z (mm)\n0;0,5\n");
   const auto problems = problems_of([&] { return run.column("z_um"); });

@@ -1,0 +1,50 @@
+"""What a purge takes away, package by package, in a folder that stands for the root (DPKG_ROOT)."""
+
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+DEBIAN = pathlib.Path(__file__).parents[2] / "debian"
+CONFIG, STATE = pathlib.Path("etc/thermocomp"), pathlib.Path("var/lib/thermocomp")
+
+
+@pytest.fixture
+def root(tmp_path):
+    for name in (CONFIG / "thermocompd.toml", CONFIG / "model.toml", CONFIG / ".hidden",
+                 CONFIG / "gateway.toml", CONFIG / "devices/ours.toml", STATE / "history.db"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("something\n")
+    return tmp_path
+
+
+def after(package, action, root):
+    """Runs the package's script as dpkg does on a root elsewhere."""
+    subprocess.run(["sh", DEBIAN / f"{package}.postrm", action], check=True, timeout=60,
+                   env={"PATH": os.environ["PATH"], "DPKG_ROOT": str(root)})
+    return sorted(str(path.relative_to(root)) for path in root.rglob("*") if path.is_file())
+
+
+def test_a_removal_keeps_everything(root):
+    before = after("thermocomp", "remove", root)
+    assert len(before) == 6
+    assert after("thermocomp-gateway", "remove", root) == before
+
+
+def test_a_purge_of_the_daemon_leaves_the_configuration_of_the_gateway(root):
+    assert after("thermocomp", "purge", root) == ["etc/thermocomp/gateway.toml"]
+    assert after("thermocomp-gateway", "purge", root) == []
+    assert not (root / CONFIG).exists()
+
+
+def test_a_purge_of_the_gateway_leaves_that_of_the_daemon(root):
+    assert len(after("thermocomp-gateway", "purge", root)) == 5
+    assert (root / CONFIG / "thermocompd.toml").exists()
+    assert after("thermocomp", "purge", root) == []
+    assert not (root / CONFIG).exists() and not (root / STATE).exists()
+
+
+def test_a_purge_of_what_was_never_configured_is_none_the_less_one(tmp_path):
+    assert after("thermocomp", "purge", tmp_path) == []
+    assert after("thermocomp-gateway", "purge", tmp_path) == []
