@@ -39,6 +39,7 @@ struct StatusView {
   const TemperatureTrend* trend{nullptr};  ///< nullptr: nobody watches the temperatures
   ReferenceRecord reference{};
   bool reference_lost{false};  ///< see StateKeeper
+  double wall_s{not_a_number};  ///< now, since 1970
 };
 
 /// What a status calls the mode. A dry run does not compensate: "dry_run" in that one's place.

@@ -188,7 +188,9 @@ StatusView Supervisor::view() {
           parts_.journal.ended_within(recent, recent_max),
           &trend_,
           parts_.keeper.reference(),
-          parts_.keeper.is_reference_lost()};
+          parts_.keeper.is_reference_lost(),
+          std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
+              .count()};
 }
 
 }  // namespace thermocomp
