@@ -100,8 +100,14 @@ double NeighbourCheck::rest_without(std::size_t candidate) const noexcept {
 NeighbourCheck::Choice NeighbourCheck::choose() const noexcept {
   const double clean = clean_share * asked_.sd_limit;
   Choice choice;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < inputs_; ++i)
+    if (present_[i] != 0) largest = std::max(largest, score(y_[i], left_[at(i, i)], i));
+  if (!(largest > asked_.sd_limit)) return choice;
+  // Not only of those that are beyond the limit: one that weighs much in the expectation of another
+  // puts that one further off than itself.
   for (std::size_t i = 0; i < inputs_; ++i) {
-    if (present_[i] == 0 || !(score(y_[i], left_[at(i, i)], i) > asked_.sd_limit)) continue;
+    if (present_[i] == 0) continue;
     const double rest = rest_without(i);
     if (choice.found && std::max(rest, choice.rest) <= clean) choice.only = false;
     if (choice.found && rest >= choice.rest) continue;
@@ -109,6 +115,8 @@ NeighbourCheck::Choice NeighbourCheck::choose() const noexcept {
     choice.input = i;
     choice.rest = rest;
   }
+  choice.found = score(y_[choice.input], left_[at(choice.input, choice.input)], choice.input) >
+                 asked_.sd_limit;
   return choice;
 }
 

@@ -102,7 +102,7 @@ class Suspicion {
   };
 
   [[nodiscard]] double& tick(std::size_t sensor, std::size_t back) noexcept;
-  [[nodiscard]] double level_K(std::size_t sensor) noexcept;
+  [[nodiscard]] double level_K(std::size_t sensor, std::size_t back) noexcept;
   [[nodiscard]] double jump_K(std::size_t sensor) noexcept;
   void close_tick(nanoseconds now) noexcept;
   void keep_levels() noexcept;
@@ -120,9 +120,11 @@ class Suspicion {
     double sd_K{0.0};
   };
   [[nodiscard]] Liar liar_of(const NeighbourCheck::Wrong& wrong) const noexcept;
+  [[nodiscard]] double held_K(const Liar& liar, const NeighbourCheck::Answer& answer) noexcept;
   void begin(const Liar& liar, nanoseconds since) noexcept;
   void end(std::size_t sensor) noexcept;
   void forget(std::size_t sensor) noexcept;
+  /// The first input that the sensor is of; as many as there are inputs: of none.
   [[nodiscard]] std::size_t input_of(std::size_t sensor) const noexcept;
   [[nodiscard]] std::size_t believed(std::size_t input) const noexcept;
   void correct(std::size_t sensor, double sd_K) noexcept;

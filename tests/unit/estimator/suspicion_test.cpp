@@ -1,6 +1,7 @@
 #include "estimator/sensing/suspicion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -383,4 +384,82 @@ TEST_CASE("a reload adopts suspicions by name, and to warn only gives the sensor
   CHECK(shop.report.sensors[2].weighed_down == (policy == SuspectedPolicy::weigh_down));
   CHECK(shop.idle_steps == 0);
   CHECK(shop.largest_step_um <= 0.05 * 12.0 + 1e-9);
+}
+
+namespace {
+
+/// Numbers of a world by its seed.
+struct Dice {
+  std::uint64_t state;
+  double operator()(double low, double high) {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return low + (high - low) * static_cast<double>(state >> 11) * 0x1p-53;
+  }
+};
+
+/// Up to four sensors that jump, creep or work loose, for a while each; some that break.
+class Liars {
+ public:
+  explicit Liars(std::uint64_t seed) : dice_{seed} {
+    for (auto& each : liars_)
+      each = {static_cast<std::size_t>(dice_(0.0, 5.999)), dice_(0.0, 4.0),
+              hour_s * dice_(17.0, 27.0), hour_s * dice_(0.1, 6.0), dice_(-6.0, 6.0)};
+  }
+  double operator()(std::size_t sensor, double degC, double time_s) const {
+    for (const auto& each : liars_) {
+      const double since_s = time_s - each.begin_s;
+      if (each.sensor != sensor || since_s < 0.0 || since_s > each.lasts_s) continue;
+      if (each.kind < 1.0)
+        degC += each.size_K;
+      else if (each.kind < 2.0)
+        degC += each.size_K * since_s / each.lasts_s;
+      else if (each.kind < 3.0)
+        degC = 0.4 * degC + 0.6 * true_degC(sensor, each.begin_s);
+      else if (since_s > 600.0)
+        degC = not_a_number;
+    }
+    return degC;
+  }
+
+ private:
+  struct Liar {
+    std::size_t sensor{0};
+    double kind{0.0};
+    double begin_s{0.0};
+    double lasts_s{0.0};
+    double size_K{0.0};
+  };
+  Dice dice_;
+  std::array<Liar, 4> liars_{};
+};
+
+}  // namespace
+
+TEST_CASE("whatever lies and breaks, suspicion keeps slew and bound and ends no compensation",
+          "[estimator][suspicion][property]") {
+  const auto seed = GENERATE(range(1u, 25u));
+  Dice dice{seed};
+  EstimatorConfig config = config_of(SuspectedPolicy::weigh_down);
+  config.axes[0].limiter = {dice(5.0, 40.0), dice(0.005, 0.2)};
+  config.compensation.offset_sd_um_max = dice(0.05, 20.0);
+  const bool smooth = dice(0.0, 1.0) < 0.5;
+  for (SensorConfig& sensor : config.sensors)
+    if (smooth) sensor.smoothing.form = SmoothingForm::sliding_line;
+  const Liars liars(seed + 1000);
+  Shop weighs(config);
+  config.compensation.suspected_sensors = SuspectedPolicy::off;
+  Shop believes(config);
+  const LimiterConfig limits = config.axes[0].limiter;
+  while (weighs.time_s < 30.0 * hour_s) {
+    weighs.step(liars);
+    believes.step(liars);
+    REQUIRE(std::isfinite(weighs.command.offset_um[0]));
+    REQUIRE(std::abs(weighs.command.offset_um[0]) <= limits.offset_um_max + 1e-9);
+    // What breaks may end it; what is suspected may not.
+    const std::vector<InputReport>& inputs = believes.report.inputs;
+    if (weighs.time_s > 16.1 * hour_s &&
+        std::all_of(inputs.begin(), inputs.end(), [](const auto& each) { return each.good; }))
+      REQUIRE(weighs.report.mode == Mode::compensating);
+  }
+  CHECK(weighs.largest_step_um <= 12.0 * limits.rate_um_per_s_max + 1e-9);
 }
