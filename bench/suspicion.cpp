@@ -10,10 +10,10 @@
 /// suspicion.cpp). Before any replay: ticks of 60 s, lines of 5 ticks, ages 1, 4 and 12 h, floor
 /// 0.1 K, clean share 0.75, end below 0.35 for 10 ticks. From hours 0-16 of the spindle with the
 /// covariance of hours 16-32, the half printed as "set_from": the limits, 4 (jump) and 6 (creep)
-/// standard deviations, 2.2 and 1.4 times the largest score there. By reasoning, after a first replay
-/// of everything: misfit share 0.25 (sizes were wrong), held share 0.5 (a spike of t16 in the other
-/// half, "judged", counted as a jump), half an hour for a creep. No number is fitted to the judged
-/// half or to the printer; the rule against spikes is owed to the judged half.
+/// standard deviations, 2.2 and 1.4 times the largest score there. By reasoning, after a first
+/// replay of everything: misfit share 0.25 (sizes were wrong), held share 0.5 (a spike of t16 in
+/// the other half, "judged", counted as a jump), half an hour for a creep. No number is fitted to
+/// the judged half or to the printer; the rule against spikes is owed to the judged half.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -247,8 +247,8 @@ ThermalModel plain_model(const std::vector<std::string>& inputs) {
 
 Fold half_of(const std::string& name, const ThermalModel& model, const RunFile& run, bool first) {
   const std::size_t half = run.rows() / 2;
-  const ThermalModel whole = first ? with_record(model, run, half, run.rows())
-                                   : with_record(model, run, 0, half);
+  const ThermalModel whole =
+      first ? with_record(model, run, half, run.rows()) : with_record(model, run, 0, half);
   return {name, whole, run, first ? 0 : half, first ? half : run.rows()};
 }
 
@@ -260,8 +260,7 @@ void print_row(const std::string& who, const char* what, const Tally& tally) {
               tally.size_K / found);
 }
 
-void add_results(const char* what, const Tally& tally, const std::string& name,
-                 std::string& last) {
+void add_results(const char* what, const Tally& tally, const std::string& name, std::string& last) {
   const auto add = [&](const char* of, double value, const char* unit) {
     char line[160];
     std::snprintf(line, sizeof line, "%s_%s_%s %.4g %s\n", name.c_str(), what, of, value, unit);
@@ -277,8 +276,8 @@ void add_results(const char* what, const Tally& tally, const std::string& name,
 
 void judge(Fold fold, std::string& last) {
   std::printf("\n%s: %.1f h, %d false suspicions\n%-14s %-8s %8s %8s %8s %8s %10s %8s\n",
-              fold.name().c_str(), fold.hours(), fold.false_suspicions(), "sensor", "lie", "planted",
-              "found %", "10 min %", "wrong %", "delay min", "size K");
+              fold.name().c_str(), fold.hours(), fold.false_suspicions(), "sensor", "lie",
+              "planted", "found %", "10 min %", "wrong %", "delay min", "size K");
   Tally jumps;
   Tally creeps;
   Tally looses;

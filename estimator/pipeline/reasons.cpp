@@ -17,9 +17,9 @@ class ReasonSet {
 }  // namespace
 
 std::uint32_t reasons_of(const Signals& signals, const Temperatures& temps,
-                                       const ReferenceState& reference,
-                         const Displacement& displacement, const ModeDecision::State& mode,
-                         const Targets& targets, const AxisBank& axes) noexcept {
+                         const ReferenceState& reference, const Displacement& displacement,
+                         const ModeDecision::State& mode, const Targets& targets,
+                         const AxisBank& axes) noexcept {
   ReasonSet reasons;
   reasons.add(!signals.online, Reason::controller_offline);
   reasons.add(!signals.complete, Reason::signal_lost);

@@ -76,7 +76,7 @@ class BlockBank {
                                                 double& temp_degC) const noexcept;
 
   std::vector<Sensor> sensors_;
-  std::vector<double> values_K_;  ///< of this step, one a sensor; NaN: not to be used
+  std::vector<double> values_K_;            ///< of this step, one a sensor; NaN: not to be used
   std::span<const std::uint8_t> left_out_;  ///< during join()
   std::vector<Block> blocks_;               ///< one a column
   std::vector<double> temps_degC_;

@@ -102,7 +102,8 @@ void LostBlocks::begin(std::span<const double> temps_degC,
     for (std::size_t b = 0; b < state_.lost_count; ++b) {
       const std::size_t i = state_.lost_at[a];
       const std::size_t k = state_.lost_at[b];
-      state_.drift_K2[at(i, k)] = state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * drift_factor(growth_, k);
+      state_.drift_K2[at(i, k)] =
+          state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * drift_factor(growth_, k);
     }
   state_.anchored_at = state_.start;
 }
@@ -217,13 +218,14 @@ void LostBlocks::grow(nanoseconds now) noexcept {
   const double drift = grown(now - state_.anchored_at, growth_.drift_time_s);
   for (std::size_t a = 0; a < state_.lost_count; ++a) {
     const std::size_t i = state_.lost_at[a];
-    const double scatter_i =
-        scatter_factor(growth_, i) * std::sqrt(grown(now - state_.lost_since[i], growth_.scatter_time_s));
+    const double scatter_i = scatter_factor(growth_, i) *
+                             std::sqrt(grown(now - state_.lost_since[i], growth_.scatter_time_s));
     for (std::size_t b = 0; b <= a; ++b) {
       const std::size_t k = state_.lost_at[b];
-      const double scatter_k =
-          scatter_factor(growth_, k) * std::sqrt(grown(now - state_.lost_since[k], growth_.scatter_time_s));
-      const double growth = drift_factor(growth_, i) * drift_factor(growth_, k) * drift + scatter_i * scatter_k;
+      const double scatter_k = scatter_factor(growth_, k) *
+                               std::sqrt(grown(now - state_.lost_since[k], growth_.scatter_time_s));
+      const double growth =
+          drift_factor(growth_, i) * drift_factor(growth_, k) * drift + scatter_i * scatter_k;
       state_.error_K2[at(i, k)] = state_.error_K2[at(k, i)] =
           state_.drift_K2[at(i, k)] + state_.spread_K2[at(i, k)] * growth;
     }

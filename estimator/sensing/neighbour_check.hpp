@@ -29,8 +29,8 @@ struct ChangeAsked {
 /// expectation errs in proportion to the motion: a = max(1, median of |x_j| / sqrt(2 C_jj)) tells
 /// how far the change is beyond those of the record.
 ///
-/// A wrong input moves the expectation of its neighbours too. Named is the one without which nothing
-/// else is left unexplained:
+/// A wrong input moves the expectation of its neighbours too. Named is the one without which
+/// nothing else is left unexplained:
 ///
 ///     y = Q x,   without c:  y_i - Q_ic y_c / Q_cc,   Q_ii - Q_ic^2 / Q_cc;
 ///

@@ -22,8 +22,8 @@ constexpr ChangeAsked jump_asked{60.0, 0.825, 4.0};
 /// A step is at the lines' meeting when the ticks scatter about them by less than this share of it:
 /// one that is a tick away scatters by as much as it seems to be.
 constexpr double misfit_share = 0.25;
-/// ... and it stays when the level has moved by this share of it. (A spike of t16 in hours 16-32 had
-/// shown that a rule against spikes was missing; the share is a plain half.)
+/// ... and it stays when the level has moved by this share of it. (A spike of t16 in hours 16-32
+/// had shown that a rule against spikes was missing; the share is a plain half.)
 constexpr double held_share = 0.5;
 /// 1.4 times the largest of the same hours over all ages (4.3).
 constexpr double creep_sd_limit = 6.0;
@@ -211,8 +211,7 @@ double Suspicion::held_K(const Liar& liar, const NeighbourCheck::Answer& answer)
     changes_K_[i] = level_K(i, 0) - level_K(i, line_ticks);
   join_changes();
   for (std::size_t i = 0; i < answer.count; ++i)
-    if (answer.wrong[i].input != liar.input)
-      input_changes_K_[answer.wrong[i].input] = not_a_number;
+    if (answer.wrong[i].input != liar.input) input_changes_K_[answer.wrong[i].input] = not_a_number;
   const double own_K = check_.remainder_K(liar.input, input_changes_K_);
   return changes_K_[liar.sensor] - (input_changes_K_[liar.input] - own_K);
 }
@@ -222,8 +221,8 @@ void Suspicion::look_for_creep(nanoseconds now, std::size_t levels_back) noexcep
   for (std::size_t i = 0; i < names_.size(); ++i)
     changes_K_[i] = level_K(i, 0) - state_.levels_K[i * levels_kept + place];
   join_changes();
-  const double ticks_ago = static_cast<double>((levels_back - 1) * ticks_a_level +
-                                               state_.ticks_since_level);
+  const double ticks_ago =
+      static_cast<double>((levels_back - 1) * ticks_a_level + state_.ticks_since_level);
   const NeighbourCheck::Answer answer =
       check_.find(input_changes_K_, {60.0 * ticks_ago, 1.0, creep_sd_limit});
   for (std::size_t i = 0; i < answer.count; ++i) {
@@ -423,8 +422,8 @@ void Suspicion::adopt(const Suspicion& previous) noexcept {
     copy(other.ticks_K, from, state_.ticks_K, i, ticks_kept);
     copy(other.levels_K, from, state_.levels_K, i, levels_kept);
     state_.suspected[i] = input_of(i) < inputs_.size() ? other.suspected[from] : std::uint8_t{0};
-    state_.weighed_down[i] = may_weigh_down_ && state_.suspected[i] != 0 ? other.weighed_down[from]
-                                                                         : std::uint8_t{0};
+    state_.weighed_down[i] =
+        may_weigh_down_ && state_.suspected[i] != 0 ? other.weighed_down[from] : std::uint8_t{0};
     state_.size_K[i] = other.size_K[from];
     state_.found_K[i] = other.found_K[from];
     state_.since[i] = other.since[from];

@@ -26,8 +26,8 @@ namespace thermocomp {
 /// without which the block agrees with its neighbours.
 ///
 /// The lie of a suspected sensor is followed on, tick by tick, by what it changes and the others
-/// do not. It is believed again when little of the lie is left for ten ticks; when it is faulted for
-/// ten ticks (somebody is at it); or with a new reference. Then its past counts no more.
+/// do not. It is believed again when little of the lie is left for ten ticks; when it is faulted
+/// for ten ticks (somebody is at it); or with a new reference. Then its past counts no more.
 class Suspicion {
  public:
   /// @pre inputs of the model with a covariance, NeighbourCheck::inputs_min at least
@@ -68,8 +68,8 @@ class Suspicion {
   void visit_state(StateArchive& archive) { archive(state_); }
 
  private:
-  static constexpr std::size_t looks = 5;         ///< in a tick
-  static constexpr std::size_t line_ticks = 5;    ///< in each line, and in a level
+  static constexpr std::size_t looks = 5;       ///< in a tick
+  static constexpr std::size_t line_ticks = 5;  ///< in each line, and in a level
   static constexpr std::size_t ticks_kept = 2 * line_ticks;
   static constexpr std::size_t ticks_a_level = 15;  ///< between two levels that are kept
   static constexpr std::size_t levels_kept = 49;    ///< 12 h
@@ -79,14 +79,14 @@ class Suspicion {
     nanoseconds next_look{};
     nanoseconds last_look{};
     nanoseconds tick_begin{};
-    std::size_t looked{0};            ///< in the tick that is not complete
+    std::size_t looked{0};  ///< in the tick that is not complete
     std::size_t ticks_since_level{0};
-    std::size_t next_tick{0};         ///< in the ring
-    std::size_t next_level{0};        ///< in the ring
-    std::size_t count{0};             ///< suspected
-    std::vector<double> looked_K;     ///< shape (sensors, looks)
-    std::vector<double> ticks_K;      ///< shape (sensors, ticks_kept), a ring
-    std::vector<double> levels_K;     ///< shape (sensors, levels_kept), a ring
+    std::size_t next_tick{0};                ///< in the ring
+    std::size_t next_level{0};               ///< in the ring
+    std::size_t count{0};                    ///< suspected
+    std::vector<double> looked_K;            ///< shape (sensors, looks)
+    std::vector<double> ticks_K;             ///< shape (sensors, ticks_kept), a ring
+    std::vector<double> levels_K;            ///< shape (sensors, levels_kept), a ring
     std::vector<std::uint8_t> suspected;     ///< one a sensor, as all below
     std::vector<std::uint8_t> weighed_down;  ///< ... and not used
     std::vector<double> size_K;              ///< of the lie, now
@@ -110,7 +110,8 @@ class Suspicion {
   void follow(std::size_t sensor) noexcept;
   void look_for_jumps(nanoseconds now) noexcept;
   void look_for_creep(nanoseconds now, std::size_t levels_back) noexcept;
-  /// Of changes_K_, one a sensor, those of the inputs: the mean over sensors that are not suspected.
+  /// Of changes_K_, one a sensor, those of the inputs: the mean over sensors that are not
+  /// suspected.
   void join_changes() noexcept;
   struct Liar {
     bool found{false};

@@ -179,7 +179,8 @@ void Invariants::check_suspicion(const Report& report, nanoseconds now) {
   const bool doubted = std::any_of(report.sensors.begin(), report.sensors.end(),
                                    [](const SensorReport& each) { return each.suspected; });
   demand(!(doubted && all_there && has_reason(report.reasons, Reason::block_lost)),
-         "suspicion_never_holds", now, "a block without a sensor, though each has one that is good");
+         "suspicion_never_holds", now,
+         "a block without a sensor, though each has one that is good");
 }
 
 bool Invariants::any_block_lost(nanoseconds now) const {
