@@ -174,21 +174,23 @@ StatusView Supervisor::view() {
   const HistoryStatistics statistics =
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);
-  return {parts_.config,
-          cycle().report(),
-          cycle().controller(),
-          cycle().timing(),
-          buses_,
-          controller_health_,
-          statistics,
-          std::move(all),
-          std::chrono::duration<double>(Clock::now() - started_).count(),
-          real_time_,
-          parts_.server.statistics(),
-          parts_.journal.ended_within(recent, recent_max),
-          &trend_,
-          parts_.keeper.reference(),
-          parts_.keeper.is_reference_lost()};
+  return {
+      parts_.config,
+      cycle().report(),
+      cycle().controller(),
+      cycle().timing(),
+      buses_,
+      controller_health_,
+      statistics,
+      std::move(all),
+      std::chrono::duration<double>(Clock::now() - started_).count(),
+      real_time_,
+      parts_.server.statistics(),
+      parts_.journal.ended_within(recent, recent_max),
+      &trend_,
+      parts_.keeper.reference(),
+      parts_.keeper.is_reference_lost(),
+      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
 
 }  // namespace thermocomp

@@ -81,6 +81,13 @@ enum class OutsidePolicy {
   shrink  ///< it follows the part of the displacement that is still believed
 };
 
+/// What becomes of a sensor whose good values its neighbours contradict.
+enum class SuspectedPolicy {
+  off,        ///< nobody looks
+  warn,       ///< it is used; status and history say so
+  weigh_down  ///< its blocks do without it, where what is left is certain enough
+};
+
 enum class UpdateRule {
   continuous,  ///< the offset follows the model
   each_cycle   ///< the offset changes at the end of a machining cycle
@@ -107,6 +114,8 @@ struct CompensationConfig {
   bool estimate_lost_blocks{true};
   double offset_sd_um_max{5.0};  ///< of any axis; beyond, an estimate does not serve: hold
   OutsidePolicy outside_domain{OutsidePolicy::warn};  ///< of a model with [made_from]
+  /// Where the model has a covariance.
+  SuspectedPolicy suspected_sensors{SuspectedPolicy::warn};
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
   void validate() const;  ///< @throws InvalidValue

@@ -39,7 +39,9 @@ struct Temperatures {
   std::span<const std::uint8_t> good;      ///< measured in this step
   std::span<const double> estimated_degC;  ///< measured, or estimated where lost
   bool all_good{false};
-  bool complete{false};  ///< each is measured or estimated
+  bool complete{false};      ///< each is measured or estimated
+  bool suspected{false};     ///< a sensor is, that lies plausibly
+  bool weighed_down{false};  ///< ... and is left out of its blocks
 };
 
 /// The state that displacement is counted from.

@@ -64,6 +64,12 @@ TermSpec lag_bank(const ThermalModel& model) {
   return term;
 }
 
+/// Blocks that mostly move together.
+void add_covariance(ThermalModel& model) {
+  for (std::size_t i = 0; i < blocks_count; ++i)
+    model.covariance_K2.emplace_back(blocks_count, 4.0)[i] += 0.04;
+}
+
 ThermalModel machine_model(bool with_bank) {
   ThermalModel model;
   for (std::size_t i = 0; i < blocks_count; ++i) model.inputs.push_back(numbered("t", i, "_degC"));
@@ -99,8 +105,15 @@ class Machine {
     controller_.applied_um.fill(0.0);
   }
 
-  void prepare() {
-    now_ += cycle;
+  Machine(const EstimatorConfig& config, const ThermalModel& model)
+      : estimator_(config, model), readings_(sensors_count) {
+    controller_.link_epoch = 1;
+    controller_.online = true;
+    controller_.applied_um.fill(0.0);
+  }
+
+  void prepare(nanoseconds later = cycle) {
+    now_ += later;
     ++steps_;
     const double time_s = 1e-9 * static_cast<double>(now_.count());
     for (std::size_t i = 0; i < sensors_count; ++i) {
@@ -125,6 +138,13 @@ class Machine {
   OffsetCommand command_;
   nanoseconds now_{};
   std::size_t steps_{0};
+};
+
+/// A step with a covariance: the median of those in which sensors are not judged, and of those in
+/// which they are (once a minute) what that costs.
+struct Judging {
+  double step_ns{0.0};
+  double minute_us{0.0};
 };
 
 /// The product of all rows at all positions with the blocks' temperatures, as Eigen does it.
@@ -206,6 +226,29 @@ Comparison compare(double smoothing_period_s, bool with_bank = false) {
   return {median(steps_ns), median(products_ns), median(ratios)};
 }
 
+Judging measure_judging() {
+  const double clock_ns = clock_cost_ns();
+  ThermalModel model = machine_model(false);
+  add_covariance(model);
+  EstimatorConfig config = machine_config(SmoothingConfig{}.period_s);
+  std::vector<double> steps_ns;
+  std::vector<double> looks_ns;
+  std::vector<double> minutes_ns;
+  for (const bool judges : {true, false}) {
+    if (!judges) config.compensation.suspected_sensors = SuspectedPolicy::off;
+    Machine machine(config, model);
+    for (int i = 0; judges && i < 20'000; ++i) steps_ns.push_back(one_step_ns(machine, clock_ns));
+    // Once a minute, after 12 h: all ages have levels.
+    for (int i = 0; i < 2000; ++i) {
+      machine.prepare(std::chrono::seconds(60));
+      const double start = now_ns();
+      machine.step();
+      (judges ? minutes_ns : looks_ns).push_back(now_ns() - start);
+    }
+  }
+  return {median(steps_ns), 1e-3 * (median(minutes_ns) - median(looks_ns))};
+}
+
 int count_steps(int steps, double period_s) {
   Machine machine(period_s);
   for (int i = 0; i < steps; ++i) {
@@ -234,6 +277,14 @@ int run() {
   const Comparison bank = compare(SmoothingConfig{}.period_s, true);
   std::printf("with a bank of lags (32 temperatures, 5 time constants): step %.0f ns\n",
               bank.step_ns);
+  const Judging judging = measure_judging();
+  std::printf(
+      "with a covariance, sensors judged once a minute: step %.0f ns, in that of the minute %.1f "
+      "us "
+      "more\n",
+      judging.step_ns, judging.minute_us);
+  std::printf("step_judging_ns %.0f ns\n", judging.step_ns);
+  std::printf("step_judging_minute %.1f us\n", judging.minute_us);
   std::printf("step_lag_bank_ns %.0f ns\n", bank.step_ns);
   std::printf("step_lag_bank_over_plain %.3f ratio\n", bank.ratio / usual.ratio);
   std::printf("step_all_due_ns %.0f ns\n", all_due.step_ns);

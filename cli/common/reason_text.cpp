@@ -7,7 +7,7 @@ namespace thermocomp::cli {
 
 namespace {
 
-constexpr std::array<ReasonText, 15> reasons{{
+constexpr std::array<ReasonText, 16> reasons{{
     {"operator_disabled", "switched off: by an operator, or never switched on yet",
      "thermocomp enable"},
     {"controller_disabled", "switched off at the controller",
@@ -38,6 +38,8 @@ constexpr std::array<ReasonText, 15> reasons{{
      "check the reference (thermocomp reference) and the model file"},
     {"outside_domain", "the machine is outside of what its model was made from",
      "the offset may be wrong: measure, and make the model anew with a run of such a day"},
+    {"sensor_suspected", "a sensor shows what its neighbours contradict",
+     "check its contact, its place and its wiring; compare it with a hand-held thermometer"},
 }};
 
 constexpr std::array<ReasonText, 12> faults{{

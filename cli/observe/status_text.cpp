@@ -169,6 +169,26 @@ std::string probed_text(const json& model) {
   return text;
 }
 
+/// Whether probings on this machine bear out what the model says of itself, an axis a line. RMS
+/// over few probings differs from a true sd by a factor of two at most (one probing in twenty).
+std::string model_error_lines(const json& model) {
+  constexpr double worse = 2.0;
+  std::string text;
+  const json& claimed = object_of(model, "claimed_sd_um");
+  for (const auto& [axis, rms] : object_of(model, "probed_rms_um").items()) {
+    const double sd_um = number_of(claimed, axis.c_str());
+    if (!rms.is_number() || !(sd_um > 0)) continue;
+    const double rms_um = rms.get<double>();
+    text += line(text.empty() ? "Model error" : "",
+                 axis + ": probings differ by " + fixed(rms_um, 1) + " um rms, claimed is " +
+                     fixed(sd_um, 1) + " um (1 sd): " +
+                     (rms_um <= worse * sd_um
+                          ? "as good as claimed"
+                          : "WORSE than claimed -> thermocomp diagnose, or make the model anew"));
+  }
+  return text;
+}
+
 /// Who took the reference, when, and at what temperatures; each is with its input.
 std::string reference_line(const json& status) {
   const json& reference = object_of(status, "reference");
@@ -200,6 +220,7 @@ std::string model_line(const json& status) {
   if (model.contains("compared") && !flag_of(model, "compared"))
     file += line("", "NEVER COMPARED with measured displacement, as far as its file says" +
                          probed_text(model));
+  file += model_error_lines(model);
   if (!flag_of(model, "outside")) return file;
   return file + line("Domain", "outside of what the model was made from, " +
                                    fixed(100.0 * number_of(model, "outside_share_24h"), 0) +
@@ -299,6 +320,8 @@ std::string sensors_text(const json& sensors, bool colours) {
     const ReasonText text = is_nan ? nan_text() : fault_text(fault);
     const bool good = fault == "none";
     std::string state = coloured(text.meaning, good ? Colour::green : Colour::red, colours);
+    if (const json& suspected = object_of(sensor, "suspected"); good && !suspected.empty())
+      state = coloured("suspected: " + suspicion_text(suspected), Colour::yellow, colours);
     if (!text.remedy.empty()) state += " -> " + std::string(text.remedy);
     result +=
         padded(text_of(sensor, "name"), width) + "  " + fixed(number_of(sensor, "raw_degC"), 2, 8) +

@@ -8,6 +8,7 @@
 
 #include "cli/common/json_fields.hpp"
 #include "cli/common/reason_text.hpp"
+#include "cli/observe/events_text.hpp"
 
 namespace thermocomp::cli {
 
@@ -126,6 +127,12 @@ Verdict verdict(const json& status) {
   return {false, mode == "disabled", "no", " (" + mode_words(mode) + since + ")"};
 }
 
+std::string suspicion_text(const json& suspected) {
+  return "off by " + fixed_signed(number_of(suspected, "size_K"), 1) +
+         " K against its neighbours since " + local_time(number_of(suspected, "since")) +
+         (flag_of(suspected, "weighed_down") ? ", not used" : ", used all the same");
+}
+
 std::vector<Trouble> troubles(const json& status) {
   std::vector<Trouble> list;
   const auto add = [&list](const std::string& what, std::string_view remedy) {
@@ -141,6 +148,8 @@ std::vector<Trouble> troubles(const json& status) {
   for (const json& sensor : list_of(status, "sensors_bad"))
     if (sensor.is_string()) bad.push_back(sensor.get<std::string>());
   if (!bad.empty()) add("bad sensors: " + joined(bad), "thermocomp sensors says why");
+  for (const json& sensor : list_of(status, "sensors_suspected"))
+    add("sensor " + text_of(sensor, "name") + " is " + suspicion_text(sensor), "");
   add_bus_troubles(status, add);
   const json& controller = object_of(status, "controller");
   add_can_trouble("controller " + text_of(controller, "name"), controller, add);

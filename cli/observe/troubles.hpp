@@ -31,6 +31,10 @@ struct Trouble {
 /// @param answer  of `status` or `sensors`
 [[nodiscard]] std::vector<std::string> estimate_lines(const nlohmann::json& answer);
 
+/// "off by +2.0 K against its neighbours since 2026-03-01 08:30:11.1, used all the same"
+/// @param suspected  of the answer of `sensors`, or one of `sensors_suspected` of `status`
+[[nodiscard]] std::string suspicion_text(const nlohmann::json& suspected);
+
 [[nodiscard]] bool has_reason(const nlohmann::json& status, const char* name);
 [[nodiscard]] std::vector<std::string> axes_not_driven(const nlohmann::json& status);
 /// "a, b, c"

@@ -192,6 +192,12 @@ CompensationConfig read_compensation(const TomlTable& table,
                                                        {"hold", OutsidePolicy::hold},
                                                        {"shrink", OutsidePolicy::shrink}},
                                                       config.outside_domain);
+  config.suspected_sensors =
+      table.choice<SuspectedPolicy>("suspected_sensors",
+                                    {{"off", SuspectedPolicy::off},
+                                     {"warn", SuspectedPolicy::warn},
+                                     {"weigh_down", SuspectedPolicy::weigh_down}},
+                                    config.suspected_sensors);
   config.enabled_at_first_start =
       table.flag("enabled_at_first_start", config.enabled_at_first_start);
   config.estimate_lost_blocks = table.flag("estimate_lost_blocks", config.estimate_lost_blocks);

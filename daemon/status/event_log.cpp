@@ -93,6 +93,7 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
 void EventLog::note_sensors(const Report& report, const EstimatorConfig& config) {
   faults_.resize(report.sensors.size(), Fault::none);
   clipping_.resize(report.sensors.size(), false);
+  suspected_.resize(report.sensors.size(), false);
   for (std::size_t i = 0; i < report.sensors.size(); ++i) {
     const SensorReport& sensor = report.sensors[i];
     if (sensor.fault != faults_[i]) {
@@ -106,11 +107,28 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
       }
       faults_[i] = sensor.fault;
     }
+    note_suspicion(i, sensor, config.sensors[i].name);
     const bool clipping = sensor.clipped_in_a_row >= clipped_in_a_row_news;
     if (clipping && !clipping_[i])
       spdlog::warn("sensor {}: {} smoothed values in a row clipped", config.sensors[i].name,
                    sensor.clipped_in_a_row);
     clipping_[i] = clipping;
+  }
+}
+
+void EventLog::note_suspicion(std::size_t index, const SensorReport& sensor,
+                              const std::string& name) {
+  if (sensor.suspected == suspected_[index]) return;
+  suspected_[index] = sensor.suspected;
+  const std::string subject = "suspected sensor " + name;
+  if (sensor.suspected) {
+    const std::string what =
+        fmt::format("off by {:+.1f} K against its neighbours", sensor.suspected_size_K);
+    journal_.fault(subject, what);
+    spdlog::warn("{}: {}{}", subject, what, sensor.weighed_down ? ", not used" : "");
+  } else {
+    journal_.recovery(subject);
+    spdlog::info("sensor {}: no longer suspected", name);
   }
 }
 

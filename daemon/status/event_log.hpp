@@ -39,6 +39,7 @@ class EventLog {
  private:
   void note_mode(const Report& report, const std::string& mode);
   void note_sensors(const Report& report, const EstimatorConfig& config);
+  void note_suspicion(std::size_t index, const SensorReport& sensor, const std::string& name);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
   void note_link(const std::string& what, bool connected, const std::string& error);
   void note_state(const std::string& what, bool connected, const std::string& state);
@@ -48,6 +49,7 @@ class EventLog {
   nanoseconds settled_at_{};  ///< of the reports
   Mode mode_{Mode::starting};
   std::uint32_t reasons_{0};
+  std::vector<bool> suspected_;
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;
   std::vector<bool> estimated_;

@@ -128,6 +128,25 @@ json age_s(const StatusView& view, nanoseconds since) {
   return number(std::max(0.0, seconds(view.report.now - since)));
 }
 
+/// What a sensor lies by, as its neighbours have it; null: nobody contradicts it.
+json suspected(const StatusView& view, const SensorReport& sensor) {
+  if (!sensor.suspected) return nullptr;
+  return {{"size_K", number(sensor.suspected_size_K)},
+          {"since", number(view.wall_s - seconds(view.report.now - sensor.suspected_since))},
+          {"weighed_down", sensor.weighed_down}};
+}
+
+json sensors_suspected(const StatusView& view) {
+  json list = json::array();
+  for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
+    json told = suspected(view, view.report.sensors[i]);
+    if (told.is_null()) continue;
+    told["name"] = view.config.estimator.sensors[i].name;
+    list.push_back(std::move(told));
+  }
+  return list;
+}
+
 json buses(const StatusView& view) {
   json list = json::array();
   for (const BusHealth& bus : view.buses) {
@@ -325,6 +344,7 @@ json status_json(const StatusView& view) {
           {"inputs", inputs(view)},
           {"reference", reference(view)},
           {"sensors_bad", bad},
+          {"sensors_suspected", sensors_suspected(view)},
           {"buses", buses(view)},
           {"controller", controller(view)},
           {"history", history(view)},
@@ -348,7 +368,8 @@ json sensors_json(const StatusView& view) {
           ever ? number(std::max(0.0, seconds(view.report.now - sensor.taken_at))) : json(nullptr)},
          {"clipped_in_a_row", sensor.clipped_in_a_row},
          {"clipped", sensor.clipped},
-         {"rejected", sensor.rejected}});
+         {"rejected", sensor.rejected},
+         {"suspected", suspected(view, sensor)}});
   }
   return {{"sensors", list}, {"inputs", inputs(view)}, {"axes", axes(view)}};
 }

@@ -38,7 +38,8 @@ struct StatusView {
   std::vector<Event> ended{};  ///< outages that are over since a few minutes, newest first
   const TemperatureTrend* trend{nullptr};  ///< nullptr: nobody watches the temperatures
   ReferenceRecord reference{};
-  bool reference_lost{false};  ///< see StateKeeper
+  bool reference_lost{false};   ///< see StateKeeper
+  double wall_s{not_a_number};  ///< now, since 1970
 };
 
 /// What a status calls the mode. A dry run does not compensate: "dry_run" in that one's place.

@@ -29,17 +29,36 @@ bool Certainty::step(const LostBlocks& lost, const DisplacementModel& model,
     return true;
   }
   if (!signals.complete || !reference.known) return !state_.uncertain;
-  for (std::size_t i = 0; i < rise_K_.size(); ++i)
-    rise_K_[i] = lost.temps_degC()[i] - reference.temps_degC[i];
+  note_rise(lost, reference);
   const double limit_um = sd_um_max_ * (state_.uncertain ? certain_again : 1.0);
   state_.uncertain = false;
   for (std::size_t i = 0; i < axis_output_.size(); ++i) {
-    model.slope(axis_output_[i], rise_K_, signals.of_model, slope_um_per_K_);
-    state_.offset_sd_um[i] = lost.sd_of(slope_um_per_K_);
+    state_.offset_sd_um[i] = sd_um(i, lost, model, signals);
     // Negated so that NaN is uncertain.
     if (!(state_.offset_sd_um[i] <= limit_um)) state_.uncertain = true;
   }
   return !state_.uncertain;
+}
+
+bool Certainty::would_serve(const LostBlocks& lost, const DisplacementModel& model,
+                            const ReferenceState& reference, const Signals& signals) noexcept {
+  if (!lost.complete()) return false;
+  if (lost.lost_count() == 0 || !signals.complete || !reference.known) return true;
+  note_rise(lost, reference);
+  for (std::size_t i = 0; i < axis_output_.size(); ++i)
+    if (!(sd_um(i, lost, model, signals) <= certain_again * sd_um_max_)) return false;
+  return true;
+}
+
+void Certainty::note_rise(const LostBlocks& lost, const ReferenceState& reference) noexcept {
+  for (std::size_t i = 0; i < rise_K_.size(); ++i)
+    rise_K_[i] = lost.temps_degC()[i] - reference.temps_degC[i];
+}
+
+double Certainty::sd_um(std::size_t axis, const LostBlocks& lost, const DisplacementModel& model,
+                        const Signals& signals) noexcept {
+  model.slope(axis_output_[axis], rise_K_, signals.of_model, slope_um_per_K_);
+  return lost.sd_of(slope_um_per_K_);
 }
 
 }  // namespace thermocomp

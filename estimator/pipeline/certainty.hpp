@@ -33,6 +33,9 @@ class Certainty {
   ///         reference nothing is compensated, and nothing new can be said.
   [[nodiscard]] bool step(const LostBlocks& lost, const DisplacementModel& model,
                           const ReferenceState& reference, const Signals& signals) noexcept;
+  /// Whether step() would say so, with room for another step: asked before anything is given up.
+  [[nodiscard]] bool would_serve(const LostBlocks& lost, const DisplacementModel& model,
+                                 const ReferenceState& reference, const Signals& signals) noexcept;
   [[nodiscard]] double offset_sd_um(std::size_t axis) const noexcept {
     return state_.offset_sd_um[axis];
   }
@@ -44,6 +47,11 @@ class Certainty {
   }
 
  private:
+  void note_rise(const LostBlocks& lost, const ReferenceState& reference) noexcept;
+  /// @pre note_rise()
+  [[nodiscard]] double sd_um(std::size_t axis, const LostBlocks& lost,
+                             const DisplacementModel& model, const Signals& signals) noexcept;
+
   const double sd_um_max_;
   const std::vector<std::size_t> axis_output_;
 

@@ -16,6 +16,7 @@ void take_reference(Stages& stages) noexcept {
   if (!stages.sensing.all_good()) return;
   const std::span<const double> temps_degC = stages.sensing.blocks().temps_degC();
   stages.reference.take(temps_degC);
+  stages.sensing.trust_all();
   stages.prediction.restart();
   stages.learned.restart();
   stages.cycle_update.restart(stages.record.now, temps_degC, stages.signals.of_model());
@@ -109,9 +110,13 @@ void Estimator::save_state(std::span<std::byte> out) const noexcept {
 }
 
 void Estimator::load_state(std::span<const std::byte> in) {
+  StateArchive before;
+  stages_->visit_all_but_suspicion(before);
+  StateArchive archive(in);
+  // Written before sensors were suspected: a suspicion that is new has done nothing yet.
+  if (in.size() == before.position_bytes()) return stages_->visit_all_but_suspicion(archive);
   if (in.size() != state_size_bytes())
     throw std::runtime_error("the estimator's state has another size than this program's");
-  StateArchive archive(in);
   stages_->visit_state(archive);
 }
 

@@ -50,6 +50,8 @@ std::string_view to_string(Reason reason) noexcept {
       return "no_target";
     case Reason::outside_domain:
       return "outside_domain";
+    case Reason::sensor_suspected:
+      return "sensor_suspected";
   }
   return "unknown";
 }

@@ -31,11 +31,12 @@ enum class Reason : std::uint32_t {
   applied_out_of_bound = 1u << 10,  ///< read-back beyond any bound of ours: axis is not driven
   block_estimated = 1u << 11,       ///< a warning: compensating, with an estimate for a lost block
   mismatch_latched =
-      1u << 12,              ///< read-backs that nothing sent explains: not driven until released
-  no_target = 1u << 13,      ///< the model's answer is no finite number
-  outside_domain = 1u << 14  ///< the machine is where its model was never made or judged
+      1u << 12,                ///< read-backs that nothing sent explains: not driven until released
+  no_target = 1u << 13,        ///< the model's answer is no finite number
+  outside_domain = 1u << 14,   ///< the machine is where its model was never made or judged
+  sensor_suspected = 1u << 15  ///< a warning: good values that the neighbours contradict
 };
-inline constexpr std::size_t reasons_count = 15;
+inline constexpr std::size_t reasons_count = 16;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
 /// Of a set of reasons (Report::reasons), whether one is in it.

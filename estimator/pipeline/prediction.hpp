@@ -40,6 +40,11 @@ class Prediction {
   [[nodiscard]] Displacement step(nanoseconds now, const Temperatures& temps,
                                   const ReferenceState& reference, const Signals& signals,
                                   const LostBlocks& lost, Probings& learned) noexcept;
+  /// Whether what is estimated serves, so that no sensor need be used that is not believed.
+  [[nodiscard]] bool would_serve(const LostBlocks& lost, const ReferenceState& reference,
+                                 const Signals& signals) noexcept {
+    return certainty_.would_serve(lost, model_, reference, signals);
+  }
   /// A new reference: lags start anew.
   void restart() noexcept;
 

@@ -16,15 +16,17 @@ class ReasonSet {
 
 }  // namespace
 
-std::uint32_t reasons_of(const Signals& signals, const ReferenceState& reference,
-                         const Displacement& displacement, const ModeDecision::State& mode,
-                         const Targets& targets, const AxisBank& axes) noexcept {
+std::uint32_t reasons_of(const Signals& signals, const Temperatures& temps,
+                         const ReferenceState& reference, const Displacement& displacement,
+                         const ModeDecision::State& mode, const Targets& targets,
+                         const AxisBank& axes) noexcept {
   ReasonSet reasons;
   reasons.add(!signals.online, Reason::controller_offline);
   reasons.add(!signals.complete, Reason::signal_lost);
   reasons.add(!reference.known, Reason::no_reference);
   reasons.add(displacement.block_lost, Reason::block_lost);
   reasons.add(displacement.block_estimated, Reason::block_estimated);
+  reasons.add(temps.suspected, Reason::sensor_suspected);
   reasons.add(displacement.not_finite, Reason::no_target);
   reasons.add(displacement.outside, Reason::outside_domain);
   reasons.add(!mode.enabled, Reason::operator_disabled);

@@ -10,7 +10,8 @@
 namespace thermocomp {
 
 /// Of all that the steps handed on. @return a set of Reason
-[[nodiscard]] std::uint32_t reasons_of(const Signals& signals, const ReferenceState& reference,
+[[nodiscard]] std::uint32_t reasons_of(const Signals& signals, const Temperatures& temps,
+                                       const ReferenceState& reference,
                                        const Displacement& displacement,
                                        const ModeDecision::State& mode, const Targets& targets,
                                        const AxisBank& axes) noexcept;

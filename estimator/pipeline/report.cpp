@@ -59,7 +59,7 @@ void fill_report(const Stages& stages, Report& out) noexcept {
   out.reasons = stages.record.reasons;
   out.enabled = mode.enabled;
   out.cycle_ends = stages.cycle_update.cycle_ends();
-  stages.sensing.blocks().report(out.sensors);
+  stages.sensing.report(out.sensors);
   const LostBlocks& lost = stages.sensing.lost();
   for (std::size_t i = 0; i < out.inputs.size(); ++i)
     out.inputs[i] = {lost.temps_degC()[i],

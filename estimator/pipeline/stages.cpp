@@ -54,8 +54,11 @@ void Stages::step(nanoseconds now, std::span<const Reading> readings,
   if (record.stepped) time.dt_s = 1e-9 * static_cast<double>((now - record.now).count());
 
   const Signals told = signals.step(now, controller);
-  const Temperatures temps = sensing.step(now, readings);
+  Temperatures temps = sensing.step(now, readings);
   const ReferenceState straight = reference.step(temps, told);
+  // A suspicion alone never ends the compensation.
+  if (temps.weighed_down && !prediction.would_serve(sensing.lost(), straight, told))
+    temps = sensing.use_all(now);
   const Displacement displacement =
       prediction.step(now, temps, straight, told, sensing.lost(), learned);
   const Mode what =
@@ -71,7 +74,7 @@ void Stages::step(nanoseconds now, std::span<const Reading> readings,
             now,
             time.dt_s,
             displacement.known,
-            reasons_of(told, straight, displacement, mode.state(), where, axes)};
+            reasons_of(told, temps, straight, displacement, mode.state(), where, axes)};
 }
 
 void Stages::plan_adoption(const Stages& previous) {
@@ -100,6 +103,11 @@ void Stages::adopt(const Stages& previous) noexcept {
 
 /// The order is that of the histories that are there already: `replay` loads them.
 void Stages::visit_state(StateArchive& archive) {
+  visit_all_but_suspicion(archive);
+  sensing.visit_suspicion(archive);
+}
+
+void Stages::visit_all_but_suspicion(StateArchive& archive) {
   auto& [cycle, stepped, now, dt_s, displacement_known, reasons] = record;
   archive(sensing);
   prediction.visit_lags(archive);

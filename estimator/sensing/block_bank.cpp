@@ -50,17 +50,33 @@ BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::strin
   good_.assign(columns.size(), 0);
 }
 
-bool BlockBank::step(nanoseconds now, std::span<const Reading> readings) noexcept {
+void BlockBank::read(nanoseconds now, std::span<const Reading> readings) noexcept {
   THERMOCOMP_ENSURE(readings.size() == sensors_.size());
   now_ = now;
   // All are looked at before any is smoothed: a difference needs its reference of this very cycle.
   for (std::size_t i = 0; i < sensors_.size(); ++i) look_at(sensors_[i], now, readings[i]);
   for (std::size_t i = 0; i < sensors_.size(); ++i) values_K_[i] = smooth(sensors_[i], now);
+}
+
+void BlockBank::screened(nanoseconds now, std::span<double> values_K) const noexcept {
+  THERMOCOMP_ENSURE(values_K.size() == sensors_.size());
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    const Sensor& sensor = sensors_[i];
+    values_K[i] = sensor.screening.usable(now) ? sensor.screening.good_degC() : not_a_number;
+    if (sensor.reference == no_sensor) continue;
+    const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
+    values_K[i] -= reference.usable(now) ? reference.good_degC() : not_a_number;
+  }
+}
+
+bool BlockBank::join(std::span<const std::uint8_t> left_out) noexcept {
+  left_out_ = left_out;
   bool all_good = true;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     good_[i] = update(blocks_[i], temps_degC_[i]) ? 1 : 0;
     all_good = all_good && good_[i] != 0;
   }
+  left_out_ = {};
   return all_good;
 }
 
@@ -86,7 +102,7 @@ double BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
 
 bool BlockBank::update(Block& block, double& temp_degC) noexcept {
   double sum_degC = 0.0;
-  for (const std::size_t sensor : block.sensors) sum_degC += values_K_[sensor];
+  for (const std::size_t sensor : block.sensors) sum_degC += in_use_K(sensor);
   if (std::isnan(sum_degC)) return update_without_the_missing(block, temp_degC);
   temp_degC = sum_degC / static_cast<double>(block.sensors.size());
   for (std::size_t i = 0; i < block.sensors.size(); ++i)
@@ -98,13 +114,20 @@ bool BlockBank::update_without_the_missing(const Block& block, double& temp_degC
   double sum_degC = 0.0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < block.sensors.size(); ++i) {
-    const double value_K = values_K_[block.sensors[i]];
+    const double value_K = in_use_K(block.sensors[i]);
     if (std::isnan(value_K)) continue;
     sum_degC += value_K - block.deviation_K[i];
     ++count;
   }
   if (count > 0) temp_degC = sum_degC / static_cast<double>(count);
   return count > 0;
+}
+
+void BlockBank::say(std::size_t column, double temp_degC) noexcept {
+  Block& block = blocks_[column];
+  for (std::size_t i = 0; i < block.sensors.size(); ++i)
+    if (const double value_K = values_K_[block.sensors[i]]; std::isfinite(value_K))
+      block.deviation_K[i] = value_K - temp_degC;
 }
 
 void BlockBank::report(std::span<SensorReport> sensors) const noexcept {
@@ -116,7 +139,11 @@ void BlockBank::report(std::span<SensorReport> sensors) const noexcept {
                   sensor.fault,
                   sensor.smoother.clipped_in_a_row(),
                   sensor.smoother.clipped(),
-                  sensor.screening.rejected()};
+                  sensor.screening.rejected(),
+                  false,
+                  false,
+                  0.0,
+                  {}};
   }
 }
 

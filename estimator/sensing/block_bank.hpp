@@ -17,8 +17,17 @@ class BlockBank {
   /// @throws InvalidValue when a column has no block or a block no sensor
   BlockBank(const EstimatorConfig& config, const std::vector<std::string>& columns);
 
-  /// Takes in the newest readings. @return whether every column has a temperature in use
-  bool step(nanoseconds now, std::span<const Reading> readings) noexcept;
+  /// Takes in the newest readings.
+  void read(nanoseconds now, std::span<const Reading> readings) noexcept;
+  /// What screening lets through now, before smoothing; one a sensor, NaN: nothing.
+  void screened(nanoseconds now, std::span<double> values_K) const noexcept;
+  /// The blocks' temperatures from what was read.
+  /// @param left_out  one a sensor: not to be used; empty: all are
+  /// @return whether every column has a temperature in use
+  bool join(std::span<const std::uint8_t> left_out) noexcept;
+  /// The block's temperature is this one when `sensor` is left out of it from now on: the others
+  /// then have deviations from it.
+  void say(std::size_t column, double temp_degC) noexcept;
 
   /// Shape (columns): the blocks' temperatures; the last known one where not good, NaN before the
   /// first.
@@ -58,14 +67,18 @@ class BlockBank {
   [[nodiscard]] double smooth(Sensor& sensor, nanoseconds now) noexcept;
   /// Index of the reference sensor in the previous bank, or no_sensor.
   [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
+  [[nodiscard]] double in_use_K(std::size_t sensor) const noexcept {
+    return left_out_.empty() || left_out_[sensor] == 0 ? values_K_[sensor] : not_a_number;
+  }
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
   /// From those that are left, less what each deviated by while all were there. @return any left
   [[nodiscard]] bool update_without_the_missing(const Block& block,
                                                 double& temp_degC) const noexcept;
 
   std::vector<Sensor> sensors_;
-  std::vector<double> values_K_;  ///< of this step, one a sensor; NaN: not to be used
-  std::vector<Block> blocks_;     ///< one a column
+  std::vector<double> values_K_;            ///< of this step, one a sensor; NaN: not to be used
+  std::span<const std::uint8_t> left_out_;  ///< during join()
+  std::vector<Block> blocks_;               ///< one a column
   std::vector<double> temps_degC_;
   std::vector<std::uint8_t> good_;
   nanoseconds now_{};

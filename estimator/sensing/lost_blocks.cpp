@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "estimator/checks.hpp"
+#include "estimator/sensing/precision.hpp"
 
 namespace thermocomp {
 namespace {
@@ -14,33 +13,8 @@ namespace {
 constexpr double variance_K2_min = 1e-12;
 constexpr double temp_degC_max = 1e4;
 
-using Matrix = Eigen::MatrixXd;
-
-/// (C + noise^2 I)^-1, row by row.
-std::vector<double> precision_of(const std::vector<std::vector<double>>& rows, double noise_K) {
-  const auto n = static_cast<Eigen::Index>(rows.size());
-  Matrix covariance_K2(n, n);
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j)
-      covariance_K2(i, j) = rows[static_cast<std::size_t>(i)].at(static_cast<std::size_t>(j));
-  // The file's matrix may be negative by what rounding does to large numbers.
-  const double rounding_K2 = 1e-8 * static_cast<double>(n) * covariance_K2.cwiseAbs().maxCoeff();
-  covariance_K2.diagonal().array() += std::max(noise_K * noise_K, rounding_K2);
-  const Eigen::LLT<Matrix> llt(covariance_K2);
-  if (llt.info() != Eigen::Success)
-    throw InvalidValue("covariance.matrix_K2", std::to_string(n) + " rows",
-                       "must be positive semidefinite");
-  const Matrix inverse = llt.solve(Matrix::Identity(n, n));
-  std::vector<double> flat;
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j) flat.push_back(0.5 * (inverse(i, j) + inverse(j, i)));
-  return flat;
-}
-
-/// 1 - exp(-age / time); 1 where it is grown at once.
 double grown(nanoseconds age, double time_s) noexcept {
-  if (!(time_s > 0)) return age > nanoseconds{} ? 1.0 : 0.0;
-  return -std::expm1(-1e-9 * static_cast<double>(age.count()) / time_s);
+  return thermocomp::grown(1e-9 * static_cast<double>(age.count()), time_s);
 }
 
 }  // namespace
@@ -49,30 +23,18 @@ LostBlocks::LostBlocks(const ThermalModel& model, nanoseconds settle)
     : columns_(model.temperature_columns()), growth_(model.covariance_growth), settle_(settle) {
   state_.temps_degC.assign(columns_.size(), not_a_number);
   if (model.covariance_K2.empty()) return;
-  require(model.covariance_K2.size() == model.inputs.size(), "covariance.matrix_K2",
-          static_cast<double>(model.covariance_K2.size()), "must have one row an input");
-  require(model.inputs.size() <= covariance_inputs_max, "covariance.matrix_K2",
-          static_cast<double>(model.inputs.size()), "has more inputs than can be estimated");
-  growth_.validate(model.inputs.size());
+  precision_per_K2_ = precision_per_K2(model);
   inputs_ = model.inputs.size();
-  precision_per_K2_ = precision_of(model.covariance_K2, growth_.noise_K);
   state_.anchor_degC.assign(inputs_, not_a_number);
   state_.lost.assign(inputs_, 0);
   state_.known.assign(inputs_, 0);
   state_.restored.assign(inputs_, 0);
   state_.lost_since.assign(inputs_, nanoseconds{});
   state_.lost_at.assign(inputs_, 0);
+  said_K2_.assign(inputs_, 0.0);
   for (auto* matrix :
        {&state_.gain, &state_.spread_K2, &state_.drift_K2, &state_.error_K2, &factor_})
     matrix->assign(inputs_ * inputs_, 0.0);
-}
-
-double LostBlocks::drift_factor(std::size_t input) const noexcept {
-  return growth_.drift_factor.empty() ? drift_factor_default : growth_.drift_factor[input];
-}
-
-double LostBlocks::scatter_factor(std::size_t input) const noexcept {
-  return growth_.scatter_factor.empty() ? 0.0 : growth_.scatter_factor[input];
 }
 
 void LostBlocks::step(nanoseconds now, std::span<const double> temps_degC,
@@ -140,7 +102,8 @@ void LostBlocks::begin(std::span<const double> temps_degC,
     for (std::size_t b = 0; b < state_.lost_count; ++b) {
       const std::size_t i = state_.lost_at[a];
       const std::size_t k = state_.lost_at[b];
-      state_.drift_K2[at(i, k)] = state_.spread_K2[at(i, k)] * drift_factor(i) * drift_factor(k);
+      state_.drift_K2[at(i, k)] =
+          state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * drift_factor(growth_, k);
     }
   state_.anchored_at = state_.start;
 }
@@ -177,7 +140,7 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
       const std::size_t i = state_.lost_at[a];
       const std::size_t k = state_.lost_at[b];
       state_.drift_K2[at(i, k)] +=
-          state_.spread_K2[at(i, k)] * drift_factor(i) * drift_factor(k) * drift;
+          state_.spread_K2[at(i, k)] * drift_factor(growth_, i) * drift_factor(growth_, k) * drift;
     }
   // What was estimated a step ago is compared with what is measured now, and goes on from there.
   for (std::size_t i = 0; i < inputs_; ++i)
@@ -189,14 +152,21 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
     for (std::size_t k = 0; k < inputs_; ++k)
       state_.drift_K2[at(i, k)] = state_.drift_K2[at(k, i)] = 0.0;
     // The value it had last was not exact, and what it would show now would not be either.
-    state_.drift_K2[at(i, i)] = 2.0 * growth_.noise_K * growth_.noise_K;
+    state_.drift_K2[at(i, i)] = 2.0 * growth_.noise_K * growth_.noise_K + said_K2_[i];
   }
   // A lost one: what was last measured, or estimated.
   for (std::size_t i = 0; i < inputs_; ++i)
     state_.anchor_degC[i] = state_.lost[i] != 0 ? state_.temps_degC[i] : temps_degC[i];
   state_.anchored_at = now;
+  std::fill(said_K2_.begin(), said_K2_.end(), 0.0);
   list_lost();
   condition();
+}
+
+void LostBlocks::say(std::size_t input, double temp_degC, double sd_K) noexcept {
+  if (!state_.begun || input >= inputs_ || state_.lost[input] != 0) return;
+  state_.temps_degC[input] = temp_degC;
+  said_K2_[input] = sd_K * sd_K;
 }
 
 void LostBlocks::list_lost() noexcept {
@@ -248,13 +218,14 @@ void LostBlocks::grow(nanoseconds now) noexcept {
   const double drift = grown(now - state_.anchored_at, growth_.drift_time_s);
   for (std::size_t a = 0; a < state_.lost_count; ++a) {
     const std::size_t i = state_.lost_at[a];
-    const double scatter_i =
-        scatter_factor(i) * std::sqrt(grown(now - state_.lost_since[i], growth_.scatter_time_s));
+    const double scatter_i = scatter_factor(growth_, i) *
+                             std::sqrt(grown(now - state_.lost_since[i], growth_.scatter_time_s));
     for (std::size_t b = 0; b <= a; ++b) {
       const std::size_t k = state_.lost_at[b];
-      const double scatter_k =
-          scatter_factor(k) * std::sqrt(grown(now - state_.lost_since[k], growth_.scatter_time_s));
-      const double growth = drift_factor(i) * drift_factor(k) * drift + scatter_i * scatter_k;
+      const double scatter_k = scatter_factor(growth_, k) *
+                               std::sqrt(grown(now - state_.lost_since[k], growth_.scatter_time_s));
+      const double growth =
+          drift_factor(growth_, i) * drift_factor(growth_, k) * drift + scatter_i * scatter_k;
       state_.error_K2[at(i, k)] = state_.error_K2[at(k, i)] =
           state_.drift_K2[at(i, k)] + state_.spread_K2[at(i, k)] * growth;
     }

@@ -52,6 +52,10 @@ class LostBlocks {
   /// Standard deviation of gain . x, with gain of shape (columns). Unit of gain times K.
   [[nodiscard]] double sd_of(std::span<const double> gain_per_K) const noexcept;
 
+  /// Just before the step in which a measured input is given up: what it is taken for, because
+  /// what it was measured at last is not believed. Nothing of an input that is lost already.
+  void say(std::size_t input, double temp_degC, double sd_K) noexcept;
+
   /// Before the first step: temperature at the end of the life before, how long ago is not known.
   void restore(std::size_t column, double temp_degC) noexcept;
 
@@ -88,8 +92,6 @@ class LostBlocks {
   [[nodiscard]] std::size_t at(std::size_t row, std::size_t column) const noexcept {
     return row * inputs_ + column;
   }
-  [[nodiscard]] double drift_factor(std::size_t input) const noexcept;
-  [[nodiscard]] double scatter_factor(std::size_t input) const noexcept;
   void begin(std::span<const double> temps_degC, std::span<const std::uint8_t> good) noexcept;
   void take_back(std::size_t input, double temp_degC) noexcept;
   void change_pattern(nanoseconds now, std::span<const double> temps_degC,
@@ -106,6 +108,7 @@ class LostBlocks {
 
   State state_;
 
+  std::vector<double> said_K2_;   ///< of say(), for the same step
   std::vector<double> factor_;    ///< scratch: Cholesky factor of Q_LL, then its inverse
   std::vector<int> column_plan_;  ///< index in the previous one, -1: none
   std::vector<int> input_plan_;

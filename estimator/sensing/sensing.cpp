@@ -27,17 +27,57 @@ nanoseconds settling_time(const EstimatorConfig& config) {
 Sensing::Sensing(const EstimatorConfig& config, const ThermalModel& model)
     : columns_(model.temperature_columns()),
       blocks_(config, columns_),
-      lost_(estimating_model(model, config), settling_time(config)) {}
+      lost_(estimating_model(model, config), settling_time(config)),
+      screened_K_(config.sensors.size(), not_a_number) {
+  if (config.compensation.suspected_sensors != SuspectedPolicy::off &&
+      !model.covariance_K2.empty() && model.inputs.size() >= NeighbourCheck::inputs_min)
+    suspicion_.emplace(config, model);
+}
 
 Temperatures Sensing::step(nanoseconds now, std::span<const Reading> readings) noexcept {
+  blocks_.read(now, readings);
+  return join(now, suspect(now));
+}
+
+/// @return the sensors to be left out, one a sensor; empty: none
+std::span<const std::uint8_t> Sensing::suspect(nanoseconds now) noexcept {
+  if (!suspicion_) return {};
+  if (suspicion_->is_due(now)) {
+    blocks_.screened(now, screened_K_);
+    suspicion_->step(now, screened_K_);
+    for (const Suspicion::Corrected& input : suspicion_->newly_weighed_down()) {
+      blocks_.say(input.input, input.temp_degC);
+      lost_.say(input.input, input.temp_degC, input.sd_K);
+    }
+  }
+  return suspicion_->count() > 0 ? suspicion_->weighed_down() : std::span<const std::uint8_t>{};
+}
+
+Temperatures Sensing::join(nanoseconds now, std::span<const std::uint8_t> left_out) noexcept {
   Temperatures temps;
-  temps.all_good = blocks_.step(now, readings);
+  temps.all_good = blocks_.join(left_out);
   lost_.step(now, blocks_.temps_degC(), blocks_.good());
   temps.measured_degC = blocks_.temps_degC();
   temps.good = blocks_.good();
   temps.estimated_degC = lost_.temps_degC();
   temps.complete = lost_.complete();
+  temps.suspected = suspicion_ && suspicion_->count() > 0;
+  temps.weighed_down = std::find(left_out.begin(), left_out.end(), 1) != left_out.end();
   return temps;
+}
+
+Temperatures Sensing::use_all(nanoseconds now) noexcept {
+  if (suspicion_) suspicion_->use_all();
+  return join(now, {});
+}
+
+void Sensing::trust_all() noexcept {
+  if (suspicion_) suspicion_->restart();
+}
+
+void Sensing::report(std::span<SensorReport> sensors) const noexcept {
+  blocks_.report(sensors);
+  if (suspicion_) suspicion_->report(sensors);
 }
 
 bool Sensing::all_good() const noexcept {
@@ -56,11 +96,13 @@ void Sensing::restore(const std::map<std::string, double>& temps_degC) {
 void Sensing::plan_adoption(const Sensing& previous) {
   blocks_.plan_adoption(previous.blocks_);
   lost_.plan_adoption(previous.lost_);
+  if (suspicion_ && previous.suspicion_) suspicion_->plan_adoption(*previous.suspicion_);
 }
 
 void Sensing::adopt(const Sensing& previous) noexcept {
   blocks_.adopt(previous.blocks_);
   lost_.adopt(previous.lost_);
+  if (suspicion_ && previous.suspicion_) suspicion_->adopt(*previous.suspicion_);
 }
 
 }  // namespace thermocomp

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "estimator/estimator_config.hpp"
 #include "estimator/sensing/block_bank.hpp"
 #include "estimator/sensing/lost_blocks.hpp"
+#include "estimator/sensing/suspicion.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/step_values.hpp"
 #include "estimator/thermal_model.hpp"
@@ -24,6 +26,13 @@ class Sensing {
   /// @param readings  one a sensor, order of the configuration (checked)
   [[nodiscard]] Temperatures step(nanoseconds now, std::span<const Reading> readings) noexcept;
 
+  /// The sensors that are weighed down are used all the same: their estimates do not serve.
+  /// @return the temperatures of this step anew
+  [[nodiscard]] Temperatures use_all(nanoseconds now) noexcept;
+  /// The machine is straight now, and its sensors show it.
+  void trust_all() noexcept;
+
+  void report(std::span<SensorReport> sensors) const noexcept;
   [[nodiscard]] const BlockBank& blocks() const noexcept { return blocks_; }
   [[nodiscard]] const LostBlocks& lost() const noexcept { return lost_; }
   [[nodiscard]] bool all_good() const noexcept;
@@ -33,11 +42,20 @@ class Sensing {
   void plan_adoption(const Sensing& previous);
   void adopt(const Sensing& previous) noexcept;
   void visit_state(StateArchive& archive) { archive(blocks_, lost_); }
+  /// Nothing without a covariance.
+  void visit_suspicion(StateArchive& archive) {
+    if (suspicion_) archive(*suspicion_);
+  }
 
  private:
+  [[nodiscard]] std::span<const std::uint8_t> suspect(nanoseconds now) noexcept;
+  [[nodiscard]] Temperatures join(nanoseconds now, std::span<const std::uint8_t> left_out) noexcept;
+
   const std::vector<std::string> columns_;
   BlockBank blocks_;
   LostBlocks lost_;
+  std::optional<Suspicion> suspicion_;
+  std::vector<double> screened_K_;  ///< scratch, one a sensor
 };
 
 }  // namespace thermocomp

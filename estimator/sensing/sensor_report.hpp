@@ -15,6 +15,10 @@ struct SensorReport {
   std::uint32_t clipped_in_a_row{0};  ///< smoothing clipped so many values running
   std::uint64_t clipped{0};
   std::uint64_t rejected{0};  ///< readings refused by screening since the start
+  bool suspected{false};      ///< good values that the neighbours contradict
+  bool weighed_down{false};   ///< ... and its blocks do without it
+  double suspected_size_K{0.0};
+  nanoseconds suspected_since{};
 };
 
 }  // namespace thermocomp

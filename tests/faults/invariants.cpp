@@ -7,6 +7,8 @@
 namespace thermocomp::faults {
 namespace {
 
+const std::array<std::vector<std::size_t>, 3> blocks{{{0, 4}, {1, 2}, {3, 5, 6}}};
+
 constexpr double tiny_um = 1e-9;
 /// What was sent so long ago does not explain a read-back any more [s].
 constexpr double window_s = 10.0;
@@ -167,8 +169,21 @@ bool Invariants::fresh(std::size_t sensor, nanoseconds now) const {
   return given_at >= nanoseconds{0} && now - given_at <= stale_after_[sensor] + slack_of(sensor);
 }
 
+/// As long as every block has a sensor that is not faulted, no suspicion ends the compensation.
+void Invariants::check_suspicion(const Report& report, nanoseconds now) {
+  const bool all_there = std::all_of(blocks.begin(), blocks.end(), [&](const auto& block) {
+    return std::any_of(block.begin(), block.end(), [&](std::size_t sensor) {
+      return report.sensors[sensor].fault == Fault::none;
+    });
+  });
+  const bool doubted = std::any_of(report.sensors.begin(), report.sensors.end(),
+                                   [](const SensorReport& each) { return each.suspected; });
+  demand(!(doubted && all_there && has_reason(report.reasons, Reason::block_lost)),
+         "suspicion_never_holds", now,
+         "a block without a sensor, though each has one that is good");
+}
+
 bool Invariants::any_block_lost(nanoseconds now) const {
-  static const std::array<std::vector<std::size_t>, 3> blocks{{{0, 4}, {1, 2}, {3, 5, 6}}};
   return std::any_of(blocks.begin(), blocks.end(), [&](const std::vector<std::size_t>& block) {
     return std::none_of(block.begin(), block.end(),
                         [&](std::size_t sensor) { return fresh(sensor, now); });
@@ -228,7 +243,9 @@ void Invariants::check_command(const CycleSeen& seen) {
 void Invariants::check_hold(const CycleSeen& seen) {
   const CompensationConfig& policy = seen.shape->estimator.compensation;
   const Report& report = *seen.report;
-  const bool lost = any_block_lost(seen.now);
+  // With a covariance a lost block is estimated.
+  const bool lost = seen.shape->model.covariance_K2.empty() && any_block_lost(seen.now);
+  check_suspicion(report, seen.now);
   const bool twice = lost && lost_before_;
   lost_before_ = lost;
   demand(!lost || report.mode != Mode::compensating, "no_offset_from_invalid_model", seen.now,

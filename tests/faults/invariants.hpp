@@ -21,14 +21,14 @@ struct Broken {
   std::string detail;
 };
 
-inline constexpr std::array<const char*, 20> invariant_names{
+inline constexpr std::array<const char*, 21> invariant_names{
     "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
     "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
     "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
     "recovered_in_time",         "state_survives_restart",       "replay_is_exact",
     "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
     "nothing_learned_mid_cut",   "held_between_cycle_ends",      "slew_kept_by_what_is_sent",
-    "unexplained_is_latched",    "looked_before_written"};
+    "unexplained_is_latched",    "looked_before_written",        "suspicion_never_holds"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -88,6 +88,7 @@ class Invariants {
   void check_sent(const CycleSeen& seen, const Move& move);
   void check_unexplained(const CycleSeen& seen, std::size_t axis);
   [[nodiscard]] bool fresh(std::size_t sensor, nanoseconds now) const;
+  void check_suspicion(const Report& report, nanoseconds now);
   [[nodiscard]] bool any_block_lost(nanoseconds now) const;
   [[nodiscard]] nanoseconds slack_of(std::size_t sensor) const { return slack_[sensor]; }
 

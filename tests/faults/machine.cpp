@@ -32,6 +32,16 @@ double Thermocouples::true_degC(std::size_t sensor, nanoseconds time) const noex
          course.swing_K * std::sin(course.rate_per_s * seconds_of(time) + course.phase);
 }
 
+/// It works loose at a rate that screening lets through, and is pressed back.
+double Thermocouples::lie_K(std::size_t sensor, nanoseconds time) const noexcept {
+  constexpr double rate_K_per_s = 0.3;
+  constexpr double lie_K_max = 4.0;
+  if (!judges_sensors(seed_) || sensor != seed_ / 3 % sensors_count) return 0.0;
+  const double in_period_s = std::fmod(seconds_of(time), 7200.0);
+  return std::clamp(rate_K_per_s * std::min(in_period_s - 1800.0, 5400.0 - in_period_s), 0.0,
+                    lie_K_max);
+}
+
 Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexcept {
   Sample sample;
   sample.given_at = time;
@@ -53,6 +63,7 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
   const FaultEvent* drift = schedule_.find(FaultKind::sensor_drifting, at, sensor, sensors_count);
   if (drift != nullptr)
     sample.temp_degC += (drift->strength - 0.5) * 0.05 * seconds_of(at - drift->begin);
+  sample.temp_degC += lie_K(sensor, at);
   const FaultEvent* spikes = schedule_.find(FaultKind::sensor_spiking, at, sensor, sensors_count);
   // One that is stuck at a spike would be a step, too.
   if (spikes != nullptr && stuck == nullptr && at >= spikes_from_ && noise % 3 == 0) {

@@ -27,6 +27,12 @@ inline constexpr std::size_t axes_count = 3;
   return seed % 2 == 1;
 }
 
+/// Whether the model of this life has a covariance, so that sensors are judged by their neighbours;
+/// then one of them lies plausibly for an hour of two.
+[[nodiscard]] constexpr bool judges_sensors(std::uint64_t seed) noexcept {
+  return seed % 3 == 1;
+}
+
 /// The configuration of a life, drawn from its seed.
 struct MachineShape {
   MachineShape(std::uint64_t seed, double cycle_hz);
@@ -83,6 +89,7 @@ class Thermocouples {
  private:
   static constexpr std::size_t kept = 64;
   [[nodiscard]] double true_degC(std::size_t sensor, nanoseconds time) const noexcept;
+  [[nodiscard]] double lie_K(std::size_t sensor, nanoseconds time) const noexcept;
   [[nodiscard]] Sample convert(std::size_t sensor, nanoseconds time) const noexcept;
   /// Neither open nor short.
   [[nodiscard]] bool whole(std::size_t sensor, nanoseconds time) const noexcept;

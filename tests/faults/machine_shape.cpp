@@ -103,6 +103,17 @@ void draw_correction(Chance& chance, EstimatorConfig& estimator) {
   if (chance.one_in(2)) compensation.cycle_end_signal = "cutting_on";
 }
 
+/// What becomes of sensors that lie, and of blocks that are lost.
+void draw_suspicion(Chance& chance, EstimatorConfig& estimator, ThermalModel& model) {
+  const double own_K2 = chance.between(0.01, 0.3);
+  for (std::size_t i = 0; i < model.inputs.size(); ++i)
+    model.covariance_K2.emplace_back(model.inputs.size(), 4.0)[i] += own_K2;
+  if (chance.one_in(2)) model.covariance_growth.drift_time_s = chance.between(600.0, 36000.0);
+  estimator.compensation.suspected_sensors =
+      chance.one_in(4) ? SuspectedPolicy::warn : SuspectedPolicy::weigh_down;
+  estimator.compensation.offset_sd_um_max = chance.between(0.2, 20.0);
+}
+
 std::vector<std::vector<double>> random_matrix(Chance& chance) {
   std::vector<std::vector<double>> rows(axes_count);
   for (auto& row : rows)
@@ -163,6 +174,10 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
   model.outputs = {"x_um", "y_um", "z_um"};
   model.matrix_um_per_K = random_matrix(chance);
   if (chance.one_in(3)) model.reference_degC = {20.0, 21.0, 22.0};
+  if (judges_sensors(seed)) {
+    Chance own(seed, 11);
+    draw_suspicion(own, estimator, model);
+  }
   if (!corrects_itself(seed)) return;
   Chance own(seed, 9);
   draw_correction(own, estimator);

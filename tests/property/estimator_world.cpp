@@ -81,6 +81,9 @@ EstimatorConfig random_config(Chance& chance) {
   config.compensation.prove_hold_s = chance.between(0.0, 2.0);
   config.compensation.estimate_lost_blocks = !chance.one_in(5);
   config.compensation.offset_sd_um_max = chance.between(0.5, 50.0);
+  config.compensation.suspected_sensors = config.compensation.estimate_lost_blocks
+                                              ? SuspectedPolicy::weigh_down
+                                              : SuspectedPolicy::warn;
   if (chance.one_in(2)) {
     config.correction.form =
         chance.one_in(2) ? CorrectionForm::recursive : CorrectionForm::two_phase;

@@ -1,6 +1,7 @@
 // 10,000 cycles of the real cycle, with a real Modbus source, history and a reload under way: on
 // its thread nothing is allocated, locked or paged in and nothing but the sleep is asked of the
 // kernel. With --plant it does one such thing on purpose, and must then say so (exit status 1).
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -32,6 +33,63 @@ constexpr std::size_t sensors = 16;
 
 enum class Plant { nothing, allocation, lock, fault, system_call };
 
+/// An estimator whose time runs 12 s a cycle: sensors are judged by their neighbours each minute,
+/// and one of four lies for three hours of six.
+class LiedTo {
+ public:
+  LiedTo() : estimator_(config(), model()), report_(estimator_.make_report()) {
+    controller_.online = true;
+    controller_.link_epoch = 1;
+  }
+  void step(std::uint64_t cycle) noexcept {
+    const nanoseconds now = std::chrono::seconds(12) * static_cast<std::int64_t>(cycle);
+    const bool lies = cycle / 900 % 2 == 1;
+    for (std::size_t i = 0; i < readings_.size(); ++i)
+      readings_[i] = {20.0 + 1e-3 * static_cast<double>((cycle + i) % 100), now, Fault::none};
+    if (lies) readings_[1].temp_degC += 2.0;
+    controller_.taken_at = now;
+    estimator_.step(now, readings_, controller_, command_);
+    estimator_.report(report_);
+    if (report_.sensors[1].weighed_down) weighed_down_.store(true);
+  }
+  [[nodiscard]] bool was_weighed_down() const noexcept { return weighed_down_.load(); }
+
+ private:
+  static constexpr std::size_t count = 4;
+  static EstimatorConfig config() {
+    EstimatorConfig config;
+    for (const char* name : {"a", "b", "c", "d"}) {
+      SensorConfig sensor;
+      sensor.name = name;
+      sensor.screening.stale_after_s = 60.0;
+      config.blocks.push_back({name, std::string(name) + "_degC", {config.sensors.size()}});
+      config.sensors.push_back(sensor);
+    }
+    config.axes.push_back({"z", "z_um", 1.0, {}});
+    config.controller_reads_back = false;
+    config.compensation.enabled_at_first_start = true;
+    config.compensation.suspected_sensors = SuspectedPolicy::weigh_down;
+    return config;
+  }
+  static ThermalModel model() {
+    ThermalModel model;
+    model.outputs = {"z_um"};
+    model.matrix_um_per_K = {std::vector<double>(count, 1.0)};
+    for (const char* name : {"a", "b", "c", "d"}) {
+      model.inputs.push_back(std::string(name) + "_degC");
+      model.covariance_K2.emplace_back(count, 1.0)[model.covariance_K2.size() - 1] = 1.01;
+    }
+    return model;
+  }
+
+  Estimator estimator_;
+  Report report_;
+  std::array<Reading, count> readings_{};
+  ControllerState controller_;
+  OffsetCommand command_;
+  std::atomic<bool> weighed_down_{false};
+};
+
 /// Called by the cycle like any other source: begins and ends the watch, gives readings that
 /// change, and does what is planted.
 class ProbeSource final : public SensorSource {
@@ -48,6 +106,7 @@ class ProbeSource final : public SensorSource {
       counts = test::end_watch();
       done.store(true);
     }
+    lied_to.step(cycle_);
     if (cycle_ == cycles_before + cycles_watched / 2) commit_the_plant();
     for (std::size_t i = 0; i + 1 < all.size(); ++i)
       all[i] = {20.0 + 1e-3 * static_cast<double>((cycle_ + i) % 100), nanoseconds(now()),
@@ -57,6 +116,7 @@ class ProbeSource final : public SensorSource {
     if (cycle_ / 700 % 3 == 2) lose(all.first(sensors - 4));
   }
 
+  LiedTo lied_to;
   std::atomic<bool> done{false};
   test::ThreadCounts counts;
 
@@ -207,6 +267,10 @@ int main(int argc, char** argv) {
               static_cast<long long>(counts.page_faults));
   if (!sent || !reloaded) {
     std::printf("the reload or a command was not taken\n");
+    return 3;
+  }
+  if (!probe.lied_to.was_weighed_down()) {
+    std::printf("a sensor that lies was not weighed down\n");
     return 3;
   }
   return counts.allocations + counts.locks + counts.system_calls == 0 && counts.page_faults == 0

@@ -31,7 +31,8 @@ bool step(BlockBank& bank, nanoseconds now, const std::vector<double>& temps_deg
   std::vector<Reading> readings;
   for (const double value : temps_degC)
     readings.push_back({value, now, std::isnan(value) ? Fault::no_answer : Fault::none});
-  return bank.step(now, readings);
+  bank.read(now, readings);
+  return bank.join({});
 }
 
 }  // namespace

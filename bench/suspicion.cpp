@@ -1,0 +1,335 @@
+/// Whether a sensor that lies plausibly is found: the estimator itself over measured temperatures,
+/// with one sensor falsified, each in turn and at several times, and with none.
+///
+/// The covariance is that of `thermocomp covariance` on one half of a record; the other half is
+/// replayed. Falsified: a jump by 2 K (every 2 h, looked at for 15 min), a creep by 4 K over the
+/// whole half, and a sensor that works loose and from then on shows 0.4 of the motion (every 4 h,
+/// until the half ends). Found: the sensor is suspected; wrong: another one is, or another one too.
+///
+/// Numbers of the check and what they were set from (estimator/sensing/neighbour_check.cpp and
+/// suspicion.cpp). Before any replay: ticks of 60 s, lines of 5 ticks, ages 1, 4 and 12 h, floor
+/// 0.1 K, clean share 0.75, end below 0.35 for 10 ticks. From hours 0-16 of the spindle with the
+/// covariance of hours 16-32, the half printed as "set_from": the limits, 4 (jump) and 6 (creep)
+/// standard deviations, 2.2 and 1.4 times the largest score there. By reasoning, after a first
+/// replay of everything: misfit share 0.25 (sizes were wrong), held share 0.5 (a spike of t16 in
+/// the other half, "judged", counted as a jump), half an hour for a creep. No number is fitted to
+/// the judged half or to the printer; the rule against spikes is owed to the judged half.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "cli/covariance_fit.hpp"
+#include "config/model_file.hpp"
+#include "config/run_file.hpp"
+#include "estimator/pipeline/estimator.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr double jump_K = 2.0;
+constexpr double creep_K = 4.0;
+constexpr double motion_left = 0.4;
+constexpr double jumps_apart_s = 7200.0;
+constexpr double looses_apart_s = 14400.0;
+constexpr double jump_watched_s = 900.0;
+constexpr double jump_aim_s = 600.0;
+/// Before the first jump: lines of five ticks on both sides of it have to be there.
+constexpr double warms_up_s = 1200.0;
+
+EstimatorConfig make_config(const ThermalModel& model, double row_s) {
+  EstimatorConfig config;
+  for (std::size_t i = 0; i < model.inputs.size(); ++i) {
+    SensorConfig sensor;
+    sensor.name = model.inputs[i];
+    sensor.screening.stale_after_s = 2.7 * row_s;
+    sensor.screening.rate_allowance_K = 50.0;  // what screening refuses need not be suspected
+    config.sensors.push_back(sensor);
+    config.blocks.push_back({model.inputs[i], model.inputs[i], {i}});
+  }
+  for (const std::string& output : model.outputs)
+    config.axes.push_back({output, output, 1.0, {500.0, 1000.0}});
+  config.controller_reads_back = false;
+  config.compensation.enabled_at_first_start = true;
+  return config;
+}
+
+class Machine {
+ public:
+  Machine(const ThermalModel& model, double row_s)
+      : estimator_(make_config(model, row_s), model),
+        report_(estimator_.make_report()),
+        readings_(model.inputs.size()) {
+    controller_.online = true;
+    controller_.link_epoch = 1;
+  }
+  const Report& step(double time_s, const std::vector<double>& temps_degC) {
+    const nanoseconds now =
+        std::chrono::seconds(1) + std::chrono::duration_cast<nanoseconds>(seconds_d(time_s));
+    for (std::size_t i = 0; i < readings_.size(); ++i)
+      readings_[i] = {temps_degC[i], now,
+                      std::isfinite(temps_degC[i]) ? Fault::none : Fault::no_answer};
+    controller_.taken_at = now;
+    estimator_.step(now, readings_, controller_, command_);
+    estimator_.report(report_);
+    return report_;
+  }
+  [[nodiscard]] std::vector<std::byte> state() const {
+    std::vector<std::byte> bytes(estimator_.state_size_bytes());
+    estimator_.save_state(bytes);
+    return bytes;
+  }
+  void load(const std::vector<std::byte>& state) { estimator_.load_state(state); }
+
+ private:
+  Estimator estimator_;
+  Report report_;
+  std::vector<Reading> readings_;
+  ControllerState controller_;
+  OffsetCommand command_;
+};
+
+/// What one kind of lie came to.
+struct Tally {
+  int planted{0};
+  int found{0};
+  int in_time{0};
+  int wrong{0};
+  double delay_s{0.0};  ///< sum over those that were found
+  double size_K{0.0};   ///< of the lie then, the same
+  void add(const Tally& other) {
+    planted += other.planted;
+    found += other.found;
+    in_time += other.in_time;
+    wrong += other.wrong;
+    delay_s += other.delay_s;
+    size_K += other.size_K;
+  }
+};
+
+double percent(int part, int whole) {
+  return whole > 0 ? 100.0 * part / whole : not_a_number;
+}
+
+/// Value of a falsified sensor at a row, from the true one and that at the row of the beginning.
+using Lie = std::function<double(double true_degC, double then_degC, double since_s)>;
+
+/// One part of a record with the covariance of another.
+class Fold {
+ public:
+  Fold(std::string name, const ThermalModel& model, const RunFile& run, std::size_t begin,
+       std::size_t end)
+      : name_(std::move(name)),
+        model_(model),
+        row_s_((run.time_s()[end - 1] - run.time_s()[begin]) / static_cast<double>(end - begin)),
+        machine_(model, row_s_) {
+    for (std::size_t row = begin; row < end; ++row) {
+      times_s_.push_back(run.time_s()[row]);
+      auto& temps_degC = temps_degC_.emplace_back();
+      for (const std::string& input : model.inputs) temps_degC.push_back(run.column(input)[row]);
+    }
+    walk_through();
+  }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const ThermalModel& model() const { return model_; }
+  [[nodiscard]] double hours() const { return (times_s_.back() - times_s_.front()) / 3600.0; }
+  [[nodiscard]] int false_suspicions() const { return false_suspicions_; }
+
+  [[nodiscard]] Tally jumps(std::size_t sensor) {
+    return tell(sensor, jumps_apart_s, jump_watched_s,
+                [](double true_degC, double, double) { return true_degC + jump_K; });
+  }
+  [[nodiscard]] Tally loose(std::size_t sensor) {
+    return tell(sensor, looses_apart_s, 1e9, [](double true_degC, double then_degC, double) {
+      return then_degC + motion_left * (true_degC - then_degC);
+    });
+  }
+  [[nodiscard]] Tally creep(std::size_t sensor) {
+    const double rate = creep_K / (times_s_.back() - times_s_.front());
+    return tell(sensor, 1e9, 1e9, [rate](double true_degC, double, double since_s) {
+      return true_degC + rate * since_s;
+    });
+  }
+
+ private:
+  struct Start {
+    std::size_t row;
+    std::vector<std::byte> state;
+  };
+
+  void walk_through() {
+    std::vector<bool> suspected(model_.inputs.size(), false);
+    double next_s = times_s_.front() + warms_up_s;
+    for (std::size_t row = 0; row < times_s_.size(); ++row) {
+      if (times_s_[row] >= next_s) {
+        starts_.push_back({row, machine_.state()});
+        next_s += jumps_apart_s;
+      }
+      const Report& report = machine_.step(times_s_[row], temps_degC_[row]);
+      for (std::size_t i = 0; i < suspected.size(); ++i) {
+        const SensorReport& sensor = report.sensors[i];
+        if (sensor.suspected && !suspected[i]) {
+          ++false_suspicions_;
+          std::printf("  %s: untouched %s suspected after %.2f h, %+.2f K\n", name_.c_str(),
+                      model_.inputs[i].c_str(), (times_s_[row] - times_s_.front()) / 3600.0,
+                      sensor.suspected_size_K);
+        }
+        suspected[i] = sensor.suspected;
+      }
+    }
+  }
+
+  [[nodiscard]] Tally tell(std::size_t sensor, double apart_s, double watched_s, const Lie& lie) {
+    Tally tally;
+    double next_s = times_s_.front();
+    for (const Start& start : starts_) {
+      if (times_s_[start.row] < next_s) continue;
+      next_s = times_s_[start.row] + apart_s - 1.0;
+      const double end_s = times_s_[start.row] + watched_s;
+      if (watched_s < 1e8 && end_s > times_s_.back()) break;
+      machine_.load(start.state);
+      tally.add(tell_once(sensor, start.row, end_s, lie));
+    }
+    return tally;
+  }
+
+  [[nodiscard]] Tally tell_once(std::size_t sensor, std::size_t begin, double end_s,
+                                const Lie& lie) {
+    Tally tally;
+    tally.planted = 1;
+    for (std::size_t row = begin; row < times_s_.size() && times_s_[row] < end_s; ++row) {
+      std::vector<double> temps_degC = temps_degC_[row];
+      const double since_s = times_s_[row] - times_s_[begin];
+      temps_degC[sensor] = lie(temps_degC[sensor], temps_degC_[begin][sensor], since_s);
+      const Report& report = machine_.step(times_s_[row], temps_degC);
+      for (std::size_t i = 0; i < temps_degC.size(); ++i)
+        if (i != sensor && report.sensors[i].suspected) tally.wrong = 1;
+      if (tally.found != 0 || !report.sensors[sensor].suspected) continue;
+      tally.found = 1;
+      tally.in_time = since_s <= jump_aim_s ? 1 : 0;
+      tally.delay_s = since_s;
+      tally.size_K = std::abs(temps_degC[sensor] - temps_degC_[row][sensor]);
+      if (end_s > times_s_.back()) break;  // of a long lie only the finding is asked
+    }
+    return tally;
+  }
+
+  std::string name_;
+  ThermalModel model_;
+  double row_s_;
+  Machine machine_;
+  std::vector<double> times_s_;
+  std::vector<std::vector<double>> temps_degC_;
+  std::vector<Start> starts_;
+  int false_suspicions_{0};
+};
+
+ThermalModel with_record(ThermalModel model, RunFile run, std::size_t begin, std::size_t end) {
+  run.selected_begin = begin;
+  run.selected_end = end;
+  const cli::CovarianceFit fit = cli::fit_covariance({&run, 1}, model.inputs);
+  model.covariance_K2 = fit.matrix_K2;
+  model.covariance_growth = fit.growth;
+  return model;
+}
+
+/// A model that only says which temperatures there are.
+ThermalModel plain_model(const std::vector<std::string>& inputs) {
+  ThermalModel model;
+  model.inputs = inputs;
+  model.outputs = {"z_um"};
+  model.matrix_um_per_K = {std::vector<double>(inputs.size(), 1.0)};
+  return model;
+}
+
+Fold half_of(const std::string& name, const ThermalModel& model, const RunFile& run, bool first) {
+  const std::size_t half = run.rows() / 2;
+  const ThermalModel whole =
+      first ? with_record(model, run, half, run.rows()) : with_record(model, run, 0, half);
+  return {name, whole, run, first ? 0 : half, first ? half : run.rows()};
+}
+
+void print_row(const std::string& who, const char* what, const Tally& tally) {
+  const double found = tally.found > 0 ? tally.found : not_a_number;
+  std::printf("%-14s %-8s %8d %8.1f %8.1f %8.1f %10.1f %8.2f\n", who.c_str(), what, tally.planted,
+              percent(tally.found, tally.planted), percent(tally.in_time, tally.planted),
+              percent(tally.wrong, tally.planted), tally.delay_s / found / 60.0,
+              tally.size_K / found);
+}
+
+void add_results(const char* what, const Tally& tally, const std::string& name, std::string& last) {
+  const auto add = [&](const char* of, double value, const char* unit) {
+    char line[160];
+    std::snprintf(line, sizeof line, "%s_%s_%s %.4g %s\n", name.c_str(), what, of, value, unit);
+    last += line;
+  };
+  add("planted", tally.planted, "lies");
+  add("found", percent(tally.found, tally.planted), "percent");
+  if (std::string(what) == "jump")
+    add("found_10min", percent(tally.in_time, tally.planted), "percent");
+  add("wrong_named", percent(tally.wrong, tally.planted), "percent");
+  if (tally.found > 0) add("delay", tally.delay_s / tally.found / 60.0, "min");
+}
+
+void judge(Fold fold, std::string& last) {
+  std::printf("\n%s: %.1f h, %d false suspicions\n%-14s %-8s %8s %8s %8s %8s %10s %8s\n",
+              fold.name().c_str(), fold.hours(), fold.false_suspicions(), "sensor", "lie",
+              "planted", "found %", "10 min %", "wrong %", "delay min", "size K");
+  Tally jumps;
+  Tally creeps;
+  Tally looses;
+  for (std::size_t i = 0; i < fold.model().inputs.size(); ++i) {
+    const Tally jump = fold.jumps(i);
+    const Tally creep = fold.creep(i);
+    const Tally loose = fold.loose(i);
+    print_row(fold.model().inputs[i], "jump", jump);
+    print_row("", "creep", creep);
+    print_row("", "loose", loose);
+    jumps.add(jump);
+    creeps.add(creep);
+    looses.add(loose);
+  }
+  print_row("all", "jump", jumps);
+  print_row("", "creep", creeps);
+  print_row("", "loose", looses);
+  add_results("jump", jumps, fold.name(), last);
+  add_results("creep", creeps, fold.name(), last);
+  add_results("loose", looses, fold.name(), last);
+  char line[160];
+  std::snprintf(line, sizeof line, "%s_hours %.1f h\n%s_false_suspicions %d suspicions\n",
+                fold.name().c_str(), fold.hours(), fold.name().c_str(), fold.false_suspicions());
+  last += line;
+}
+
+int run(const std::filesystem::path& folder) {
+  std::string last;
+  const ThermalModel spindle = load_model(folder / "spindle_46h" / "static_model.toml");
+  const RunFile hours = load_run({folder / "spindle_46h" / "hours_00_32.csv"});
+  judge(half_of("spindle_set_from", spindle, hours, true), last);
+  judge(half_of("spindle_judged", spindle, hours, false), last);
+  const ThermalModel frame = plain_model({"frame_degC", "chamber_degC", "bed_degC"});
+  const RunFile morning = load_run({folder / "printer_frame" / "2021-06-13_morning.csv"});
+  judge(half_of("printer_heated", frame, morning, true), last);
+  judge(half_of("printer_cooled", frame, morning, false), last);
+  std::printf("\n%s", last.c_str());
+  return 0;
+}
+
+}  // namespace
+}  // namespace thermocomp
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: bench_suspicion FOLDER (of spindle_46h, printer_frame)\n");
+    return 2;
+  }
+  try {
+    return thermocomp::run(argv[1]);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "suspicion: %s\n", error.what());
+    return 2;
+  }
+}

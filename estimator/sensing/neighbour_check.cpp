@@ -1,0 +1,158 @@
+#include "estimator/sensing/neighbour_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/checks.hpp"
+#include "estimator/sensing/precision.hpp"
+
+namespace thermocomp {
+namespace {
+
+/// No thermocouple in a machine is better than this over hours, whatever a record's matrix says.
+constexpr double floor_K = 0.1;
+/// Nothing else is left unexplained: below this share of the limit.
+constexpr double clean_share = 0.75;
+
+}  // namespace
+
+NeighbourCheck::NeighbourCheck(const ThermalModel& model)
+    : inputs_(model.inputs.size()),
+      growth_(model.covariance_growth),
+      precision_per_K2_(precision_per_K2(model)),
+      present_(inputs_, 0),
+      change_K_(inputs_, 0.0),
+      left_(inputs_ * inputs_, 0.0),
+      y_(inputs_, 0.0),
+      motions_(inputs_, 0.0) {
+  for (std::size_t i = 0; i < inputs_; ++i)
+    change_sd_K_.push_back(
+        std::sqrt(2.0 * (model.covariance_K2[i][i] + growth_.noise_K * growth_.noise_K)));
+}
+
+void NeighbourCheck::prepare(std::span<const double> change_K) noexcept {
+  THERMOCOMP_ENSURE(change_K.size() == inputs_);
+  std::copy(precision_per_K2_.begin(), precision_per_K2_.end(), left_.begin());
+  std::fill(present_.begin(), present_.end(), std::uint8_t{1});
+  present_count_ = inputs_;
+  for (std::size_t i = 0; i < inputs_; ++i) {
+    change_K_[i] = change_K[i];
+    if (!std::isfinite(change_K[i])) leave_out(i);
+  }
+  for (std::size_t i = 0; i < inputs_; ++i) {
+    y_[i] = 0.0;
+    if (present_[i] == 0) continue;
+    for (std::size_t k = 0; k < inputs_; ++k)
+      if (present_[k] != 0) y_[i] += left_[at(i, k)] * change_K_[k];
+  }
+}
+
+/// The precision of the others, when nothing is known of this one.
+void NeighbourCheck::leave_out(std::size_t input) noexcept {
+  present_[input] = 0;
+  --present_count_;
+  const double pivot = left_[at(input, input)];
+  for (std::size_t i = 0; i < inputs_; ++i) {
+    if (present_[i] == 0) continue;
+    const double share = left_[at(i, input)] / pivot;
+    y_[i] -= share * y_[input];
+    for (std::size_t k = 0; k < inputs_; ++k)
+      if (present_[k] != 0) left_[at(i, k)] -= share * left_[at(input, k)];
+  }
+}
+
+double NeighbourCheck::motion() noexcept {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < inputs_; ++i)
+    if (present_[i] != 0) motions_[count++] = std::abs(change_K_[i]) / change_sd_K_[i];
+  const auto middle = motions_.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(motions_.begin(), middle, motions_.begin() + static_cast<std::ptrdiff_t>(count));
+  return std::max(1.0, *middle);
+}
+
+double NeighbourCheck::variance_K2(std::size_t input, double precision) const noexcept {
+  const double drift = drift_factor(growth_, input);
+  const double scatter = scatter_factor(growth_, input);
+  const double growth = drift * drift * grown(asked_.age_s, growth_.drift_time_s) +
+                        scatter * scatter * grown(asked_.age_s, growth_.scatter_time_s);
+  const double change_K2 = 2.0 * growth_.noise_K * growth_.noise_K + growth / precision;
+  return asked_.share * amplified_ * change_K2 + floor_K * floor_K;
+}
+
+double NeighbourCheck::score(double y, double precision, std::size_t input) const noexcept {
+  // Rounding may leave nothing of the precision of two inputs that are one.
+  if (!(precision > 0)) return 0.0;
+  return std::abs(y) / precision / std::sqrt(variance_K2(input, precision));
+}
+
+double NeighbourCheck::rest_without(std::size_t candidate) const noexcept {
+  const double pivot = left_[at(candidate, candidate)];
+  double rest = 0.0;
+  for (std::size_t i = 0; i < inputs_; ++i) {
+    if (present_[i] == 0 || i == candidate) continue;
+    const double cross = left_[at(i, candidate)];
+    rest = std::max(rest, score(y_[i] - cross * y_[candidate] / pivot,
+                                left_[at(i, i)] - cross * cross / pivot, i));
+  }
+  return rest;
+}
+
+NeighbourCheck::Choice NeighbourCheck::choose() const noexcept {
+  const double clean = clean_share * asked_.sd_limit;
+  Choice choice;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < inputs_; ++i)
+    if (present_[i] != 0) largest = std::max(largest, score(y_[i], left_[at(i, i)], i));
+  if (!(largest > asked_.sd_limit)) return choice;
+  // Not only of those that are beyond the limit: one that weighs much in the expectation of another
+  // puts that one further off than itself.
+  for (std::size_t i = 0; i < inputs_; ++i) {
+    if (present_[i] == 0) continue;
+    const double rest = rest_without(i);
+    if (choice.found && std::max(rest, choice.rest) <= clean) choice.only = false;
+    if (choice.found && rest >= choice.rest) continue;
+    choice.found = true;
+    choice.input = i;
+    choice.rest = rest;
+  }
+  choice.found = score(y_[choice.input], left_[at(choice.input, choice.input)], choice.input) >
+                 asked_.sd_limit;
+  return choice;
+}
+
+NeighbourCheck::Answer NeighbourCheck::find(std::span<const double> change_K,
+                                            const ChangeAsked& asked) noexcept {
+  asked_ = asked;
+  prepare(change_K);
+  Answer answer;
+  if (present_count_ < inputs_min) return answer;
+  const double beyond = motion();
+  amplified_ = beyond * beyond;
+  const double clean = clean_share * asked.sd_limit;
+  while (answer.count < wrong_max && present_count_ >= inputs_min) {
+    const Choice choice = choose();
+    if (!choice.found || !choice.only) return {};
+    const std::size_t i = choice.input;
+    Wrong& wrong = answer.wrong[answer.count++];
+    wrong = {i, y_[i] / left_[at(i, i)], std::sqrt(variance_K2(i, left_[at(i, i)]))};
+    leave_out(i);
+    if (choice.rest > clean) continue;
+    // The first of two was measured with the second among its neighbours.
+    if (answer.count > 1) {
+      const std::size_t first = answer.wrong[0].input;
+      std::copy(change_K.begin(), change_K.end(), motions_.begin());
+      motions_[answer.wrong[1].input] = not_a_number;
+      answer.wrong[0].size_K = remainder_K(first, motions_);
+    }
+    return answer;
+  }
+  return {};
+}
+
+double NeighbourCheck::remainder_K(std::size_t input, std::span<const double> change_K) noexcept {
+  prepare(change_K);
+  if (present_[input] == 0 || present_count_ < 2) return not_a_number;
+  return y_[input] / left_[at(input, input)];
+}
+
+}  // namespace thermocomp

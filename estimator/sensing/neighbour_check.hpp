@@ -1,0 +1,99 @@
+/// Which temperature changed as its neighbours say that it cannot have.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "estimator/thermal_model.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+/// A change between two moments, and how sure one must be.
+struct ChangeAsked {
+  double age_s{0.0};     ///< between the two
+  double share{1.0};     ///< of the variance of a change of that age that the way of asking leaves
+  double sd_limit{1e9};  ///< a remainder of so many standard deviations is not believed
+};
+
+/// Of the changes x of all inputs, and with the precision matrix Q of the model's covariance, what
+/// is left of input i when the others are taken away, and its standard deviation:
+///
+///     r_i = (Q x)_i / Q_ii,
+///     sd_i^2 = share a^2 (2 noise^2 + (d_i^2 g(age / drift_time) + s_i^2 g(age / scatter_time)) /
+///              Q_ii) + floor^2,       g(h) = 1 - exp(-h),
+///
+/// the growth that the model file states of estimates in hours that it was not made from. A linear
+/// expectation errs in proportion to the motion: a = max(1, median of |x_j| / sqrt(2 C_jj)) tells
+/// how far the change is beyond those of the record.
+///
+/// A wrong input moves the expectation of its neighbours too. Named is the one without which
+/// nothing else is left unexplained:
+///
+///     y = Q x,   without c:  y_i - Q_ic y_c / Q_cc,   Q_ii - Q_ic^2 / Q_cc;
+///
+/// two at once where two are needed. Nobody is, where three would be, or where another explains as
+/// much: then the machine does what the record never saw, or nothing tells the two apart.
+/// Source: conditional distribution of a Gaussian vector by its precision matrix.
+class NeighbourCheck {
+ public:
+  static constexpr std::size_t inputs_min = 3;  ///< of two nobody can tell which is wrong
+  static constexpr std::size_t wrong_max = 2;
+
+  struct Wrong {
+    std::size_t input{0};
+    double size_K{0.0};  ///< of its change, not explained
+    double sd_K{0.0};
+  };
+  struct Answer {
+    std::size_t count{0};
+    std::array<Wrong, wrong_max> wrong{};
+  };
+
+  /// @throws InvalidValue when covariance and model do not fit each other; allocates
+  explicit NeighbourCheck(const ThermalModel& model);
+
+  /// @param change_K  shape (inputs); NaN: not known
+  /// Never throws, never allocates; O(inputs^2 (1 + unknown inputs)).
+  [[nodiscard]] Answer find(std::span<const double> change_K, const ChangeAsked& asked) noexcept;
+  /// r of one input. NaN: its change or those of all others are not known.
+  [[nodiscard]] double remainder_K(std::size_t input, std::span<const double> change_K) noexcept;
+
+ private:
+  [[nodiscard]] std::size_t at(std::size_t row, std::size_t column) const noexcept {
+    return row * inputs_ + column;
+  }
+  void prepare(std::span<const double> change_K) noexcept;
+  void leave_out(std::size_t input) noexcept;
+  [[nodiscard]] double motion() noexcept;
+  [[nodiscard]] double variance_K2(std::size_t input, double precision) const noexcept;
+  /// Standardised, of every input that is present; of one that has nothing to say 0.
+  [[nodiscard]] double score(double y, double precision, std::size_t input) const noexcept;
+  struct Choice {
+    bool found{false};
+    bool only{true};  ///< no other explains as much
+    std::size_t input{0};
+    double rest{0.0};  ///< largest score that is left without it
+  };
+  [[nodiscard]] double rest_without(std::size_t candidate) const noexcept;
+  [[nodiscard]] Choice choose() const noexcept;
+
+  const std::size_t inputs_;
+  const CovarianceGrowth growth_;
+  const std::vector<double> precision_per_K2_;
+  std::vector<double> change_sd_K_;  ///< sqrt(2 C_jj)
+
+  // Scratch of one question.
+  ChangeAsked asked_;
+  double amplified_{1.0};  ///< a^2
+  std::size_t present_count_{0};
+  std::vector<std::uint8_t> present_;
+  std::vector<double> change_K_;
+  std::vector<double> left_;  ///< precision of what is present, shape (inputs, inputs)
+  std::vector<double> y_;
+  std::vector<double> motions_;
+};
+
+}  // namespace thermocomp

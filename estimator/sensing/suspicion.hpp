@@ -1,0 +1,151 @@
+/// Sensors that lie plausibly: good values, and the neighbours say that they cannot be.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/estimator_config.hpp"
+#include "estimator/sensing/neighbour_check.hpp"
+#include "estimator/sensing/sensor_report.hpp"
+#include "estimator/state_archive.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// Each minute (a tick, the median of five looks at what screening let through, before smoothing)
+/// four changes of all inputs are put to the NeighbourCheck:
+///
+///     jump   the step between two lines of five ticks each, extended to where they meet
+///     creep  the level (median of five ticks) less that of 1, 4 and 12 hours ago; for half an hour
+///
+/// Only changes count: neither the mean of the record nor the reference is needed, and a sensor
+/// that reads half a degree high does no harm. In a block of several sensors the one is named
+/// without which the block agrees with its neighbours.
+///
+/// The lie of a suspected sensor is followed on, tick by tick, by what it changes and the others
+/// do not. It is believed again when little of the lie is left for ten ticks; when it is faulted
+/// for ten ticks (somebody is at it); or with a new reference. Then its past counts no more.
+class Suspicion {
+ public:
+  /// @pre inputs of the model with a covariance, NeighbourCheck::inputs_min at least
+  /// @throws InvalidValue when covariance and model do not fit each other; allocates
+  Suspicion(const EstimatorConfig& config, const ThermalModel& model);
+
+  /// Whether step() wants values at `now`; else it need not be called.
+  [[nodiscard]] bool is_due(nanoseconds now) const noexcept {
+    return !state_.started || now >= state_.next_look;
+  }
+  /// @param values_K  one a sensor, screened; NaN: none to be used
+  /// Never throws, never allocates. O(inputs^2) once a minute, else O(sensors).
+  void step(nanoseconds now, std::span<const double> values_K) noexcept;
+
+  [[nodiscard]] std::size_t count() const noexcept { return state_.count; }
+  /// One a sensor: to be left out of its blocks.
+  [[nodiscard]] std::span<const std::uint8_t> weighed_down() const noexcept {
+    return state_.weighed_down;
+  }
+  /// What an input is when the lies of its sensors are taken away.
+  struct Corrected {
+    std::size_t input{0};
+    double temp_degC{not_a_number};
+    double sd_K{0.0};
+  };
+  /// Of the inputs whose sensors the last step began to weigh down.
+  [[nodiscard]] std::span<const Corrected> newly_weighed_down() const noexcept {
+    return {corrected_.data(), corrected_count_};
+  }
+  /// Without them the offsets would be too uncertain: suspected, and used all the same.
+  void use_all() noexcept;
+  /// The machine and its sensors are right as they are now.
+  void restart() noexcept;
+
+  void report(std::span<SensorReport> sensors) const noexcept;
+  void plan_adoption(const Suspicion& previous);
+  void adopt(const Suspicion& previous) noexcept;
+  void visit_state(StateArchive& archive) { archive(state_); }
+
+ private:
+  static constexpr std::size_t looks = 5;       ///< in a tick
+  static constexpr std::size_t line_ticks = 5;  ///< in each line, and in a level
+  static constexpr std::size_t ticks_kept = 2 * line_ticks;
+  static constexpr std::size_t ticks_a_level = 15;  ///< between two levels that are kept
+  static constexpr std::size_t levels_kept = 49;    ///< 12 h
+
+  struct State {
+    bool started{false};
+    nanoseconds next_look{};
+    nanoseconds last_look{};
+    nanoseconds tick_begin{};
+    std::size_t looked{0};  ///< in the tick that is not complete
+    std::size_t ticks_since_level{0};
+    std::size_t next_tick{0};                ///< in the ring
+    std::size_t next_level{0};               ///< in the ring
+    std::size_t count{0};                    ///< suspected
+    std::vector<double> looked_K;            ///< shape (sensors, looks)
+    std::vector<double> ticks_K;             ///< shape (sensors, ticks_kept), a ring
+    std::vector<double> levels_K;            ///< shape (sensors, levels_kept), a ring
+    std::vector<std::uint8_t> suspected;     ///< one a sensor, as all below
+    std::vector<std::uint8_t> weighed_down;  ///< ... and not used
+    std::vector<double> size_K;              ///< of the lie, now
+    std::vector<double> found_K;             ///< ... when it was found
+    std::vector<nanoseconds> since;
+    std::vector<std::uint32_t> agreed_ticks;   ///< in a row
+    std::vector<std::uint32_t> missing_ticks;  ///< in a row
+    std::vector<std::uint32_t> creep_ticks;    ///< in a row that it seemed to creep
+    void visit_state(StateArchive& archive) {
+      auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t] = *this;
+      archive(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t);
+    }
+  };
+
+  [[nodiscard]] double& tick(std::size_t sensor, std::size_t back) noexcept;
+  [[nodiscard]] double level_K(std::size_t sensor, std::size_t back) noexcept;
+  [[nodiscard]] double jump_K(std::size_t sensor) noexcept;
+  void close_tick(nanoseconds now) noexcept;
+  void keep_levels() noexcept;
+  void follow_suspected() noexcept;
+  void follow(std::size_t sensor) noexcept;
+  void look_for_jumps(nanoseconds now) noexcept;
+  void look_for_creep(nanoseconds now, std::size_t levels_back) noexcept;
+  /// Of changes_K_, one a sensor, those of the inputs: the mean over sensors that are not
+  /// suspected.
+  void join_changes() noexcept;
+  struct Liar {
+    bool found{false};
+    std::size_t sensor{0};
+    std::size_t input{0};
+    double size_K{0.0};
+    double sd_K{0.0};
+  };
+  [[nodiscard]] Liar liar_of(const NeighbourCheck::Wrong& wrong) const noexcept;
+  [[nodiscard]] double held_K(const Liar& liar, const NeighbourCheck::Answer& answer) noexcept;
+  void begin(const Liar& liar, nanoseconds since) noexcept;
+  void end(std::size_t sensor) noexcept;
+  void forget(std::size_t sensor) noexcept;
+  /// The first input that the sensor is of; as many as there are inputs: of none.
+  [[nodiscard]] std::size_t input_of(std::size_t sensor) const noexcept;
+  [[nodiscard]] std::size_t believed(std::size_t input) const noexcept;
+  void correct(std::size_t sensor, double sd_K) noexcept;
+
+  const std::vector<std::string> names_;       ///< of the sensors
+  const std::vector<std::string> references_;  ///< ... that theirs are differences to, or ""
+  const bool may_weigh_down_;
+  const std::vector<std::vector<std::size_t>> inputs_;  ///< sensors of each
+  NeighbourCheck check_;
+
+  State state_;
+
+  std::vector<double> changes_K_;        ///< scratch, one a sensor
+  std::vector<double> input_changes_K_;  ///< scratch, one an input
+  std::vector<double> lies_K_;           ///< scratch, one an input
+  std::vector<double> misfit_K_;         ///< scratch, one a sensor: rms about its lines
+  std::vector<std::uint8_t> creeps_;     ///< scratch, one a sensor
+  std::vector<Corrected> corrected_;
+  std::size_t corrected_count_{0};
+  std::vector<int> sensor_plan_;  ///< index in the previous one, -1: none or another quantity
+};
+
+}  // namespace thermocomp
