@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-#include "config/units.hpp"
+#include "config/text/units.hpp"
 #include "modelling/inspection/robust.hpp"
 
 namespace thermocomp::inspection {

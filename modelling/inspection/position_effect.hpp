@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "config/run_file.hpp"
+#include "config/runs/run_file.hpp"
 
 namespace thermocomp::inspection {
 

@@ -21,9 +21,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/covariance_fit.hpp"
-#include "config/model_file.hpp"
-#include "config/run_file.hpp"
+#include "cli/model/covariance_fit.hpp"
+#include "config/model/model_file.hpp"
+#include "config/runs/run_file.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
