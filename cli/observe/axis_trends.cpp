@@ -54,8 +54,9 @@ std::string AxisTrends::bars(const std::deque<Sample>& samples) const {
   for (std::size_t cell = 0; cell < count; ++cell) {
     // The last value of each equal part, so that the newest one is always seen.
     const Sample& sample = samples[(cell + 1) * samples.size() / count - 1];
-    const double share = 0.5 + (sample.offset - middle) / range;
-    const auto level = static_cast<std::size_t>(std::clamp(std::lround(7.0 * share), 0L, 7L));
+    // Apart from the middle of two levels, where what is still would flicker.
+    const double height = 3.01 + 7.0 * (sample.offset - middle) / range;
+    const auto level = static_cast<std::size_t>(std::clamp(std::lround(height), 0L, 7L));
     text += wide_ ? wide_bars.at(level) : plain_bars.at(level);
   }
   return text;

@@ -10,7 +10,8 @@ namespace {
 
 constexpr const char* style =
     "body{font:16px/1.5 sans-serif;max-width:900px;margin:1.5em auto;padding:0 1em;color:#1a202c;"
-    "background:#fff}h1{font-size:1.6em;line-height:1.2}h2{font-size:1.2em;margin:1.6em 0 .3em}"
+    "background:#fff}h1,h2,p,li{overflow-wrap:anywhere}h1{font-size:1.6em;line-height:1.2}h2{font-"
+    "size:1.2em;margin:1.6em 0 .3em}"
     ".wide{overflow-x:auto}table{border-collapse:collapse;margin:.5em 0}"
     "td,th{border:1px solid #cbd5e0;padding:.25em .6em;text-align:right;vertical-align:top}"
     "td:first-child,th:first-child{text-align:left}th{background:#edf2f7;font-weight:600}"
