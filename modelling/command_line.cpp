@@ -6,9 +6,9 @@
 
 #include "modelling/diagnosis/command/diagnose_command.hpp"
 #include "modelling/experiments/plan_command.hpp"
-#include "modelling/identification/fit_command.hpp"
-#include "modelling/identification/group_command.hpp"
-#include "modelling/identification/tiebar_command.hpp"
+#include "modelling/identification/equation/group_command.hpp"
+#include "modelling/identification/families/fit_command.hpp"
+#include "modelling/identification/gate/tiebar_command.hpp"
 #include "modelling/inspection/inspect_command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/placement/place_command.hpp"

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <random>
 
-#include "modelling/identification/subset_search.hpp"
+#include "modelling/identification/equation/subset_search.hpp"
 
 namespace {
 

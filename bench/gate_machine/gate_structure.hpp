@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "modelling/identification/gate_machine.hpp"
+#include "modelling/identification/gate/gate_machine.hpp"
 
 namespace thermocomp::bench {
 

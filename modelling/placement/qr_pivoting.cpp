@@ -18,7 +18,7 @@ Eigen::MatrixXd modes_of(const PlacementProblem& problem) {
     fields.col(f) = Eigen::Map<const Eigen::VectorXd>(
         problem.used[static_cast<std::size_t>(f)].rise_K.data(), nodes);
   }
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(fields, Eigen::ComputeThinU);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(fields, Eigen::ComputeThinU);
   const auto& values = svd.singularValues();
   Eigen::Index modes = 0;
   while (modes < count && modes < static_cast<Eigen::Index>(problem.blocks.size()) &&

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "modelling/identification/bank_fit.hpp"
+#include "modelling/identification/families/bank_fit.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

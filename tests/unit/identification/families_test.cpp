@@ -1,4 +1,4 @@
-#include "modelling/identification/families.hpp"
+#include "modelling/identification/families/families.hpp"
 
 #include <cmath>
 #include <random>
@@ -7,7 +7,7 @@
 
 #include "config/model/model_file.hpp"
 #include "estimator/model/model_domain.hpp"
-#include "modelling/identification/bank_fit.hpp"
+#include "modelling/identification/families/bank_fit.hpp"
 #include "synthetic_places.hpp"
 
 using namespace thermocomp;

@@ -1,4 +1,4 @@
-#include "modelling/identification/fit.hpp"
+#include "modelling/identification/equation/fit.hpp"
 
 #include <algorithm>
 #include <cstdlib>

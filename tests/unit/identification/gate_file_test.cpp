@@ -1,4 +1,4 @@
-#include "modelling/identification/gate_file.hpp"
+#include "modelling/identification/gate/gate_file.hpp"
 
 #include <initializer_list>
 #include <string>

@@ -1,4 +1,4 @@
-#include "modelling/identification/model_frame.hpp"
+#include "modelling/identification/families/model_frame.hpp"
 
 #include <catch2/catch.hpp>
 

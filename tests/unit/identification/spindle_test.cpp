@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "modelling/identification/fit.hpp"
+#include "modelling/identification/equation/fit.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -1,4 +1,4 @@
-#include "modelling/identification/tie_course.hpp"
+#include "modelling/identification/gate/tie_course.hpp"
 
 #include <algorithm>
 #include <cmath>

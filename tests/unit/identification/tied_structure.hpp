@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "modelling/identification/tied_columns.hpp"
+#include "modelling/identification/gate/tied_columns.hpp"
 
 namespace thermocomp::gate_tests {
 

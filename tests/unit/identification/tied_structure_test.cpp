@@ -9,7 +9,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "modelling/identification/tie_course.hpp"
+#include "modelling/identification/gate/tie_course.hpp"
 
 namespace thermocomp::gate_tests {
 namespace {

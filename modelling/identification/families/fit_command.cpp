@@ -1,4 +1,4 @@
-#include "modelling/identification/fit_command.hpp"
+#include "modelling/identification/families/fit_command.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -13,9 +13,9 @@
 #include "cli/common/run_loader.hpp"
 #include "cli/common/terminal.hpp"
 #include "config/model/model_file.hpp"
-#include "modelling/identification/families.hpp"
-#include "modelling/identification/fit.hpp"
-#include "modelling/identification/model_frame.hpp"
+#include "modelling/identification/equation/fit.hpp"
+#include "modelling/identification/families/families.hpp"
+#include "modelling/identification/families/model_frame.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "modelling/identification/families_fit.hpp"
+#include "modelling/identification/families/families_fit.hpp"
 
 namespace thermocomp::identification {
 

@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 
+#include "modelling/identification/equation/subset_search.hpp"
 #include "modelling/identification/measured_tests.hpp"
-#include "modelling/identification/subset_search.hpp"
 
 namespace thermocomp::identification {
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/model/model_domain.hpp"
-#include "modelling/identification/families.hpp"
+#include "modelling/identification/families/families.hpp"
 #include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {

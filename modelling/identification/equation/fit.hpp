@@ -7,9 +7,9 @@
 #include <Eigen/Core>
 
 #include "estimator/thermal_model.hpp"
-#include "modelling/identification/lag_search.hpp"
-#include "modelling/identification/similarity.hpp"
-#include "modelling/identification/subset_search.hpp"
+#include "modelling/identification/equation/lag_search.hpp"
+#include "modelling/identification/equation/similarity.hpp"
+#include "modelling/identification/equation/subset_search.hpp"
 
 namespace thermocomp::identification {
 

@@ -1,4 +1,4 @@
-#include "modelling/identification/families.hpp"
+#include "modelling/identification/families/families.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "modelling/identification/bank_fit.hpp"
-#include "modelling/identification/heat_fit.hpp"
-#include "modelling/identification/made_from_tests.hpp"
+#include "modelling/identification/equation/heat_fit.hpp"
+#include "modelling/identification/families/bank_fit.hpp"
+#include "modelling/identification/families/made_from_tests.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -1,4 +1,4 @@
-#include "modelling/identification/lag_search.hpp"
+#include "modelling/identification/equation/lag_search.hpp"
 
 #include <algorithm>
 #include <cmath>

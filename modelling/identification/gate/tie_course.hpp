@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "config/runs/run_file.hpp"
-#include "modelling/identification/gate_file.hpp"
+#include "modelling/identification/gate/gate_file.hpp"
 
 namespace thermocomp::identification {
 

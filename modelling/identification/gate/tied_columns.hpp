@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "modelling/identification/gate_machine.hpp"
+#include "modelling/identification/gate/gate_machine.hpp"
 
 namespace thermocomp::identification {
 

@@ -1,4 +1,4 @@
-#include "modelling/identification/group_command.hpp"
+#include "modelling/identification/equation/group_command.hpp"
 
 #include <cstdio>
 #include <memory>
@@ -9,7 +9,7 @@
 
 #include "cli/common/output_file.hpp"
 #include "cli/common/run_loader.hpp"
-#include "modelling/identification/similarity.hpp"
+#include "modelling/identification/equation/similarity.hpp"
 #include "modelling/identification/svg.hpp"
 
 namespace thermocomp::identification {

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "config/text/number_text.hpp"
-#include "modelling/identification/families.hpp"
-#include "modelling/identification/fit.hpp"
+#include "modelling/identification/equation/fit.hpp"
+#include "modelling/identification/families/families.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/identification/svg.hpp"
 #include "modelling/markup/xml_text.hpp"

@@ -1,4 +1,4 @@
-#include "modelling/identification/bank_fit.hpp"
+#include "modelling/identification/families/bank_fit.hpp"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "estimator/thermal_model.hpp"
-#include "modelling/identification/families_fit.hpp"
+#include "modelling/identification/families/families_fit.hpp"
 
 namespace thermocomp::identification {
 

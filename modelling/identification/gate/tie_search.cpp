@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "modelling/identification/tie_course.hpp"
+#include "modelling/identification/gate/tie_course.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "config/text/problems.hpp"
-#include "modelling/identification/tied_columns.hpp"
+#include "modelling/identification/gate/tied_columns.hpp"
 
 namespace thermocomp::identification {
 

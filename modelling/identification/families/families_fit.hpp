@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "estimator/thermal_model.hpp"
-#include "modelling/identification/fit.hpp"
+#include "modelling/identification/equation/fit.hpp"
 
 namespace thermocomp::identification {
 

@@ -1,4 +1,4 @@
-#include "modelling/identification/tiebar_command.hpp"
+#include "modelling/identification/gate/tiebar_command.hpp"
 
 #include <cstdio>
 #include <memory>
@@ -12,11 +12,11 @@
 
 #include "cli/common/output_file.hpp"
 #include "cli/common/run_loader.hpp"
-#include "modelling/identification/gate_file.hpp"
-#include "modelling/identification/gate_machine.hpp"
+#include "modelling/identification/gate/gate_file.hpp"
+#include "modelling/identification/gate/gate_machine.hpp"
+#include "modelling/identification/gate/tie_course.hpp"
+#include "modelling/identification/gate/tied_columns.hpp"
 #include "modelling/identification/printed.hpp"
-#include "modelling/identification/tie_course.hpp"
-#include "modelling/identification/tied_columns.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -1,4 +1,4 @@
-#include "modelling/identification/subset_search.hpp"
+#include "modelling/identification/equation/subset_search.hpp"
 
 #include <algorithm>
 #include <array>

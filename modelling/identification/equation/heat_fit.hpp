@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "modelling/identification/fit.hpp"
+#include "modelling/identification/equation/fit.hpp"
 
 namespace thermocomp::identification {
 

@@ -1,4 +1,4 @@
-#include "modelling/identification/tied_columns.hpp"
+#include "modelling/identification/gate/tied_columns.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "modelling/identification/similarity.hpp"
+#include "modelling/identification/equation/similarity.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "modelling/identification/fit.hpp"
+#include "modelling/identification/equation/fit.hpp"
 
 #include <algorithm>
 #include <array>
@@ -141,7 +141,7 @@ void judge_outputs(const MeasuredTests& tests, const Stacked& data, Fit& fit) {
   judge_hot_half(tests, data, fit);
   Eigen::MatrixXd scaled = data.x;
   scaled.colwise().normalize();
-  const auto values = scaled.bdcSvd().singularValues();
+  const auto values = scaled.jacobiSvd().singularValues();
   fit.condition = values[0] / values[values.size() - 1];
 }
 

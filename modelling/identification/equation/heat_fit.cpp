@@ -1,4 +1,4 @@
-#include "modelling/identification/heat_fit.hpp"
+#include "modelling/identification/equation/heat_fit.hpp"
 
 #include <algorithm>
 #include <array>

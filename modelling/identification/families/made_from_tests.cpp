@@ -1,4 +1,4 @@
-#include "modelling/identification/made_from_tests.hpp"
+#include "modelling/identification/families/made_from_tests.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "modelling/identification/gate_machine.hpp"
+#include "modelling/identification/gate/gate_machine.hpp"
 
 #include <cmath>
 
