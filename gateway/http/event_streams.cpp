@@ -1,7 +1,6 @@
 #include "gateway/http/event_streams.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <microhttpd.h>
 #include <mutex>
 #include <new>
@@ -51,7 +50,7 @@ ssize_t EventStreams::Parts::read(void* cls, std::uint64_t /*position*/, char* o
     return 0;
   }
   const std::size_t count = std::min(size, stream.frame->text.size() - stream.sent);
-  std::memcpy(out, stream.frame->text.data() + stream.sent, count);
+  stream.frame->text.copy(out, count, stream.sent);
   stream.sent += count;
   return static_cast<ssize_t>(count);
 }

@@ -82,7 +82,8 @@ int socket_of(MHD_Connection* connection) {
   return info != nullptr ? info->connect_fd : -1;
 }
 
-void log_library(void* /*cls*/, const char* format, va_list arguments) {
+[[gnu::format(printf, 2, 0)]] void log_library(void* /*cls*/, const char* format,
+                                               va_list arguments) {
   std::array<char, 300> text{};
   std::vsnprintf(text.data(), text.size(), format, arguments);
   spdlog::debug("http: {}", text.data());
@@ -313,7 +314,7 @@ MHD_Result HttpServer::Parts::post(MHD_Connection* connection, std::string_view 
     return answer(connection, MHD_HTTP_UNSUPPORTED_MEDIA_TYPE, json_type,
                   error_text("the body must be application/json"));
   return later(connection, request, [this, user = request.user, body = request.body] {
-    const JsonAnswer done = commands.take(user, body, *feed.newest());
+    JsonAnswer done = commands.take(user, body, *feed.newest());
     if (done.status != MHD_HTTP_OK) ++refused;
     return done;
   });

@@ -65,7 +65,7 @@ class SettingsReader {
 
   /// The same for a file that must be there; its secrets are not looked at here.
   [[nodiscard]] fs::path existing(const TomlTable& table, std::string_view key) const {
-    const fs::path named = path(table, key);
+    fs::path named = path(table, key);
     std::error_code ignored;
     if (!named.empty() && !fs::is_regular_file(named, ignored))
       table.problem(key, "must name a file that exists");
@@ -81,7 +81,7 @@ class SettingsReader {
   }
 
   [[nodiscard]] static std::string address(const TomlTable& table, const std::string& otherwise) {
-    const std::string given = table.text("address", otherwise);
+    std::string given = table.text("address", otherwise);
     if (!is_numeric_address(given))
       table.problem("address", "must be an IPv4 or IPv6 address in numbers");
     return given;
