@@ -4,7 +4,6 @@
 
 #include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
-#include "modelling/inspection/position_effect.hpp"
 #include "modelling/inspection/robust.hpp"
 
 namespace thermocomp::inspection {
@@ -53,15 +52,14 @@ bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double
 }
 
 void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
+  std::vector<double>& values = run.values[column];
   const bool output = is_output(run.columns[column]);
-  std::vector<double> values = run.values[column];
-  if (output) {
-    const std::vector<double> moved = position_effect(run, column);
-    for (std::size_t row = 0; row < values.size(); ++row) values[row] -= moved[row];
-  }
+  std::vector<double> around(values.size());
   Eigen::VectorXd leaps(static_cast<Eigen::Index>(values.size()));
-  for (std::size_t row = 0; row < values.size(); ++row)
-    leaps[static_cast<Eigen::Index>(row)] = values[row] - median_around(values, row);
+  for (std::size_t row = 0; row < values.size(); ++row) {
+    around[row] = median_around(values, row);
+    leaps[static_cast<Eigen::Index>(row)] = values[row] - around[row];
+  }
   double deviation = robust_deviation(leaps);
   // Where most rows hold still, those that move say how far it moves.
   if (!(deviation > 0)) {
@@ -82,8 +80,7 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
     leapt.push_back(row);
   }
   if (made.finding.times_s.empty()) return;
-  for (const std::size_t row : leapt)
-    run.values[column][row] -= leaps[static_cast<Eigen::Index>(row)];
+  for (const std::size_t row : leapt) values[row] = around[row];
   made.finding.at_s = made.finding.times_s.front();
   made.finding.until_s = made.finding.times_s.back();
   made.score = std::abs(made.finding.size) / std::max(least, 1e-12);

@@ -111,68 +111,6 @@ TEST_CASE("spikes are found one by one, and replaced", "[inspection]") {
         Approx(run.column("t2_degC")[299]).margin(0.3));
 }
 
-namespace {
-
-/// The same with a slide that leaves its place in every eighth row, on a guideway that bends as the
-/// machine warms.
-RunFile moving_recording(unsigned seed) {
-  RunFile run = recording(seed);
-  std::vector<double> position;
-  for (std::size_t row = 0; row < rows; ++row) {
-    const bool moves = row % 8 == 0;
-    position.push_back(250.0 + (moves ? 200.0 * std::sin(2.6 * static_cast<double>(row)) : 0.0));
-    const double warm_K = run.column("t5_degC")[row] - 20.0;
-    column(run, "z_um")[row] += 0.004 * (position.back() - 100.0) * warm_K;
-  }
-  run.columns.emplace_back("y_mm");
-  run.values.push_back(std::move(position));
-  return run;
-}
-
-}  // namespace
-
-TEST_CASE("a displacement that goes with the position of an axis is no outlier", "[inspection]") {
-  for (unsigned seed = 1; seed <= 3; ++seed) {
-    RunFile run = moving_recording(seed);
-    const Inspection inspection = inspect({run});
-    INFO(inspection_text(inspection));
-    CHECK(inspection.findings.empty());
-    // By a name that is no position nothing tells it from a probing that went wrong.
-    run.columns.back() = "y_load";
-    CHECK(find(inspect({run}), "outliers") != nullptr);
-  }
-}
-
-TEST_CASE("an outlier is one also while an axis moves", "[inspection]") {
-  RunFile run = moving_recording(1);
-  for (const std::size_t row : {70U, 350U, 611U}) column(run, "z_um")[row] += 12.0;
-  const Inspection inspection = inspect({run});
-  INFO(inspection_text(inspection));
-  REQUIRE(inspection.findings.size() == 1);
-  CHECK(inspection.findings.front().kind == "outliers");
-  CHECK(inspection.findings.front().times_s == std::vector<double>{4200, 21000, 36660});
-  CHECK(inspection.findings.front().size == Approx(12.0).margin(1.0));
-}
-
-TEST_CASE("some dozens of probings at a few positions tell what the position does",
-          "[inspection]") {
-  RunFile run = recording();
-  for (std::vector<double>& values : run.values) values.resize(60);
-  run.selected_end = run.rows();
-  std::vector<double> position;
-  for (std::size_t row = 0; row < run.rows(); ++row) {
-    position.push_back(row % 4 == 0 ? 300.0 : 10.0 * static_cast<double>(row % 4));
-    column(run, "z_um")[row] += 0.05 * position.back();
-  }
-  run.columns.emplace_back("y_mm");
-  run.values.push_back(std::move(position));
-  const Inspection inspection = inspect({run}, 0.0);
-  INFO(inspection_text(inspection));
-  CHECK(find(inspection, "outliers") == nullptr);
-  run.columns.back() = "y_load";
-  CHECK(find(inspect({run}, 0.0), "outliers") != nullptr);
-}
-
 TEST_CASE("what stands still, is coarse or is another's reading is said", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 330; row < 430; ++row)
