@@ -52,7 +52,7 @@ SUITES = {
          "state_.temps_degC[i] += share * off_K;",
          "state_.temps_degC[i] += {P} ? 0.0 : share * off_K;"),
         ("second_loss_forgets_the_drift", LOST,
-         "drift_factor(i) * drift_factor(k) * drift;",
+         "drift_factor(growth_, i) * drift_factor(growth_, k) * drift;",
          "drift_factor(i) * drift_factor(k) * ({P} ? 0.0 : drift);"),
         ("never_measured_is_complete", LOST,
          "state_.complete = state_.complete && state_.known[i] != 0;",
