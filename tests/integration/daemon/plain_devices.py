@@ -295,3 +295,41 @@ class PlainAmplifier(PlainController):
     def all_volts(self):
         with self.lock:
             return list(self.volts)
+
+# The same module and controller as thermocomp-sim has them.
+SIMULATED = """format = 1
+[[bus]]
+name = "sensors"
+kind = "modbus_tcp"
+port = 0
+[[device]]
+name = "module"
+bus = "sensors"
+unit = 1
+encoding = "int16"
+scale = 0.01
+[[channel]]
+name = "column"
+device = "module"
+address = 0
+[[channel]]
+name = "spindle"
+device = "module"
+address = 1
+[controller]
+name = "cnc"
+kind = "modbus_tcp"
+port = 0
+valid_bits = { table = "holding", address = 2, encoding = "uint16" }
+heartbeat = { table = "holding", address = 3, encoding = "uint16" }
+[[controller.signal]]
+name = "compensation_off_on"
+table = "discrete_input"
+address = 0
+value = 0
+[[axis]]
+name = "z"
+output = "z_um"
+offset = { table = "holding", address = 0, encoding = "int32", scale = 0.001 }
+applied = { table = "input", address = 10, encoding = "int32", scale = 0.001 }
+"""

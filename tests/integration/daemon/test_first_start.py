@@ -8,8 +8,7 @@ import time
 import pytest
 
 from lab import BIN, Refused, eventually, run_tool
-from plain_devices import CONFIG, MODEL
-from test_survival import SIMULATED
+from plain_devices import CONFIG, MODEL, SIMULATED
 
 # The column cools by 4 K, for which 12 um are to be added.
 WANTED_um = 12.0

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from lab import assert_replays_exactly, count_rows, eventually, read_columns, run_tool
-from plain_devices import RATE_UM_PER_S, Machine, assert_slewed
+from plain_devices import RATE_UM_PER_S, SIMULATED, Machine, assert_slewed
 
 
 @pytest.fixture
@@ -197,44 +197,6 @@ def test_history_survives_a_power_cut_and_replays_exactly(machine, lab):
     assert status == 0, said
     assert len(read_columns(lab.folder / "run.csv")["time_s"]) == len(columns["time_s"])
     assert count_rows(daemon.history)[0] >= 4
-
-
-SIMULATED = """format = 1
-[[bus]]
-name = "sensors"
-kind = "modbus_tcp"
-port = 0
-[[device]]
-name = "module"
-bus = "sensors"
-unit = 1
-encoding = "int16"
-scale = 0.01
-[[channel]]
-name = "column"
-device = "module"
-address = 0
-[[channel]]
-name = "spindle"
-device = "module"
-address = 1
-[controller]
-name = "cnc"
-kind = "modbus_tcp"
-port = 0
-valid_bits = { table = "holding", address = 2, encoding = "uint16" }
-heartbeat = { table = "holding", address = 3, encoding = "uint16" }
-[[controller.signal]]
-name = "compensation_off_on"
-table = "discrete_input"
-address = 0
-value = 0
-[[axis]]
-name = "z"
-output = "z_um"
-offset = { table = "holding", address = 0, encoding = "int32", scale = 0.001 }
-applied = { table = "input", address = 10, encoding = "int32", scale = 0.001 }
-"""
 
 
 def test_a_simulated_machine_that_restarts_gets_its_offset_back_slowly(machine, lab):
