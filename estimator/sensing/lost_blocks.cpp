@@ -55,6 +55,8 @@ void LostBlocks::step(nanoseconds now, std::span<const double> temps_degC,
   for (std::size_t i = 0; i < inputs_; ++i)
     changed = changed || (good[i] == 0) != (state_.lost[i] != 0);
   if (changed) change_pattern(now, temps_degC, good);
+  // Kept longer it would be a state that is not saved: a block may go on by another sensor.
+  std::fill(said_K2_.begin(), said_K2_.end(), 0.0);
   for (std::size_t i = 0; i < columns_.size(); ++i)
     if (good[i] != 0 || i >= inputs_) state_.temps_degC[i] = temps_degC[i];
   for (std::size_t i = 0; i < inputs_; ++i)
@@ -158,7 +160,6 @@ void LostBlocks::change_pattern(nanoseconds now, std::span<const double> temps_d
   for (std::size_t i = 0; i < inputs_; ++i)
     state_.anchor_degC[i] = state_.lost[i] != 0 ? state_.temps_degC[i] : temps_degC[i];
   state_.anchored_at = now;
-  std::fill(said_K2_.begin(), said_K2_.end(), 0.0);
   list_lost();
   condition();
 }

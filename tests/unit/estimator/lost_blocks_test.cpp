@@ -210,6 +210,29 @@ TEST_CASE("after a restart a lost block goes on from what was stored, with the w
   CHECK(bank.lost.sd_K(3) >= 0.99 * grown.lost.sd_K(3));
 }
 
+TEST_CASE("what is said of a block that stays measured is forgotten: a saved state tells all",
+          "[lost_blocks]") {
+  Bank bank(model_of(4));
+  bank.step(3);
+  bank.lost.say(1, 19.0, 2.0);  // another sensor of the block goes on
+  bank.step();
+  StateArchive count;
+  bank.lost.visit_state(count);
+  std::vector<std::byte> bytes(count.position_bytes());
+  StateArchive save{std::span<std::byte>(bytes)};
+  bank.lost.visit_state(save);
+  Bank again(model_of(4));
+  StateArchive load{std::span<const std::byte>(bytes)};
+  again.lost.visit_state(load);
+  again.now = bank.now;
+  for (Bank* each : {&bank, &again}) {
+    each->good[1] = 0;
+    each->step();
+  }
+  CHECK(bank.lost.sd_K(1) == again.lost.sd_K(1));
+  CHECK(bank.lost.temps_degC()[1] == 20.0);
+}
+
 TEST_CASE("a reload carries estimates over by name", "[lost_blocks]") {
   const ThermalModel model = model_of(4);
   Bank bank(model);
