@@ -15,7 +15,7 @@
 #include "cli/model/covariance_fit.hpp"
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
-#include "estimator/pipeline/estimator.hpp"
+#include "measured_machine.hpp"
 
 namespace thermocomp {
 namespace {
@@ -27,61 +27,11 @@ constexpr std::array<double, 2> outages_h{1.0, 8.0};
 using Lost = std::vector<std::size_t>;
 
 EstimatorConfig make_config(const ThermalModel& model, bool estimate) {
-  EstimatorConfig config;
-  for (std::size_t i = 0; i < model.inputs.size(); ++i) {
-    SensorConfig sensor;
-    sensor.name = model.inputs[i];
-    sensor.screening.stale_after_s = 40.0;  // rows are 15 s apart
-    config.sensors.push_back(sensor);
-    config.blocks.push_back({model.inputs[i], model.inputs[i], {i}});
-  }
-  for (const std::string& output : model.outputs)
-    config.axes.push_back({output, output, 1.0, {500.0, 1000.0}});
-  config.controller_reads_back = false;
-  config.compensation.enabled_at_first_start = true;
+  EstimatorConfig config = measured_config(model, 40.0);  // rows are 15 s apart
   config.compensation.estimate_lost_blocks = estimate;
   config.compensation.offset_sd_um_max = 500.0;  // to see all of it
   return config;
 }
-
-/// The estimator with a controller that applies what it is sent.
-class Machine {
- public:
-  Machine(const ThermalModel& model, bool estimate)
-      : estimator_(make_config(model, estimate), model),
-        report_(estimator_.make_report()),
-        readings_(model.inputs.size()) {
-    controller_.online = true;
-    controller_.link_epoch = 1;
-  }
-  void step(double time_s, const std::vector<double>& temps_degC, const Lost& lost) {
-    const nanoseconds now =
-        std::chrono::seconds(1) + std::chrono::duration_cast<nanoseconds>(seconds_d(time_s));
-    for (std::size_t i = 0; i < readings_.size(); ++i)
-      readings_[i] = {temps_degC[i], now, Fault::none};
-    for (const std::size_t i : lost) readings_[i] = {not_a_number, now, Fault::open_circuit};
-    controller_.taken_at = now;
-    estimator_.step(now, readings_, controller_, command_);
-  }
-  [[nodiscard]] const OffsetCommand& offsets() const { return command_; }
-  [[nodiscard]] const Report& report() {
-    estimator_.report(report_);
-    return report_;
-  }
-  [[nodiscard]] std::vector<std::byte> state() const {
-    std::vector<std::byte> bytes(estimator_.state_size_bytes());
-    estimator_.save_state(bytes);
-    return bytes;
-  }
-  void load(const std::vector<std::byte>& state) { estimator_.load_state(state); }
-
- private:
-  Estimator estimator_;
-  Report report_;
-  std::vector<Reading> readings_;
-  ControllerState controller_;
-  OffsetCommand command_;
-};
 
 /// Sums over rows and axes.
 struct Tally {
@@ -113,7 +63,9 @@ struct Tally {
 class Fold {
  public:
   Fold(const ThermalModel& model, const RunFile& run, std::size_t begin, std::size_t end)
-      : model_(model), estimating_(model, true), holding_(model, false) {
+      : model_(model),
+        estimating_(make_config(model, true), model),
+        holding_(make_config(model, false), model) {
     for (std::size_t row = begin; row < end; ++row) {
       times_s_.push_back(run.time_s()[row]);
       auto& temps_degC = temps_degC_.emplace_back();
@@ -154,8 +106,8 @@ class Fold {
         starts_.push_back({row, estimating_.state(), holding_.state()});
         next_s += apart_s;
       }
-      estimating_.step(times_s_[row], temps_degC_[row], {});
-      holding_.step(times_s_[row], temps_degC_[row], {});
+      estimating_.step(times_s_[row], temps_degC_[row]);
+      holding_.step(times_s_[row], temps_degC_[row]);
       truth_um_.push_back(estimating_.offsets().offset_um);
     }
   }
@@ -174,8 +126,8 @@ class Fold {
   }
 
   ThermalModel model_;
-  Machine estimating_;
-  Machine holding_;
+  MeasuredMachine estimating_;
+  MeasuredMachine holding_;
   std::vector<double> times_s_;
   std::vector<std::vector<double>> temps_degC_;
   std::vector<std::array<double, axes_max>> truth_um_;
