@@ -46,6 +46,7 @@ BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::strin
     blocks_.push_back({block->sensors, std::vector<double>(block->sensors.size(), 0.0)});
   }
   values_K_.assign(sensors_.size(), not_a_number);
+  kept_K_ = values_K_;
   temps_degC_.assign(columns.size(), not_a_number);
   good_.assign(columns.size(), 0);
 }
@@ -70,13 +71,17 @@ void BlockBank::screened(nanoseconds now, std::span<double> values_K) const noex
 }
 
 bool BlockBank::join(std::span<const std::uint8_t> left_out) noexcept {
-  left_out_ = left_out;
+  in_use_K_ = values_K_;
+  if (!left_out.empty()) {
+    for (std::size_t i = 0; i < values_K_.size(); ++i)
+      kept_K_[i] = left_out[i] != 0 ? not_a_number : values_K_[i];
+    in_use_K_ = kept_K_;
+  }
   bool all_good = true;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     good_[i] = update(blocks_[i], temps_degC_[i]) ? 1 : 0;
     all_good = all_good && good_[i] != 0;
   }
-  left_out_ = {};
   return all_good;
 }
 
@@ -102,7 +107,7 @@ double BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
 
 bool BlockBank::update(Block& block, double& temp_degC) noexcept {
   double sum_degC = 0.0;
-  for (const std::size_t sensor : block.sensors) sum_degC += in_use_K(sensor);
+  for (const std::size_t sensor : block.sensors) sum_degC += in_use_K_[sensor];
   if (std::isnan(sum_degC)) return update_without_the_missing(block, temp_degC);
   temp_degC = sum_degC / static_cast<double>(block.sensors.size());
   for (std::size_t i = 0; i < block.sensors.size(); ++i)
@@ -114,7 +119,7 @@ bool BlockBank::update_without_the_missing(const Block& block, double& temp_degC
   double sum_degC = 0.0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < block.sensors.size(); ++i) {
-    const double value_K = in_use_K(block.sensors[i]);
+    const double value_K = in_use_K_[block.sensors[i]];
     if (std::isnan(value_K)) continue;
     sum_degC += value_K - block.deviation_K[i];
     ++count;

@@ -67,18 +67,16 @@ class BlockBank {
   [[nodiscard]] double smooth(Sensor& sensor, nanoseconds now) noexcept;
   /// Index of the reference sensor in the previous bank, or no_sensor.
   [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
-  [[nodiscard]] double in_use_K(std::size_t sensor) const noexcept {
-    return left_out_.empty() || left_out_[sensor] == 0 ? values_K_[sensor] : not_a_number;
-  }
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
   /// From those that are left, less what each deviated by while all were there. @return any left
   [[nodiscard]] bool update_without_the_missing(const Block& block,
                                                 double& temp_degC) const noexcept;
 
   std::vector<Sensor> sensors_;
-  std::vector<double> values_K_;            ///< of this step, one a sensor; NaN: not to be used
-  std::span<const std::uint8_t> left_out_;  ///< during join()
-  std::vector<Block> blocks_;               ///< one a column
+  std::vector<double> values_K_;      ///< of this step, one a sensor; NaN: not to be used
+  std::vector<double> kept_K_;        ///< scratch: the same, what is left out NaN
+  std::span<const double> in_use_K_;  ///< during join(), one of the two
+  std::vector<Block> blocks_;         ///< one a column
   std::vector<double> temps_degC_;
   std::vector<std::uint8_t> good_;
   nanoseconds now_{};
