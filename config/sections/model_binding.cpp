@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "config/text/units.hpp"
+#include "estimator/sensing/neighbour_check.hpp"
 
 namespace thermocomp::sections {
 namespace {
@@ -41,11 +42,23 @@ void check_blocks(const BindingTables& tables, const EstimatorConfig& config,
   }
 }
 
+/// Asked for and impossible: nobody would notice that no sensor is ever weighed down.
+void check_weighing_down(const BindingTables& tables, const EstimatorConfig& config,
+                         const ThermalModel& model) {
+  if (config.compensation.suspected_sensors != SuspectedPolicy::weigh_down) return;
+  if (!model.covariance_K2.empty() && model.inputs.size() >= NeighbourCheck::inputs_min) return;
+  tables.root.problem("compensation.suspected_sensors", "weigh_down",
+                      "needs a model with [covariance] and at least " +
+                          std::to_string(NeighbourCheck::inputs_min) +
+                          " inputs (`thermocomp covariance` makes it from records)");
+}
+
 }  // namespace
 
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
                    const ThermalModel& model) {
   check_blocks(tables, config, model.temperature_columns());
+  check_weighing_down(tables, config, model);
   for (const std::string& signal : model.signal_columns()) {
     if (!is_operating(signal)) continue;  // a problem of the model file already
     if (contains(config.signals, signal)) continue;

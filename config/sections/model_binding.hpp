@@ -17,7 +17,7 @@ struct BindingTables {
 };
 
 /// Every temperature column of the model has exactly one block, every signal it names is read from
-/// the controller, every axis' output exists.
+/// the controller, every axis' output exists; and what is asked of a covariance, it can give.
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
                    const ThermalModel& model);
 

@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "config/daemon/daemon_config.hpp"
+#include "config/model/model_file.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;
@@ -396,6 +397,31 @@ TEST_CASE("all problems are told at once, in both files, in the order of their l
   CHECK(problems.back().file == "model.toml");
   CHECK(std::is_sorted(problems.begin(), problems.end() - 1,
                        [](const Problem& a, const Problem& b) { return a.line < b.line; }));
+}
+
+TEST_CASE("suspected sensors can be weighed down only where a covariance says by what",
+          "[config]") {
+  const std::string asked = edited(example("small_machine.toml"), "suspected_sensors = \"warn\"",
+                                   "suspected_sensors = \"weigh_down\"");
+  const std::string model = example("small_machine_model.toml");
+  CHECK(mentions(problems_of([&] { return parse(asked, model); }), "compensation.suspected_sensors",
+                 "thermocomp covariance"));
+  const std::string blind =
+      edited(asked, "estimate_lost_blocks = true", "estimate_lost_blocks = false");
+  CHECK(mentions(problems_of([&] { return parse(blind, model); }),
+                 "compensation.estimate_lost_blocks", "must be true where suspected_sensors"));
+  const std::string odd = edited(asked, "\"weigh_down\"", "\"ignore\"");
+  CHECK(mentions(problems_of([&] { return parse(odd, model); }), "compensation.suspected_sensors",
+                 "\"weigh_down\""));
+  const ThermalModel read = parse_model(model, "model.toml");
+  std::string rows;
+  for (std::size_t i = 0; i < read.inputs.size(); ++i) {
+    rows += "[";
+    for (std::size_t j = 0; j < read.inputs.size(); ++j) rows += i == j ? "5.0, " : "4.0, ";
+    rows += "], ";
+  }
+  const std::string able = model + "\n[covariance]\nmatrix_K2 = [" + rows + "]\n";
+  CHECK(parse(asked, able).estimator.compensation.suspected_sensors == SuspectedPolicy::weigh_down);
 }
 
 TEST_CASE("an edit that breaks several rules is told once a rule", "[config]") {
