@@ -129,9 +129,8 @@ build_options=()
 if [[ $quick == yes ]]; then
   ctest_options=(--label-regex '^quick$' "${ctest_options[@]}")
   build_options=(--target quick_tests)
-else
-  stage "packages" scripts/setup.sh test
 fi
+stage "packages" scripts/setup.sh test
 stage "configure $preset" cmake --preset "$preset"
 stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)" "${build_options[@]}"
 # The guest in which programs with sanitizers can run. Without it the tests on CAN fail and say so;

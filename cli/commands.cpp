@@ -27,8 +27,10 @@ void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) 
   add_init_command(app, action);
   add_check_command(app, action);
   add_scan_command(app, action);
+  app.fallthrough();  // `thermocomp status --socket FILE` too
   add_observe_commands(app, global, action);
   add_operate_commands(app, global, action);
+  app.fallthrough(false);
   add_history_commands(app, action);
   add_report_command(app, action);
   add_import_command(app, action);

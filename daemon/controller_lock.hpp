@@ -9,7 +9,7 @@
 
 namespace thermocomp {
 
-/// What the configuration's controller is reached by, as names to lock:
+/// The ways by which the configuration's controller is reached, as names to lock:
 ///   Modbus TCP   host, port and unit, as they are written
 ///   Modbus RTU   the serial device, whatever its path
 ///   CAN          the interface and the identifier of each frame that we send

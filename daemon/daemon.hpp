@@ -17,7 +17,7 @@ class Daemon {
 
   /// Starts everything and supervises until SIGTERM or SIGINT; SIGHUP reloads. The caller's thread
   /// is main of the architecture.
-  /// @throws RealTimeError when real time is required and not to be had
+  /// @throws RealTimeError when real time is required and not available
   void run();
 
  private:

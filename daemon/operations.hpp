@@ -19,10 +19,10 @@
 
 namespace thermocomp {
 
-/// Main's thread only; nothing waits. What an operator was told is what survives a restart: a
-/// command is called done only when it is on disk, and one that the cycle did not take in time
-/// never happens. Configuration, reports and state change together, in poll(), when the cycle has
-/// gone over to a new brain.
+/// Main's thread only; nothing waits. What an operator was told survives a restart: a command is
+/// called done only when it is on disk, and one that the cycle did not take in time never happens.
+/// Configuration, reports and state change together, in poll(), when the cycle has gone over to a
+/// new brain.
 class Operations {
  public:
   /// All of them outlive this.
@@ -46,16 +46,16 @@ class Operations {
   [[nodiscard]] RpcPending command(const Command& asked);
   /// @throws ConfigurationError, or RpcError: a restart is needed, a reload is under way
   [[nodiscard]] RpcPending reload();
-  /// The same for SIGHUP. While one is under way, one more follows it, however many are asked for.
+  /// The same for SIGHUP. However many arrive while one is under way, one more follows it.
   void hang_up();
 
   void poll();
-  /// Whether poll() has anything to look after.
+  /// Whether poll() has anything to do.
   [[nodiscard]] bool is_busy() const noexcept { return cycle_.is_busy(); }
   /// After the cycle has ended.
   void settle();
 
-  /// @param at_once  also what alone could wait
+  /// @param at_once  writes even what could wait
   void save_state(bool at_once);
 
   [[nodiscard]] CycleHandle& cycle() noexcept { return cycle_; }

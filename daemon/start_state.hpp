@@ -1,4 +1,4 @@
-/// With which state the daemon starts, and what the operator must be told of it.
+/// The state with which the daemon starts, and what the operator must be told about it.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ struct StartState {
   std::vector<std::string> warnings;
 };
 
-/// The state file's content. Where that is missing or cannot be used:
+/// The state file's content. Where that is missing or unusable:
 ///   no history, or an empty one   missing: the first start; unusable: disabled, reference lost
 ///   newest segment sound          all from there
 ///   only older ones sound         all from the newest of them, but disabled: what an operator did

@@ -101,6 +101,9 @@ void Supervisor::note_report() {
   events_.note_estimates(cycle().report(), parts_.config.estimator,
                          parts_.config.model.temperature_columns());
   const Report& report = cycle().report();
+  const bool all_driven = std::all_of(report.axes.begin(), report.axes.end(),
+                                      [](const AxisReport& axis) { return axis.driven; });
+  if (report.mode != Mode::compensating || !all_driven) idle_until_ = Clock::now();
   if (trend_.is_due(report.now))
     trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);
 }
@@ -190,7 +193,8 @@ StatusView Supervisor::view() {
       &trend_,
       parts_.keeper.reference(),
       parts_.keeper.is_reference_lost(),
-      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()};
+      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(),
+      std::chrono::duration<double>(Clock::now() - idle_until_).count()};
 }
 
 }  // namespace thermocomp

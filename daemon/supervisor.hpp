@@ -19,8 +19,8 @@
 
 namespace thermocomp {
 
-/// Nothing here waits longer than a tick, whatever is under way: the watchdog is fed as long as the
-/// cycle advances, and only then.
+/// Nothing here waits longer than a tick, whatever is under way: the watchdog is fed while, and
+/// only while, the cycle advances.
 class Supervisor {
  public:
   /// All of them outlive this.
@@ -44,7 +44,7 @@ class Supervisor {
 
   /// Once the cycle has advanced; tells the service manager. @throws RealTimeError if it does not
   void wait_until_ready(Cycle& running);
-  /// Until a signal ends it; then, where so configured, takes the offsets to zero.
+  /// Runs until a signal ends it; then, if so configured, takes the offsets to zero.
   void run();
 
   [[nodiscard]] StatusView view();
@@ -71,6 +71,7 @@ class Supervisor {
   Clock::time_point next_tick_{};
   Clock::time_point next_health_{};
   Clock::time_point next_note_{};
+  Clock::time_point idle_until_{Clock::now()};
   std::uint64_t cycles_seen_{0};
   std::vector<BusHealth> buses_;
   ControllerHealth controller_health_;

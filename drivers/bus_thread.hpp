@@ -1,4 +1,4 @@
-/// An ordinary thread for one bus: named, a stack sized on purpose, deaf to signals.
+/// An ordinary thread for one bus: named, with a stack sized on purpose, and deaf to signals.
 #pragma once
 
 #include <functional>

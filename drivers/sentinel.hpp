@@ -1,4 +1,4 @@
-/// A number of a device that is no measured value but a message.
+/// A number from a device that is a message, not a measured value.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace thermocomp {
 
-/// A raw value that is no temperature but a message of the device.
+/// A raw value that is a message of the device, not a temperature.
 struct Sentinel {
   std::int64_t code{0};  ///< raw value before scale and offset (of the encoding's signedness)
   Fault fault{Fault::open_circuit};

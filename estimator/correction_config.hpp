@@ -22,7 +22,7 @@ struct CorrectionConfig {
   bool as_printed{
       false};  ///< two_phase: R_1 = measured / predicted, right only while the tie is cold
   double noise_um{1.0};  ///< standard deviation of a probing
-  double turn_um{3.0};   ///< two_phase: phase 2 begins when the displacement came back so far
+  double turn_um{3.0};   ///< two_phase: phase 2 begins once it has come back by this much
   double contribution_um_min{3.0};  ///< a smaller one cannot tell its gain
   double gain_min{0.3};
   double gain_max{3.0};

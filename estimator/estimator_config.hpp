@@ -22,7 +22,7 @@ struct ScreeningConfig {
   double stale_after_s{5.0};     ///< age beyond which a reading is stale
   double rate_K_per_s_max{0.5};  ///< fastest believable slew
   double rate_allowance_K{1.0};  ///< what noise may add to a step [K]
-  double stuck_after_s{0.0};     ///< the very same value for so long is a fault; 0: never
+  double stuck_after_s{0.0};     ///< the same value for this long is a fault; 0: never
   void validate() const;         ///< @throws InvalidValue
 };
 
@@ -33,7 +33,7 @@ enum class SmoothingHistory { raw, screened };
 struct SmoothingConfig {
   SmoothingForm form{SmoothingForm::sliding_line};
   SmoothingHistory history{SmoothingHistory::screened};
-  double period_s{60.0};     ///< one value of the sensor every so often; 0: every reading
+  double period_s{60.0};     ///< one value of the sensor per period; 0: every reading
   std::size_t samples{6};    ///< n, values in a line (3..32)
   double half_width_K{0.3};  ///< w, half the band
   double outage_s{300.0};    ///< a gap this long restarts the history
@@ -63,25 +63,42 @@ struct LimiterConfig {
   void validate() const;          ///< @throws InvalidValue
 };
 
-/// An axis (or rotary axis: um reads urad) that takes an offset.
+/// What the controller makes of the offsets at the nodes of an axis' travel.
+enum class TravelForm : std::uint8_t {
+  line,  ///< two nodes, the ends: the straight line between them, the nearest to the curve
+  table  ///< straight from node to node
+};
+
+/// A place of an axis' travel that has an offset of its own: the controller interpolates between
+/// the nodes by the position that it has itself. What is bounded and slew-limited at each node is
+/// so everywhere between them.
+struct TravelNode {
+  std::string axis;      ///< whose travel: "x"; its nodes stand next to each other, by position
+  std::string position;  ///< position signal of the model, "x_mm"
+  double position_mm{0.0};
+  TravelForm form{TravelForm::table};
+};
+
+/// An axis (or rotary axis: um reads urad) that takes an offset, or one node of its travel.
 struct AxisConfig {
   std::string name;    ///< "z"
   std::string output;  ///< output of the model whose negative is sent
   double sign{1.0};    ///< +1, or -1 where the controller counts the offset the other way
   LimiterConfig limiter;
+  std::optional<TravelNode> node{};
 };
 
 enum class LossPolicy { hold, ramp_to_zero };
 enum class StopPolicy { hold, ramp_to_zero };
 
-/// What becomes of the offset where the machine is outside of what its model was made from.
+/// What happens to the offset while the machine is outside what its model was made from.
 enum class OutsidePolicy {
   warn,   ///< it follows the model; status and history say so
   hold,   ///< it stays
   shrink  ///< it follows the part of the displacement that is still believed
 };
 
-/// What becomes of a sensor whose good values its neighbours contradict.
+/// What happens to a sensor whose good values its neighbours contradict.
 enum class SuspectedPolicy {
   off,        ///< nobody looks
   warn,       ///< it is used; status and history say so
@@ -96,12 +113,12 @@ enum class UpdateRule {
 struct CompensationConfig {
   UpdateRule update{UpdateRule::continuous};
   std::string cycle_end_signal;        ///< "cycle_end_on", "cycles"; empty: by command only
-  std::uint64_t cycles_per_update{1};  ///< each_cycle: at each so-many-th cycle end
-  double cycle_ahead{0.0};             ///< each_cycle: share of the last change added beyond
+  std::uint64_t cycles_per_update{1};  ///< each_cycle: an update at every n-th cycle end
+  double cycle_ahead{0.0};             ///< each_cycle: share of the last change to extrapolate by
   LossPolicy on_loss{LossPolicy::hold};
   double hold_s{600.0};                  ///< ramp_to_zero: hold this long first
   StopPolicy on_stop{StopPolicy::hold};  ///< where the daemon leaves the offsets when it is stopped
-  double stop_ramp_s_max{120.0};         ///< ramp_to_zero: it ends after so long wherever they are
+  double stop_ramp_s_max{120.0};         ///< ramp_to_zero: given up after this long
   /// Without a state to go on from; false: nothing moves before an operator enables it.
   bool enabled_at_first_start{false};
   bool hold_while_cutting{false};  ///< the offset changes only while cutting_signal is 0
@@ -109,7 +126,7 @@ struct CompensationConfig {
   std::string disable_signal;      ///< "compensation_off_on": 1 disables; empty: none
   double controller_stale_after_s{2.0};
   double mismatch_um{2.0};       ///< applied and sent may differ by this much
-  double mismatch_after_s{3.0};  ///< ... or longer by more for this long
+  double mismatch_after_s{3.0};  ///< ... by more, for no longer than this
   /// A block without a good sensor is estimated where the model has a covariance.
   bool estimate_lost_blocks{true};
   double offset_sd_um_max{5.0};  ///< of any axis; beyond, an estimate does not serve: hold

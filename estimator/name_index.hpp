@@ -12,7 +12,7 @@
 
 namespace thermocomp {
 
-/// @return where `name` stands in `names`
+/// @return the index of `name` in `names`
 /// @throws InvalidValue with `key` and `rule` when it does not
 [[nodiscard]] inline std::size_t index_of(const std::vector<std::string>& names,
                                           const std::string& name, const char* key,
@@ -22,7 +22,7 @@ namespace thermocomp {
   return static_cast<std::size_t>(found - names.begin());
 }
 
-/// Where each of our names stands among theirs; -1: nowhere.
+/// The index of each of our names among theirs; -1: not among them.
 [[nodiscard]] inline std::vector<int> plan_names(const std::vector<std::string>& ours,
                                                  const std::vector<std::string>& theirs) {
   std::vector<int> plan;
@@ -33,7 +33,7 @@ namespace thermocomp {
   return plan;
 }
 
-/// What stands at the same name takes the place of ours.
+/// Ours are replaced by what stands under the same name.
 template <class T>
 void take_by_plan(const std::vector<int>& plan, const std::vector<T>& from,
                   std::vector<T>& to) noexcept {

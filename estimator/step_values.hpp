@@ -62,12 +62,12 @@ struct Displacement {
   bool held{false};                 ///< ... and configured to stay there
   double believed_share{1.0};       ///< of the model's displacement
   std::span<const double> zero_um;  ///< of the outputs: the model at the reference state
-  std::span<const double> axis_um;  ///< one an axis, with what was learned by probing
+  std::span<const double> axis_um;  ///< one per axis, with what was learned by probing
 };
 
 /// Where the axes are to go.
 struct Targets {
-  std::span<const double> axis_um;  ///< one an axis; NaN: stay
+  std::span<const double> axis_um;  ///< one per axis; NaN: stay
   bool may_change{true};            ///< false: hold_while_cutting holds the offset
   bool waits_for_cut{false};        ///< going to zero waits for the end of a cut
   bool stand_where_unknown{false};  ///< an axis without a target has the one it stands at

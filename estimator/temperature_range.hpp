@@ -26,7 +26,7 @@ class TemperatureRange {
   double degC_max_{not_a_number};
 };
 
-/// Of references that were kept those that no sensor of their column may show, in words:
+/// Of kept references, those that no sensor of their column can show, in words:
 /// "reference_degC.t1_degC = 1e+300 must be in ...".
 [[nodiscard]] std::vector<std::string> impossible_references(
     const EstimatorConfig& config, const std::vector<std::string>& columns,

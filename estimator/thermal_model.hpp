@@ -64,13 +64,13 @@ struct CovarianceGrowth {
   double noise_K{0.02};                     ///< of a block's temperature; keeps the matrix regular
   double drift_time_s{0.0};                 ///< 0: at once
   double scatter_time_s{0.0};               ///< 0: at once
-  std::vector<double> drift_factor;         ///< one an input; empty: drift_factor_default
-  std::vector<double> scatter_factor;       ///< one an input; empty: 0
+  std::vector<double> drift_factor;         ///< one per input; empty: drift_factor_default
+  std::vector<double> scatter_factor;       ///< one per input; empty: 0
   void validate(std::size_t inputs) const;  ///< @throws InvalidValue
 };
 
-/// `[made_from]`: the rows that a model was made from and what it left there, so that it can be
-/// said how far a prediction may be believed.
+/// `[made_from]`: the rows that a model was made from and what it left there, which tells how far a
+/// prediction may be believed.
 struct MadeFrom {
   /// Of one output, in its own unit.
   struct Output {
@@ -88,12 +88,12 @@ struct MadeFrom {
   double hours{0.0};
   bool within_one_run{false};        ///< judged on blocks of the only run
   std::vector<std::string> columns;  ///< temperatures and signals that the model reads
-  std::vector<double> low;           ///< one a column, as recorded (degC, not rise)
+  std::vector<double> low;           ///< one per column, as recorded (degC, not rise)
   std::vector<double> high;
   /// The domain: levels of the temperatures, then rises and signals after each low pass, 0 among
   /// them; see ModelDomain.
   std::vector<double> taus_s;
-  std::vector<double> mean;                     ///< one a feature
+  std::vector<double> mean;                     ///< one per feature
   std::vector<std::vector<double>> covariance;  ///< shape (features, features)
   double distance_max{0.0};                     ///< beyond it a row is outside
   std::map<std::string, Output> outputs;
@@ -113,9 +113,9 @@ struct RecordedCourse {
   struct Point {
     CoursePhase phase{};
     double since_s{0.0};         ///< since the heat came or went
-    std::vector<double> rise_K;  ///< one an input
-    std::vector<double> gain;    ///< one a group
-    std::vector<double> sd;      ///< one a group
+    std::vector<double> rise_K;  ///< one per input
+    std::vector<double> gain;    ///< one per group
+    std::vector<double> sd;      ///< one per group
 
     bool operator==(const Point& other) const = default;
   };
@@ -131,7 +131,7 @@ struct RecordedCourse {
 struct ThermalModel {
   std::vector<std::string> inputs;   ///< temperature columns, e.g. "t1_degC"
   std::vector<std::string> outputs;  ///< "z_um", "b_urad"
-  /// One value an input [degC], or empty: the first valid sample.
+  /// One value per input [degC], or empty: the first valid sample.
   std::vector<double> reference_degC;
   std::vector<std::vector<double>> matrix_um_per_K;
   std::vector<GuidewaySpec> guideways;
@@ -163,14 +163,14 @@ struct TermParameter {
 };
 enum class TermSubject {
   model_temperature,         ///< an input of the model
-  other_temperature,         ///< a temperature that is no input
+  other_temperature,         ///< a temperature that is not an input
   any_temperature,           ///< either of the two
   signal,                    ///< an operating signal or a position
   output,                    ///< an output of the model
   two_model_temperatures,    ///< "a|b", both inputs
   temperature_and_position,  ///< "a|b", any temperature and a position, in lexical order
   column_and_temperature,    ///< "a|b": a temperature, signal or position, then a temperature
-  several,                   ///< no one subject: LagBankSpec names them
+  several,                   ///< no single subject: LagBankSpec names them
 };
 struct TermKind {
   std::string name;
@@ -184,7 +184,7 @@ struct SubjectColumns {
   std::string second;  ///< empty: there is one column
 };
 [[nodiscard]] SubjectColumns subject_columns(std::string_view subject);
-/// Whether a column is called as a temperature is (*_degC, *_K).
+/// Whether a column's name is that of a temperature (*_degC, *_K).
 [[nodiscard]] bool is_temperature_name(std::string_view column) noexcept;
 
 /// Every kind of term that the daemon evaluates, with the names and parameters of model files

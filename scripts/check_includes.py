@@ -113,12 +113,10 @@ def drawing(includes):
     """The floors as a table, the highest first."""
     drawn = {path: [other for other in found if other.split("/")[0] in DRAWN]
              for path, found in includes.items() if path.split("/")[0] in DRAWN}
-    graph = graph_of(drawn, os.path.dirname)
-    lines = ["| floor | folder | includes |", "|---|---|---|"]
-    stack = floors(graph)
+    stack = floors(graph_of(drawn, os.path.dirname))
+    lines = ["| floor | folders |", "|---|---|"]
     for number in range(len(stack), 0, -1):
-        for node in stack[number - 1]:
-            lines.append(f"| {number} | `{node}` | {', '.join(sorted(graph[node])) or '-'} |")
+        lines.append(f"| {number} | {', '.join(f'`{node}`' for node in stack[number - 1])} |")
     return "\n".join(lines)
 
 

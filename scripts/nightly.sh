@@ -38,7 +38,7 @@ part "faults at 100 Hz" \
   "$bin/thermocomp_faults" --seeds 0:192 --hours 1 --cycle-hz 100 --complete
 part "attacks" "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --jobs 4 --minutes 45
 part "attacks on CAN" tests/vm/run_with_can.sh --timeout 1500 env TMPDIR=/dev/shm \
-  "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --links can --minutes 15
+  "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED" --links can,can_travel --minutes 15
 part "attacks on LinuxCNC" tests/attack/run_linuxcnc.sh \
   "$python" tests/attack/attack.py --bin "$bin" --seed "$SEED"
 for benchmark in $(bench/run.sh); do

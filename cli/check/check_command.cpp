@@ -5,14 +5,17 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/check/register_table.hpp"
+#include "cli/check/travel_deviation.hpp"
 #include "cli/common/json_fields.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/problems.hpp"
 #include "drivers/sensors/make_source.hpp"
+#include "estimator/axis_spans.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 
 namespace thermocomp::cli {
@@ -52,6 +55,16 @@ std::string list_names(const Names& items) {
   return result;
 }
 
+/// "x (2 nodes), z"
+std::string list_axes(const std::vector<AxisConfig>& axes) {
+  std::string result;
+  for (const AxisSpan& span : axis_spans(axes)) {
+    result += (result.empty() ? "" : ", ") + axis_name(axes[span.first]);
+    if (axes[span.first].node) result += " (" + counted(span.count, "node") + ")";
+  }
+  return result;
+}
+
 /// Sensors that the model gets nothing from; empty where there is none.
 std::string unused_sensors_text(const EstimatorConfig& config) {
   std::string names;
@@ -68,6 +81,18 @@ std::string unused_sensors_text(const EstimatorConfig& config) {
   }
   if (names.empty()) return {};
   return "in no block: " + names + " (recorded, but nothing is computed from it)\n";
+}
+
+/// Whether sensors are watched that read what their neighbours contradict.
+std::string watch_text(const DaemonConfig& config) {
+  const SuspectedPolicy policy = config.estimator.compensation.suspected_sensors;
+  if (policy == SuspectedPolicy::off)
+    return "sensors that creep or jump: not watched, by suspected_sensors = \"off\"";
+  if (config.model.covariance_K2.empty())
+    return "sensors that creep or jump: NOT watched, since the model has no [covariance] "
+           "(thermocomp covariance makes it)";
+  return policy == SuspectedPolicy::warn ? "sensors that creep or jump: told"
+                                         : "sensors that creep or jump: told, and not used";
 }
 
 /// What the model file says of how well it fits a machine.
@@ -101,7 +126,7 @@ void print_what_was_found(const DaemonConfig& config) {
             << '\n'
             << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)
             << '\n'
-            << unused_sensors_text(estimator) << "axes: " << list_names(estimator.axes) << '\n'
+            << unused_sensors_text(estimator) << "axes: " << list_axes(estimator.axes) << '\n'
             << "controller " << controller_kind(config) << ", "
             << counted(estimator.signals.size(), "signal") << '\n'
             << "model " << config.model_file.string() << ": "
@@ -109,7 +134,8 @@ void print_what_was_found(const DaemonConfig& config) {
             << counted(config.model.outputs.size(), "output") << ", "
             << counted(config.model.terms.size(), "extension term") << ", SHA-256 "
             << config.model_checksum << '\n'
-            << comparison_text(config.model) << '\n'
+            << travel_deviation_text(config) << comparison_text(config.model) << '\n'
+            << watch_text(config) << '\n'
             << first_start_text(config) << '\n'
             << config.file.string() << ": OK\n";
 }

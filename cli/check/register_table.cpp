@@ -10,6 +10,7 @@
 #include "cli/common/modbus_names.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
+#include "estimator/axis_spans.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -51,8 +52,10 @@ std::string unit_of_axis(const AxisConfig& axis) {
 /// "bit 0: x, bit 1: z; 1 = the offset is good"
 std::string valid_text(const std::vector<AxisConfig>& axes) {
   std::string text("valid bits; ");
-  for (std::size_t i = 0; i < axes.size(); ++i)
-    text += (i == 0 ? "bit " : ", bit ") + std::to_string(i) + ": " + axes[i].name;
+  const std::vector<AxisSpan> spans = axis_spans(axes);
+  for (std::size_t i = 0; i < spans.size(); ++i)
+    text +=
+        (i == 0 ? "bit " : ", bit ") + std::to_string(i) + ": " + axis_name(axes[spans[i].first]);
   return text + "; 1: take the offset";
 }
 
@@ -71,14 +74,65 @@ Row axis_row(const ModbusAxis& place, const ModbusValue& value, const AxisConfig
   return {place_name(value), type_name(value), what + meant + axis.name, scaled(unit, value.scale)};
 }
 
+/// A set: the registers that the controller takes over together.
+void add_set(const ModbusTravel& travel, const AxisConfig& axis, std::vector<Row>& written,
+             std::vector<Row>& read) {
+  const std::string of_axis = " of axis " + axis_name(axis);
+  const auto number = [&](const ModbusValue& value, const std::string& what) {
+    written.push_back({place_name(value), type_name(value), what + of_axis, "-"});
+  };
+  const auto add = [&](const std::vector<ModbusValue>& values, const std::string& before,
+                       std::vector<Row>& rows) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const TravelValueText text = travel_value_text(travel, unit_of_axis(axis), i);
+      rows.push_back({place_name(values[i]), type_name(values[i]), before + text.what + of_axis,
+                      scaled(text.unit, values[i].scale)});
+    }
+  };
+  number(travel.begin, "begin: number of the set");
+  add(travel.values, "", written);
+  number(travel.end, "end: number of the set");
+  add(travel.applied, "applied ", read);
+}
+
+/// How the controller interpolates, and when it takes a set over.
+template <class Controller>
+std::string set_text(const DaemonConfig& config, const Controller& controller,
+                     const std::string& taken_over) {
+  std::string text;
+  const std::vector<AxisSpan> spans = axis_spans(config.estimator.axes);
+  for (std::size_t i = 0; i < controller.axes.size(); ++i) {
+    const auto& travel = controller.axes[i].travel;
+    if (!travel) continue;
+    const AxisConfig& axis = config.estimator.axes[spans[i].first];
+    text += "  axis " + axis_name(axis) + ": ";
+    if (travel->p0_mm)
+      text += "offset = K0 + slope (" + axis.node->position + " - " + number_text(*travel->p0_mm) +
+              " mm)";
+    else
+      text += "offset straight from node to node by " + axis.node->position;
+    text += ", for " + axis.node->position + " from " + number_text(travel->nodes_mm.front()) +
+            " to " + number_text(travel->nodes_mm.back()) + " mm\n";
+  }
+  if (text.empty()) return text;
+  return "\nInterpolated by the controller, by its own position (a set is taken over where " +
+         taken_over + "):\n" + text;
+}
+
 std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfig& controller) {
   const std::vector<AxisConfig>& axes = config.estimator.axes;
   std::vector<Row> written;
   std::vector<Row> read;
-  for (std::size_t i = 0; i < axes.size(); ++i) {
+  const std::vector<AxisSpan> spans = axis_spans(axes);
+  for (std::size_t i = 0; i < spans.size(); ++i) {
     const ModbusAxis& place = controller.axes[i];
-    written.push_back(axis_row(place, place.offset, axes[i], ""));
-    if (place.applied) read.push_back(axis_row(place, *place.applied, axes[i], "applied "));
+    const AxisConfig& axis = axes[spans[i].first];
+    if (place.travel) {
+      add_set(*place.travel, axis, written, read);
+      continue;
+    }
+    written.push_back(axis_row(place, place.offset, axis, ""));
+    if (place.applied) read.push_back(axis_row(place, *place.applied, axis, "applied "));
   }
   if (const auto& valid = controller.valid_bits)
     written.push_back({place_name(*valid), type_name(without_sign(*valid)), valid_text(axes), "-"});
@@ -130,19 +184,40 @@ std::string frames_text(const Frames& frames) {
   return text;
 }
 
+/// A set: what the controller takes over together.
+void add_set(Frames& frames, const CanTravel& travel, const CanSet& set, const AxisConfig& axis,
+             const std::string& before) {
+  const std::string of_axis = " of axis " + axis_name(axis);
+  for (std::size_t i = 0; i < set.values.size(); ++i) {
+    const TravelValueText text = travel_value_text(travel, unit_of_axis(axis), i);
+    add(frames, set.values[i], before + text.what + of_axis,
+        scaled(text.unit, set.values[i].scale, set.values[i].offset));
+  }
+  for (const CanSignal& number : set.numbers)
+    add(frames, number, before + "number of the set" + of_axis, "-", true);
+}
+
+void add_axis(const CanAxis& place, const AxisConfig& axis, Frames& written, Frames& read) {
+  if (place.travel) {
+    add_set(written, *place.travel, place.travel->sent, axis, "");
+    add_set(read, *place.travel, place.travel->applied, axis, "applied ");
+    return;
+  }
+  const std::string unit = unit_of_axis(axis);
+  add(written, place.offset, "offset of axis " + axis.name,
+      scaled(unit, place.offset.scale, place.offset.offset));
+  if (place.applied)
+    add(read, *place.applied, "applied offset of axis " + axis.name,
+        scaled(unit, place.applied->scale, place.applied->offset));
+}
+
 std::string can_table(const DaemonConfig& config, const CanControllerConfig& controller) {
   const std::vector<AxisConfig>& axes = config.estimator.axes;
   Frames written;
   Frames read;
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    const CanAxis& place = controller.axes[i];
-    const std::string unit = unit_of_axis(axes[i]);
-    add(written, place.offset, "offset of axis " + axes[i].name,
-        scaled(unit, place.offset.scale, place.offset.offset));
-    if (place.applied)
-      add(read, *place.applied, "applied offset of axis " + axes[i].name,
-          scaled(unit, place.applied->scale, place.applied->offset));
-  }
+  const std::vector<AxisSpan> spans = axis_spans(axes);
+  for (std::size_t i = 0; i < spans.size(); ++i)
+    add_axis(controller.axes[i], axes[spans[i].first], written, read);
   if (controller.valid_bits) add(written, *controller.valid_bits, valid_text(axes), "-", true);
   if (controller.heartbeat)
     add(written, *controller.heartbeat,
@@ -159,11 +234,19 @@ std::string can_table(const DaemonConfig& config, const CanControllerConfig& con
          number_text(controller.silent_after_s) + " s:\n" + frames_text(read);
 }
 
+/// Of frames, beside their numbers.
+std::string taken_over_text(const CanControllerConfig& controller) {
+  return "its newest frames carry the same number, none older than " +
+         number_text(CanTravel::forgotten_after_s(controller.period_s)) + " s";
+}
+
 std::string bounds_text(const DaemonConfig& config) {
   std::string text = "\nWhat the daemon keeps to, and the controller should refuse beyond:\n";
-  for (const AxisConfig& axis : config.estimator.axes) {
+  for (const AxisSpan& span : axis_spans(config.estimator.axes)) {
+    const AxisConfig& axis = config.estimator.axes[span.first];
     const std::string unit = unit_of_axis(axis);
-    text.append("  axis ").append(axis.name).append(": offset within +-");
+    text.append("  axis ").append(axis_name(axis)).append(": offset ");
+    text.append(axis.node ? "everywhere on the travel " : "").append("within +-");
     text.append(number_text(axis.limiter.offset_um_max)).append(" ").append(unit);
     text.append(", changing by at most ").append(number_text(axis.limiter.rate_um_per_s_max));
     text.append(" ").append(unit).append("/s\n");
@@ -189,7 +272,7 @@ std::string missing_text(bool valid_bits, bool heartbeat, bool reads_back) {
 template <class Controller>
 std::string gaps_of(const Controller& controller) {
   const bool reads_back = std::all_of(controller.axes.begin(), controller.axes.end(),
-                                      [](const auto& axis) { return axis.applied.has_value(); });
+                                      [](const auto& axis) { return axis.reads_back(); });
   return missing_text(controller.valid_bits.has_value(), controller.heartbeat.has_value(),
                       reads_back);
 }
@@ -197,10 +280,14 @@ std::string gaps_of(const Controller& controller) {
 struct TableText {
   const DaemonConfig& config;
   std::string operator()(const ModbusControllerConfig& controller) const {
-    return modbus_table(config, controller) + bounds_text(config) + gaps_of(controller);
+    return modbus_table(config, controller) +
+           set_text(config, controller, "`end`, read first, equals `begin`, read last") +
+           bounds_text(config) + gaps_of(controller);
   }
   std::string operator()(const CanControllerConfig& controller) const {
-    return can_table(config, controller) + bounds_text(config) + gaps_of(controller);
+    return can_table(config, controller) +
+           set_text(config, controller, taken_over_text(controller)) + bounds_text(config) +
+           gaps_of(controller);
   }
   std::string operator()(const BridgeControllerConfig&) const {
     return "LinuxCNC: no registers; its bridge calls the daemon (docs/linuxcnc.md)\n" +

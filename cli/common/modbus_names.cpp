@@ -3,6 +3,8 @@
 #include <array>
 #include <variant>
 
+#include "config/text/number_text.hpp"
+
 namespace thermocomp::cli {
 
 std::string table_name(ModbusTable table) {
@@ -68,6 +70,14 @@ ModbusValue without_sign(ModbusValue value) noexcept {
   if (value.encoding == Encoding::int16) value.encoding = Encoding::uint16;
   if (value.encoding == Encoding::int32) value.encoding = Encoding::uint32;
   return value;
+}
+
+TravelValueText travel_value_text(const TravelShape& travel, const std::string& unit,
+                                  std::size_t index) {
+  if (!travel.p0_mm) return {"offset at " + number_text(travel.nodes_mm[index]) + " mm", unit};
+  const std::string at = number_text(*travel.p0_mm) + " mm";
+  if (index == 0) return {"K0, offset at " + at, unit};
+  return index == 1 ? TravelValueText{"slope", unit + "/m"} : TravelValueText{"P0", "mm"};
 }
 
 std::string line_name(const ModbusLine& line) {

@@ -18,6 +18,14 @@ namespace thermocomp::cli {
 [[nodiscard]] std::string type_name(const ModbusValue& value);
 /// As of a value that is a count or bits and has no sign, whatever the configuration calls it.
 [[nodiscard]] ModbusValue without_sign(ModbusValue value) noexcept;
+/// What a value of a travel's set means: "slope" in "um/m", "offset at 400 mm" in "um", ...
+struct TravelValueText {
+  std::string what;
+  std::string unit;
+};
+/// @param unit  of the axis' offset: "um", "urad"
+[[nodiscard]] TravelValueText travel_value_text(const TravelShape& travel, const std::string& unit,
+                                                std::size_t index);
 /// "127.0.0.1:502", or "/dev/ttyUSB0, 19200 baud, 8N1"
 [[nodiscard]] std::string line_name(const ModbusLine& line);
 /// "exception 2 (illegal data address)"

@@ -68,9 +68,16 @@ std::string with_unit(const std::string& name, std::string unit) {
   return header.append("\"");
 }
 
+/// What a logger writes of a quotient without a value.
+bool is_infinite(std::string_view field) {
+  return field == "INF" || field == "+INF" || field == "-INF";
+}
+
 /// A table's rows with the fields of `left_out` taken away.
+/// Infinite values are missing there; the table says how many.
 void append_rows(std::string_view rest, int line, const std::string& name, std::size_t columns,
-                 const std::vector<bool>& left_out, std::string& text) {
+                 const std::vector<bool>& left_out, PlainTable& table) {
+  std::size_t infinite = 0;
   while (!rest.empty()) {
     ++line;
     const std::string_view row = take_line(rest);
@@ -82,12 +89,16 @@ void append_rows(std::string_view rest, int line, const std::string& name, std::
     bool first = true;
     for (std::size_t i = 0; i < fields.size(); ++i) {
       if (left_out[i]) continue;
-      if (!first) text += ',';
-      text += fields[i];
+      if (!first) table.text += ',';
+      if (is_infinite(fields[i]))
+        ++infinite;
+      else
+        table.text += fields[i];
       first = false;
     }
-    text += '\n';
+    table.text += '\n';
   }
+  if (infinite > 0) table.said.push_back("INF, taken as missing: " + std::to_string(infinite));
 }
 
 }  // namespace
@@ -121,7 +132,7 @@ PlainTable plain_toa5(std::string_view text, const std::string& name) {
     table.text += with_unit(names[i], is_time ? "" : head[2][i]);
   }
   table.text += '\n';
-  append_rows(text, 4, name, names.size(), left_out, table.text);
+  append_rows(text, 4, name, names.size(), left_out, table);
   table.said.push_back("TOA5 of station '" + (head[0].size() > 1 ? head[0][1] : std::string()) +
                        "', table '" + head[0].back() + "': names in line 2, units in line 3");
   if (std::find(left_out.begin(), left_out.end(), true) != left_out.end())
@@ -143,7 +154,7 @@ PlainTable plain_kw_watcher(std::string_view text, const std::string& name) {
   for (std::size_t i = 2; i < columns; ++i)
     table.text.append(",").append(with_unit(head[1][i], head[6][i]));
   table.text += '\n';
-  append_rows(text, 7, name, columns, std::vector<bool>(columns, false), table.text);
+  append_rows(text, 7, name, columns, std::vector<bool>(columns, false), table);
   table.said.emplace_back("KW Watcher: names in line 2, units in line 7");
   return table;
 }

@@ -1,6 +1,7 @@
 #include "cli/init/init_draft.hpp"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "config/text/number_text.hpp"
 #include "config/toml/toml_text.hpp"
@@ -196,8 +197,10 @@ std::string configuration_text(const InitDraft& draft) {
       "format = 1\n";
   if (!draft.own_folder.empty())
     text += "state_file = " + toml_string(draft.own_folder + "/state.json") + "\n";
+  const bool is_relative = std::filesystem::path(draft.model_file).is_relative();
   text += "\n[model]\nfile = " + toml_string(draft.model_file) +
-          "                # relative to this file\n\n" + buses_text(draft);
+          (is_relative ? "                # relative to this file" : "") + "\n\n" +
+          buses_text(draft);
   for (const InitModule& module : draft.modules) text += module_text(draft, module);
   return text + blocks_text(draft) + controller_text(draft.controller) + axes_text(draft) +
          files_text(draft);

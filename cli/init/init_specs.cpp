@@ -179,7 +179,9 @@ InitModule parse_module(const std::string& text) {
                   ": must be UNIT=PRESET[:CHANNELS], for another bus than the first "
                   "BUS/UNIT=..., without a preset UNIT=TABLE:TYPE:DEGC_A_COUNT:ADDRESSES");
   InitModule module;
-  const std::vector<std::string> where = split(text.substr(0, equals), '/');
+  std::vector<std::string> where = split(text.substr(0, equals), '/');
+  if (where.size() == 2 && where[0].starts_with("bus"))  // as the configuration names it
+    where[0].erase(0, 3);
   if (where.size() > 2) throw Failure(text + ": must begin with UNIT= or BUS/UNIT=");
   if (where.size() == 2)
     module.bus = static_cast<std::size_t>(whole_number(where[0], 1, 99, "bus of " + text)) - 1;

@@ -187,7 +187,10 @@ void add_covariance_command(CLI::App& app, Action& action) {
 
 void add_model_commands(CLI::App& app, Action& action) {
   const auto predict_options = std::make_shared<PredictOptions>();
-  CLI::App* sub = app.add_subcommand("predict", "the model alone over a run file");
+  CLI::App* sub = app.add_subcommand(
+      "predict",
+      "the model alone over a run file; of each measured output it prints the RMS and the largest "
+      "of what the model leaves, in um");
   sub->add_option("--model", predict_options->model, "model file")->type_name("FILE")->required();
   sub->add_option("RUN", predict_options->run, "run file, RUN.csv or RUN.csv@T0:T1")
       ->type_name("FILE")

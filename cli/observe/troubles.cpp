@@ -117,7 +117,11 @@ Verdict verdict(const json& status) {
     return {false, true, "no: DRY RUN",
             ", nothing is written to the controller (" +
                 (mode == "dry_run" ? "all is read and computed" : mode_words(mode)) + since + ")"};
-  if (is_compensating(status)) return {true, true, "yes", since};
+  if (is_compensating(status)) {
+    // An earlier daemon tells of the mode alone.
+    const char* key = status.contains("compensating_s") ? "compensating_s" : "mode_since_s";
+    return {true, true, "yes", ", for " + duration_text(number_of(status, key))};
+  }
   if (mode == "compensating") {
     const auto idle = axes_not_driven(status);
     return {false, false, "no",
@@ -140,6 +144,8 @@ std::vector<Trouble> troubles(const json& status) {
   };
   for (const json& reason : list_of(status, "reasons")) {
     const std::string name = reason.is_string() ? reason.get<std::string>() : reason.dump();
+    // Signals come from the controller: where that is away, it is the cause.
+    if (name == "signal_lost" && has_reason(status, "controller_offline")) continue;
     const ReasonText text = reason_text(name);
     add(std::string(text.meaning), text.remedy);
   }

@@ -34,7 +34,7 @@ constexpr double patience_s = 10.0;
 json axis_now(const GlobalOptions& global, const std::string& name) {
   const json offsets = ask_daemon(global.socket, "offsets", json::object());
   for (const json& axis : list_of(offsets, "axes"))
-    if (text_of(axis, "name") == name) return axis;
+    if (text_of(axis, "name") == name || text_of(axis, "axis") == name) return axis;
   return json::object();
 }
 

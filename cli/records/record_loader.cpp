@@ -23,16 +23,18 @@ bool is_history(const std::string& file) {
 }
 
 RunFile load_record(const std::string& argument, RunLoader& loader) {
-  if (!is_history(argument)) return loader.load(argument);
+  const RunSelection selection = parse_selection(argument);
+  const std::string file = selection.file.string();
+  if (!is_history(file)) return loader.load(argument);
   std::ostringstream text;
-  Progress progress("reading " + argument);
+  Progress progress("reading " + file);
   const ExportSummary summary =
-      export_run(argument, std::nullopt, std::nullopt, text,
+      export_run(file, std::nullopt, std::nullopt, text,
                  [&progress](double fraction) { progress.update(fraction); });
   for (const HistoryDamage& damage : summary.damage) {
-    std::fprintf(stderr, "%s: %s\n", argument.c_str(), printable_text(to_string(damage)).c_str());
+    std::fprintf(stderr, "%s: %s\n", file.c_str(), printable_text(to_string(damage)).c_str());
   }
-  return parse_run(text.str(), argument);
+  return parse_run(text.str(), argument, selection);  // the stretch is a part of its name
 }
 
 }  // namespace thermocomp::cli

@@ -11,8 +11,8 @@ namespace thermocomp::cli {
 /// Whether a file is a database as thermocompd writes its history.
 [[nodiscard]] bool is_history(const std::string& file);
 
-/// RUN.csv[@T0:T1] by `loader`, or a history as `thermocomp export` gives it; what of it is damaged
-/// is told on stderr.
+/// RUN.csv[@T0:T1] by `loader`, or a history (with @T0:T1 as well, seconds since its start) as
+/// `thermocomp export` gives it; what of it is damaged is told on stderr.
 /// @throws ConfigurationError, HistoryError
 [[nodiscard]] RunFile load_record(const std::string& argument, RunLoader& loader);
 

@@ -66,12 +66,16 @@ class Setups {
     }
   }
 
+  [[nodiscard]] const ReplaySetup* of(const SegmentInfo& segment) const {
+    const auto found = setups_.find(segment.setup);
+    return found == setups_.end() ? nullptr : &found->second;
+  }
+
   [[nodiscard]] const ReplaySetup* at(double moment_s) const {
     const ReplaySetup* setup = nullptr;
     for (const SegmentInfo& segment : segments_) {
       if (s_per_ns * static_cast<double>(segment.wall_ns) > moment_s && setup != nullptr) break;
-      const auto found = setups_.find(segment.setup);
-      if (found != setups_.end()) setup = &found->second;
+      if (const ReplaySetup* found = of(segment)) setup = found;
     }
     return setup;
   }
@@ -81,32 +85,61 @@ class Setups {
   std::map<std::int64_t, ReplaySetup> setups_;
 };
 
-AxisWeek axis_week(const AxisConfig& axis, const ThinnedHistory& course) {
+/// Of segments with or without a dry run; one behind the other they are one.
+std::vector<WallSpan> spans_of(const std::vector<SegmentInfo>& segments, const Setups& setups,
+                               bool dry_run, const WallSpan& span) {
+  constexpr double apart_s = 1.0;
+  std::vector<WallSpan> spans;
+  for (const SegmentInfo& segment : segments) {
+    const ReplaySetup* setup = setups.of(segment);
+    if (setup == nullptr || setup->dry_run != dry_run) continue;
+    const WallSpan one =
+        WallSpan{s_per_ns * static_cast<double>(segment.wall_ns), end_s(segment)}.within(span);
+    if (!(one.length_s() > 0.0)) continue;
+    if (!spans.empty() && std::abs(one.from_s - spans.back().to_s) < apart_s)
+      spans.back().to_s = one.to_s;
+    else
+      spans.push_back(one);
+  }
+  return spans;
+}
+
+/// Of the points at one place.
+OffsetRange range_of(const std::vector<double>& offsets, const std::vector<PointPlace>& places,
+                     PointPlace place, double bound_um) {
+  OffsetRange range;
+  double count = 0.0;
+  double sizes = 0.0;
+  double bound = 0.0;
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    if (places[i] != place || !std::isfinite(offsets[i])) continue;
+    range.low_um = std::fmin(range.low_um, offsets[i]);
+    range.high_um = std::fmax(range.high_um, offsets[i]);
+    sizes += std::abs(offsets[i]);
+    count += 1.0;
+    if (std::abs(offsets[i]) >= at_bound_share * bound_um) bound += 1.0;
+  }
+  if (count > 0.0) {
+    range.mean_size_um = sizes / count;
+    range.at_bound_share = bound / count;
+  }
+  return range;
+}
+
+AxisWeek axis_week(const AxisConfig& axis, const ThinnedHistory& course,
+                   const std::vector<PointPlace>& places) {
   AxisWeek week;
   week.name = axis.name;
   week.unit = axis.output.ends_with("_urad") ? "urad" : "um";
   week.bound_um = axis.limiter.offset_um_max;
   const auto* offsets = column_of(course, axis.name + "_offset_um");
   if (offsets == nullptr) return week;
-  double count = 0.0;
-  double sizes = 0.0;
-  double bound = 0.0;
-  for (const double offset : *offsets) {
-    if (!std::isfinite(offset)) continue;
-    week.low_um = std::fmin(week.low_um, offset);
-    week.high_um = std::fmax(week.high_um, offset);
-    sizes += std::abs(offset);
-    count += 1.0;
-    if (std::abs(offset) >= at_bound_share * week.bound_um) bound += 1.0;
-  }
-  if (count > 0.0) {
-    week.mean_size_um = sizes / count;
-    week.at_bound_share = bound / count;
-  }
+  week.sent = range_of(*offsets, places, PointPlace::sent, week.bound_um);
+  week.dry_run = range_of(*offsets, places, PointPlace::dry_run, week.bound_um);
   return week;
 }
 
-/// What was taken out right then is what the model claimed, as far as slew and bound let it.
+/// The offset right then is what the model claimed, as far as slew and bound let it.
 double offset_at(const std::filesystem::path& history, double moment_s, const std::string& axis,
                  const SetupParser& parser) {
   const ThinnedHistory there = thin_history(history, moment_s - probing_half_s,
@@ -118,17 +151,15 @@ double offset_at(const std::filesystem::path& history, double moment_s, const st
 ProbingWeek probing_of(const std::filesystem::path& history, const ReplaySetup& setup,
                        double moment_s, const std::string& axis, double value_um,
                        const SetupParser& parser) {
-  ProbingWeek probing{moment_s, axis, std::nan(""), value_um};
+  ProbingWeek probing{moment_s, axis, std::nan(""), value_um, setup.dry_run};
   const auto& axes = setup.estimator.axes;
   const auto of = std::find_if(axes.begin(), axes.end(),
                                [&](const AxisConfig& one) { return one.name == axis; });
   if (of == axes.end()) return probing;
-  const double taken_um =
-      setup.dry_run ? 0.0 : -offset_at(history, moment_s, axis, parser) * of->sign;
-  probing.claimed_um = taken_um;
-  // Given as a whole, what the offset takes out is still in it.
-  if (setup.estimator.correction.measured == MeasuredMeaning::total)
-    probing.left_um = value_um - taken_um;
+  probing.claimed_um = -offset_at(history, moment_s, axis, parser) * of->sign;
+  // Given as a whole (always so in a dry run), what the offset takes out is still in it.
+  if (setup.estimator.correction.measured == MeasuredMeaning::total || setup.dry_run)
+    probing.left_um = value_um - probing.claimed_um;
   return probing;
 }
 
@@ -216,6 +247,12 @@ WallSpan WallSpan::within(const WallSpan& other) const noexcept {
   return {std::max(from_s, other.from_s), std::min(to_s, other.to_s)};
 }
 
+double MachineWeek::dry_run_s() const {
+  double sum = 0.0;
+  for (const WallSpan& one : dry_runs) sum += one.length_s();
+  return sum;
+}
+
 double MachineWeek::mode_s(const std::string& mode) const {
   double sum = 0.0;
   for (const ModeSpell& spell : modes)
@@ -265,6 +302,10 @@ std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) 
     ++outages.count;
     outages.lasted_s += within.length_s();
     outages.lasts = !ended && until_s >= span.to_s - 1.0;
+    Outages::Kind& kind = outages.kinds[list[i].what];
+    ++kind.count;
+    kind.lasted_s += within.length_s();
+    kind.lasts = outages.lasts;
   }
   std::vector<Outages> sorted;
   for (auto& [subject, outages] : found) sorted.push_back(std::move(outages));
@@ -305,6 +346,25 @@ std::vector<SensorWeek> sensors_of(const ThinnedHistory& course) {
   return sensors;
 }
 
+std::vector<PointPlace> places_of(const ThinnedHistory& course, const std::vector<WallSpan>& sent,
+                                  const std::vector<WallSpan>& dry_runs) {
+  const std::vector<double>& time_s = course.time_s;
+  const double half_s = time_s.size() > 1 ? 0.5 * (time_s[1] - time_s[0]) : 0.0;
+  const auto touches = [half_s](double middle_s, const std::vector<WallSpan>& spans) {
+    return std::any_of(spans.begin(), spans.end(), [&](const WallSpan& span) {
+      return span.overlaps({middle_s - half_s, middle_s + half_s});
+    });
+  };
+  std::vector<PointPlace> places;
+  for (const double middle_s : time_s) {
+    if (!touches(middle_s, dry_runs))
+      places.push_back(PointPlace::sent);
+    else
+      places.push_back(touches(middle_s, sent) ? PointPlace::both : PointPlace::dry_run);
+  }
+  return places;
+}
+
 WallSpan recorded_span(const std::filesystem::path& history) {
   const HistoryReader reader(history);
   WallSpan span{1e300, -1e300};
@@ -337,10 +397,13 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.outages = outages_of(events, span);
   week.sensors = sensors_of(week.course);
   const Setups setups(reader, parser, week.damage);
+  week.sent = spans_of(reader.segments(), setups, false, span);
+  week.dry_runs = spans_of(reader.segments(), setups, true, span);
   if (const ReplaySetup* setup = setups.at(span.to_s)) {
     week.dry_run = setup->dry_run;
+    const std::vector<PointPlace> places = places_of(week.course, week.sent, week.dry_runs);
     for (const AxisConfig& axis : setup->estimator.axes)
-      week.axes.push_back(axis_week(axis, week.course));
+      week.axes.push_back(axis_week(axis, week.course, places));
   }
   for (const RecordedEvent& event : events.events) {
     const double at_s = wall_s(event);

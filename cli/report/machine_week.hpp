@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/history/format/recorded_event.hpp"
@@ -21,6 +22,9 @@ struct WallSpan {
   double from_s{0.0};
   double to_s{0.0};
   [[nodiscard]] double length_s() const noexcept { return to_s > from_s ? to_s - from_s : 0.0; }
+  [[nodiscard]] bool overlaps(const WallSpan& other) const noexcept {
+    return from_s < other.to_s && other.from_s < to_s;
+  }
   [[nodiscard]] WallSpan within(const WallSpan& other) const noexcept;
 };
 
@@ -29,30 +33,48 @@ struct ModeSpell {
   std::string mode;  ///< "compensating", "holding", ...
 };
 
-/// Faults of one subject ("sensor bed", "bus cabinet", "reason controller_offline").
+/// Before a sensor's name: it shows what its neighbours contradict.
+inline constexpr std::string_view suspected_sensor = "suspected sensor ";
+
+/// Faults of one subject ("sensor bed", "suspected sensor bed", "bus cabinet",
+/// "reason controller_offline").
 struct Outages {
+  struct Kind {
+    std::size_t count{0};
+    double lasted_s{0.0};
+    bool lasts{false};
+    bool operator==(const Kind&) const = default;
+  };
   std::string subject;
   std::string what;  ///< the last one
   std::size_t count{0};
   double lasted_s{0.0};
-  bool lasts{false};  ///< at the end of the stretch
+  bool lasts{false};                  ///< at the end of the stretch
+  std::map<std::string, Kind> kinds;  ///< the same, by what
+};
+
+struct OffsetRange {
+  double low_um{std::numeric_limits<double>::quiet_NaN()};
+  double high_um{std::numeric_limits<double>::quiet_NaN()};
+  double mean_size_um{std::numeric_limits<double>::quiet_NaN()};  ///< of |offset|
+  double at_bound_share{0.0};                                     ///< of the time with an offset
+  [[nodiscard]] bool is_there() const noexcept { return low_um <= high_um; }
 };
 
 struct AxisWeek {
   std::string name;
   std::string unit;  ///< "um", "urad"
   double bound_um{0.0};
-  double low_um{std::numeric_limits<double>::quiet_NaN()};
-  double high_um{std::numeric_limits<double>::quiet_NaN()};
-  double mean_size_um{std::numeric_limits<double>::quiet_NaN()};  ///< of |offset|
-  double at_bound_share{0.0};                                     ///< of the time with an offset
+  OffsetRange sent;
+  OffsetRange dry_run;  ///< computed and recorded, and not sent
 };
 
 struct ProbingWeek {
   double wall_s{0.0};
   std::string axis;
-  double claimed_um{std::numeric_limits<double>::quiet_NaN()};  ///< displacement that was taken out
+  double claimed_um{std::numeric_limits<double>::quiet_NaN()};  ///< displacement by the offset
   double left_um{std::numeric_limits<double>::quiet_NaN()};     ///< at the tool, with the offset
+  bool dry_run{false};  ///< the offset was not sent: both are what they would have been
 };
 
 /// A sensor beside the one that moved most like it.
@@ -77,11 +99,14 @@ struct MachineWeek {
   std::vector<SensorWeek> sensors;
   std::vector<RecordedEvent> commands;  ///< oldest first
   std::size_t starts{0};                ///< of the daemon
-  bool dry_run{false};
+  std::vector<WallSpan> sent;           ///< recorded outside of dry runs; in order
+  std::vector<WallSpan> dry_runs;       ///< recorded, and nothing sent; in order
+  bool dry_run{false};                  ///< at the end
   std::vector<HistoryDamage> damage;
   ThinnedHistory course;
 
   [[nodiscard]] double mode_s(const std::string& mode) const;
+  [[nodiscard]] double dry_run_s() const;
 };
 
 /// The same from the parts, for a test.
@@ -92,6 +117,12 @@ struct WeekEvents {
 [[nodiscard]] std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& span);
 [[nodiscard]] std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span);
 [[nodiscard]] std::vector<SensorWeek> sensors_of(const ThinnedHistory& course);
+
+/// Whether a point of a course lies in a dry run, or elsewhere; `both`: its mean is of both.
+enum class PointPlace { sent, dry_run, both };
+[[nodiscard]] std::vector<PointPlace> places_of(const ThinnedHistory& course,
+                                                const std::vector<WallSpan>& sent,
+                                                const std::vector<WallSpan>& dry_runs);
 
 /// @throws HistoryError when nothing can be taken from the file
 [[nodiscard]] MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& span,

@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "cli/common/json_fields.hpp"
 #include "cli/common/reason_text.hpp"
@@ -17,6 +20,7 @@ constexpr double bound_told_share = 0.01;
 constexpr double left_told_share = 0.3;
 constexpr double left_told_um = 2.0;
 
+/// Of dry runs and of the rest alike: by both the model is judged.
 double rms_left_um(const MachineWeek& week, const std::string& axis, double& claimed_um,
                    std::size_t& count) {
   double squares = 0.0;
@@ -33,24 +37,102 @@ double rms_left_um(const MachineWeek& week, const std::string& axis, double& cla
   return std::sqrt(squares / n);
 }
 
-void add_outages(const MachineWeek& week, const std::string& kind,
+bool is_told(const Outages::Kind& kind) {
+  return kind.lasted_s >= outage_told_s || kind.lasts || kind.count >= 5;
+}
+
+/// "2 times, 54 min 0 s in all, and still."
+std::string how_often(const Outages::Kind& kind) {
+  return std::to_string(kind.count) + (kind.count == 1 ? " time, " : " times, ") +
+         duration_text(kind.lasted_s) + " in all" + (kind.lasts ? ", and still" : "") + ".";
+}
+
+std::string as_a_sentence(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
+
+std::string what_to_do(const ReasonText& text) {
+  return text.remedy.empty() ? "" : " Do: " + std::string(text.remedy) + ".";
+}
+
+void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {
+  for (const Outages& outages : week.outages) {
+    if (!outages.subject.starts_with("reason ")) continue;
+    // Lines of sensors and axes say which.
+    if (outages.what == "sensor_suspected" || outages.what == "at_bound") continue;
+    const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
+    const ReasonText text = reason_text(outages.what);
+    if (is_told(all))
+      lines.push_back(as_a_sentence(std::string(text.meaning)) + ", " + how_often(all) +
+                      what_to_do(text));
+  }
+}
+
+/// Buses, axes, the controller.
+void add_devices(const MachineWeek& week, const std::string& kind,
                  std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
     if (!outages.subject.starts_with(kind)) continue;
-    if (outages.lasted_s < outage_told_s && !outages.lasts && outages.count < 5) continue;
-    const bool sensor = kind == "sensor ";
-    const bool reason = kind == "reason ";
-    const ReasonText text = sensor ? fault_text(outages.what) : reason_text(outages.what);
-    std::string line = reason ? std::string(text.meaning) : outages.subject + ": ";
-    if (!reason) line += sensor ? std::string(text.meaning) : outages.what;
-    line += ", " + std::to_string(outages.count) + (outages.count == 1 ? " time, " : " times, ") +
-            duration_text(outages.lasted_s) + " in all" + (outages.lasts ? ", and still" : "") +
-            ".";
-    if (!text.remedy.empty() && (sensor || reason))
-      line += " Do: " + std::string(text.remedy) + ".";
-    if (!sensor && !reason) line += " Look at its cable, its supply and its address.";
-    lines.push_back(std::move(line));
+    const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
+    if (is_told(all))
+      lines.push_back(as_a_sentence(outages.subject) + ": " + outages.what + ", " + how_often(all) +
+                      " Look at its cable, its supply and its address.");
   }
+}
+
+/// Those with the same fault for the same time are one line: a bus takes all its sensors with it.
+void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines) {
+  struct Group {
+    std::string what;
+    Outages::Kind kind;
+    std::vector<std::string> sensors;
+  };
+  const std::string sensor = "sensor ";
+  std::vector<Group> groups;
+  for (const Outages& outages : week.outages) {
+    if (!outages.subject.starts_with(sensor)) continue;
+    for (const auto& [what, kind] : outages.kinds) {
+      if (!is_told(kind)) continue;
+      const auto alike = [&what = what, &kind = kind](const Group& group) {
+        return group.what == what && group.kind.count == kind.count &&
+               group.kind.lasts == kind.lasts &&
+               std::abs(group.kind.lasted_s - kind.lasted_s) < outage_told_s;
+      };
+      auto group = std::find_if(groups.begin(), groups.end(), alike);
+      if (group == groups.end()) group = groups.insert(group, {what, kind, {}});
+      group->sensors.push_back(outages.subject.substr(sensor.size()));
+    }
+  }
+  std::stable_sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
+    return a.kind.lasted_s > b.kind.lasted_s;
+  });
+  for (const Group& group : groups) {
+    std::string names;
+    for (const std::string& name : group.sensors) names += (names.empty() ? "" : ", ") + name;
+    const ReasonText text = fault_text(group.what);
+    lines.push_back((group.sensors.size() == 1 ? "Sensor " : "Sensors ") + names + ": " +
+                    std::string(text.meaning) + ", " + how_often(group.kind) + what_to_do(text));
+  }
+}
+
+void add_suspicions(const MachineWeek& week, std::vector<std::string>& lines) {
+  for (const Outages& outages : week.outages) {
+    if (!outages.subject.starts_with(suspected_sensor)) continue;
+    const std::string name = outages.subject.substr(suspected_sensor.size());
+    lines.push_back("Sensor " + name + " is suspected: " + outages.what + ", " +
+                    std::to_string(outages.count) + (outages.count == 1 ? " time, " : " times, ") +
+                    duration_text(outages.lasted_s) + " in all" +
+                    (outages.lasts ? ", and still" : "") +
+                    ". Do: check its contact, its place and its wiring; hold a thermometer beside "
+                    "it. Where it is right as it is, take a new reference: thermocomp reference.");
+  }
+}
+
+bool is_suspected(const MachineWeek& week, const std::string& sensor) {
+  return std::any_of(week.outages.begin(), week.outages.end(), [&](const Outages& outages) {
+    return outages.subject == std::string(suspected_sensor) + sensor;
+  });
 }
 
 void add_sensors(const MachineWeek& week, std::vector<std::string>& lines) {
@@ -58,6 +140,8 @@ void add_sensors(const MachineWeek& week, std::vector<std::string>& lines) {
     if (!(std::abs(sensor.drift_K) > drift_told_K &&
           std::abs(sensor.drift_K) > drift_told_sd * sensor.drift_sd_K))
       continue;
+    // Said already, and more exactly.
+    if (is_suspected(week, sensor.name) || is_suspected(week, sensor.neighbour)) continue;
     lines.push_back("Sensor " + sensor.name + " drifted by " + figure_text(sensor.drift_K) +
                     " K against " + sensor.neighbour +
                     ", which otherwise moves like it: look at how both are fixed, and compare them "
@@ -68,9 +152,9 @@ void add_sensors(const MachineWeek& week, std::vector<std::string>& lines) {
 void add_axes(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const AxisWeek& axis : week.axes) {
     const std::string unit = axis.unit == "urad" ? " µrad" : " µm";
-    if (axis.at_bound_share > bound_told_share)
+    if (axis.sent.at_bound_share > bound_told_share)
       lines.push_back("Axis " + axis.name + " stood at its bound of " + figure_text(axis.bound_um) +
-                      unit + " for " + figure_text(100.0 * axis.at_bound_share) +
+                      unit + " for " + figure_text(100.0 * axis.sent.at_bound_share) +
                       " % of the time: what lies beyond is not taken out. Find out why it is so "
                       "much before the bound is raised.");
     double claimed_um = 0.0;
@@ -87,11 +171,12 @@ void add_axes(const MachineWeek& week, std::vector<std::string>& lines) {
 
 std::vector<std::string> advice(const MachineWeek& week) {
   std::vector<std::string> lines;
-  add_outages(week, "reason ", lines);
-  add_outages(week, "axis ", lines);
-  add_outages(week, "controller ", lines);
-  add_outages(week, "sensor ", lines);
-  add_outages(week, "bus ", lines);
+  add_reasons(week, lines);
+  add_devices(week, "axis ", lines);
+  add_devices(week, "controller ", lines);
+  add_devices(week, "bus ", lines);
+  add_sensor_faults(week, lines);
+  add_suspicions(week, lines);
   add_axes(week, lines);
   add_sensors(week, lines);
   if (week.dry_run)

@@ -1,8 +1,12 @@
 #include "cli/report/week_page.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <deque>
+#include <string_view>
+#include <utility>
 
 #include "cli/common/json_fields.hpp"
 #include "cli/common/reason_text.hpp"
@@ -51,13 +55,19 @@ std::string summary(const MachineWeek& week) {
   if (week.recorded_s > 0.0)
     text += ", that is " + figure_text(100.0 * on_s / week.recorded_s) +
             " % of the time in which the daemon ran";
-  return text + ".";
+  text += ".";
+  if (week.dry_run_s() > 0.0)
+    text += " Of the time in which it ran, " + hours(week.dry_run_s()) +
+            " were a dry run: everything was computed and recorded, and nothing was sent to the "
+            "machine.";
+  return text;
 }
 
 std::string time_table(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"", "time", "share"}};
   const auto add = [&](const std::string& what, double seconds) {
-    if (seconds < 1.0) return;
+    constexpr double told_s_min = 30.0;
+    if (seconds < told_s_min) return;
     rows.push_back(
         {what, hours(seconds), figure_text(100.0 * seconds / week.span.length_s()) + " %"});
   };
@@ -95,20 +105,33 @@ std::string spells_part(const MachineWeek& week) {
 std::string why_part(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"why it did less than it could", "times", "in all"}};
   for (const Outages& outages : week.outages)
-    if (outages.subject.starts_with("reason "))
+    // A suspicion stands with its sensor; by itself it takes nothing away.
+    if (outages.subject.starts_with("reason ") && outages.what != "sensor_suspected")
       rows.push_back({std::string(reason_text(outages.what).meaning), std::to_string(outages.count),
                       duration_text(outages.lasted_s)});
   return html_table(rows);
 }
 
-std::string axes_part(const MachineWeek& week) {
+std::string ranges_table(const MachineWeek& week, const std::string& what,
+                         OffsetRange AxisWeek::*range) {
   std::vector<std::vector<std::string>> rows{
-      {"displacement taken out", "least", "most", "mean size", "bound", "at the bound"}};
-  for (const AxisWeek& axis : week.axes)
-    rows.push_back({axis.name + ", " + unit_words(axis.unit), figure_text(-axis.high_um),
-                    figure_text(-axis.low_um), figure_text(axis.mean_size_um),
-                    figure_text(axis.bound_um), figure_text(100.0 * axis.at_bound_share) + " %"});
+      {what, "least", "most", "mean size", "bound", "at the bound"}};
+  for (const AxisWeek& axis : week.axes) {
+    const OffsetRange& of = axis.*range;
+    if (of.is_there())
+      rows.push_back({axis.name + ", " + unit_words(axis.unit), figure_text(-of.high_um),
+                      figure_text(-of.low_um), figure_text(of.mean_size_um),
+                      figure_text(axis.bound_um), figure_text(100.0 * of.at_bound_share) + " %"});
+  }
   return html_table(rows);
+}
+
+std::string axes_part(const MachineWeek& week) {
+  std::string html = ranges_table(week, "displacement taken out", &AxisWeek::sent);
+  if (html.empty()) html = html_paragraph("Nothing was taken out.");
+  const std::string dry =
+      ranges_table(week, "computed in the dry run, not taken out", &AxisWeek::dry_run);
+  return dry.empty() ? html : html + dry;
 }
 
 std::string probings_part(const MachineWeek& week) {
@@ -120,35 +143,43 @@ std::string probings_part(const MachineWeek& week) {
     std::string unit = "µm";
     for (const AxisWeek& axis : week.axes)
       if (axis.name == probing.axis) unit = unit_words(axis.unit);
+    const std::string dry = probing.dry_run ? " (dry run)" : "";
     rows.push_back({local_text(probing.wall_s), probing.axis,
-                    figure_text(probing.claimed_um) + " " + unit,
-                    figure_text(probing.left_um) + " " + unit});
+                    figure_text(probing.claimed_um) + " " + unit + dry,
+                    figure_text(probing.left_um) + " " + unit + dry});
   }
   html += html_table(rows);
   return html + html_paragraph(
                     "Taken out: the offset at that moment, which is what the model "
                     "claimed as far as bound and slew let it. Left: what the probing "
-                    "found with it.",
+                    "found with it. In a dry run nothing was sent: what would have been taken "
+                    "out, and what would have been left.",
                     "small");
 }
 
 std::string sensors_part(const MachineWeek& week) {
-  std::vector<std::vector<std::string>> rows{
-      {"sensor", "lowest, °C", "highest, °C", "without a value", "faults", "against", "drift, K"}};
+  std::vector<std::vector<std::string>> rows{{"sensor", "lowest, °C", "highest, °C",
+                                              "without a value", "faults", "suspected", "against",
+                                              "drift, K"}};
   for (const SensorWeek& sensor : week.sensors) {
     std::size_t faults = 0;
-    for (const Outages& outages : week.outages)
+    std::string suspected = "-";
+    for (const Outages& outages : week.outages) {
       if (outages.subject == "sensor " + sensor.name) faults = outages.count;
+      if (outages.subject == std::string(suspected_sensor) + sensor.name)
+        suspected = duration_text(outages.lasted_s) + (outages.lasts ? ", still" : "");
+    }
     const bool known = std::isfinite(sensor.drift_sd_K);
     rows.push_back(
         {sensor.name, figure_text(sensor.low_degC), figure_text(sensor.high_degC),
-         figure_text(100.0 * sensor.missing_share) + " %", std::to_string(faults),
+         figure_text(100.0 * sensor.missing_share) + " %", std::to_string(faults), suspected,
          sensor.neighbour.empty() ? "-" : sensor.neighbour,
          known ? figure_text(sensor.drift_K) + " ± " + figure_text(2.0 * sensor.drift_sd_K) : "-"});
   }
   return html_heading("Sensors") + html_table(rows) +
          html_paragraph(
-             "Drift: of the difference to the sensor that moved most like it, over the "
+             "Suspected: the time in which the daemon found the sensor against what its neighbours "
+             "said of it. Drift: of the difference to the sensor that moved most like it, over the "
              "whole time, beside what follows from that one's own course; ± two standard "
              "deviations, six hours counted as one independent value.",
              "small");
@@ -157,7 +188,9 @@ std::string sensors_part(const MachineWeek& week) {
 std::string outages_part(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"buses, units, axes", "last", "times", "in all"}};
   for (const Outages& outages : week.outages) {
-    if (outages.subject.starts_with("reason ") || outages.subject.starts_with("sensor ")) continue;
+    if (outages.subject.starts_with("reason ") || outages.subject.starts_with("sensor ") ||
+        outages.subject.starts_with(suspected_sensor))
+      continue;
     rows.push_back({outages.subject, outages.what, std::to_string(outages.count),
                     duration_text(outages.lasted_s) + (outages.lasts ? ", still" : "")});
   }
@@ -166,23 +199,94 @@ std::string outages_part(const MachineWeek& week) {
          (table.empty() ? html_paragraph("No faults of buses, devices or controller.") : table);
 }
 
-std::string picture(const MachineWeek& week) {
-  std::vector<PlotPanel> panels{{"offsets as sent", "µm or µrad", {}, 170.0},
-                                {"temperatures", "°C", {}, 150.0}};
-  std::size_t temperatures = 0;
-  for (const ThinnedColumn& column : week.course.columns)
-    if (column.name.ends_with("_degC")) ++temperatures;
-  std::size_t next[2] = {0, 0};
-  for (const ThinnedColumn& column : week.course.columns) {
-    const bool is_temperature = column.name.ends_with("_degC");
-    std::string name = column.name.substr(0, column.name.size() - (is_temperature ? 5 : 10));
-    if (is_temperature && temperatures > named_max) name.clear();
-    const std::size_t panel = is_temperature ? 1 : 0;
-    panels[panel].lines.push_back({name, colours[next[panel]++ % colours.size()], column.values});
+/// A column where its points lie in one place; gaps elsewhere.
+std::vector<double> only(const std::vector<double>& values, const std::vector<PointPlace>& places,
+                         PointPlace place) {
+  std::vector<double> kept = values;
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    if (places[i] != place) kept[i] = std::nan("");
+  return kept;
+}
+
+bool has_values(const std::vector<double>& values) {
+  return std::any_of(values.begin(), values.end(), [](double value) { return !std::isnan(value); });
+}
+
+std::string day_text(std::time_t seconds) {
+  std::tm day{};
+  localtime_r(&seconds, &day);
+  std::array<char, 16> text{};
+  std::strftime(text.data(), text.size(), "%a %d", &day);
+  return text.data();
+}
+
+/// The beginning, and the midnights of the machine's place: a course of some days is read by them.
+std::vector<TimeTick> days_of(const WallSpan& span) {
+  const auto from = static_cast<std::time_t>(span.from_s);
+  std::vector<TimeTick> ticks{{0.0, day_text(from)}};
+  std::tm day{};
+  localtime_r(&from, &day);
+  day.tm_hour = day.tm_min = day.tm_sec = 0;
+  for (;;) {
+    ++day.tm_mday;
+    day.tm_isdst = -1;
+    const std::time_t midnight = std::mktime(&day);
+    if (midnight < 0 || static_cast<double>(midnight) >= span.to_s) return ticks;
+    ticks.push_back({static_cast<double>(midnight) - span.from_s, day_text(midnight)});
   }
-  if (panels[1].lines.empty()) panels.pop_back();
-  if (panels[0].lines.empty()) panels.erase(panels.begin());
-  if (panels.empty()) return "";
+}
+
+struct WeekPanels {
+  std::deque<std::vector<double>> kept;  ///< what the lines look at
+  std::vector<PlotPanel> panels;
+};
+
+std::string units_of(const MachineWeek& week) {
+  std::string units;
+  for (const char* unit : {"um", "urad"})
+    if (std::any_of(week.axes.begin(), week.axes.end(),
+                    [unit](const AxisWeek& axis) { return axis.unit == unit; }))
+      units += (units.empty() ? "" : " or ") + unit_words(unit);
+  return units;
+}
+
+void add_offsets(const MachineWeek& week, const std::string& title, PointPlace place,
+                 WeekPanels& all) {
+  const std::vector<PointPlace> places = places_of(week.course, week.sent, week.dry_runs);
+  PlotPanel panel{title, units_of(week), {}, 170.0};
+  std::size_t next = 0;
+  for (const ThinnedColumn& column : week.course.columns) {
+    constexpr std::string_view offset = "_offset_um";
+    if (!column.name.ends_with(offset)) continue;
+    const char* colour = colours[next++ % colours.size()];
+    std::vector<double> values = only(column.values, places, place);
+    if (!has_values(values)) continue;
+    all.kept.push_back(std::move(values));
+    panel.lines.push_back(
+        {column.name.substr(0, column.name.size() - offset.size()), colour, all.kept.back()});
+  }
+  if (!panel.lines.empty()) all.panels.push_back(std::move(panel));
+}
+
+void add_temperatures(const MachineWeek& week, WeekPanels& all) {
+  PlotPanel panel{"temperatures", "°C", {}, 150.0};
+  constexpr std::string_view degC = "_degC";
+  for (const ThinnedColumn& column : week.course.columns) {
+    if (!column.name.ends_with(degC)) continue;
+    panel.lines.push_back({column.name.substr(0, column.name.size() - degC.size()),
+                           colours[panel.lines.size() % colours.size()], column.values});
+  }
+  if (panel.lines.size() > named_max)
+    for (PlotLine& line : panel.lines) line.label.clear();
+  if (!panel.lines.empty()) all.panels.push_back(std::move(panel));
+}
+
+std::string picture(const MachineWeek& week) {
+  WeekPanels all;
+  add_offsets(week, "offsets as sent", PointPlace::sent, all);
+  add_offsets(week, "offsets of the dry run, not sent", PointPlace::dry_run, all);
+  add_temperatures(week, all);
+  if (all.panels.empty()) return "";
   std::vector<double> since_s = week.course.time_s;
   for (double& time : since_s) time -= week.span.from_s;
   std::vector<PlotSpan> spans;
@@ -190,9 +294,13 @@ std::string picture(const MachineWeek& week) {
     if (spell.mode == "compensating")
       spans.push_back(
           {"", spell.span.from_s - week.span.from_s, spell.span.to_s - week.span.from_s});
+  constexpr double days_told_s = 36.0 * 3600.0;
+  const bool by_days = week.span.length_s() > days_told_s;
   return html_figure(
-      panels_plot(since_s, panels, spans),
-      "Hours from " + local_text(week.span.from_s) + "; shaded: compensating. Means of " +
+      panels_plot(since_s, all.panels, spans,
+                  by_days ? days_of(week.span) : std::vector<TimeTick>{}),
+      (by_days ? "A day begins at its line" : "Hours from " + local_text(week.span.from_s)) +
+          "; shaded: compensating. Means of " +
           duration_text(week.span.length_s() / static_cast<double>(week.course.time_s.size())) +
           " each.");
 }

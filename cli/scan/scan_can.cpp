@@ -6,10 +6,12 @@
 #include <optional>
 #include <poll.h>
 
+#include "cli/common/modbus_names.hpp"
 #include "config/text/units.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
 #include "drivers/monotonic_clock.hpp"
+#include "estimator/axis_spans.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp::cli {
@@ -212,10 +214,21 @@ ScanController scan_can_controller(const DaemonConfig& config,
     shown.place = place_name(signal);
     shown.unit = unit;
   };
+  const std::vector<AxisSpan> spans = axis_spans(config.estimator.axes);
   for (std::size_t i = 0; i < controller.axes.size(); ++i) {
-    const AxisConfig& axis = config.estimator.axes[i];
-    if (const auto& applied = controller.axes[i].applied)
-      add(*applied, "applied of axis " + axis.name, std::string(unit_of(axis.output).symbol));
+    const AxisConfig& axis = config.estimator.axes[spans[i].first];
+    const std::string unit(unit_of(axis.output).symbol);
+    const std::string of_axis = " of axis " + axis_name(axis);
+    if (const auto& applied = controller.axes[i].applied) add(*applied, "applied" + of_axis, unit);
+    const auto& travel = controller.axes[i].travel;
+    if (!travel) continue;
+    const CanSet& set = travel->applied;
+    for (std::size_t each = 0; each < set.values.size(); ++each) {
+      const TravelValueText text = travel_value_text(*travel, unit, each);
+      add(set.values[each], "applied " + text.what + of_axis, text.unit);
+    }
+    for (const CanSignal& number : set.numbers)
+      add(number, "number of the applied set" + of_axis, "");
   }
   for (const CanControllerSignal& signal : controller.signals) {
     const std::string& name = config.estimator.signals[signal.signal];

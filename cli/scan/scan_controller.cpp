@@ -15,6 +15,7 @@
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
+#include "estimator/axis_spans.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -39,11 +40,30 @@ Place place_of(const ModbusValue& value, const std::string& what, const std::str
   return place;
 }
 
+/// What the registers of a set mean: "begin", "offset at 400 mm", ...
+std::vector<Place> places_of_set(const ModbusTravel& travel, const AxisConfig& axis,
+                                 const std::vector<ModbusValue>& values, const std::string& before,
+                                 bool is_written) {
+  std::vector<Place> places;
+  const std::string unit(unit_of(axis.output).symbol);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const TravelValueText text = travel_value_text(travel, unit, i);
+    places.push_back(place_of(values[i], before + text.what + " of axis " + axis_name(axis),
+                              text.unit, is_written));
+  }
+  return places;
+}
+
 /// What the daemon reads, in its order: the requests are then the same.
 std::vector<Place> read_places(const DaemonConfig& config, const ModbusControllerConfig& modbus) {
   std::vector<Place> places;
+  const std::vector<AxisSpan> spans = axis_spans(config.estimator.axes);
   for (std::size_t i = 0; i < modbus.axes.size(); ++i) {
-    const AxisConfig& axis = config.estimator.axes[i];
+    const AxisConfig& axis = config.estimator.axes[spans[i].first];
+    if (const auto& travel = modbus.axes[i].travel) {
+      for (Place& place : places_of_set(*travel, axis, travel->applied, "applied ", false))
+        places.push_back(std::move(place));
+    }
     if (!modbus.axes[i].applied) continue;
     const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
     places.push_back(place_of(*modbus.axes[i].applied, "applied of axis " + axis.name, unit));
@@ -58,8 +78,17 @@ std::vector<Place> read_places(const DaemonConfig& config, const ModbusControlle
 std::vector<Place> written_places(const DaemonConfig& config,
                                   const ModbusControllerConfig& modbus) {
   std::vector<Place> places;
+  const std::vector<AxisSpan> spans = axis_spans(config.estimator.axes);
   for (std::size_t i = 0; i < modbus.axes.size(); ++i) {
-    const AxisConfig& axis = config.estimator.axes[i];
+    const AxisConfig& axis = config.estimator.axes[spans[i].first];
+    if (const auto& travel = modbus.axes[i].travel) {
+      const std::string of_axis = " of axis " + axis_name(axis);
+      places.push_back(place_of(travel->begin, "begin" + of_axis, "", true));
+      for (Place& place : places_of_set(*travel, axis, travel->values, "", true))
+        places.push_back(std::move(place));
+      places.push_back(place_of(travel->end, "end" + of_axis, "", true));
+      continue;
+    }
     const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
     places.push_back(place_of(modbus.axes[i].offset, "offset of axis " + axis.name, unit, true));
   }

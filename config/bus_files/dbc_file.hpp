@@ -1,7 +1,7 @@
 /// DBC files: which messages a CAN bus has and where the signals stand in them.
 ///
-/// Read strictly: what breaks the grammar, refers to something that does not exist or cannot be in
-/// a frame is a problem with file, line and rule. Comments, nodes, value tables, environment
+/// Read strictly: what breaks the grammar, refers to something that does not exist or does not fit
+/// into a frame is a problem with file, line and rule. Comments, nodes, value tables, environment
 /// variables and attributes other than VFrameFormat are checked for their form only.
 #pragma once
 
@@ -38,7 +38,7 @@ struct DbcMessage {
 };
 
 struct DbcFile {
-  std::vector<DbcMessage> messages;  ///< without VECTOR__INDEPENDENT_SIG_MSG, which is none
+  std::vector<DbcMessage> messages;  ///< without VECTOR__INDEPENDENT_SIG_MSG, which is not one
 
   [[nodiscard]] const DbcMessage* find(std::string_view message) const noexcept;
   [[nodiscard]] std::vector<std::string> message_names() const;

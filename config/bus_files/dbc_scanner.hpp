@@ -18,13 +18,14 @@ struct DbcSyntaxError {
   std::string rule;
 };
 
-/// White space before what is asked for is skipped; what is not found is a DbcSyntaxError.
+/// White space before what is asked for is skipped; a DbcSyntaxError is thrown where it is not
+/// found.
 class DbcScanner {
  public:
   explicit DbcScanner(std::string_view text) : text_(text) {}
 
   [[nodiscard]] bool at_end();
-  /// Of what comes next.
+  /// Line of what comes next.
   [[nodiscard]] int line();
   [[nodiscard]] bool accept(char symbol);
   void expect(char symbol);

@@ -1,8 +1,8 @@
 /// Electronic data sheets (CiA 306): names and types of the objects of a CANopen device.
 ///
-/// An EDS file is an INI file whose comments begin a line with ';'. Libraries for INI files take
-/// ';' inside a line, '#', quotes or indented lines for something else than data sheets mean, cut
-/// long lines or cannot tell the line of an entry; so the form is read here, strictly: what is
+/// An EDS file is an INI file whose comments begin a line with ';'. Libraries for INI files read
+/// ';' inside a line, '#', quotes or indented lines otherwise than data sheets mean them, cut long
+/// lines or do not give the line of an entry; so the form is read here, strictly: a line that is
 /// neither a section, an entry, a comment nor empty is a problem, as is a section or entry that
 /// stands there twice.
 #pragma once
@@ -31,14 +31,14 @@ struct EdsObject {
   /// ParameterName; of a sub-object that of its object, a '/', and its own. What is not printable
   /// ASCII is replaced by '?'.
   std::string name;
-  std::optional<ObjectType> type;  ///< none: no number (text, domain)
+  std::optional<ObjectType> type;  ///< none: not a number (text, domain)
 };
 
 struct EdsFile {
   std::vector<EdsObject> objects;  ///< those that hold a value, by address
 
   [[nodiscard]] const EdsObject* find(const ObjectAddress& address) const noexcept;
-  /// By the whole name, or by the part behind the '/'. More than one: the name is not clear.
+  /// By the whole name, or by the part behind the '/'. More than one: the name is ambiguous.
   [[nodiscard]] std::vector<const EdsObject*> find(std::string_view name) const;
   [[nodiscard]] std::vector<std::string> names() const;
 };

@@ -1,5 +1,5 @@
-/// One bus of the daemon's file while it is read, of whatever kind. A kind is a file NAME_bus.cpp
-/// that opens such sections, and its line in bus_kinds.
+/// One bus of the daemon's file, of any kind, while it is read. A kind is a file NAME_bus.cpp that
+/// opens such sections, and its line in bus_kinds.
 #pragma once
 
 #include <array>
@@ -30,7 +30,8 @@ struct ChannelTables {
   std::size_t index{0};  ///< of the sensor in the configuration
   double stale_after_s{0.0};
 
-  /// That a reading as old as its period is not stale yet. @param period  the key, for the rule
+  /// Checks that a reading as old as its period is not stale yet. @param period  the key, for the
+  /// rule
   void check_period(double period_s, const std::string& period) const;
 };
 

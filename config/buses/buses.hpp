@@ -18,7 +18,7 @@ struct SensorTables {
   std::span<const SensorConfig> sensors;
 };
 
-/// @param presets, files  whose problems are the caller's to tell
+/// @param presets, files  the caller reports their problems
 /// @return by kind, those of one kind as in the file
 [[nodiscard]] std::vector<BusConfig> read_buses(const TomlTable& root, const SensorTables& sensors,
                                                 Presets& presets, BusFiles& files);

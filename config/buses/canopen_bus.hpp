@@ -24,16 +24,17 @@ struct CanopenDevice {
 [[nodiscard]] CanopenBusConfig read_canopen_bus(const TomlTable& table, const std::string& name);
 [[nodiscard]] CanopenDevice read_canopen_device(const TomlTable& table, const std::string& name,
                                                 EdsFiles& eds_files);
-/// nullopt: it is an object by name, and no data sheet says which.
+/// nullopt: the object is given by name, and no data sheet says which it is.
 /// What `sensor` leaves out is as in `device`.
 [[nodiscard]] std::optional<CanopenChannel> read_canopen_channel(const TomlTable& sensor,
                                                                  const TomlTable& device,
                                                                  const CanopenDevice& known,
                                                                  const EdsFiles& eds_files);
-/// That a TPDO belongs to one node. @param device  the table of `node`, the last of the bus' nodes
+/// Checks that a TPDO belongs to one node. @param device  the table of `node`, the last of the bus'
+/// nodes
 void check_canopen_node(const TomlTable& device, const CanopenBusConfig& bus,
                         const CanopenNodeConfig& node);
-/// ... also where a sensor names it. @param node  position in the bus
+/// The same where a sensor names the TPDO. @param node  position in the bus
 void check_canopen_channel(const TomlTable& sensor, const CanopenBusConfig& bus, std::size_t node,
                            const CanopenChannel& channel);
 

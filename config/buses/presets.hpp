@@ -25,7 +25,7 @@ struct Preset {
   TomlTable device;                                ///< keys of a [[device]]
   std::map<std::string, TomlTable> thermocouples;  ///< by type; empty: the module itself knows
   std::map<int, TomlTable> channels;               ///< by the number printed on the module
-  /// Those somebody asked for: what stands in the others was read by nobody.
+  /// Those that were asked for: nobody has read what stands in the others.
   mutable std::set<std::string> thermocouples_used;
   mutable std::set<int> channels_used;
 };
@@ -38,7 +38,7 @@ class Presets {
   /// The preset that a [[device]] names; nullptr where it names none, or none that can be read
   /// (then a problem of the device, unless there are no folders).
   [[nodiscard]] const Preset* of_device(const TomlTable& device);
-  /// The device over its preset. Refuses a preset of another protocol than the bus'.
+  /// The device over its preset. Refuses a preset of a protocol other than the bus'.
   [[nodiscard]] static TomlTable over_preset(const TomlTable& device, const Preset& preset,
                                              const std::string& protocol);
   /// A [[sensor]] over its channel of the preset; `channel` and `thermocouple` are read here.
@@ -48,7 +48,7 @@ class Presets {
 
   /// What is wrong with the presets that were used.
   [[nodiscard]] std::vector<Problem> problems() const;
-  /// Says nothing about keys of presets that nobody asked for.
+  /// Does not report keys of presets that nobody asked for.
   void ignore_rest() const;
 
  private:
@@ -56,7 +56,7 @@ class Presets {
 
   std::vector<std::filesystem::path> folders_;
   std::map<std::string, std::shared_ptr<const Preset>> read_;  ///< nullptr: could not be read
-  std::vector<Problem> broken_;                                ///< files that are no TOML
+  std::vector<Problem> broken_;                                ///< files that are not TOML
 };
 
 }  // namespace thermocomp::sections

@@ -75,7 +75,7 @@ struct DaemonConfig {
                                                const std::string& model_text,
                                                const std::string& model_name);
 
-/// What differs between the two that a running daemon cannot take over; empty: a reload will do.
+/// Differences between the two that a running daemon cannot take over; empty: a reload will do.
 /// A reload takes over model, blocks, screening, smoothing, limiter, compensation and log_level.
 [[nodiscard]] std::vector<std::string> restart_needed(const DaemonConfig& running,
                                                       const DaemonConfig& next);

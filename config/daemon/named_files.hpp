@@ -1,5 +1,5 @@
-/// The files that a configuration names: none of those that the daemon writes may be another one,
-/// by whatever path or link.
+/// The files that a configuration names: none that the daemon writes may be another of them, by
+/// whatever path or link.
 #pragma once
 
 #include <filesystem>
@@ -25,8 +25,8 @@ struct NamedFile {
   std::vector<std::string> endings{};
 };
 
-/// What is wrong becomes a problem of the key: links that lead nowhere else than to themselves,
-/// what is no regular file, and every pair of names of one file of which at least one is written.
+/// What is wrong becomes a problem of the key: links that lead only to themselves, what is not a
+/// regular file, and every pair of names of one file that is written under at least one of them.
 /// Paths are compared with all links followed, files that exist by device and inode too.
 void check_named_files(const std::vector<NamedFile>& files);
 

@@ -17,7 +17,7 @@ namespace thermocomp {
 /// @param name stands for the file in problems
 [[nodiscard]] ThermalModel parse_model(const std::string& text, const std::string& name);
 
-/// What could be read, and what is wrong with it. Never throws. With problems the model serves
+/// What could be read, and what is wrong with it. Never throws. With problems the model is good
 /// only for further checks: `inputs` and `outputs` hold the names that stand there.
 struct ModelReading {
   ThermalModel model;

@@ -1,5 +1,5 @@
-/// `--columns MAP.toml`: what a person says about the form of his files where they do not say it
-/// themselves. config/examples/columns.toml shows every key.
+/// `--columns MAP.toml`: what a person says about the form of files that do not say it themselves.
+/// config/examples/columns.toml shows every key.
 #pragma once
 
 #include <filesystem>
@@ -22,7 +22,7 @@ struct ColumnMap {
   std::optional<char> separator;  ///< ',', ';' or tab
   std::optional<char> decimal;    ///< '.' or ','
   std::optional<char> thousands;  ///< between groups of three digits
-  int header_line{0};             ///< counted from 1; 0: the first that is no comment
+  int header_line{0};             ///< counted from 1; 0: the first that is not a comment
   DateOrder date_order{DateOrder::unknown};
   std::vector<std::string> time;     ///< column, or date and clock time; empty: found
   std::string time_unit;             ///< "s", "ms", "min", "h", "day", "hh:mm", "mm:ss" or empty

@@ -16,7 +16,7 @@ namespace thermocomp {
 /// @return nullopt unless all of `field` is one finite decimal number
 [[nodiscard]] std::optional<double> finite_number(std::string_view field);
 
-/// Takes the part before the next separator off `rest`; false when nothing is left.
+/// Takes the part before the next separator off `rest`. @return false when nothing is left
 [[nodiscard]] bool take(std::string_view& rest, char separator, std::string_view& part);
 
 /// At most 40 bytes of it, not cut within a letter; what is left out is told by " ...".

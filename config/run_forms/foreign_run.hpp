@@ -1,6 +1,6 @@
 /// Run files as people have them: any usual separator, decimal comma, dates, units in the header.
-/// Nothing is guessed: what may mean two things is a problem that shows the line to write in the
-/// file of `--columns`. docs/run_files.md has the rules.
+/// Nothing is guessed: what is ambiguous is a problem that shows the line to write in the file of
+/// `--columns`. docs/run_files.md has the rules.
 #pragma once
 
 #include <optional>
@@ -23,7 +23,7 @@ namespace thermocomp {
 [[nodiscard]] RunFile read_foreign_run(std::string_view text, const std::string& name,
                                        const ColumnMap* map);
 
-/// Of the same file when its time_s was 0; nullopt where its times have no date.
+/// The wall time at which time_s of the same file was 0; nullopt where its times have no date.
 /// @throws ConfigurationError as above
 [[nodiscard]] std::optional<WallZero> wall_zero(std::string_view text, const std::string& name,
                                                 const ColumnMap* map);

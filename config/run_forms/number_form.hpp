@@ -1,4 +1,4 @@
-/// Numbers with a decimal point or comma, and which of them a table has.
+/// Numbers with a decimal point or comma, and which of the two a table uses.
 #pragma once
 
 #include <optional>
@@ -13,8 +13,8 @@ struct NumberForm {
   char thousands{'\0'};  ///< none
 };
 
-/// What the fields of the table show. 1,234 alone may be 1.234 or 1234 and decides nothing; a table
-/// that has nothing else is a problem, with the line to write.
+/// The form that the fields of the table show. 1,234 alone may be 1.234 or 1234 and decides
+/// nothing; a table that has nothing else is a problem, with the line to write.
 /// @param map  may be nullptr
 [[nodiscard]] NumberForm number_form(const TextTable& table, const ColumnMap* map,
                                      ProblemList& problems);

@@ -1,4 +1,4 @@
-/// Problems of one run file, not without end.
+/// Problems of one run file, up to a limit.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ class ProblemList {
     if (full()) return;  // also within a row of many columns
     problems_.push_back({file_, line, std::move(key), shortened(value), std::move(rule)});
   }
-  /// Of another file that belongs to it.
+  /// A problem of another file that belongs to it.
   void add(Problem problem) {
     if (!full()) problems_.push_back(std::move(problem));
   }

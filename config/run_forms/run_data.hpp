@@ -17,7 +17,7 @@ struct RunFile {
   std::vector<std::vector<double>> values;  ///< shape (columns, rows); NaN: missing
   std::size_t selected_begin{0};
   std::size_t selected_end{0};
-  /// How a file of another form was taken, a line each; empty: it has our own form.
+  /// How a file of another form was read, line by line; empty: it has our own form.
   std::vector<std::string> understood;
 
   [[nodiscard]] std::size_t rows() const noexcept { return values.empty() ? 0 : values[0].size(); }

@@ -89,12 +89,18 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"days", "time", 86400, 0, "_s", true},
 });
 
+/// "TC(1)", "TC(1,2)": an element of a logger's array, no unit.
+bool is_index(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789, ") == std::string_view::npos;
+}
+
 /// "T1 [°C]": the part in the brackets at the end.
 bool split_brackets(std::string_view header, SpelledName& name) {
   for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
     if (!header.ends_with(close)) continue;
     const auto begin = header.rfind(open);
     if (begin == std::string_view::npos) continue;
+    if (open == '(' && is_index(header.substr(begin + 1, header.size() - begin - 2))) continue;
     name.base = trimmed(header.substr(0, begin));
     name.unit = trimmed(header.substr(begin + 1, header.size() - begin - 2));
     name.known = spelled_unit(name.unit);

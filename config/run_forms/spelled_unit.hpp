@@ -7,14 +7,14 @@
 
 namespace thermocomp {
 
-/// A unit in somebody's spelling. A number of it becomes `factor * number + offset` in the base
-/// unit of its dimension (degC, um, urad, s, ...).
+/// A unit as somebody spells it. A number of it becomes `factor * number + offset` in the base unit
+/// of its dimension (degC, um, urad, s, ...).
 struct SpelledUnit {
   std::string_view spelling;   ///< "°F"
   std::string_view dimension;  ///< "temperature"
   double factor{1.0};
   double offset{0.0};
-  std::string_view suffix;       ///< of ours that is nearest, "_degC"; empty: a signal without unit
+  std::string_view suffix;       ///< the nearest of ours, "_degC"; empty: a signal without unit
   bool only_in_brackets{false};  ///< too short to be taken for a unit elsewhere
 };
 
@@ -36,12 +36,12 @@ struct UnitConversion {
   double offset{0.0};
   [[nodiscard]] bool is_identity() const { return factor == 1.0 && offset == 0.0; }
 };
-/// From a spelled unit to that of a column's name of ours.
+/// From a spelled unit to the unit of one of our column names.
 /// @return nullopt when they are of different dimensions
 [[nodiscard]] std::optional<UnitConversion> conversion(const SpelledUnit& from,
                                                        std::string_view column);
 
-/// `base` as a column's name of ours: blanks, commas, quotes and bars as `_`.
+/// `base` as one of our column names: blanks, commas, quotes and bars as `_`.
 [[nodiscard]] std::string plain_name(std::string_view base);
 
 }  // namespace thermocomp

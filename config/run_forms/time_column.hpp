@@ -16,8 +16,8 @@ struct TimeColumns {
   [[nodiscard]] bool has(std::size_t column) const;
 };
 
-/// `time_s`; else what the map says; else the one column that is called so (time, Zeit, ...), has
-/// a unit of time, or holds dates or times of the clock.
+/// `time_s`; else what the map says; else the one column that is called time, Zeit, ..., has a unit
+/// of time, or holds dates or clock times.
 /// @param map  may be nullptr
 /// @return nullopt after a problem
 [[nodiscard]] std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
@@ -26,7 +26,7 @@ struct TimeColumns {
 
 /// When time_s was 0, by the clock that wrote the file.
 struct WallZero {
-  double seconds{0.0};  ///< since 1970, of UTC or of the zone that the writer had
+  double seconds{0.0};  ///< since 1970, in UTC or the writer's zone
   bool is_utc{false};
 };
 

@@ -26,7 +26,7 @@ struct TimeStamp {
   std::optional<double> zone_s;  ///< east of Greenwich
 };
 
-/// @return nullopt when `text` is no date and no time of a clock. A day that no calendar has is
+/// @return nullopt when `text` is neither a date nor a clock time. A day that no calendar has is
 ///         found by seconds_of(), not here.
 [[nodiscard]] std::optional<TimeStamp> parse_time_stamp(std::string_view text);
 

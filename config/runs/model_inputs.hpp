@@ -1,4 +1,4 @@
-/// What a model takes of a run file: the same for `predict` and `diagnose`.
+/// What a model takes from a run file: the same for `predict` and `diagnose`.
 #pragma once
 
 #include <optional>
@@ -20,7 +20,8 @@ struct ModelInputs {
   std::vector<std::size_t> rows;  ///< of the file, those in which none of the columns is missing
 };
 
-/// @throws ConfigurationError when the run lacks a column, or one to refer to has no value
+/// @throws ConfigurationError when the run lacks a column, or a column needed as reference has no
+///                            value
 [[nodiscard]] ModelInputs model_inputs(const ThermalModel& model, const RunFile& run);
 
 /// The first value that is not missing; nullopt: all are.

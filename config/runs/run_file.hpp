@@ -23,7 +23,7 @@ struct RunSelection {
 };
 
 /// `FILE`, `FILE@T0:T1`, `FILE@T0:`, `FILE@:T1`. An `@` that no `:` follows belongs to the name.
-/// @throws ConfigurationError when a bound is no number or T0 < T1 does not hold
+/// @throws ConfigurationError when a bound is not a number or T0 < T1 does not hold
 [[nodiscard]] RunSelection parse_selection(std::string_view argument);
 
 /// At least one row; time_s present and strictly increasing. A selection without rows is refused.

@@ -181,6 +181,17 @@ FrameBits frame_bits(const CanSignal& signal) {
   return bits;
 }
 
+void TakenBits::add(const TomlTable& table, std::string_view key, const CanSignal& signal) {
+  FrameBits& used = used_[{signal.id, signal.extended_id}];
+  const FrameBits bits = frame_bits(signal);
+  if ((used & bits).any()) table.problem(key, "shares bits with another value of its frame");
+  used |= bits;
+}
+
+bool TakenBits::has_frame_of(const CanSignal& signal) const {
+  return used_.contains({signal.id, signal.extended_id});
+}
+
 Range reach(const CanSignal& signal) {
   if (signal.is_float) return {};
   const double counts = std::ldexp(1.0, signal.length_bits);

@@ -3,9 +3,11 @@
 
 #include <bitset>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "config/toml/toml_reader.hpp"
@@ -22,7 +24,7 @@ enum class CanUse {
   offset,       ///< of an axis, sent or applied: scale
   bits          ///< heartbeat, valid bits: an unsigned number without scale
 };
-/// What `own` leaves out is as in `base` (which may be `own` again). Multiplexors are for
+/// What `own` leaves out is taken from `base` (which may be `own` again). Multiplexors are for
 /// temperatures only.
 [[nodiscard]] CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse use);
 
@@ -43,7 +45,7 @@ enum class CanUse {
 /// Mask and codes of a status whose place is known.
 [[nodiscard]] CanStatus read_status_numbers(const TomlTable& table, const CanField& field);
 
-/// The lists of codes that are messages and no values, for a signal whose place is known.
+/// The lists of codes that are messages, not values, for a signal whose place is known.
 [[nodiscard]] std::vector<Sentinel> read_can_codes(const TomlTable& own, const TomlTable& base,
                                                    const CanSignal& signal);
 
@@ -52,7 +54,18 @@ using FrameBits = std::bitset<512>;
 /// not fit into 8 bytes (FD: 64).
 [[nodiscard]] FrameBits frame_bits(const CanSignal& signal);
 
-/// The numbers that raw * scale + offset can be, least and greatest.
+/// Which bits of which frames are taken: no two values of a frame may share any.
+class TakenBits {
+ public:
+  void add(const TomlTable& table, std::string_view key, const CanSignal& signal);
+  /// Whether something stands in the signal's frame.
+  [[nodiscard]] bool has_frame_of(const CanSignal& signal) const;
+
+ private:
+  std::map<std::pair<std::uint32_t, bool>, FrameBits> used_;
+};
+
+/// The smallest and greatest value of raw * scale + offset.
 [[nodiscard]] Range reach(const CanSignal& signal);
 
 }  // namespace thermocomp::sections

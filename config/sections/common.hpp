@@ -36,7 +36,7 @@ inline std::string unique_name(const TomlTable& table, std::set<std::string>& se
   return 1.0;
 }
 
-/// The codes of `[low, high]` that are messages and no values, by the lists open_circuit_codes,
+/// The codes within `[low, high]` that are messages, not values, by the lists open_circuit_codes,
 /// short_circuit_codes, over_range_codes, under_range_codes and error_codes; a list in `own`
 /// replaces that of `base`.
 [[nodiscard]] std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base,
@@ -53,8 +53,8 @@ struct NumberField {
   double Config::*member;
 };
 
-/// Reads each field, absent ones as in `fallback`, and then puts Config::validate() to work: every
-/// field it refuses is a problem at its key and goes back to `fallback`, until the rest is valid.
+/// Reads each field, absent ones as in `fallback`, and then calls Config::validate(): every field
+/// it refuses becomes a problem at its key and goes back to `fallback`, until the rest is valid.
 /// @pre fallback.validate() passes
 template <class Config, std::size_t N>
 void read_fields(const TomlTable& table, const std::array<NumberField<Config>, N>& fields,

@@ -2,27 +2,34 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 
 #include "config/sections/can_signals.hpp"
+#include "config/sections/can_travel.hpp"
 #include "config/sections/common.hpp"
+#include "config/sections/modbus_travel.hpp"
 #include "config/sections/modbus_values.hpp"
+#include "config/sections/travel_section.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
+#include "estimator/axis_spans.hpp"
 
 namespace thermocomp::sections {
 namespace {
 
 enum class Kind { dry_run, modbus_tcp, modbus_rtu, piezo_tcp, piezo_rtu, can, linuxcnc, unknown };
 
+/// Of a controller that cannot interpolate along the travel.
+void refuse_travel(const TomlTable& axis) {
+  refuse_all(axis, {"line", "table"},
+             "needs a controller that takes a set of values as a whole (kind = \"modbus_tcp\", "
+             "\"modbus_rtu\" or \"can\"); with `offset` the daemon itself follows the position");
+}
+
 /// The bound of the axis must be something that the value can carry, or offsets would be cut off.
 void check_reach(const TomlTable& table, std::string_view key, const Range& reach,
                  const AxisConfig& axis) {
-  const double bound = axis.limiter.offset_um_max;
-  if (reach.contains(bound) && reach.contains(-bound)) return;
-  table.problem(key, "must be able to hold -offset_um_max ... offset_um_max, but reaches from " +
-                         number_text(reach.min) + " to " + number_text(reach.max));
+  sections::check_reach(table, key, reach, axis.limiter.offset_um_max);
 }
 
 void check_bits(const TomlTable& table, double greatest, std::size_t axes) {
@@ -30,45 +37,13 @@ void check_bits(const TomlTable& table, double greatest, std::size_t axes) {
   table.problem("valid_bits", "must have a bit for each of the " + std::to_string(axes) + " axes");
 }
 
-/// Registers that are written, and by what: no register may be written for two purposes.
-class WrittenRegisters {
- public:
-  void add(const TomlTable& table, std::string_view key, const ModbusValue& value) {
-    for (int i = 0; i < static_cast<int>(words_of(value.table, value.encoding)); ++i) {
-      const auto [entry, is_new] = used_.emplace(value.address + i, table.path());
-      if (is_new) continue;
-      table.problem(key, "register " + std::to_string(value.address + i) + " is written by " +
-                             entry->second + " already");
-      return;
-    }
-  }
-
- private:
-  std::map<int, std::string> used_;
-};
-
-/// The same for the bits of the frames that are sent.
-class SentBits {
- public:
-  void add(const TomlTable& table, std::string_view key, const CanSignal& signal) {
-    FrameBits& used = used_[{signal.id, signal.extended_id}];
-    const FrameBits bits = frame_bits(signal);
-    if ((used & bits).any()) table.problem(key, "shares bits with another value that is sent");
-    used |= bits;
-  }
-  [[nodiscard]] bool sends(const CanSignal& signal) const {
-    return used_.contains({signal.id, signal.extended_id});
-  }
-
- private:
-  std::map<std::pair<std::uint32_t, bool>, FrameBits> used_;
-};
-
 class ControllerReader {
  public:
   ControllerReader(const TomlTable& table, const std::vector<TomlTable>& axis_tables,
                    const std::vector<AxisConfig>& axes)
-      : table_(table), axis_tables_(axis_tables), axes_(axes) {}
+      : table_(table), axis_tables_(axis_tables), offsets_(axes.size()) {
+    for (const AxisSpan& span : axis_spans(axes)) axes_.push_back(axes[span.first]);
+  }
 
   ControllerReading read(const std::set<std::string>& serial_devices) {
     name_ = table_.text("name");
@@ -125,9 +100,11 @@ class ControllerReader {
     for (const std::string& key : table_.keys()) {
       if (key != "name" && key != "kind") table_.refuse(key, rule);
     }
-    for (const TomlTable& axis : axis_tables_)
+    for (const TomlTable& axis : axis_tables_) {
       refuse_all(axis, {"offset", "applied", "piezo"}, rule);
-    result_.config = DryRunControllerConfig{name_, axes_.size()};
+      refuse_travel(axis);
+    }
+    result_.config = DryRunControllerConfig{name_, offsets_};
   }
 
   void read_linuxcnc() {
@@ -142,6 +119,7 @@ class ControllerReader {
         table_.refuse(key, rule);
     for (std::size_t i = 0; i < axes_.size(); ++i) {
       refuse_all(axis_tables_[i], {"offset", "applied", "piezo"}, rule);
+      refuse_travel(axis_tables_[i]);
       if (axes_[i].output.ends_with("_urad"))
         axis_tables_[i].problem("output", "must be in um: LinuxCNC takes offsets of linear axes");
       config.axes.push_back(axes_[i].name);
@@ -172,12 +150,16 @@ class ControllerReader {
 
   /// Either every axis shows what is applied, or none does.
   void check_read_back() {
-    const auto shows = [](const TomlTable& axis) { return axis.has("applied"); };
+    const auto shows = [](const TomlTable& axis) {
+      return axis.has("applied") || travel_table(axis).has("applied");
+    };
     const auto count = std::count_if(axis_tables_.begin(), axis_tables_.end(), shows);
     result_.reads_back = count > 0;
     if (count == 0) return;
     for (const TomlTable& axis : axis_tables_) {
-      if (!shows(axis)) axis.problem("applied", "must be given for all axes or for none");
+      if (shows(axis)) continue;
+      const TomlTable travel = travel_table(axis);
+      (travel ? travel : axis).problem("applied", "must be given for all axes or for none");
     }
   }
 
@@ -193,10 +175,8 @@ class ControllerReader {
     config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
     refuse_all(table_, {"interface", "silent_after_s"}, "makes no sense for a Modbus controller");
     WrittenRegisters written;
-    for (std::size_t i = 0; i < axes_.size(); ++i) {
-      config.axes.push_back(volts ? read_piezo_axis(axis_tables_[i], axes_[i], written)
-                                  : read_modbus_axis(axis_tables_[i], axes_[i], written));
-    }
+    for (std::size_t i = 0; i < axes_.size(); ++i)
+      config.axes.push_back(read_axis(axis_tables_[i], axes_[i], volts, written));
     check_read_back();
     config.valid_bits = read_written_bits("valid_bits", written);
     if (config.valid_bits) check_bits(table_, reach(*config.valid_bits).max, axes_.size());
@@ -215,6 +195,25 @@ class ControllerReader {
     const ModbusValue value = read_modbus_value(place, RegisterUse::written_bits);
     written.add(table_, key, value);
     return value;
+  }
+
+  static ModbusAxis read_axis(const TomlTable& table, const AxisConfig& axis, bool volts,
+                              WrittenRegisters& written) {
+    if (volts) {
+      refuse_travel(table);
+      return read_piezo_axis(table, axis, written);
+    }
+    if (!travel_table(table)) return read_modbus_axis(table, axis, written);
+    refuse_plain_places(table);
+    ModbusAxis place;
+    place.travel = read_modbus_travel(table, axis.limiter.offset_um_max, written);
+    return place;
+  }
+
+  /// Of an axis with a travel.
+  static void refuse_plain_places(const TomlTable& axis) {
+    refuse_all(axis, {"offset", "applied", "piezo"},
+               "makes no sense beside `line` or `table`, which has places of its own");
   }
 
   static ModbusAxis read_piezo_axis(const TomlTable& table, const AxisConfig& axis,
@@ -285,8 +284,13 @@ class ControllerReader {
                {"host", "port", "unit", "device", "baud", "parity", "data_bits", "stop_bits",
                 "rs485", "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},
                "makes no sense for kind = \"can\"");
-    SentBits sent;
-    for (std::size_t i = 0; i < axes_.size(); ++i) read_can_offset(i, config, sent);
+    TakenBits sent;
+    std::vector<std::optional<CanTravelSection>> travels;
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      travels.push_back(read_can_travel(i, sent));
+      config.axes.emplace_back();
+      if (!travels[i]) config.axes[i].offset = read_can_offset(i, sent);
+    }
     for (const auto& [key, place] :
          {std::pair("valid_bits", &config.valid_bits), std::pair("heartbeat", &config.heartbeat)}) {
       const TomlTable value = table_.table_or_empty(key);
@@ -295,21 +299,19 @@ class ControllerReader {
       sent.add(table_, key, **place);
     }
     if (config.valid_bits) check_bits(table_, reach(*config.valid_bits).max, axes_.size());
-    const auto received = [&](const TomlTable& table, std::string_view key,
-                              const CanSignal& signal) {
-      if (sent.sends(signal)) table.problem(key, "is in a frame that is sent, not received");
-    };
     for (std::size_t i = 0; i < axes_.size(); ++i) {
-      const TomlTable applied = axis_tables_[i].table_or_empty("applied");
-      if (!applied) continue;
-      config.axes[i].applied = read_can_signal(applied, applied, CanUse::offset);
-      received(axis_tables_[i], "applied", *config.axes[i].applied);
-      check_reach(axis_tables_[i], "applied", reach(*config.axes[i].applied), axes_[i]);
+      if (travels[i]) {
+        travels[i]->read_applied(sent);
+        travels[i]->check_round(config.period_s, config.silent_after_s);
+        config.axes[i].travel = travels[i]->travel();
+      } else {
+        config.axes[i].applied = read_can_applied(i, sent);
+      }
     }
     check_read_back();
     read_signals([&](const TomlTable& table, std::size_t index) {
       config.signals.push_back({index, read_can_signal(table, table, CanUse::signal)});
-      received(table, "id", config.signals.back().value);
+      refuse_sent(table, "id", config.signals.back().value, sent);
       const bool is_switch = unit_of(table.text("name", "")).suffix == "_on";
       if (is_switch && !reach(config.signals.back().value).contains(1.0)) {
         table.problem("signed", "must be false: one bit with a sign is 0 or -1, not 0 or 1");
@@ -319,19 +321,44 @@ class ControllerReader {
     result_.config = std::move(config);
   }
 
-  void read_can_offset(std::size_t index, CanControllerConfig& config, SentBits& sent) const {
+  [[nodiscard]] std::optional<CanTravelSection> read_can_travel(std::size_t index,
+                                                                TakenBits& sent) const {
+    const TomlTable& axis = axis_tables_[index];
+    if (!travel_table(axis)) return std::nullopt;
+    refuse_plain_places(axis);
+    return CanTravelSection(axis, axes_[index].limiter.offset_um_max, sent);
+  }
+
+  [[nodiscard]] CanSignal read_can_offset(std::size_t index, TakenBits& sent) const {
     const TomlTable& table = axis_tables_[index];
     const TomlTable offset = table.table("offset");
-    CanAxis& place = config.axes.emplace_back();
-    place.offset = read_can_signal(offset, offset, CanUse::offset);
-    if (!offset) return;
-    sent.add(table, "offset", place.offset);
-    check_reach(table, "offset", reach(place.offset), axes_[index]);
+    CanSignal signal = read_can_signal(offset, offset, CanUse::offset);
+    if (!offset) return signal;
+    sent.add(table, "offset", signal);
+    check_reach(table, "offset", reach(signal), axes_[index]);
+    return signal;
+  }
+
+  [[nodiscard]] std::optional<CanSignal> read_can_applied(std::size_t index,
+                                                          const TakenBits& sent) const {
+    const TomlTable& table = axis_tables_[index];
+    const TomlTable applied = table.table_or_empty("applied");
+    if (!applied) return std::nullopt;
+    CanSignal signal = read_can_signal(applied, applied, CanUse::offset);
+    refuse_sent(table, "applied", signal, sent);
+    check_reach(table, "applied", reach(signal), axes_[index]);
+    return signal;
+  }
+
+  static void refuse_sent(const TomlTable& table, std::string_view key, const CanSignal& signal,
+                          const TakenBits& sent) {
+    if (sent.has_frame_of(signal)) table.problem(key, "is in a frame that is sent, not received");
   }
 
   TomlTable table_;
   const std::vector<TomlTable>& axis_tables_;
-  const std::vector<AxisConfig>& axes_;
+  std::vector<AxisConfig> axes_;  ///< one a table; of a travel its first node
+  std::size_t offsets_;           ///< nodes of travels counted
   std::string name_;
   ControllerReading result_;
 };

@@ -15,11 +15,11 @@ struct ControllerReading {
   ControllerConfig config;
   std::vector<std::string> signals;  ///< names, in order
   bool reads_back{true};
-  double period_s{0.0};  ///< of the exchange; 0: there is none
+  double period_s{0.0};  ///< of the exchange; 0: no exchange
   bool dry_run{false};   ///< nothing is to be written
 };
 
-/// @param axis_tables  the [[axis]] tables, in the order of `axes`
+/// @param axis_tables  the [[axis]] tables, in the order of `axes`; of one with a travel all nodes
 /// @param serial_devices  those that a bus uses already
 [[nodiscard]] ControllerReading read_controller(const TomlTable& table,
                                                 const std::vector<TomlTable>& axis_tables,

@@ -9,7 +9,7 @@ namespace thermocomp::sections {
 
 [[nodiscard]] CorrectionConfig read_correction(const TomlTable& table);
 
-/// Every input of a group is one of the model, and of no other group.
+/// Checks that every input of a group is one of the model, and in no other group.
 void check_correction(const TomlTable& table, const CorrectionConfig& config,
                       const ThermalModel& model);
 

@@ -139,6 +139,66 @@ std::vector<BlockConfig> read_blocks(const std::vector<TomlTable>& tables,
   return blocks;
 }
 
+namespace {
+
+/// Nodes of [axis.table], or both ends of the travel of [axis.line]; empty after a problem.
+std::vector<double> read_nodes_mm(const TomlTable& travel, std::string_view key,
+                                  std::size_t nodes_max) {
+  std::vector<double> nodes_mm = travel.numbers(key, Range::between(-1e6, 1e6));
+  if (!travel) return {};
+  if (nodes_mm.size() < 2 || nodes_mm.size() > nodes_max) {
+    travel.problem(key, nodes_max == 2 ? "must be both ends of the travel"
+                                       : "must be 2 to " + std::to_string(nodes_max) + " nodes");
+    return {};
+  }
+  for (std::size_t i = 1; i < nodes_mm.size(); ++i) {
+    if (nodes_mm[i] > nodes_mm[i - 1]) continue;
+    travel.problem(key, "must increase");
+    return {};
+  }
+  return nodes_mm;
+}
+
+std::set<std::string> names_of(const std::vector<TomlTable>& tables) {
+  std::set<std::string> names;
+  for (const TomlTable& table : tables)
+    if (table.is_text("name")) names.insert(table.text("name"));
+  return names;
+}
+
+/// An axis whose controller interpolates along its travel becomes its nodes: "x_1", "x_2", ...
+/// @param names  of the [[axis]] tables
+std::vector<AxisConfig> nodes_of(const TomlTable& table, const AxisConfig& axis,
+                                 const std::set<std::string>& names) {
+  const bool is_line = table.has("line");
+  const std::string_view key = is_line ? "line" : "table";
+  if (is_line && table.has("table")) table.refuse("table", "makes no sense beside `line`");
+  const TomlTable travel = table.table(key);
+  TravelNode node;
+  node.axis = axis.name;
+  node.form = is_line ? TravelForm::line : TravelForm::table;
+  node.position = travel.text("position");
+  if (!node.position.empty() && unit_of(node.position).suffix != "_mm")
+    travel.problem("position", "must be a position (*_mm) of the model");
+  const std::vector<double> nodes_mm =
+      is_line ? read_nodes_mm(travel, "travel_mm", 2) : read_nodes_mm(travel, "nodes_mm", axes_max);
+  std::vector<AxisConfig> nodes;
+  for (const double position_mm : nodes_mm) {
+    AxisConfig& each = nodes.emplace_back(axis);
+    each.node = node;
+    each.node->position_mm = position_mm;
+    each.name = axis.name + "_" + std::to_string(nodes.size());
+    if (names.contains(each.name))
+      table.problem("name", "the nodes of its travel are called " + axis.name + "_1, " + axis.name +
+                                "_2, ...: another axis must not be called " + each.name);
+  }
+  // After a problem there is one axis all the same, so that the rest can be looked at.
+  if (nodes.empty()) nodes.push_back(axis);
+  return nodes;
+}
+
+}  // namespace
+
 std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
   constexpr std::array<NumberField<LimiterConfig>, 2> fields{{
       {"offset_um_max", &LimiterConfig::offset_um_max},
@@ -147,7 +207,7 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
   std::set<std::string> names;
   std::vector<AxisConfig> axes;
   for (const TomlTable& table : tables) {
-    AxisConfig& axis = axes.emplace_back();
+    AxisConfig axis;
     axis.name = unique_name(table, names);
     axis.output = table.text("output");
     if (!axis.output.empty() && !is_output(axis.output)) {
@@ -160,9 +220,18 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
       if (!table.has(field.key)) table.problem(field.key, "must be given");
     }
     read_fields(table, fields, LimiterConfig{}, axis.limiter);
-  }
-  if (axes.size() > axes_max) {
-    tables[axes_max].problem("name", "there must be at most " + std::to_string(axes_max) + " axes");
+    const bool has_nodes = table.has("line") || table.has("table");
+    const bool fitted = axes.size() <= axes_max;
+    if (has_nodes) {
+      for (AxisConfig& node : nodes_of(table, axis, names_of(tables)))
+        axes.push_back(std::move(node));
+    } else {
+      axes.push_back(std::move(axis));
+    }
+    if (!fitted || axes.size() <= axes_max) continue;
+    std::string rule("there must be at most ");
+    rule.append(std::to_string(axes_max)).append(" axes, nodes of travels counted");
+    table.problem("name", rule);
   }
   return axes;
 }

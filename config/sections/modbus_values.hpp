@@ -25,7 +25,7 @@ enum class RegisterUse {
 
 [[nodiscard]] ModbusRenewal read_modbus_renewal(const TomlTable& table);
 
-/// The numbers that raw * scale can be, least and greatest.
+/// The smallest and greatest value of raw * scale.
 [[nodiscard]] Range reach(const ModbusValue& value);
 
 }  // namespace thermocomp::sections

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "config/text/units.hpp"
+#include "estimator/axis_spans.hpp"
 #include "estimator/sensing/neighbour_check.hpp"
 
 namespace thermocomp::sections {
@@ -53,6 +54,24 @@ void check_weighing_down(const BindingTables& tables, const EstimatorConfig& con
                           " inputs (`thermocomp covariance` makes it from records)");
 }
 
+/// What a controller is to interpolate by must be what the displacement depends on, and that must
+/// be a curve: with play in a joint it is one on the way there and another on the way back.
+void check_travel(const TomlTable& table, const AxisConfig& axis, const ThermalModel& model) {
+  const TomlTable travel = table.table(axis.node->form == TravelForm::line ? "line" : "table");
+  std::vector<std::string> positions;
+  for (const std::string& signal : model.signal_columns())
+    if (signal.ends_with("_mm")) positions.push_back(signal);
+  if (!contains(positions, axis.node->position))
+    travel.problem("position", positions.empty()
+                                   ? "the model depends on no position: give the axis an `offset`"
+                                   : "must be a position of the model: " + joined(positions));
+  for (const TermSpec& term : model.terms)
+    if (term.kind == "hysteresis" && term.subject == axis.output)
+      table.problem("output",
+                    "the model gives it a hysteresis: its displacement along the travel "
+                    "is no curve; give the axis an `offset`");
+}
+
 }  // namespace
 
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
@@ -65,11 +84,13 @@ void check_binding(const BindingTables& tables, const EstimatorConfig& config,
     tables.root.problem("controller.signal", signal,
                         "the model needs this signal from the controller");
   }
-  for (std::size_t i = 0; i < config.axes.size(); ++i) {
-    const std::string& output = config.axes[i].output;
-    if (!is_output(output) || contains(model.outputs, output)) continue;
-    tables.axes[i].problem("output",
-                           "must be an output of the model: " + joined(model.outputs) + like_hint);
+  const std::vector<AxisSpan> spans = axis_spans(config.axes);
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    const AxisConfig& axis = config.axes[spans[i].first];
+    if (is_output(axis.output) && !contains(model.outputs, axis.output))
+      tables.axes[i].problem(
+          "output", "must be an output of the model: " + joined(model.outputs) + like_hint);
+    if (axis.node) check_travel(tables.axes[i], axis, model);
   }
 }
 

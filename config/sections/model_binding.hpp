@@ -16,8 +16,9 @@ struct BindingTables {
   std::vector<TomlTable> axes;
 };
 
-/// Every temperature column of the model has exactly one block, every signal it names is read from
-/// the controller, every axis' output exists; and what is asked of a covariance, it can give.
+/// Checks that every temperature column of the model has exactly one block, every signal it names
+/// is read from the controller, every axis' output exists, and the model has the covariance that
+/// the configuration needs.
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
                    const ThermalModel& model);
 

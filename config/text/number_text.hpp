@@ -1,4 +1,4 @@
-/// Numbers as text that reads back to the very same bits.
+/// Numbers as text that reads back to the same bits.
 #pragma once
 
 #include <string>

@@ -14,8 +14,8 @@ namespace thermocomp {
 inline constexpr std::string_view printable_rule =
     "must be printable: no control characters, none that turn the direction of writing";
 
-/// The same text with what is not printable named instead: `<U+202E>`; a byte that is not UTF-8 as
-/// `?`, a C0 control character or DEL as a blank.
+/// The same text with what is not printable named: `<U+202E>`; a byte that is not UTF-8 as `?`, a
+/// C0 control character or DEL as a blank.
 [[nodiscard]] std::string printable_text(std::string_view text);
 
 }  // namespace thermocomp

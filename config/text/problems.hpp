@@ -9,7 +9,7 @@ namespace thermocomp {
 
 /// One broken rule. Parts that do not apply are empty (line: 0).
 struct Problem {
-  std::string file;   ///< as it was named by whoever asked for it
+  std::string file;   ///< as named by the caller
   int line{0};        ///< counted from 1; 0: the file as a whole
   std::string key;    ///< e.g. "sensor[bed_front].address"; in a run file the column
   std::string value;  ///< as written, shortened; "(missing)" where there is none
@@ -19,7 +19,7 @@ struct Problem {
 /// `file:line: key = value: rule`; what does not apply is left out.
 [[nodiscard]] std::string to_string(const Problem& problem);
 
-/// All problems of one load. what() has one line a problem.
+/// All problems of one load. what() has one line per problem.
 class ConfigurationError : public std::runtime_error {
  public:
   /// Sorts by file (in order of first appearance) and line; drops exact repetitions.

@@ -29,7 +29,7 @@ struct Unit {
 /// Position or operating signal: what a controller reports.
 [[nodiscard]] bool is_operating(std::string_view column);
 
-/// Whether a column can be called so in a run file: printable UTF-8 without blanks at the ends,
+/// Whether a column of a run file can have this name: printable UTF-8 without blanks at the ends,
 /// without comma, quote, `|` (which joins two subjects) and `#` at the start.
 [[nodiscard]] bool is_column_name(std::string_view name);
 inline constexpr std::string_view column_name_rule =

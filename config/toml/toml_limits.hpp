@@ -1,5 +1,5 @@
-/// What a TOML text may have, looked at before it is parsed: the parser recurses into nested tables
-/// and lists, and what it makes of a text takes thirty times the text's size.
+/// Limits of a TOML text, checked before it is parsed: the parser recurses into nested tables and
+/// lists, and its result takes thirty times the text's size.
 #pragma once
 
 #include <cstddef>
@@ -20,8 +20,8 @@ struct TomlExcess {
   int line{1};
   std::string rule;
 };
-/// The first place that breaks a limit; nullopt: there is none. A text that is not TOML is looked
-/// at up to where it stops to be. Does not recurse, O(size).
+/// The first place that breaks a limit; nullopt: there is none. A text that is not TOML is checked
+/// up to where it stops being TOML. Does not recurse, O(size).
 [[nodiscard]] std::optional<TomlExcess> toml_excess(std::string_view text);
 
 }  // namespace thermocomp

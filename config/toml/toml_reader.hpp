@@ -118,9 +118,8 @@ class TomlTable {
   /// `[[key]]`, at least one.
   [[nodiscard]] std::vector<TomlTable> tables_required(std::string_view key) const;
 
-  /// This table over `base`: a key that is not here is looked for there, and what is said about it
-  /// names the file and the line where it stands. Nested tables are not merged; keys() is as
-  /// before.
+  /// This table over `base`: a key that is not here is looked up there, and problems name the file
+  /// and the line where it stands. Nested tables are not merged; keys() is as before.
   [[nodiscard]] TomlTable over(const TomlTable& base) const;
 
   /// Whether the key stands there. Marks it as known.
@@ -139,8 +138,8 @@ class TomlTable {
   void problem(std::string_view key, std::string_view value, std::string_view rule) const;
   /// `key` must not stand here: `rule` says why.
   void refuse(std::string_view key, std::string_view rule) const;
-  /// Says nothing about keys of this table that nobody asked for (because what they mean hangs on
-  /// a key that has a problem).
+  /// Does not report keys of this table that nobody asked for (because their meaning depends on a
+  /// key that has a problem).
   void ignore_rest() const;
 
   /// Line of the key, or of the table where the key is absent.
@@ -211,7 +210,7 @@ class TomlDocument {
 /// @throws ConfigurationError
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path);
 
-/// Of `known` the name that is so near to `name` that it was probably meant; else empty.
+/// The name of `known` that is so near to `name` that it was probably meant; else empty.
 [[nodiscard]] std::string nearest_name(std::string_view name,
                                        const std::vector<std::string>& known);
 

@@ -13,7 +13,7 @@ namespace thermocomp {
 [[nodiscard]] std::string toml_key(std::string_view name);
 /// A TOML float: unlike JSON's it needs a point or an exponent to be one.
 [[nodiscard]] std::string toml_number(double value);
-/// A list of rows, one a line, with the end of the line.
+/// A list of rows, one per line, with the end of the line.
 [[nodiscard]] std::string toml_rows(const std::vector<std::vector<double>>& values);
 
 template <class Values, class Show>

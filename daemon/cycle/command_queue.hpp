@@ -16,7 +16,7 @@ class CommandQueue {
  public:
   static constexpr std::size_t capacity = 64;
 
-  /// Producer. @return its number, counted from 0; none: 64 wait already
+  /// Producer. @return the command's number, counted from 0; none: 64 wait already
   std::optional<std::uint64_t> try_push(const Command& command) noexcept;
   /// Producer. @param number  of a command that was pushed and is not known to be done
   /// @return false: the consumer has it

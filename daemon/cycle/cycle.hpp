@@ -48,8 +48,8 @@ class Cycle {
 
   /// Until stop(); the first cycle is the grid's newest.
   void run() noexcept;
-  /// What run() does by the system's clock, for who has a time of his own: begin() once, then
-  /// step() and next_after() in turn.
+  /// What run() does by the system's clock, for callers with a time of their own: begin() once,
+  /// then step() and next_after() in turn.
   /// @return the first cycle to step
   [[nodiscard]] std::uint64_t begin(nanoseconds now) noexcept;
   void step(std::uint64_t cycle) noexcept;
@@ -71,8 +71,8 @@ class Cycle {
   [[nodiscard]] std::uint64_t commands_done() const noexcept {
     return commands_done_.load(std::memory_order_acquire);
   }
-  /// The cycle goes over to `next` at its next step. The brain it had until then can be had by
-  /// take_retired(). @pre the last one handed over has been taken back or withdrawn
+  /// The cycle goes over to `next` at its next step. take_retired() then gives the brain it had
+  /// until then. @pre the last one handed over has been taken back or withdrawn
   void hand_over(std::unique_ptr<CycleBrain> next) noexcept;
   [[nodiscard]] std::unique_ptr<CycleBrain> take_retired() noexcept;
   /// The brain that was handed over, which the cycle then never sees; none: it has it already.
@@ -83,7 +83,7 @@ class Cycle {
   [[nodiscard]] const ControllerState& controller() noexcept;
 
   [[nodiscard]] const CycleTiming& timing() const noexcept { return timing_; }
-  /// Lateness and work so far are forgotten: starting up is not running.
+  /// Forgets lateness and work so far: starting up is not running.
   void clear_timing() noexcept;
   /// After run() has returned: the last offsets and the cycle they are from.
   [[nodiscard]] const OffsetCommand& last_offsets() const noexcept { return offsets_; }

@@ -1,5 +1,4 @@
-/// Main's side of the cycle: what was sent to it, what has become of it, and what was not taken in
-/// time.
+/// Main's side of the cycle: what was sent to it, what came of it, and what was not taken in time.
 #pragma once
 
 #include <chrono>
@@ -12,7 +11,7 @@
 
 namespace thermocomp {
 
-/// Of a command or a new brain on its way to the cycle.
+/// What came of a command or a new brain on its way to the cycle.
 enum class Outcome {
   waiting,
   done,       ///< the newest report says what it did
@@ -29,7 +28,7 @@ class CycleHandle {
  public:
   using Clock = std::chrono::steady_clock;
   using Tracked = std::shared_ptr<const Outcome>;
-  /// Called by poll() for each command that is done, before its outcome says so.
+  /// Called by poll() for each command that is done, before its outcome becomes `done`.
   using CommandDone = std::function<void(const Command&)>;
 
   /// At 1 Hz a command takes up to 1 s.
@@ -46,7 +45,7 @@ class CycleHandle {
   Tracked replace(std::unique_ptr<CycleBrain> next, Clock::time_point now);
   /// Whether a brain is on its way: no other can be handed over until it is done or withdrawn.
   [[nodiscard]] bool replacing() const noexcept { return replacement_.outcome != nullptr; }
-  /// Whether poll() has anything to look after.
+  /// Whether poll() has anything to do.
   [[nodiscard]] bool is_busy() const noexcept { return replacing() || !commands_.empty(); }
 
   /// What is done becomes `done`, what is late is withdrawn or becomes `overdue`.
@@ -54,7 +53,7 @@ class CycleHandle {
   /// After the cycle has ended: what it did is done, the rest is withdrawn.
   void settle();
 
-  /// Of the newest brain whose change-over is done.
+  /// The report of the newest brain whose change-over is done.
   [[nodiscard]] const Report& report() { return cycle_.report(); }
   [[nodiscard]] const Estimator& estimator() { return cycle_.brain().estimator; }
   [[nodiscard]] const ControllerState& controller() { return cycle_.controller(); }

@@ -9,7 +9,7 @@
 
 namespace thermocomp {
 
-/// One writer counts, any thread reads. Buckets: 64 a factor of two, from 1 ns to 18 minutes.
+/// One writer counts, any thread reads. Buckets: 64 per factor of two, from 1 ns to 18 minutes.
 /// Wait-free, no allocation.
 class DurationHistogram {
  public:

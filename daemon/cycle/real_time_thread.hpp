@@ -15,8 +15,8 @@ class RealTimeError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Keeps all memory of the process resident once it has been touched, now and later, and the heap
-/// from being given back.
+/// Keeps all memory of the process resident once it has been touched, now and later, and keeps the
+/// heap from being given back.
 /// @return empty, or why it was not possible
 [[nodiscard]] std::string lock_memory();
 

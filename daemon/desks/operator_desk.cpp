@@ -1,28 +1,36 @@
 #include "daemon/desks/operator_desk.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "config/text/problems.hpp"
 #include "daemon/desks/reference_rules.hpp"
+#include "estimator/axis_spans.hpp"
 
 namespace thermocomp {
 namespace {
 
 using nlohmann::json;
 
+/// By its name; an axis that the controller interpolates also by the name of any of its nodes.
+/// @return the first of its entries
 std::uint32_t axis_index(const StatusView& view, const json& params) {
   if (!params.contains("axis") || !params["axis"].is_string())
     throw RpcError(rpc::invalid_params, "params.axis must be the name of an axis");
   const auto name = params["axis"].get<std::string>();
   std::string known;
-  for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i) {
-    const std::string& each = view.config.estimator.axes[i].name;
-    if (each == name) return static_cast<std::uint32_t>(i);
-    known += (known.empty() ? "" : ", ") + each;
+  const std::vector<AxisConfig>& axes = view.config.estimator.axes;
+  for (const AxisSpan& span : axis_spans(axes)) {
+    for (std::size_t i = span.first; i < span.end(); ++i)
+      if (axes[i].name == name || axis_name(axes[i]) == name)
+        return static_cast<std::uint32_t>(span.first);
+    known += (known.empty() ? "" : ", ") + axis_name(axes[span.first]);
   }
   throw RpcError(rpc::invalid_params, "axis " + name + " does not exist; there is " + known);
 }
@@ -32,6 +40,31 @@ double value_um(const json& params) {
       !std::isfinite(params["value_um"].get<double>()))
     throw RpcError(rpc::invalid_params, "params.value_um must be a finite number");
   return params["value_um"].get<double>();
+}
+
+/// Whether any entry of the axis, of a travel any node, is so.
+bool any_node(const StatusView& view, std::size_t axis, bool AxisReport::*is_so) {
+  const AxisSpan span = span_of(view.config.estimator.axes, axis);
+  for (std::size_t i = span.first; i < span.end(); ++i)
+    if (view.report.axes[i].*is_so) return true;
+  return false;
+}
+
+/// A figure of the axis; of a travel where its slide stands.
+template <class Figure>
+double where_it_stands(const StatusView& view, std::size_t axis, Figure figure) {
+  const AxisSpan span = span_of(view.config.estimator.axes, axis);
+  if (span.count == 1) return figure(view.report.axes[axis]);
+  std::vector<double> nodes;
+  for (std::size_t i = span.first; i < span.end(); ++i)
+    nodes.push_back(figure(view.report.axes[i]));
+  const std::vector<std::string> signals = view.config.model.signal_columns();
+  const auto signal =
+      std::find(signals.begin(), signals.end(), view.config.estimator.axes[axis].node->position);
+  const double position_mm =
+      view.report.signals[static_cast<std::size_t>(signal - signals.begin())].value;
+  return value_on_travel(std::span(view.config.estimator.axes).subspan(span.first, span.count),
+                         nodes, position_mm);
 }
 
 void refuse_unless(bool holds, const std::string& why) {
@@ -91,10 +124,12 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
   constexpr double most_um = 1000.0;  // no thermal displacement; a slip of the keyboard
   if (!(std::abs(command.value_um) <= most_um))
     throw RpcError(rpc::invalid_params, "params.value_um must be in [-1000, 1000]");
-  const AxisReport& axis = view.report.axes[command.axis];
-  const double displacement_um = axis.displacement_um;
+  const double displacement_um = where_it_stands(
+      view, command.axis, [](const AxisReport& axis) { return axis.displacement_um; });
   const bool remains = view.config.estimator.correction.measured == MeasuredMeaning::remaining;
-  const double applied_um = std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
+  const double applied_um = where_it_stands(view, command.axis, [](const AxisReport& axis) {
+    return std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
+  });
   const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;
   return then(actions.command(command), [command, displacement_um, remains, effect_um] {
     // What is left at the tool, where the model is right: nothing but what the offset still lacks.
@@ -118,7 +153,8 @@ RpcPending prove(const DeskActions& actions, const json& params) {
       "a proving move is at most compensation.prove_um_max = " + std::to_string(most_um) + " um");
   const AxisReport& axis = view.report.axes[command.axis];
   refuse_unless(axis.driven, "the axis is not driven: the controller is offline or not in step");
-  refuse_unless(!axis.proving, "the axis is being proved already");
+  refuse_unless(!any_node(view, command.axis, &AxisReport::proving),
+                "the axis is being proved already");
   refuse_unless(!has_reason(view.report.reasons, Reason::cutting),
                 "not while the controller says it is cutting");
   const double rate_um_per_s = view.config.estimator.axes[command.axis].limiter.rate_um_per_s_max;
@@ -132,7 +168,8 @@ RpcPending prove(const DeskActions& actions, const json& params) {
 RpcPending release(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::release, axis_index(view, params), 0.0};
-  refuse_unless(view.report.axes[command.axis].latched, "the axis has no latched mismatch");
+  refuse_unless(any_node(view, command.axis, &AxisReport::latched),
+                "the axis has no latched mismatch");
   return actions.command(command);
 }
 

@@ -1,4 +1,4 @@
-/// The methods of the status socket: reads, commands and who may use them.
+/// The methods of the status socket: reads, commands, and who may use them.
 #pragma once
 
 #include <functional>
@@ -21,7 +21,7 @@ struct DeskActions {
   /// The result is there once the cycle runs with the new configuration.
   /// @throws ConfigurationError or RpcError with what is wrong; the running one then stays
   std::function<RpcPending()> reload;
-  /// A bridge's report and its answer; empty where the controller is no bridge. @throws RpcError
+  /// A bridge's report and its answer; empty where the controller is not a bridge. @throws RpcError
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
   /// What happened in this run, for `events`.
   std::function<nlohmann::json()> events{};

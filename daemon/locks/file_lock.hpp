@@ -1,4 +1,4 @@
-/// A file that one process at a time may call its own.
+/// A file that only one process at a time may use.
 #pragma once
 
 #include <filesystem>
@@ -8,8 +8,8 @@
 namespace thermocomp {
 
 /// Holds `<file>.lock` beside the file, under the name that the file has once every link is
-/// followed, so that one file with two paths has one lock. Who holds it stands in it. The kernel
-/// releases it when the process ends in whatever way; at an orderly end the lock file goes too.
+/// followed, so that one file with two paths has one lock. It names its holder. The kernel releases
+/// it however the process ends; at an orderly end the lock file goes too.
 ///
 /// The file itself cannot carry the lock: a state file is replaced at every save, a damaged history
 /// is moved aside.

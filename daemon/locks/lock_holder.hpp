@@ -1,4 +1,4 @@
-/// What is thrown when something is in use already, and by whom.
+/// What is thrown when something is already in use; says by whom.
 #pragma once
 
 #include <stdexcept>
@@ -21,7 +21,7 @@ class LockImpossible : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// "process 4711 (thermocompd /etc/thermocomp/thermocompd.toml)", as far as it can be known: the
+/// "process 4711 (thermocompd /etc/thermocomp/thermocompd.toml)", as far as it is known; the
 /// command line names the configuration.
 [[nodiscard]] std::string describe_process(pid_t process);
 

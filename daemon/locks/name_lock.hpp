@@ -1,4 +1,4 @@
-/// A name that one process at a time may hold on this machine.
+/// A name that only one process at a time may hold on this machine.
 #pragma once
 
 #include <string>
@@ -7,10 +7,9 @@
 
 namespace thermocomp {
 
-/// For what is no file: a controller's address. The name is bound as a Unix socket's in the
-/// abstract namespace: no folder and no rights are needed, the kernel frees it when the process
-/// ends in whatever way, and it knows who holds it. It counts within a network namespace, as the
-/// address does.
+/// For what is not a file: a controller's address. The name is bound as a Unix socket's in the
+/// abstract namespace: no folder and no rights are needed, the kernel frees it however the process
+/// ends, and knows who holds it. It counts within a network namespace, as the address does.
 class NameLock {
  public:
   /// @throws LockHeld, LockImpossible

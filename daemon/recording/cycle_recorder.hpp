@@ -1,5 +1,4 @@
-/// The real-time side of the history: finds what changed since the last cycle and records only
-/// that.
+/// The real-time side of the history: records only what changed since the last cycle.
 #pragma once
 
 #include <array>

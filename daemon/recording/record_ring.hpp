@@ -25,7 +25,7 @@ class RecordRing {
   /// Consumer: moves up to out.size() records into `out`. @return how many
   std::size_t pop(std::span<Record> out) noexcept;
 
-  /// Producer: what could not be recorded. Any thread may ask how much that is.
+  /// Producer: counts what could not be recorded. Any thread may ask how much that is.
   void count_lost(std::uint64_t records) noexcept;
   [[nodiscard]] std::uint64_t lost() const noexcept;
   [[nodiscard]] std::size_t capacity() const noexcept { return mask_ + 1; }

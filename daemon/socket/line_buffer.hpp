@@ -1,4 +1,4 @@
-/// Bytes in, lines out, never more held than one line may have and one read brings.
+/// Bytes in, lines out; never holds more than the longest line and one read.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ class LineBuffer {
 
   void add(std::string_view bytes);
   /// The next line without its end ("\n" or "\r\n").
-  /// @return false when there is no whole one
+  /// @return false when there is no whole line
   [[nodiscard]] bool take(std::string& line);
   [[nodiscard]] bool has_line() const noexcept { return end_ != std::string::npos; }
   /// The line at the front, whole or not, has more than line_bytes_max: nothing is taken any more.

@@ -18,9 +18,9 @@ class ListeningSocket {
   ListeningSocket& operator=(const ListeningSocket&) = delete;
 
   [[nodiscard]] int fd() const noexcept { return fd_; }
-  /// The next connection, non-blocking; -1 when there is none. Its number is beyond those that
-  /// select() can wait for, where the limit of open files allows it: libmodbus waits with select(),
-  /// and the buses shall not run out of such numbers because many clients are connected.
+  /// The next connection, non-blocking; -1 when there is none. Where the limit of open files allows
+  /// it, its number is beyond those that select() can wait for: libmodbus waits with select(), and
+  /// many clients must not use up the numbers that buses need.
   [[nodiscard]] int accept_one() noexcept;
 
  private:
@@ -33,8 +33,8 @@ class ListeningSocket {
   ino_t inode_{0};
 };
 
-/// Raises the process' soft limit of open files, as far as it may, to what so many connections need
-/// beside the rest of the daemon. @return for how many connections there is room, at most `wanted`
+/// Raises the process' soft limit of open files, as far as it may, to what `wanted` connections
+/// need beside the rest of the daemon. @return for how many of them there is room
 [[nodiscard]] std::size_t places_for_descriptors(std::size_t wanted) noexcept;
 
 }  // namespace thermocomp

@@ -19,14 +19,14 @@ struct Peer {
   std::vector<gid_t> groups;  ///< supplementary
 };
 
-/// The groups of the configuration as the system knows them; nothing for those it does not know.
+/// The groups of the configuration as the system knows them; none for those it does not know.
 struct AccessGroups {
   std::optional<gid_t> read;
   std::optional<gid_t> operate;
   std::optional<gid_t> bridge;
 };
 
-/// Asks the system, which may ask a server of the site: not for every connection of many.
+/// Asks the system, which may in turn ask a server of the site: too slow for every connection.
 [[nodiscard]] AccessGroups look_up_groups(const SocketConfig& config);
 /// As the kernel noted them at connect(). @return nothing when it does not tell
 [[nodiscard]] std::optional<Peer> peer_of(int socket_fd);

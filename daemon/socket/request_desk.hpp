@@ -25,17 +25,17 @@ struct Answer {
   std::string text;  ///< one line with its end; empty: none is due (the protocol's "notification")
   bool is_error{false};
   std::optional<Subscription> subscription;  ///< takes the place of the one before
-  /// Set: nothing else is there yet. Asked again and again; once it returns true, the answer that
-  /// it was given is whole.
+  /// If set, nothing else is there yet. It is called again and again; once it returns true, the
+  /// answer it was given is complete.
   std::function<bool(Answer&)> later{};
 };
 
 /// Not supported on purpose, and refused in words: batches (an array of requests; several lines do
 /// the same) and parameters by position. Members of a request that JSON-RPC does not know are
-/// ignored, as it wants.
+/// ignored, as it asks.
 class RequestDesk {
  public:
-  /// Arrays and objects within each other; the deepest request that means anything has 3.
+  /// Nesting of arrays and objects; the deepest meaningful request has 3.
   static constexpr int depth_max = 16;
   static constexpr std::size_t id_bytes_max = 256;
   static constexpr double period_s_min = 0.1;
@@ -45,7 +45,7 @@ class RequestDesk {
 
   void add_method(const std::string& name, AccessClass access, RpcHandler handler);
   void add_slow_method(const std::string& name, AccessClass access, RpcSlowHandler handler);
-  /// @param line  any bytes. Throws nothing of a client's making
+  /// @param line  any bytes; never throws because of them
   [[nodiscard]] Answer answer(const PeerAccess& access, std::string_view line) const;
   /// The line that tells a subscriber the result of a reading method.
   /// @pre the method exists

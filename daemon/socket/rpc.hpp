@@ -51,8 +51,8 @@ class RpcError : public std::runtime_error {
 /// Gets `params` (an object; an empty one where the request has none), returns the result.
 using RpcHandler = std::function<nlohmann::json(const nlohmann::json& params)>;
 
-/// A result that takes its time: asked about every millisecond until it is there, and forgotten
-/// when the client has gone. May throw what a handler throws.
+/// A result that takes time: called every millisecond until it is there, and forgotten when the
+/// client has gone. May throw what a handler throws.
 using RpcPending = std::function<std::optional<nlohmann::json>()>;
 /// Begins what was asked for.
 using RpcSlowHandler = std::function<RpcPending(const nlohmann::json& params)>;

@@ -34,7 +34,7 @@ struct ServedClient {
   [[nodiscard]] std::size_t held_bytes() const noexcept {
     return input.capacity_bytes() + output.capacity();
   }
-  /// Nothing of it is under way: neither request nor answer nor subscription.
+  /// Nothing is under way: neither request nor answer nor subscription.
   [[nodiscard]] bool is_idle() const noexcept {
     return !subscription && !queued && !owes() && !later;
   }
@@ -45,7 +45,7 @@ struct ServedClient {
   TokenBucket tokens;
   LineBuffer input;
   std::string output;
-  std::size_t sent{0};  ///< bytes at the front of `output` that are gone already
+  std::size_t sent{0};  ///< bytes at the front of `output` that are already sent
 
   bool input_ended{false};  ///< the peer sends no more; answers may still be owed
   bool hung_up{false};      ///< nor does it read any more; what it has sent still counts

@@ -1,4 +1,4 @@
-/// The operators' door: JSON-RPC 2.0 over a Unix stream socket, one JSON object a line.
+/// The operators' door: JSON-RPC 2.0 over a Unix stream socket, one JSON object per line.
 #pragma once
 
 #include <chrono>
@@ -31,17 +31,17 @@ struct SocketLimits {
 
   std::size_t clients_max{1200};
   std::size_t operator_places{32};  ///< of clients_max; only for who may change something
-  std::size_t strangers_max{16};    ///< who may do nothing: one answer and good-bye
+  std::size_t strangers_max{16};    ///< without any permission: one answer, then closed
   std::size_t buffered_bytes_max{std::size_t{16} << 20};  ///< for all clients together
   double requests_per_s{100.0};                           ///< of one client; above it is read later
   double requests_burst{200.0};
   double all_requests_per_s{2000.0};
   double all_requests_burst{200.0};
   Duration partial_line_max{std::chrono::seconds(10)};  ///< a line that has begun
-  Duration unread_max{std::chrono::seconds(30)};        ///< an answer of which nothing is taken
+  Duration unread_max{std::chrono::seconds(30)};        ///< an answer that is not being taken
   Duration idle_max{std::chrono::minutes(10)};          ///< no request and no subscription
   Duration stranger_max{std::chrono::seconds(5)};
-  Duration replaceable_after{std::chrono::seconds(1)};  ///< idle so long: makes room for another
+  Duration replaceable_after{std::chrono::seconds(1)};  ///< idle this long: makes room for another
   Duration turn_max{std::chrono::milliseconds(10)};     ///< of handle(); one request more at most
 };
 
@@ -57,12 +57,13 @@ struct SocketLimits {
 ///
 /// `subscribe` {"methods": ["status", ...], "period_s": 1.0}: the results of these reading methods
 /// (default: status) are sent as notifications {"method": NAME, "params": RESULT} every period
-/// (0.1..60 s) until the client disconnects or calls it again. One that does not read in time is
-/// told later how many it missed: {"method": "missed", "params": {"notifications": N}}.
+/// (0.1..60 s) until the client disconnects or calls it again. A client that does not read in time
+/// is told later how many it missed: {"method": "missed", "params": {"notifications": N}}.
 class StatusServer {
  public:
   /// Binds and listens. A socket file nobody listens on any more is replaced. Raises the process'
-  /// soft limit of open files as far as it needs and may; with fewer it takes fewer clients.
+  /// soft limit of open files as far as needed and allowed; with a lower one it takes fewer
+  /// clients.
   /// @throws SocketError: another daemon listens there, folder missing, path too long, ...
   explicit StatusServer(const SocketConfig& config, const SocketLimits& limits = {});
   ~StatusServer();  ///< closes and removes the socket file
@@ -70,13 +71,13 @@ class StatusServer {
   StatusServer& operator=(const StatusServer&) = delete;
 
   void add_method(const std::string& name, AccessClass access, RpcHandler handler);
-  /// While the result is waited for, everybody else is served; this client's next request is not
+  /// While the result is awaited everybody else is served, but this client's next request is not
   /// begun.
   void add_slow_method(const std::string& name, AccessClass access, RpcSlowHandler handler);
   /// Readable when there is something to do: for the owner's epoll or poll.
   [[nodiscard]] int fd() const noexcept;
   /// Waits up to `timeout` for something to do and does it, or a part of it: what is left makes
-  /// fd() readable again. Throws nothing of a client's making.
+  /// fd() readable again. Never throws because of a client.
   void handle(std::chrono::milliseconds timeout);
   [[nodiscard]] SocketStatistics statistics() const noexcept;
   /// For a handler: the user of the request in hand, as the kernel gives it; -1: not known.

@@ -1,4 +1,4 @@
-/// So many things a second, and so many at once after a pause.
+/// A bound on how many things happen per second, and at once after a pause.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class TokenBucket {
     return true;
   }
   void give_back() noexcept { level_ += 1.0; }
-  /// From when on one can be taken.
+  /// The earliest time at which one can be taken.
   [[nodiscard]] Clock::time_point next(Clock::time_point now) noexcept {
     refill(now);
     if (level_ >= 1.0) return now;

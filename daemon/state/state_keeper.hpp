@@ -19,7 +19,7 @@ class StateKeeper {
 
   /// @param start           the daemon's at its start; only what differs from it is written
   /// @param is_on_disk      `start` need not be written
-  /// @param reference_lost  the reference of `start` is not the machine's: nobody knows that one
+  /// @param reference_lost  the reference of `start` is not the machine's, which nobody knows
   /// @param reference       when the reference of `start` was taken
   StateKeeper(std::filesystem::path file, PersistentState start, bool is_on_disk,
               bool reference_lost, const ReferenceRecord& reference = {})
@@ -34,7 +34,7 @@ class StateKeeper {
   /// Writes whatever differs from what is on disk.
   void save(const PersistentState& state, Clock::time_point now);
 
-  /// Of the last attempt; empty: what was given last is on disk.
+  /// What went wrong at the last attempt; empty: what was given last is on disk.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
 
   /// Until an operator takes a new one, the reference is unknown: compensating would take the

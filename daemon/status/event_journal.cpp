@@ -40,12 +40,12 @@ void EventJournal::fault(const std::string& subject, const std::string& what) {
   add(at, event_of("fault", subject, what));
 }
 
-void EventJournal::recovery(const std::string& subject) {
+void EventJournal::recovery(const std::string& subject, std::chrono::nanoseconds ago) {
   const auto outage = outages_.find(subject);
   if (outage == outages_.end()) return;
   const Moment at = now_();
   Event event = event_of("recovery", subject, outage->second.what);
-  event.duration_s = seconds(at.monotonic - outage->second.since);
+  event.duration_s = seconds(at.monotonic - ago - outage->second.since);
   outages_.erase(outage);
   add(at, std::move(event));
 }

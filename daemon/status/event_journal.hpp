@@ -42,8 +42,8 @@ class EventJournal {
   /// The subject has this fault from now on. Another one than before is told, but the outage counts
   /// from the first.
   void fault(const std::string& subject, const std::string& what);
-  /// The subject has none any more; nothing where it had none.
-  void recovery(const std::string& subject);
+  /// The subject has had none for the time `ago`; nothing where it had none.
+  void recovery(const std::string& subject, std::chrono::nanoseconds ago = {});
   /// A mode that begins; the same again is nothing.
   void mode(const std::string& name);
   void command(const std::string& what, std::int64_t user);

@@ -1,6 +1,7 @@
 #include "daemon/status/event_log.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include <spdlog/spdlog.h>
 
@@ -11,6 +12,13 @@ namespace {
 
 /// So many clipped values in a row are news: the temperature really runs away from its past.
 constexpr std::uint32_t clipped_in_a_row_news = 5;
+
+/// What is beyond a limit by a little comes and goes with the noise: over is it after a minute
+/// without.
+nanoseconds over_after(Reason reason) {
+  const bool has_limit = reason == Reason::at_bound || reason == Reason::outside_domain;
+  return has_limit ? std::chrono::minutes(1) : nanoseconds{};
+}
 
 std::string reason_names(std::uint32_t reasons) {
   std::string names;
@@ -67,27 +75,37 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config, 
 }
 
 void EventLog::note_mode(const Report& report, const std::string& mode) {
-  // "cutting" comes and goes with every part; it is in the status, not in the log.
-  const std::uint32_t reasons = report.reasons & ~static_cast<std::uint32_t>(Reason::cutting);
-  if (first_ || report.mode != mode_ || reasons != reasons_) {
-    const bool good = report.mode == Mode::compensating && reasons == 0;
-    spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}", mode,
-                reason_names(reasons));
-  }
+  const std::uint32_t told = reasons_;
   for (std::size_t i = 0; i < reasons_count; ++i) {
     const auto reason = static_cast<Reason>(1u << i);
-    // What an operator wanted is no fault; the command and the mode tell of it.
-    if (reason == Reason::operator_disabled) continue;
-    if (has_reason(reasons, reason) == has_reason(reasons_, reason)) continue;
-    const std::string name(to_string(reason));
-    if (has_reason(reasons, reason))
-      journal_.fault("reason " + name, name);
-    else
-      journal_.recovery("reason " + name);
+    // Cutting comes and goes with every part; it is in the status, not in the log.
+    if (reason != Reason::cutting)
+      note_reason(reason, has_reason(report.reasons, reason), report.now);
+  }
+  if (first_ || report.mode != mode_ || reasons_ != told) {
+    const bool good = report.mode == Mode::compensating && reasons_ == 0;
+    spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}", mode,
+                reason_names(reasons_));
   }
   journal_.mode(mode);
   mode_ = report.mode;
-  reasons_ = reasons;
+}
+
+void EventLog::note_reason(Reason reason, bool is_given, nanoseconds now) {
+  const auto bit = static_cast<std::uint32_t>(reason);
+  nanoseconds& last = given_last_[static_cast<std::size_t>(std::countr_zero(bit))];
+  const bool is_told = (reasons_ & bit) != 0;
+  const nanoseconds wanted = over_after(reason);
+  if (is_given) last = now;
+  if (is_given == is_told || (is_told && now - last < wanted)) return;
+  reasons_ ^= bit;
+  // What an operator wanted is no fault; the command and the mode tell of it.
+  if (reason == Reason::operator_disabled) return;
+  const std::string name(to_string(reason));
+  if (is_given)
+    journal_.fault("reason " + name, name);
+  else
+    journal_.recovery("reason " + name, wanted > nanoseconds{} ? now - last : wanted);
 }
 
 void EventLog::note_sensors(const Report& report, const EstimatorConfig& config) {

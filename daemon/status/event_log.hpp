@@ -2,6 +2,7 @@
 /// has to log.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <map>
 #include <string>
@@ -38,6 +39,7 @@ class EventLog {
 
  private:
   void note_mode(const Report& report, const std::string& mode);
+  void note_reason(Reason reason, bool is_given, nanoseconds now);
   void note_sensors(const Report& report, const EstimatorConfig& config);
   void note_suspicion(std::size_t index, const SensorReport& sensor, const std::string& name);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
@@ -48,7 +50,8 @@ class EventLog {
   bool first_{true};
   nanoseconds settled_at_{};  ///< of the reports
   Mode mode_{Mode::starting};
-  std::uint32_t reasons_{0};
+  std::uint32_t reasons_{0};  ///< told, and not yet over
+  std::array<nanoseconds, reasons_count> given_last_{};
   std::vector<bool> suspected_;
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;

@@ -87,6 +87,10 @@ json axes(const StatusView& view) {
                     {"proving", axis.proving},
                     {"offset_sd", number(axis.offset_sd_um)},
                     {"offset_sd_max", view.config.estimator.compensation.offset_sd_um_max}});
+    if (config.node) {
+      list.back()["axis"] = config.node->axis;
+      list.back()["at_mm"] = config.node->position_mm;
+    }
     if (std::isfinite(axis.held_um)) list.back()["held"] = axis.held_um;
     if (view.config.estimator.correction.form != CorrectionForm::off)
       list.back()["correction"] = correction(view, axis.correction);
@@ -323,7 +327,9 @@ json status_json(const StatusView& view) {
       bad.push_back(view.config.estimator.sensors[i].name);
   return {{"mode", mode_name(view.report.mode, view.config.dry_run)},
           {"dry_run", view.config.dry_run},
-          {"mode_since_s", number(seconds(view.report.now - view.report.mode_since))},
+          {"mode_since_s",
+           number(std::min(seconds(view.report.now - view.report.mode_since), view.uptime_s))},
+          {"compensating_s", number(view.compensating_s)},
           {"enabled", view.report.enabled},
           {"reasons", reasons(view.report)},
           {"cycle_ends", view.report.cycle_ends},

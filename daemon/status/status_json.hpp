@@ -35,14 +35,16 @@ struct StatusView {
   double uptime_s{0.0};
   bool real_time{false};
   SocketStatistics socket;
-  std::vector<Event> ended{};  ///< outages that are over since a few minutes, newest first
+  std::vector<Event> ended{};              ///< outages that ended in the last minutes, newest first
   const TemperatureTrend* trend{nullptr};  ///< nullptr: nobody watches the temperatures
   ReferenceRecord reference{};
   bool reference_lost{false};   ///< see StateKeeper
   double wall_s{not_a_number};  ///< now, since 1970
+  /// For so long every axis has been driven in mode `compensating`.
+  double compensating_s{not_a_number};
 };
 
-/// What a status calls the mode. A dry run does not compensate: "dry_run" in that one's place.
+/// What a status calls the mode. A dry run does not compensate: its "compensating" is "dry_run".
 [[nodiscard]] std::string_view mode_name(Mode mode, bool dry_run) noexcept;
 
 /// NaN becomes null. Units are the ends of the keys; axes and outputs name theirs.

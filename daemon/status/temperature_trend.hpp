@@ -12,7 +12,7 @@
 
 namespace thermocomp {
 
-/// The temperatures of the model's columns over the last half hour, a row every few seconds.
+/// The temperatures of the model's columns over the last half hour, one row every few seconds.
 /// Main's thread only; time is an argument.
 class TemperatureTrend {
  public:
@@ -31,16 +31,16 @@ class TemperatureTrend {
     /// Warming or cooling, and by more than the resolution of a coarse module.
     [[nodiscard]] bool is_uneven() const noexcept;
   };
-  /// Of a column that stands still enough for a reference, at most [K/h]. In 32 h of a recorded
+  /// Largest rate of a column that stands still enough for a reference [K/h]. In 32 h of a recorded
   /// spindle the fastest structural sensor stayed below 1.1 K/h in 99 % of all half hours that
   /// began 3 h after the last change of speed, and above 4.2 K/h in 95 % of those in the first hour
   /// after a rise.
   static constexpr double even_rate_K_per_h_max = 3.0;
-  /// A change by less is not told from the steps of a module with 0.1 K.
+  /// A smaller change cannot be told from the steps of a module with 0.1 K.
   static constexpr double change_K_min = 0.3;
 
   [[nodiscard]] bool is_due(nanoseconds now) const noexcept;
-  /// @param columns  of the model; others than before begin anew
+  /// @param columns  of the model; if they differ from before, all begins anew
   void note(nanoseconds now, const std::vector<std::string>& columns,
             std::span<const InputReport> inputs);
   /// @param temp_degC  of this column, now

@@ -1,4 +1,4 @@
-/// Where the daemon's log goes and how much of it.
+/// Where the daemon's log goes, and how much is logged.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// What systemd is told: readiness, status, watchdog. Silent where the daemon is no service.
+/// What systemd is told: readiness, status, watchdog. Silent where the daemon is not a service.
 #pragma once
 
 #include <chrono>
@@ -13,7 +13,7 @@ class ServiceManager {
   void ready(const std::string& status) noexcept;
   void reloading() noexcept;
   void stopping(const std::string& status) noexcept;
-  /// A stop that takes its time: not killed for the next `time`.
+  /// Announces a slow stop: the daemon is not to be killed for the next `time`.
   void extend_stop(std::chrono::microseconds time) noexcept;
   void status(const std::string& status) noexcept;  ///< only sent when it has changed
   /// Feeds the watchdog; called only when the cycle has advanced.

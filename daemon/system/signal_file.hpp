@@ -5,7 +5,7 @@ namespace thermocomp {
 
 class SignalFile {
  public:
-  /// What came since the last call; any number of SIGHUPs are one wish.
+  /// What came since the last call; any number of SIGHUPs count as one.
   struct Asked {
     int stop{0};  ///< SIGTERM or SIGINT, the last of them; 0: none
     bool reload{false};

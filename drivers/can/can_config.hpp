@@ -24,7 +24,8 @@ struct CanField {
   bool operator==(const CanField&) const = default;
 };
 
-/// A multiplexor: a number in the frame that says which of several contents the rest of it has.
+/// A multiplexor: a number in the frame that says which of several contents the rest of the frame
+/// has.
 struct CanSelector {
   /// Numbers from first to last, both included.
   struct Pages {

@@ -19,7 +19,7 @@ namespace thermocomp {
 /// The bytes behind a reading, as they came; empty: none since the bus or its node was lost.
 struct RawReading {
   std::vector<std::uint8_t> value;   ///< frame, object, or part of a long message
-  std::vector<std::uint8_t> status;  ///< where it is asked for apart
+  std::vector<std::uint8_t> status;  ///< where it is asked for separately
 };
 
 class CanProtocol {
@@ -37,7 +37,7 @@ class CanProtocol {
   virtual void opened(nanoseconds now) = 0;  ///< the bus can be used from now on
   virtual void closed(nanoseconds now) = 0;  ///< ... no longer; every reading becomes no_answer
   virtual void take(const CanFrame& frame) = 0;
-  /// What is due by now. To be called after take() and at least every 50 ms.
+  /// Does what is due by now. To be called after take(), and at least every 50 ms.
   virtual void advance(nanoseconds now) = 0;
   /// Frames to send, oldest first; each is given once.
   [[nodiscard]] virtual std::optional<CanFrame> next_frame() = 0;

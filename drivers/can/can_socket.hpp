@@ -27,7 +27,7 @@ struct CanId {
   auto operator<=>(const CanId&) const = default;
 };
 
-/// Identifiers that agree with `id` in the bits of `mask` (and are as long).
+/// Identifiers of the same length that agree with `id` in the bits of `mask`.
 struct CanFilter {
   CanId id;
   std::uint32_t mask{0x1FFFFFFF};
@@ -73,13 +73,13 @@ struct CanErrors {
 [[nodiscard]] nanoseconds monotonic_stamp(nanoseconds realtime_stamp, nanoseconds realtime_now,
                                           nanoseconds monotonic_now) noexcept;
 
-/// The least number of bytes, `size` or more, that a frame can have: above 8 only some exist.
+/// The smallest frame size of at least `size` bytes: above 8 only some sizes exist.
 /// @pre size <= can_bytes_max
 [[nodiscard]] std::size_t whole_frame_bytes(std::size_t size) noexcept;
 
 /// One bus seen through one socket, classic and FD frames alike; used by one thread. Trouble is
-/// data: no method throws after construction (but for memory), a lost link closes the socket and
-/// error() says why.
+/// data: no method throws after construction (except for lack of memory); a lost link closes the
+/// socket, and error() says why.
 class CanSocket {
  public:
   static constexpr std::size_t filters_max = 512;  ///< the kernel's CAN_RAW_FILTER_MAX
@@ -138,8 +138,8 @@ class CanSocket {
   int socket_{-1};
   CanState state_{CanState::down};
   nanoseconds state_since_;
-  /// It was opened without a carrier, which is how an interface that is bus-off shows itself; no
-  /// error frame tells of what was before.
+  /// It was opened without a carrier, which is how a bus-off interface shows itself; no error frame
+  /// tells what happened before.
   bool without_carrier_{false};
   bool send_failed_{false};
   std::string error_;

@@ -18,10 +18,10 @@ namespace thermocomp {
 inline constexpr std::size_t can_classic_bytes_max = 8;
 inline constexpr std::size_t can_bytes_max = 64;  ///< of a CAN FD frame
 
-/// A bit for each of a frame's, by its DBC number.
+/// One bit for each bit of a frame, by its DBC number.
 using CanBits = std::bitset<8 * can_bytes_max>;
 
-/// Refuses a signal that cannot be: identifier, length, place in 8 bytes (FD: 64), float length,
+/// Refuses an impossible signal: identifier, length, place in 8 bytes (FD: 64), float length,
 /// scale, multiplexors. The keys named are those of CanSignal and CanField.
 /// @throws InvalidValue
 void check(const CanSignal& signal);
@@ -49,7 +49,7 @@ void insert_raw(std::span<std::uint8_t> payload, const CanSignal& signal,
                 std::uint64_t raw) noexcept;
 
 /// Whether the frame carries the signal: false when a multiplexor in it shows another page. A frame
-/// too short for a multiplexor counts as one that does, so that decode() can call it bad.
+/// too short for a multiplexor counts as carrying it, so that decode() can call it bad.
 /// @pre check(signal) passes
 [[nodiscard]] bool carries(std::span<const std::uint8_t> payload, const CanSignal& signal) noexcept;
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "drivers/controllers/travel_values.hpp"
 #include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 
@@ -15,9 +16,29 @@ CanId id_of(const CanSignal& signal) {
   return {signal.id, signal.extended_id};
 }
 
+/// Values and numbers.
+std::vector<const CanSignal*> signals_of(const CanSet& set) {
+  std::vector<const CanSignal*> signals;
+  for (const CanSignal& value : set.values) signals.push_back(&value);
+  for (const CanSignal& number : set.numbers) signals.push_back(&number);
+  return signals;
+}
+
+std::vector<const CanSignal*> sent_signals(const CanAxis& axis) {
+  if (axis.travel) return signals_of(axis.travel->sent);
+  return {&axis.offset};
+}
+
+std::vector<const CanSignal*> shown_signals(const CanAxis& axis) {
+  if (axis.travel) return signals_of(axis.travel->applied);
+  if (axis.applied) return {&*axis.applied};
+  return {};
+}
+
 std::vector<const CanSignal*> sent_signals(const CanControllerConfig& config) {
   std::vector<const CanSignal*> signals;
-  for (const CanAxis& axis : config.axes) signals.push_back(&axis.offset);
+  for (const CanAxis& axis : config.axes)
+    for (const CanSignal* signal : sent_signals(axis)) signals.push_back(signal);
   if (config.valid_bits) signals.push_back(&*config.valid_bits);
   if (config.heartbeat) signals.push_back(&*config.heartbeat);
   return signals;
@@ -25,9 +46,8 @@ std::vector<const CanSignal*> sent_signals(const CanControllerConfig& config) {
 
 std::vector<const CanSignal*> received_signals(const CanControllerConfig& config) {
   std::vector<const CanSignal*> signals;
-  for (const CanAxis& axis : config.axes) {
-    if (axis.applied) signals.push_back(&*axis.applied);
-  }
+  for (const CanAxis& axis : config.axes)
+    for (const CanSignal* signal : shown_signals(axis)) signals.push_back(signal);
   for (const CanControllerSignal& signal : config.signals) signals.push_back(&signal.value);
   return signals;
 }
@@ -54,17 +74,36 @@ void check_signals(const CanControllerConfig& config) {
   }
 }
 
+void check_travels(const CanControllerConfig& config) {
+  for (const CanAxis& axis : config.axes) {
+    if (!axis.travel) continue;
+    check_travel(*axis.travel);
+    if (!axis.reads_back()) continue;
+    std::map<CanId, CanBits> shown;
+    for (const CanSignal* signal : signals_of(axis.travel->applied)) {
+      CanBits& bits = shown[id_of(*signal)];
+      require((bits & bits_of(*signal)).none(), "start_bit", signal->start_bit,
+              "signals of a set must not overlap");
+      bits |= bits_of(*signal);
+    }
+    const double round_s = static_cast<double>(set_numbers(axis.travel->sent)) * config.period_s;
+    require(round_s > config.silent_after_s, "silent_after_s", config.silent_after_s,
+            "must be less than the time in which the numbers of a set come round");
+  }
+}
+
 void check_config(const CanControllerConfig& config) {
   require(config.period_s > 0.0 && std::isfinite(config.period_s), "period_s", config.period_s,
           "must be finite and more than 0");
   require(config.silent_after_s > 0.0, "silent_after_s", config.silent_after_s,
           "must be more than 0");
-  require(config.axes.size() <= axes_max, "axes", static_cast<double>(config.axes.size()),
-          "a controller has at most 16 axes");
+  require(config.offsets() <= axes_max, "axes", static_cast<double>(config.offsets()),
+          "a controller has at most 16 axes, nodes of travels counted");
   for (const CanControllerSignal& signal : config.signals) {
     require(signal.signal < signals_max, "signal", static_cast<double>(signal.signal),
             "a controller has at most 48 signals");
   }
+  check_travels(config);
   check_signals(config);
   if (config.valid_bits) {
     require(static_cast<std::size_t>(config.valid_bits->length_bits) >= config.axes.size() &&
@@ -79,9 +118,20 @@ void check_config(const CanControllerConfig& config) {
 
 std::vector<double> applied_resolution_um(const CanControllerConfig& config) {
   std::vector<double> steps_um;
-  for (const CanAxis& axis : config.axes)
-    steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+  for (const CanAxis& axis : config.axes) {
+    for (std::size_t node = 0; node < axis.offsets(); ++node) {
+      if (axis.travel)
+        steps_um.push_back(resolution_um(*axis.travel, axis.travel->applied, node));
+      else
+        steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+    }
+  }
   return steps_um;
+}
+
+double sent_resolution_um(const CanAxis& axis, std::size_t node) {
+  if (axis.travel) return resolution_um(*axis.travel, axis.travel->sent, node);
+  return std::abs(axis.offset.scale);
 }
 
 }  // namespace
@@ -90,6 +140,12 @@ CanController::CanController(CanControllerConfig config)
     : config_((check_config(config), std::move(config))),
       socket_(config_.interface, received_ids(config_)),
       gate_(from_seconds(config_.period_s), applied_resolution_um(config_)) {
+  std::size_t offsets = 0;
+  for (const CanAxis& axis : config_.axes) {
+    first_.push_back(offsets);
+    offsets += axis.offsets();
+  }
+  set_numbers_.assign(config_.axes.size(), 0);
   plan_outgoing();
   plan_incoming();
   held_um_.fill(not_a_number);
@@ -113,9 +169,21 @@ CanController::Outgoing& CanController::outgoing(const CanSignal& signal) {
   return found;
 }
 
+CanController::Incoming& CanController::incoming(const CanSignal& signal) {
+  const CanId id = id_of(signal);
+  const auto known = std::find_if(incoming_.begin(), incoming_.end(),
+                                  [&](const Incoming& other) { return other.id == id; });
+  Incoming& found = known != incoming_.end() ? *known : incoming_.emplace_back();
+  found.id = id;
+  return found;
+}
+
 void CanController::plan_outgoing() {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
-    outgoing(config_.axes[axis].offset).axes.push_back(axis);
+    for (const CanSignal* signal : sent_signals(config_.axes[axis])) {
+      std::vector<std::size_t>& axes = outgoing(*signal).axes;
+      if (axes.empty() || axes.back() != axis) axes.push_back(axis);
+    }
   }
   if (config_.valid_bits) outgoing(*config_.valid_bits).has_valid_bits = true;
   if (config_.heartbeat) outgoing(*config_.heartbeat).has_heartbeat = true;
@@ -127,21 +195,18 @@ void CanController::plan_outgoing() {
 }
 
 void CanController::plan_incoming() {
-  const auto add = [this](const CanSignal& signal, double* target) {
-    const CanId id = id_of(signal);
-    const auto known = std::find_if(incoming_.begin(), incoming_.end(),
-                                    [&](const Incoming& other) { return other.id == id; });
-    Incoming& found = known != incoming_.end() ? *known : incoming_.emplace_back();
-    found.id = id;
-    found.values.emplace_back(signal, target);
-  };
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
     const CanAxis& place = config_.axes[axis];
-    if (place.applied) add(*place.applied, &state_.applied_um[axis]);
+    if (place.travel && place.reads_back()) {
+      for (const CanSignal* signal : shown_signals(place)) incoming(*signal);
+      shown_sets_.push_back({{}, axis, CanSetReader(place.travel->applied)});
+    } else if (place.applied) {
+      incoming(*place.applied)
+          .values.emplace_back(*place.applied, &state_.applied_um[first_[axis]]);
+    }
   }
-  for (const CanControllerSignal& signal : config_.signals) {
-    add(signal.value, &state_.signals[signal.signal]);
-  }
+  for (const CanControllerSignal& signal : config_.signals)
+    incoming(signal.value).values.emplace_back(signal.value, &state_.signals[signal.signal]);
 }
 
 void CanController::start() {
@@ -174,6 +239,10 @@ ControllerHealth CanController::health() const {
 
 void CanController::run() {
   next_send_ = monotonic_now();
+  const bool sends_sets = std::any_of(config_.axes.begin(), config_.axes.end(),
+                                      [](const CanAxis& axis) { return axis.travel.has_value(); });
+  if (sends_sets)
+    quiet_until_ = next_send_ + from_seconds(CanTravel::forgotten_after_s(config_.period_s));
   while (!stopping_.load()) {
     if (!socket_.is_open()) {
       open_or_pause();
@@ -230,6 +299,7 @@ void CanController::take(const CanFrame& frame) {
     whole = whole && decoded.fault != Fault::bad_frame;
     *target = decoded.value;
   }
+  whole = take_sets(frame) && whole;
   if (whole) {
     found->received_at = frame.received_at;
     found->seen = true;
@@ -239,6 +309,48 @@ void CanController::take(const CanFrame& frame) {
   ++health_.read_errors;
 }
 
+/// @return false: it is too short for what it should carry
+bool CanController::take_sets(const CanFrame& frame) {
+  bool whole = true;
+  for (ShownSet& shown : shown_sets_) {
+    const CanSetReader::Taken taken = shown.reader.take(frame);
+    whole = whole && taken != CanSetReader::Taken::too_short;
+    if (taken != CanSetReader::Taken::whole) continue;
+    shown.received_at = shown.reader.received_at();
+    shown.seen = true;
+    const CanTravel& travel = *config_.axes[shown.axis].travel;
+    offsets_shown(travel, shown.reader.values(),
+                  std::span(state_.applied_um).subspan(first_[shown.axis], travel.nodes_mm.size()));
+  }
+  return whole;
+}
+
+bool CanController::all_frames_seen() const noexcept {
+  return std::all_of(incoming_.begin(), incoming_.end(),
+                     [](const Awaited& frame) { return frame.seen; });
+}
+
+bool CanController::all_sets_seen() const noexcept {
+  return std::all_of(shown_sets_.begin(), shown_sets_.end(),
+                     [](const Awaited& set) { return set.seen; });
+}
+
+void CanController::await_all() noexcept {
+  for (Incoming& frame : incoming_) frame.seen = false;
+  for (ShownSet& set : shown_sets_) {
+    set.seen = false;
+    set.reader.forget();
+  }
+}
+
+void CanController::await_what_is_older(nanoseconds than) noexcept {
+  for (Incoming& frame : incoming_) frame.seen = frame.seen && frame.received_at >= than;
+  for (ShownSet& set : shown_sets_) {
+    set.seen = set.seen && set.received_at >= than;
+    set.reader.forget_before(than);
+  }
+}
+
 /// In sync or not, from what has arrived and how long ago. A bus-off counts even where it was over
 /// before we looked: what waited to be sent then is lost.
 void CanController::supervise(nanoseconds now) {
@@ -246,21 +358,17 @@ void CanController::supervise(nanoseconds now) {
   bus_offs_ = socket_.errors().bus_off;
   if (!socket_.is_open() || socket_.bus_off() || was_off) {
     if (gate_.in_sync()) lose();
-    for (Incoming& frame : incoming_) frame.seen = false;
+    await_all();
     silent_ = false;
     return tell_error();
   }
-  const nanoseconds limit = from_seconds(config_.silent_after_s);
-  for (Incoming& frame : incoming_) {
-    if (now - frame.received_at > limit) frame.seen = false;
-  }
-  const bool all_seen = std::all_of(incoming_.begin(), incoming_.end(),
-                                    [](const Incoming& frame) { return frame.seen; });
+  await_what_is_older(now - from_seconds(config_.silent_after_s));
+  const bool all_seen = all_frames_seen() && all_sets_seen();
   if (gate_.in_sync() && !all_seen) {
     lose();
     silent_ = true;
     tell_error();
-  } else if (!gate_.in_sync() && all_seen) {
+  } else if (!gate_.in_sync() && all_seen && now >= quiet_until_) {
     synchronise();
   }
 }
@@ -269,7 +377,11 @@ void CanController::supervise(nanoseconds now) {
 void CanController::tell_error() {
   const std::scoped_lock lock(health_mutex_);
   health_.last_error = socket_.error();
-  if (silent_ && health_.last_error.empty()) health_.last_error = "the controller is silent";
+  if (!health_.last_error.empty() || gate_.in_sync()) return;
+  if (all_frames_seen() && !all_sets_seen())
+    health_.last_error = "the frames that show what is applied along a travel are of two sets";
+  else if (silent_)
+    health_.last_error = "the controller is silent";
 }
 
 void CanController::note_bus_state() {
@@ -283,6 +395,7 @@ void CanController::note_bus_state() {
 void CanController::synchronise() {
   const std::uint32_t before = gate_.epoch();
   hold_what_is_applied(!is_same_link(gate_.synchronised(state_.applied_um), before));
+  number_sets();
   const nanoseconds now = monotonic_now();
   next_send_ = now + gate_.next_pause();
   publish(true, now);
@@ -296,16 +409,43 @@ void CanController::synchronise() {
 /// or between; any other is not to be sent back to where it came from, and then neither is known.
 void CanController::hold_what_is_applied(bool link_is_new) {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
-    const double applied_um = state_.applied_um[axis];
-    double& held_um = held_um_[axis];
-    if (!link_is_new && !std::isnan(held_um)) continue;
-    const double slack_um =
-        WriteGate::unexplained_um + 2.0 * std::abs(config_.axes[axis].offset.scale);
-    const bool believed = std::isnan(held_um) || std::isnan(applied_um) ||
-                          (applied_um >= std::min(0.0, held_um) - slack_um &&
-                           applied_um <= std::max(0.0, held_um) + slack_um);
-    held_um = believed ? applied_um : not_a_number;
+    for (std::size_t node = 0; node < config_.axes[axis].offsets(); ++node) {
+      const double applied_um = state_.applied_um[first_[axis] + node];
+      double& held_um = held_um_[first_[axis] + node];
+      if (!link_is_new && !std::isnan(held_um)) continue;
+      const double slack_um =
+          WriteGate::unexplained_um + 2.0 * sent_resolution_um(config_.axes[axis], node);
+      const bool believed = std::isnan(held_um) || std::isnan(applied_um) ||
+                            (applied_um >= std::min(0.0, held_um) - slack_um &&
+                             applied_um <= std::max(0.0, held_um) + slack_um);
+      held_um = believed ? applied_um : not_a_number;
+    }
   }
+}
+
+/// What is held may be another content now: it has another number.
+void CanController::number_sets() {
+  if (!numbered_) {
+    const auto periods =
+        static_cast<std::uint64_t>(monotonic_now() / from_seconds(config_.period_s));
+    std::fill(set_numbers_.begin(), set_numbers_.end(), periods);
+    for (const ShownSet& shown : shown_sets_)
+      set_numbers_[shown.axis] =
+          shown.reader.number() + set_numbers(config_.axes[shown.axis].travel->sent) / 2;
+  }
+  numbered_ = true;
+  for (std::uint64_t& number : set_numbers_) ++number;
+}
+
+bool CanController::is_driven(std::size_t axis) const noexcept {
+  const OffsetCommand& command = gate_.command();
+  for (std::size_t i = first_[axis]; i < first_[axis] + config_.axes[axis].offsets(); ++i)
+    if (!command.valid[i] || !std::isfinite(command.offset_um[i])) return false;
+  return true;
+}
+
+std::span<double> CanController::held_um(std::size_t axis) noexcept {
+  return std::span(held_um_).subspan(first_[axis], config_.axes[axis].offsets());
 }
 
 void CanController::send_command(nanoseconds now) {
@@ -315,10 +455,11 @@ void CanController::send_command(nanoseconds now) {
   // Without frames of the controller nothing else would renew the published time.
   if (incoming_.empty() && gate_.in_sync()) publish(true, now);
   if (verdict == SendVerdict::nothing_to_send) return;
-  const OffsetCommand& command = gate_.command();
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
-    const double offset_um = command.offset_um[axis];
-    if (command.valid[axis] && std::isfinite(offset_um)) held_um_[axis] = offset_um;
+    if (!is_driven(axis)) continue;
+    std::copy_n(gate_.command().offset_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]),
+                config_.axes[axis].offsets(), held_um(axis).begin());
+    ++set_numbers_[axis];
   }
   ++heartbeat_;
   const bool sent = std::all_of(outgoing_.begin(), outgoing_.end(),
@@ -330,20 +471,35 @@ void CanController::send_command(nanoseconds now) {
   if (!sent) health_.last_error = socket_.error();
 }
 
+/// Only sets are in it, and none of them may be followed: a controller that goes by the valid bits
+/// of the turn before would take over what is held.
+bool CanController::may_be_left_out(const Outgoing& outgoing) const noexcept {
+  if (outgoing.has_valid_bits || outgoing.has_heartbeat) return false;
+  return std::none_of(outgoing.axes.begin(), outgoing.axes.end(), [this](std::size_t axis) {
+    return !config_.axes[axis].travel || is_driven(axis);
+  });
+}
+
 bool CanController::compose_and_send(Outgoing& outgoing) {
+  if (may_be_left_out(outgoing)) return true;
   const std::span<std::uint8_t> data(outgoing.frame.data.data(), outgoing.frame.size);
   for (const std::size_t axis : outgoing.axes) {
-    const bool known = !std::isnan(held_um_[axis]);
+    const std::span<const double> held = held_um(axis);
+    const bool known =
+        std::none_of(held.begin(), held.end(), [](double each) { return std::isnan(each); });
     if (!known && !outgoing.has_valid_bits) return true;  // held back, see the class
-    encode(known ? held_um_[axis] : 0.0, data, config_.axes[axis].offset);
+    const std::vector<double> offset_um =
+        known ? std::vector<double>(held.begin(), held.end()) : std::vector(held.size(), 0.0);
+    if (const auto& travel = config_.axes[axis].travel)
+      put_set(travel->sent, travel_values(*travel, travel->sent.values.size(), offset_um),
+              set_numbers_[axis], outgoing.frame);
+    else
+      encode(offset_um.front(), data, config_.axes[axis].offset);
   }
   if (outgoing.has_valid_bits) {
-    const OffsetCommand& command = gate_.command();
     std::uint64_t bits = 0;
-    for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
-      const bool valid = command.valid[axis] && std::isfinite(command.offset_um[axis]);
-      bits |= std::uint64_t{valid ? 1u : 0u} << axis;
-    }
+    for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
+      bits |= std::uint64_t{is_driven(axis) ? 1u : 0u} << axis;
     insert_raw(data, *config_.valid_bits, bits);
   }
   if (outgoing.has_heartbeat) insert_raw(data, *config_.heartbeat, heartbeat_);
@@ -354,15 +510,11 @@ void CanController::publish(bool online, nanoseconds now) {
   state_.online = online;
   state_.link_epoch = gate_.epoch();
   state_.look = gate_.look();
-  if (incoming_.empty()) {
-    state_.taken_at = now;
-  } else {
-    state_.taken_at = std::min_element(incoming_.begin(), incoming_.end(),
-                                       [](const Incoming& a, const Incoming& b) {
-                                         return a.received_at < b.received_at;
-                                       })
-                          ->received_at;
-  }
+  state_.taken_at = now;
+  for (const Incoming& frame : incoming_)
+    state_.taken_at = std::min(state_.taken_at, frame.received_at);
+  for (const ShownSet& set : shown_sets_)
+    state_.taken_at = std::min(state_.taken_at, set.received_at);
   states_.back() = state_;
   states_.publish();
 }
@@ -373,7 +525,7 @@ void CanController::lose(bool same_link) {
     gate_.paused();
   else
     gate_.lost();
-  for (Incoming& frame : incoming_) frame.seen = false;
+  await_all();
   publish(false, monotonic_now());
   const std::scoped_lock lock(health_mutex_);
   health_.connected = false;

@@ -9,6 +9,7 @@
 #include "drivers/can/can_socket.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
+#include "drivers/controllers/travel_frames.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/wait_free_slot.hpp"
 #include "drivers/wake_event.hpp"
@@ -25,6 +26,15 @@ namespace thermocomp {
 /// axis of which neither is known is not sent, unless the valid bits stand in the same frame. Valid
 /// bits and heartbeat are raw numbers: scale and offset are not used; the heartbeat starts anew
 /// when its bits are full.
+///
+/// Of an axis whose controller interpolates along its travel the offsets of all nodes go as one set
+/// with a number of its own (CanTravel), while all of them are valid; else its frames are not sent,
+/// unless something else stands in them. Each number stands for one content. What the controller
+/// shows of it counts when all frames carry the number of one set, and is as old as the oldest of
+/// them. Nothing is sent until the frames of whoever sent before this link was started are
+/// forgotten; the numbers then go on half-way round from the one in effect, or by the clock where
+/// it is not told: what is left of a former set in a queue or in a controller that forgets nothing
+/// has another number.
 class CanController final : public ControllerLink {
  public:
   /// @throws InvalidValue for signals that cannot be or overlap
@@ -46,35 +56,58 @@ class CanController final : public ControllerLink {
     bool has_valid_bits{false};
     bool has_heartbeat{false};
   };
-  /// A frame we listen for, with where its values go in state_.
-  struct Incoming {
-    CanId id;
-    std::vector<std::pair<CanSignal, double*>> values;
+  /// What has to come anew when the link is (re)established, and then again and again.
+  struct Awaited {
     nanoseconds received_at{};
     bool seen{false};  ///< since the link was (re)established
+  };
+  /// A frame we listen for, with where its values go in state_; those of sets go to shown_sets_.
+  struct Incoming : Awaited {
+    CanId id;
+    std::vector<std::pair<CanSignal, double*>> values{};
+  };
+  /// The set of an axis that the controller shows.
+  struct ShownSet : Awaited {
+    std::size_t axis{0};
+    CanSetReader reader;
   };
 
   void plan_outgoing();
   void plan_incoming();
   Outgoing& outgoing(const CanSignal& signal);
+  Incoming& incoming(const CanSignal& signal);
   void run();
   void open_or_pause();
   void receive();
   void take(const CanFrame& frame);
+  bool take_sets(const CanFrame& frame);
+  [[nodiscard]] bool all_frames_seen() const noexcept;
+  [[nodiscard]] bool all_sets_seen() const noexcept;
+  void await_all() noexcept;
+  void await_what_is_older(nanoseconds than) noexcept;
   void supervise(nanoseconds now);
   void note_bus_state();
   void tell_error();
   void synchronise();
   void hold_what_is_applied(bool link_is_new);
+  void number_sets();
+  [[nodiscard]] bool is_driven(std::size_t axis) const noexcept;
+  [[nodiscard]] std::span<double> held_um(std::size_t axis) noexcept;
   void send_command(nanoseconds now);
+  [[nodiscard]] bool may_be_left_out(const Outgoing& outgoing) const noexcept;
   bool compose_and_send(Outgoing& outgoing);
   void publish(bool online, nanoseconds now);
   void lose(bool same_link = false);
 
   const CanControllerConfig config_;
+  std::vector<std::size_t> first_;  ///< one an axis: its first offset in command and state
   std::vector<Outgoing> outgoing_;  ///< offsets first, then valid bits, then heartbeat
   ControllerState state_;           ///< the thread's own
   std::vector<Incoming> incoming_;
+  std::vector<ShownSet> shown_sets_;
+  std::vector<std::uint64_t> set_numbers_;  ///< one an axis: of the set sent last
+  bool numbered_{false};                    ///< they have begun
+  nanoseconds quiet_until_{};               ///< before, nothing is sent
   CanSocket socket_;
   WriteGate gate_;
   std::uint64_t heartbeat_{0};

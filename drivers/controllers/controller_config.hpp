@@ -1,6 +1,7 @@
 /// What the controller drivers are built from: plain structures, filled by config/ or by a test.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <variant>
@@ -28,12 +29,48 @@ struct ModbusSignal {
   bool operator==(const ModbusSignal&) const = default;
 };
 
+/// A controller that interpolates an axis' offset along its travel by itself. Its offset at each
+/// node is one of the command's, in a row; what they come to is sent as a set of values that is
+/// taken over as a whole or not at all.
+struct TravelShape {
+  static constexpr std::size_t nodes_max = 16;
+  std::vector<double> nodes_mm;  ///< increasing; of a line both ends of the travel
+  /// A line: the values are K0, the offset at P0 [um], its slope [um/m] and, where it is told, P0
+  /// itself [mm]:  offset = K0 + slope (P - P0).  None: the offset at each node [um].
+  std::optional<double> p0_mm;
+  bool operator==(const TravelShape&) const = default;
+};
+
+/// In registers a set is one block of
+///
+///     begin | values | end
+///
+/// begin and end hold the number of the set. The block goes in one request, lowest address first.
+/// A reader that takes `end` first, then the values, then `begin`, and finds both equal, has no
+/// values of two sets, wherever it stopped in between.
+struct ModbusTravel : TravelShape {
+  ModbusValue begin;
+  std::vector<ModbusValue> values;
+  ModbusValue end;
+  std::vector<ModbusValue> applied;  ///< the same values in effect; empty: not read back
+  bool operator==(const ModbusTravel&) const = default;
+};
+
 /// Per axis: where the offset is written and where the controller shows what it applies.
 struct ModbusAxis {
   ModbusValue offset;
   std::optional<ModbusValue> applied;  ///< none: the controller does not read back
   /// `offset` takes volts of an amplifier, not um, and `applied` shows volts.
   std::optional<PiezoConfig> piezo{};
+  std::optional<ModbusTravel> travel{};  ///< in place of `offset` and `applied`
+
+  /// How many offsets of the command are this axis'.
+  [[nodiscard]] std::size_t offsets() const noexcept {
+    return travel ? travel->nodes_mm.size() : 1;
+  }
+  [[nodiscard]] bool reads_back() const noexcept {
+    return travel ? !travel->applied.empty() : applied.has_value();
+  }
   bool operator==(const ModbusAxis&) const = default;
 };
 
@@ -42,16 +79,57 @@ struct ModbusControllerConfig {
   ModbusLine line;
   int unit{1};
   double period_s{0.1};          ///< write and read every so often
-  std::vector<ModbusAxis> axes;  ///< order of the configuration's axes
+  std::vector<ModbusAxis> axes;  ///< order of the configuration's axes, one with all its nodes
   std::vector<ModbusSignal> signals;
   std::optional<ModbusValue> valid_bits;  ///< register: bit i = offset of axis i is valid
   std::optional<ModbusValue> heartbeat;   ///< register: counts up with every write
+
+  [[nodiscard]] std::size_t offsets() const noexcept {
+    std::size_t count = 0;
+    for (const ModbusAxis& axis : axes) count += axis.offsets();
+    return count;
+  }
   bool operator==(const ModbusControllerConfig&) const = default;
 };
 
+/// Values that belong together and stand in one frame or in several. Each of these frames carries
+/// the number of the set: those with the same number are one set, however many were lost between.
+struct CanSet {
+  static constexpr int number_bits_min = 8;
+  static constexpr int number_bits_max = 32;
+  std::vector<CanSignal> values;
+  std::vector<CanSignal> numbers;  ///< raw counts of equal length, one in each frame of the values
+  bool operator==(const CanSet&) const = default;
+};
+
+/// Over CAN a set comes frame by frame, and some do not come: a reader takes it over when the
+/// newest frames of all its identifiers carry the same number. Numbers come round, so a frame older
+/// than forgotten_after_s() is part of no set.
+struct CanTravel : TravelShape {
+  CanSet sent;
+  CanSet applied;  ///< the values in effect, with the number of their set; empty: not read back
+  bool operator==(const CanTravel&) const = default;
+
+  /// @param period_s  of the frames that are sent
+  [[nodiscard]] static double forgotten_after_s(double period_s) noexcept {
+    constexpr double least_s = 1.0;
+    constexpr double periods = 10.0;
+    return std::max(least_s, periods * period_s);
+  }
+};
+
 struct CanAxis {
-  CanSignal offset;                  ///< in a frame we send
-  std::optional<CanSignal> applied;  ///< in a frame the controller sends
+  CanSignal offset;                   ///< in a frame we send
+  std::optional<CanSignal> applied;   ///< in a frame the controller sends
+  std::optional<CanTravel> travel{};  ///< in place of `offset` and `applied`
+
+  /// How many offsets of the command are this axis'.
+  [[nodiscard]] std::size_t offsets() const noexcept {
+    return travel ? travel->nodes_mm.size() : 1;
+  }
+  [[nodiscard]] bool reads_back() const noexcept {
+    return travel ? !travel->applied.values.empty() : applied.has_value();
+  }
   bool operator==(const CanAxis&) const = default;
 };
 struct CanControllerSignal {
@@ -65,10 +143,16 @@ struct CanControllerConfig {
   double period_s{0.1};
   double silent_after_s{2.0};  ///< any configured frame missing for so long: offline
   double reconnect_s{0.5};
-  std::vector<CanAxis> axes;
+  std::vector<CanAxis> axes;  ///< order of the configuration's axes, one with all its nodes
   std::vector<CanControllerSignal> signals;
-  std::optional<CanSignal> valid_bits;
+  std::optional<CanSignal> valid_bits;  ///< bit i = offset of axis i is valid
   std::optional<CanSignal> heartbeat;
+
+  [[nodiscard]] std::size_t offsets() const noexcept {
+    std::size_t count = 0;
+    for (const CanAxis& axis : axes) count += axis.offsets();
+    return count;
+  }
   bool operator==(const CanControllerConfig&) const = default;
 };
 

@@ -25,9 +25,10 @@ struct Maker {
 
 struct AxesCounter {
   std::size_t operator()(const DryRunControllerConfig& config) const { return config.axes; }
+  std::size_t operator()(const BridgeControllerConfig& config) const { return config.axes.size(); }
   template <class Config>
   std::size_t operator()(const Config& config) const {
-    return config.axes.size();
+    return config.offsets();
   }
 };
 

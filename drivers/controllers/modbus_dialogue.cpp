@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/controllers/travel_registers.hpp"
+#include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
@@ -56,14 +58,22 @@ void check_config(const ModbusControllerConfig& config) {
   require(config.period_s > 0.0 && std::isfinite(config.period_s), "period_s", config.period_s,
           "must be finite and more than 0");
   require(config.unit >= 0 && config.unit <= 255, "unit", config.unit, "must be in [0, 255]");
-  require(config.axes.size() <= axes_max, "axes", static_cast<double>(config.axes.size()),
-          "a controller has at most 16 axes");
+  require(config.offsets() <= axes_max, "axes", static_cast<double>(config.offsets()),
+          "a controller has at most 16 axes, nodes of travels counted");
   std::vector<std::pair<std::size_t, std::size_t>> written;
   const auto note = [&written](const ModbusValue& value, const char* key) {
     check_written(value, key);
     written.emplace_back(value.address, value.address + registers_of(value.encoding));
   };
   for (const ModbusAxis& axis : config.axes) {
+    if (axis.travel) {
+      check_travel(*axis.travel);
+      note(axis.travel->begin, "begin");
+      for (const ModbusValue& value : axis.travel->values) note(value, "values");
+      note(axis.travel->end, "end");
+      for (const ModbusValue& value : axis.travel->applied) check_place(value, "applied");
+      continue;
+    }
     note(axis.offset, "offset");
     if (axis.applied) check_place(*axis.applied, "applied");
     if (axis.piezo) axis.piezo->validate();
@@ -84,8 +94,14 @@ void check_config(const ModbusControllerConfig& config) {
 
 std::vector<double> applied_resolution_um(const ModbusControllerConfig& config) {
   std::vector<double> steps_um;
-  for (const ModbusAxis& axis : config.axes)
-    steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+  for (const ModbusAxis& axis : config.axes) {
+    for (std::size_t node = 0; node < axis.offsets(); ++node) {
+      if (axis.travel)
+        steps_um.push_back(shown_resolution_um(*axis.travel, node));
+      else
+        steps_um.push_back(axis.applied ? std::abs(axis.applied->scale) : 0.0);
+    }
+  }
   return steps_um;
 }
 
@@ -107,20 +123,34 @@ ModbusDialogue::ModbusDialogue(ModbusControllerConfig config, ModbusConnection& 
       gate_(from_seconds(config_.period_s), applied_resolution_um(config_)),
       next_exchange_at_(connection.now()),
       retry_at_(connection.now()) {
-  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
-    if (!config_.axes[axis].applied) continue;
-    read_values_.push_back(*config_.axes[axis].applied);
-    read_targets_.push_back(config_.axes[axis].piezo ? &shown_V_[axis] : &state_.applied_um[axis]);
-  }
-  for (const ModbusSignal& signal : config_.signals) {
-    read_values_.push_back(signal.value);
-    read_targets_.push_back(&state_.signals[signal.signal]);
-  }
-  read_plan_ = plan_reads(read_values_);
+  plan_values();
   for (const ModbusAxis& axis : config_.axes)
     piezos_.push_back(axis.piezo ? std::optional<PiezoDrive>(*axis.piezo) : std::nullopt);
   health_.name = config_.name;
   health_.kind = std::holds_alternative<ModbusTcp>(config_.line.link) ? "modbus_tcp" : "modbus_rtu";
+}
+
+void ModbusDialogue::plan_values() {
+  std::size_t offsets = 0;
+  for (const ModbusAxis& axis : config_.axes) {
+    first_.push_back(offsets);
+    offsets += axis.offsets();
+    shown_sets_.emplace_back(axis.travel ? axis.travel->applied.size() : 0, not_a_number);
+  }
+  set_numbers_.assign(config_.axes.size(), 0);
+  const auto read = [this](const ModbusValue& value, double& target) {
+    read_values_.push_back(value);
+    read_targets_.push_back(&target);
+  };
+  for (std::size_t i = 0; i < config_.axes.size(); ++i) {
+    const ModbusAxis& axis = config_.axes[i];
+    for (std::size_t each = 0; each < shown_sets_[i].size(); ++each)
+      read(axis.travel->applied[each], shown_sets_[i][each]);
+    if (axis.applied) read(*axis.applied, axis.piezo ? shown_V_[i] : state_.applied_um[first_[i]]);
+  }
+  for (const ModbusSignal& signal : config_.signals)
+    read(signal.value, state_.signals[signal.signal]);
+  read_plan_ = plan_reads(read_values_);
 }
 
 void ModbusDialogue::newest(ControllerState& state) noexcept {
@@ -176,7 +206,7 @@ bool ModbusDialogue::synchronise() {
     const std::scoped_lock lock(health_mutex_);
     ++health_.connects;
   }
-  if (!read_all()) {
+  if (!read_set_numbers() || !read_all()) {
     lose(refused_);
     return false;
   }
@@ -187,6 +217,26 @@ bool ModbusDialogue::synchronise() {
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
   health_.last_error.clear();
+  return true;
+}
+
+bool ModbusDialogue::read_set_numbers() {
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
+    const auto& travel = config_.axes[axis].travel;
+    if (!travel) continue;
+    std::vector<std::uint16_t> words(registers_of(travel->end.encoding));
+    const Exchange exchange = with_retries([&] {
+      return connection_.read(config_.unit, ModbusTable::holding, travel->end.address, words);
+    });
+    if (!exchange.ok()) {
+      const std::scoped_lock lock(health_mutex_);
+      ++health_.read_errors;
+      health_.last_error =
+          "reading from " + std::to_string(travel->end.address) + ": " + describe(exchange);
+      return false;
+    }
+    set_numbers_[axis] = bits_of(words, travel->end.encoding, travel->end.word_order);
+  }
   return true;
 }
 
@@ -231,15 +281,8 @@ double ModbusDialogue::written_value(std::size_t axis, double offset_um) {
 std::vector<WriteField> ModbusDialogue::fields_of(const OffsetCommand& command) {
   std::vector<WriteField> fields;
   double valid_bits = 0.0;
-  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
-    if (!drivable(command, axis)) continue;
-    const double value = written_value(axis, command.offset_um[axis]);
-    if (std::isnan(value)) continue;  // a piezo that waits for the offset to stand still
-    valid_bits += std::ldexp(1.0, static_cast<int>(axis));
-    const ModbusValue& place = config_.axes[axis].offset;
-    fields.push_back(field_of(place, WriteStage::offset, value,
-                              {place.encoding, place.word_order, place.scale, 0.0}));
-  }
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
+    add_axis(axis, command, fields, valid_bits);
   if (config_.valid_bits) {
     fields.push_back(field_of(*config_.valid_bits, WriteStage::valid_bits, valid_bits,
                               raw_format(*config_.valid_bits)));
@@ -249,6 +292,25 @@ std::vector<WriteField> ModbusDialogue::fields_of(const OffsetCommand& command) 
                               static_cast<double>(heartbeat_), raw_format(*config_.heartbeat)));
   }
   return fields;
+}
+
+void ModbusDialogue::add_axis(std::size_t axis, const OffsetCommand& command,
+                              std::vector<WriteField>& fields, double& valid_bits) {
+  const ModbusAxis& place = config_.axes[axis];
+  for (std::size_t i = 0; i < place.offsets(); ++i)
+    if (!drivable(command, first_[axis] + i)) return;
+  const auto offset_um = std::span(command.offset_um).subspan(first_[axis], place.offsets());
+  if (place.travel) {
+    set_numbers_[axis] = (set_numbers_[axis] + 1) % travel_numbers(*place.travel);
+    fields.push_back(travel_field(*place.travel, set_numbers_[axis], offset_um));
+  } else {
+    const double value = written_value(axis, offset_um.front());
+    if (std::isnan(value)) return;  // a piezo that waits for the offset to stand still
+    const ModbusValue& offset = place.offset;
+    fields.push_back(field_of(offset, WriteStage::offset, value,
+                              {offset.encoding, offset.word_order, offset.scale, 0.0}));
+  }
+  valid_bits += std::ldexp(1.0, static_cast<int>(axis));
 }
 
 bool ModbusDialogue::write_command() {
@@ -336,6 +398,16 @@ void ModbusDialogue::take(std::span<const std::vector<std::uint16_t>> answers) {
         format_in(value.table, {value.encoding, value.word_order, value.scale, 0.0});
     *read_targets_[i] = decode(words.subspan(place.word), format, {}).value;
   }
+  show_travels();
+}
+
+void ModbusDialogue::show_travels() noexcept {
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) {
+    const auto& travel = config_.axes[axis].travel;
+    if (!travel || travel->applied.empty()) continue;
+    offsets_shown(*travel, shown_sets_[axis],
+                  std::span(state_.applied_um).subspan(first_[axis], travel->nodes_mm.size()));
+  }
 }
 
 /// A new epoch begins: what the amplifiers show, where they do, is where their axes stand.
@@ -353,7 +425,7 @@ void ModbusDialogue::show_piezos() {
   for (std::size_t axis = 0; axis < piezos_.size(); ++axis) {
     if (!piezos_[axis] || !config_.axes[axis].applied) continue;
     piezos_[axis]->show(connection_.now(), shown_V_[axis]);
-    state_.applied_um[axis] = piezos_[axis]->applied_um();
+    state_.applied_um[first_[axis]] = piezos_[axis]->applied_um();
     if (piezos_[axis]->obeyed()) continue;
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = "the amplifier of axis " + std::to_string(axis + 1) + " shows " +
@@ -364,7 +436,7 @@ void ModbusDialogue::show_piezos() {
 std::array<double, axes_max> ModbusDialogue::without_leaps_um() const noexcept {
   std::array<double, axes_max> applied_um = state_.applied_um;
   for (std::size_t axis = 0; axis < piezos_.size(); ++axis)
-    if (piezos_[axis]) applied_um[axis] = not_a_number;
+    if (piezos_[axis]) applied_um[first_[axis]] = not_a_number;
   return applied_um;
 }
 

@@ -27,6 +27,11 @@ namespace thermocomp {
 /// by way of 0 V: whether it stands where it was told is left to its drive and to the estimator's
 /// comparison.
 ///
+/// Of an axis whose controller interpolates along its travel the offsets of all nodes go as one set
+/// with a number of its own (ModbusTravel), while all of them are valid. The numbers go on from the
+/// one that stands in `end` whenever everything is read anew: a set that was broken off, by whoever
+/// wrote before, is never taken for one that is whole.
+///
 /// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
 /// heartbeat counts up with every command written and starts anew when its register is full. Valid
 /// bits and heartbeat are raw numbers: their scale is not used.
@@ -52,6 +57,8 @@ class ModbusDialogue {
 
  private:
   bool synchronise();
+  /// The numbers of the sets that stand in the registers. False: they could not be read.
+  bool read_set_numbers();
   void exchange();
   /// Reads all and begins a new epoch where that is not explained. False: it could not be read.
   bool look();
@@ -59,6 +66,10 @@ class ModbusDialogue {
   bool write_command();
   bool write(const WriteField& request);
   std::vector<WriteField> fields_of(const OffsetCommand& command);
+  void add_axis(std::size_t axis, const OffsetCommand& command, std::vector<WriteField>& fields,
+                double& valid_bits);
+  void plan_values();
+  void show_travels() noexcept;
   [[nodiscard]] double written_value(std::size_t axis, double offset_um);
   bool read_all();
   void take(std::span<const std::vector<std::uint16_t>> answers);
@@ -75,12 +86,15 @@ class ModbusDialogue {
 
   const ModbusControllerConfig config_;
   std::vector<ModbusValue> read_values_;  ///< applied offsets, then signals
-  std::vector<double*> read_targets_;     ///< where each of them goes in state_
+  std::vector<double*> read_targets_;     ///< where each of them goes
+  std::vector<std::size_t> first_;        ///< one an axis: its first offset in command and state
   ReadPlan read_plan_;
   ModbusConnection& connection_;
   WriteGate gate_;
   std::vector<std::optional<PiezoDrive>> piezos_;  ///< one an axis
-  std::array<double, axes_max> shown_V_{};         ///< by the amplifiers of piezos
+  std::array<double, axes_max> shown_V_{};         ///< by the amplifiers of piezos, one an axis
+  std::vector<std::vector<double>> shown_sets_;    ///< one an axis: ModbusTravel::applied
+  std::vector<std::uint64_t> set_numbers_;         ///< one an axis: of the set written last
   std::uint64_t heartbeat_{0};
   ControllerState state_;  ///< the thread's own
   WaitFreeSlot<ControllerState> states_;

@@ -1,5 +1,5 @@
 /// A Modbus line that is open or not: one exchange at a time, every wait bounded and interruptible,
-/// every answer checked to be the answer to this very request.
+/// every answer checked to be the answer to this request.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ struct Exchange {
   [[nodiscard]] bool unit_answered() const noexcept;
 };
 
-/// What is checked of a line before anything is opened.
+/// Checks a line before anything is opened.
 /// @throws DriverError naming what cannot work (unknown baud rate, parity, port, empty host, ...)
 void check_line(const ModbusLine& line);
 
@@ -45,7 +45,7 @@ void check_line(const ModbusLine& line);
 /// 19200 baud; TCP: 0 unless configured.
 [[nodiscard]] nanoseconds inter_frame_delay(const ModbusLine& line) noexcept;
 
-/// The time a frame of so many bytes takes on the line; TCP: 0.
+/// The time that a frame of `bytes` bytes takes on the line; TCP: 0.
 [[nodiscard]] nanoseconds time_on_line(const ModbusLine& line, std::size_t bytes) noexcept;
 
 /// One thread uses a connection; only cancel() may come from another.
@@ -59,7 +59,7 @@ class ModbusConnection {
  public:
   /// @throws DriverError as check_line()
   explicit ModbusConnection(const ModbusLine& line);
-  /// Over another port than the line's own; its time is then that of every exchange.
+  /// Over a port other than the line's own, whose clock then times every exchange.
   /// @throws DriverError as check_line()
   ModbusConnection(const ModbusLine& line, std::unique_ptr<ModbusPort> port);
   ModbusConnection(const ModbusConnection&) = delete;
@@ -74,7 +74,7 @@ class ModbusConnection {
   [[nodiscard]] bool connected() const noexcept;
   [[nodiscard]] const std::string& last_error() const noexcept;
 
-  /// Reads words.size() registers (at most 125), or bits, one a word (at most 2000).
+  /// Reads words.size() registers (at most 125), or bits, one per word (at most 2000).
   /// `words` is written only when the outcome is ok.
   Exchange read(int unit, ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words);
   /// Writes holding registers (function 16; at most 123). ok: the unit has confirmed them.
@@ -90,7 +90,7 @@ class ModbusConnection {
   /// @return false when cancelled
   bool pause_until(nanoseconds time) noexcept;
 
-  /// From any thread, for good: every call under way or to come returns soon with `cancelled`.
+  /// From any thread, and for good: every present and future call soon returns `cancelled`.
   void cancel() noexcept;
   [[nodiscard]] bool cancelled() const noexcept;
 

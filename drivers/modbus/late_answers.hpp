@@ -1,5 +1,5 @@
-/// When may a unit on a serial line be asked again after a request without answer? Pure; the time
-/// is passed in.
+/// When a unit on a serial line may be asked again after a request without an answer. Pure; the
+/// time is passed in.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ struct ModbusQuestion {
   std::size_t answer_bytes{0};
 };
 
-/// Whether an answer to `a` could be taken for one to `b`: the answer to a read names its function
-/// and its length only; that to a write names what was written.
+/// Whether an answer to `a` could be taken for one to `b`: the answer to a read names only its
+/// function and length; that to a write names what was written.
 [[nodiscard]] constexpr bool confusable(const ModbusQuestion& a, const ModbusQuestion& b) noexcept {
   constexpr std::uint8_t last_read_function = 4;
   return a.function == b.function && b.function <= last_read_function &&
@@ -27,9 +27,9 @@ struct ModbusQuestion {
 /// Modbus RTU answers carry no number: an answer that comes late looks like the answer to whatever
 /// was asked of the same unit meanwhile. So the unit is left alone for a while, longer each time;
 /// and once it answers although earlier requests are still owed, it is left alone for as long as
-/// it may be behind. An answer to the very same question is no older than `lateness_max`; another
-/// question that it would fit as well waits until it cannot come any more. Safe for units that are
-/// late by up to `lateness_max`; other units on the line need not wait, as answers name their unit.
+/// it may be behind. An answer to the same question is no older than `lateness_max`; another
+/// question that it would also fit waits until it can no longer come. Safe for units that are late
+/// by up to `lateness_max`; other units on the line need not wait, as answers name their unit.
 class LateAnswers {
  public:
   using nanoseconds = std::chrono::nanoseconds;
@@ -49,7 +49,7 @@ class LateAnswers {
     pause_ = std::min(2 * pause_, lateness_max);
   }
 
-  /// Something came that is no answer: the unit is awake, but the true answer may still come,
+  /// Something came that is not an answer: the unit is awake, but the true answer may still come,
   /// mostly within `timeout`.
   void spoiled(const ModbusQuestion& question, nanoseconds sent_at, nanoseconds timeout) noexcept {
     question_ = question;

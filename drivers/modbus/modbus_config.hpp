@@ -18,7 +18,7 @@ enum class Encoding { int16, uint16, int32, uint32, float32, float64 };
 enum class WordOrder { abcd, dcba, badc, cdab };
 enum class ModbusTable { coil, discrete_input, holding, input };
 
-/// Registers a value takes: 1, 2 or 4.
+/// Number of registers a value takes: 1, 2 or 4.
 [[nodiscard]] constexpr std::size_t registers_of(Encoding encoding) noexcept {
   switch (encoding) {
     case Encoding::int16:
@@ -104,9 +104,9 @@ struct ModbusRenewal {
 struct ModbusDeviceConfig {
   std::string name;
   int unit{1};           ///< 0..247 (255 on TCP)
-  double period_s{1.0};  ///< read every so often
+  double period_s{1.0};  ///< how often it is read
   int registers_per_request_max{125};
-  int gap_registers_max{8};  ///< unused registers read along rather than ask twice
+  int gap_registers_max{8};  ///< unused registers read along to save a request
   bool one_register_a_request{false};
   std::optional<ModbusRenewal> renewal;
   std::vector<ModbusChannel> channels;

@@ -1,5 +1,5 @@
 /// What carries the bytes of a Modbus line and knows the time: a TCP socket, a serial port, or a
-/// simulation of either. Which bytes are an answer to what is ModbusConnection's to say.
+/// simulation of either. ModbusConnection decides which bytes answer what.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ struct PortBytes {
     bytes,           ///< `size` of them, at least one
     nothing,         ///< TCP: none there yet. Serial: a frame for nobody here
     wrong_checksum,  ///< serial
-    too_long,        ///< serial: more than a frame can have
+    too_long,        ///< serial: longer than any frame
     broke_off,       ///< serial: the rest of the frame did not come in time
     lost             ///< the line is gone
   };
@@ -47,7 +47,7 @@ class ModbusPort {
   /// has come unasked is thrown away.
   /// @return whether all of it was taken
   virtual bool send(std::span<const std::uint8_t> bytes) noexcept = 0;
-  /// Until something can be received, or is wrong with the line.
+  /// Waits until something can be received, or something is wrong with the line.
   virtual PortWait wait_for_input(nanoseconds deadline) noexcept = 0;
   /// TCP: what is there of the stream, without waiting. Serial: one frame of which the first byte
   /// is there, without its checksum; the rest of it may take `rest`.
@@ -57,7 +57,7 @@ class ModbusPort {
 
   /// @return false when cancelled
   virtual bool pause_until(nanoseconds time) noexcept = 0;
-  /// For good: every wait under way or to come ends at once.
+  /// For good: every present and future wait ends at once.
   virtual void cancel() noexcept = 0;
   [[nodiscard]] virtual bool cancelled() const noexcept = 0;
 };

@@ -36,7 +36,7 @@ struct NumberFormat {
   return {Encoding::uint16, WordOrder::abcd, format.scale, format.offset};
 }
 
-/// The value's bit pattern, right-aligned, most significant byte first brought into place.
+/// The value's bit pattern, right-aligned, its bytes brought into order.
 /// @pre registers.size() >= registers_of(encoding)
 [[nodiscard]] std::uint64_t bits_of(std::span<const std::uint16_t> registers, Encoding encoding,
                                     WordOrder order) noexcept;

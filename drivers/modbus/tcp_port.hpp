@@ -12,7 +12,7 @@ namespace thermocomp {
 
 class TcpPort final : public ModbusPort {
  public:
-  /// @param connect_max  the longest a connection may take to come about
+  /// @param connect_max  the longest that connecting may take
   TcpPort(const ModbusTcp& tcp, nanoseconds connect_max) : tcp_(tcp), connect_max_(connect_max) {}
   ~TcpPort() override { close_socket(); }
 

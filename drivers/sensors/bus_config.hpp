@@ -1,4 +1,4 @@
-/// A bus that brings readings, of any kind (drivers/sensors/make_source.hpp makes its source).
+/// A bus of any kind that brings readings (drivers/sensors/make_source.hpp makes its source).
 #pragma once
 
 #include <string>

@@ -16,8 +16,8 @@
 
 namespace thermocomp {
 
-/// An interface that is missing, down or bus-off is tried again for ever. What frames mean is for
-/// the derived class, whose hooks run on the thread only; its destructor must call stop().
+/// An interface that is missing, down or bus-off is tried again for ever. The derived class knows
+/// what frames mean; its hooks run on the thread only, and its destructor must call stop().
 class CanInterfaceSource : public SensorSource {
  public:
   /// @throws DriverError when the system has no CAN sockets at all
@@ -32,13 +32,13 @@ class CanInterfaceSource : public SensorSource {
     std::string kind;  ///< as BusHealth tells it
     std::string interface;
     double reconnect_s{0.5};
-    nanoseconds patience;  ///< work() is called at least so often while the interface is open
+    nanoseconds patience;  ///< work() is called at least this often while the interface is open
     nanoseconds gather{};  ///< pause after work(), so that frames come in batches
   };
   /// @param wanted   identifiers to receive; more by socket().also_want()
   /// @param sensors  of each reading the index in the whole configuration
   /// @param units    as they are before the start
-  /// @throws InvalidValue for an interface or a number of identifiers that cannot be
+  /// @throws InvalidValue for an impossible interface or number of identifiers
   CanInterfaceSource(Setting setting, std::vector<CanId> wanted, std::vector<std::size_t> sensors,
                      std::vector<UnitHealth> units);
 
@@ -48,7 +48,7 @@ class CanInterfaceSource : public SensorSource {
   virtual void bus_closed(nanoseconds now) = 0;
   /// Receives what has come and does what is due.
   virtual void work() = 0;
-  /// @param readings  one a sensor, to be overwritten; of the right size
+  /// @param readings  shape (sensors of this bus); overwritten
   virtual void write_readings(std::vector<Reading>& readings) = 0;
   [[nodiscard]] virtual std::vector<UnitHealth> units(nanoseconds now) = 0;
 

@@ -1,4 +1,4 @@
-/// Thermocouple readings of what speaks a protocol on one CAN interface: CANopen, J1939.
+/// Thermocouple readings by a protocol on one CAN interface: CANopen, J1939.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ namespace thermocomp {
 class CanProtocolSource final : public CanInterfaceSource {
  public:
   /// @param kind  as BusHealth tells it
-  /// @throws InvalidValue for an interface or a number of identifiers that cannot be
+  /// @throws InvalidValue for an impossible interface or number of identifiers
   CanProtocolSource(std::string name, std::string kind, std::string interface, double reconnect_s,
                     std::unique_ptr<CanProtocol> protocol);
   ~CanProtocolSource() override;

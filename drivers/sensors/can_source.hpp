@@ -13,15 +13,15 @@
 namespace thermocomp {
 
 /// Listens only. A reading's time is that of its frame's arrival at the interface. A frame whose
-/// counter shows what it showed before is none: neither value nor time change (the first frame
-/// after the bus was lost has nothing before it). While the interface is missing, down or bus-off
-/// its readings are no_answer; it is tried again for ever.
+/// counter has not moved does not count: neither value nor time change (the first frame after the
+/// bus was lost has nothing before it). While the interface is missing, down or bus-off its
+/// readings are no_answer; it is tried again for ever.
 ///
 /// Frames are fetched in batches, each 10 ms at the earliest after the one before: their times are
 /// the kernel's, and a full bus costs little.
 class CanSource final : public CanInterfaceSource {
  public:
-  /// @throws InvalidValue for a signal, interface or number of identifiers that cannot be
+  /// @throws InvalidValue for an impossible signal, interface or number of identifiers
   explicit CanSource(const CanBusConfig& config);
   ~CanSource() override;
 
@@ -53,7 +53,7 @@ class CanSource final : public CanInterfaceSource {
   static void note_arrival(Arrival arrival, UnitHealth& unit);
 
   std::vector<Channel> channels_;  ///< in the order of the identifiers
-  std::vector<Reading> readings_;  ///< one a channel
+  std::vector<Reading> readings_;  ///< one per channel
   std::vector<UnitHealth> units_;
   std::vector<nanoseconds> last_good_;  ///< arrival of each device's last good frame; 0: none
 };

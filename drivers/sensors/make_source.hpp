@@ -13,7 +13,7 @@ namespace thermocomp {
 /// @throws InvalidValue or DriverError for a configuration that cannot work
 [[nodiscard]] std::unique_ptr<SensorSource> make_source(const BusConfig& bus);
 
-/// What people are told of a bus before it is opened.
+/// What people are told about a bus before it is opened.
 struct BusOutline {
   std::string kind;       ///< as BusHealth tells it
   std::string interface;  ///< "can0"; empty on Modbus

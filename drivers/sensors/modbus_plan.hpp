@@ -1,4 +1,4 @@
-/// Which requests read all of a Modbus device, and where each value then stands. Pure.
+/// The requests that read all of a Modbus device, and where each value then stands. Pure.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-/// What is asked of the units of one Modbus line and when, and what readings the answers are.
+/// What is asked of the units of one Modbus line, when, and what readings the answers become.
 #pragma once
 
 #include <mutex>
@@ -16,7 +16,7 @@ namespace thermocomp {
 /// last answer that gave it a value arrived (with a renewal counter: the last answer in which the
 /// counter had moved); a reading with a fault keeps it and has no value.
 ///
-/// A request that fails is tried again as the line's `retries` say (of a unit that answered until
+/// A failed request is tried again as the line's `retries` say (for a unit that answered until
 /// then); a unit without answer is asked again with growing pauses (UnitBackoff), alone on its
 /// line at least every `reconnect_s` (serial: every 3 s, for the sake of late answers). A lost line
 /// is opened again every `reconnect_s`.
@@ -28,7 +28,7 @@ class ModbusPoller {
 
   /// When act() has something to do next; it then waits until that time by itself.
   [[nodiscard]] nanoseconds next_action_at() const noexcept;
-  /// One thing: connecting, one device's round of requests, or telling that the line is lost.
+  /// Does one thing: connects, runs one device's round of requests, or tells that the line is lost.
   /// @pre not called again once the connection is cancelled
   void act();
 
@@ -84,7 +84,7 @@ class ModbusPoller {
   std::vector<Reading> readings_;     ///< the thread's own
   WaitFreeSlot<std::vector<Reading>> slot_;
   nanoseconds next_connect_at_{0};
-  bool lost_{true};  ///< no line since it was lost, or never yet
+  bool lost_{true};  ///< no line, or not yet
   bool loss_told_{false};
   bool answers_since_connect_{false};
   mutable std::mutex health_mutex_;

@@ -13,7 +13,7 @@ namespace thermocomp {
 
 struct BusHealth {
   std::string name;
-  std::string kind;  ///< "modbus_tcp", "modbus_rtu", "can"
+  std::string kind;  ///< of the configuration: "modbus_tcp", "can", ...
   bool connected{false};
   std::uint64_t connects{0};  ///< times the bus was opened
   std::string last_error;
@@ -34,12 +34,13 @@ class SensorSource {
   SensorSource& operator=(const SensorSource&) = delete;
   virtual ~SensorSource() = default;
 
-  /// Starts the bus' thread. A bus that is not there yet is no error: it is tried again for ever.
+  /// Starts the bus' thread. A bus that is not there yet is not an error: it is tried again for
+  /// ever.
   /// @throws DriverError when the configuration cannot work on this system at all
   virtual void start() = 0;
   /// Ends the thread within a second. The readings stay as they were.
   virtual void stop() noexcept = 0;
-  /// Copies this bus' newest readings into `all` (one entry a configured sensor, in the order of
+  /// Copies this bus' newest readings into `all` (one entry per configured sensor, in the order of
   /// the configuration; entries of other buses are left alone). Wait-free, no allocation; called
   /// by one thread only.
   virtual void newest(std::span<Reading> all) noexcept = 0;

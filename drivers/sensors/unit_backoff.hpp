@@ -1,4 +1,4 @@
-/// How often is a unit that does not answer asked again? Pure; the time is passed in.
+/// How often a unit that does not answer is asked again. Pure; the time is passed in.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-/// Whether the controller applies what it was sent, delays of the link allowed for.
+/// Whether the controller applies what it was sent, allowing for delays of the link.
 #pragma once
 
 #include <array>
@@ -18,10 +18,10 @@ class AppliedCheck {
   void restart(nanoseconds now, double offset_um) noexcept;
   void sent(nanoseconds now, double offset_um) noexcept;
   [[nodiscard]] bool agrees(double applied_um) const noexcept;
-  /// What a controller that was away may have become of itself: what was sent to it, nothing (0),
-  /// or anything between on its way back.
+  /// Whether a controller that was away can apply this of its own accord: what was sent to it,
+  /// nothing (0), or anything in between on its way back.
   [[nodiscard]] bool agrees_after_absence(double applied_um) const noexcept;
-  /// After a reload: what the other has sent counts as sent by this one.
+  /// After a reload: what `previous` has sent counts as sent by this one.
   void adopt(const AppliedCheck& previous) noexcept { state_ = previous.state_; }
 
   void visit_state(StateArchive& archive) { archive(state_); }

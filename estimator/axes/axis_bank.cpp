@@ -15,6 +15,8 @@ AxisBank::AxisBank(const EstimatorConfig& config) {
     axes_.emplace_back(axis, config.compensation, config.controller_reads_back);
     signs_.push_back(axis.sign);
   }
+  spans_ = axis_spans(config.axes);
+  for (const AxisSpan& span : spans_) span_of_.insert(span_of_.end(), span.count, span);
 }
 
 void AxisBank::step(const StepTime& time, const Targets& targets, const Signals& signals,
@@ -28,15 +30,27 @@ void AxisBank::step(const StepTime& time, const Targets& targets, const Signals&
   input.taken_at = controller.taken_at;
   command.link_epoch = controller.link_epoch;
   command.look = controller.look;
-  for (std::size_t i = 0; i < axes_.size(); ++i) {
-    input.applied_um = controller.applied_um[i];
-    input.target_um = targets.axis_um[i];
-    if (targets.stand_where_unknown && !std::isfinite(input.target_um))
-      input.target_um = axes_[i].offset_um();
-    axes_[i].step(input);
-    command.offset_um[i] = axes_[i].offset_um();
-    command.valid[i] = axes_[i].driven();
+  for (const AxisSpan& span : spans_) {
+    for (std::size_t i = span.first; i < span.end(); ++i) {
+      input.applied_um = controller.applied_um[i];
+      axes_[i].observe(input);
+    }
+    const bool moves = driven(span);
+    for (std::size_t i = span.first; i < span.end(); ++i) {
+      input.target_um = targets.axis_um[i];
+      if (targets.stand_where_unknown && !std::isfinite(input.target_um))
+        input.target_um = axes_[i].offset_um();
+      moves ? axes_[i].move(input) : axes_[i].stand(time.now);
+      command.offset_um[i] = axes_[i].offset_um();
+      command.valid[i] = moves;
+    }
   }
+}
+
+bool AxisBank::driven(const AxisSpan& span) const noexcept {
+  for (std::size_t i = span.first; i < span.end(); ++i)
+    if (!axes_[i].driven()) return false;
+  return true;
 }
 
 bool AxisBank::synced() const noexcept {
@@ -47,6 +61,17 @@ bool AxisBank::synced() const noexcept {
 double AxisBank::compensated_um(std::size_t axis) const noexcept {
   const double applied_um = axes_[axis].applied_um();
   return signs_[axis] * (std::isfinite(applied_um) ? applied_um : axes_[axis].offset_um());
+}
+
+void AxisBank::prove(std::size_t axis, double move_um) noexcept {
+  const AxisSpan span = span_of_[axis];
+  if (!driven(span)) return;
+  for (std::size_t i = span.first; i < span.end(); ++i) axes_[i].prove(move_um);
+}
+
+void AxisBank::release(std::size_t axis) noexcept {
+  const AxisSpan span = span_of_[axis];
+  for (std::size_t i = span.first; i < span.end(); ++i) axes_[i].release();
 }
 
 void AxisBank::end_proves() noexcept {

@@ -43,17 +43,21 @@ AxisChannel::AxisChannel(const AxisConfig& config, const CompensationConfig& com
   state_.trusted_um = config.limiter.offset_um_max;
 }
 
-void AxisChannel::step(const AxisInput& input) noexcept {
+void AxisChannel::observe(const AxisInput& input) noexcept {
   if (input.link_epoch != state_.epoch) take_epoch(input.link_epoch);
   if (input.online) note_read_back(input);
   if (!state_.synced)
     synchronise(input);
   else if (input.online && reads_back_)
     compare(input);
-  if (!driven()) {
-    state_.prove.phase = ProvePhase::none;
-    return;
-  }
+}
+
+void AxisChannel::stand(nanoseconds now) noexcept {
+  end_prove();
+  if (driven()) check_.sent(now, limiter_.offset_um());
+}
+
+void AxisChannel::move(const AxisInput& input) noexcept {
   state_.driven_once = true;
   state_.driven_at = input.now;
   state_.target_um = input.target_um;
@@ -88,9 +92,6 @@ void AxisChannel::synchronise(const AxisInput& input) noexcept {
     return;
   }
   if (!std::isfinite(input.applied_um)) return;
-  // Away for longer than a controller may lag, it shows none of the values on the way any more.
-  if (input.taken_at - state_.read_back_at > lag_max)
-    check_.restart(input.now, limiter_.offset_um());
   state_.synced = true;
   state_.starting = true;
   compare(input);
@@ -98,14 +99,19 @@ void AxisChannel::synchronise(const AxisInput& input) noexcept {
 
 void AxisChannel::compare(const AxisInput& input) noexcept {
   if (!std::isfinite(input.applied_um)) return;
-  const bool fresh = input.taken_at != state_.read_back_at;
-  state_.read_back_at = input.taken_at;
   state_.out_of_bound = is_out_of_bound(input.applied_um);
+  const nanoseconds before = state_.read_back_at;
+  const bool fresh = input.taken_at != before;
+  // What a new link shows beyond the bound is nothing that was sent, however long it shows it.
+  const bool nonsense = state_.starting && !state_.latched && state_.out_of_bound;
+  if (!nonsense) state_.read_back_at = input.taken_at;
   if (state_.latched) {
     state_.starting = false;  // a release decides where to start
     state_.agreed_since = input.now;
     if (state_.releasing && fresh) check_release(input);
   } else if (state_.starting) {
+    // Away for longer than a controller may lag, it shows none of the values on the way any more.
+    if (input.taken_at - before > lag_max) check_.restart(input.now, limiter_.offset_um());
     start_on_link(input, fresh);
   } else if (check_.agrees(input.applied_um)) {
     note_explained(input, fresh);
@@ -187,6 +193,7 @@ void AxisChannel::check_release(const AxisInput& input) noexcept {
   const double could_go_um = limiter_.rate_um_per_s() * to_seconds(input.now - state_.driven_at);
   if (first || std::abs(input.applied_um - sent_um) > could_go_um) return;
   end_latch();
+  state_.unwritten_for = read_backs_until_written;
   start_from(input.now, std::clamp(input.applied_um, -state_.trusted_um, state_.trusted_um));
 }
 

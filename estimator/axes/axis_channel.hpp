@@ -24,24 +24,29 @@ struct AxisInput {
 
 /// A read-back is evidence, not a command. The offset starts from it in three cases only: at the
 /// first contact with a controller; on a new link, where it is nothing, or between that and what
-/// was sent lately; and when an operator releases a mismatch. In all others the value sent stays
-/// the axis' own.
+/// was sent lately; and when an operator releases a mismatch. In all other cases the value sent
+/// stays the axis' own.
 ///
-/// A read-back that nothing sent lately explains pauses the axis; a second one before so many good
-/// ones have followed latches the mismatch: the axis is not driven until release().
+/// A read-back that nothing sent lately explains pauses the axis; a second one, before sixteen good
+/// ones have followed, latches the mismatch: the axis is not driven until release().
 class AxisChannel {
  public:
   AxisChannel(const AxisConfig& config, const CompensationConfig& compensation, bool reads_back);
 
-  void step(const AxisInput& input) noexcept;
+  /// What the controller tells: may it be driven?
+  void observe(const AxisInput& input) noexcept;
+  /// Nothing is sent in this step: what was sent last stays, and in time is all that was.
+  void stand(nanoseconds now) noexcept;
+  /// Towards the target. @pre driven(), and the offset is sent
+  void move(const AxisInput& input) noexcept;
   /// Moves by `move_um` and back; the compensation of this axis waits meanwhile. Ignored unless
   /// driven, or beyond prove_um_max.
   void prove(double move_um) noexcept;
   void end_prove() noexcept { state_.prove.phase = ProvePhase::none; }
   /// An operator says that what caused a latched mismatch is mended. The next read-backs decide:
-  /// explained by the very factor, sign or constant that was latched, or not two alike, it stays
-  /// latched; else the axis starts from what is read back, once the slew rate would have had the
-  /// time to go there from what was sent last.
+  /// explained by the same factor, sign or constant that was latched, or no two of them alike, it
+  /// stays latched; else the axis starts from what is read back, once it could have got there at
+  /// its slew rate from what was sent last.
   void release() noexcept;
 
   [[nodiscard]] double offset_um() const noexcept { return limiter_.offset_um(); }
@@ -56,7 +61,7 @@ class AxisChannel {
   [[nodiscard]] bool mismatch() const noexcept { return state_.mismatch; }
   [[nodiscard]] bool latched() const noexcept { return state_.latched; }
   [[nodiscard]] bool releasing() const noexcept { return state_.releasing; }
-  /// Of the newest latch.
+  /// What was sent and read when the newest latch came.
   [[nodiscard]] const Mismatch& latched_mismatch() const noexcept {
     return state_.latched_mismatch;
   }
@@ -91,7 +96,7 @@ class AxisChannel {
     double trusted_um{0.0};
     bool synced{false};
     bool starting{false};     ///< a new link's first believable read-back is waited for
-    bool driven_once{false};  ///< by this program: what is applied is no longer anybody's
+    bool driven_once{false};  ///< by this program, so what is applied is ours
     bool out_of_bound{false};
     bool mismatch{false};
     nanoseconds agreed_since{};

@@ -96,19 +96,30 @@ void SentAndRead::note(double sent_um, double read_um) noexcept {
   ++count_;
 }
 
-double SentAndRead::worst_um(double factor, double constant_um) const noexcept {
+std::size_t SentAndRead::disagreeing() const noexcept {
+  std::size_t pairs = 0;
+  for (; pairs < kept(); ++pairs) {
+    const std::size_t i = index_of(pairs);
+    if (std::abs(read_um_[i] - sent_um_[i]) <= noise_um) break;
+  }
+  return pairs;
+}
+
+double SentAndRead::worst_um(std::size_t pairs, double factor, double constant_um) const noexcept {
   double worst = 0.0;
-  for (std::size_t i = 0; i < kept(); ++i)
+  for (std::size_t age = 0; age < pairs; ++age) {
+    const std::size_t i = index_of(age);
     worst = std::max(worst, std::abs(read_um_[i] - (factor * sent_um_[i] + constant_um)));
+  }
   return worst;
 }
 
-double SentAndRead::spread_um(double sent_um) const noexcept {
+double SentAndRead::spread_um(std::size_t pairs, double sent_um) const noexcept {
   double low = sent_um;
   double high = sent_um;
-  for (std::size_t i = 0; i < kept(); ++i) {
-    low = std::min(low, sent_um_[i]);
-    high = std::max(high, sent_um_[i]);
+  for (std::size_t age = 0; age < pairs; ++age) {
+    low = std::min(low, sent_um_[index_of(age)]);
+    high = std::max(high, sent_um_[index_of(age)]);
   }
   return high - low;
 }
@@ -119,10 +130,19 @@ bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
     // Where the offset was at rest it need not have moved: only what the newest were sent counts.
     apart = std::max(apart, std::abs(read_um_[i] - read_um));
   }
-  return apart <= noise_um && spread_um(sent_um) > 3.0 * noise_um;
+  return apart <= noise_um && spread_um(kept(), sent_um) > 3.0 * noise_um;
 }
 
 Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
+  const Mismatch found = judge_newest(kept(), sent_um, read_um);
+  const std::size_t since_it_began = disagreeing();
+  if (found.likely != MismatchCause::changes_alone || since_it_began == 0) return found;
+  const Mismatch lately = judge_newest(since_it_began, sent_um, read_um);
+  return lately.sure && lately.likely == MismatchCause::constant ? lately : found;
+}
+
+Mismatch SentAndRead::judge_newest(std::size_t pairs, double sent_um,
+                                   double read_um) const noexcept {
   Mismatch found;
   found.sent_um = sent_um;
   found.read_um = read_um;
@@ -134,13 +154,13 @@ Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
   const double allowed_um = noise_um + share_of_mismatch * std::abs(read_um - sent_um);
   const double factor = std::abs(sent_um) >= sent_um_min ? read_um / sent_um : not_a_number;
   const double constant_um = read_um - sent_um;
-  const double of_factor_um = worst_um(factor, 0.0);
-  const double of_constant_um = worst_um(1.0, constant_um);
+  const double of_factor_um = worst_um(pairs, factor, 0.0);
+  const double of_constant_um = worst_um(pairs, 1.0, constant_um);
   // Negated comparisons would take NaN, the factor of next to nothing, for a good one.
   const bool factor_fits = std::isfinite(factor) && of_factor_um <= allowed_um;
   const bool constant_fits = of_constant_um <= allowed_um;
-  found.sure =
-      spread_um(sent_um) > std::max(spread_um_min, spread_share_min * std::abs(read_um - sent_um));
+  found.sure = spread_um(pairs, sent_um) >
+               std::max(spread_um_min, spread_share_min * std::abs(read_um - sent_um));
   const bool by_factor =
       factor_fits && (!constant_fits || is_usual(factor) || is_near(factor, -1.0) ||
                       (found.sure && of_factor_um < of_constant_um));

@@ -1,5 +1,5 @@
-/// Why a controller may apply something else than it is sent, told from what was sent and read
-/// back.
+/// Why a controller may apply something other than what it is sent, judged by what was sent and
+/// read back.
 #pragma once
 
 #include <array>
@@ -27,9 +27,9 @@ struct Mismatch {
   double read_um{not_a_number};
   MismatchCause likely{MismatchCause::none};
   double size{not_a_number};  ///< factor: times what is sent; constant: [um]
-  /// More than one value sent tells the same: a factor, sign or constant is no coincidence.
+  /// More than one value sent says the same, so the factor, sign or constant is no coincidence.
   bool sure{false};
-  /// A factor that is as well a constant: too little has been sent to tell them apart.
+  /// A factor that might as well be a constant: too little has been sent to tell them apart.
   bool or_constant{false};
 
   /// Whether the same factor, sign or constant still explains a pair.
@@ -44,12 +44,13 @@ struct Mismatch {
 [[nodiscard]] std::string likely_text(const Mismatch& mismatch);
 
 /// The last values sent, each with what was read back: only those that differ, so that a slow
-/// offset does not fill the memory with one and the same pair.
+/// offset does not fill the memory with one pair.
 class SentAndRead {
  public:
   void note(double sent_um, double read_um) noexcept;
   /// The likeliest cause of a pair that does not agree. A factor or constant is taken from that
-  /// pair and must hold for the older ones too, the lag of a moving offset allowed for.
+  /// pair and must hold for the older ones too, allowing for the lag of a moving offset. A constant
+  /// may have begun lately: then for those since a pair last agreed, at least two.
   [[nodiscard]] Mismatch judge(double sent_um, double read_um) const noexcept;
 
   void visit_state(StateArchive& archive) { archive(sent_um_, read_um_, count_); }
@@ -57,10 +58,20 @@ class SentAndRead {
  private:
   static constexpr std::size_t length = 16;
   [[nodiscard]] std::size_t kept() const noexcept { return count_ < length ? count_ : length; }
-  /// Largest |read - (factor sent + constant)| of the pairs kept.
-  [[nodiscard]] double worst_um(double factor, double constant_um) const noexcept;
+  /// @param age  0: the newest
+  [[nodiscard]] std::size_t index_of(std::size_t age) const noexcept {
+    return (count_ - 1 - age) % length;
+  }
+  /// How many of the newest differ from what was sent.
+  [[nodiscard]] std::size_t disagreeing() const noexcept;
+  [[nodiscard]] Mismatch judge_newest(std::size_t pairs, double sent_um,
+                                      double read_um) const noexcept;
+  // Of the newest `pairs`:
+  /// largest |read - (factor sent + constant)|
+  [[nodiscard]] double worst_um(std::size_t pairs, double factor,
+                                double constant_um) const noexcept;
   [[nodiscard]] bool stands_still(double sent_um, double read_um) const noexcept;
-  [[nodiscard]] double spread_um(double sent_um) const noexcept;
+  [[nodiscard]] double spread_um(std::size_t pairs, double sent_um) const noexcept;
 
   std::array<double, length> sent_um_{};
   std::array<double, length> read_um_{};

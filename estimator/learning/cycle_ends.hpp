@@ -12,7 +12,7 @@ namespace thermocomp {
 /// Counts cycle ends from commands and from a signal of the controller, and says when they are due.
 class CycleEnds {
  public:
-  /// @param every     a correction at each so-many-th cycle end
+  /// @param every      a correction at every n-th cycle end
   /// @param is_switch  the signal is 0 or 1, and ends a cycle by rising; else any change does
   CycleEnds(std::uint64_t every, bool is_switch) : every_(every), is_switch_(is_switch) {}
 
@@ -39,8 +39,7 @@ class CycleEnds {
   }
   [[nodiscard]] std::uint64_t count() const noexcept { return state_.count; }
   /// @param same_signal  of the other's configuration and of ours: an edge during the reload
-  /// counts;
-  ///                     what another signal showed last says nothing
+  ///                     counts; what another signal showed last says nothing
   void adopt(const CycleEnds& previous, bool same_signal) noexcept {
     const double last = same_signal ? previous.state_.last : state_.last;
     state_ = previous.state_;

@@ -1,4 +1,4 @@
-/// Correction once a machining cycle: between two cycle ends the compensation goes by the state
+/// Correction once per machining cycle: between two cycle ends the compensation goes by the state
 /// that the machine had at the last one (JP7689460B2; Teratani et al. 1995, eq. 33 to 38).
 #pragma once
 
@@ -14,7 +14,7 @@
 namespace thermocomp {
 
 /// What is held is a state, never a displacement: block temperatures, operating signals and the
-/// terms' past, one interval ahead where that is wanted:
+/// terms' past, one interval ahead if wanted:
 ///   T_held = T_n + ahead (T_n - T_(n-1))
 /// The displacement is evaluated from them whenever it is asked for, at the axes' present positions
 /// (signals in mm) and with the gains of the moment. So a moving slide, a gain that a probing has
@@ -51,7 +51,7 @@ class CycleHold {
 
   /// Before the first step: what was held before the restart, NaN where it is not known.
   void restore(std::span<const double> temps_degC, std::span<const double> signals) noexcept;
-  /// After a reload; plans as of plan_names() and plan_terms().
+  /// After a reload; plans from plan_names() and plan_terms().
   void adopt(const CycleHold& previous, const std::vector<int>& columns,
              const std::vector<int>& signals, const std::vector<int>& terms) noexcept;
   void visit_state(StateArchive& archive) { archive(model_, state_); }

@@ -13,7 +13,10 @@ CycleUpdate::CycleUpdate(const EstimatorConfig& config, const ThermalModel& mode
       axis_output_(axis_output),
       hold_(model, config.compensation.cycle_ahead),
       ends_(config.compensation.cycles_per_update, signal_name_.ends_with("_on")),
+      curves_(config, model),
+      places_(node_places(config, model)),
       held_um_(model.outputs.size(), not_a_number),
+      node_um_(axis_output.size(), not_a_number),
       rise_K_(model.temperature_columns().size(), 0.0) {
   state_.axis_um.assign(axis_output.size(), not_a_number);
 }
@@ -35,15 +38,19 @@ std::span<const double> CycleUpdate::step(nanoseconds now, const Displacement& d
 
 void CycleUpdate::evaluate(const Displacement& displacement, const ReferenceState& reference,
                            const Signals& signals, const Probings& learned) noexcept {
-  hold_.displacement(reference.temps_degC, signals.of_model, held_um_);
+  const auto displacement_at = [&](std::span<const double> at, std::span<double> out_um) {
+    hold_.displacement(reference.temps_degC, at, out_um);
+  };
+  curves_.step(displacement_at, signals.of_model, node_um_);
+  displacement_at(signals.of_model, held_um_);
   for (std::size_t i = 0; i < rise_K_.size(); ++i)
     rise_K_[i] = hold_.temps_degC()[i] - reference.temps_degC[i];
   // Held like the temperatures; after a restart it is not known any more.
   const double share = std::isfinite(state_.share) ? state_.share : displacement.believed_share;
   for (std::size_t i = 0; i < axis_output_.size(); ++i)
-    state_.axis_um[i] =
-        share * (held_um_[axis_output_[i]] - displacement.zero_um[axis_output_[i]]) +
-        learned.correction_um(i, rise_K_);
+    state_.axis_um[i] = share * ((places_[i].is_node ? node_um_[i] : held_um_[axis_output_[i]]) -
+                                 displacement.zero_um[axis_output_[i]]) +
+                        learned.correction_um(i, rise_K_);
 }
 
 void CycleUpdate::restart(nanoseconds now, std::span<const double> temps_degC,

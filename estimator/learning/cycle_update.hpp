@@ -10,6 +10,7 @@
 #include "estimator/learning/cycle_hold.hpp"
 #include "estimator/learning/probings.hpp"
 #include "estimator/model/displacement_model.hpp"
+#include "estimator/model/travel_curves.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/step_values.hpp"
 #include "estimator/thermal_model.hpp"
@@ -23,7 +24,7 @@ class CycleUpdate {
  public:
   struct State {
     double share{not_a_number};   ///< of the model that was believed when the cycle ended
-    std::vector<double> axis_um;  ///< one an axis, of the held state
+    std::vector<double> axis_um;  ///< one per axis, of the held state
   };
 
   /// @param axis_output  axis -> output of the model
@@ -32,7 +33,7 @@ class CycleUpdate {
 
   /// @param compensating  a cycle end may be taken
   /// @param live          the model, stepped with these values
-  /// @return one an axis: what is compensated
+  /// @return one per axis: what is compensated
   [[nodiscard]] std::span<const double> step(nanoseconds now, const Displacement& displacement,
                                              bool compensating, const Temperatures& temps,
                                              const ReferenceState& reference,
@@ -52,7 +53,7 @@ class CycleUpdate {
   void restore(std::span<const double> temps_degC, std::span<const double> signals) noexcept {
     hold_.restore(temps_degC, signals);
   }
-  /// After a reload, with plans of plan_names() and plan_terms().
+  /// After a reload, with plans from plan_names() and plan_terms().
   void adopt(const CycleUpdate& previous, const std::vector<int>& columns,
              const std::vector<int>& signals, const std::vector<int>& axes,
              const std::vector<int>& terms) noexcept;
@@ -73,8 +74,11 @@ class CycleUpdate {
   CycleHold hold_;
   CycleEnds ends_;
   State state_;
-  std::vector<double> held_um_;  ///< scratch, one an output: the model at the held state
-  std::vector<double> rise_K_;   ///< scratch, one a column
+  TravelCurves curves_;
+  const std::vector<NodePlace> places_;
+  std::vector<double> held_um_;  ///< scratch, one per output: the model at the held state
+  std::vector<double> node_um_;  ///< scratch, one per axis: that at its node
+  std::vector<double> rise_K_;   ///< scratch, one per column
 };
 
 }  // namespace thermocomp

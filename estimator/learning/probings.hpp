@@ -1,4 +1,4 @@
-/// What displacements measured at the tool teach: a correction an axis, and how far the model was
+/// What displacements measured at the tool teach: a correction per axis, and how far the model was
 /// off.
 #pragma once
 
@@ -27,7 +27,7 @@ class Probings {
   /// @param may_change  false: what was learned waits for the end of the cut
   void step(nanoseconds now, const Temperatures& temps, const ReferenceState& reference,
             bool may_change) noexcept;
-  /// What the axis' displacement differs from the model's by.
+  /// By how much the axis' displacement differs from the model's [um].
   [[nodiscard]] double correction_um(std::size_t axis) const noexcept {
     return corrections_[axis].correction_um();
   }
@@ -37,7 +37,7 @@ class Probings {
     return corrections_[axis].correction_um(rise_K);
   }
 
-  /// Said by an operator or a probe, whatever can be made of it.
+  /// A value from an operator or a probe, whether or not anything can be learned from it.
   void note(std::size_t axis, double value_um) noexcept { measured_um_[axis] = value_um; }
   /// @param total_um  measured, as it would be without any offset
   /// @param model_um  the model's at the same moment, without correction
@@ -53,7 +53,7 @@ class Probings {
 
   /// Before the first step; see RunningCorrection::restore().
   void restore(const std::map<std::string, double>& corrections);
-  /// @param axes  of plan_names()
+  /// @param axes  from plan_names()
   void adopt(const Probings& previous, const std::vector<int>& axes) noexcept;
   void visit_learned(StateArchive& archive);
   void visit_measured(StateArchive& archive) { archive(measured_um_); }
@@ -61,10 +61,10 @@ class Probings {
  private:
   const std::vector<std::string> axis_names_;
 
-  std::vector<RunningCorrection> corrections_;  ///< one an axis, as are the next two
+  std::vector<RunningCorrection> corrections_;  ///< one per axis, as are the next two
   std::vector<ProbedError> errors_;
   std::vector<double> measured_um_;
-  std::vector<double> rise_K_;  ///< scratch, one a column
+  std::vector<double> rise_K_;  ///< scratch, one per column
 };
 
 }  // namespace thermocomp

@@ -11,7 +11,7 @@
 
 namespace thermocomp {
 
-/// One value a group of the correction, with standard deviation.
+/// One value per group of the correction, with standard deviation.
 struct RecordedGains {
   std::array<double, correction_groups_max> gain{};
   std::array<double, correction_groups_max> sd{};
@@ -32,7 +32,7 @@ class CourseLookup {
                double gain_sd);
 
   [[nodiscard]] bool empty() const noexcept { return points_.empty(); }
-  /// @param rise_K  of the model's inputs first (temperature_columns())
+  /// @param rise_K  shape (temperature_columns()), the model's inputs first
   /// Never throws, never allocates; O(points x inputs).
   [[nodiscard]] RecordedGains at(CoursePhase phase, double since_s,
                                  std::span<const double> rise_K) const noexcept;
@@ -46,7 +46,7 @@ class CourseLookup {
   double bandwidth_;
   double gain_sd_;
   double since_spread_s_{0.0};
-  std::vector<double> rise_spread_K_;  ///< one an input
+  std::vector<double> rise_spread_K_;  ///< one per input
 };
 
 }  // namespace thermocomp

@@ -19,9 +19,9 @@
 
 namespace thermocomp {
 
-/// What there is to know about one axis' correction.
+/// The state of one axis' correction, for people.
 struct CorrectionReport {
-  std::array<double, correction_groups_max> gain{};       ///< learned, one a group
+  std::array<double, correction_groups_max> gain{};       ///< learned, one per group
   std::array<double, correction_groups_max> gain_used{};  ///< in use: mid-cut those from before it
   std::array<double, correction_groups_max> gain_sd{};    ///< as of the last probing
   double bias_um{0.0};
@@ -64,7 +64,7 @@ class RunningCorrection {
   /// @param rise_K      of the model's temperature columns
   /// @param may_change  false while cutting: what was learned waits
   void step(nanoseconds now, std::span<const double> rise_K, bool may_change) noexcept;
-  /// What the corrected displacement differs from the model's by [um].
+  /// By how much the corrected displacement differs from the model's [um].
   [[nodiscard]] double correction_um() const noexcept { return correction_of(state_.used); }
   /// The same at another state of the machine.
   [[nodiscard]] double correction_um(std::span<const double> rise_K) const noexcept {
@@ -79,7 +79,7 @@ class RunningCorrection {
   [[nodiscard]] CorrectionReport report() const noexcept;
   /// Gains by name ("gain1", ...), as in `report`, and those in use where they differ; allocates.
   [[nodiscard]] static std::map<std::string, double> persistent(const CorrectionReport& report);
-  /// Before the first step, from "AXIS.gain1" and so on. Values that are no gains are ignored.
+  /// Before the first step, from "AXIS.gain1" and so on. Values that cannot be gains are ignored.
   void restore(const std::map<std::string, double>& of_all_axes, const std::string& axis);
   /// After a reload, where the groups are the same.
   void adopt(const RunningCorrection& previous) noexcept;
@@ -112,7 +112,7 @@ class RunningCorrection {
     }
   };
 
-  /// Of the look-up; there only with a course, so that the states of other machines stay as they
+  /// State of the look-up; only with a course, so that the states of other machines stay as they
   /// are.
   struct Record {
     explicit Record(double back_um) : phase(back_um) {}
@@ -129,10 +129,10 @@ class RunningCorrection {
   void look_up(std::span<const double> rise_K) noexcept;
   /// Variance of a learned gain now; infinite before the first probing of this life.
   [[nodiscard]] double learned_variance(std::size_t group) const noexcept;
-  /// Variance of the gain in use: that of the surer one of both, since what was learned went on
-  /// from the record and does not add to it.
+  /// Variance of the gain in use: that of the surer of the two, since what was learned went on from
+  /// the record and does not add to it.
   [[nodiscard]] double joint_variance(std::size_t group) const noexcept;
-  /// What was learned, with a course joined to what that says.
+  /// What was learned, joined with what the course says, if there is one.
   [[nodiscard]] Gains joint_gains() const noexcept;
   void go_on_from_joint() noexcept;
   [[nodiscard]] Contributions contributions_um(std::span<const double> rise_K) const noexcept;

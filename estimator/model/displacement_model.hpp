@@ -35,9 +35,9 @@ class DisplacementModel {
             std::span<const double> reference_degC, std::span<const double> signals,
             std::span<double> displacement_um) noexcept;
 
-  /// The derivative of an output to the temperatures, at these rises and positions: matrix,
-  /// guideway rows and terms. Where a term answers late, the larger of what it does on the way and
-  /// in the end.
+  /// The derivative of an output with respect to the temperatures, at these rises and positions:
+  /// matrix, guideway rows and terms. Where a term acts with a lag, the larger of its effect at
+  /// first and in the end.
   /// @param rise_K          shape (temperature_columns)
   /// @param signals         shape (signal_columns)
   /// @param slope_um_per_K  shape (temperature_columns); overwritten

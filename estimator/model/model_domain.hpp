@@ -41,11 +41,12 @@ class ModelDomain {
 
   [[nodiscard]] double distance() const noexcept;  ///< d; 0 before the first step
   [[nodiscard]] bool outside() const noexcept;     ///< d > distance_max
-  /// What of the model's displacement is still believed: 1 inside, (distance_max / d)^2 outside.
+  /// The share of the model's displacement that is still believed: 1 inside, (distance_max / d)^2
+  /// outside.
   [[nodiscard]] double believed_share() const noexcept;
   /// Standard deviation of an output's prediction: spread_um(), times
-  /// sqrt((1 + n d^2 / f) / (1 + n / f)) for what f rows' worth of data say about gains, where d is
-  /// above 1. NaN: nothing is known about the output.
+  /// sqrt((1 + n d^2 / f) / (1 + n / f)), f: the rows that the data are worth (freedom), d: at
+  /// least 1. NaN: nothing is known about the output.
   [[nodiscard]] double sd_um(std::size_t output) const noexcept;
 
   void visit_state(StateArchive& archive);

@@ -1,4 +1,4 @@
-/// Share of the last day that the machine was outside of its model's domain.
+/// Share of the last day for which the machine was outside its model's domain.
 #pragma once
 
 #include <array>

@@ -1,6 +1,7 @@
 #include "estimator/pipeline/certainty.hpp"
 
 #include <algorithm>
+#include <span>
 
 namespace thermocomp {
 namespace {
@@ -15,8 +16,10 @@ Certainty::Certainty(const EstimatorConfig& config, const ThermalModel& model,
                      const std::vector<std::size_t>& axis_output)
     : sd_um_max_(config.compensation.offset_sd_um_max),
       axis_output_(axis_output),
+      places_(node_places(config, model)),
       rise_K_(model.temperature_columns().size(), 0.0),
-      slope_um_per_K_(rise_K_.size(), 0.0) {
+      slope_um_per_K_(rise_K_.size(), 0.0),
+      signals_(model.signal_columns().size(), 0.0) {
   state_.offset_sd_um.assign(axis_output_.size(), 0.0);
 }
 
@@ -57,7 +60,13 @@ void Certainty::note_rise(const LostBlocks& lost, const ReferenceState& referenc
 
 double Certainty::sd_um(std::size_t axis, const LostBlocks& lost, const DisplacementModel& model,
                         const Signals& signals) noexcept {
-  model.slope(axis_output_[axis], rise_K_, signals.of_model, slope_um_per_K_);
+  std::span<const double> at = signals.of_model;
+  if (places_[axis].is_node) {
+    std::copy(at.begin(), at.end(), signals_.begin());
+    signals_[places_[axis].signal] = places_[axis].position_mm;
+    at = signals_;
+  }
+  model.slope(axis_output_[axis], rise_K_, at, slope_um_per_K_);
   return lost.sd_of(slope_um_per_K_);
 }
 

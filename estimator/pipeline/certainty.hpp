@@ -6,6 +6,7 @@
 
 #include "estimator/estimator_config.hpp"
 #include "estimator/model/displacement_model.hpp"
+#include "estimator/model/travel_curves.hpp"
 #include "estimator/sensing/lost_blocks.hpp"
 #include "estimator/state_archive.hpp"
 #include "estimator/step_values.hpp"
@@ -17,11 +18,11 @@ namespace thermocomp {
 ///
 ///     sd = sqrt(g^T V g),   g: slope of the axis' output, V: LostBlocks,
 ///
-/// against compensation.offset_sd_um_max.
+/// of a node of a travel with the slide there, against compensation.offset_sd_um_max.
 class Certainty {
  public:
   struct State {
-    std::vector<double> offset_sd_um;  ///< one an axis; 0 where all is measured
+    std::vector<double> offset_sd_um;  ///< one per axis; 0 where all is measured
     bool uncertain{false};
   };
 
@@ -54,10 +55,12 @@ class Certainty {
 
   const double sd_um_max_;
   const std::vector<std::size_t> axis_output_;
+  const std::vector<NodePlace> places_;  ///< one per axis
 
   State state_;
-  std::vector<double> rise_K_;          ///< scratch, one a column
-  std::vector<double> slope_um_per_K_;  ///< scratch, one a column
+  std::vector<double> rise_K_;          ///< scratch, one per column
+  std::vector<double> slope_um_per_K_;  ///< scratch, one per column
+  std::vector<double> signals_;         ///< scratch, of the model
 };
 
 }  // namespace thermocomp

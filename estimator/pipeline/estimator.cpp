@@ -1,5 +1,7 @@
 #include "estimator/pipeline/estimator.hpp"
 
+#include <array>
+#include <span>
 #include <stdexcept>
 
 #include "estimator/checks.hpp"
@@ -22,12 +24,27 @@ void take_reference(Stages& stages) noexcept {
   stages.cycle_update.restart(stages.record.now, temps_degC, stages.signals.of_model());
 }
 
+/// What the tool is offset by now, as a displacement: of a travel between its nodes.
+double compensated_now_um(const Stages& stages, std::size_t axis) noexcept {
+  const AxisSpan span = stages.axes.span(axis);
+  if (span.count == 1) return stages.axes.compensated_um(axis);
+  std::array<double, axes_max> nodes_um{};
+  for (std::size_t i = 0; i < span.count; ++i)
+    nodes_um[i] = stages.axes.compensated_um(span.first + i);
+  const double position_mm = stages.signals.of_model()[stages.prediction.place(axis).signal];
+  return value_on_travel(std::span(stages.config.axes).subspan(span.first, span.count), nodes_um,
+                         position_mm);
+}
+
+/// What was measured where the slide stands teaches all nodes of its travel.
 void take_measured(Stages& stages, std::size_t axis, double value_um) noexcept {
-  stages.learned.note(axis, value_um);
+  const AxisSpan span = stages.axes.span(axis);
+  for (std::size_t i = span.first; i < span.end(); ++i) stages.learned.note(i, value_um);
   if (!stages.record.displacement_known) return;  // nothing to compare it with
   const bool remains = stages.config.correction.measured == MeasuredMeaning::remaining;
-  const double total_um = remains ? value_um - stages.axes.compensated_um(axis) : value_um;
-  stages.learned.learn(axis, total_um, stages.prediction.model_um(axis));
+  const double total_um = remains ? value_um - compensated_now_um(stages, axis) : value_um;
+  const double model_um = stages.prediction.output_um(stages.axis_output[axis]);
+  for (std::size_t i = span.first; i < span.end(); ++i) stages.learned.learn(i, total_um, model_um);
 }
 
 /// What was held between two cycle ends; a temperature that no sensor can show was not.

@@ -26,7 +26,7 @@ class Estimator {
   Estimator& operator=(Estimator&&) noexcept;
 
   /// One cycle. `now` must not run backwards. Never throws, never allocates.
-  /// @param readings  one a sensor, order of the configuration (checked)
+  /// @param readings  one per sensor, order of the configuration (checked)
   /// @param command   overwritten: offsets of all axes with the epoch they belong to
   void step(nanoseconds now, std::span<const Reading> readings, const ControllerState& controller,
             OffsetCommand& command) noexcept;
@@ -50,9 +50,9 @@ class Estimator {
   [[nodiscard]] PersistentState persistent_state(const Report& report) const {
     return make_persistent_state(config(), model(), report);
   }
-  /// Before the first step; allocates. A reference outside of what the sensors of its column may
-  /// show (their screening) is not one that was ever taken: then no reference is, and the
-  /// compensation is switched off, because the next one would be that of a machine in any state.
+  /// Before the first step; allocates. A reference outside what the screening lets the sensors of
+  /// its column show was never taken. Then none is restored, and the compensation is switched off,
+  /// because the next one would be that of a machine in any state.
   /// @return what was refused, by key, value and rule; empty: nothing
   std::vector<std::string> restore(const PersistentState& state);
   /// Bumpless reload: takes over offsets, switches, references, smoothing and lag states by name.

@@ -32,14 +32,14 @@ enum class Reason : std::uint32_t {
   block_estimated = 1u << 11,       ///< a warning: compensating, with an estimate for a lost block
   mismatch_latched =
       1u << 12,                ///< read-backs that nothing sent explains: not driven until released
-  no_target = 1u << 13,        ///< the model's answer is no finite number
+  no_target = 1u << 13,        ///< the model's answer is not a finite number
   outside_domain = 1u << 14,   ///< the machine is where its model was never made or judged
   sensor_suspected = 1u << 15  ///< a warning: good values that the neighbours contradict
 };
 inline constexpr std::size_t reasons_count = 16;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
-/// Of a set of reasons (Report::reasons), whether one is in it.
+/// Whether a set of reasons (Report::reasons) holds one.
 [[nodiscard]] constexpr bool has_reason(std::uint32_t reasons, Reason reason) noexcept {
   return (reasons & static_cast<std::uint32_t>(reason)) != 0;
 }

@@ -1,4 +1,4 @@
-/// What of an estimator is to survive a restart, said once.
+/// What of an estimator survives a restart, said once.
 #pragma once
 
 #include <map>
@@ -15,7 +15,7 @@ struct PersistentState {
   bool enabled{true};
   std::map<std::string, double> reference_degC;  ///< by temperature column
   /// The numbers that the model file gave as reference at the time, by input; none: first sample.
-  /// Other numbers in the file at a restart are meant, and take the place of the stored ones.
+  /// Other numbers in the file at a restart are deliberate, and replace the stored ones.
   std::map<std::string, double> model_reference_degC;
   std::map<std::string, double> reference_signals;  ///< operating signals then, by column
   std::map<std::string, double> offset_um;          ///< by axis, last sent

@@ -9,10 +9,14 @@ Prediction::Prediction(const EstimatorConfig& config, const ThermalModel& model,
                        const std::vector<std::size_t>& axis_output)
     : policy_(config.compensation.outside_domain),
       axis_output_(axis_output),
+      places_(node_places(config, model)),
       model_(model),
       at_reference_(model),
       certainty_(config, model, axis_output),
-      axis_um_(axis_output.size(), not_a_number) {
+      axis_um_(axis_output.size(), not_a_number),
+      curves_(config, model),
+      node_um_(axis_output.size(), not_a_number) {
+  if (!curves_.empty()) elsewhere_.emplace(model);
   if (model.made_from) domain_.emplace(model);
   state_.model_um.assign(model.outputs.size(), not_a_number);
   state_.zero_um.assign(model.outputs.size(), not_a_number);
@@ -54,6 +58,19 @@ void Prediction::predict(nanoseconds now, const Temperatures& temps,
   }
   model_.step(now, temps.estimated_degC, reference.temps_degC, signals.of_model, state_.model_um);
   if (domain_) domain_->step(now, temps.estimated_degC, reference.temps_degC, signals.of_model);
+  if (!curves_.empty()) look_along_travels(now, temps, reference, signals);
+}
+
+/// At this moment once more, so that no lag moves on.
+void Prediction::look_along_travels(nanoseconds now, const Temperatures& temps,
+                                    const ReferenceState& reference,
+                                    const Signals& signals) noexcept {
+  elsewhere_->copy_states(model_);
+  curves_.step(
+      [&](std::span<const double> at, std::span<double> out_um) {
+        elsewhere_->step(now, temps.estimated_degC, reference.temps_degC, at, out_um);
+      },
+      signals.of_model, node_um_);
 }
 
 void Prediction::restart() noexcept {

@@ -1,4 +1,4 @@
-/// Temperatures, reference and signals to the displacement of each axis.
+/// From temperatures, reference and signals to the displacement of each axis.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 #include "estimator/model/displacement_model.hpp"
 #include "estimator/model/model_domain.hpp"
 #include "estimator/model/outside_share.hpp"
+#include "estimator/model/travel_curves.hpp"
 #include "estimator/pipeline/certainty.hpp"
 #include "estimator/sensing/lost_blocks.hpp"
 #include "estimator/state_archive.hpp"
@@ -20,8 +21,11 @@ namespace thermocomp {
 
 /// displacement of an axis = share (model now - model at the reference state) + correction,
 ///
-/// share: what is believed of the model outside of its domain (outside_domain = "shrink"), else 1.
+/// share: how far the model is believed outside its domain (outside_domain = "shrink"), else 1.
 /// What was learned by probing stays believed: it is the model that left its domain.
+///
+/// At a node of a travel the model is asked as if the slide stood there; lags have lived through
+/// where it really was.
 class Prediction {
  public:
   struct State {
@@ -40,7 +44,7 @@ class Prediction {
   [[nodiscard]] Displacement step(nanoseconds now, const Temperatures& temps,
                                   const ReferenceState& reference, const Signals& signals,
                                   const LostBlocks& lost, Probings& learned) noexcept;
-  /// Whether what is estimated serves, so that no sensor need be used that is not believed.
+  /// Whether the estimates are good enough to do without sensors that are not believed.
   [[nodiscard]] bool would_serve(const LostBlocks& lost, const ReferenceState& reference,
                                  const Signals& signals) noexcept {
     return certainty_.would_serve(lost, model_, reference, signals);
@@ -48,13 +52,16 @@ class Prediction {
   /// A new reference: lags start anew.
   void restart() noexcept;
 
-  /// Of an output, since the reference; NaN before the first.
+  /// Displacement of an output since the reference; NaN before the first.
   [[nodiscard]] double output_um(std::size_t output) const noexcept {
     return state_.model_um[output] - state_.zero_um[output];
   }
-  /// Of an axis by the model alone.
+  /// Where an axis' entry stands for a place of its travel.
+  [[nodiscard]] const NodePlace& place(std::size_t axis) const noexcept { return places_[axis]; }
+  /// Displacement of an axis by the model alone; of a node as if the slide stood there.
   [[nodiscard]] double model_um(std::size_t axis) const noexcept {
-    return output_um(axis_output_[axis]);
+    if (!places_[axis].is_node) return output_um(axis_output_[axis]);
+    return node_um_[axis] - state_.zero_um[axis_output_[axis]];
   }
   [[nodiscard]] double axis_um(std::size_t axis, const Probings& learned) const noexcept {
     return believed_share() * model_um(axis) + learned.correction_um(axis);
@@ -85,12 +92,15 @@ class Prediction {
   void visit_state(StateArchive& archive) {
     auto& [zero_known, model_um, zero_um] = state_;
     archive(zero_known, model_um, zero_um);
+    if (!curves_.empty()) archive(node_um_);
   }
   void visit_certainty(StateArchive& archive) { archive(certainty_); }
 
  private:
   void predict(nanoseconds now, const Temperatures& temps, const ReferenceState& reference,
                const Signals& signals) noexcept;
+  void look_along_travels(nanoseconds now, const Temperatures& temps,
+                          const ReferenceState& reference, const Signals& signals) noexcept;
   [[nodiscard]] bool outside() const noexcept { return domain_ && domain_->outside(); }
   [[nodiscard]] double believed_share() const noexcept {
     return policy_ == OutsidePolicy::shrink && domain_ ? domain_->believed_share() : 1.0;
@@ -98,6 +108,7 @@ class Prediction {
 
   const OutsidePolicy policy_;
   const std::vector<std::size_t> axis_output_;
+  const std::vector<NodePlace> places_;  ///< one per axis
 
   DisplacementModel model_;
   DisplacementModel at_reference_;     ///< the same model, only ever asked for the zero
@@ -106,6 +117,9 @@ class Prediction {
   Certainty certainty_;
   State state_;
   std::vector<double> axis_um_;
+  TravelCurves curves_;
+  std::optional<DisplacementModel> elsewhere_;  ///< the same model with its slides at the nodes
+  std::vector<double> node_um_;                 ///< one per axis: the model at its node
 };
 
 }  // namespace thermocomp

@@ -9,7 +9,7 @@
 
 namespace thermocomp {
 
-/// Of all that the steps handed on. @return a set of Reason
+/// From all that the steps handed on. @return a set of Reason
 [[nodiscard]] std::uint32_t reasons_of(const Signals& signals, const Temperatures& temps,
                                        const ReferenceState& reference,
                                        const Displacement& displacement,

@@ -11,9 +11,9 @@
 
 namespace thermocomp {
 
-/// Temperatures: the model file's numbers, else each column's first good value. Signals: nothing
-/// but zero beside numbers, which mean a machine at rest; a sampled reference says that the machine
-/// is straight as it is, whatever it is doing, so that the signals of that moment belong to it.
+/// Temperatures: the model file's numbers, else each column's first good value. Signals: zero
+/// beside such numbers, which mean a machine at rest; a sampled reference says that the machine is
+/// straight as it is, whatever it is doing, so the signals of that moment belong to it.
 class Reference {
  public:
   explicit Reference(const ThermalModel& model);
@@ -31,14 +31,14 @@ class Reference {
   void restore(const std::map<std::string, double>& temps_degC,
                const std::map<std::string, double>& signals);
   /// After a reload with plans of plan_names(). Numbers newly written into the model file are
-  /// meant; otherwise the machine's state stays.
+  /// deliberate; otherwise the machine's state stays.
   void adopt(const Reference& previous, const std::vector<int>& columns,
              const std::vector<int>& signals) noexcept;
   void visit_temperatures(StateArchive& archive) { archive(temps_degC_); }
   void visit_signals(StateArchive& archive) { archive(signals_); }
 
  private:
-  const std::vector<double> of_model_file_;  ///< one an input, or empty
+  const std::vector<double> of_model_file_;  ///< one per input, or empty
   const std::vector<std::string> columns_;
   const std::vector<std::string> signal_names_;
 

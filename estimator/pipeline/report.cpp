@@ -13,7 +13,7 @@ void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexce
   out.applied_um = channel.applied_um();
   out.measured_um = stages.learned.measured_um(axis);
   out.synced = channel.synced();
-  out.driven = channel.driven();
+  out.driven = stages.axes.driven(axis);
   out.mismatch = channel.mismatch();
   out.latched = channel.latched();
   out.releasing = channel.releasing();

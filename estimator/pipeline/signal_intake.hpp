@@ -1,4 +1,4 @@
-/// The controller's state to the signals that a step goes by.
+/// From the controller's state to the signals that a step goes by.
 #pragma once
 
 #include <array>
@@ -16,7 +16,8 @@
 namespace thermocomp {
 
 /// A controller that is silent, or whose values are older than controller_stale_after_s, tells
-/// nothing: positions and switches of it are not to be acted on, and the lost ones hold.
+/// nothing: its positions and switches are not acted on, and the offset holds where they are
+/// needed.
 class SignalIntake {
  public:
   struct State {
@@ -31,7 +32,7 @@ class SignalIntake {
   /// Of the model's signals, as last told.
   [[nodiscard]] std::span<const double> of_model() const noexcept { return of_model_; }
 
-  /// @param plan  of plan_names() for the model's signals
+  /// @param plan  from plan_names() for the model's signals
   void adopt(const SignalIntake& previous, const std::vector<int>& plan) noexcept;
   void visit_told(StateArchive& archive) {
     auto& [told, online] = state_;

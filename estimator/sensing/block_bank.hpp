@@ -1,4 +1,5 @@
-/// Sensors to block temperatures: screening, smoothing, differences, the mean of a block's sensors.
+/// From sensors to block temperatures: screening, smoothing, differences, the mean of a block's
+/// sensors.
 #pragma once
 
 #include <span>
@@ -19,14 +20,14 @@ class BlockBank {
 
   /// Takes in the newest readings.
   void read(nanoseconds now, std::span<const Reading> readings) noexcept;
-  /// What screening lets through now, before smoothing; one a sensor, NaN: nothing.
+  /// What screening lets through now, before smoothing; one per sensor, NaN: nothing.
   void screened(nanoseconds now, std::span<double> values_K) const noexcept;
   /// The blocks' temperatures from what was read.
-  /// @param left_out  one a sensor: not to be used; empty: all are
+  /// @param left_out  one per sensor: not to be used; empty: all are
   /// @return whether every column has a temperature in use
   bool join(std::span<const std::uint8_t> left_out) noexcept;
-  /// The block's temperature is this one when `sensor` is left out of it from now on: the others
-  /// then have deviations from it.
+  /// From now on the block's temperature is `temp_degC`, since a sensor of it is left out: the
+  /// deviations of the others count from there.
   void say(std::size_t column, double temp_degC) noexcept;
 
   /// Shape (columns): the blocks' temperatures; the last known one where not good, NaN before the
@@ -57,8 +58,8 @@ class BlockBank {
   };
   struct Block {
     std::vector<std::size_t> sensors;
-    /// What each sensor differs from the block's mean, kept from when all were good: a sensor that
-    /// drops out does not shift the mean.
+    /// By how much each sensor differs from the block's mean, kept from when all were good: a
+    /// sensor that drops out does not shift the mean.
     std::vector<double> deviation_K;
   };
 
@@ -68,15 +69,16 @@ class BlockBank {
   /// Index of the reference sensor in the previous bank, or no_sensor.
   [[nodiscard]] int previous_reference(const Sensor& sensor) const noexcept;
   [[nodiscard]] bool update(Block& block, double& temp_degC) noexcept;
-  /// From those that are left, less what each deviated by while all were there. @return any left
+  /// From the sensors that are left, less their deviations while all were there. @return whether
+  /// any is left
   [[nodiscard]] bool update_without_the_missing(const Block& block,
                                                 double& temp_degC) const noexcept;
 
   std::vector<Sensor> sensors_;
-  std::vector<double> values_K_;      ///< of this step, one a sensor; NaN: not to be used
+  std::vector<double> values_K_;      ///< of this step, one per sensor; NaN: not to be used
   std::vector<double> kept_K_;        ///< scratch: the same, what is left out NaN
   std::span<const double> in_use_K_;  ///< during join(), one of the two
-  std::vector<Block> blocks_;         ///< one a column
+  std::vector<Block> blocks_;         ///< one per column
   std::vector<double> temps_degC_;
   std::vector<std::uint8_t> good_;
   nanoseconds now_{};

@@ -52,11 +52,11 @@ class LostBlocks {
   /// Standard deviation of gain . x, with gain of shape (columns). Unit of gain times K.
   [[nodiscard]] double sd_of(std::span<const double> gain_per_K) const noexcept;
 
-  /// Just before the step in which a measured input is given up: what it is taken for, because
-  /// what it was measured at last is not believed. Nothing of an input that is lost already.
+  /// Just before the step in which a measured input is given up: the value to take it for, because
+  /// its last measured one is not believed. Does nothing for an input that is lost already.
   void say(std::size_t input, double temp_degC, double sd_K) noexcept;
 
-  /// Before the first step: temperature at the end of the life before, how long ago is not known.
+  /// Before the first step: temperature at the end of the previous run, an unknown time ago.
   void restore(std::size_t column, double temp_degC) noexcept;
 
   void visit_state(StateArchive& archive) { archive(state_); }
@@ -72,9 +72,9 @@ class LostBlocks {
     nanoseconds anchored_at{};
     std::vector<double> anchor_degC;
     std::vector<double> temps_degC;
-    std::vector<std::uint8_t> lost;      ///< one an input
+    std::vector<std::uint8_t> lost;      ///< one per input
     std::vector<std::uint8_t> known;     ///< has had a value, or an estimate to go on from
-    std::vector<std::uint8_t> restored;  ///< ... from the life before only
+    std::vector<std::uint8_t> restored;  ///< ... from the previous run only
     std::vector<nanoseconds> lost_since;
     std::vector<std::size_t> lost_at;  ///< the lost inputs, the first lost_count of them
     std::size_t lost_count{0};

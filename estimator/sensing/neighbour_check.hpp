@@ -15,7 +15,7 @@ namespace thermocomp {
 struct ChangeAsked {
   double age_s{0.0};     ///< between the two
   double share{1.0};     ///< of the variance of a change of that age that the way of asking leaves
-  double sd_limit{1e9};  ///< a remainder of so many standard deviations is not believed
+  double sd_limit{1e9};  ///< standard deviations beyond which a remainder is not believed
 };
 
 /// Of the changes x of all inputs, and with the precision matrix Q of the model's covariance, what
@@ -34,8 +34,9 @@ struct ChangeAsked {
 ///
 ///     y = Q x,   without c:  y_i - Q_ic y_c / Q_cc,   Q_ii - Q_ic^2 / Q_cc;
 ///
-/// two at once where two are needed. Nobody is, where three would be, or where another explains as
-/// much: then the machine does what the record never saw, or nothing tells the two apart.
+/// two at once where two are needed. None is named where three would be needed, or where another
+/// explains as much: then the machine does what the record never saw, or nothing tells the two
+/// apart.
 /// Source: conditional distribution of a Gaussian vector by its precision matrix.
 class NeighbourCheck {
  public:

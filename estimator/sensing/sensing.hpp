@@ -1,4 +1,4 @@
-/// Readings to the temperatures of the model's columns: the way through this folder.
+/// From readings to the temperatures of the model's columns: the way through this folder.
 #pragma once
 
 #include <map>
@@ -17,13 +17,13 @@
 
 namespace thermocomp {
 
-/// Screening and smoothing a sensor, blocks, and an estimate for blocks that have no good sensor.
+/// Screening and smoothing per sensor, blocks, and an estimate for blocks that have no good sensor.
 class Sensing {
  public:
   /// @throws InvalidValue when a column has no block or a block no sensor
   Sensing(const EstimatorConfig& config, const ThermalModel& model);
 
-  /// @param readings  one a sensor, order of the configuration (checked)
+  /// @param readings  one per sensor, order of the configuration (checked)
   [[nodiscard]] Temperatures step(nanoseconds now, std::span<const Reading> readings) noexcept;
 
   /// The sensors that are weighed down are used all the same: their estimates do not serve.
@@ -37,12 +37,12 @@ class Sensing {
   [[nodiscard]] const LostBlocks& lost() const noexcept { return lost_; }
   [[nodiscard]] bool all_good() const noexcept;
 
-  /// Before the first step: temperatures at the end of the life before, by column.
+  /// Before the first step: temperatures at the end of the previous run, by column.
   void restore(const std::map<std::string, double>& temps_degC);
   void plan_adoption(const Sensing& previous);
   void adopt(const Sensing& previous) noexcept;
   void visit_state(StateArchive& archive) { archive(blocks_, lost_); }
-  /// Nothing without a covariance.
+  /// Does nothing without a covariance.
   void visit_suspicion(StateArchive& archive) {
     if (suspicion_) archive(*suspicion_);
   }
@@ -55,7 +55,7 @@ class Sensing {
   BlockBank blocks_;
   LostBlocks lost_;
   std::optional<Suspicion> suspicion_;
-  std::vector<double> screened_K_;  ///< scratch, one a sensor
+  std::vector<double> screened_K_;  ///< scratch, one per sensor
 };
 
 }  // namespace thermocomp

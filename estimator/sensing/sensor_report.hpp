@@ -1,4 +1,4 @@
-/// What there is to know about one sensor after a step.
+/// One sensor after a step, for people.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ struct SensorReport {
   double smoothed_degC{not_a_number};  ///< what the block gets; a difference where configured
   nanoseconds taken_at{};
   Fault fault{Fault::never_read};     ///< after screening
-  std::uint32_t clipped_in_a_row{0};  ///< smoothing clipped so many values running
+  std::uint32_t clipped_in_a_row{0};  ///< values that smoothing clipped in a row
   std::uint64_t clipped{0};
   std::uint64_t rejected{0};  ///< readings refused by screening since the start
   bool suspected{false};      ///< good values that the neighbours contradict

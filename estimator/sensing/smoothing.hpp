@@ -82,7 +82,7 @@ class LineOfLines {
   Line expected_;
 };
 
-/// One sensor's smoothing: picks one value a period, clips it into the expected band, keeps the
+/// One sensor's smoothing: picks one value per period, clips it into the expected band, keeps the
 /// history as configured, restarts after an outage.
 class Smoother {
  public:

@@ -1,4 +1,4 @@
-/// Sensors that lie plausibly: good values, and the neighbours say that they cannot be.
+/// Sensors that lie plausibly: their values are good, but contradict the neighbours'.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ namespace thermocomp {
 ///     creep  the level (median of five ticks) less that of 1, 4 and 12 hours ago; for half an hour
 ///
 /// Only changes count: neither the mean of the record nor the reference is needed, and a sensor
-/// that reads half a degree high does no harm. In a block of several sensors the one is named
+/// that reads half a degree high does no harm. In a block of several sensors, the one is named
 /// without which the block agrees with its neighbours.
 ///
 /// The lie of a suspected sensor is followed on, tick by tick, by what it changes and the others
@@ -38,12 +38,12 @@ class Suspicion {
   [[nodiscard]] bool is_due(nanoseconds now) const noexcept {
     return !state_.started || now >= state_.next_look;
   }
-  /// @param values_K  one a sensor, screened; NaN: none to be used
+  /// @param values_K  one per sensor, screened; NaN: none to be used
   /// Never throws, never allocates. O(inputs^2) once a minute, else O(sensors).
   void step(nanoseconds now, std::span<const double> values_K) noexcept;
 
   [[nodiscard]] std::size_t count() const noexcept { return state_.count; }
-  /// One a sensor: to be left out of its blocks.
+  /// One per sensor: to be left out of its blocks.
   [[nodiscard]] std::span<const std::uint8_t> weighed_down() const noexcept {
     return state_.weighed_down;
   }
@@ -87,7 +87,7 @@ class Suspicion {
     std::vector<double> looked_K;            ///< shape (sensors, looks)
     std::vector<double> ticks_K;             ///< shape (sensors, ticks_kept), a ring
     std::vector<double> levels_K;            ///< shape (sensors, levels_kept), a ring
-    std::vector<std::uint8_t> suspected;     ///< one a sensor, as all below
+    std::vector<std::uint8_t> suspected;     ///< one per sensor, as all below
     std::vector<std::uint8_t> weighed_down;  ///< ... and not used
     std::vector<double> size_K;              ///< of the lie, now
     std::vector<double> found_K;             ///< ... when it was found
@@ -110,7 +110,7 @@ class Suspicion {
   void follow(std::size_t sensor) noexcept;
   void look_for_jumps(nanoseconds now) noexcept;
   void look_for_creep(nanoseconds now, std::size_t levels_back) noexcept;
-  /// Of changes_K_, one a sensor, those of the inputs: the mean over sensors that are not
+  /// Of changes_K_, one per sensor, those of the inputs: the mean over sensors that are not
   /// suspected.
   void join_changes() noexcept;
   struct Liar {
@@ -125,7 +125,7 @@ class Suspicion {
   void begin(const Liar& liar, nanoseconds since) noexcept;
   void end(std::size_t sensor) noexcept;
   void forget(std::size_t sensor) noexcept;
-  /// The first input that the sensor is of; as many as there are inputs: of none.
+  /// The first input that the sensor belongs to; the number of inputs: to none.
   [[nodiscard]] std::size_t input_of(std::size_t sensor) const noexcept;
   [[nodiscard]] std::size_t believed(std::size_t input) const noexcept;
   void correct(std::size_t sensor, double sd_K) noexcept;
@@ -138,11 +138,11 @@ class Suspicion {
 
   State state_;
 
-  std::vector<double> changes_K_;        ///< scratch, one a sensor
-  std::vector<double> input_changes_K_;  ///< scratch, one an input
-  std::vector<double> lies_K_;           ///< scratch, one an input
-  std::vector<double> misfit_K_;         ///< scratch, one a sensor: rms about its lines
-  std::vector<std::uint8_t> creeps_;     ///< scratch, one a sensor
+  std::vector<double> changes_K_;        ///< scratch, one per sensor
+  std::vector<double> input_changes_K_;  ///< scratch, one per input
+  std::vector<double> lies_K_;           ///< scratch, one per input
+  std::vector<double> misfit_K_;         ///< scratch, one per sensor: rms about its lines
+  std::vector<std::uint8_t> creeps_;     ///< scratch, one per sensor
   std::vector<Corrected> corrected_;
   std::size_t corrected_count_{0};
   std::vector<int> sensor_plan_;  ///< index in the previous one, -1: none or another quantity

@@ -20,6 +20,8 @@ using nlohmann::json;
 void add_compensation(const json& status, std::vector<AlarmCondition>& wrong) {
   const cli::Verdict verdict = cli::verdict(status);
   if (verdict.compensating) return;
+  // A dry run that computes is what somebody wants, for days.
+  if (text_of(status, "mode") == "dry_run") return;
   AlarmCondition condition{"compensation", "compensating: " + verdict.answer + verdict.detail, ""};
   for (const json& reason : list_of(status, "reasons"))
     if (reason.is_string() && condition.remedy.empty())

@@ -118,6 +118,15 @@ Address address_of(const HttpSettings& settings) {
   return address;
 }
 
+/// As one of the problems of page_state(); the compensation does not suffer, so the verdict stays.
+json broker_is_away(const MqttSettings& mqtt) {
+  return {{"what", "the MQTT broker on " + mqtt.host + ", port " + std::to_string(mqtt.port) +
+                       ", is away: nobody gets values or alarms from it"},
+          {"remedy",
+           "start the broker; if it runs, journalctl -u thermocomp-gateway says why it "
+           "refuses. The newest messages are kept, and sent when it is back"}};
+}
+
 }  // namespace
 
 struct HttpServer::Parts {
@@ -151,7 +160,7 @@ struct HttpServer::Parts {
   MHD_Result history(MHD_Connection* connection, Request& request);
   MHD_Result later(MHD_Connection* connection, Request& request, WorkDesk::Work work);
   MHD_Result stream(MHD_Connection* connection);
-  [[nodiscard]] std::string metrics() const;
+  [[nodiscard]] GatewayFigures figures() const;
 
   const GatewaySettings& settings;
   DaemonFeed& feed;
@@ -178,7 +187,8 @@ HttpServer::Parts::Parts(const GatewaySettings& settings_in, DaemonFeed& feed_in
       files(files_in),
       hosts(settings_in.http.address, settings_in.http.names),
       commands(settings_in),
-      add_figures(std::move(add_figures_in)) {
+      add_figures(std::move(add_figures_in)),
+      connections(settings_in.http.connections_max) {
   if (!settings.http.passwords.empty()) passwords.emplace(settings.http.passwords);
   if (settings.http.has_tls()) {
     certificate = read_text_file(settings.http.certificate);
@@ -301,7 +311,8 @@ MHD_Result HttpServer::Parts::route(MHD_Connection* connection, std::string_view
   if (path == "/api/commands")
     return answer(connection, MHD_HTTP_OK, json_type, dumped(commands.offered(request.user)));
   if (path == "/metrics")
-    return answer(connection, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8", metrics());
+    return answer(connection, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8",
+                  metrics_text(*feed.newest(), figures()));
   return answer(connection, MHD_HTTP_NOT_FOUND, json_type, error_text("there is no such page"));
 }
 
@@ -358,13 +369,13 @@ MHD_Result HttpServer::Parts::stream(MHD_Connection* connection) {
   return queue(connection, MHD_HTTP_OK, "text/event-stream", streams.open(connection));
 }
 
-std::string HttpServer::Parts::metrics() const {
-  GatewayFigures figures;
-  figures.pages = streams.count();
-  figures.requests = requests;
-  figures.refused = refused;
-  if (add_figures) add_figures(figures);
-  return metrics_text(*feed.newest(), figures);
+GatewayFigures HttpServer::Parts::figures() const {
+  GatewayFigures told;
+  told.pages = streams.count();
+  told.requests = requests;
+  told.refused = refused;
+  if (add_figures) add_figures(told);
+  return told;
 }
 
 void HttpServer::Parts::listen() {
@@ -440,6 +451,9 @@ HttpServer::~HttpServer() = default;
 void HttpServer::show(const SnapshotPointer& snapshot) {
   json state = page_state(*snapshot, parts_->settings.machine);
   state["events"] = page_events(*snapshot, page_events_max);
+  const GatewayFigures figures = parts_->figures();
+  if (figures.mqtt_enabled && !figures.mqtt_connected)
+    state["problems"].push_back(broker_is_away(parts_->settings.mqtt));
   auto frame = std::make_shared<StreamFrame>();
   frame->number = snapshot->number;
   frame->text = "event: state\ndata: " + dumped(state) + "\n\n";

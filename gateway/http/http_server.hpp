@@ -18,7 +18,8 @@ namespace thermocomp::gateway {
 /// whole, however slowly it comes.
 class HttpServer {
  public:
-  /// Fills in, for /metrics, what other parts of the gateway know; called on the server's thread.
+  /// Fills in, for /metrics and the page, what other parts of the gateway know. Called on the
+  /// server's thread and by show().
   using AddFigures = std::function<void(GatewayFigures&)>;
 
   /// @throws std::runtime_error when it cannot listen, or certificate or key cannot be used

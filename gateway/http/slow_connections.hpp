@@ -14,8 +14,15 @@ class SlowConnections {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::seconds request_max{15};  ///< until a request is whole
   static constexpr std::chrono::seconds answer_max{60};   ///< until its answer is taken
+  /// The same while every place is taken: others wait for one.
+  static constexpr std::chrono::seconds request_max_when_full{3};
+  static constexpr std::chrono::seconds answer_max_when_full{10};
+  /// Of a stream: what lies in the kernel because nobody takes it.
+  static constexpr std::size_t untaken_bytes_max = std::size_t{64} * 1024;
 
   enum class Stage { request, answer, stream };
+
+  explicit SlowConnections(std::size_t places) : places_max_(places) {}
 
   void opened(int fd, Clock::time_point now);
   void is_at(int fd, Stage stage, Clock::time_point now);
@@ -29,6 +36,7 @@ class SlowConnections {
     Stage stage{Stage::request};
     Clock::time_point since;
   };
+  const std::size_t places_max_;
   mutable std::mutex mutex_;
   std::unordered_map<int, Place> places_;  ///< by socket
 };

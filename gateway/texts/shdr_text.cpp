@@ -188,7 +188,7 @@ std::string device_file(const Snapshot& snapshot, const std::string& machine) {
       item_name("thermocomp", machine) + "\" name=\"" + machine + "\" uuid=\"thermocomp-" +
       machine + "\">\n      <Description>thermal compensation</Description>\n      <DataItems>\n";
   append_item(xml, {"EVENT", "AVAILABILITY", ""}, "avail");
-  append_item(xml, {"EVENT", "FUNCTIONAL_MODE", ""}, "mode");
+  append_item(xml, {"EVENT", "VARIABLE", ""}, "mode");
   append_item(xml, condition_item, "system");
   for (const json& sensor : list_of(snapshot.sensors, "sensors")) {
     const std::string name = text_of(sensor, "name");

@@ -14,7 +14,7 @@ struct Pick {
   std::size_t factor{0};
   int level{0};
 };
-/// Levels that must not all stand in one test.
+/// Levels that must not all occur in one test.
 using Forbidden = std::vector<Pick>;
 
 /// What a plan must keep; `no_level` in a row stands for a level still open.
@@ -25,9 +25,9 @@ class Constraints {
 
   [[nodiscard]] bool empty() const noexcept { return forbidden_.empty(); }
   [[nodiscard]] const std::vector<int>& level_counts() const noexcept { return level_counts_; }
-  /// Whether nothing that is forbidden stands in the row already.
+  /// Whether the row, as far as it is filled, holds nothing forbidden.
   [[nodiscard]] bool kept_by(const std::vector<int>& row) const noexcept;
-  /// The row with its open levels filled in; empty where that cannot be.
+  /// The row with its open levels filled in; empty where that is impossible.
   /// @throws std::runtime_error when the search takes too long (a million steps)
   [[nodiscard]] std::vector<int> completed(std::vector<int> row) const;
 
@@ -40,7 +40,7 @@ class Constraints {
 
 struct PairCount {
   std::size_t possible{0};    ///< pairs of levels that some allowed test holds
-  std::size_t impossible{0};  ///< pairs that what is forbidden rules out
+  std::size_t impossible{0};  ///< pairs that the forbidden combinations rule out
   std::size_t covered{0};     ///< of the possible ones, by the plan
 };
 [[nodiscard]] PairCount count_pairs(const Design& design, const Constraints& constraints);

@@ -24,8 +24,9 @@ struct Design {
 /// @throws std::invalid_argument for a name that is not in array_names()
 [[nodiscard]] std::vector<Design> array_variants(std::string_view name);
 
-/// Columns of the array for factors with so many levels each, in their order. A factor with fewer
-/// levels than its column has its first levels repeated ("dummy levels"). Empty rows: does not fit.
+/// Columns of the array for factors with the given numbers of levels, in their order. A factor with
+/// fewer levels than its column has its first levels repeated ("dummy levels"). Empty rows: does
+/// not fit.
 struct FittedArray {
   Design design;
   bool dummy_levels{false};

@@ -27,7 +27,7 @@ struct TestPlan {
 /// Tests with their levels, strength and balance, for a person.
 [[nodiscard]] std::string plan_text(const TestPlan& plan);
 [[nodiscard]] std::string plan_json(const TestPlan& plan);
-/// Plan as CSV: test, then a column a factor.
+/// The plan as CSV: test, then one column per factor.
 [[nodiscard]] std::string plan_csv(const TestPlan& plan);
 /// What to do in the workshop, test by test, with the planned stops (Markdown).
 [[nodiscard]] std::string test_sheet(const TestPlan& plan);

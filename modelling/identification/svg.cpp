@@ -154,9 +154,10 @@ std::string svg_of(const Diagram& diagram) {
 std::string svg_of(const HeatMap& map) {
   constexpr double cell_px = 18.0;
   constexpr double names_px = 120.0;
+  constexpr double title_px_min = 420.0;
   const auto count = static_cast<double>(map.order.size());
-  std::string text =
-      head(names_px + cell_px * count + 20.0, names_px + cell_px * count + 50.0, map.title);
+  std::string text = head(std::max(names_px + cell_px * count + 20.0, title_px_min),
+                          names_px + cell_px * count + 50.0, map.title);
   for (std::size_t i = 0; i < map.order.size(); ++i) {
     const double y = 30.0 + cell_px * static_cast<double>(i);
     const std::string name = xml_text(map.names[map.order[i]]);

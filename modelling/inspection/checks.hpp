@@ -11,7 +11,7 @@
 
 namespace thermocomp::inspection {
 
-/// A finding on its way: how far it stands out of what the same column does otherwise.
+/// A candidate finding, with how far it stands out from what the same column does otherwise.
 struct Suspicion {
   Finding finding;
   double score{0.0};
@@ -31,7 +31,7 @@ void check_values(const std::vector<RunFile>& runs, Suspicions& found);
 
 /// Each reading against its expectation from the others: steps, creep, loosening of temperatures;
 /// steps of displacements. What is found is taken out of `recording`, and what is left is looked at
-/// again, so that one sensor's fault is not laid at its neighbours' door.
+/// again, so that one sensor's fault is not blamed on its neighbours.
 void check_changes(Recording recording, const std::vector<RunFile>& runs, Suspicions& found,
                    const std::function<void(double)>& progress);
 /// Pairs of readings that agree with the other runs only when they are exchanged.

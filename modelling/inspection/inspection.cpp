@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "modelling/inspection/checks.hpp"
 
@@ -27,10 +28,30 @@ void bridge(RunFile& run, const Finding& stuck) {
     values[i] = values[begin] + slope * (time_s[i] - time_s[begin]);
 }
 
+/// Without what the compensation did, in a file that `thermocomp export` wrote: beside an axis'
+/// offset there is what the controller applied. These are no displacements of the machine.
+RunFile of_machine(RunFile run) {
+  const std::vector<std::string> columns = run.columns;
+  for (const std::string& name : columns) {
+    if (!name.ends_with("_offset_um")) continue;
+    const std::string axis = name.substr(0, name.size() - std::string_view("_offset_um").size());
+    if (std::find(columns.begin(), columns.end(), axis + "_applied_um") == columns.end()) continue;
+    for (const char* kind : {"_offset_um", "_applied_um", "_measured_um"}) {
+      const auto column = run.find(axis + kind);
+      if (!column) continue;
+      run.columns.erase(run.columns.begin() + static_cast<std::ptrdiff_t>(*column));
+      run.values.erase(run.values.begin() + static_cast<std::ptrdiff_t>(*column));
+    }
+  }
+  return run;
+}
+
 }  // namespace
 
-Inspection inspect(const std::vector<RunFile>& runs, double told_min,
+Inspection inspect(const std::vector<RunFile>& given, double told_min,
                    const std::function<void(double)>& progress) {
+  std::vector<RunFile> runs;
+  for (const RunFile& run : given) runs.push_back(of_machine(run));
   Inspection inspection;
   Suspicions suspicions;
   std::vector<RunFile> calm = runs;

@@ -14,14 +14,14 @@ namespace thermocomp::inspection {
 
 /// @param told_min  findings less probable than this are not listed
 /// @param progress  called now and then with the share of the work that is done; may be empty
-/// @pre runs is not empty
-[[nodiscard]] Inspection inspect(const std::vector<RunFile>& runs, double told_min = 0.5,
+/// @pre given is not empty
+[[nodiscard]] Inspection inspect(const std::vector<RunFile>& given, double told_min = 0.5,
                                  const std::function<void(double)>& progress = {});
 
 /// The recording without what is wrong with it.
 struct Cleaned {
   std::vector<RunFile> runs;
-  std::vector<std::string> notes;  ///< what was changed and why, a line each
+  std::vector<std::string> notes;  ///< what was changed and why, one line each
 };
 
 /// Takes findings from `probability_min` on: spikes and outliers become the median of their

@@ -1,4 +1,4 @@
-/// All runs as matrices on a coarser grid, on which readings are held against each other.
+/// All runs as matrices on a coarser grid, on which readings are compared with each other.
 #pragma once
 
 #include <string>
@@ -26,7 +26,7 @@ struct Recording {
 };
 
 /// Columns that all runs have, and that have values in at least half of each run's rows
-/// (displacements: in 20 rows). Means of so many rows that each run has at most `rows_max`.
+/// (displacements: in 20 rows). Thinned by means, so that each run has at most `rows_max` rows.
 [[nodiscard]] Recording make_recording(const std::vector<RunFile>& runs, Eigen::Index rows_max);
 
 /// First-order low pass of each column, started at each run's first row.

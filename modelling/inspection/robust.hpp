@@ -7,7 +7,7 @@
 
 namespace thermocomp::inspection {
 
-/// Of the finite values; NaN without any.
+/// Median of the finite values; NaN without any.
 [[nodiscard]] double median(std::vector<double> values);
 /// 1.4826 times the median distance from the median: the standard deviation of what is normal.
 [[nodiscard]] double robust_deviation(const Eigen::Ref<const Eigen::VectorXd>& values);

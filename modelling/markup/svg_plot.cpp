@@ -12,7 +12,9 @@ namespace {
 constexpr double width = 860.0;
 constexpr double left = 52.0;
 constexpr double right = 10.0;
-constexpr double title_height = 20.0;
+constexpr double title_height = 24.0;
+/// Of a title above its panel: the highest tick's label ends below it.
+constexpr double title_up = 11.0;
 constexpr double axis_height = 32.0;
 constexpr double gap = 8.0;
 constexpr double small_width = 240.0;
@@ -49,7 +51,7 @@ Range range_of(const std::vector<Values>& columns) {
 
 std::string number(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
+  std::snprintf(text, sizeof text, "%.6g", value);
   return text;
 }
 
@@ -73,6 +75,11 @@ std::string label(double x, double y, const std::string& text, const std::string
 /// "h120.0"
 std::string way(char direction, double length) {
   return std::string(1, direction).append(coordinate(length));
+}
+
+/// About, of the font that labels are in.
+double text_width(const std::string& text) {
+  return 6.6 * static_cast<double>(text.size());
 }
 
 std::string straight(double x, double y, const std::string& along, const char* kind) {
@@ -123,6 +130,35 @@ std::string horizontal_axis(const Box& box, const Range& range, const std::strin
   return svg + label(box.x + box.width, box.y + box.height + 28, unit, "text-anchor=\"end\"");
 }
 
+std::string named_axis(const Box& box, const Range& hours, const std::vector<TimeTick>& ticks) {
+  std::string svg = straight(box.x, box.y + box.height, way('h', box.width), "axis");
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    const double at = box.across(hours, ticks[i].at_s / 3600.0);
+    const double next =
+        i + 1 < ticks.size() ? box.across(hours, ticks[i + 1].at_s / 3600.0) : box.x + box.width;
+    svg += straight(at, box.y + box.height, "v16", "axis");
+    if (at + text_width(ticks[i].label) + 8 < next)
+      svg += label(at + 4, box.y + box.height + 14, ticks[i].label);
+  }
+  return svg;
+}
+
+/// Of a line: a gap that is longer is not bridged.
+double gap_max(const Range& x, Values time, Values values) {
+  std::vector<double> steps;
+  double last = std::nan("");
+  for (std::size_t row = 0; row < time.size(); ++row) {
+    if (!std::isfinite(values[row])) continue;
+    if (std::isfinite(last)) steps.push_back(time[row] - last);
+    last = time[row];
+  }
+  if (steps.empty()) return x.high - x.low;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  constexpr double seen_share = 0.01;
+  return std::max(10.0 * *middle, seen_share * (x.high - x.low));
+}
+
 std::string curve(const Box& box, const Range& x, const Range& y, Values time, const PlotLine& line,
                   std::size_t points) {
   std::string svg = "<path fill=\"none\" stroke=\"";
@@ -130,10 +166,16 @@ std::string curve(const Box& box, const Range& x, const Range& y, Values time, c
   if (line.as_dots) svg.append("\" stroke-width=\"5\" stroke-linecap=\"round");
   svg.append("\" d=\"");
   const std::size_t stride = 1 + (time.size() - 1) / points;
+  const double bridged = gap_max(x, time, line.values) + static_cast<double>(stride) *
+                                                             (x.high - x.low) /
+                                                             static_cast<double>(time.size());
   bool pen_down = false;
+  double last = 0.0;
   for (std::size_t row = 0; row < time.size(); row += stride) {
     const double value = line.values[row];
     if (!std::isfinite(value)) continue;
+    pen_down = pen_down && time[row] - last <= bridged;
+    last = time[row];
     svg.append(pen_down ? "L" : "M").append(place(box.across(x, time[row]), box.up(y, value)));
     if (line.as_dots) svg.append("h0");
     pen_down = !line.as_dots;
@@ -157,14 +199,15 @@ std::string panel_svg(const PlotPanel& panel, const Box& box, Values time, const
   for (const PlotLine& line : panel.lines) columns.push_back(line.values);
   const Range y = range_of(columns);
   const std::string title = panel.title + (panel.unit.empty() ? "" : ", " + panel.unit);
-  std::string svg = label(4, box.y - 6, title, "class=\"title\"");
+  std::string svg = label(4, box.y - title_up, title, "class=\"title\"");
   svg += vertical_axis(box, y, panel.height > 100 ? 5 : 3);
   double legend = width - right;
   for (std::size_t i = panel.lines.size(); i > 0; --i) {
     const PlotLine& line = panel.lines[i - 1];
     if (line.label.empty()) continue;
-    svg += label(legend, box.y - 6, line.label, "text-anchor=\"end\" fill=\"" + line.colour + "\"");
-    legend -= 14.0 + 6.6 * static_cast<double>(line.label.size());
+    svg += label(legend, box.y - title_up, line.label,
+                 "text-anchor=\"end\" fill=\"" + line.colour + "\"");
+    legend -= 14.0 + text_width(line.label);
   }
   const auto points =
       std::min(points_max, panel_points_max / std::max<std::size_t>(1, panel.lines.size()));
@@ -191,7 +234,7 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
 }
 
 std::string panels_plot(Values time_s, const std::vector<PlotPanel>& panels,
-                        const std::vector<PlotSpan>& spans) {
+                        const std::vector<PlotSpan>& spans, const std::vector<TimeTick>& ticks) {
   double height = axis_height;
   for (const PlotPanel& panel : panels) height += title_height + panel.height + gap;
   std::string svg = begin(width, height);
@@ -202,8 +245,11 @@ std::string panels_plot(Values time_s, const std::vector<PlotPanel>& panels,
   for (const PlotPanel& panel : panels) {
     const Box box{left, top, width - left - right, panel.height};
     for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
+    for (const TimeTick& tick : ticks)
+      svg += straight(box.across(x, tick.at_s / 3600.0), box.y, way('v', box.height), "grid");
     svg += panel_svg(panel, box, hours, x);
-    if (&panel == &panels.back()) svg += horizontal_axis(box, x, "time, h", 10);
+    if (&panel == &panels.back())
+      svg += ticks.empty() ? horizontal_axis(box, x, "time, h", 10) : named_axis(box, x, ticks);
     top += panel.height + gap + title_height;
   }
   return svg + "</svg>\n";
@@ -235,7 +281,7 @@ std::string bars_plot(const std::vector<NamedBar>& bars) {
     for (const BarPart& part : bars.front().parts) {
       svg.append("<path stroke=\"").append(part.colour).append("\" stroke-width=\"10\" d=\"M");
       svg.append(place(legend, 10)).append("h10\"/>").append(label(legend + 14, 14, part.label));
-      legend += 34.0 + 6.6 * static_cast<double>(part.label.size());
+      legend += 34.0 + text_width(part.label);
     }
   double top = title_height + gap;
   for (const NamedBar& bar : bars) {

@@ -10,8 +10,10 @@ namespace thermocomp {
 struct PlotLine {
   std::string label;  ///< empty: not in the legend
   std::string colour;
-  std::span<const double> values;  ///< as many as there are times; NaN leaves a gap
-  bool as_dots{false};             ///< single values, not joined by a line
+  /// As many as there are times. NaN is left out; a gap that is much longer than the others of the
+  /// line is not bridged.
+  std::span<const double> values;
+  bool as_dots{false};  ///< single values, not joined by a line
 };
 
 /// A stretch of time behind all panels, shaded and named at its top.
@@ -19,6 +21,12 @@ struct PlotSpan {
   std::string label;
   double from_s{0.0};
   double to_s{0.0};
+};
+
+/// A named moment on the axis of time, with a line through all panels.
+struct TimeTick {
+  double at_s{0.0};
+  std::string label;
 };
 
 /// Lines over the axis of time that all panels share.
@@ -31,9 +39,12 @@ struct PlotPanel {
 
 /// Panels one above the other, with ticks, grid and units; long columns are thinned to what a
 /// screen shows when the picture is made wider.
+/// @param ticks  in order; take the place of hours. A label stands to the right of its line, where
+///               there is room before the next one
 [[nodiscard]] std::string panels_plot(std::span<const double> time_s,
                                       const std::vector<PlotPanel>& panels,
-                                      const std::vector<PlotSpan>& spans = {});
+                                      const std::vector<PlotSpan>& spans = {},
+                                      const std::vector<TimeTick>& ticks = {});
 
 /// Dots of y over x.
 struct PlotDots {

@@ -11,7 +11,7 @@ namespace thermocomp::placement {
 
 struct MethodResult {
   std::string name;            ///< "greedy"
-  std::vector<Index> sensors;  ///< a node a block; empty where it is no placement of one a block
+  std::vector<Index> sensors;  ///< one node per block; empty for a method of another kind
   ErrorFigures used;
   ErrorFigures left_out;
   std::vector<ErrorFigures> by_case;  ///< shape (load cases)
@@ -20,7 +20,7 @@ struct MethodResult {
 struct Comparison {
   MethodResult uncompensated;
   std::vector<MethodResult> methods;
-  std::vector<TendencyPlacement> ways;  ///< one a way, in the order of all_ways
+  std::vector<TendencyPlacement> ways;  ///< one per way, in the order of all_ways
   std::size_t best_way{0};              ///< least RMS over the used load cases
   GreedyPlacement greedy;
 

@@ -37,7 +37,7 @@ struct BlockOfSensors {
   std::string name;
   std::vector<Index> nodes;
   std::vector<Index> candidates;  ///< where a sensor can stand
-  double from_support_m{0.0};     ///< of the block's middle from the middle of what is held
+  double from_support_m{0.0};     ///< from the block's middle to the middle of what is held
 };
 
 /// Blocks whose rise is changed together in the method of tendency patterns.
@@ -45,7 +45,7 @@ struct Pattern {
   std::string name;
   std::vector<bool> blocks;    ///< shape (blocks)
   Numbers percents;            ///< r, each tried
-  bool shrinks_as_one{false};  ///< where a block would leave its bounds; else each is cut alone
+  bool shrinks_as_one{false};  ///< all blocks get one smaller r at a bound; else cut each
 };
 
 struct LoadCase {
@@ -92,8 +92,8 @@ struct ErrorFigures {
 [[nodiscard]] ErrorFigures errors_of(const PlacementProblem& problem,
                                      const std::vector<Field>& fields,
                                      const std::vector<Numbers>& estimates_um);
-/// With one sensor a block: what P1 makes of their readings.
-/// @param sensors  a node a block
+/// Displacements by P1 from the readings of one sensor per block.
+/// @param sensors  one node per block
 [[nodiscard]] std::vector<Numbers> estimates_um(const PlacementProblem& problem,
                                                 const std::vector<Field>& fields,
                                                 const std::vector<Index>& sensors);

@@ -1,4 +1,4 @@
-/// Other ways to choose a node a block, to compare with and to choose from.
+/// Other ways to choose one node per block, to compare with and to choose from.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ struct GreedyPlacement {
 [[nodiscard]] GreedyPlacement place_greedily(const PlacementProblem& problem);
 
 /// QR with column pivoting of the fields' modes: each pivot is the node with the greatest part not
-/// yet explained by the nodes chosen. One a block; blocks beyond the number of modes get their
-/// centroid.
+/// yet explained by the nodes chosen. One node per block; blocks beyond the number of modes get
+/// their centroid.
 /// Source: K. Manohar et al., Data-driven sparse sensor placement for reconstruction, 2018.
 [[nodiscard]] std::vector<Index> place_by_qr(const PlacementProblem& problem);
 
@@ -46,7 +46,7 @@ struct Reconstruction {
                                                 const std::vector<Field>& fields,
                                                 const Reconstruction& reconstruction);
 
-/// A candidate a block at random; reproducible.
+/// One candidate per block at random; reproducible.
 [[nodiscard]] std::vector<Index> place_at_random(const PlacementProblem& problem,
                                                  std::uint64_t seed);
 

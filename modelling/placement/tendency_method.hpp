@@ -26,7 +26,7 @@ enum class Start { mean, median, centroid };
 
 struct TendencyOptions {
   Start start{Start::mean};
-  double threshold_um{0.01};  ///< the error at which it is enough
+  double threshold_um{0.01};  ///< the error at which the iteration stops
   int rounds_max{200};
 };
 
@@ -51,7 +51,7 @@ struct TendencyRun {
 struct TendencyPlacement {
   Way way{};
   std::vector<TendencyRun> runs;  ///< one for each used field
-  std::vector<Index> sensors;     ///< a node a block
+  std::vector<Index> sensors;     ///< one node per block
 };
 
 /// Step 11: in each block the node whose temperatures are nearest to theta_g; over several fields

@@ -10,7 +10,7 @@
 
 namespace thermocomp::structure {
 
-/// What one film or one joint is made of.
+/// The couplings of one film or one joint.
 struct NamedCouplings {
   std::string name;
   BodyPartKind kind{BodyPartKind::joint};
@@ -19,10 +19,10 @@ struct NamedCouplings {
 
 /// Everything that conducts and carries heat, bound to a structure's mesh.
 struct HeatModel {
-  Reduction reduction;               ///< bonded joints
-  std::vector<Coupling> dry;         ///< contacts and convection to the room
-  std::vector<Coupling> flooded;     ///< the same and convection to the coolant
-  std::vector<double> room_W_per_K;  ///< heat a kelvin of the room's air brings in, shape (nodes)
+  Reduction reduction;                  ///< bonded joints
+  std::vector<Coupling> dry;            ///< contacts and convection to the room
+  std::vector<Coupling> flooded;        ///< the same and convection to the coolant
+  std::vector<double> room_W_per_K;     ///< heat per kelvin of the room's air, shape (nodes)
   std::vector<double> coolant_W_per_K;  ///< the same of the coolant
   /// For each [[heat]] how it spreads over the nodes, adding up to 1. Shape (heats)(nodes).
   std::vector<std::vector<double>> shares;

@@ -6,8 +6,8 @@
 
 namespace thermocomp::structure {
 
-/// Every node of the faces `from` follows the face of `to` that it lies on. Faces that nowhere come
-/// as near as gap_m are a problem of the finder's.
+/// Every node of the faces `from` follows the face of `to` that it lies on. Faces that come nowhere
+/// nearer than gap_m are a problem, told by the finder.
 void tie_faces(RegionFinder& finder, const Mesh& mesh, const JointSpec& joint,
                Reduction& reduction);
 

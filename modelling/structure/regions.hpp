@@ -9,7 +9,7 @@
 
 namespace thermocomp::structure {
 
-/// Finds what regions mean; what cannot be found is collected as problems.
+/// Finds the nodes and faces of regions; what cannot be found is collected as problems.
 class RegionFinder {
  public:
   /// @pre the mesh outlives this
@@ -39,7 +39,7 @@ class RegionFinder {
   std::vector<Problem> problems_;
 };
 
-/// One coupling a quadrature point of the faces, as strong as its share of the area [m^2].
+/// One coupling per quadrature point of the faces, as strong as its share of the area [m^2].
 /// `complete(place_m, coupling)` adds what the point is coupled to; false: the point is left out.
 template <class Complete>
 [[nodiscard]] std::vector<Coupling> couplings_on(const Mesh& mesh, const std::vector<Face>& faces,

@@ -13,7 +13,7 @@
 
 namespace thermocomp::structure {
 
-/// Says what begins; for long work.
+/// Told what begins, in long work.
 using Progress = std::function<void(std::string_view)>;
 
 struct Structure {
@@ -23,7 +23,8 @@ struct Structure {
   std::vector<Coupling> springs;  ///< to the ground and between parts
   std::vector<std::string> block_names;
   std::vector<Index> block_of_node;
-  /// The outputs in their order, then for each guideway and each of its outputs a row a position.
+  /// The outputs in their order, then for each guideway and each of its outputs one row per
+  /// position.
   std::vector<Functional> rows;
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
+#include <cstddef>
 #include <optional>
 #include <string_view>
 
@@ -87,14 +89,23 @@ AxisBinding parsed(const RunFile& run, const std::string& value) {
   return binding;
 }
 
-/// The column that is called like an axis: as measured at the tool, or as a displacement.
+bool has_a_course(const RunFile& run, const std::string& column) {
+  const auto& values = run.column(column);
+  std::size_t count = 0;
+  for (std::size_t row = run.selected_begin; row < run.selected_end; ++row)
+    if (std::isfinite(values[row])) ++count;
+  return count >= 2;
+}
+
+/// The column that is called like an axis: as measured at the tool, or as a displacement. A history
+/// has columns of all axes, also of those that nobody measured.
 std::optional<std::string> column_called(const RunFile& run, const std::string& axis) {
   for (const char* end : {"_measured_um", "_um", "_measured_urad", "_urad"})
     for (const std::string& column : run.columns) {
       std::string lower = column;
       std::transform(lower.begin(), lower.end(), lower.begin(),
                      [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (lower == axis + end) return column;
+      if (lower == axis + end && has_a_course(run, column)) return column;
     }
   return std::nullopt;
 }
@@ -137,8 +148,11 @@ std::vector<AxisBinding> bind_axes(const RunFile& run, const TestOptions& option
   if (options.axes.empty()) bindings = by_names(run, options);
   if (bindings.empty())
     refuse(run, "(missing)",
-           "no column is called like an axis (x_um ... c_urad); " + displacement_columns(run) +
-               ": say which is which, --axis z=COLUMN");
+           "no column that is called like an axis (x_um ... c_urad) has two values in the rows "
+           "selected; " +
+               displacement_columns(run) +
+               ": say which is which, --axis z=COLUMN; into a history they come by thermocomp "
+               "measured AXIS UM");
   return bindings;
 }
 

@@ -9,7 +9,7 @@
 
 namespace thermocomp::thermal_test {
 
-/// A displacement, or a tilt as the difference of two by their distance.
+/// A displacement, or a tilt: the difference of two divided by their distance.
 struct AxisBinding {
   std::string axis;  ///< "x", "b", "x2"
   std::string column;
@@ -18,7 +18,7 @@ struct AxisBinding {
 };
 
 /// What `--axis` says and, without it, what the names of the columns say.
-/// @throws ConfigurationError naming what was written and what is to be
+/// @throws ConfigurationError naming what was written and what is required
 [[nodiscard]] std::vector<AxisBinding> bind_axes(const RunFile& run, const TestOptions& options);
 
 /// "X", "X at position 2"

@@ -1,4 +1,4 @@
-/// The course of one displacement in a test, with its noise taken down and known.
+/// The course of one displacement in a test, smoothed, with its noise known.
 #pragma once
 
 #include <cstddef>

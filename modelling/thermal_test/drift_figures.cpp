@@ -85,8 +85,12 @@ std::vector<Stretch> stretches_of(Part part, const std::vector<double>& time_s,
   }
   std::vector<Stretch> hours;
   if (phases.runs || phases.to_s - phases.from_s < hour_s) return hours;
-  for (double from = phases.from_s; from + hour_s <= phases.to_s; from += hours_step_s)
-    hours.push_back(stretch_between(time_s, from, from + hour_s));
+  for (double from = phases.from_s; from + hour_s <= phases.to_s; from += hours_step_s) {
+    const Stretch hour = stretch_between(time_s, from, from + hour_s);
+    // It begins with the value before; where values are rare that may be hours away.
+    if (hour.end > hour.begin && time_s[hour.end - 1] - time_s[hour.begin] <= 1.25 * hour_s)
+      hours.push_back(hour);
+  }
   return hours;
 }
 

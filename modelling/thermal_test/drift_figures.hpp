@@ -10,8 +10,8 @@
 
 namespace thermocomp::thermal_test {
 
-/// A range with the interval in which that of the tool lies in 95 of 100 cases. Noise can only
-/// make a range larger than it is, so the interval goes further down than up.
+/// A range with its 95 % interval. Noise can only make a range larger, so the interval reaches
+/// further down than up.
 struct Figure {
   double value{std::numeric_limits<double>::quiet_NaN()};
   double low{std::numeric_limits<double>::quiet_NaN()};
@@ -60,10 +60,10 @@ struct TestFigures {
 inline constexpr double settled_share = 0.15;
 
 [[nodiscard]] TestFigures figures_of(const TestData& data);
-/// The same of an earlier end of running, for a comparison with a shorter test.
+/// The same with an earlier end of running, for a comparison with a shorter test.
 [[nodiscard]] TestFigures figures_until(const TestData& data, double running_s);
 
-/// b by a. Errors of both count as independent: their squares add.
+/// `after` divided by `before`. Their errors count as independent: squares add.
 [[nodiscard]] Figure ratio_of(const Figure& after, const Figure& before);
 
 }  // namespace thermocomp::thermal_test

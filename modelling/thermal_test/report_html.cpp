@@ -33,15 +33,30 @@ std::string duration_words(double seconds) {
   return text;
 }
 
+/// "22", "1.5": a percentage is not known more exactly.
 std::string percent(double share) {
-  return figure_text(100.0 * share);
+  char text[32];
+  std::snprintf(text, sizeof text, share < 0.0995 ? "%.1f" : "%.0f", 100.0 * share);
+  return text;
 }
 
 std::string percent_words(const Figure& ratio) {
-  std::string words = percent(ratio.value) + " %";
+  const std::string words = percent(ratio.value) + " %";
+  // From a fraction of the figure to many times the other side: no figure at all.
+  const bool is_wide = !(ratio.high <= 1.5);
+  if (is_wide && !(ratio.low > 0.2 * ratio.value)) return words + " (noise alone may have made it)";
   if (std::isfinite(ratio.high))
     return words + " (" + percent(ratio.low) + " to " + percent(ratio.high) + ")";
-  return words + " (at least " + percent(ratio.low) + "; before, noise alone may have moved it)";
+  return words + " (at least " + percent(ratio.low) + ")";
+}
+
+/// In a column, what stands in brackets stays in one line.
+std::string cell_of(std::string words) {
+  const std::size_t bracket = words.find('(');
+  for (std::size_t at = words.find(" to "); bracket != std::string::npos && at != std::string::npos;
+       at = words.find(" to ", at))
+    words.replace(at, 4, "\u00a0to\u00a0");
+  return words;
 }
 
 std::string settled_word(const AxisFigures& axis) {
@@ -145,6 +160,10 @@ class TestPicture {
   std::vector<std::unique_ptr<std::vector<double>>> kept_;
 };
 
+std::string figure_cell(const Figure& figure) {
+  return cell_of(figure_words(figure, ""));
+}
+
 std::string axes_table(const TestFigures& figures, TestKind kind) {
   std::vector<std::vector<std::string>> rows;
   if (kind == TestKind::environment)
@@ -155,19 +174,20 @@ std::string axes_table(const TestFigures& figures, TestKind kind) {
   for (const AxisFigures& axis : figures.axes) {
     const std::string name = axis.name + ", " + unit_words(axis.unit);
     if (kind == TestKind::environment)
-      rows.push_back({name, figure_words(axis.whole, ""), figure_words(axis.largest_hour, "")});
+      rows.push_back({name, figure_cell(axis.whole), figure_cell(axis.largest_hour)});
     else
-      rows.push_back({name, figure_words(axis.first_hour, ""), figure_words(axis.until_end, ""),
-                      figure_words(axis.cooling, ""),
-                      axis.last_by_first.is_there() ? percent_words(axis.last_by_first) : "-",
-                      settled_word(axis)});
+      rows.push_back(
+          {name, figure_cell(axis.first_hour), figure_cell(axis.until_end),
+           figure_cell(axis.cooling),
+           axis.last_by_first.is_there() ? cell_of(percent_words(axis.last_by_first)) : "-",
+           settled_word(axis)});
   }
   const Figure& together =
       kind == TestKind::environment ? figures.combined_whole : figures.combined_until_end;
   if (together.is_there()) {
     std::vector<std::string> row(rows.front().size());
     row[0] = "combined, µm";
-    row[kind == TestKind::environment ? 1 : 2] = figure_words(together, "");
+    row[kind == TestKind::environment ? 1 : 2] = figure_cell(together);
     rows.push_back(row);
   }
   return html_table(rows);
@@ -178,9 +198,10 @@ std::string temperatures_table(const TestFigures& figures) {
       {"temperature", "at the start, °C", "change while it ran, K", "range of the record, K"}};
   if (!figures.phases.runs) rows.front()[2] = "change to the end, K";
   for (const TemperatureFigures& temperature : figures.temperatures)
-    rows.push_back({temperature.name + (temperature.is_room ? " (room)" : ""),
-                    figure_text(temperature.at_start_degC), figure_text(temperature.change_K),
-                    figure_text(temperature.range_K)});
+    rows.push_back(
+        {temperature.name + (temperature.is_room && temperature.name != "room" ? " (room)" : ""),
+         figure_text(temperature.at_start_degC), figure_text(temperature.change_K),
+         figure_text(temperature.range_K)});
   return html_table(rows);
 }
 
@@ -217,16 +238,16 @@ std::string ratios_part(const TestAnswer& answer) {
   std::string html = html_heading("Before against after");
   const bool runs = answer.before.phases.runs;
   std::vector<std::vector<std::string>> rows{
-      {"after as a share of before", "first 60 min", "until the end"}};
-  if (!runs) rows.front() = {"after as a share of before", "whole test"};
+      {runs ? "range until the end of running" : "range of the whole test", "before", "after",
+       "after as a share of before"}};
+  if (runs) rows.front().push_back("the same of the first 60 min");
+  const auto share = [](const Figure& ratio) {
+    return ratio.is_there() ? cell_of(percent_words(ratio)) : std::string("-");
+  };
   for (const AxisRatio& ratio : answer.ratios) {
-    const auto cell = [](const Figure& figure) {
-      return figure.is_there() ? percent_words(figure) : std::string("-");
-    };
-    if (runs)
-      rows.push_back({ratio.name, cell(ratio.first_hour), cell(ratio.until_end)});
-    else
-      rows.push_back({ratio.name, cell(ratio.whole)});
+    rows.push_back({ratio.name + ", " + unit_words(ratio.unit), figure_cell(ratio.before),
+                    figure_cell(ratio.after), share(runs ? ratio.until_end : ratio.whole)});
+    if (runs) rows.back().push_back(share(ratio.first_hour));
   }
   html += html_table(rows);
   if (rows.size() < 2) html += html_paragraph("The two records have no axis in common.");
@@ -260,6 +281,8 @@ std::string method_part(const TestAnswer& answer) {
     lines.push_back(text + ".");
   }
   for (const std::string& said : answer.before.said) lines.push_back(said + ".");
+  if (answer.after && answer.after->said != answer.before.said)
+    for (const std::string& said : answer.after->said) lines.push_back("After: " + said + ".");
   return html_heading("How these figures were made") + html_list(lines);
 }
 
@@ -273,7 +296,11 @@ std::string figure_words(const Figure& figure, const std::string& unit) {
 }
 
 std::string axis_sentence(const AxisFigures& axis, const TestPhases& phases) {
-  const std::string verb = axis.unit == "urad" ? " tilted by " : " moved by ";
+  // Two positions of an axis come nearer or go apart.
+  const bool is_distance = axis.name.find("growth") != std::string::npos;
+  const std::string verb = axis.unit == "urad" ? " tilted by "
+                           : is_distance       ? " changed by "
+                                               : " moved by ";
   if (!phases.runs)
     return axis.name + verb + figure_words(axis.whole, axis.unit) + " in " +
            duration_words(phases.to_s - phases.from_s) + ".";

@@ -74,9 +74,11 @@ TestAnswer answer_of(TestData before, std::optional<TestData> after) {
   for (const AxisFigures& axis : first.axes)
     for (const AxisFigures& other : second.axes) {
       if (other.name != axis.name || other.unit != axis.unit) continue;
-      answer.ratios.push_back({axis.name, ratio_of(other.first_hour, axis.first_hour),
-                               ratio_of(other.until_end, axis.until_end),
-                               ratio_of(other.whole, axis.whole)});
+      const bool runs = answer.before.phases.runs;
+      answer.ratios.push_back(
+          {axis.name, axis.unit, runs ? axis.until_end : axis.whole,
+           runs ? other.until_end : other.whole, ratio_of(other.first_hour, axis.first_hour),
+           ratio_of(other.until_end, axis.until_end), ratio_of(other.whole, axis.whole)});
     }
   add_notes(answer);
   return answer;

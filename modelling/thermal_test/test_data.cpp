@@ -133,7 +133,7 @@ void phases_from_times(const RunFile& run, const std::string& running, TestPhase
     refuse(run, "--running", running,
            "must lie in the record, which is " + std::to_string(phases.from_s) + ":" +
                std::to_string(phases.to_s));
-  phases.said = "ran from " + hours_text(phases.running_from_s) + " to " +
+  phases.said = "It ran from " + hours_text(phases.running_from_s) + " to " +
                 hours_text(phases.running_to_s) + ", as --running says";
 }
 
@@ -150,7 +150,7 @@ void phases_from_column(const RunFile& run, const std::string& column, TestPhase
   phases.running_to_s = time_s[last];
   if (!(phases.running_to_s > phases.running_from_s))
     refuse(run, column, "(one row)", "says that it ran for one row alone");
-  phases.said = "ran from " + hours_text(phases.running_from_s) + " to " +
+  phases.said = "It ran from " + hours_text(phases.running_from_s) + " to " +
                 hours_text(phases.running_to_s) + ", as " + column + " says";
 }
 

@@ -47,7 +47,7 @@ struct TestData {
   std::vector<double> speed_time_s;
   std::vector<double> speed;
   std::vector<double> breaks_s;   ///< at which the speed changed
-  std::vector<std::string> said;  ///< how columns were taken, a line each
+  std::vector<std::string> said;  ///< how columns were read, one line each
 };
 
 /// @throws ConfigurationError naming the file and the line to write

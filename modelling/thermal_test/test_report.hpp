@@ -13,7 +13,10 @@ namespace thermocomp::thermal_test {
 /// An axis that both tests have. Where one ran shorter, both until then.
 struct AxisRatio {
   std::string name;
-  Figure first_hour;
+  std::string unit;
+  Figure before;  ///< range until then, or of the whole record of the surroundings
+  Figure after;
+  Figure first_hour;  ///< of here on: after by before
   Figure until_end;
   Figure whole;
 };
@@ -25,7 +28,7 @@ struct TestAnswer {
   std::optional<TestData> after;
   std::optional<TestFigures> after_figures;
   std::vector<AxisRatio> ratios;
-  std::vector<std::string> notes;  ///< what a comparison has to bear in mind
+  std::vector<std::string> notes;  ///< what to bear in mind in a comparison
 };
 
 /// Figures and, of two tests, their ratios.

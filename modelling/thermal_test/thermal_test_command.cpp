@@ -102,7 +102,8 @@ void add_report(CLI::App& group, std::function<int()>& action) {
   const auto options = std::make_shared<ReportOptions>();
   CLI::App* sub = group.add_subcommand(
       "report", "the figures of one test, or of one before and one after, as a page");
-  sub->add_option("BEFORE", options->before, "RUN.csv[@T0:T1], or a history with probed values")
+  sub->add_option("BEFORE", options->before,
+                  "RUN.csv[@T0:T1], or a history with probed values, [@T0:T1] too")
       ->type_name("FILE")
       ->required();
   sub->add_option("AFTER", options->after, "the same test of the compensated machine")

@@ -118,14 +118,14 @@ void CanNode::send(const CanFrames& frames) {
   }
 }
 
-std::map<CanId, CanFrame> CanNode::receive() {
-  std::map<CanId, CanFrame> newest;
+std::vector<CanFrame> CanNode::receive() {
+  std::vector<CanFrame> frames;
   while (socket_.is_open()) {
     const auto batch = socket_.receive();
-    for (const CanFrame& frame : batch) newest[frame.id] = frame;
+    frames.insert(frames.end(), batch.begin(), batch.end());
     if (batch.size() < CanSocket::batch_max) break;
   }
-  return newest;
+  return frames;
 }
 
 }  // namespace thermocomp

@@ -51,8 +51,8 @@ class CanNode {
   [[nodiscard]] std::string error() const { return socket_.is_open() ? "" : socket_.error(); }
   void keep_open(nanoseconds now);
   void send(const CanFrames& frames);
-  /// Newest frame of each identifier that has arrived since the last call.
-  [[nodiscard]] std::map<CanId, CanFrame> receive();
+  /// What has arrived since the last call, oldest first.
+  [[nodiscard]] std::vector<CanFrame> receive();
 
  private:
   CanSocket socket_;

@@ -8,7 +8,17 @@
 namespace thermocomp {
 
 SimulatedCnc::SimulatedCnc(const SimulatedController& config)
-    : config_(config), wanted_um_(config.axes.size(), 0.0), applied_um_(config.axes.size(), 0.0) {
+    : config_(config),
+      tool_um_(config.axes.size(), 0.0),
+      looked_at_s_(config.axes.size(), 0.0),
+      set_numbers_(config.axes.size(), 0) {
+  std::size_t offsets = 0;
+  for (const SimulatedAxis& axis : config.axes) {
+    first_.push_back(offsets);
+    offsets += axis.offsets();
+  }
+  wanted_um_.assign(offsets, 0.0);
+  applied_um_.assign(offsets, 0.0);
   const bool watched =
       (config.heartbeat || config.can_heartbeat) && config.heartbeat_timeout_s > 0.0;
   if (!watched) config_.heartbeat_timeout_s = 0.0;
@@ -30,14 +40,20 @@ void SimulatedCnc::take(double now_s, const CncOrder& order) {
   alive_ = config_.heartbeat_timeout_s <= 0.0 ||
            (beaten_ && now_s - beat_at_s_ <= config_.heartbeat_timeout_s);
   if (!alive_ || rejects_) return;
-  for (std::size_t i = 0; i < wanted_um_.size(); ++i) {
-    const double offset = order.offset_um[i];
-    const double bound = config_.axes[i].offset_um_max;
-    const bool valid = i < 64 && ((order.valid_bits >> i) & 1) != 0;
-    if (valid && std::isfinite(offset) && (bound <= 0.0 || std::abs(offset) <= bound)) {
-      wanted_um_[i] = offset;
-    }
-  }
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis) take_axis(axis, order);
+}
+
+void SimulatedCnc::take_axis(std::size_t axis, const CncOrder& order) {
+  const double bound = config_.axes[axis].offset_um_max;
+  const bool valid = axis < 64 && ((order.valid_bits >> axis) & 1) != 0;
+  const auto begin = order.offset_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]);
+  const auto end = begin + static_cast<std::ptrdiff_t>(config_.axes[axis].offsets());
+  const bool good = std::all_of(begin, end, [bound](double offset) {
+    return std::isfinite(offset) && (bound <= 0.0 || std::abs(offset) <= bound);
+  });
+  if (!valid || !good) return;
+  std::copy(begin, end, wanted_um_.begin() + static_cast<std::ptrdiff_t>(first_[axis]));
+  if (axis < order.set_numbers.size()) set_numbers_[axis] = order.set_numbers[axis];
 }
 
 bool SimulatedCnc::step(double now_s, const ControllerEffect& effect) {
@@ -53,21 +69,50 @@ bool SimulatedCnc::step(double now_s, const ControllerEffect& effect) {
     alive_ = beaten_ && now_s - beat_at_s_ <= config_.heartbeat_timeout_s;
     if (!alive_) return homed;
   }
-  for (std::size_t i = 0; i < applied_um_.size(); ++i) {
-    const double goal = wanted_um_[i] + effect.misapplied_um;
-    const double share = config_.tau_s > 0.0 ? -std::expm1(-dt_s / config_.tau_s) : 1.0;
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
+    step_axis(axis, dt_s, effect.misapplied_um);
+  return homed;
+}
+
+void SimulatedCnc::step_axis(std::size_t axis, double dt_s, double misapplied_um) {
+  const SimulatedAxis& config = config_.axes[axis];
+  const double share = config_.tau_s > 0.0 ? -std::expm1(-dt_s / config_.tau_s) : 1.0;
+  const double rate = config.rate_um_per_s_max;
+  for (std::size_t i = first_[axis]; i < first_[axis] + config.offsets(); ++i) {
+    const double goal = wanted_um_[i] + misapplied_um;
     double change = share * (goal - applied_um_[i]);
-    const double rate = config_.axes[i].rate_um_per_s_max;
     if (rate > 0.0) change = std::clamp(change, -rate * dt_s, rate * dt_s);
     applied_um_[i] += change;
-    if (piezos_[i]) piezos_[i]->step(applied_um_[i]);
   }
-  return homed;
+  if (piezos_[axis]) piezos_[axis]->step(applied_um_[first_[axis]]);
+}
+
+void SimulatedCnc::stand_at(std::size_t axis, double now_s, double position_mm) {
+  const double dt_s = std::max(0.0, now_s - looked_at_s_.at(axis));
+  looked_at_s_[axis] = now_s;
+  const double rate = config_.axes[axis].travel->interpolation_um_per_s_max;
+  double change = between_nodes_um(axis, position_mm) - tool_um_[axis];
+  if (rate > 0.0) change = std::clamp(change, -rate * dt_s, rate * dt_s);
+  tool_um_[axis] += change;
+}
+
+/// A line goes on beyond the ends of its travel, a table does not.
+double SimulatedCnc::between_nodes_um(std::size_t axis, double position_mm) const {
+  const TravelShape& travel = config_.axes[axis].travel->shape();
+  const std::vector<double>& nodes_mm = travel.nodes_mm;
+  const std::span<const double> nodes_um = nodes(axis);
+  std::size_t above = 1;
+  while (above + 1 < nodes_mm.size() && position_mm > nodes_mm[above]) ++above;
+  double share = (position_mm - nodes_mm[above - 1]) / (nodes_mm[above] - nodes_mm[above - 1]);
+  if (!travel.p0_mm) share = std::clamp(share, 0.0, 1.0);
+  return nodes_um[above - 1] + share * (nodes_um[above] - nodes_um[above - 1]);
 }
 
 void SimulatedCnc::forget() {
   std::fill(wanted_um_.begin(), wanted_um_.end(), 0.0);
   std::fill(applied_um_.begin(), applied_um_.end(), 0.0);
+  std::fill(tool_um_.begin(), tool_um_.end(), 0.0);
+  std::fill(set_numbers_.begin(), set_numbers_.end(), 0);
   for (auto& piezo : piezos_)
     if (piezo) piezo->step(0.0);
 }

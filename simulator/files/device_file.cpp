@@ -3,6 +3,8 @@
 #include <map>
 
 #include "config/buses/presets.hpp"
+#include "config/sections/can_travel.hpp"
+#include "config/sections/modbus_travel.hpp"
 #include "config/text/units.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"
@@ -287,6 +289,49 @@ SimulatedPiezoConfig read_piezo(const TomlTable& table) {
   return piezo;
 }
 
+/// What the daemon sends and the controller shows in frames of its own; a bit that a set takes
+/// twice is a problem of the section already.
+CanTravel read_travel_frames(Draft& state, const TomlTable& axis, double offset_um_max,
+                             std::size_t bus) {
+  sections::TakenBits sent;
+  sections::CanTravelSection section(axis, offset_um_max, sent);
+  section.read_applied(sent);
+  const CanTravel& travel = section.travel();
+  const TomlTable table = sections::travel_table(axis);
+  for (const CanSet* set : {&travel.sent, &travel.applied}) {
+    for (const CanSignal& signal : set->values) take(state, bus, signal, table);
+    for (const CanSignal& signal : set->numbers) take(state, bus, signal, table);
+  }
+  return travel;
+}
+
+/// [axis.line] or [axis.table], by the keys that the daemon's file has.
+SimulatedTravel read_travel(Draft& state, const TomlTable& axis, double offset_um_max,
+                            std::size_t bus) {
+  const TomlTable table = sections::travel_table(axis);
+  const SimulatedController& controller = *state.machine.controller;
+  SimulatedTravel travel;
+  travel.position = table.text("position");
+  check_column(state, table, "position", travel.position);
+  travel.interpolation_um_per_s_max =
+      table.number("interpolation_um_per_s_max", Range::between(0.0, 1e6), 0.0);
+  if (controller.bus.kind == SimulatedBusKind::can) {
+    travel.frames = read_travel_frames(state, axis, offset_um_max, bus);
+    travel.frame_age_s_max =
+        table.number("frame_age_s_max", Range::above(0.0, 3600.0), travel.frame_age_s_max);
+    return travel;
+  }
+  sections::WrittenRegisters written;
+  travel.registers = sections::read_modbus_travel(axis, offset_um_max, written);
+  const auto take_all = [&](const std::vector<ModbusValue>& values) {
+    for (const ModbusValue& value : values) take(state, bus, controller.unit, value, table);
+  };
+  take_all({travel.registers.begin, travel.registers.end});
+  take_all(travel.registers.values);
+  take_all(travel.registers.applied);
+  return travel;
+}
+
 void read_axis(Draft& state, const TomlTable& table, NameList& axes, std::size_t bus) {
   SimulatedAxis axis;
   axis.name = axes.read(table);
@@ -302,6 +347,11 @@ void read_axis(Draft& state, const TomlTable& table, NameList& axes, std::size_t
   axis.offset_um_max = table.number("offset_um_max", Range::between(0.0, 1e6), 0.0);
   if (table.has("piezo")) axis.piezo = read_piezo(table.table("piezo"));
   axis.rate_um_per_s_max = table.number("rate_um_per_s_max", Range::between(0.0, 1e6), 0.0);
+  if (sections::travel_table(table)) {
+    axis.travel = read_travel(state, table, axis.offset_um_max, bus);
+    state.machine.controller->axes.push_back(axis);
+    return;
+  }
   std::optional<ModbusValue> registers;
   std::optional<CanSignal> frame;
   read_value(state, table.table("offset"), ModbusTable::holding, bus, registers, frame);
@@ -366,7 +416,9 @@ void read_controller(Draft& state, const TomlTable& root) {
   }
   NameList axes;
   for (const TomlTable& entry : root.tables("axis")) read_axis(state, entry, axes, bus);
-  if (controller.axes.size() > axes_max) table.problem("axis", "must be at most 16");
+  std::size_t offsets = 0;
+  for (const SimulatedAxis& axis : controller.axes) offsets += axis.offsets();
+  if (offsets > axes_max) table.problem("axis", "must be at most 16, nodes of travels counted");
 }
 
 void read_target(const Draft& state, const TomlTable& table, EventConfig& event) {

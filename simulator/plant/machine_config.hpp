@@ -78,6 +78,20 @@ struct SimulatedPiezoConfig {
   std::vector<double> curve_um;  ///< displacement then
 };
 
+/// The controller interpolates along the travel: by the position that it has itself, as often as
+/// it looks at it.
+struct SimulatedTravel {
+  ModbusTravel registers;
+  std::string position;                    ///< column of the plant
+  double interpolation_um_per_s_max{0.0};  ///< real time; 0: at once
+  std::optional<CanTravel> frames{};       ///< on CAN instead of `registers`
+  double frame_age_s_max{1.0};             ///< CAN: an older frame is part of no set
+
+  [[nodiscard]] const TravelShape& shape() const noexcept {
+    return frames ? static_cast<const TravelShape&>(*frames) : registers;
+  }
+};
+
 struct SimulatedAxis {
   std::string name;
   std::string output;             ///< displacement that this axis' offset acts on
@@ -89,6 +103,12 @@ struct SimulatedAxis {
   CanSignal can_offset;
   std::optional<CanSignal> can_applied;
   std::optional<SimulatedPiezoConfig> piezo{};
+  std::optional<SimulatedTravel> travel{};  ///< in place of `offset` and `applied`
+
+  /// How many offsets it takes.
+  [[nodiscard]] std::size_t offsets() const noexcept {
+    return travel ? travel->shape().nodes_mm.size() : 1;
+  }
 };
 
 struct SimulatedController {

@@ -6,6 +6,8 @@
 #include <stdexcept>
 
 #include "drivers/can/can_socket.hpp"
+#include "drivers/controllers/travel_frames.hpp"
+#include "drivers/controllers/travel_values.hpp"
 #include "estimator/checks.hpp"
 #include "simulator/devices/can_node.hpp"
 #include "simulator/devices/modbus_rtu_line.hpp"
@@ -74,14 +76,25 @@ struct Controller {
   CanFrames frames;
   CncOrder order;
   SimulatedCnc cnc;
-  std::vector<std::optional<std::size_t>> columns;  ///< of the signals; none: its fixed value
+  std::vector<std::optional<std::size_t>> columns;    ///< of the signals; none: its fixed value
+  std::vector<std::optional<std::size_t>> positions;  ///< columns of the axes with a travel
+  std::vector<std::optional<CanSetReader>> sets;      ///< on CAN, of the axes with a travel
   std::vector<double> start;  ///< of the signals that are probes: their output at the first look
   nanoseconds next_frame{};
 
   explicit Controller(const SimulatedController& from) : config(from), cnc(from) {
-    order.offset_um.assign(from.axes.size(), not_a_number);
+    std::size_t offsets = 0;
+    for (const SimulatedAxis& axis : from.axes) offsets += axis.offsets();
+    order.offset_um.assign(offsets, not_a_number);
+    order.set_numbers.assign(from.axes.size(), 0);
   }
 };
+
+std::vector<CanSignal> signals_of(const CanSet& set) {
+  std::vector<CanSignal> signals = set.values;
+  signals.insert(signals.end(), set.numbers.begin(), set.numbers.end());
+  return signals;
+}
 
 }  // namespace
 
@@ -135,6 +148,18 @@ struct SimulatedMachine::Parts {
       can ? made.frames.define(signal.can) : made.unit.define(signal.place, false);
     }
     for (const SimulatedAxis& axis : made.config.axes) {
+      auto& position = made.positions.emplace_back();
+      auto& set = made.sets.emplace_back();
+      if (axis.travel) {
+        position = index_in(columns, axis.travel->position, "the controller", source);
+        if (const auto& travel = axis.travel->frames) {
+          set.emplace(travel->sent);
+          for (const CanSignal& signal : signals_of(travel->applied)) made.frames.define(signal);
+        } else {
+          define_set(made.unit, axis.travel->registers);
+        }
+        continue;
+      }
       if (!can) made.unit.define(axis.offset, true);
       if (axis.applied) made.unit.define(*axis.applied, false);
       if (axis.can_applied) made.frames.define(*axis.can_applied);
@@ -143,15 +168,25 @@ struct SimulatedMachine::Parts {
     if (made.config.heartbeat) made.unit.define(*made.config.heartbeat, true);
   }
 
+  static void define_set(ModbusUnit& unit, const ModbusTravel& travel) {
+    unit.define(travel.begin, true);
+    for (const ModbusValue& value : travel.values) unit.define(value, true);
+    unit.define(travel.end, true);
+    for (const ModbusValue& value : travel.applied) unit.define(value, false);
+  }
+
   [[nodiscard]] std::vector<CanId> wanted_by_controller() const {
     std::vector<CanId> wanted;
+    const auto want = [&wanted](const CanSignal& signal) {
+      wanted.push_back({signal.id, signal.extended_id});
+    };
     for (const SimulatedAxis& axis : controller->config.axes) {
-      wanted.push_back({axis.can_offset.id, axis.can_offset.extended_id});
+      if (!axis.travel) want(axis.can_offset);
+      if (axis.travel && axis.travel->frames)
+        for (const CanSignal& number : axis.travel->frames->sent.numbers) want(number);
     }
-    for (const auto& signal :
-         {controller->config.can_valid_bits, controller->config.can_heartbeat}) {
-      if (signal) wanted.push_back({signal->id, signal->extended_id});
-    }
+    for (const auto& signal : {controller->config.can_valid_bits, controller->config.can_heartbeat})
+      if (signal) want(*signal);
     return wanted;
   }
 
@@ -246,7 +281,11 @@ struct SimulatedMachine::Parts {
   void take_written() {
     const SimulatedController& from = controller->config;
     for (std::size_t i = 0; i < from.axes.size(); ++i) {
-      controller->order.offset_um[i] = controller->unit.value(from.axes[i].offset);
+      if (from.axes[i].travel)
+        take_set(i, from.axes[i].travel->registers);
+      else
+        controller->order.offset_um[controller->cnc.first(i)] =
+            controller->unit.value(from.axes[i].offset);
     }
     if (from.valid_bits) {
       controller->order.valid_bits = static_cast<std::uint64_t>(
@@ -258,19 +297,36 @@ struct SimulatedMachine::Parts {
     step_controller(now_s);
   }
 
+  /// As a whole or not at all: `end` and `begin` hold the number of one and the same set.
+  void take_set(std::size_t axis, const ModbusTravel& travel) {
+    if (controller->unit.value(travel.end) != controller->unit.value(travel.begin)) return;
+    std::vector<double> values;
+    for (const ModbusValue& value : travel.values) values.push_back(controller->unit.value(value));
+    offsets_shown(travel, values,
+                  std::span(controller->order.offset_um)
+                      .subspan(controller->cnc.first(axis), travel.nodes_mm.size()));
+  }
+
   void take_frames(double now_s) {
     const auto frames = buses.back().can->receive();
     if (frames.empty() || effects.controller_unit.silent || effects.controller_unit.down) return;
+    std::map<CanId, const CanFrame*> newest;
+    for (const CanFrame& frame : frames) {
+      newest[frame.id] = &frame;
+      take_sets(frame);
+    }
     const auto value_of = [&](const CanSignal& signal, double otherwise) {
-      const auto found = frames.find({signal.id, signal.extended_id});
-      if (found == frames.end()) return otherwise;
-      const CanValue decoded = decode(found->second.payload(), signal);
+      const auto found = newest.find({signal.id, signal.extended_id});
+      if (found == newest.end()) return otherwise;
+      const CanValue decoded = decode(found->second->payload(), signal);
       return decoded.fault == Fault::none ? decoded.value : otherwise;
     };
     const SimulatedController& from = controller->config;
     CncOrder& order = controller->order;
     for (std::size_t i = 0; i < from.axes.size(); ++i) {
-      order.offset_um[i] = value_of(from.axes[i].can_offset, order.offset_um[i]);
+      if (from.axes[i].travel) continue;
+      double& offset_um = order.offset_um[controller->cnc.first(i)];
+      offset_um = value_of(from.axes[i].can_offset, offset_um);
     }
     if (from.can_valid_bits) {
       order.valid_bits = static_cast<std::uint64_t>(
@@ -280,23 +336,64 @@ struct SimulatedMachine::Parts {
     controller->cnc.take(now_s, order);
   }
 
+  /// As a whole or not at all: every frame of the axis carries the number of one and the same set.
+  void take_sets(const CanFrame& frame) {
+    for (std::size_t axis = 0; axis < controller->sets.size(); ++axis) {
+      auto& set = controller->sets[axis];
+      if (!set) continue;
+      const SimulatedTravel& travel = *controller->config.axes[axis].travel;
+      set->forget_before(frame.received_at - from_seconds(travel.frame_age_s_max));
+      if (set->take(frame) != CanSetReader::Taken::whole) continue;
+      offsets_shown(travel.shape(), set->values(),
+                    std::span(controller->order.offset_um)
+                        .subspan(controller->cnc.first(axis), travel.shape().nodes_mm.size()));
+      controller->order.set_numbers[axis] = set->number();
+    }
+  }
+
   void step_controller(double now_s) {
     const bool homed = controller->cnc.step(now_s, effects.controller);
     if (homed) forget_offsets();
     for (std::size_t i = 0; i < controller->config.axes.size(); ++i) {
       const SimulatedAxis& axis = controller->config.axes[i];
       const double applied = controller->cnc.shown(i);
+      if (axis.travel) show_set(i, *axis.travel);
       if (axis.applied) controller->unit.set_value(*axis.applied, 0.0, applied);
       if (axis.can_applied) controller->frames.set_value(*axis.can_applied, applied);
     }
+  }
+
+  void show_set(std::size_t axis, const SimulatedTravel& travel) {
+    const std::size_t count =
+        travel.frames ? travel.frames->applied.values.size() : travel.registers.applied.size();
+    if (count == 0) return;
+    const std::vector<double> values =
+        travel_values(travel.shape(), count, controller->cnc.nodes(axis));
+    for (std::size_t i = 0; i < count; ++i) {
+      if (travel.frames)
+        controller->frames.set_value(travel.frames->applied.values[i], values[i]);
+      else
+        controller->unit.set_value(travel.registers.applied[i], 0.0, values[i]);
+    }
+    if (!travel.frames) return;
+    const auto number = static_cast<std::int64_t>(controller->cnc.set_number(axis));
+    for (const CanSignal& place : travel.frames->applied.numbers)
+      controller->frames.set_code(place, number);
   }
 
   /// What the registers said before no longer counts.
   void forget_offsets() {
     controller->cnc.forget();
     std::fill(controller->order.offset_um.begin(), controller->order.offset_um.end(), not_a_number);
+    for (auto& set : controller->sets)
+      if (set) set->forget();
     if (controller->config.bus.kind == SimulatedBusKind::can) return;
     for (const SimulatedAxis& axis : controller->config.axes) {
+      if (axis.travel) {
+        for (const ModbusValue& value : axis.travel->registers.values)
+          controller->unit.set_value(value, 0.0, 0.0);
+        continue;
+      }
       controller->unit.set_value(axis.offset, 0.0, 0.0);
     }
     if (controller->config.valid_bits) {
@@ -335,6 +432,9 @@ struct SimulatedMachine::Parts {
       }
     }
     if (can) take_frames(seconds_of(now));
+    for (std::size_t i = 0; i < from.axes.size(); ++i)
+      if (controller->positions[i])
+        controller->cnc.stand_at(i, seconds_of(now), row[*controller->positions[i]]);
     step_controller(seconds_of(now));
     const UnitEffect& effect = effects.controller_unit;
     if (can && now >= controller->next_frame && !effect.silent && !effect.down) {

@@ -196,7 +196,7 @@ def run_try(name, link, seed, first, end, given):
     """Every attack is tried once; after that, while there is time."""
     if not first and time.monotonic() > end:
         return None
-    with one_bus if link == "can" else contextlib.nullcontext():
+    with one_bus if link.startswith("can") else contextlib.nullcontext():
         began = time.monotonic()
         result, said = start_try(name, link, seed, given)
     result["seed"] = seed

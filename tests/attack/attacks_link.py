@@ -5,6 +5,7 @@ import struct
 import time
 
 from modbus_server import Hold, as_it_is
+from process import eventually
 from registry import attack
 
 BEFORE_UM, WANTED_UM = -3.0, -24.0
@@ -165,7 +166,7 @@ def connection_is_lost_again_and_again(rig):
     rig.follows_again()
 
 
-@attack(links=("tcp", "rtu", "can", "bridge"))
+@attack(links=("tcp", "rtu", "can", "can_travel", "bridge"))
 def goes_silent_and_comes_back(rig):
     """The cable is out for moments and for longer than anybody's patience."""
     if not rig.start(BEFORE_UM):
@@ -203,6 +204,88 @@ def strange_frames(rig):
         bus.close()
     time.sleep(1.2)
     rig.follows_again()
+
+
+def losses(rig):
+    """Some frames do not come, some twice, some only after the next one."""
+    held_back = []
+
+    def spoil(frames):
+        come, chosen = held_back + frames, rig.random.random()
+        held_back.clear()
+        if chosen < 0.3:
+            return []
+        if chosen < 0.4:
+            return come * 2
+        if chosen < 0.5:
+            held_back.extend(frames)
+            return come[:-len(frames)]
+        return come
+    return spoil
+
+
+def loses_frames_of_sets(rig, controller):
+    controller.spoil, controller.spoil_shown = losses(rig), losses(rig)
+
+
+def without(identifier):
+    return lambda frames: [each for each in frames if each[0] != identifier]
+
+
+def loses_nothing(controller):
+    controller.spoil = controller.spoil_shown = lambda frames: frames
+
+
+@attack(links=("can_travel",), limit_s=90.0)
+def frames_of_sets_are_lost(rig):
+    """What interpolates along the travel gets and shows only some of the frames, then those of one
+    node alone for longer than the numbers take to come round."""
+    if not rig.start(BEFORE_UM):
+        return
+    controller = rig.machine.controller
+    rig.machine.wants_um(WANTED_UM)
+    loses_frames_of_sets(rig, controller)
+    time.sleep(LOOKED_AT_S)
+    loses_nothing(controller)
+    rig.follows_again()
+    time.sleep(1.0)
+    controller.spoil = without(0x201)
+    rig.machine.wants_um(rig.axis.position_um - 1.0)  # less than would be a mismatch
+    time.sleep(256 * 0.02 + 0.5)
+    loses_nothing(controller)
+    rig.follows_again()
+    rig.must(controller.mixtures == 0, "values of two sets were taken over")
+
+
+@attack(links=("can_travel",), limit_s=150.0)
+def killed_between_frames_of_a_set(rig):
+    """kill -9 while one node's frames no longer come, beside a controller that forgets no frame; of
+    the next daemon the other node's do not come at first. What it sends must not complete what was
+    broken off."""
+    if not rig.start(BEFORE_UM):
+        return
+    controller = rig.machine.controller
+    controller.forgets = False
+    for way in (1, -1, 1, -1, 1, -1):
+        rig.tries += 1
+        near, far = rig.random.sample((0x201, 0x202), 2)
+        rig.machine.wants_um(way * WANTED_UM)
+        time.sleep(rig.random.uniform(0.3, 0.6))
+        controller.spoil = without(near)
+        time.sleep(rig.random.uniform(0.0, 0.1))
+        rig.daemon.kill()
+        time.sleep(0.1)  # until what it sent has come
+        controller.spoil = without(far)
+        rig.machine.wants_um(-way * WANTED_UM)
+        seen = controller.nodes[near][1]
+        if not rig.restart():
+            return
+        rig.must(eventually(lambda: controller.nodes[near][1] != seen), "sends nothing again")
+        time.sleep(0.4)
+        loses_nothing(controller)
+        rig.must(rig.daemon.wait_for("compensating"), "does not compensate again")
+    rig.follows_again()
+    rig.must(controller.mixtures == 0, "values of two sets were taken over")
 
 
 # ---- bridges

@@ -13,6 +13,7 @@ BUSES = ("tcp", "rtu", "can", "bridge")
 BEFORE_UM, WANTED_UM = -3.0, -24.0
 SEEN_WITHIN_S = 6.0
 LOOKED_AT_S = 3.0
+EXPLAINED_UM = 1.0  # WriteGate::unexplained_um: nearer to what was sent lately no other writer is seen
 
 
 def seen_within_s(rig):
@@ -228,6 +229,27 @@ def lies_when_it_is_released(rig):
     rig.follows_again()
 
 
+@attack(links=BUSES)
+def adds_from_now_on_and_is_released(rig):
+    """Something is added from some moment on, and whoever releases the axis does not mend it: that
+    it stands elsewhere may be believed once, as after another writer, but it must not walk away."""
+    if not rig.start(BEFORE_UM):
+        return
+    stood_um, added_um = rig.axis.position_um, rig.random.choice((6.0, -6.0))
+    rig.axis.lie = lies.constant(added_um)
+    rig.must(eventually(lambda: latched(rig.daemon), 8.0), "a mismatch is not latched")
+    for _ in range(5):
+        rig.tries += 1
+        time.sleep(1.2 * abs(added_um) / rig.axis.rate_um_per_s)  # it could have gone there
+        rig.release()
+        time.sleep(0.5)
+    # It is also on its way to its target until it is latched again.
+    rig.must(abs(rig.axis.position_um - stood_um) < 1.5 * abs(added_um),
+             f"walks from {stood_um:.1f} to {rig.axis.position_um:.1f} um, release by release")
+    rig.axis.lie = None
+    rig.follows_again()
+
+
 @attack(links=("tcp", "rtu", "can"))
 def another_writer_now_and_then(rig):
     """A program of the controller's own sets the offset to something else at times."""
@@ -244,11 +266,15 @@ def another_writer_now_and_then(rig):
         with rig.axis.lock:
             if rig.random.random() < 0.5:
                 rig.axis.position_um = other
-    rig.axis.stands_at(rig.axis.position_um)
+    with rig.axis.lock:
+        # Put back to what was sent a few periods ago it stands where the daemon may have taken it,
+        # and the daemon goes on from what it sent last; from anywhere else it must begin there.
+        if abs(rig.axis.position_um - rig.axis.writes[-1].value_um) > EXPLAINED_UM:
+            rig.axis.stands_at(rig.axis.position_um)
     rig.follows_again()
 
 
-@attack(links=("tcp", "rtu", "can"))
+@attack(links=("tcp", "rtu", "can", "can_travel"))
 def re_homes(rig):
     """The controller forgets the offset between two readings, link and registers alive."""
     if not rig.start(-6.0):
@@ -271,7 +297,7 @@ def home_when_read(axis):
     eventually(lambda: axis.told, 5.0)
 
 
-@attack(links=("tcp", "rtu", "can"))
+@attack(links=("tcp", "rtu", "can", "can_travel"))
 def controller_restarts(rig):
     """Switched off and on: registers 0, a new link."""
     if not rig.start(-6.0):

@@ -85,8 +85,8 @@ def damaged_state_after_disable(rig):
         status = rig.daemon.status()
         rig.must(status["enabled"] is False and status["mode"] != "compensating",
                  f"{damage}: enabled again")
-        taken = [now for now, was in zip(rig.daemon.references(), cold)
-                 if now is not None and abs(now - was) > 0.01]
+        taken = [warm for warm, was in zip(rig.daemon.references(), cold)
+                 if warm is not None and abs(warm - was) > 0.01]
         rig.must(not taken, f"{damage}: a new reference is taken from the warm machine")
         rig.machine.thermocouples.show(20.0)
         time.sleep(0.3)

@@ -106,7 +106,10 @@ class CanController:
             if not self.silent and time.monotonic() - shown_at >= PERIOD_S:
                 shown_at = time.monotonic()
                 with contextlib.suppress(OSError):
-                    self.bus.send(frame(APPLIED, self.applied()))
+                    self.show()
+
+    def show(self):
+        self.bus.send(frame(APPLIED, self.applied()))
 
     def take(self, received, at_s):
         identifier, length = struct.unpack("=IB", received[:5])
@@ -127,3 +130,62 @@ class CanController:
         self.ending.set()
         self.thread.join(5)
         self.bus.close()
+
+
+NODES = (0x201, 0x202)  # of a travel; each with the number of its set
+NODES_APPLIED = (0x301, 0x303)
+POSITION = 0x302
+
+
+class CanTravelController(CanController):
+    """Interpolates between two nodes, whose offsets are the same here: where they differ, the set is
+    a mixture. `spoil` may lose, repeat and hold back the frames of the nodes, `spoil_shown` those
+    that show what is applied."""
+
+    FORGOTTEN_AFTER_S = 1.0
+
+    def __init__(self, *arguments):
+        self.nodes = {}  # identifier: (counts, number, at_s) of its newest frame
+        self.in_effect = 0
+        self.mixtures = 0
+        self.valid = False
+        self.forgets = True
+        self.spoil = self.spoil_shown = lambda frames: frames
+        super().__init__(*arguments)
+
+    def restart(self):
+        self.nodes.clear()
+        self.in_effect = 0
+        super().restart()
+
+    def take(self, received, at_s):
+        identifier, length = struct.unpack("=IB", received[:5])
+        if self.silent or identifier not in (OFFSET, *NODES) or length < 5:
+            return
+        if identifier == OFFSET:
+            self.valid = received[12] & 1 != 0
+            self.take_over()
+            return
+        for identifier, counts, number, at_s in self.spoil(
+                [(identifier, *struct.unpack("<iB", received[8:13]), at_s)]):
+            self.nodes[identifier] = (counts, number, at_s)
+            self.take_over()
+
+    def take_over(self):
+        """At each frame, as soon as a set seems to be whole."""
+        if not self.valid or len(self.nodes) < len(NODES):
+            return
+        near, far = (self.nodes[identifier] for identifier in NODES)
+        if near[1] != far[1] or near[1] == self.in_effect:
+            return
+        if self.forgets and time.monotonic() - min(near[2], far[2]) > self.FORGOTTEN_AFTER_S:
+            return
+        self.mixtures += near[0] != far[0]
+        self.in_effect = near[1]
+        self.axis.written(0.001 * near[0], at_s=max(near[2], far[2]))
+
+    def show(self):
+        data = self.applied() + bytes([self.in_effect])
+        for identifier in self.spoil_shown(list(NODES_APPLIED)):
+            self.bus.send(frame(identifier, data))
+        self.bus.send(frame(POSITION, struct.pack("<H", 100)))

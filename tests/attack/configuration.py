@@ -82,7 +82,7 @@ rate_um_per_s_max = {rate}
 offset = {{ table = "holding", address = 0, encoding = "int32", scale = 0.001 }}
 applied = {{ table = "input", address = 10, encoding = "{shown_as}", scale = {shown_scale} }}
 """
-CAN_CONTROLLER = """[controller]
+CAN_LINK = """[controller]
 name = "cnc"
 kind = "can"
 interface = "vcan1"
@@ -91,13 +91,52 @@ silent_after_s = 0.5
 reconnect_s = 0.1
 valid_bits = {{ id = 0x200, start_bit = 32, length_bits = 8 }}
 heartbeat = {{ id = 0x200, start_bit = 40, length_bits = 8 }}
-[[axis]]
+"""
+CAN_CONTROLLER = CAN_LINK + """[[axis]]
 name = "z"
 output = "z_um"
 offset_um_max = {bound}
 rate_um_per_s_max = {rate}
 offset = {{ id = 0x200, start_bit = 0, length_bits = 32, scale = 0.001 }}
 applied = {{ id = 0x300, start_bit = 0, length_bits = 32, {can_float}scale = {shown_scale} }}
+"""
+# Along the travel nothing changes: both nodes have the same offset.
+TRAVEL_MODEL = MODEL + """[guideway.bed]
+axis = "y_mm"
+positions_mm = [0.0, 500.0]
+rows_um_per_K.z_um = [[0.0, 0.0], [0.0, 0.0]]
+"""
+CAN_TRAVEL_CONTROLLER = CAN_LINK + """[[controller.signal]]
+name = "y_mm"
+id = 0x302
+start_bit = 0
+length_bits = 16
+signed = false
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = {bound}
+rate_um_per_s_max = {rate}
+[axis.table]
+position = "y_mm"
+nodes_mm = [0.0, 500.0]
+offsets = [
+  {{ id = 0x201, start_bit = 0, length_bits = 32, scale = 0.001 }},
+  {{ id = 0x202, start_bit = 0, length_bits = 32, scale = 0.001 }},
+]
+set_numbers = [
+  {{ id = 0x201, start_bit = 32, length_bits = 8 }},
+  {{ id = 0x202, start_bit = 32, length_bits = 8 }},
+]
+[axis.table.applied]
+offsets = [
+  {{ id = 0x301, start_bit = 0, length_bits = 32, {can_float}scale = {shown_scale} }},
+  {{ id = 0x303, start_bit = 0, length_bits = 32, {can_float}scale = {shown_scale} }},
+]
+set_numbers = [
+  {{ id = 0x301, start_bit = 32, length_bits = 8 }},
+  {{ id = 0x303, start_bit = 32, length_bits = 8 }},
+]
 """
 BRIDGE = """[controller]
 name = "mill"

@@ -16,7 +16,7 @@ RESOLUTION_UM = 0.001
 LINK_PERIOD_S = 0.02
 REFERENCE_degC = 20.0
 VALID, HEARTBEAT, APPLIED = 2, 3, 10  # registers; the offset is in 0 and 1
-LINKS = ("tcp", "rtu", "can", "bridge", "piezo")
+LINKS = ("tcp", "rtu", "can", "can_travel", "bridge", "piezo")
 CURVE = ((0.0, -22.0), (25.0, -16.5), (50.0, -9.4), (75.0, -1.3), (100.0, 7.2), (125.0, 15.4),
          (150.0, 22.8))
 PIEZO_BOUND_UM = 20.0
@@ -133,7 +133,8 @@ class Machine:
         self.thermocouples = Thermocouples(self.choices.get("encoding", "int32"))
         self.slaves = []
         getattr(self, "make_" + link)()
-        (self.folder / "model.toml").write_text(text.MODEL)
+        model = text.TRAVEL_MODEL if link == "can_travel" else text.MODEL
+        (self.folder / "model.toml").write_text(model)
 
     def make_tcp(self):
         self.controller = ModbusController(self.axis, self.shown_as, self.shown_scale)
@@ -157,19 +158,22 @@ class Machine:
         self.sensor_slave = self.tcp_slave(self.thermocouples.registers, "module")
         self.slaves.append(self.slave)
 
-    def make_can(self):
-        from can_nodes import CanController, CanThermocouples
+    def make_can(self, travel=False):
+        from can_nodes import CanController, CanThermocouples, CanTravelController
         self.thermocouples = self.sensor_slave = CanThermocouples("vcan0")
-        self.controller = self.slave = CanController(self.axis, "vcan1", self.shown_as,
-                                                     self.shown_scale)
+        made = CanTravelController if travel else CanController
+        self.controller = self.slave = made(self.axis, "vcan1", self.shown_as, self.shown_scale)
         self.slaves += [self.sensor_slave, self.slave]
+
+    def make_can_travel(self):
+        self.make_can(travel=True)
 
     def tcp_slave(self, registers, name):
         self.slaves.append(TcpSlave(registers, name))
         return self.slaves[-1]
 
     def sensor_text(self):
-        if self.link == "can":
+        if self.link.startswith("can"):
             return text.CAN_SENSORS
         kind = "modbus_rtu" if self.link == "rtu" else "modbus_tcp"
         return (f'[[bus]]\nname = "cabinet"\nkind = "{kind}"\n{self.sensor_slave.place()}' +
@@ -181,6 +185,8 @@ class Machine:
             return text.DRY_RUN.format(**choices)
         if self.link == "can":
             return text.CAN_CONTROLLER.format(**choices)
+        if self.link == "can_travel":
+            return text.CAN_TRAVEL_CONTROLLER.format(**choices)
         if self.link == "bridge":
             return text.BRIDGE.format(**choices)
         choices = choices | {"place": self.slave.place()}

@@ -303,6 +303,10 @@ void Invariants::check_correction(const CycleSeen& seen) {
     if (shape.estimator.correction.form != CorrectionForm::off) check_learning(seen, i);
     check_held_displacement(seen, i);
     if (report.mode != Mode::compensating) continue;
+    if (shape.estimator.axes[i].node) {
+      check_node(seen, i);
+      continue;
+    }
     learned_[i].contribution_um = contributions_um(shape, report, i);
     const CorrectionReport& now = report.axes[i].correction;
     double expected_um = 0.0;
@@ -320,6 +324,24 @@ void Invariants::check_correction(const CycleSeen& seen) {
   note_learned(report);
   probings_ = {};
   referenced_ = false;
+}
+
+/// What a node of the travel is moved by is the model's with the slide there, wherever it stands.
+void Invariants::check_node(const CycleSeen& seen, std::size_t axis) {
+  const ThermalModel& model = seen.shape->model;
+  const std::vector<double>& row =
+      model.guideways.front().rows_um_per_K.at(seen.shape->estimator.axes[axis].output)[axis - 1];
+  double expected_um = 0.0;
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const InputReport& input = seen.report->inputs[i];
+    expected_um +=
+        (model.matrix_um_per_K[1][i] + row[i]) * (input.temp_degC - input.reference_degC);
+  }
+  const double displacement_um = seen.report->axes[axis].displacement_um;
+  demand(std::abs(displacement_um - expected_um) < 1e-6, "node_follows_its_rows", seen.now, [&] {
+    return fmt::format("axis {}: {:.6f} um at its node, its rows say {:.6f}", axis, displacement_um,
+                       expected_um);
+  });
 }
 
 void Invariants::check_learning(const CycleSeen& seen, std::size_t axis) {

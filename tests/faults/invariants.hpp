@@ -79,6 +79,7 @@ class Invariants {
   void check_command(const CycleSeen& seen);
   void check_hold(const CycleSeen& seen);
   void check_correction(const CycleSeen& seen);
+  void check_node(const CycleSeen& seen, std::size_t axis);
   void check_learning(const CycleSeen& seen, std::size_t axis);
   void check_cycle_hold(const CycleSeen& seen);
   void check_held_displacement(const CycleSeen& seen, std::size_t axis);

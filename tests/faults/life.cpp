@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <memory>
 
+#include "estimator/axis_spans.hpp"
 #include "estimator/checks.hpp"
 #include "estimator/pipeline/persistent_state.hpp"
 #include "history_disk.hpp"
@@ -178,7 +179,10 @@ class Life {
       if (!releases_.one_in(static_cast<std::uint64_t>((well ? 5.0 : 60.0) * options_.cycle_hz)))
         continue;
       const Command command{CommandKind::release, static_cast<std::uint32_t>(axis), 0.0};
-      if (daemon_->cycle().send(command)) judge_.released(axis);
+      if (!daemon_->cycle().send(command)) continue;
+      // Nodes of a travel are released together.
+      const AxisSpan released = span_of(shape_.estimator.axes, axis);
+      for (std::size_t i = released.first; i < released.end(); ++i) judge_.released(i);
     }
   }
 

@@ -239,7 +239,7 @@ void SimulatedController::advance(nanoseconds time) {
 void SimulatedController::read(std::size_t address, std::span<std::uint16_t> words,
                                nanoseconds time) {
   advance(time);
-  std::array<std::uint16_t, 8> image{};
+  std::array<std::uint16_t, 9> image{};
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     if (const FaultEvent* other = lie(FaultKind::second_writer, axis, time))
       disturb(axis, 60.0 * (other->strength - 0.5) + 0.02 * seconds_of(time - other->begin));
@@ -255,14 +255,27 @@ void SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
   }
   image[6] = says_cutting(time) ? 1 : 0;
   image[7] = switched_off(time) ? 1 : 0;
-  for (std::size_t i = 0; i < words.size(); ++i)
-    words[i] =
-        address + i >= 100 && address + i < 108 ? image[address + i - 100] : std::uint16_t{0};
+  image[8] = static_cast<std::uint16_t>((time / std::chrono::milliseconds(10)) % 500);  // mm
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::size_t at = address + i;
+    words[i] = 0;
+    if (at >= 100 && at < 100 + image.size()) words[i] = image[at - 100];
+    if (at >= 200 && at < 200 + written_.size()) words[i] = written_[at - 200];
+  }
   for (std::size_t axis = 0; axis < axes_count; ++axis)
     if (!seen_[axis]) seen_at_[axis] = time;
   seen_.fill(true);
   ++reads_since_break_;
   looked_at_ = time;
+}
+
+/// By its valid bit; the nodes of a travel by that of their axis, and only as a whole set.
+bool SimulatedController::is_ordered(std::size_t axis) const noexcept {
+  const bool is_node = interpolates(seed_) && axis > 0;
+  const std::size_t begin = words_an_offset();
+  const std::size_t end = valid_at() - 1;
+  return ((unsigned{written_[valid_at()]} >> (is_node ? 1 : axis)) & 1u) != 0 &&
+         (!is_node || written_[begin] == written_[end]);
 }
 
 bool SimulatedController::write(std::size_t address, std::span<const std::uint16_t> words,
@@ -272,11 +285,10 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
   if (address < 200 || address + words.size() > 216) return false;
   std::copy(words.begin(), words.end(),
             written_.begin() + static_cast<std::ptrdiff_t>(address - 200));
-  const std::size_t valid_at = words_an_offset() * axes_count;
-  if (address + words.size() <= 200 + valid_at) return true;  // the mark of validity comes later
+  if (address + words.size() <= 200 + valid_at()) return true;  // the mark of validity comes later
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
-    if (((unsigned{written_[valid_at]} >> axis) & 1u) == 0) continue;
-    const std::size_t at = words_an_offset() * axis;
+    if (!is_ordered(axis)) continue;
+    const std::size_t at = offset_at(axis);
     double told_um = 0.1 * static_cast<double>(static_cast<std::int16_t>(written_[at]));
     if (floats_)
       told_um = static_cast<double>(

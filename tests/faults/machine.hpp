@@ -33,6 +33,13 @@ inline constexpr std::size_t axes_count = 3;
   return seed % 3 == 1;
 }
 
+/// Whether the controller of this life interpolates by itself: the second and third axis are then
+/// two nodes of one travel, and their offsets a set of registers. Not where the model corrects
+/// itself.
+[[nodiscard]] constexpr bool interpolates(std::uint64_t seed) noexcept {
+  return seed % 8 == 2;
+}
+
 /// The configuration of a life, drawn from its seed.
 struct MachineShape {
   MachineShape(std::uint64_t seed, double cycle_hz);
@@ -157,6 +164,14 @@ class SimulatedController {
   [[nodiscard]] const FaultEvent* lie(FaultKind kind, std::size_t axis, nanoseconds time) const;
   [[nodiscard]] double shown_um(std::size_t axis, nanoseconds time);
   [[nodiscard]] std::size_t words_an_offset() const noexcept { return floats_ ? 2 : 1; }
+  /// Of the registers written, from 200: where an axis' offset stands, and the valid bits.
+  [[nodiscard]] std::size_t offset_at(std::size_t axis) const noexcept {
+    return words_an_offset() * axis + (interpolates(seed_) && axis > 0 ? 1 : 0);
+  }
+  [[nodiscard]] std::size_t valid_at() const noexcept {
+    return words_an_offset() * axes_count + (interpolates(seed_) ? 2 : 0);
+  }
+  [[nodiscard]] bool is_ordered(std::size_t axis) const noexcept;
 
   std::uint64_t seed_;
   const FaultSchedule& schedule_;

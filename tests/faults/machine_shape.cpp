@@ -1,5 +1,6 @@
 #include <string>
 
+#include "drivers/modbus/modbus_config.hpp"
 #include "machine.hpp"
 
 namespace thermocomp::faults {
@@ -114,6 +115,46 @@ void draw_suspicion(Chance& chance, EstimatorConfig& estimator, ThermalModel& mo
   estimator.compensation.offset_sd_um_max = chance.between(0.2, 20.0);
 }
 
+/// The second and third axis as two nodes of one travel: registers, position and model.
+void lay_out_travel(MachineShape& shape, Chance& chance) {
+  ModbusControllerConfig& controller = shape.controller;
+  const ModbusValue x = controller.axes[0].offset;
+  std::uint16_t next = x.address;
+  const auto take = [&next](ModbusValue value) {
+    value.address = next;
+    next = static_cast<std::uint16_t>(next + registers_of(value.encoding));
+    return value;
+  };
+  const ModbusValue number{ModbusTable::holding, 0, Encoding::uint16};
+  controller.axes[0].offset = take(x);
+  ModbusTravel travel;
+  travel.nodes_mm = {0.0, 500.0};
+  travel.begin = take(number);
+  for (std::size_t node = 1; node < axes_count; ++node) {
+    travel.values.push_back(take(x));
+    travel.applied.push_back(*controller.axes[node].applied);
+  }
+  travel.end = take(number);
+  controller.axes.resize(1);
+  controller.axes.emplace_back().travel = travel;
+  controller.valid_bits = take(number);
+  controller.heartbeat = take(number);
+  controller.signals.push_back({2, {ModbusTable::holding, 108, Encoding::uint16}});
+  shape.estimator.signals.emplace_back("y_mm");
+  const AxisConfig y = shape.estimator.axes[1];
+  for (std::size_t node = 1; node < axes_count; ++node) {
+    AxisConfig& axis = shape.estimator.axes[node];
+    axis = y;
+    axis.name = node == 1 ? "y_1" : "y_2";
+    axis.node = TravelNode{"y", "y_mm", travel.nodes_mm[node - 1], TravelForm::table};
+  }
+  const auto row = [&chance] {
+    return std::vector<double>{chance.between(-6.0, 6.0), chance.between(-6.0, 6.0),
+                               chance.between(-6.0, 6.0)};
+  };
+  shape.model.guideways = {{"y", "y_mm", {0.0, 500.0}, {{"y_um", {row(), row()}}}}};
+}
+
 std::vector<std::vector<double>> random_matrix(Chance& chance) {
   std::vector<std::vector<double>> rows(axes_count);
   for (auto& row : rows)
@@ -177,6 +218,10 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
   if (judges_sensors(seed)) {
     Chance own(seed, 11);
     draw_suspicion(own, estimator, model);
+  }
+  if (interpolates(seed)) {
+    Chance own(seed, 12);
+    lay_out_travel(*this, own);
   }
   if (!corrects_itself(seed)) return;
   Chance own(seed, 9);

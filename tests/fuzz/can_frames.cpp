@@ -1,4 +1,5 @@
-/// What a CAN socket hands out, error frames and time stamps included, and what is decoded from it.
+/// What a CAN socket hands out, error frames and time stamps included, what is decoded from it, and
+/// sets of values that it is put together to.
 ///
 /// Input: signals, then the messages as the kernel would deliver them.
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include "common/virtual_line.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
+#include "drivers/controllers/travel_frames.hpp"
 #include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 
@@ -113,6 +115,41 @@ void check_frame(const CanFrame& frame, const std::vector<CanSignal>& signals) {
   }
 }
 
+/// Two identifiers, a value in the first bytes and the number of its set in the last one.
+class TwoFrames {
+ public:
+  static constexpr std::array<std::uint32_t, 2> ids{0x100, 0x101};
+
+  void take(const CanFrame& frame) {
+    const CanSetReader::Taken taken = reader_.take(frame);
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      if (frame.id == CanId{ids[i], false} && frame.size >= 8) newest_[i] = frame;
+    if (taken != CanSetReader::Taken::whole) return;
+    FUZZ_PROMISE(newest_[0].data[7] == newest_[1].data[7]);
+    FUZZ_PROMISE(reader_.number() == newest_[0].data[7]);
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      FUZZ_PROMISE(reader_.values()[i] == newest_[i].data[0] + 256.0 * newest_[i].data[1]);
+  }
+
+ private:
+  static CanSet set() {
+    CanSet set;
+    for (const std::uint32_t id : ids) {
+      CanSignal value;
+      value.id = id;
+      value.is_signed = false;
+      CanSignal number = value;
+      number.start_bit = 56;
+      number.length_bits = 8;
+      set.values.push_back(value);
+      set.numbers.push_back(number);
+    }
+    return set;
+  }
+  CanSetReader reader_{set()};
+  std::array<CanFrame, 2> newest_{};
+};
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -120,6 +157,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::vector<CanSignal> signals = signals_from(feed);
   std::vector<CanId> wanted;
   for (const CanSignal& signal : signals) wanted.push_back({signal.id, signal.extended_id});
+  for (const std::uint32_t id : TwoFrames::ids) wanted.push_back({id, false});
+  TwoFrames two_frames;
   std::size_t delivered = 0;
   const fuzz::VirtualCan bus([&](mmsghdr& message) { return deliver(feed, delivered, message); });
   CanSocket socket("can0", wanted);
@@ -129,7 +168,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto frames = socket.receive();
     FUZZ_PROMISE(frames.size() <= CanSocket::batch_max);
     handed_out += frames.size();
-    for (const CanFrame& frame : frames) check_frame(frame, signals);
+    for (const CanFrame& frame : frames) {
+      check_frame(frame, signals);
+      two_frames.take(frame);
+    }
     FUZZ_PROMISE(socket.is_open());
     FUZZ_PROMISE(!socket.bus_off() || !socket.error().empty());
   }

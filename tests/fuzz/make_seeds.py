@@ -2,6 +2,7 @@
 """Writes the seeds and dictionaries of the fuzz targets from the examples and the sources.
 
     tests/fuzz/make_seeds.py [HISTORY.db]
+    tests/fuzz/make_seeds.py --check      writes nothing; exit status 1: a seed is missing or old
 
 HISTORY.db: of the program make_history_seed; without it the seed of history_file stays. Inputs that
 were found to break something, seeds/TARGET/found-*, are never touched.
@@ -89,11 +90,19 @@ matrix_K2 = [[4.0, 1.0], [1.0, 9.0]]
 """
 
 
+CHECK_ONLY = "--check" in sys.argv[1:]
+old_seeds = []
+
+
 def write(target, name, content):
-    folder = SEEDS / target
-    folder.mkdir(parents=True, exist_ok=True)
+    seed = SEEDS / target / name
     data = content if isinstance(content, bytes) else content.encode()
-    (folder / name).write_bytes(data)
+    if CHECK_ONLY:
+        if not seed.is_file() or seed.read_bytes() != data:
+            old_seeds.append(seed.relative_to(ROOT))
+        return
+    seed.parent.mkdir(parents=True, exist_ok=True)
+    seed.write_bytes(data)
 
 
 def bare(path):
@@ -351,6 +360,9 @@ def can_seeds():
         "<HBB", 0x101, 7, 31)
     write("can_frames", "frames", two + message(0, 0x100, b"\x10\x02" * 4) +
           message(0, 0x101, bytes(8)) + b"\x80" + message(1, 0x100, b"\1"))
+    write("can_frames", "sets", two + message(0, 0x100, bytes([16, 2, 0, 0, 0, 0, 0, 5])) +
+          message(0, 0x101, bytes([1, 0, 0, 0, 0, 0, 0, 5])) +
+          message(0, 0x101, bytes([2, 0, 0, 0, 0, 0, 0, 6])) + message(0, 0x100, bytes(7)))
     errors = b"".join(message(2, kind, bytes([0, state]))
                       for kind, state in ((0x40, 0), (0x100, 0), (4, 0x30), (4, 0x0C), (4, 0x40)))
     write("can_frames", "errors", two + errors)
@@ -545,7 +557,11 @@ def main():
     j1939_seeds()
     eds_seeds()
     dbc_seeds()
-    history_seeds(sys.argv[1] if len(sys.argv) > 1 else None)
+    history_seeds(sys.argv[1] if len(sys.argv) > 1 and not CHECK_ONLY else None)
+    if CHECK_ONLY:
+        for seed in old_seeds:
+            print(f"{seed}: missing or old; run tests/fuzz/make_seeds.py")
+        sys.exit(1 if old_seeds else 0)
     dictionaries()
 
 

@@ -16,6 +16,7 @@ from planting import files_of, write_copies, write_if_new
 SMOOTHING = "estimator/sensing/smoothing.cpp"
 LOST = "estimator/sensing/lost_blocks.cpp"
 APPLIED = "estimator/axes/applied_check.cpp"
+MISMATCH = "estimator/axes/mismatch.cpp"
 TERMS = "estimator/model/terms/"
 CYCLE = "daemon/cycle/cycle.cpp"
 HANDLE = "daemon/cycle/cycle_handle.cpp"
@@ -72,6 +73,9 @@ SUITES = {
          "std::min(0.0, lowest_um()), std::max(0.0, highest_um())",
          "{P} ? lowest_um() : std::min(0.0, lowest_um()),\n"
          "                    {P} ? highest_um() : std::max(0.0, highest_um())"),
+        ("constant_must_have_been_there_always", MISMATCH,
+         "if (found.likely != MismatchCause::changes_alone ||",
+         "if ({P} || found.likely != MismatchCause::changes_alone ||"),
         ("lag_is_no_difference", TERMS + "thermal_lag.cpp",
          "late_.step(input.now, rise_K) - rise_K;",
          "late_.step(input.now, rise_K) - ({P} ? 0.0 : rise_K);"),

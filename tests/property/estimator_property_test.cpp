@@ -18,11 +18,12 @@ std::string text_of(const Outcome& outcome) {
 }
 
 /// In how many lives of the seeds a rule notices the planted bug.
-std::size_t noticed(Planted planted) {
+std::size_t noticed(Planted planted, bool travel = false) {
   std::size_t count = 0;
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     WorldOptions options;
     options.planted = planted;
+    options.travel = travel;
     if (live(seed, options).violation) ++count;
   }
   return count;
@@ -55,6 +56,27 @@ TEST_CASE("whatever happens, offsets keep their bound and slew and are sent only
   const Outcome outcome = live(seed, {});
   INFO(text_of(outcome));
   CHECK_FALSE(outcome.violation.has_value());
+}
+
+TEST_CASE("so do the nodes of a travel, each by itself and all together", "[property][estimator]") {
+  const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
+  CAPTURE(seed);
+  WorldOptions options;
+  options.travel = true;
+  const Outcome outcome = live(seed, options);
+  INFO(text_of(outcome));
+  CHECK_FALSE(outcome.violation.has_value());
+}
+
+TEST_CASE("a state saved and loaded in the middle of a life with a travel changes no bit",
+          "[property][estimator]") {
+  const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
+  CAPTURE(seed);
+  WorldOptions through;
+  through.travel = true;
+  WorldOptions interrupted = through;
+  interrupted.reload_state_at = 250;
+  CHECK(live(seed, through).trace == live(seed, interrupted).trace);
 }
 
 TEST_CASE("the random lives reach what they are meant to test", "[property][estimator]") {
@@ -109,6 +131,13 @@ TEST_CASE("planted bugs break the rules", "[property][estimator]") {
   CHECK(noticed(Planted::epoch_ignored) > seeds / 20);
   CHECK(noticed(Planted::read_back_hidden) > seeds / 2);
   CHECK(noticed(Planted::reload_from_nothing) > seeds / 20);
+}
+
+TEST_CASE("planted bugs break the rules along a travel too", "[property][estimator]") {
+  CHECK(noticed(Planted::double_rate, true) > seeds / 2);
+  CHECK(noticed(Planted::larger_bound, true) > seeds / 20);
+  CHECK(noticed(Planted::always_valid, true) > seeds / 2);
+  CHECK(noticed(Planted::read_back_hidden, true) > seeds / 2);
 }
 
 TEST_CASE("hidden faults and a forgotten state are noticed", "[property][estimator]") {

@@ -41,6 +41,8 @@ enum class Planted {
 struct WorldOptions {
   std::size_t steps{600};
   Planted planted{Planted::nothing};
+  /// The second and third axis are the ends of a travel along "y_mm", or nodes of a table on it.
+  bool travel{false};
   /// From this step on all readings are faulty, stale or impossible - or withheld altogether.
   std::optional<std::size_t> lost_from;
   bool lost_are_withheld{false};

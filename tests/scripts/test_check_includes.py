@@ -43,8 +43,7 @@ def test_the_floors_are_drawn_highest_first_and_the_rest_of_the_document_stays(t
     text = (tree / "docs" / "ARCHITECTURE.md").read_text(encoding="utf-8")
     assert text.startswith("before\n") and text.endswith("after\n")
     rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
-    assert rows == ["| 3 | `daemon` | drivers |", "| 2 | `drivers` | estimator |",
-                    "| 1 | `estimator` | - |"]
+    assert rows == ["| 3 | `daemon` |", "| 2 | `drivers` |", "| 1 | `estimator` |"]
 
 
 def test_a_circle_of_two_files_of_one_folder_is_found_and_named(tree):

@@ -1,11 +1,12 @@
 #!/bin/bash
-# build_rootfs.sh FOLDER DEPENDENCY... [-- ASKED...]
+# build_rootfs.sh FOLDER DEPENDENCY... [-- ASKED... [-- ALSO...]]
 #
 # Makes FOLDER/rootfs, a small Debian 12 with systemd as its init, by mmdebstrap, unless it is there
 # and as this script and the dependencies want it. DEPENDENCY: the packages that the ones under test
 # depend on. What they add to a minimal Debian with systemd is noted in FOLDER/dependencies: lines
 # "PACKAGE KIB". ASKED: packages that are not installed; FOLDER/asked has apt's lines about how much
-# they and what they need would add to those. Needs root and a Debian mirror.
+# they and what they need would add to those. ALSO: packages that are installed and counted nowhere. Needs
+# root and a Debian mirror.
 set -euo pipefail
 mkdir -p "${1:?a folder}"
 folder=$(cd -- "$1" && pwd)
@@ -21,13 +22,19 @@ while (($#)) && [[ $1 != -- ]]; do
   dependencies+=("$1")
   shift
 done
-asked=("${@:2}")
+asked=() also=()
+if (($#)); then shift; fi
+while (($#)) && [[ $1 != -- ]]; do
+  asked+=("$1")
+  shift
+done
+also=("${@:2}")
 rm -rf "$folder/rootfs" "$folder/rootfs.stamp" "$folder/asked"
 began=$SECONDS
 
 # What boots; then what is under test needs; then what the tests themselves need.
 base=systemd,systemd-sysv,dbus
-tools=(kmod iproute2 procps python3 python3-pytest)
+tools=(kmod iproute2 procps python3 python3-pytest "${also[@]}")
 list_packages() { printf "chroot \"\$1\" dpkg-query -W -f '\${Package} \${Installed-Size}\\\\n' | sort > %q" "$1"; }
 apt_install="chroot \"\$1\" env DEBIAN_FRONTEND=noninteractive apt-get -q -y --no-install-recommends install"
 # --assume-no: says what it would do, and ends with status 1.

@@ -13,7 +13,7 @@ CONFIG, STATE = pathlib.Path("etc/thermocomp"), pathlib.Path("var/lib/thermocomp
 @pytest.fixture
 def root(tmp_path):
     for name in (CONFIG / "thermocompd.toml", CONFIG / "model.toml", CONFIG / ".hidden",
-                 CONFIG / "gateway.toml", CONFIG / "devices/ours.toml", STATE / "history.db"):
+                 CONFIG / "gateway.toml", CONFIG / "gateway.passwords", CONFIG / "gateway.key", CONFIG / "devices/ours.toml", STATE / "history.db"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("something\n")
     return tmp_path
@@ -28,12 +28,13 @@ def after(package, action, root):
 
 def test_a_removal_keeps_everything(root):
     before = after("thermocomp", "remove", root)
-    assert len(before) == 6
+    assert len(before) == 8
     assert after("thermocomp-gateway", "remove", root) == before
 
 
-def test_a_purge_of_the_daemon_leaves_the_configuration_of_the_gateway(root):
-    assert after("thermocomp", "purge", root) == ["etc/thermocomp/gateway.toml"]
+def test_a_purge_of_the_daemon_leaves_what_is_the_gateways(root):
+    assert after("thermocomp", "purge", root) == [
+        f"etc/thermocomp/gateway.{end}" for end in ("key", "passwords", "toml")]
     assert after("thermocomp-gateway", "purge", root) == []
     assert not (root / CONFIG).exists()
 

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <unistd.h>
@@ -70,6 +71,33 @@ class RawSender {
     frame.can_id = id;
     for (const int byte : bytes) frame.data[frame.len++] = static_cast<std::uint8_t>(byte);
     return ::write(socket_, &frame, sizeof frame) == static_cast<ssize_t>(sizeof frame);
+  }
+
+ private:
+  int socket_;
+};
+
+/// What passes on an interface, classic frames alone.
+class RawReceiver {
+ public:
+  explicit RawReceiver(const std::string& interface)
+      : socket_(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW)) {
+    sockaddr_can address{};
+    address.can_family = AF_CAN;
+    address.can_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
+    if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) < 0) {
+      throw std::runtime_error("no " + interface);
+    }
+  }
+  RawReceiver(const RawReceiver&) = delete;
+  RawReceiver& operator=(const RawReceiver&) = delete;
+  ~RawReceiver() { ::close(socket_); }
+
+  /// Without waiting.
+  std::optional<can_frame> receive() {
+    can_frame frame{};
+    if (::read(socket_, &frame, sizeof frame) != static_cast<ssize_t>(sizeof frame)) return {};
+    return frame;
   }
 
  private:

@@ -276,3 +276,233 @@ TEST_CASE("the end of the CAN link sends the newest command once more", "[vm][co
   link.stop();
   CHECK(eventually([&] { return dump.shows("100   [7]  96 00 00 00 01"); }));
 }
+
+namespace {
+
+constexpr std::uint32_t near_frame = 0x110, far_frame = 0x111, bits_frame = 0x112;
+constexpr std::uint32_t near_shown = 0x210, far_shown = 0x211;
+
+/// One axis with two nodes in two frames, the number in the third byte of each.
+CanControllerConfig two_nodes(const std::string& interface) {
+  const auto number = [](std::uint32_t id) {
+    CanSignal signal = place(id, 16, 8);
+    signal.is_signed = false;
+    return signal;
+  };
+  CanControllerConfig config;
+  config.name = "cnc";
+  config.interface = interface;
+  config.period_s = 0.02;
+  config.silent_after_s = 0.5;
+  config.reconnect_s = 0.05;
+  CanTravel travel;
+  travel.nodes_mm = {0.0, 500.0};
+  travel.sent.values = {place(near_frame, 0, 16, 0.01), place(far_frame, 0, 16, 0.01)};
+  travel.sent.numbers = {number(near_frame), number(far_frame)};
+  travel.applied.values = {place(near_shown, 0, 16, 0.01), place(far_shown, 0, 16, 0.01)};
+  travel.applied.numbers = {number(near_shown), number(far_shown)};
+  CanAxis axis;
+  axis.travel = travel;
+  config.axes = {axis};
+  config.valid_bits = place(bits_frame, 0, 8);
+  config.heartbeat = place(bits_frame, 8, 8);
+  return config;
+}
+
+/// A controller of its own: takes sets over that are whole, and shows the one in effect. What is
+/// asked of it here is kept apart from what the link is built from.
+class Interpolator {
+ public:
+  explicit Interpolator(const std::string& interface)
+      : bus_(interface), ear_(interface), thread_([this] { run(); }) {}
+  Interpolator(const Interpolator&) = delete;
+  Interpolator& operator=(const Interpolator&) = delete;
+  ~Interpolator() {
+    stopping = true;
+    thread_.join();
+  }
+
+  struct Node {
+    int counts{0};
+    int number{-1};
+  };
+  std::atomic<int> number_in_effect{0};
+  std::atomic<int> near_counts{0};
+  std::atomic<int> far_counts{0};
+  std::atomic<int> far_shown_behind{0};  ///< its frame shows a set that is older by so many
+  std::atomic<bool> tells{true};
+  std::atomic<bool> takes_over{true};
+  std::atomic<int> valid{-1};
+  std::atomic<int> sets{0};           ///< taken over
+  std::atomic<int> first_number{-1};  ///< of the first frame with a value
+  std::atomic<int> reused{0};         ///< a number came with another content
+  std::atomic<bool> stopping{false};
+
+ private:
+  void run() {
+    while (!stopping) {
+      while (const auto frame = ear_.receive()) take(*frame);
+      if (tells) {
+        const int number = number_in_effect;
+        show(near_shown, near_counts, number);
+        show(far_shown, far_counts, number - far_shown_behind);
+      }
+      std::this_thread::sleep_for(5ms);
+    }
+  }
+  void show(std::uint32_t id, int counts, int number) {
+    bus_.send(id, {counts & 0xFF, (counts >> 8) & 0xFF, number & 0xFF});
+  }
+  void take(const can_frame& frame) {
+    if (frame.can_id == bits_frame) {
+      valid = frame.data[0];
+      return;
+    }
+    if (frame.can_id != near_frame && frame.can_id != far_frame) return;
+    const Node node{static_cast<std::int16_t>(frame.data[0] | (frame.data[1] << 8)), frame.data[2]};
+    if (first_number < 0) first_number = node.number;
+    const bool is_near = frame.can_id == near_frame;
+    Node& mine = is_near ? near_ : far_;
+    if (mine.number == node.number && mine.counts != node.counts) ++reused;
+    mine = node;
+    if (near_.number != far_.number || !takes_over) return;
+    near_counts = near_.counts;
+    far_counts = far_.counts;
+    number_in_effect = near_.number;
+    ++sets;
+  }
+
+  RawSender bus_;
+  test::RawReceiver ear_;
+  Node near_;
+  Node far_;
+  std::thread thread_;
+};
+
+}  // namespace
+
+TEST_CASE("a set goes in several frames with one number that counts up",
+          "[vm][controller][travel]") {
+  Interpolator machine("vcan0");
+  Candump dump("vcan0,110:7FE");
+  CanController link(two_nodes("vcan0"));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 1.0);
+  cycle.want(1, -2.0);
+  REQUIRE(eventually([&] { return machine.sets > 300; }));  // past all 256 numbers
+  CHECK(machine.near_counts == 100);
+  CHECK(machine.far_counts == -200);
+  CHECK(machine.valid == 1);
+  CHECK(machine.reused == 0);
+  REQUIRE(eventually([&] { return cycle.state().applied_um[1] == Approx(-2.0); }));
+  CHECK(cycle.state().applied_um[0] == Approx(1.0));
+  CHECK(dump.shows("110   [3]  64 00 FF"));
+  CHECK(dump.shows("111   [3]  38 FF FF"));
+  CHECK(dump.shows("110   [3]  64 00 00"));
+}
+
+TEST_CASE("the first set comes after a silence, half-way round from the one in effect",
+          "[vm][controller][travel]") {
+  Interpolator machine("vcan0");
+  machine.number_in_effect = 200;
+  machine.near_counts = 150;
+  const nanoseconds began = monotonic_now();
+  CanController link(two_nodes("vcan0"));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 1.5);
+  cycle.want(1, 0.0);
+  REQUIRE(eventually([&] { return machine.first_number >= 0; }));
+  CHECK(monotonic_now() - began >= 1s);
+  // What is held while the cycle has not answered has a number too.
+  CHECK(machine.first_number >= (200 + 128 + 1) % 256);
+  CHECK(machine.first_number < (200 + 128 + 20) % 256);
+  CHECK(machine.reused == 0);
+}
+
+TEST_CASE("what is applied counts when all frames carry the number of one set",
+          "[vm][controller][travel]") {
+  Interpolator machine("vcan0");
+  machine.takes_over = false;
+  machine.number_in_effect = 7;
+  machine.near_counts = 100;
+  machine.far_counts = 300;
+  CanController link(two_nodes("vcan0"));
+  link.start();
+  Cycle cycle(link);
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  CHECK(cycle.state().applied_um[1] == Approx(3.0));
+  const auto shown_again = [&] {
+    const std::uint64_t reads = link.health().reads;
+    return eventually([&] { return link.health().reads > reads + 8; });
+  };
+  machine.far_shown_behind = 1;
+  REQUIRE(shown_again());
+  machine.near_counts = 9000;
+  REQUIRE(shown_again());
+  CHECK(cycle.state().applied_um[0] == Approx(1.0));  // not the half of another set
+  REQUIRE(eventually([&] { return !cycle.state().online; }));
+  REQUIRE(
+      eventually([&] { return link.health().last_error.find("two sets") != std::string::npos; }));
+  machine.near_counts = 50;
+  REQUIRE(shown_again());
+  machine.far_shown_behind = 0;
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  CHECK(cycle.state().applied_um[0] == Approx(0.5));
+  CHECK(cycle.state().applied_um[1] == Approx(3.0));
+  CHECK(eventually([&] { return link.health().last_error.empty(); }));
+}
+
+TEST_CASE("while one node must stand, the set stays and its valid bit is 0",
+          "[vm][controller][travel]") {
+  Interpolator machine("vcan0");
+  CanController link(two_nodes("vcan0"));
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 1.0);
+  cycle.want(1, 2.0);
+  REQUIRE(eventually([&] { return machine.far_counts == 200 && machine.valid == 1; }));
+  cycle.want(0, 5.0, false);
+  REQUIRE(eventually([&] { return machine.valid == 0; }));
+  const int number = machine.number_in_effect;
+  const int sets = machine.sets;
+  cycle.want(1, 2.5);
+  const std::uint64_t writes = link.health().writes;
+  REQUIRE(eventually([&] { return link.health().writes > writes + 5; }));
+  CHECK(machine.far_counts == 200);
+  CHECK(machine.number_in_effect == number);
+  CHECK(machine.sets <= sets + 1);  // not even the same one again
+  cycle.want(0, 1.0);
+  REQUIRE(eventually([&] { return machine.far_counts == 250; }));
+  CHECK(machine.reused == 0);
+}
+
+TEST_CASE("on every new link the numbers go on, each with one content",
+          "[vm][controller][travel]") {
+  Interpolator machine("vcan0");
+  CanController link(two_nodes("vcan0"));
+  link.start();
+  Cycle cycle(link);
+  for (int round = 0; round < 5; ++round) {
+    cycle.want(0, 1.0 + 0.1 * round);
+    cycle.want(1, 2.0 - 0.1 * round);
+    const int sets = machine.sets;
+    REQUIRE(eventually([&] { return machine.sets > sets + 5; }));
+    const int number = machine.number_in_effect;
+    machine.tells = false;
+    REQUIRE(eventually([&] { return !cycle.state().online; }));
+    const int last = machine.number_in_effect;
+    machine.near_counts = 0;  // it has restarted, and shows no number
+    machine.far_counts = 0;
+    machine.number_in_effect = 0;
+    const int before = machine.sets;
+    machine.tells = true;
+    REQUIRE(eventually([&] { return machine.sets > before + 2; }));
+    const int went_on = (machine.number_in_effect - last + 256) % 256;
+    CAPTURE(round, number, last);
+    CHECK(went_on > 0);
+    CHECK(went_on < 100);
+  }
+  CHECK(machine.reused == 0);
+}

@@ -22,7 +22,7 @@ namespace thermocomp {
 class ByteWriter {
  public:
   void u8(std::uint8_t value) { bytes_.push_back(static_cast<std::byte>(value)); }
-  /// Seven bits a byte, lowest first.
+  /// Seven bits per byte, lowest first.
   void varint(std::uint64_t value) {
     for (; value >= 0x80; value >>= 7) u8(static_cast<std::uint8_t>(value | 0x80));
     u8(static_cast<std::uint8_t>(value));

@@ -1,4 +1,4 @@
-/// Records <-> the bytes of one chunk: what changed little takes few bytes, every bit is kept.
+/// Records <-> the bytes of one chunk: small changes take few bytes, and every bit is kept.
 ///
 /// A record is: kind, detail, cycle (difference to the record before), index, time (difference to
 /// the last one of its kind), value (XOR with the last one of its kind and index; a byte that says
@@ -62,14 +62,14 @@ class ChunkDecoder {
   std::uint64_t left_;
 };
 
-/// A time on the daemon's grid that can be: not before the start of the system, nor centuries
-/// later.
+/// Whether a time on the daemon's grid is possible: not before the start of the system, nor
+/// centuries later.
 [[nodiscard]] constexpr bool is_grid_time(std::int64_t time_ns) noexcept {
   return time_ns >= 0 && time_ns <= (std::int64_t{1} << 61);
 }
 
-/// The estimator's state has inner counts and places that are believed when it is loaded. So its
-/// bytes carry a checksum, and bytes that changed on the disk are refused.
+/// Adds a checksum: the estimator's state has inner counts and places that are believed when it is
+/// loaded, so bytes that changed on the disk must be refused.
 void add_seal(std::vector<std::byte>& bytes);
 /// Takes the checksum off. @throws HistoryError when it does not fit
 void take_seal(std::vector<std::byte>& bytes);

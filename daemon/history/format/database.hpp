@@ -16,7 +16,7 @@
 
 namespace thermocomp {
 
-/// "thco": says that a SQLite file is a history of ours.
+/// "thco": marks a SQLite file as a history of ours.
 inline constexpr std::int64_t history_application_id = 0x7468636F;
 inline constexpr std::int64_t history_version = 1;
 
@@ -55,7 +55,7 @@ class Database {
   sqlite3* handle_{nullptr};
 };
 
-/// @throws HistoryError: the file is of another program, or of a version that is not known
+/// @throws HistoryError: the file is another program's, or of an unknown version
 void require_history(Database& database);
 
 class Statement {

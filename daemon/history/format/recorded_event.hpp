@@ -1,4 +1,4 @@
-/// What happened, as the history keeps it: of every run of the daemon that is still in the file.
+/// What happened, as the history keeps it, for every run of the daemon that is still in the file.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-/// Checksums of the history's rows: SQLite has none of its own, and a flipped bit in a packed value
-/// is a value as well. Only for the .cpp files of this folder.
+/// Checksums of the history's rows: SQLite has none of its own, and a packed value with a flipped
+/// bit is still a value. Only for the .cpp files of this folder.
 ///
 /// `chunk.checksum` covers the chunk's numbers and records, `segment.checksum` what is written once
 /// for a segment and the texts of its setup. NULL, or no such column: written by an earlier
@@ -39,9 +39,9 @@ struct ChunkNumbers {
 [[nodiscard]] bool has_checksum_columns(Database& database);
 void add_checksum_columns(Database& database);
 
-/// The checksum that the row of this segment ought to have. @throws HistoryError: no such row
+/// The checksum that the row of this segment should have. @throws HistoryError: no such row
 [[nodiscard]] std::int64_t segment_checksum(Database& database, std::int64_t segment);
-/// @throws HistoryError when the row has a checksum that it does not fit
+/// @throws HistoryError when the row does not fit its checksum
 void check_segment_row(Database& database, std::int64_t segment);
 
 }  // namespace thermocomp

@@ -1,4 +1,4 @@
-/// What a history says of its segments, and what of it cannot be used.
+/// What a history says about its segments, and which parts of it cannot be used.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ struct SegmentInfo {
   std::string program_version;
 };
 
-/// What of a history cannot be used, and why.
+/// A part of a history that cannot be used, and why.
 struct HistoryDamage {
   std::int64_t segment{0};  ///< 0: the file as a whole
   std::string why;          ///< one line

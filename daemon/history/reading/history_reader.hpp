@@ -1,4 +1,4 @@
-/// Reads a history, also one that a daemon is writing at the moment.
+/// Reads a history, even one that a daemon is writing at the moment.
 #pragma once
 
 #include <cstddef>
@@ -36,15 +36,15 @@ class RecordCursor {
   RecordCursor(const HistoryReader& reader, const SegmentInfo& segment);
   ~RecordCursor();
   RecordCursor(RecordCursor&&) noexcept;
-  /// Nothing of a chunk that is not sound is given out: its checksum is looked at (histories of
-  /// earlier versions have none), and that all of it can be decoded.
+  /// Nothing is given out of a chunk that is not sound: its checksum must fit (histories of earlier
+  /// versions have none) and all of it must decode.
   /// @return false after the last record of the segment's whole cycles
   /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted meanwhile
   bool next(Record& out);
-  /// After an error: goes on with the next chunk there is. What its records leave out is unknown.
+  /// After an error: goes on with the next chunk there is. What the damaged one said is unknown.
   /// @return false when there is none
   bool resume();
-  /// Whether a chunk so far said a wall time that cannot be; the last good difference then counts.
+  /// Whether a chunk so far gave an impossible wall time; the last good difference then counts.
   [[nodiscard]] bool wall_time_was_impossible() const noexcept;
   /// Wall clock minus the grid's time, as noted with the record last returned [ns].
   [[nodiscard]] std::int64_t wall_minus_grid_ns() const noexcept;
@@ -57,11 +57,11 @@ class RecordCursor {
 
 class HistoryReader {
  public:
-  /// Opens for reading only and takes note of the segments there are now. A segment that cannot be
-  /// (or overlaps the one in front of it) is left out and told by damage(); a wall time that cannot
-  /// be, of a clock that was set wrong, is replaced by what the segments beside it say.
-  /// @throws HistoryError naming the file: missing, no history, of no version that there is, or so
-  ///         damaged that there is nothing to be taken from it
+  /// Opens for reading only and takes note of the segments there are now. An impossible segment (or
+  /// one that overlaps the one in front of it) is left out and told by damage(); an impossible wall
+  /// time, from a clock that was set wrong, is replaced by what the segments beside it say.
+  /// @throws HistoryError naming the file: missing, no history, of an unknown version, or so
+  ///                      damaged that nothing can be taken from it
   explicit HistoryReader(const std::filesystem::path& file);
   ~HistoryReader();
   HistoryReader(HistoryReader&&) noexcept;

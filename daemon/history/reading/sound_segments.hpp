@@ -11,8 +11,7 @@
 
 namespace thermocomp {
 
-/// What no history can be: without these limits the arithmetic of times would overflow, and a
-/// replay would never end.
+/// Beyond these limits the arithmetic of times would overflow, or a replay would never end.
 inline constexpr std::int64_t grid_ns_max = std::int64_t{1} << 60;  ///< 36 years of a system's run
 inline constexpr std::int64_t span_ns_max = std::int64_t{1} << 55;  ///< a year; segments last weeks
 inline constexpr std::int64_t wall_ns_max = std::int64_t{1} << 62;  ///< in the year 2116
@@ -21,12 +20,12 @@ inline constexpr std::int64_t wall_ns_max = std::int64_t{1} << 62;  ///< in the 
   return wall_ns >= 0 && wall_ns <= wall_ns_max;
 }
 
-/// @throws HistoryError when the numbers of the segment cannot be, its wall time left aside
+/// @throws HistoryError when the numbers of the segment are impossible, its wall time apart
 void check_times(const SegmentInfo& segment);
 
 /// Leaves out, and tells in `damage`: a segment on another grid than most of its run; one that
-/// begins before the one in front of it ends; one whose times go beyond all bounds. Puts a likely
-/// wall time where one cannot be.
+/// begins before the one in front of it ends; one whose times go beyond all bounds. Replaces an
+/// impossible wall time by a likely one.
 /// @param segments  by id, each passed by check_times()
 [[nodiscard]] std::vector<SegmentInfo> sound_segments(std::vector<SegmentInfo> segments,
                                                       std::vector<HistoryDamage>& damage);

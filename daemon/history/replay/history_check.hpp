@@ -1,4 +1,5 @@
-/// What of a history is sound, segment by segment. Looks only; a repair is never in place.
+/// Which parts of a history are sound, segment by segment. Only looks: nothing is repaired in
+/// place.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-/// What the history says the machine's state was when the daemon last ran: for a start without a
-/// state file that can be used.
+/// The machine's state when the daemon last ran, by the history: for a start without a usable state
+/// file.
 #pragma once
 
 #include <filesystem>
@@ -22,7 +22,7 @@ struct RecordedState {
 };
 
 /// Steps the newest sound segment again to its end; a segment of 6 h at 100 Hz takes some seconds.
-/// Throws nothing of the file's making.
+/// Never throws because of the file.
 [[nodiscard]] RecordedState last_recorded_state(const std::filesystem::path& history,
                                                 const SetupParser& parser = parse_setup);
 

@@ -1,4 +1,4 @@
-/// The daemon's own estimator over what was recorded, and what was recorded as a run file.
+/// The daemon's own estimator over what was recorded, and the record as a run file.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct ReplaySummary {
   std::uint64_t segments{0};
   std::uint64_t gaps{0};       ///< segments before which something was lost
   std::uint64_t cycles{0};     ///< steps
-  std::uint64_t compared{0};   ///< offsets, one an axis and noted cycle
+  std::uint64_t compared{0};   ///< offsets, one per axis and noted cycle
   std::uint64_t different{0};  ///< ... that differ in any bit, or in their valid mark or epoch
   double largest_difference_um{0.0};
   std::optional<std::uint64_t> first_different_cycle;
@@ -74,13 +74,13 @@ enum class ExportContent {
 /// something was probed, in the first row after an operator gave it (without the offset in effect,
 /// as `[correction] measured` says what he gave); `<axis>_offset_um`, `<axis>_applied_um` and
 /// `<axis>_measured_um`, which is what the operator said.
-/// Comment lines tell the wall time of the first row, of one an hour and of each that follows a
-/// gap or a clock that was set; what is missing between two rows; faults of sensors as they begin
+/// Comment lines tell the wall time of the first row, of one row per hour and of each that follows
+/// a gap or a clock that was set; what is missing between two rows; faults of sensors as they begin
 /// and end, commands and changes of the model.
 /// The inputs come from stepping the estimator again. Where a segment is damaged that ends, and
 /// they are means of what was read until the next segment. A chunk that is damaged costs its own
-/// rows, and a segment that cannot be read at all is left out. Segments outside of `from` and `to`
-/// are not read.
+/// rows, and a segment that cannot be read at all is left out. Segments outside `from` and `to` are
+/// not read.
 /// @throws HistoryError when nothing can be taken from the file
 ExportSummary export_run(const std::filesystem::path& history,
                          const std::optional<HistoryTime>& from,

@@ -1,9 +1,12 @@
 #include "daemon/history/replay/segment_export.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
 #include "config/text/number_text.hpp"
+#include "estimator/axis_spans.hpp"
 
 namespace thermocomp {
 namespace {
@@ -230,9 +233,24 @@ void SegmentExport::take_measured() {
   measured_um_[axis] = record_.value;
   displacement_um_[axis] = record_.value;
   if (config_.correction.measured != MeasuredMeaning::remaining) return;
-  const double applied_um = inputs_.controller.applied_um[axis];
-  const double effect_um = std::isfinite(applied_um) ? applied_um : offset_um_[axis];
-  displacement_um_[axis] -= config_.axes[axis].sign * effect_um;
+  displacement_um_[axis] -= config_.axes[axis].sign * effect_um(axis);
+}
+
+/// What the axis is offset by; of a travel where its slide stands.
+double SegmentExport::effect_um(std::size_t axis) const {
+  const AxisSpan span = span_of(config_.axes, axis);
+  std::array<double, axes_max> nodes_um{};
+  for (std::size_t i = 0; i < span.count; ++i) {
+    const double applied_um = inputs_.controller.applied_um[span.first + i];
+    nodes_um[i] = std::isfinite(applied_um) ? applied_um : offset_um_[span.first + i];
+  }
+  if (span.count == 1) return nodes_um[0];
+  const auto& names = config_.signals;
+  const auto signal = std::find(names.begin(), names.end(), config_.axes[axis].node->position);
+  if (signal == names.end()) return not_a_number;
+  return value_on_travel(
+      std::span(config_.axes).subspan(span.first, span.count), nodes_um,
+      inputs_.controller.signals[static_cast<std::size_t>(signal - names.begin())]);
 }
 
 /// Steps the estimator up to and with the cycle.

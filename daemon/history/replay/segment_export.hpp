@@ -34,7 +34,7 @@ struct ExportPlaces {
                                          const std::vector<bool>& probed, RunColumns& columns);
 
 /// Marks the axes of which an operator measured a displacement in this segment. What cannot be read
-/// is not told here: the export itself says it.
+/// is not reported here but by the export itself.
 void note_probed(const HistoryReader& reader, const SegmentInfo& segment,
                  std::vector<bool>& probed) noexcept;
 
@@ -66,6 +66,7 @@ class SegmentExport {
   void take_offsets();
   void take_command();
   void take_measured();
+  [[nodiscard]] double effect_um(std::size_t axis) const;
   void follow(std::uint64_t cycle);
   void give_up_following(const std::string& why);
   void fill_inputs(std::vector<double>& row);

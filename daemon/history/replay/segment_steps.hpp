@@ -10,7 +10,7 @@
 
 namespace thermocomp {
 
-/// Stands before the step of a cycle; step() takes it and moves on, over cycles that were skipped.
+/// Stands before the step of a cycle; step() takes that step and moves on, passing skipped cycles.
 class SegmentSteps {
  public:
   /// @throws HistoryError, std::runtime_error when the state at its start cannot be loaded

@@ -1,5 +1,5 @@
-/// What replay and export have in common: the inputs in force while a segment's records pass, and
-/// the history's own time. Only for the .cpp files of this folder.
+/// What replay and export share: the inputs in force while a segment's records pass, and the
+/// history's own time. Only for the .cpp files of this folder.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ struct InputsInForce {
   std::vector<Reading> readings;
   ControllerState controller;
   /// Takes over a reading, link, applied or signal record.
-  /// @throws HistoryError when its index cannot be
+  /// @throws HistoryError when its index is impossible
   void apply(const Record& record);
-  /// After records that are lost: nothing is known until it is told again.
+  /// After lost records: nothing is known until it is recorded again.
   void forget();
 };
 

@@ -1,4 +1,4 @@
-/// A stretch of a history for a chart: some hundred points of it, however long it is.
+/// A stretch of a history for a chart: some hundred points, however long it is.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace thermocomp {
 
 struct ThinnedColumn {
   std::string name;            ///< `<sensor>_degC`, `<axis>_offset_um`
-  std::vector<double> values;  ///< one a point; NaN: nothing good was recorded there
+  std::vector<double> values;  ///< one per point; NaN: nothing good was recorded there
 };
 
 struct ThinnedHistory {

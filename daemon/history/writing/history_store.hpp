@@ -7,9 +7,8 @@
 ///   segment  where a replay can start: run (one number for each start of the daemon), grid, first
 ///            and last whole cycle, wall clock, reason, the estimator's exact state, the inputs in
 ///            force
-///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more a
-///   commit;
-///            wall_minus_grid_ns: wall clock minus the grid's time when it was written
+///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more per
+///            commit; wall_minus_grid_ns: wall clock minus the grid's time when it was written
 ///   event    what happened (recorded_event.hpp), the newest; a file of an earlier version gets the
 ///            table when it is opened for writing
 /// segment and chunk have a checksum (row_checksum.hpp); files of earlier versions get the columns
@@ -94,11 +93,11 @@ class HistoryStore {
   void move_aside(const std::string& why) noexcept;
 
   /// All rows in one transaction.
-  /// @param prove  write something even without rows, to see whether the disk works
+  /// @param prove  writes something even without rows, to see whether the disk works
   void write(const PendingRows& pending, bool prove);
   /// Deletes the oldest whole segments until size and age are in bounds. Age counts only while the
-  /// wall clock has gone as steadily as the monotonic one for an hour: a clock that is set wrong
-  /// for a moment must not cost the history.
+  /// wall clock has gone as steadily as the monotonic one for an hour: a clock set wrong for a
+  /// moment must not cost the history.
   void keep_within_bounds(std::int64_t current_token);
 
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }

@@ -59,8 +59,8 @@ class HistoryWriter {
   /// @throws HistoryError when the file is of a newer version or of another program, or another
   ///         process writes it
   void start();
-  /// What start() does before it starts the thread, and what the thread does every 50 ms: for who
-  /// has a time of his own and no thread.
+  /// What start() does before it starts the thread, and what the thread does every 50 ms: for
+  /// callers with a time of their own and no thread.
   void open();
   void work();
   /// Writes what is left and closes the file. Gives up on a disk that does not work after one try.

@@ -15,7 +15,7 @@ struct HistorySetup {
   std::string model_checksum;
 };
 
-/// Where the writer has its times from.
+/// Where the writer gets its times from.
 struct WriterClocks {
   std::function<nanoseconds()> monotonic;  ///< the grid's
   std::function<nanoseconds()> wall;       ///< since 1970, may be stepped

@@ -79,7 +79,7 @@ struct CanopenNodeConfig {
   int node{1};  ///< 1..127
   /// Period of the node's heartbeat, written to its object 1017; 0: as the node has it.
   double heartbeat_s{0.0};
-  double heartbeat_timeout_s{0.0};  ///< no heartbeat for so long: the node is lost; 0: not watched
+  double heartbeat_timeout_s{0.0};  ///< without a heartbeat this long: lost; 0: not watched
   double pdo_period_s{0.0};         ///< how often the node sends each TPDO; 0: not known
   EmergencyForm emergency{EmergencyForm::generic};
   std::vector<CanopenWrite> writes;

@@ -11,8 +11,8 @@ namespace thermocomp {
 
 class CanopenLine final : public CanProtocol {
  public:
-  /// @throws InvalidValue for a node number that cannot be or is used twice, and for signals that
-  /// cannot be
+  /// @throws InvalidValue for a node number that is impossible or used twice, and for impossible
+  ///                      signals
   explicit CanopenLine(CanopenBusConfig config);
 
   [[nodiscard]] std::vector<CanFilter> wanted() const override;

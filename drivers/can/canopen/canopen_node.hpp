@@ -27,8 +27,8 @@ std::vector<std::size_t> place_channels(const CanopenMapping& mapping,
 
 /// The life of a node: pre-operational while it is set up (writes, each read back; COB-IDs and
 /// mappings asked for), then started, then read. A reboot, a lost heartbeat or a lost bus begins it
-/// anew. A channel shows a value only while all of that is well; its readings are no_answer
-/// before and between, device_error where the set-up was refused or two nodes say the same thing.
+/// anew. A channel shows a value only while all of that is well; its readings are no_answer before
+/// and in between, device_error where the set-up was refused or two nodes send the same thing.
 class CanopenNode {
  public:
   CanopenNode(const CanopenNodeConfig& config, const CanopenBusConfig& bus);
@@ -50,7 +50,7 @@ class CanopenNode {
   [[nodiscard]] std::span<const Reading> readings() const noexcept { return readings_; }
   [[nodiscard]] const std::vector<RawReading>& raw() const noexcept { return raw_; }
   [[nodiscard]] const std::vector<CanopenChannel>& channels() const noexcept { return channels_; }
-  /// Of TPDOs that the node said are its own, in this life.
+  /// COB-IDs of the TPDOs that the node has said are its own since it came up.
   [[nodiscard]] std::span<const std::uint32_t> cob_ids_told() const noexcept { return told_; }
   /// Another node says that this TPDO is its own; empty: none does.
   void claim_conflict(const std::string& reason, nanoseconds now);
@@ -106,7 +106,7 @@ class CanopenNode {
   std::vector<std::optional<Fault>> emergencies_;  ///< of the channels
   std::vector<nanoseconds> poll_at_;
   std::vector<char> vouched_for_;  ///< whether the status after the last poll was good
-  std::vector<Watched> watched_;   ///< a TPDO each
+  std::vector<Watched> watched_;   ///< one per TPDO
   SdoClient client_;
 
   Phase phase_{Phase::closed};

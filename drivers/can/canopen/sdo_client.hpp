@@ -15,7 +15,7 @@
 
 namespace thermocomp {
 
-/// What a node means by an abort code; "unknown abort code" for one that CiA 301 does not know.
+/// What a node means by an abort code; "unknown abort code" for one that is not in CiA 301.
 [[nodiscard]] std::string_view sdo_abort_name(std::uint32_t code) noexcept;
 
 /// "1017:00"
@@ -64,7 +64,8 @@ class SdoClient {
   [[nodiscard]] std::optional<CanFrame> next_frame();
   /// The end of a transfer; given once.
   [[nodiscard]] std::optional<SdoResult> result();
-  /// Answers to transfers that had been answered already: another node has the same number.
+  /// Number of answers to transfers that had already been answered: another node has the same
+  /// number.
   [[nodiscard]] std::uint64_t second_answers() const noexcept { return second_answers_; }
 
  private:

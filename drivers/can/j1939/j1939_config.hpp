@@ -19,7 +19,7 @@ struct J1939Parameter {
   int length_bits{16};   ///< 2..32
   double scale{1.0};     ///< value = raw * scale + offset
   double offset{0.0};
-  std::vector<Sentinel> sentinels;           ///< told before the ranges of the standard
+  std::vector<Sentinel> sentinels;           ///< take precedence over the standard's ranges
   Fault error{Fault::device_error};          ///< what the standard's "error" means here
   Fault not_available{Fault::device_error};  ///< ... and "not available"
   bool operator==(const J1939Parameter&) const = default;

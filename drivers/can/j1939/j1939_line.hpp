@@ -17,7 +17,7 @@ namespace thermocomp {
 /// no_answer until its NAME is heard again.
 class J1939Line final : public CanProtocol {
  public:
-  /// @throws InvalidValue for parameters and addresses that cannot be
+  /// @throws InvalidValue for impossible parameters and addresses
   explicit J1939Line(J1939BusConfig config);
 
   [[nodiscard]] std::vector<CanFilter> wanted() const override;

@@ -36,7 +36,7 @@ struct J1939Id {
 /// @pre an addressed PGN has 0 in its lowest byte
 [[nodiscard]] CanId identifier(const J1939Id& id) noexcept;
 
-/// @throws InvalidValue for a place or PGN that cannot be; the keys are those of J1939Parameter
+/// @throws InvalidValue for an impossible place or PGN; the keys are those of J1939Parameter
 void check(const J1939Parameter& parameter);
 
 /// The parameter's bits; those beyond the message's end are 0. @pre check(parameter) passes

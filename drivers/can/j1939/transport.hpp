@@ -29,7 +29,7 @@ class TransportReceiver {
 
   /// Our address; nullopt: only broadcasts are taken.
   void set_address(std::optional<std::uint8_t> address);
-  /// Ends all transfers without a word.
+  /// Drops all transfers; the senders are not told.
   void forget();
 
   /// Groups pgn_transfer and pgn_transfer_data. @return a message that is whole now
@@ -71,7 +71,7 @@ class TransportReceiver {
 
   std::vector<std::uint32_t> wanted_;
   std::optional<std::uint8_t> address_;
-  std::map<Key, Transfer> transfers_;  ///< one of each sort a sender: at most 2 x 256
+  std::map<Key, Transfer> transfers_;  ///< one of each sort per sender: at most 2 x 256
   std::deque<CanFrame> frames_;
   std::uint64_t failed_{0};
 };

@@ -37,11 +37,11 @@ class Term {
   virtual void correct_displacement(std::span<double> /*displacement_um*/) noexcept {}
 
   /// Adds how much `output` moves with each temperature by this term in the end
-  /// [um/K], shape (temperature_columns); for the spread of an offset. Every kind says it, also
-  /// that it is nothing: an operating signal's, or one that passes a temperature on late.
+  /// [um/K], shape (temperature_columns); for the spread of an offset. Every kind must say it, even
+  /// where it is nothing: for an operating signal, or a temperature passed on late.
   virtual void add_slope(const TermInput& input, std::size_t output,
                          std::span<double> slope_um_per_K) const noexcept = 0;
-  /// After all add_slope(): where the way to the end goes further than the end, that.
+  /// After all add_slope(): the effect on the way, where it is larger than in the end.
   virtual void add_slope_on_the_way(std::size_t /*output*/,
                                     std::span<double> /*slope_um_per_K*/) const noexcept {}
   /// After both: from the corrected rise to what was read.
@@ -66,7 +66,7 @@ struct TermContext {
 };
 
 /// A kind of term and how it is made. To add one: a file with its registration, and its line in
-/// term_registry.cpp.
+/// THERMOCOMP_TERMS below.
 struct TermRegistration {
   TermKind kind{};
   std::unique_ptr<Term> (*make)(const TermContext& context){nullptr};

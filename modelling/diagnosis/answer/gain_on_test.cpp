@@ -4,6 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include <Eigen/Cholesky>
+
 #include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis {
@@ -13,14 +15,17 @@ constexpr int resamples = 400;
 constexpr int test_blocks = 16;
 constexpr double turn = 6.283185307179586;
 
-/// The sine of known period and size that fits the residual best: only its phase is free.
+/// The sine of known period and size that fits the residual best beside a level: only its phase is
+/// free.
 Column sine_in(const Column& time_s, const Column& residual, const Correction& correction) {
   const Eigen::ArrayXd angle = turn / correction.period_s * time_s.array();
-  const Eigen::ArrayXd values = residual.array().isFinite().select(residual.array(), 0.0);
-  const double count = static_cast<double>(residual.array().isFinite().count());
-  const Eigen::ArrayXd centred = values - (count > 0 ? values.sum() / count : 0.0);
-  const double phase = std::atan2((centred * angle.cos()).sum(), (centred * angle.sin()).sum());
-  return correction.amplitude_um * (angle + phase).sin();
+  Eigen::MatrixXd waves(time_s.size(), 3);
+  waves << angle.sin(), angle.cos(), Eigen::ArrayXd::Ones(time_s.size());
+  const Eigen::ArrayXd there = residual.array().isFinite().cast<double>();
+  const Column values = residual.array().isFinite().select(residual.array(), 0.0);
+  waves.array().colwise() *= there;
+  const Eigen::Vector3d of = (waves.transpose() * waves).ldlt().solve(waves.transpose() * values);
+  return correction.amplitude_um * (angle + std::atan2(of[1], of[0])).sin();
 }
 
 struct BlockSquares {

@@ -91,6 +91,9 @@ struct Cause {
   /// from its parameters. Null: nothing.
   Correction (*correction)(const std::vector<Parameter>& parameters){nullptr};
   ErrorOfReading error_of_reading{nullptr};  ///< of a fault of one reading in one run
+  /// The error is in proportion to the reading: what is left of its motion is smaller than the
+  /// motion was, what is left of its noise is not.
+  bool shrinks_reading{false};
 
   /// What it would do to the temperatures of a thermal network. Null: the thermal layer does not
   /// have it.

@@ -22,6 +22,7 @@ std::vector<double> periods_of(const Material& material) {
        frequency <= 1.0 / shortest_s && periods.size() < periods_max;
        frequency += std::max(0.4 / length_s, 0.004 * frequency))
     periods.push_back(1.0 / frequency);
+  std::reverse(periods.begin(), periods.end());
   return periods;
 }
 

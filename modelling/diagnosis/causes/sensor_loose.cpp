@@ -77,6 +77,7 @@ Cause sensor_loose() {
   cause.hypotheses = of;
   cause.gains = gain;
   cause.error_of_reading = error_K;
+  cause.shrinks_reading = true;
   return cause;
 }
 

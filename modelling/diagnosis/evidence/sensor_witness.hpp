@@ -1,7 +1,7 @@
 /// What the other sensors say of a supposed fault of one reading.
 #pragma once
 
-#include <map>
+#include <optional>
 #include <vector>
 
 #include "modelling/diagnosis/data/panel.hpp"
@@ -15,9 +15,10 @@ struct Accused {
   double times{1.0};
 };
 
-/// A reading is predicted from the other temperatures and the signals, each with lags; the fault
-/// that the displacement asks for must be seen in what is left of it. What the predictions of all
-/// sensors need of a run is reckoned when the run is asked for first.
+/// A reading is predicted from the other temperatures and the signals, each with lags, by
+/// coefficients that all runs share; the fault that the displacement asks for must be seen in what
+/// is left of it in its run. What the predictions of all sensors need is reckoned when it is asked
+/// for first.
 class SensorWitness {
  public:
   /// Both must outlive it.
@@ -36,12 +37,12 @@ class SensorWitness {
     Eigen::MatrixXd products;  ///< of the whitened columns
     Eigen::MatrixXd factor;    ///< lower, of the products and the prior
   };
-  struct Run {
+  struct Readings {
     Panel columns;         ///< each divided by its largest value; those of the inputs last
     Eigen::VectorXd size;  ///< these values
     std::vector<UnderNoise> noises;
   };
-  /// An error of a reading beside a run's columns under one noise.
+  /// An error of a reading beside the columns under one noise.
   struct Beside {
     Eigen::VectorXd products;  ///< with the columns
     double square{0.0};
@@ -50,21 +51,27 @@ class SensorWitness {
   struct Likelihood {
     double without{0.0};
     double with{0.0};
+    double log_determinant{0.0};  ///< of the reading's covariance, its coefficients unknown
   };
 
-  [[nodiscard]] const Run& run(std::size_t index);
-  [[nodiscard]] Run made(const MeasuredRun& run) const;
-  /// Of an error under each noise of the run.
-  [[nodiscard]] static std::vector<Beside> beside(const Run& run, const Column& error_K);
+  [[nodiscard]] const Readings& readings();
+  [[nodiscard]] Readings made() const;
+  /// Of an error under each noise.
+  [[nodiscard]] static std::vector<Beside> beside(const Readings& readings, const Column& error_K);
   /// Column of a sensor's reading; the next is the same late.
-  [[nodiscard]] Eigen::Index column_of(const Run& run, std::size_t sensor) const;
-  [[nodiscard]] static Likelihood likelihood(const Run& run, const UnderNoise& noise,
+  [[nodiscard]] Eigen::Index column_of(const Readings& readings, std::size_t sensor) const;
+  [[nodiscard]] static Likelihood likelihood(const Readings& readings, const UnderNoise& noise,
                                              const Beside& error, Eigen::Index reading,
                                              double times);
+  /// 2 ln L of a reading of which the fault has left a share since its onset.
+  [[nodiscard]] static double likelihood_of_shrunk(const Readings& readings,
+                                                   const UnderNoise& noise, Eigen::Index reading,
+                                                   const Column& corrected_K, const Column& left,
+                                                   double log_determinant);
 
   const MeasuredData& data_;
   const StackedRows& rows_;
-  std::map<std::size_t, Run> runs_;
+  std::optional<Readings> readings_;
 };
 
 }  // namespace thermocomp::diagnosis

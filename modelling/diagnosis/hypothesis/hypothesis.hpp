@@ -30,9 +30,9 @@ enum class Form {
 /// One shape parameter of a hypothesis, searched over a grid.
 struct ShapeParameter {
   std::string name;
-  std::vector<double> grid;
-  bool logarithmic{false};  ///< refined between grid points on a logarithmic scale
-  bool discrete{false};     ///< not refined
+  std::vector<double> grid;  ///< ascending
+  bool logarithmic{false};   ///< refined between grid points on a logarithmic scale
+  bool discrete{false};      ///< not refined
 };
 
 /// What a hypothesis pays that contains a simpler one as a special case.

@@ -218,6 +218,7 @@ class Search {
   [[nodiscard]] static Finding finding_of(const std::vector<Explanation>& candidates,
                                           std::size_t chosen);
   void refit(std::vector<Finding>& findings);
+  void settle_for_left_out_rows(Explanation& explanation) const;
   void measure_spread(std::vector<Finding>& findings);
   [[nodiscard]] double widening(const Setting& setting, const Panel& columns,
                                 const Eigen::VectorXd& gains) const;

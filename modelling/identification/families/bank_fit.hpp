@@ -22,7 +22,7 @@ struct BankColumns {
   [[nodiscard]] std::size_t size() const noexcept { return subjects.size() * taus_s.size(); }
 };
 
-/// Time constants by a ratio of three from 5 min up to a sixth of the longest run, at least twice
+/// Time constants by a ratio of three from 5 min up to a third of the longest run, at least twice
 /// the step; as many as leave no more than 600 columns. A signal that is only ever 0 or 1 has no
 /// square.
 [[nodiscard]] BankColumns bank_columns(const MeasuredTests& tests);

@@ -84,10 +84,10 @@ const char* why(const MeasuredTests& tests, const FamiliesFit& fit) {
 std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   const bool one_run = tests.runs.size() < 2;
   std::string text = printed(
-      "%zu temperatures, %zu operating signals, %zu %s; left out one at a "
+      "temperatures: %zu, operating signals: %zu, %s: %zu; left out one at a "
       "time, everything chosen anew, RMS in um:\n",
-      tests.places.size(), tests.signals.size(), tests.folds.size(),
-      one_run ? "blocks of one run" : "runs");
+      tests.places.size(), tests.signals.size(), one_run ? "blocks of one run" : "runs",
+      tests.folds.size());
   text += printed("    %-11s", "family");
   for (const std::string& output : tests.outputs) text += printed(" %10s", output.c_str());
   text += "   of none's squares\n";

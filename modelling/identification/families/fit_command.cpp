@@ -72,7 +72,10 @@ void write(const std::string& destination, const std::string& text) {
 /// In the frame of --like where that was given.
 std::string model_text(const Options& options, const ThermalModel& fitted) {
   if (options.like.empty()) return write_model(fitted);
-  return write_model(in_frame(fitted, load_model(options.like)));
+  std::vector<std::string> notes;
+  const ThermalModel model = in_frame(fitted, load_model(options.like), notes);
+  for (const std::string& note : notes) std::fprintf(stderr, "%s\n", note.c_str());
+  return write_model(model);
 }
 
 /// One equation of few sensors, as JP7689460B2 has it.

@@ -75,7 +75,8 @@ std::string curves(const MeasuredTests& tests, const Fit& fit, Eigen::Index outp
 
 std::string groups_map(const MeasuredTests& tests, const Fit& fit) {
   HeatMap map;
-  map.title = "similarity of the places; chosen ones are marked with *";
+  map.title = fit.places.empty() ? "which places move alike: light"
+                                 : "which places move alike: light; chosen: *";
   map.names = tests.places;
   for (const std::size_t place : fit.places) map.names[place].insert(0, "* ");
   map.values = similarity(tests, true);
@@ -91,7 +92,7 @@ std::string page(const MeasuredTests& tests, const Fit& fit, const std::string& 
   std::string text(
       "<!DOCTYPE html>\n<html><head><meta charset=\"utf-8\"><title>thermocomp fit</title></head>\n"
       "<body style=\"font-family:sans-serif;max-width:1000px\">\n<h1>Sensors and equation</h1>\n"
-      "<pre>");
+      "<pre style=\"white-space:pre-wrap\">");
   text.append(xml_text(said)).append("</pre>\n");
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     text += curves(tests, fit, static_cast<Eigen::Index>(o));

@@ -17,6 +17,19 @@ Names together(const Names& first, const Names& second) {
   return all;
 }
 
+Names without(const Names& all, const Names& those) {
+  Names rest;
+  for (const std::string& name : all)
+    if (std::find(those.begin(), those.end(), name) == those.end()) rest.push_back(name);
+  return rest;
+}
+
+std::string joined(const Names& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 std::size_t place_of(const Names& names, const std::string& name) {
   return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
 }
@@ -32,13 +45,23 @@ void take_rows(const ThermalModel& from, ThermalModel& into) {
 
 }  // namespace
 
-ThermalModel in_frame(const ThermalModel& fitted, const ThermalModel& frame) {
-  if (!frame.terms.empty() || !frame.guideways.empty() || frame.course ||
-      !frame.covariance_K2.empty())
-    throw std::runtime_error(
-        "--like: that model has terms, guideways, a covariance or a course, which a fit cannot "
-        "keep; "
-        "name one with a matrix alone, as init writes it");
+ThermalModel in_frame(const ThermalModel& fitted, const ThermalModel& frame, Names& notes) {
+  const Names kept = without(frame.outputs, fitted.outputs);
+  const bool has_more = !frame.terms.empty() || !frame.guideways.empty() || frame.course;
+  if (has_more && !kept.empty())
+    throw std::runtime_error("--like: " + joined(kept) +
+                             " of that model was not fitted, and its terms, guideways or course "
+                             "would be lost: name it in --outputs too, or a model with a matrix "
+                             "alone");
+  if (!kept.empty()) notes.push_back(joined(kept) + ": not fitted, the row of --like stays");
+  for (const std::string& name : without(fitted.outputs, frame.outputs))
+    notes.push_back(name +
+                    ": no output of the model of --like; it compensates only where an axis "
+                    "of the configuration names it");
+  if (has_more) notes.emplace_back("terms, guideways and course of --like are not taken over");
+  if (!frame.covariance_K2.empty())
+    notes.emplace_back(
+        "the covariance of --like is not taken over: make it anew (thermocomp covariance)");
   ThermalModel model = fitted;
   model.inputs = together(frame.inputs, fitted.inputs);
   model.outputs = together(frame.outputs, fitted.outputs);

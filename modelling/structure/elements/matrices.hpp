@@ -33,7 +33,7 @@ struct Coupling {
   void add(std::span<const Index> face_nodes, std::span<const double> values, double sign);
 };
 
-/// K: 3 unknowns a node, plus couplings.  [N/m]
+/// K: 3 unknowns per node, plus couplings [N/m].
 /// @param material_of_part  shape (parts)
 [[nodiscard]] SparseSymmetric stiffness_matrix(const Mesh& mesh,
                                                std::span<const Material> material_of_part,
@@ -50,7 +50,7 @@ struct Coupling {
 [[nodiscard]] std::vector<double> thermal_load_transposed(
     const Mesh& mesh, std::span<const Material> material_of_part, std::span<const double> v);
 
-/// One unknown a node: conduction plus couplings [W/K], and capacity [J/K], in equal patterns.
+/// One unknown per node: conduction plus couplings [W/K], and capacity [J/K], in equal patterns.
 struct HeatMatrices {
   SparseSymmetric conduction;
   SparseSymmetric capacity;

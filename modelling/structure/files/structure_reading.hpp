@@ -29,7 +29,7 @@ constexpr std::array<const char*, 3> range_keys{"x_mm", "y_mm", "z_mm"};
 /// `name`; a problem where `names` has it already.
 [[nodiscard]] std::string read_unique_name(const TomlTable& table, std::set<std::string>& names);
 
-/// What `key` names, as its place among `known`; a problem and 0 where there is none such.
+/// The index among `known` of what `key` names; a problem and 0 where there is none.
 [[nodiscard]] Index read_index(const TomlTable& table, std::string_view key,
                                const std::vector<std::string>& known, std::string_view what);
 

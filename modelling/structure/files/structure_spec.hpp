@@ -21,7 +21,7 @@ struct Origin {
   std::string value;  ///< as it may be shown
 };
 
-/// Nodes or faces: everything that keeps all that is given.
+/// Nodes or faces: everything that meets all given conditions.
 struct Region {
   std::optional<std::string> part;
   std::optional<std::string> group;  ///< a name of the mesh file
@@ -59,8 +59,7 @@ struct JointSpec {
   bool bonded{true};
   Vec3 stiffness_N_per_m{};  ///< of the whole joint, where it is not bonded
   double gap_m{0.0};         ///< greatest distance between the faces
-  /// Heat through the faces; none: a bonded joint conducts as if it were not there, one by springs
-  /// not at all.
+  /// Heat through the faces; none: a bonded joint conducts perfectly, one by springs not at all.
   std::optional<double> conductance_W_per_m2_K;
 };
 
@@ -96,7 +95,7 @@ struct GuidewayRows {
   std::string name;
   std::string axis;
   std::vector<double> positions_mm;
-  std::vector<PlaceSpec> places;  ///< one a position
+  std::vector<PlaceSpec> places;  ///< one per position
   /// Where the meshes have the axis: rows then say what other positions differ by.
   std::optional<PlaceSpec> drawn;
   std::map<std::string, Vec3> outputs;  ///< name -> direction
@@ -133,7 +132,7 @@ struct LoadCaseSpec {
   bool left_out{false};  ///< judges a placement and takes no part in it
 };
 
-/// By how much a pattern changes the rise of its blocks where the file does not say it.
+/// By how much a pattern changes the rise of its blocks where the file does not say.
 inline const std::vector<double> usual_percents{10.0, -10.0, 5.0, -5.0};
 
 /// Blocks that are made warmer or cooler together where sensors are placed.

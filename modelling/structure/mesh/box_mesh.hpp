@@ -13,7 +13,7 @@ struct BoxShape {
 };
 
 /// Appends a part. Every face of a box is a plane of the grid through the whole part, so walls,
-/// ribs and openings meet in common nodes. A tetrahedral mesh has six elements a cell.
+/// ribs and openings meet in common nodes. A tetrahedral mesh has six elements per cell.
 /// @param boxes   in order: where boxes overlap the last one decides
 /// @param size_m  an element's greatest edges along x, y, z
 /// @return the number of elements; 0 where the boxes leave nothing

@@ -34,7 +34,7 @@ struct Mesh {
   std::vector<Element> elements;
   std::vector<Index> connectivity;
   std::vector<std::string> part_names;
-  /// One map a part: groups are known by the mesh that the part came from.
+  /// One map per part: groups are known by the mesh that the part came from.
   std::vector<std::map<std::string, Group>> groups;
 
   [[nodiscard]] std::span<const Index> nodes_of(const Element& element) const {
@@ -79,7 +79,7 @@ struct Box {
 };
 [[nodiscard]] Box bounds_of(std::span<const Vec3> points_m);
 
-/// Of two lengths of a model what counts as none [m].
+/// The distance below which two points of the model count as one [m].
 [[nodiscard]] double coincidence_m(const Mesh& mesh);
 
 }  // namespace thermocomp::structure

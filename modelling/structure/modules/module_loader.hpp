@@ -3,7 +3,7 @@
 
 namespace thermocomp::structure {
 
-/// A module, and what is said where it cannot be had.
+/// A module, and what is said where it is missing.
 struct Module {
   const char* name;       ///< of the file
   const char* does;       ///< "reads ..."
@@ -11,9 +11,9 @@ struct Module {
   const char* needs;      ///< the library that it is linked with, and its package
 };
 
-/// Loads the module for good: its libraries are not made for being unloaded. In a build tree it
-/// lies beside the program, installed in lib/thermocomp.
-/// @throws std::runtime_error, not one of a file: nothing is wrong with what was to be read
+/// Loads the module for good: its libraries are not made to be unloaded. In a build tree it lies
+/// beside the program, installed in lib/thermocomp.
+/// @throws std::runtime_error, not an error of a file: nothing is wrong with what was to be read
 [[nodiscard]] const void* functions_of(const Module& module);
 
 }  // namespace thermocomp::structure

@@ -19,12 +19,12 @@ struct HeatInput {
 
 class Conduction {
  public:
-  /// @pre reduction has one component a node and outlives this
+  /// @pre reduction has one component per node and outlives this
   Conduction(const Mesh& mesh, std::span<const Material> material_of_part,
              const Reduction& reduction, std::span<const Coupling> couplings);
 
   [[nodiscard]] std::size_t nodes() const noexcept { return reduction_.full_size(); }
-  /// L T = q. @throws FactorisationError where nothing sets the level of the temperature
+  /// L T = q. @throws FactorisationError where nothing fixes the level of the temperature
   [[nodiscard]] std::vector<double> steady_degC(const HeatInput& input) const;
   /// Heat held at `temps_degC` [J], above 0 degC.
   [[nodiscard]] double energy_J(std::span<const double> temps_degC) const;

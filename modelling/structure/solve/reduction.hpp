@@ -1,4 +1,4 @@
-/// Which unknowns are free: u = T q + g, with q the free ones, g what is given.
+/// Which unknowns are free: u = T q + g, with q the free ones and g what is given.
 #pragma once
 
 #include <span>

@@ -39,7 +39,7 @@ class Statics {
   /// The same from forces [N], shape (3 nodes).
   [[nodiscard]] std::vector<double> displacement_under_m(std::span<const double> force_N) const;
   /// The adjoint: for each output its derivative by the temperature of every node [m/K], shape
-  /// (outputs)(nodes). One solve an output, whatever the number of nodes and blocks.
+  /// (outputs)(nodes). One solve per output, whatever the number of nodes and blocks.
   [[nodiscard]] std::vector<std::vector<double>> sensitivities(
       std::span<const Functional> outputs) const;
 
@@ -60,8 +60,8 @@ using Stress = std::array<double, 6>;
                                                     std::span<const double> displacement_m,
                                                     std::span<const double> rise_K);
 
-/// What can move without being held or sprung, one line a body: supports, ties and couplings are
-/// looked at on the bodies' rigid motions. Empty: everything is held.
+/// What can move without being held or sprung, one line per body: supports, ties and couplings are
+/// tried on the bodies' rigid motions. Empty: everything is held.
 [[nodiscard]] std::vector<std::string> free_motions(const Mesh& mesh, const Reduction& reduction,
                                                     std::span<const Coupling> couplings);
 

@@ -142,6 +142,9 @@ def test_by_options_without_a_terminal(foreign, folder):
     assert answer.returncode == 2 and "--force" in answer.stderr
     assert config.read_text() == before
     assert run(*arguments, "--force").returncode == 0
+    arguments[5] = "bus1/" + arguments[5]  # as the configuration names it
+    assert run(*arguments, "--force").returncode == 0
+    assert config.read_text() == before
 
 
 def test_a_model_that_is_there_is_bound_by_the_sensors_names(foreign, folder):

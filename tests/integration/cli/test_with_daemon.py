@@ -37,6 +37,11 @@ def test_json_is_the_daemons_answer_and_why_the_exit_status(daemon):
     assert json.loads(answer.stdout) == daemon.answers["status"] | {"exit_status": 0, "why": []}
 
 
+def test_the_socket_can_be_named_behind_the_command(daemon):
+    assert run("status", "--socket", daemon.path).returncode == 0
+    assert run("prove", "z", "5", "--socket", daemon.path + "none").returncode == 2
+
+
 def test_the_socket_can_be_named_by_the_environment(daemon):
     assert run("status", env={"THERMOCOMP_SOCKET": daemon.path}).returncode == 0
 
@@ -52,6 +57,20 @@ def test_operator_commands_ask_the_right_method(daemon):
         assert answer.returncode == 0, answer.stderr
         assert daemon.requests[-1]["method"] == method
         assert daemon.requests[-1].get("params", {}) == params
+
+
+def test_release_says_what_it_takes_on_trust(daemon):
+    daemon.answers["release"] = {"done": True}
+    axis = {"name": "z", "unit": "um", "driven": False, "applied": 26.67,
+            "mismatch": {"sent_um": 14.67, "read_um": 26.67, "likely": "changes without us"}}
+    daemon.answers["status"] = status_answer(axes=[axis])
+    said = run("--socket", daemon.path, "release", "z").stdout
+    assert "reads back +26.67 um where +14.67 um was sent last" in said
+    assert daemon.requests[-1] | {"id": 0} == {
+        "jsonrpc": "2.0", "id": 0, "method": "release", "params": {"axis": "z"}}
+    axis["applied"] = 14.6
+    daemon.answers["status"] = status_answer(axes=[axis])
+    assert "reads back" not in run("--socket", daemon.path, "release", "z").stdout
 
 
 def test_measured_shows_what_is_left_beside_what_the_model_says_is_left(daemon):

@@ -12,7 +12,7 @@ from lab import eventually, run_tool
 
 def without_times(value):
     """Numbers that differ from one moment to the next taken out, so that two answers compare."""
-    changing = {"age_s", "uptime_s", "mode_since_s", "cycle", "socket", "last_commit_age_s",
+    changing = {"age_s", "uptime_s", "mode_since_s", "compensating_s", "cycle", "socket", "last_commit_age_s",
                 "size_MB", "round_trip_ms", "requests", "answers", "writes", "reads", "state_s",
                 "rate_K_per_h", "ended", "outside_share_24h"}
     if isinstance(value, dict):

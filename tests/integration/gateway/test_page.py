@@ -1,34 +1,27 @@
 """The page in a real browser: no error in its console, and it follows the machine."""
 
+import importlib.util
 import os
 import shutil
 import time
 
 import pytest
 
+from chromium import headless
+from gateway_lab import Broker, Gateway
 from lab import eventually
 
-webdriver = pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
-if not shutil.which("chromedriver"):
-    pytest.skip("chromium-driver is not installed", allow_module_level=True)
+pytestmark = [
+    pytest.mark.skipif(not importlib.util.find_spec("selenium"), reason="python3-selenium is not installed"),
+    pytest.mark.skipif(not shutil.which("chromedriver"), reason="chromium-driver is not installed")]
 
 PHONE, WALL = (390, 844), (1920, 1080)
 
 
 @pytest.fixture
 def browser(lab):
-    options = webdriver.ChromeOptions()
-    for argument in ("headless", "no-sandbox", "disable-gpu", "disable-dev-shm-usage",
-                     "disable-background-networking", "hide-scrollbars",
-                     f"user-data-dir={lab.folder / 'browser'}"):
-        options.add_argument("--" + argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    service = webdriver.chrome.service.Service(shutil.which("chromedriver"))
-    driver = webdriver.Chrome(options=options, service=service)
-    try:
+    with headless(lab.folder) as driver:
         yield driver
-    finally:
-        driver.quit()
 
 
 def resize(browser, size):
@@ -52,6 +45,13 @@ def picture(browser, name):
         browser.save_screenshot(os.path.join(folder, name + ".png"))
 
 
+def within_s(check, what):
+    """How long it took; that is the claim of the document, not of this test."""
+    begun = time.monotonic()
+    eventually(check, what)
+    return time.monotonic() - begun
+
+
 def show(browser, gateway, size, query=""):
     resize(browser, size)
     browser.get(f"http://localhost:{gateway.port}/{query}")
@@ -67,7 +67,9 @@ def no_wider_than_the_screen(browser):
 def test_it_loads_without_an_error_and_fits_the_screen(machine, gateway, browser, size, query):
     show(browser, gateway, size, query)
     machine.warm_by(9.0)
-    eventually(lambda: "+9.0" in text(browser, "axes"), "the offset")
+    machine.daemon.wait_for_offset(9.0)
+    took_s = within_s(lambda: "+9.0" in text(browser, "axes"), "the offset")
+    print(f"the page shows the daemon's offset after {took_s:.2f} s")
     eventually(lambda: browser.execute_script(
         "return document.querySelectorAll('.axis canvas').length") > 0, "a chart")
     assert no_wider_than_the_screen(browser)
@@ -86,13 +88,6 @@ def test_it_loads_without_an_error_and_fits_the_screen(machine, gateway, browser
         "return performance.getEntriesByType('resource').map(e => e.name)"
         ".filter(name => !name.startsWith(location.origin))")
     assert elsewhere == []
-
-
-def within_s(check, what):
-    """How long it took; that is the claim of the document, not of this test."""
-    begun = time.monotonic()
-    eventually(check, what)
-    return time.monotonic() - begun
 
 
 def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
@@ -123,12 +118,30 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     assert console(browser, but=refused) == []
 
 
+def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):
+    broker = lab.also_end(Broker(lab.folder)).start()
+    gateway = lab.also_end(Gateway(lab, machine.daemon, "", f'[mqtt]\nhost = "localhost"\n'
+                                   f'port = {broker.port}')).start()
+    show(browser, gateway, PHONE)
+    eventually(lambda: text(browser, "problem-list") == "", "nothing is wrong")
+    broker.stop()
+    took = {"gone": within_s(lambda: "MQTT broker" in text(browser, "problem-list"), "it is told")}
+    assert "start the broker" in text(browser, "problem-list")
+    assert text(browser, "answer") == "yes"
+    picture(browser, "broker")
+    broker.start()
+    took["back"] = within_s(lambda: text(browser, "problem-list") == "", "it is found again")
+    print("the page said so after", {name: f"{s:.1f} s" for name, s in took.items()})
+
+
 def test_a_clock_that_is_wrong_is_told(machine, gateway, browser):
     resize(browser, PHONE)
     browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {
         "source": "const now = Date.now; Date.now = () => now() - 7230000;"})
     browser.get(f"http://localhost:{gateway.port}/")
-    eventually(lambda: "2 h 0 min ahead of" in text(browser, "problem-list"), "the clocks differ")
+    took_s = within_s(lambda: "2 h 0 min ahead of" in text(browser, "problem-list"),
+                      "the clocks differ")
+    print(f"the page said so after {took_s:.1f} s")
 
 
 def test_names_cannot_become_a_part_of_the_page(machine, gateway, browser):

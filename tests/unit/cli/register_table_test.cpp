@@ -73,6 +73,44 @@ TEST_CASE("what the contract lacks is said", "[cli][registers]") {
   CHECK_THAT(text, Contains("no applied"));
 }
 
+TEST_CASE("a set is shown register by register, and how it is interpolated", "[cli][registers]") {
+  const std::string text = register_table(example("travel.toml"));
+  for (const char* part :
+       {"begin: number of the set of axis x", "K0, offset at 0 mm of axis x", "um/m, count x 0.001",
+        "P0 of axis x", "offset at 150 mm of axis z", "applied offset at 600 mm of axis z",
+        "bit 0: x, bit 1: z", "offset = K0 + slope (x_mm - 0 mm)", "everywhere on the travel"})
+    CHECK_THAT(text, Contains(part));
+}
+
+TEST_CASE("a set in frames is shown frame by frame, with its number in each", "[cli][registers]") {
+  const std::string text = register_table(example("travel_can.toml"));
+  const auto read = text.find("Sent by the controller, each frame");
+  REQUIRE(read != std::string::npos);
+  const auto frame = [](const std::string& part, const char* id) {
+    const auto begin = part.find(std::string("frame ") + id);
+    REQUIRE(begin != std::string::npos);
+    return part.substr(begin, part.find(" frame ", begin + 1) - begin);
+  };
+  const std::string sent = text.substr(0, read);
+  const std::string shown = text.substr(read);
+  for (const char* row :
+       {"0, 24 bits", "K0, offset at 0 mm of axis x", "um/m, count x 0.001",
+        "48, 16 bits           unsigned, little endian  number of the set of axis x"})
+    CHECK_THAT(frame(sent, "0x210"), Contains(row));
+  CHECK_THAT(frame(sent, "0x211"), Contains("offset at 300 mm of axis z"));
+  CHECK_THAT(frame(sent, "0x211"), Contains("number of the set of axis z"));
+  CHECK_THAT(frame(sent, "0x212"), Contains("offset at 600 mm of axis z"));
+  CHECK_THAT(frame(sent, "0x212"), Contains("number of the set of axis z"));
+  CHECK_THAT(frame(sent, "0x200"), Contains("bit 0: x, bit 1: z"));
+  CHECK_THAT(frame(shown, "0x292"), Contains("applied offset at 600 mm of axis z"));
+  CHECK_THAT(frame(shown, "0x292"), Contains("applied number of the set of axis z"));
+  for (const char* part :
+       {"its newest frames carry the same number, none older than 1 s",
+        "offset = K0 + slope (x_mm - 0 mm)", "everywhere on the travel within +-60 um"})
+    CHECK_THAT(text, Contains(part));
+  CHECK_THAT(text, !Contains("Missing"));
+}
+
 TEST_CASE("a piezo's registers are volts, and no controller has none", "[cli][registers]") {
   CHECK_THAT(register_table(example("piezo.toml")), Contains("voltage of axis"));
   CHECK_THAT(register_table(example("modbus_rtu.toml")), Contains("there is no controller"));

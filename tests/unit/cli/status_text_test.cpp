@@ -193,6 +193,29 @@ TEST_CASE("the error state of a CAN interface is told with its age and a remedy"
   CHECK_THAT(status_text(status, false), !Contains("bus body"));
 }
 
+TEST_CASE("a sensor that lies plausibly is told with its size and whether it is used",
+          "[cli][status]") {
+  json status = good_status();
+  const json lie = {{"size_K", -2.04}, {"since", 1'700'000'000.0}, {"weighed_down", false}};
+  status["sensors_suspected"] = {lie};
+  status["sensors_suspected"][0]["name"] = "head";
+  status["reasons"] = {"sensor_suspected"};
+  const std::string used = status_text(status, false);
+  CHECK_THAT(used, Contains("sensor head is off by -2.0 K against its neighbours since "));
+  CHECK_THAT(used, Contains(", used all the same"));
+  CHECK_THAT(used, !Contains("Problems        : none"));
+  status["sensors_suspected"][0]["weighed_down"] = true;
+  CHECK_THAT(status_text(status, false), Contains(", not used"));
+
+  json sensor = {{"name", "head"}, {"fault", "none"},       {"raw_degC", 20.0},
+                 {"age_s", 0.1},   {"smoothed_degC", 20.0}, {"rejected", 0},
+                 {"clipped", 0},   {"suspected", nullptr}};
+  CHECK_THAT(sensors_text({{"sensors", {sensor}}}, false), !Contains("suspected"));
+  sensor["suspected"] = lie;
+  CHECK_THAT(sensors_text({{"sensors", {sensor}}}, false),
+             Contains("suspected: off by -2.0 K against its neighbours since "));
+}
+
 TEST_CASE("an answer of an unexpected shape is shown, not fatal", "[cli][status]") {
   for (const char* text : {"{}", "[]", "null", "7", R"({"axes": 5, "cycle": [], "mode": 3})"}) {
     const json odd = json::parse(text);

@@ -278,6 +278,75 @@ TEST_CASE("a piezo's curve is read, must rise, and must reach the axis' bound", 
   }
 }
 
+TEST_CASE("an axis whose controller interpolates along the travel becomes its nodes",
+          "[config][travel]") {
+  const DaemonConfig config = load_daemon_config(examples / "travel.toml");
+  const std::vector<AxisConfig>& axes = config.estimator.axes;
+  REQUIRE(axes.size() == 7);
+  CHECK(axes[0].name == "x_1");
+  CHECK(axes[0].node->axis == "x");
+  CHECK(axes[1].node->position_mm == 800.0);
+  CHECK(axes[1].node->form == TravelForm::line);
+  CHECK(axes[6].name == "z_5");
+  CHECK(axes[6].node->position == "z_mm");
+  CHECK(axes[6].limiter.offset_um_max == 60.0);
+  CHECK(config.estimator.controller_reads_back);
+  const auto& controller = std::get<ModbusControllerConfig>(config.controller);
+  REQUIRE(controller.axes.size() == 2);
+  CHECK(controller.offsets() == 7);
+  CHECK(controller.axes[0].travel->p0_mm == 0.0);
+  CHECK(controller.axes[0].travel->values.size() == 3);
+  CHECK(controller.axes[0].travel->end.address == 107);
+  CHECK_FALSE(controller.axes[1].travel->p0_mm);
+  CHECK(controller.axes[1].travel->values.at(4).address == 125);
+  CHECK(controller.axes[1].travel->applied.at(4).address == 125);
+}
+
+TEST_CASE("a travel that cannot be is refused, with key and rule", "[config][travel]") {
+  const std::string text = example("travel.toml");
+  const std::vector<std::pair<std::pair<std::string, std::string>, const char*>> bad = {
+      {{"travel_mm = [0.0, 800.0]", "travel_mm = [800.0, 0.0]"}, "travel_mm"},
+      {{"travel_mm = [0.0, 800.0]", "travel_mm = [0.0, 400.0, 800.0]"}, "both ends of the travel"},
+      {{"p0_mm = 0.0 ", "p0_mm = -1.0 "}, "must be within travel_mm"},
+      {{"position = \"x_mm\"", "position = \"y_mm\""},
+       "must be a position of the model: x_mm, z_mm"},
+      {{"position = \"x_mm\"", "position = \"column_degC\""}, "must be a position"},
+      {{"nodes_mm = [0.0, 150.0, 300.0, 450.0, 600.0]", "nodes_mm = [0.0]"}, "2 to 16 nodes"},
+      {{"nodes_mm = [0.0, 150.0, 300.0, 450.0, 600.0]",
+        "nodes_mm = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14]"},
+       "at most 16 axes, nodes of travels counted"},
+      {{"address = 103, encoding = \"int32\", scale = 0.001 }\np0_r",
+        "address = 104, encoding = \"int32\", scale = 0.001 }\np0_r"},
+       "must begin at register 103"},
+      {{"address = 126, encoding", "address = 127, encoding"}, "must begin at register 126"},
+      {{"address = 107, encoding = \"uint16\"", "address = 107, encoding = \"uint32\""},
+       "must have the encoding of `begin`"},
+      {{"slope_um_per_m = { table = \"holding\", address = 103, encoding = \"int32\", scale = "
+        "0.001",
+        "slope_um_per_m = { table = \"holding\", address = 103, encoding = \"int32\", scale = 0.2"},
+       "one count moves the end of the travel by 0.16 um"},
+      {{"address = 121, encoding = \"int16\", scale = 0.01",
+        "address = 121, encoding = \"int16\", scale = 0.001"},
+       "must be able to hold -offset_um_max"},
+      {{"address = 120, encoding", "address = 107, encoding"}, "is written by"},
+      {{"[axis.table] ",
+        "offset = { table = \"holding\", address = 1, encoding = \"int16\" }\n"
+        "[axis.table] "},
+       "makes no sense beside"},
+      {{"name = \"z\"", "name = \"x_2\""}, "nodes"},
+  };
+  for (const auto& [edit, rule] : bad) {
+    INFO(edit.second);
+    CHECK_THROWS_WITH(parse(edited(text, edit.first, edit.second), "travel_model.toml"),
+                      Catch::Contains(rule));
+  }
+  const std::string play =
+      example("travel_model.toml") +
+      "\n[[term]]\nkind = \"hysteresis\"\nsubject = \"x_um\"\nwidth_um = 2.0\n";
+  CHECK_THROWS_WITH(parse_daemon_config(text, "machine.toml", play, "model.toml"),
+                    Catch::Contains("is no curve"));
+}
+
 TEST_CASE("keys of cycles make no sense where the offset follows the model", "[config]") {
   CHECK_THROWS_WITH(
       edited_machine("update = \"continuous\"", "update = \"continuous\"\ncycles_per_update = 2"),

@@ -121,3 +121,12 @@ TEST_CASE("a full buffer keeps the newest messages, and the last of each topic",
   while (const auto message = buffer.take()) taken += message->topic + message->payload + " ";
   CHECK(taken == "often2 often3 often4 often4 rarer ");
 }
+
+TEST_CASE("a dry run is no alarm, one that lacks a sensor is", "[gateway][alarm]") {
+  Snapshot snapshot = good_snapshot();
+  snapshot.status["dry_run"] = true;
+  snapshot.status["mode"] = "dry_run";
+  CHECK(wrong_now(snapshot).empty());
+  snapshot.status["mode"] = "holding";
+  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"compensation"});
+}

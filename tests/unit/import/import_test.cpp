@@ -120,6 +120,30 @@ TEST_CASE("TOA5: names and units from their lines, record numbers left out", "[i
   CHECK(says(run, "'RECORD' left out"));
 }
 
+TEST_CASE("TOA5: elements of an array keep their units, what has no value is missing", "[import]") {
+  // As multiplexers of thermocouples are written; the fractions of a second of fast tables.
+  const auto written = [](const std::string& unit_of_flags) {
+    return "\"TOA5\",\"mill_3\",\"CR3000\",\"1\",\"CR3000.Std.22\",\"CPU:a.CR3\",\"24006\","
+           "\"fast\"\r\n"
+           "\"TIMESTAMP\",\"RECORD\",\"TC(1)\",\"TC(2)\",\"Flag(1)\"\r\n"
+           "\"TS\",\"RN\",\"Deg C\",\"Deg C\",\"" +
+           unit_of_flags +
+           "\"\r\n"
+           "\"\",\"\",\"Smp\",\"Smp\",\"Smp\"\r\n"
+           "\"2012-06-07 12:45:00.05\",11,20.5,21.5,0\r\n"
+           "\"2012-06-07 12:45:00.1\",12,\"INF\",\"NAN\",1\r\n";
+  };
+  const RunFile run = import_text(written("-"), "x", nullptr, {}).run;
+  CHECK(run.columns == Columns{"time_s", "TC(1)_degC", "TC(2)_degC", "Flag(1)"});
+  CHECK(run.time_s()[1] == Approx(0.05));
+  CHECK(run.column("TC(2)_degC")[0] == 21.5);
+  CHECK(std::isnan(run.column("TC(1)_degC")[1]));
+  CHECK(std::isnan(run.column("TC(2)_degC")[1]));
+  CHECK(says(run, "INF, taken as missing: 1"));
+  CHECK_THROWS_WITH(import_text(written(""), "x", nullptr, {}),
+                    Contains("column 4 = Flag(1): has no unit"));
+}
+
 TEST_CASE("KW Watcher: seven lines above the rows", "[import]") {
   const RunFile run = imported("kw_watcher.csv");
   CHECK(run.columns == Columns{"time_s", "bed_degC", "head_degC", "spindle_rpm"});

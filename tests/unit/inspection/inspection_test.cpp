@@ -56,6 +56,17 @@ const Finding* find(const Inspection& inspection, const std::string& kind) {
 
 }  // namespace
 
+TEST_CASE("what the compensation did is no displacement of the machine", "[inspection]") {
+  RunFile run = recording();
+  for (const char* name : {"z_offset_um", "z_applied_um", "z_measured_um"}) {
+    run.columns.emplace_back(name);
+    run.values.emplace_back(rows, 0.0);
+    for (std::size_t row = 300; row < rows; row += 40) run.values.back()[row] = 18.0;
+  }
+  for (const Finding& each : inspect({run}).findings)
+    CHECK_THAT(each.column, !Catch::Contains("z_"));
+}
+
 TEST_CASE("nothing is found in a recording that is as it should be", "[inspection]") {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const Inspection inspection = inspect({recording(seed)});

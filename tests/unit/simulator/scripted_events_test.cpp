@@ -131,6 +131,53 @@ TEST_CASE("a controller approaches the offset with its time constant and rate") 
   CHECK(limited.applied_um(0) == Approx(2.0));
 }
 
+TEST_CASE("a controller takes all nodes of a travel or none, and interpolates by its position") {
+  SimulatedController config = two_axes();
+  config.heartbeat.reset();
+  config.axes[0].offset_um_max = 60.0;
+  config.axes[0].travel.emplace();
+  config.axes[0].travel->registers.nodes_mm = {0.0, 100.0, 300.0};
+  config.axes[0].travel->interpolation_um_per_s_max = 10.0;
+  SimulatedCnc cnc(config);
+  CHECK(cnc.first(1) == 3);
+  cnc.take(0.0, {{0.0, 5.0, 1.0, 7.0}, 3, 0.0});
+  cnc.step(0.1, {});
+  cnc.stand_at(0, 1.0, 50.0);
+  CHECK(cnc.applied_um(0) == Approx(2.5));
+  cnc.stand_at(0, 1.1, 200.0);
+  CHECK(cnc.applied_um(0) == Approx(3.0));
+  cnc.stand_at(0, 1.15, 150.0);
+  CHECK(cnc.applied_um(0) == Approx(3.5));  // a step of its own limit
+  CHECK(cnc.applied_um(1) == 7.0);
+  cnc.take(1.2, {{1.0, 100.0, 1.0, 8.0}, 3, 0.0});
+  cnc.step(1.3, {});
+  CHECK(cnc.nodes(0)[0] == 0.0);  // one is out of bound
+  CHECK(cnc.nodes(0)[1] == 5.0);
+  CHECK(cnc.applied_um(1) == 8.0);
+  cnc.stand_at(0, 9.0, 900.0);
+  CHECK(cnc.applied_um(0) == Approx(1.0));  // a table's end holds beyond it
+}
+
+TEST_CASE("the number of a set is in effect with its values, and forgotten with them") {
+  SimulatedController config = two_axes();
+  config.heartbeat.reset();
+  config.axes[0].travel.emplace();
+  config.axes[0].travel->frames.emplace();
+  config.axes[0].travel->frames->nodes_mm = {0.0, 100.0};
+  SimulatedCnc cnc(config);
+  CHECK(cnc.set_number(0) == 0);
+  cnc.take(0.0, {{1.0, 2.0, 7.0}, 3, 0.0, {9, 0}});
+  CHECK(cnc.set_number(0) == 9);
+  cnc.take(0.1, {{3.0, 4.0, 7.0}, 2, 0.0, {10, 0}});  // its valid bit is 0
+  cnc.step(0.2, {});
+  CHECK(cnc.set_number(0) == 9);
+  CHECK(cnc.nodes(0)[1] == 2.0);
+  cnc.take(0.3, {{3.0, NAN, 7.0}, 3, 0.0, {11, 0}});
+  CHECK(cnc.set_number(0) == 9);
+  cnc.forget();
+  CHECK(cnc.set_number(0) == 0);
+}
+
 TEST_CASE("a controller rejects, misapplies and forgets as the script says") {
   SimulatedController config = two_axes();
   config.heartbeat.reset();

@@ -215,6 +215,23 @@ TEST_CASE("rare probings are figures too, with their own noise", "[thermal_test]
   CHECK(axis.until_end.high - axis.until_end.value == Approx(1.96 * std::sqrt(2.0) * 0.5));
 }
 
+TEST_CASE("values that are hours apart say nothing of an hour", "[thermal_test]") {
+  RunFile run = simulated(0.0, 3);
+  auto& z = run.values[*run.find("z_um")];
+  const auto keep_every = [&](std::size_t rows) {
+    for (std::size_t i = 0; i < z.size(); ++i)
+      if (i % rows != 0) z[i] = std::nan("");
+    TestOptions options = options_of(TestKind::environment);
+    options.axes = {"z=z_um"};
+    options.noise_um = 0.1;
+    return figures_of(test_data(run, options)).axes.at(0);
+  };
+  CHECK(keep_every(60).largest_hour.is_there());  // five minutes
+  const AxisFigures rare = keep_every(1800);      // two and a half hours
+  CHECK_FALSE(rare.largest_hour.is_there());
+  CHECK(rare.whole.is_there());
+}
+
 TEST_CASE("an axis by a formula of two probes is the tilt that names give", "[thermal_test]") {
   const RunFile run = simulated(0.1, 5);
   TestOptions options = options_of(TestKind::spindle);
@@ -224,6 +241,27 @@ TEST_CASE("an axis by a formula of two probes is the tilt that names give", "[th
   REQUIRE(given.axes.size() == 1);
   CHECK(given.axes[0].measured.value == named.axes.back().measured.value);
   CHECK(given.axes[0].unit == "urad");
+}
+
+TEST_CASE("of a history, axes that nobody measured are left out", "[thermal_test]") {
+  RunFile run = simulated(0.0, 3);
+  run.columns[*run.find("x1_um")] = "x_measured_um";
+  run.columns[*run.find("x2_um")] = "z_measured_um";
+  const std::size_t x = *run.find("x_measured_um");
+  const std::size_t z = *run.find("z_measured_um");
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    run.values[x][row] = std::nan("");
+    if (row % 500 != 10) run.values[z][row] = std::nan("");
+  }
+  const TestData data = test_data(run, options_of(TestKind::spindle));
+  REQUIRE(data.axes.size() == 1);
+  CHECK(data.axes[0].from == "z_measured_um");
+  // Where what was measured has no values, the displacement of that name is the axis.
+  for (double& value : run.values[z]) value = std::nan("");
+  CHECK(test_data(run, options_of(TestKind::spindle)).axes.at(0).from == "z_um");
+  for (double& value : run.values[*run.find("z_um")]) value = std::nan("");
+  CHECK_THROWS_WITH(test_data(run, options_of(TestKind::spindle)),
+                    Contains("has two values") && Contains("thermocomp measured AXIS UM"));
 }
 
 TEST_CASE("what is not clear is asked for by the option to write", "[thermal_test]") {

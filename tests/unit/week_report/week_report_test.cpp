@@ -118,6 +118,152 @@ TEST_CASE("what to do: a drifting sensor is named, a steady one is not", "[week]
   CHECK(advice(week).empty());
 }
 
+TEST_CASE("a sensor that was suspected is named with what to do, in its own line", "[week]") {
+  MachineWeek week;
+  week.span = {begin_s, begin_s + 7 * day_s};
+  week.course = week_of_sensors(2.0, 3);  // column drifts, too
+  week.sensors = sensors_of(week.course);
+  const WeekEvents events{
+      {event_at(0, "mode", "", "compensating"),
+       event_at(1000, "fault", "reason sensor_suspected", "sensor_suspected"),
+       event_at(1000, "fault", "suspected sensor column", "off by +2.0 K against its neighbours"),
+       event_at(8200, "recovery", "suspected sensor column", ""),
+       event_at(8200, "recovery", "reason sensor_suspected", "")},
+      {{1, begin_s + 7 * day_s}}};
+  week.modes = mode_spells(events, week.span);
+  week.outages = outages_of(events, week.span);
+  const std::vector<std::string> lines = advice(week);
+  REQUIRE_FALSE(lines.empty());
+  CHECK_THAT(lines[0], Contains("Sensor column is suspected: off by +2.0 K") &&
+                           Contains("1 time, 2 h 0 min in all. Do:") && Contains("thermometer"));
+  for (const std::string& line : lines) {
+    CHECK_THAT(line, !Contains("drifted by"));  // said once
+    CHECK_THAT(line, !Contains("a sensor shows what its neighbours contradict"));
+  }
+  const std::string html = week_html(week);
+  CHECK_THAT(html, Contains("<td>2 h 0 min</td>"));
+  CHECK_THAT(html, Contains("No faults of buses, devices or controller."));
+}
+
+TEST_CASE("a bus takes its sensors with it in one line, and a broken one has its own", "[week]") {
+  WeekEvents events{{}, {{1, begin_s + day_s}}};
+  events.events.push_back(event_at(1000, "fault", "bus cabinet", "no answer"));
+  for (const char* name : {"bed", "column", "oil"})
+    events.events.push_back(event_at(1001, "fault", std::string("sensor ") + name, "no_answer"));
+  for (const char* name : {"bed", "column", "oil"})
+    events.events.push_back(event_at(1700, "recovery", std::string("sensor ") + name, "no_answer"));
+  events.events.push_back(event_at(1700, "recovery", "bus cabinet", "no answer"));
+  events.events.push_back(event_at(5000, "fault", "sensor oil", "open_circuit"));
+  events.events.push_back(event_at(9000, "recovery", "sensor oil", "open_circuit"));
+  MachineWeek week;
+  week.span = {begin_s, begin_s + day_s};
+  week.outages = outages_of(events, week.span);
+  REQUIRE(week.outages.size() == 4);
+  CHECK(week.outages[0].subject == "sensor oil");
+  CHECK(week.outages[0].count == 2);
+  CHECK(week.outages[0].kinds.at("open_circuit").count == 1);
+  CHECK(week.outages[0].kinds.at("open_circuit").lasted_s == Approx(4000.0).margin(1e-3));
+  const std::vector<std::string> lines = advice(week);
+  REQUIRE(lines.size() == 3);
+  CHECK_THAT(lines[0], Contains("Bus cabinet: no answer, 1 time, 11 min 40 s in all."));
+  CHECK_THAT(lines[1], Contains("Sensor oil: thermocouple broken, 1 time, 1 h 6 min"));
+  CHECK_THAT(lines[2], Contains("Sensors oil, bed, column: the unit does not answer, 1 time") ||
+                           Contains("Sensors bed, column, oil: the unit does not answer, 1 time"));
+}
+
+TEST_CASE("a picture does not bridge the hours in which the daemon did not run", "[week]") {
+  MachineWeek week;
+  week.span = {begin_s, begin_s + 7 * day_s};
+  week.course = week_of_sensors(0.0, 3);
+  const auto pens = [&] {
+    const std::string html = week_html(week);
+    const std::size_t at = html.find("stroke=\"#2b6cb0\"");
+    const std::string path = html.substr(at, html.find("/>", at) - at);
+    return std::count(path.begin(), path.end(), 'M');
+  };
+  CHECK(pens() == 1);
+  for (std::size_t i = 300; i < 360; ++i) week.course.columns[0].values[i] = std::nan("");
+  CHECK(pens() == 2);
+  week.course.columns[0].values[500] = std::nan("");  // one point is no gap
+  CHECK(pens() == 2);
+}
+
+TEST_CASE("a point of a course is sent, of a dry run, or of both", "[week]") {
+  ThinnedHistory course;
+  course.time_s = {5.0, 15.0, 25.0, 35.0};
+  const auto places = places_of(course, {{26.0, 40.0}}, {{0.0, 22.0}});
+  REQUIRE(places.size() == 4);
+  CHECK(places[0] == PointPlace::dry_run);
+  CHECK(places[1] == PointPlace::dry_run);
+  CHECK(places[2] == PointPlace::both);
+  CHECK(places[3] == PointPlace::sent);
+}
+
+TEST_CASE("what a dry run computed is not said to have been taken out", "[week]") {
+  const TempFolder folder;
+  const auto config = history_config(folder / "h.db");
+  const WriterClocks clocks{[] { return nanoseconds(0); },
+                            [] { return std::chrono::hours(500000); }};
+  const double zero_s = 3600.0 * 500007.0;
+  // The text of the configuration is the gain of its model: 2 is a dry run, 0.5 is not.
+  const SetupParser parser = [](const SegmentSetup& text) {
+    ReplaySetup setup = parse_test_setup(text);
+    setup.dry_run = std::stod(text.config_text) > 1.0;
+    return setup;
+  };
+  RecordedMachine machine(config, 11, 65536, clocks);
+  machine.start();
+  machine.run(12000);
+  RecordedEvent probed = event_at(0, "command", "", "measured z 2.5 um");
+  probed.number = 1;
+  probed.wall_ns = std::llround((zero_s + 60.0) * 1e9);
+  machine.writer().note(probed);
+  machine.reload(0.5);
+  machine.run(12000);
+  machine.stop();
+
+  double dry_um = 0.0;
+  double sent_um = 0.0;
+  double at_probing_um = 0.0;
+  std::size_t near = 0;
+  const auto note = [&](const ReplayedOffsets& offsets) {
+    double& largest = offsets.time_s < 120.0 ? dry_um : sent_um;
+    largest = std::max(largest, std::abs(offsets.recorded_um[1]));
+    if (std::abs(offsets.time_s - 60.0) > 2.0) return;
+    at_probing_um += offsets.recorded_um[1];
+    ++near;
+  };
+  static_cast<void>(replay(config.file, note, {}, parse_test_setup));
+  const MachineWeek week = machine_week(config.file, recorded_span(config.file), parser);
+  CHECK(week.dry_run_s() == Approx(120.0).margin(1.0));
+  CHECK_FALSE(week.dry_run);
+  REQUIRE(week.axes.size() == 2);
+  const AxisWeek& z = week.axes[1];
+  REQUIRE(z.dry_run.is_there());
+  REQUIRE(z.sent.is_there());
+  CHECK(std::max(std::abs(z.dry_run.low_um), std::abs(z.dry_run.high_um)) ==
+        Approx(dry_um).margin(0.1 * dry_um + 0.5));
+  CHECK(std::max(std::abs(z.sent.low_um), std::abs(z.sent.high_um)) ==
+        Approx(sent_um).margin(0.1 * sent_um + 0.5));
+  REQUIRE(week.probings.size() == 1);
+  CHECK(week.probings[0].dry_run);
+  const double computed_um = -at_probing_um / static_cast<double>(near);
+  CHECK(week.probings[0].claimed_um == Approx(computed_um).margin(0.3));
+  // In a dry run a probing is the whole displacement.
+  CHECK(week.probings[0].left_um == Approx(2.5 - computed_um).margin(0.3));
+  const std::string html = week_html(week);
+  CHECK_THAT(html, Contains("displacement taken out") &&
+                       Contains("computed in the dry run, not taken out") &&
+                       Contains("offsets of the dry run, not sent") && Contains("(dry run)") &&
+                       Contains("were a dry run"));
+
+  const MachineWeek dry = machine_week(config.file, {zero_s, zero_s + 110.0}, parser);
+  CHECK(dry.dry_run);
+  CHECK_FALSE(dry.axes.at(1).sent.is_there());
+  const std::string dry_html = week_html(dry);
+  CHECK_THAT(dry_html, Contains("Nothing was taken out.") && !Contains("offsets as sent"));
+}
+
 TEST_CASE("a recorded machine: offsets and probings as replay has them", "[week]") {
   const TempFolder folder;
   const auto config = history_config(folder / "h.db");
@@ -157,8 +303,8 @@ TEST_CASE("a recorded machine: offsets and probings as replay has them", "[week]
   CHECK(week.mode_s("disabled") == Approx(30.0).margin(1.0));
   REQUIRE(week.axes.size() == 2);
   const auto [low, high] = std::minmax_element(z_um.begin(), z_um.end());
-  CHECK(week.axes[1].low_um == Approx(*low).margin(0.1 * (*high - *low) + 0.5));
-  CHECK(week.axes[1].high_um == Approx(*high).margin(0.1 * (*high - *low) + 0.5));
+  CHECK(week.axes[1].sent.low_um == Approx(*low).margin(0.1 * (*high - *low) + 0.5));
+  CHECK(week.axes[1].sent.high_um == Approx(*high).margin(0.1 * (*high - *low) + 0.5));
   REQUIRE(week.probings.size() == 1);
   CHECK(week.probings[0].left_um == 2.5);
   CHECK(week.probings[0].claimed_um ==

@@ -1,14 +1,16 @@
 #!/usr/bin/python3
-"""What thermocomp-gateway costs beside a running daemon: memory, processor, bytes of the page, time
-for a month of history. Processes and devices are those of the integration tests.
+"""What thermocomp-gateway costs beside a running daemon: memory, processor, bytes of the page, its first
+paint in a browser, time for a month of history. Processes and devices are those of the integration tests.
 
-    bench/daemon/gateway.py [--pages 5] [--seconds 30]
+    bench/gateway/gateway.py [--pages 5] [--seconds 30]
 """
 import argparse
 import contextlib
 import os
 import pathlib
+import shutil
 import sqlite3
+import statistics
 import sys
 import tempfile
 import threading
@@ -17,8 +19,9 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/integration/gateway"), str(ROOT / "tests/integration/daemon")]
 
+from chromium import headless  # noqa: E402
 from gateway_lab import Gateway  # noqa: E402
-from lab import Lab  # noqa: E402
+from lab import Lab, eventually  # noqa: E402
 from plain_devices import Machine  # noqa: E402
 
 
@@ -46,6 +49,22 @@ def open_pages(gateway, count, stack, stops):
         link = stack.enter_context(contextlib.closing(gateway.connect()))
         link.request("GET", "/api/events")
         threading.Thread(target=read, args=(link.getresponse(),), daemon=True).start()
+
+
+def first_paints_ms(gateway, folder, loads):
+    """From the beginning of each load to the first paint with content; nothing is cached."""
+    paints = []
+    with headless(folder, "window-size=390,844") as driver:
+        driver.execute_cdp_cmd("Network.enable", {})
+        driver.execute_cdp_cmd("Network.setCacheDisabled", {"cacheDisabled": True})
+        for _ in range(loads):
+            driver.get(f"http://localhost:{gateway.port}/")
+            paint = eventually(lambda: driver.execute_script(
+                "const paint = performance.getEntriesByName('first-contentful-paint')[0];"
+                "return paint && document.getElementById('answer').textContent === 'yes'"
+                " ? paint.startTime : null"), "a paint")
+            paints.append(paint)
+    return paints
 
 
 def stretch_to_a_month(history):
@@ -79,6 +98,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pages", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--loads", type=int, default=9)
     options = parser.parse_args()
     lab = Lab(pathlib.Path(tempfile.mkdtemp(prefix="gateway")))
     stops = threading.Event()
@@ -96,6 +116,9 @@ def main():
             share = (processor_s(gateway.process.pid) - used_s) / (time.monotonic() - begun_s)
             resident_MB, own_MB = memory_MB(gateway.process.pid)
             stops.set()
+        paints_ms = []
+        if shutil.which("chromedriver") and shutil.which("chromium"):
+            paints_ms = first_paints_ms(gateway, lab.folder, options.loads)
         machine.daemon.end()
         from_s, month_s = stretch_to_a_month(machine.daemon.history)
         begun_s = time.monotonic()
@@ -105,6 +128,9 @@ def main():
         assert known == 900, known
         print(f"month: {told['chunks']} commits, {told['chunks_read']} read, 900 points")
         print(f"gateway.page {page_bytes / 1000:.1f} kB")
+        if paints_ms:
+            print(f"gateway.first_paint {statistics.median(paints_ms):.0f} ms")
+            print(f"gateway.first_paint_worst {max(paints_ms):.0f} ms")
         print(f"gateway.resident {resident_MB:.1f} MB")
         print(f"gateway.resident_own {own_MB:.1f} MB")
         print(f"gateway.processor {100 * share:.2f} percent")

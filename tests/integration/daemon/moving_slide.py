@@ -1,0 +1,122 @@
+"""A slide at 10 m/min over a bed that bends: the machine of the tests of controllers that interpolate
+along the travel, on whatever bus."""
+
+from lab import read_columns
+
+# um/K along the travel; 10 K bend it by 40 um from end to end, and it is no straight line.
+NODES_MM = [0.0, 200.0, 400.0, 600.0, 800.0]
+ROWS_UM_PER_K = [0.0, 1.5, 2.5, 3.3, 4.0]
+WARM_K = 10.0
+LINE_DEVIATION_UM = 2.5
+SPEED_MM_PER_S = 10_000.0 / 60.0
+ROW_S = 0.02
+REST_S = 3.0  # cold, for the reference
+WARM_S = 4.0  # at rest, until the offsets are there
+MOVING_S = 12.0
+# Counts of 0.001 um and 0.001 um/m, and what a row's rounding adds.
+ROUNDING_UM = 0.02
+
+MODEL = f"""format = 1
+inputs = ["bed_degC"]
+outputs = ["x_um"]
+reference = "first_sample"
+matrix_um_per_K = [[0.0]]
+[guideway.bed]
+axis = "x_mm"
+positions_mm = {NODES_MM}
+rows_um_per_K.x_um = {[[row] for row in ROWS_UM_PER_K]}
+"""
+# The daemon's file from its sensor on.
+FILTER = """[screening]
+stale_after_s = 2.0
+rate_allowance_K = 100.0
+[smoothing]
+form = "off"
+[[block]]
+name = "bed"
+input = "bed_degC"
+sensors = ["bed"]
+"""
+COMPENSATION = """[compensation]
+enabled_at_first_start = true
+prove_hold_s = 0.2
+[history]
+@HISTORY@
+offsets_period_s = 0.1
+commit_s = 0.2
+"""
+
+
+def axis_text(form_text):
+    return ('[[axis]]\nname = "x"\noutput = "x_um"\noffset_um_max = 60.0\n'
+            "rate_um_per_s_max = 40.0\n" + form_text)
+
+
+def simulated_axis_text(form_text):
+    """The controller refuses beyond its own bound and steps no faster than 100 um/s by itself."""
+    axis = axis_text(form_text).replace("rate_um_per_s_max = 40.0", "rate_um_per_s_max = 100.0")
+    for key in ("[axis.line]\n", "[axis.table]\n"):
+        axis = axis.replace(key, key + "interpolation_um_per_s_max = 100.0\n")
+    return axis
+
+
+def curve_um(position_mm):
+    i = min(int(position_mm // 200.0), 3)
+    share = (position_mm - NODES_MM[i]) / 200.0
+    return WARM_K * ((1 - share) * ROWS_UM_PER_K[i] + share * ROWS_UM_PER_K[i + 1])
+
+
+def position_mm(time_s):
+    way_mm = max(0.0, time_s - REST_S - WARM_S) * SPEED_MM_PER_S % 1600.0
+    return way_mm if way_mm <= 800.0 else 1600.0 - way_mm
+
+
+def write_run(path):
+    """At rest, then warm, then to and fro at 10 m/min."""
+    with path.open("w") as out:
+        out.write("time_s,bed_degC,x_mm,x_um\n")
+        for row in range(round((REST_S + WARM_S + MOVING_S) / ROW_S)):
+            time_s = row * ROW_S
+            warm = time_s >= REST_S
+            at_mm = position_mm(time_s)
+            out.write(f"{time_s:.3f},{20.0 + WARM_K * warm},{at_mm:.4f},"
+                      f"{curve_um(at_mm) if warm else 0.0:.5f}\n")
+
+
+def write_standing_run(folder):
+    path = folder / "standing.csv"
+    path.write_text("time_s,bed_degC,x_mm,x_um\n0,20,0,0\n1,20,0,0\n")
+    return path
+
+
+class Moving:
+    """The simulated controller with its slide, and the daemon."""
+
+    def __init__(self, lab, machine, daemon_text, stay=True, tick_ms=5):
+        """daemon_text: made of the ports that the simulator has."""
+        self.lab = lab
+        run = lab.folder / "run.csv"
+        write_run(run)
+        self.truth = lab.folder / "truth.csv"
+        options = ["--replay", run, "--row-period-ms", 1000 * ROW_S, "--start-on-heartbeat",
+                   "--truth", self.truth, "--tick-ms", tick_ms]
+        self.simulator = lab.simulator(machine, *options, *(["--stay"] if stay else []))
+        (lab.folder / "model.toml").write_text(MODEL)
+        self.daemon = lab.daemon(daemon_text(self.simulator.ready["ports"]))
+
+    def errors_beside(self, expected_um):
+        """|error| of the tool in each row on the way, less what is expected at that place."""
+        columns = read_columns(self.truth)
+        errors = [abs(error - expected_um(position_mm(time_s)))
+                  for time_s, error in zip(columns["time_s"], columns["x_error_um"])
+                  if time_s > REST_S + WARM_S]
+        assert len(errors) > MOVING_S / ROW_S / 3
+        return errors
+
+    def peak_error_um(self):
+        return max(self.errors_beside(lambda _at_mm: 0.0))
+
+    def wait_for_warm_line(self):
+        """Nearest to a curve of 0 to -40 um with its bend of 5 um: 2.5 um beside both ends."""
+        self.daemon.wait_for_offset(-LINE_DEVIATION_UM, 0.01, "x_1")
+        self.daemon.wait_for_offset(-4.0 * WARM_K - LINE_DEVIATION_UM, 0.01, "x_2")

@@ -1,0 +1,213 @@
+"""A controller that interpolates its offset along the travel: real registers, a moving slide."""
+
+import socket
+import struct
+
+import pytest
+
+from lab import assert_replays_exactly, eventually, run_tool
+from moving_slide import (COMPENSATION, FILTER, LINE_DEVIATION_UM, MODEL, MOVING_S, NODES_MM, REST_S,
+                          ROUNDING_UM, WARM_K, WARM_S, Moving, axis_text, simulated_axis_text,
+                          write_standing_run)
+
+
+def value(table, address, encoding="int32", scale=0.001):
+    scaled = f", scale = {scale}" if scale else ""
+    return f'{{ table = "{table}", address = {address}, encoding = "{encoding}"{scaled} }}'
+
+
+LINE = f"""[axis.line]
+position = "x_mm"
+travel_mm = [0.0, 800.0]
+p0_mm = 100.0
+begin = {value("holding", 100, "uint16", 0)}
+k0_um = {value("holding", 101)}
+slope_um_per_m = {value("holding", 103)}
+end = {value("holding", 105, "uint16", 0)}
+[axis.line.applied]
+k0_um = {value("input", 101)}
+slope_um_per_m = {value("input", 103)}
+"""
+TABLE = f"""[axis.table]
+position = "x_mm"
+nodes_mm = {NODES_MM}
+begin = {value("holding", 100, "uint16", 0)}
+offsets = {value("holding", 101)}
+end = {value("holding", 111, "uint16", 0)}
+applied = {value("input", 101)}
+"""
+FORMS = {"line": LINE, "table": TABLE}
+
+PLACES = f"""valid_bits = {value("holding", 10, "uint16", 0)}
+heartbeat = {value("holding", 11, "uint16", 0)}
+[[controller.signal]]
+name = "x_mm"
+table = "input"
+address = 20
+encoding = "float32"
+"""
+MACHINE = """format = 1
+[[bus]]
+name = "sensors"
+kind = "modbus_tcp"
+host = "127.0.0.1"
+port = 0
+[[device]]
+name = "module"
+bus = "sensors"
+unit = 1
+period_s = 0.02
+table = "input"
+encoding = "float32"
+[[channel]]
+name = "bed"
+column = "bed_degC"
+device = "module"
+address = 0
+[controller]
+name = "cnc"
+kind = "modbus_tcp"
+host = "127.0.0.1"
+port = 0
+unit = 1
+"""
+DAEMON = """format = 1
+@STATE@
+[loop]
+rate_hz = 100
+[model]
+file = "model.toml"
+[[bus]]
+name = "sensors"
+kind = "modbus_tcp"
+host = "127.0.0.1"
+port = {sensors}
+[[device]]
+name = "module"
+bus = "sensors"
+unit = 1
+period_s = 0.02
+table = "input"
+encoding = "float32"
+[[sensor]]
+name = "bed"
+device = "module"
+address = 0
+"""
+CONTROLLER = """[controller]
+name = "cnc"
+kind = "modbus_tcp"
+host = "127.0.0.1"
+port = {cnc}
+unit = 1
+period_s = 0.02
+"""
+
+
+def machine_text(form):
+    return MACHINE + PLACES + simulated_axis_text(FORMS[form])
+
+
+def daemon_text(form, ports):
+    return (DAEMON.format(sensors=ports["sensors"]) + FILTER +
+            CONTROLLER.format(cnc=ports["cnc"]) + PLACES + axis_text(FORMS[form]) + COMPENSATION)
+
+
+def moving_slide(lab, form, stay=True):
+    return Moving(lab, machine_text(form), lambda ports: daemon_text(form, ports), stay)
+
+
+@pytest.mark.parametrize("form", ["line", "table"])
+def test_the_controller_interpolates_what_the_daemon_fitted(lab, form):
+    moving = moving_slide(lab, form, stay=False)
+    daemon = moving.daemon.start()
+    moving.simulator.wait(60 + REST_S + WARM_S + MOVING_S)
+    names = [axis["name"] for axis in daemon.status()["axes"]]
+    assert names == (["x_1", "x_2"] if form == "line" else [f"x_{i + 1}" for i in range(5)])
+    daemon.committed()
+    daemon.end()
+    peak_um = moving.peak_error_um()
+    print(f"{form}: peak error {peak_um:.3f} um at 10 m/min")
+    expected_um = LINE_DEVIATION_UM if form == "line" else 0.0
+    assert abs(peak_um - expected_um) <= ROUNDING_UM
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+
+
+def test_a_daemon_that_was_killed_goes_on_along_the_travel(lab):
+    moving = moving_slide(lab, "line")
+    daemon = moving.daemon.start()
+    moving.wait_for_warm_line()
+    daemon.kill()
+    daemon.start().wait_for_mode("compensating")
+    status = daemon.status()
+    assert not any(axis["mismatch"] for axis in status["axes"])
+    far = next(axis for axis in status["axes"] if axis["name"] == "x_2")
+    assert far["axis"] == "x" and far["at_mm"] == 800.0
+    assert abs(far["applied"] + 4.0 * WARM_K + LINE_DEVIATION_UM) < 0.1
+    # One axis to an operator, whatever it is called.
+    assert daemon.cli("prove", "x", "3")[0] == 0
+    assert daemon.cli("prove", "y", "3")[0] != 0
+    daemon.end()
+
+
+class RawClient:
+    def __init__(self, port):
+        self.link = socket.create_connection(("127.0.0.1", port), 10)
+
+    def ask(self, pdu):
+        self.link.sendall(struct.pack(">HHHB", 1, 0, len(pdu) + 1, 1) + pdu)
+        with self.link.makefile("rb") as stream:
+            _, _, length, _ = struct.unpack(">HHHB", stream.read(7))
+            return stream.read(length - 1)
+
+    def write(self, address, *words):
+        answer = self.ask(struct.pack(f">BHHB{len(words)}H", 16, address, len(words),
+                                      2 * len(words), *words))
+        assert answer[0] == 16, answer
+
+    def applied(self):
+        """K0 and slope in counts."""
+        return struct.unpack(">2i", self.ask(struct.pack(">BHH", 4, 101, 4))[2:])
+
+
+def words_of(number):
+    return struct.unpack(">2H", struct.pack(">i", number))
+
+
+def test_a_set_that_is_broken_off_is_never_applied(lab):
+    machine = machine_text("line").replace("valid_bits", "heartbeat_timeout_s = 0.0\nvalid_bits")
+    simulator = lab.simulator(machine, "--replay", write_standing_run(lab.folder), "--stay")
+    client = RawClient(simulator.ready["ports"]["cnc"])
+    first = (7, *words_of(1000), *words_of(2000), 7)
+    client.write(10, 1)
+    client.write(100, *first)
+    eventually(lambda: client.applied() == (1000, 2000), "the whole set")
+    second = (8, *words_of(-500), *words_of(9000), 8)
+    for end in range(1, len(second)):  # registers 100 to 105, broken off after each of them
+        client.write(100, *second[:end])
+        client.write(11, end)
+        assert client.applied() == (1000, 2000), end
+    client.write(100, *second)
+    eventually(lambda: client.applied() == (-500, 9000), "the next whole set")
+
+
+def test_check_tells_how_far_a_line_lies_off(lab):
+    (lab.folder / "model.toml").write_text(MODEL)
+    config = lab.folder / "line.toml"
+    text = daemon_text("line", {"sensors": 1502, "cnc": 1503})
+    text = text.replace("@STATE@\n", "").replace("@HISTORY@\n", "")
+    config.write_text(text)
+    status, said, _ = run_tool("check", config)
+    assert status == 0 and "axes: x (2 nodes)" in said
+    assert "largest deviation from the model's curve for 10 K: 2.50 um of 40.00 um" in said
+    status, said, _ = run_tool("check", "--registers", config)
+    assert status == 0
+    for part in ("holding 100", "begin: number of the set of axis x",
+                 "K0, offset at 100 mm of axis x", "um/m, count x 0.001",
+                 "offset = K0 + slope (x_mm - 100 mm)", "everywhere on the travel within +-60 um"):
+        assert part in said, said
+    begin = text.index('name = "cnc"')
+    config.write_text(text[:begin] + 'name = "mill"\nkind = "linuxcnc"\n' +
+                      text[text.index("[[controller.signal]]"):])
+    status, _, said = run_tool("check", config)
+    assert status == 2 and "axis[x].line" in said and "takes a set of values as a whole" in said

@@ -1,0 +1,91 @@
+// What of the reports becomes an event, in a time of the test's own.
+#include "daemon/status/event_log.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace thermocomp;
+using namespace std::chrono_literals;
+
+namespace {
+
+struct Bench {
+  std::chrono::nanoseconds monotonic{1000s};
+  EventJournal journal{[this] { return EventJournal::Moment{monotonic, 1'700'000'000s}; }};
+  EventLog log{journal};
+  EstimatorConfig config;
+  Report report;
+
+  Bench() {
+    config.sensors.resize(2);
+    config.sensors[0].name = "bed";
+    config.sensors[1].name = "head";
+    report.sensors.resize(2);
+    report.mode = Mode::compensating;
+    pass(10s);
+  }
+  void pass(std::chrono::nanoseconds time) {
+    monotonic += time;
+    report.now = monotonic;
+    log.note_report(report, config);
+  }
+  [[nodiscard]] std::vector<Event> about(const std::string& subject) const {
+    std::vector<Event> found;
+    for (const Event& event : journal.events())
+      if (event.subject == subject) found.push_back(event);
+    return found;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a suspected sensor is a fault with its size, and recovers", "[daemon][events]") {
+  Bench bench;
+  bench.report.sensors[1].suspected = true;
+  bench.report.sensors[1].suspected_size_K = -2.04;
+  bench.report.reasons = static_cast<std::uint32_t>(Reason::sensor_suspected);
+  bench.pass(1s);
+  bench.report.sensors[1].suspected_size_K = -2.4;  // the same lie, followed on: no news
+  bench.pass(59s);
+  bench.report.sensors[1].suspected = false;
+  bench.report.reasons = 0;
+  bench.pass(1s);
+  const auto told = bench.about("suspected sensor head");
+  REQUIRE(told.size() == 2);
+  CHECK(told[0].kind == "fault");
+  CHECK(told[0].what == "off by -2.0 K against its neighbours");
+  CHECK(told[1].kind == "recovery");
+  CHECK(told[1].duration_s == Approx(60.0));
+  CHECK(bench.about("suspected sensor bed").empty());
+  const auto reason = bench.about("reason sensor_suspected");
+  REQUIRE(reason.size() == 2);
+  CHECK(reason[1].duration_s == Approx(60.0));
+}
+
+TEST_CASE("a target that flickers about its bound is one outage", "[daemon][events]") {
+  Bench bench;
+  for (int i = 0; i < 100; ++i) {
+    bench.report.reasons = i % 2 == 0 ? static_cast<std::uint32_t>(Reason::at_bound) : 0u;
+    bench.pass(20s);
+  }
+  REQUIRE(bench.about("reason at_bound").size() == 1);
+  bench.pass(20s);
+  CHECK(bench.about("reason at_bound").size() == 1);
+  bench.pass(20s);
+  const auto told = bench.about("reason at_bound");
+  REQUIRE(told.size() == 2);
+  CHECK(told[1].kind == "recovery");
+  CHECK(told[1].duration_s == Approx(98 * 20.0));  // to where it was last
+}
+
+TEST_CASE("what has no limit is over at once", "[daemon][events]") {
+  Bench bench;
+  bench.report.reasons = static_cast<std::uint32_t>(Reason::block_lost);
+  bench.report.mode = Mode::holding;
+  bench.pass(1s);
+  bench.report.reasons = 0;
+  bench.report.mode = Mode::compensating;
+  bench.pass(7s);
+  const auto told = bench.about("reason block_lost");
+  REQUIRE(told.size() == 2);
+  CHECK(told[1].duration_s == Approx(7.0));
+}

@@ -1,0 +1,333 @@
+// What an axis makes of what its controller reads back, on one link and on the next.
+#include <algorithm>
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "axis_bench.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::test;
+using namespace std::chrono_literals;
+
+TEST_CASE("an axis is not driven before the controller has told what it applies", "[axis]") {
+  Bench bench;
+  bench.obeys = false;
+  bench.input.online = false;
+  bench.steps(5, 30.0);
+  CHECK_FALSE(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 0.0);
+  bench.input.online = true;
+  bench.input.applied_um = not_a_number;
+  bench.steps(5, 30.0);
+  CHECK_FALSE(bench.axis().synced());
+  bench.input.applied_um = 12.0;
+  bench.step(30.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == Approx(12.2));  // from what is applied, at the rate
+}
+
+TEST_CASE("an axis of a link that was never connected is not driven", "[axis]") {
+  for (const bool reads_back : {true, false}) {
+    Bench bench(reads_back);
+    bench.input.link_epoch = 0;
+    bench.steps(5, 30.0);
+    CHECK_FALSE(bench.axis().driven());
+    CHECK(bench.axis().offset_um() == 0.0);
+  }
+}
+
+TEST_CASE("a controller that does not read back is driven from what was sent last", "[axis]") {
+  Bench bench(false);
+  bench.bank.restore(0, 8.0);
+  bench.input.applied_um = not_a_number;
+  bench.step(8.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 8.0);
+  CHECK(std::isnan(bench.axis().applied_um()));
+  bench.input.link_epoch = 2;
+  bench.steps(3, 8.0);
+  CHECK(bench.axis().offset_um() == 8.0);
+}
+
+TEST_CASE("a new link starts from the read-back, not from what was sent", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  REQUIRE(bench.axis().offset_um() == 10.0);
+  bench.input.online = false;
+  bench.input.link_epoch = 2;
+  bench.step(10.0);
+  CHECK_FALSE(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 10.0);
+  bench.obeys = false;
+  bench.input.online = true;
+  bench.input.applied_um = 3.0;
+  bench.step(10.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == Approx(3.2));
+  CHECK_FALSE(bench.axis().mismatch());
+}
+
+TEST_CASE("a restored offset that is out of date gives way to the read-back", "[axis]") {
+  Bench bench;
+  bench.bank.restore(0, 40.0);
+  bench.input.applied_um = -5.0;
+  bench.obeys = false;
+  bench.step(40.0);
+  CHECK(bench.axis().offset_um() == Approx(-4.8));
+}
+
+TEST_CASE("a restored offset that no configuration allows is not taken", "[axis]") {
+  for (const double offset_um : {501.0, -1e9, not_a_number}) {
+    Bench bench(false);
+    bench.bank.restore(0, offset_um);
+    CHECK(bench.axis().offset_um() == 0.0);
+  }
+}
+
+TEST_CASE("a read-back that is old when the link is new does not take the offset back", "[axis]") {
+  Bench bench;
+  bench.steps(50, 30.0);
+  const double sent_um = bench.axis().offset_um();
+  bench.obeys = false;
+  bench.input.link_epoch = 2;
+  bench.input.applied_um = sent_um - 1.0;  // half a second ago
+  bench.step(30.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == sent_um);
+  bench.obeys = true;
+  bench.steps(4, 30.0);
+  CHECK(bench.axis().offset_um() > sent_um);
+  bench.obeys = false;
+  bench.input.link_epoch = 3;
+  bench.input.applied_um = 0.0;  // restarted
+  bench.step(30.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == Approx(0.2));
+}
+
+TEST_CASE("a new link that shows nonsense for long ages what was sent before", "[axis]") {
+  Bench bench;
+  bench.steps(400, 40.0);  // on its way 1.2 um was sent too, long ago
+  REQUIRE(bench.axis().offset_um() == 40.0);
+  bench.obeys = false;
+  bench.input.link_epoch = 2;
+  bench.input.applied_um = -81.0;
+  bench.steps(600, 40.0);
+  CHECK_FALSE(bench.axis().driven());
+  bench.input.applied_um = 1.2;
+  int steps = 0;
+  while (!bench.axis().driven() && steps++ < 100) bench.step(40.0);
+  // A new link may start from between nothing and what was sent; it must not leap to the latter.
+  CHECK(bench.axis().offset_um() < 2.0);
+}
+
+TEST_CASE("a new link that shows nonsense while the offset moves ages it too", "[axis]") {
+  Bench bench;
+  bench.steps(20, 40.0);  // from 0.2 to 4 um within the window
+  const double sent_um = bench.axis().offset_um();
+  bench.obeys = false;
+  bench.input.link_epoch = 2;
+  bench.input.applied_um = -81.0;
+  bench.steps(600, 40.0);
+  bench.input.applied_um = 1.2;
+  int steps = 0;
+  while (!bench.axis().driven() && steps++ < 100) bench.step(40.0);
+  CHECK(sent_um > 3.0);
+  CHECK(bench.axis().offset_um() < 2.0);
+}
+
+TEST_CASE("an axis that a new link finds on its way back starts from there", "[axis]") {
+  Bench bench;
+  bench.steps(145, 30.0);  // the values on the way are of the last moments
+  const double sent_um = bench.axis().offset_um();
+  bench.obeys = false;
+  bench.input.link_epoch = 2;
+  bench.input.applied_um = not_a_number;
+  for (int i = 0; i < 16; ++i) bench.step(30.0);
+  bench.input.link_epoch = 3;
+  bench.input.applied_um = 0.9 * sent_um;
+  bench.step(30.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == Approx(0.9 * sent_um + 0.2));
+}
+
+TEST_CASE("one unexplained read-back pauses the axis, which goes on from its own offset",
+          "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  bench.input.applied_um = -40.0;
+  bench.step(12.0);
+  CHECK_FALSE(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 10.0);
+  bench.input.applied_um = 10.0;
+  bench.step(12.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == Approx(10.2));
+  bench.input.applied_um = -40.0;  // once more, soon after: no accident
+  bench.step(12.0);
+  CHECK(bench.axis().latched());
+}
+
+TEST_CASE("a pause of the same link changes nothing that is sent", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.input.link_epoch += epochs_of_a_link;
+  bench.obeys = false;
+  bench.input.applied_um = 9.1;  // within what counts as agreement
+  bench.steps(2, 12.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 10.0);  // until a command of the new epoch has been written
+  bench.step(12.0);
+  CHECK(bench.axis().offset_um() == Approx(10.2));
+}
+
+TEST_CASE("a controller that refuses what it is sent finds no pent-up offset later", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  for (int i = 0; i < 100; ++i) {
+    bench.input.link_epoch += epochs_of_a_link;
+    bench.steps(2, 40.0);
+  }
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 10.0);
+}
+
+TEST_CASE("a new link that shows neither what was sent nor less of it is not believed", "[axis]") {
+  for (const double applied_um : {20.0, -10.0, 13.0}) {
+    Bench bench;
+    bench.steps(100, 10.0);
+    bench.obeys = false;
+    bench.input.link_epoch = 2;
+    bench.input.applied_um = applied_um;
+    bench.step(10.0);
+    CHECK_FALSE(bench.axis().driven());
+    bench.step(10.0);
+    CHECK(bench.axis().latched());
+    CHECK(bench.axis().offset_um() == 10.0);
+  }
+}
+
+TEST_CASE("after a disagreement an old read-back does not start an axis", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  bench.input.applied_um = 0.0;
+  bench.step(10.0);
+  const nanoseconds taken_at = bench.input.taken_at;
+  for (int i = 0; i < 20; ++i) {  // the very same read-back again and again
+    bench.input.now += 100ms;
+    bench.input.taken_at = taken_at;
+    bench.look();
+    CHECK_FALSE(bench.axis().driven());
+  }
+}
+
+TEST_CASE("an axis that was overridden stands where it is", "[axis]") {
+  // A link slower than the cycle: what is read back is what was sent two steps before.
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  bench.input.applied_um = 0.0;
+  for (int i = 0; i < 200; ++i) bench.step(10.0);
+  CHECK_FALSE(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 10.0);
+}
+
+TEST_CASE("a read-back that is late, but of what was sent, is no mismatch", "[axis]") {
+  Bench bench;
+  bench.steps(50, 5.0);
+  bench.obeys = false;  // the read-back stands still while the offset goes on
+  const double before_um = bench.axis().offset_um();
+  for (int i = 0; i < 20; ++i) bench.step(20.0);
+  CHECK_FALSE(bench.axis().mismatch());
+  CHECK(bench.axis().offset_um() > before_um + 3.9);
+}
+
+TEST_CASE("a controller that ignores what it is sent becomes a mismatch", "[axis]") {
+  Bench bench;
+  bench.steps(10, 0.0);
+  bench.obeys = false;
+  bench.steps(60, 50.0);
+  CHECK(bench.axis().latched());
+  CHECK(bench.axis().offset_um() < 50.0);
+}
+
+TEST_CASE("a first read-back beyond the bound is not driven until it is back", "[axis]") {
+  Bench bench;
+  bench.obeys = false;
+  for (const double applied_um : {50.2, -400.0, 1e30}) {
+    bench.input.applied_um = applied_um;
+    bench.step(1.0);
+    CHECK(bench.axis().out_of_bound());
+    CHECK_FALSE(bench.axis().driven());
+    CHECK(std::abs(bench.axis().offset_um()) <= 50.0);
+  }
+  bench.input.applied_um = 49.0;
+  bench.step(49.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 49.0);
+}
+
+TEST_CASE("a read-back rounded just beyond the bound is the bound", "[axis]") {
+  Bench bench;
+  bench.obeys = false;
+  bench.input.applied_um = 50.05;
+  bench.step(50.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 50.0);
+}
+
+TEST_CASE("a read-back that is no number changes nothing once in agreement", "[axis]") {
+  Bench bench;
+  bench.steps(100, 10.0);
+  bench.obeys = false;
+  bench.input.applied_um = not_a_number;
+  bench.steps(50, 12.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 12.0);
+}
+
+TEST_CASE("while the controller is silent the offset goes on without comparison", "[axis]") {
+  Bench bench;
+  bench.steps(10, 0.0);
+  bench.obeys = false;
+  bench.input.online = false;
+  bench.input.applied_um = 33.0;
+  bench.steps(10, 1.0);
+  CHECK(bench.axis().driven());
+  CHECK_FALSE(bench.axis().mismatch());
+  CHECK(bench.axis().offset_um() == 1.0);
+}
+
+TEST_CASE("the surface-aware hold keeps the offset while cutting", "[axis]") {
+  Bench bench;
+  bench.steps(10, 1.0);
+  bench.input.may_change = false;
+  bench.steps(50, 9.0);
+  CHECK(bench.axis().offset_um() == 1.0);
+  CHECK(bench.axis().target_um() == 9.0);
+  bench.input.may_change = true;
+  bench.step(9.0);
+  CHECK(bench.axis().offset_um() == Approx(1.2));
+}
+
+TEST_CASE("after a reload the axis goes on from where it is", "[axis]") {
+  Bench before;
+  before.steps(300, 40.0);
+  Bench after(true, axis_of(10, 2));
+  after.bank.adopt(before.bank, {0});
+  after.input = before.input;
+  CHECK(after.axis().driven());
+  double last_um = 40.0;
+  for (int i = 0; i < 150; ++i) {
+    after.step(40.0);
+    CHECK(after.axis().offset_um() == Approx(std::max(10.0, last_um - 0.2)));
+    last_um = after.axis().offset_um();
+  }
+  CHECK(last_um == 10.0);
+  CHECK(after.axis().driven());
+  CHECK_FALSE(after.axis().mismatch());
+}
