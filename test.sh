@@ -1,20 +1,21 @@
 #!/bin/bash
-# Builds everything and runs every test of one build. What .ci/run does besides: the sanitizers'
-# builds, short runs of the fuzz targets, format and static checks.
-#   ./test.sh [--quick] [--preset PRESET] [-- CTEST_OPTION...]
-#   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
+# Builds everything and runs the tests of one build. What .ci/run does besides: the sanitizers' builds,
+# format and static checks.
+#   ./test.sh [--quick | --all] [--preset PRESET] [-- CTEST_OPTION...]
 #   --quick: for daily work, the test programs alone: no packages, processes, guests or campaigns
+#   --all: those too that plant bugs in copies of the sources and try whether the tests find them
+#   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
 source scripts/common.sh
 exec </dev/null
 
 usage() {
-  sed -n 's/^# \{0,1\}//; 4,6p' "${BASH_SOURCE[0]}"
+  sed -n 's/^# \{0,1\}//; 4,7p' "${BASH_SOURCE[0]}"
 }
 
 preset=release
-quick=no
+extent=usual
 ctest_options=()
 while (($#)); do
   case $1 in
@@ -23,8 +24,8 @@ while (($#)); do
       preset=$2
       shift 2
       ;;
-    --quick)
-      quick=yes
+    --quick | --all)
+      extent=${1#--}
       shift
       ;;
     --)
@@ -126,16 +127,20 @@ coverage_report() {
 }
 
 build_options=()
-if [[ $quick == yes ]]; then
-  ctest_options=(--label-regex '^quick$' "${ctest_options[@]}")
-  build_options=(--target quick_tests)
-fi
+case $extent in
+  quick)
+    ctest_options=(--label-regex '^quick$' "${ctest_options[@]}")
+    build_options=(--target quick_tests)
+    ;;
+  usual) ctest_options=(--label-exclude '^planted$' "${ctest_options[@]}") ;;
+  all) build_options=(--target all planted_tests) ;;
+esac
 stage "packages" scripts/setup.sh test
 stage "configure $preset" cmake --preset "$preset"
 stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)" "${build_options[@]}"
 # The guest in which programs with sanitizers can run. Without it the tests on CAN fail and say so;
 # all others need not suffer.
-if [[ $quick == no && ($preset == asan-ubsan* || $preset == tsan) ]]; then
+if [[ $extent != quick && ($preset == asan-ubsan* || $preset == tsan) ]]; then
   stage "kernel of the guest" scripts/guest-kernel.sh || true
 fi
 rm -f "$results" "$repeated" "$failed_names"

@@ -26,7 +26,7 @@ part() {
 # Before anything is configured: thermocomp-petsc is built where PETSc is there.
 part "packages of PETSc" scripts/setup.sh petsc
 for preset in release asan-ubsan-all tsan debug coverage; do
-  part "$preset" ./test.sh --preset "$preset"
+  part "$preset" ./test.sh --all --preset "$preset"
 done
 part "includes" scripts/check_includes.py
 part "format" scripts/check-format.sh

@@ -10,9 +10,10 @@ namespace thermocomp::thermal_test {
 namespace {
 
 constexpr double hour_s = 3600.0;
-constexpr int draws_count = 400;
-constexpr double draws_quantile = 0.975;
-constexpr double normal_975 = 1.96;
+// A report has a dozen figures, and who accepts a machine by it wants all of them to hold.
+constexpr int draws_count = 1000;
+constexpr double draws_quantile = 0.995;
+constexpr double normal_995 = 2.576;
 constexpr std::uint64_t seed = 230;
 /// Of the largest hour: how far apart those lie that are looked at.
 constexpr double hours_step_s = 300.0;
@@ -55,7 +56,7 @@ Figure with_interval(double value, std::vector<double> noise_ranges, double nois
   if (!std::isfinite(value)) return figure;
   figure.value = value;
   figure.low = std::max(0.0, value - quantile(std::move(noise_ranges), draws_quantile));
-  figure.high = value + normal_975 * std::sqrt(2.0) * noise_left;
+  figure.high = value + normal_995 * std::sqrt(2.0) * noise_left;
   return figure;
 }
 

@@ -10,7 +10,7 @@
 
 namespace thermocomp::thermal_test {
 
-/// A range with its 95 % interval. Noise can only make a range larger, so the interval reaches
+/// A range with its 99 % interval. Noise can only make a range larger, so the interval reaches
 /// further down than up.
 struct Figure {
   double value{std::numeric_limits<double>::quiet_NaN()};

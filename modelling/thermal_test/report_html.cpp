@@ -262,7 +262,7 @@ std::string method_part(const TestAnswer& answer) {
       "end. Cooling, the combined drift, the hour with most and whether it settled are added here. "
       "The text of the standard decides where this page and it differ.",
       "Settled: the range of the last hour of running is under 15 % of that of the first.",
-      "In brackets stands what the figure would be in 95 of 100 cases without the noise of the "
+      "In brackets stands what the figure would be in 99 of 100 cases without the noise of the "
       "probe. The noise is known from second differences of neighbouring values and from what "
       "smoothing leaves; it was drawn 400 times, in blocks as long as the window. Noise makes a "
       "range larger, never smaller, so the lower bound lies further away. Errors of the probe that "

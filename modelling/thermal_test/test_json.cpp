@@ -15,7 +15,7 @@ json number(double value) {
 
 json figure_json(const Figure& figure) {
   if (!figure.is_there()) return nullptr;
-  return {{"value", number(figure.value)}, {"ci95", {number(figure.low), number(figure.high)}}};
+  return {{"value", number(figure.value)}, {"ci99", {number(figure.low), number(figure.high)}}};
 }
 
 json axis_json(const AxisFigures& axis) {

@@ -25,7 +25,8 @@ WEIGHED = 12  # explanations of the first round that count
 PRICE = 2.0   # precision of the causes' priors
 SCORE_SCALE = 20.0
 CAUSES = sorted(FAMILIES)
-SHARED = 4    # weights that all causes share
+CROWD = 0.1   # what leaves as little within this, in ln, crowds an explanation
+SHARED = ("left_out", "likelihood", "first_place", "place", "behind", "share", "crowd")
 STEPS = 3000
 
 
@@ -47,13 +48,18 @@ def cases_of(paths):
 
 
 def features(weighed):
-    rows = np.zeros((len(weighed) + 1, SHARED + len(CAUSES) + 1))
+    rows = np.zeros((len(weighed) + 1, len(SHARED) + len(CAUSES) + 1))
+    best = max((each["score"] for each in weighed), default=0.0)
+    left = np.array([each["log_left"] for each in weighed])
     for place, each in enumerate(weighed):
         score = each["score"]
-        rows[place, :SHARED] = (np.clip(-each["log_left"], -0.5, 3.0),
-                                np.sign(score) * np.log1p(abs(score) / SCORE_SCALE),
-                                place == 0, -np.log1p(place))
-        rows[place, SHARED + CAUSES.index(each["cause"])] = 1.0
+        rows[place, :len(SHARED)] = (np.clip(-each["log_left"], -0.5, 3.0),
+                                     np.sign(score) * np.log1p(abs(score) / SCORE_SCALE),
+                                     place == 0, -np.log1p(place),
+                                     -np.log1p((best - score) / SCORE_SCALE),
+                                     np.clip(each["left_out_gain"], -0.5, 1.0),
+                                     -np.log(np.sum(left < each["log_left"] + CROWD)))
+        rows[place, len(SHARED) + CAUSES.index(each["cause"])] = 1.0
     rows[-1, -1] = 1.0
     return rows
 
@@ -68,7 +74,7 @@ def fitted(cases):
     """By steepest descent with the step length of Barzilai and Borwein, halved while it leads up."""
     def loss(weights):
         of_causes = np.zeros_like(weights)
-        of_causes[SHARED:-1] = weights[SHARED:-1]
+        of_causes[len(SHARED):-1] = weights[len(SHARED):-1]
         value, slope = 0.5 * PRICE * of_causes @ of_causes, PRICE * of_causes
         for case in cases:
             stated = probabilities(case, weights)
@@ -76,7 +82,7 @@ def fitted(cases):
             value -= np.log(right)
             slope = slope - case["features"].T @ (stated * case["hits"] / right - stated)
         return value, slope
-    weights = np.zeros(SHARED + len(CAUSES) + 1)
+    weights = np.zeros(len(SHARED) + len(CAUSES) + 1)
     value, slope = loss(weights)
     length = 1e-3
     for _ in range(STEPS):
@@ -124,9 +130,8 @@ def judged(cases, weights_of):
 def main():
     cases = cases_of(sys.argv[1:])
     weights = fitted(cases)
-    print("left_out %.2f likelihood %.2f first_place %.2f place %.2f none %.2f" % (
-        *weights[:SHARED], weights[-1]))
-    for cause, prior in zip(CAUSES, weights[SHARED:-1]):
+    print(" ".join("%s %.2f" % of for of in zip((*SHARED, "none"), (*weights[:len(SHARED)], weights[-1]))))
+    for cause, prior in zip(CAUSES, weights[len(SHARED):-1]):
         print("  %-22s %.2f" % (cause, prior))
     print("cases it comes from")
     judged(cases, lambda _: weights)

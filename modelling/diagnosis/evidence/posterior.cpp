@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <span>
 
 #include "modelling/diagnosis/causes/cause.hpp"
 
@@ -14,22 +16,52 @@ constexpr std::size_t weighed_max = 12;
 constexpr double score_scale = 20.0;
 constexpr double left_min = -0.5;
 constexpr double left_max = 3.0;
+constexpr double share_min = -0.5;
+constexpr double share_max = 1.0;
+/// Leaves of rows left out as little, in ln.
+constexpr double crowd = 0.1;
 
 // calibrate_posterior.py prints what follows, and the priors of causes/.
 constexpr double weight_of_left_out = 4.32;
 constexpr double weight_of_likelihood = 0.74;
 constexpr double weight_of_first_place = 1.53;
 constexpr double weight_of_place = 0.18;
+constexpr double weight_of_behind = 0.0;
+constexpr double weight_of_share = 0.0;
+constexpr double weight_of_crowd = 0.0;
 constexpr double utility_of_none = 5.29;
 
-double utility(const Explanation& explanation, std::size_t place) {
-  const double likelihood =
-      std::copysign(std::log1p(std::abs(explanation.score) / score_scale), explanation.score);
-  return weight_of_left_out * std::clamp(-explanation.log_left, left_min, left_max) +
-         weight_of_likelihood * likelihood + (place == 0 ? weight_of_first_place : 0.0) -
-         weight_of_place * std::log1p(static_cast<double>(place)) +
-         cause_named(explanation.hypothesis->cause).prior;
-}
+/// What the weighed explanations are told from each other by.
+class Field {
+ public:
+  explicit Field(std::span<const Explanation> weighed) : weighed_(weighed) {
+    for (const Explanation& each : weighed) best_score_ = std::max(best_score_, each.score);
+  }
+
+  [[nodiscard]] double utility(std::size_t place) const {
+    const Explanation& of = weighed_[place];
+    const double likelihood = std::copysign(std::log1p(std::abs(of.score) / score_scale), of.score);
+    return weight_of_left_out * std::clamp(-of.log_left, left_min, left_max) +
+           weight_of_share * std::clamp(of.left_out_gain, share_min, share_max) -
+           weight_of_crowd * std::log(as_good_as(of)) + weight_of_likelihood * likelihood -
+           weight_of_behind * std::log1p((best_score_ - of.score) / score_scale) +
+           (place == 0 ? weight_of_first_place : 0.0) -
+           weight_of_place * std::log1p(static_cast<double>(place)) +
+           cause_named(of.hypothesis->cause).prior;
+  }
+
+ private:
+  /// Explanations that leave about as little or less, itself among them.
+  [[nodiscard]] double as_good_as(const Explanation& of) const {
+    return static_cast<double>(
+        std::count_if(weighed_.begin(), weighed_.end(), [&](const Explanation& other) {
+          return other.log_left < of.log_left + crowd;
+        }));
+  }
+
+  std::span<const Explanation> weighed_;
+  double best_score_{-std::numeric_limits<double>::infinity()};
+};
 
 }  // namespace
 
@@ -40,7 +72,8 @@ const std::string& family_of(const std::string& cause) {
 Posterior posterior(const std::vector<Explanation>& explanations) {
   const std::size_t weighed = std::min(weighed_max, explanations.size());
   std::vector<double> utilities;
-  for (std::size_t i = 0; i < weighed; ++i) utilities.push_back(utility(explanations[i], i));
+  const Field field(std::span<const Explanation>{explanations}.first(weighed));
+  for (std::size_t i = 0; i < weighed; ++i) utilities.push_back(field.utility(i));
   double most = utility_of_none;
   for (const double each : utilities) most = std::max(most, each);
   double sum = std::exp(utility_of_none - most);

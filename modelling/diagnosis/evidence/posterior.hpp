@@ -22,7 +22,10 @@ struct Posterior {
 /// P(h) = exp(u_h) / (exp(u_none) + sum of exp(u)), u a weighted sum of
 ///
 ///   - what the explanation takes of rows that it was not fitted to, -log_left,
+///   - the share that it takes of the RMS of the outputs on which it acts, in those rows,
+///   - how many others, in ln, take about as much of them,
 ///   - its likelihood, sign(score) ln(1 + |score| / 20), since neighbouring rows say the same,
+///   - how far that is behind the likeliest's, ln(1 + difference / 20),
 ///   - its place in the order of Search::choose(),
 ///   - how often its cause was right where all that was the same.
 ///

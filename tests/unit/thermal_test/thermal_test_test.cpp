@@ -132,8 +132,8 @@ TEST_CASE("figures of a noisy test are within their intervals of the machine wit
   INFO(coverage.within + of_z.within << " of " << coverage.figures + of_z.figures
                                      << " within; of Z, mean width by value "
                                      << of_z.width_share / of_z.figures);
-  CHECK(coverage.within >= 0.95 * coverage.figures);
-  CHECK(of_z.within >= 0.95 * of_z.figures);
+  CHECK(coverage.within == coverage.figures);
+  CHECK(of_z.within == of_z.figures);
   // An interval that says nothing would hold everything.
   CHECK(of_z.width_share / of_z.figures < 0.2);
 }
@@ -167,7 +167,7 @@ TEST_CASE("after by before, and the combined drift, are within their intervals",
           farthest = std::max(farthest, std::hypot(x[i] - x[j], z[i] - z[j]));
     together.take(answer.before_figures.combined_until_end, farthest);
   }
-  CHECK(ratios.within + of_z.within >= 0.95 * (ratios.figures + of_z.figures));
+  CHECK(ratios.within + of_z.within == ratios.figures + of_z.figures);
   CHECK(together.within == together.figures);
   CHECK(of_z.width_share / of_z.figures < 0.3);
 }

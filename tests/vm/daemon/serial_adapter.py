@@ -39,6 +39,8 @@ class SerialAdapter:
         self.offsets = []  # as rig.Monitor notes them
         self.begin = time.monotonic()
         self.unread = b""
+        # A bus that is off is silent: no frame may follow the line that says so.
+        self.sending = threading.Lock()
         self.ending = threading.Event()
         self.thread = threading.Thread(target=self.run)
         self.thread.start()
@@ -52,9 +54,10 @@ class SerialAdapter:
                 *lines, self.unread = self.unread.split(b"\r")
                 for line in lines:
                     self.take(line)
-            if self.opened and not self.cut and time.monotonic() >= due:
-                due = time.monotonic() + 0.05
-                self.send_frames()
+            with self.sending:
+                if self.opened and not self.cut and time.monotonic() >= due:
+                    due = time.monotonic() + 0.05
+                    self.send_frames()
 
     def take(self, line):
         if line.startswith(b"O"):
@@ -81,9 +84,10 @@ class SerialAdapter:
     def tell_state(self, letter):
         """a: active, w: warning, p: passive, b: bus-off, with counters that fit."""
         counters = {"a": "000000", "w": "100000", "p": "130000", "b": "000256"}[letter]
-        if letter == "b":
-            self.opened = False
-        self.send(f"s{letter}{counters}".encode())
+        with self.sending:
+            if letter == "b":
+                self.opened = False
+            self.send(f"s{letter}{counters}".encode())
 
     def close(self):
         self.ending.set()
