@@ -215,8 +215,7 @@ void Daemon::Parts::stop() noexcept {
   } catch (const std::exception& error) {
     spdlog::error("state not saved: {}", error.what());
   }
-  if (CycleRecorder* recorder = cycle.brain().recorder.get())
-    recorder->finish(cycle.last_cycle(), cycle.last_offsets());
+  cycle.finish_recording();
   if (history) history->stop();
 }
 

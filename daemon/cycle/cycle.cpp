@@ -52,9 +52,9 @@ Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLin
 }
 
 std::uint64_t Cycle::begin(nanoseconds now) noexcept {
-  const std::uint64_t cycle = newest_due(now);
-  if (brain_->recorder) brain_->recorder->begin(cycle, brain_->estimator, SegmentReason::start);
-  return cycle;
+  expected_ = newest_due(now);
+  if (brain_->recorder) brain_->recorder->begin(expected_, brain_->estimator, SegmentReason::start);
+  return expected_;
 }
 
 void Cycle::run() noexcept {
@@ -74,7 +74,11 @@ void Cycle::run() noexcept {
 }
 
 void Cycle::step(std::uint64_t cycle) noexcept {
+  // Only now: at the end the last step's offsets are still recorded, and they come before these.
+  if (cycle > expected_ && brain_->recorder) brain_->recorder->skipped(expected_, cycle - 1);
   cycle_ = cycle;
+  expected_ = cycle + 1;
+  has_stepped_ = true;
   take_over(cycle);
   CycleBrain& brain = *brain_;
   bool commanded = false;
@@ -97,6 +101,12 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   if (commanded) commands_done_.store(commands_.taken(), std::memory_order_release);
 }
 
+std::optional<std::uint64_t> Cycle::finish_recording() noexcept {
+  if (!has_stepped_) return std::nullopt;
+  if (brain_->recorder) brain_->recorder->finish(cycle_, offsets_);
+  return cycle_;
+}
+
 std::uint64_t Cycle::newest_due(nanoseconds now) const noexcept {
   return now < grid_.start ? 0 : static_cast<std::uint64_t>((now - grid_.start) / grid_.period);
 }
@@ -108,7 +118,6 @@ std::uint64_t Cycle::next_after(std::uint64_t cycle, nanoseconds now) noexcept {
   if (due <= cycle + 1) return cycle + 1;
   timing_.missed.store(timing_.missed.load(std::memory_order_relaxed) + due - cycle - 1,
                        std::memory_order_relaxed);
-  if (brain_->recorder) brain_->recorder->skipped(cycle + 1, due - 1);
   return due;
 }
 

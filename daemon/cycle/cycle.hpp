@@ -85,9 +85,9 @@ class Cycle {
   [[nodiscard]] const CycleTiming& timing() const noexcept { return timing_; }
   /// Forgets lateness and work so far: starting up is not running.
   void clear_timing() noexcept;
-  /// After run() has returned: the last offsets and the cycle they are from.
-  [[nodiscard]] const OffsetCommand& last_offsets() const noexcept { return offsets_; }
-  [[nodiscard]] std::uint64_t last_cycle() const noexcept { return cycle_; }
+  /// After run() has returned: records where it ended, with the offsets of the last step.
+  /// @return the cycle of that step; none: there was none
+  std::optional<std::uint64_t> finish_recording() noexcept;
   /// Main's side: the brain in use, as of take_retired().
   [[nodiscard]] CycleBrain& brain() noexcept { return *observed_; }
 
@@ -114,7 +114,9 @@ class Cycle {
   std::vector<Reading> readings_;
   ControllerState controller_;
   OffsetCommand offsets_;
-  std::uint64_t cycle_{0};
+  std::uint64_t cycle_{0};     ///< stepped last
+  std::uint64_t expected_{0};  ///< the one after; what lies between it and the next step was skipped
+  bool has_stepped_{false};
   std::uint64_t report_every_;
   std::uint64_t next_report_{0};
 };

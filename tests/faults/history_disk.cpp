@@ -61,6 +61,7 @@ struct HistoryDisk::Parts {
     HistoryConfig history;
     history.file = folder / "history.db";
     history.size_MB_max = 64.0;
+    history.offsets_period_s = 3.0;  // some cycles, as in RecordedTwin
     history.commit_s = 9.0;
     history.segment_h = 0.5;
     return history;
@@ -139,6 +140,20 @@ void HistoryDisk::kill(nanoseconds now) {
     parts.writer->work();
   }
   parts.disk.writes_left = 0;
+  parts.writer.reset();
+}
+
+void HistoryDisk::end(std::uint64_t last_cycle, nanoseconds now) {
+  Parts& parts = *parts_;
+  parts.now = now + std::chrono::minutes(2);  // the commit is due
+  parts.writer->work();
+  const HistoryStatistics statistics = parts.writer->statistics();
+  const bool is_whole =
+      statistics.commits != parts.commits_seen && statistics.lost == parts.lost_seen;
+  if (is_whole && last_cycle >= parts.next_cycle) {
+    parts.committed.push_back({parts.grid.start, parts.next_cycle, last_cycle});
+    ++parts.commits_all;
+  }
   parts.writer.reset();
 }
 

@@ -26,6 +26,9 @@ class HistoryDisk {
   void work(nanoseconds now);
   /// The process is gone, perhaps in the middle of a commit. The recorder must not be used again.
   void kill(nanoseconds now);
+  /// As a service manager ends the daemon, once the recorder has said where it ends: everything is
+  /// written, if the disk takes it.
+  void end(std::uint64_t last_cycle, nanoseconds now);
   /// @return what is missing or different in the file; empty: nothing
   [[nodiscard]] std::string verify();
   [[nodiscard]] std::uint64_t commits() const noexcept;

@@ -140,13 +140,19 @@ class Life {
     if (options_.verbose) fmt::print("{:>10.1f} s  the daemon starts again\n", life_s());
   }
 
+  /// Every other kill is a service manager's, which the daemon takes as an order to end.
   void finish() {
-    if (disk_) {
+    const std::optional<std::uint64_t> ended =
+        last_kill_ % 2 == 0 ? daemon_->cycle().finish_recording() : std::nullopt;
+    if (disk_ && ended) {
+      disk_->end(*ended, world_.now);
+    } else if (disk_) {
       disk_->kill(world_.now);
     } else if (!judge_.broken()) {  // a twin that has come out different goes on no further
       if (const auto different = twin_->finish())
         judge_.demand(false, "replay_is_exact", world_.now,
-                      fmt::format("cycle {} came out different", *different));
+                      fmt::format("cycle {} came out different or was recorded out of order",
+                                  *different));
     }
     if (twin_) result_.replayed += twin_->replayed();
     twin_.reset();

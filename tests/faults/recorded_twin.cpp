@@ -9,6 +9,8 @@ namespace thermocomp::faults {
 namespace {
 
 constexpr std::size_t cycles_a_chunk = 128;
+/// Some cycles long: what is noted in each cycle needs no care at an end.
+constexpr std::chrono::seconds offsets_period{5};
 
 bool same_command(const OffsetCommand& a, const OffsetCommand& b) {
   if (a.link_epoch != b.link_epoch) return false;
@@ -24,7 +26,7 @@ std::unique_ptr<CycleRecorder> RecordedTwin::make_recorder(const Estimator& esti
   auto recording = std::make_shared<RecordingSession>();
   recording->id = next_session_++;
   sessions_[recording->id] = {recording, estimator.config(), estimator.model()};
-  return std::make_unique<CycleRecorder>(ring_, recording, grid_, std::chrono::seconds(1),
+  return std::make_unique<CycleRecorder>(ring_, recording, grid_, offsets_period,
                                          estimator);
 }
 
@@ -35,14 +37,17 @@ std::optional<std::uint64_t> RecordedTwin::stepped(std::uint64_t cycle,
 }
 
 std::optional<std::uint64_t> RecordedTwin::finish() {
-  return drain();
+  const auto different = drain();
+  return different ? different : out_of_order_;
 }
 
 std::optional<std::uint64_t> RecordedTwin::drain() {
   std::array<Record, 512> batch{};
   while (const std::size_t count = ring_.pop(batch)) {
     for (std::size_t i = 0; i < count; ++i) {
+      if (batch[i].kind == RecordKind::cycle_done) continue;  // the writer keeps none either
       if (batch[i].kind != RecordKind::segment_begin) {
+        if (!order_.admits(batch[i]) && !out_of_order_) out_of_order_ = batch[i].cycle;
         encoder_.add(batch[i]);
         continue;
       }
@@ -61,6 +66,7 @@ void RecordedTwin::begin(const Record& record) {
   decode_inputs(encode_inputs(snapshot.readings, snapshot.controller), inputs_.readings,
                 inputs_.controller);
   snapshot.taken.store(false);
+  order_ = RecordOrder(record.cycle);
 }
 
 /// The cycles expected before `before`, from the records encoded until now.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/history/format/chunk_codec.hpp"
+#include "daemon/history/format/record_order.hpp"
 #include "daemon/history/replay/segment_walk.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/record.hpp"
@@ -24,7 +25,8 @@ class RecordedTwin {
   /// After each cycle: what the first estimator sent.
   /// @return the cycle that came out different, if one did
   std::optional<std::uint64_t> stepped(std::uint64_t cycle, const OffsetCommand& command);
-  /// What is left.
+  /// What is left, and whether what was recorded has the order of a history.
+  /// @return the cycle that came out different or of the record out of order, if there is one
   std::optional<std::uint64_t> finish();
   [[nodiscard]] std::uint64_t replayed() const noexcept { return replayed_; }
 
@@ -50,6 +52,8 @@ class RecordedTwin {
   std::vector<Expected> expected_;
   std::unique_ptr<Estimator> twin_;
   InputsInForce inputs_;
+  RecordOrder order_;
+  std::optional<std::uint64_t> out_of_order_;  ///< cycle of the first record that is
   std::uint64_t replayed_{0};
 };
 

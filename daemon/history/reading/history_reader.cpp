@@ -8,6 +8,7 @@
 
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/format/database.hpp"
+#include "daemon/history/format/record_order.hpp"
 #include "daemon/history/format/row_checksum.hpp"
 #include "daemon/history/reading/sound_segments.hpp"
 
@@ -184,10 +185,9 @@ struct RecordCursor::Parts {
   std::int64_t through{-1};  ///< last cycle that the chunks read so far hold whole
   std::int64_t wall_minus_grid_ns{0};
   bool wall_was_impossible{false};
-  std::uint64_t newest_cycle{0};  ///< of the chunks so far
-  bool has_offsets{false};        ///< the newest record is an offset of that cycle
-  std::vector<Record> records;    ///< of the chunk
-  std::size_t given{0};           ///< of those
+  RecordOrder order;            ///< of the chunks so far
+  std::vector<Record> records;  ///< of the chunk
+  std::size_t given{0};         ///< of those
 };
 
 RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segment)
@@ -195,7 +195,7 @@ RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segme
           std::make_unique<Parts>(reader.parts_->database, segment, reader.parts_->has_checksums)) {
   parts_->wall_minus_grid_ns = segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
   parts_->through = static_cast<std::int64_t>(segment.first_cycle) - 1;
-  parts_->newest_cycle = segment.first_cycle;
+  parts_->order = RecordOrder(segment.first_cycle);
 }
 RecordCursor::~RecordCursor() = default;
 RecordCursor::RecordCursor(RecordCursor&&) noexcept = default;
@@ -214,17 +214,10 @@ void RecordCursor::Parts::decode(std::vector<std::byte> bytes, std::uint64_t cou
   std::vector<Record> decoded;
   decoded.reserve(count);
   ChunkDecoder chunk(std::move(bytes), count);
-  std::uint64_t cycle = newest_cycle;
-  bool is_offset = has_offsets;
-  for (Record record; chunk.next(record); decoded.push_back(record)) {
-    // Within a cycle the offsets, which come out of its step, are the last.
-    const bool is_late = record.cycle == cycle && is_offset && record.kind != RecordKind::offset;
-    require(record.cycle >= cycle && !is_late, "records are out of order");
-    cycle = record.cycle;
-    is_offset = record.kind == RecordKind::offset;
-  }
-  newest_cycle = cycle;
-  has_offsets = is_offset;
+  RecordOrder order_then = order;
+  for (Record record; chunk.next(record); decoded.push_back(record))
+    require(order_then.admits(record), "records are out of order");
+  order = order_then;
   records = std::move(decoded);
   given = 0;
 }

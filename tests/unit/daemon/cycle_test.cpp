@@ -2,6 +2,7 @@
 #include "daemon/cycle/cycle.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -156,6 +157,36 @@ TEST_CASE("cycles that were overrun are counted and the phase is kept", "[cycle]
   const Report& report = running.cycle.report();
   // Every step's time lies on the grid, before and after.
   CHECK((report.now - running.grid.start) % running.grid.period == 0ns);
+}
+
+TEST_CASE("what is noted at the end stands before the cycles that were skipped by then", "[cycle]") {
+  DryRunController controller{{"none", 1}};
+  const Grid grid{1h, 10ms};
+  RecordRing ring{256};
+  auto recorded = brain(1.0);
+  recorded->recorder = std::make_unique<CycleRecorder>(ring, std::make_shared<RecordingSession>(),
+                                                       grid, 1s, recorded->estimator);
+  Cycle cycle{grid, {}, controller, 1, std::move(recorded)};
+  REQUIRE(cycle.begin(grid.start) == 0);
+  CHECK_FALSE(cycle.finish_recording());  // a daemon that is ended while it starts
+  cycle.step(0);
+  cycle.step(1);
+  REQUIRE(cycle.next_after(1, grid.time_of(5)) == 5);
+  const bool goes_on = GENERATE(false, true);
+  if (goes_on) cycle.step(5);
+  CHECK(cycle.finish_recording() == (goes_on ? 5 : 1));
+
+  std::array<Record, 256> records{};
+  const std::size_t count = ring.pop(records);
+  std::vector<std::uint64_t> skipped;
+  std::uint64_t newest = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    CHECK(records[i].cycle >= newest);
+    newest = records[i].cycle;
+    if (records[i].kind == RecordKind::skipped) skipped.push_back(records[i].cycle);
+  }
+  CHECK(newest == (goes_on ? 5 : 1));
+  CHECK(skipped == (goes_on ? std::vector<std::uint64_t>{2} : std::vector<std::uint64_t>{}));
 }
 
 TEST_CASE("a handed over brain takes the place of the old one at once and bumpless", "[cycle]") {
