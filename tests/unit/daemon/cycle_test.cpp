@@ -159,7 +159,8 @@ TEST_CASE("cycles that were overrun are counted and the phase is kept", "[cycle]
   CHECK((report.now - running.grid.start) % running.grid.period == 0ns);
 }
 
-TEST_CASE("what is noted at the end stands before the cycles that were skipped by then", "[cycle]") {
+TEST_CASE("what is noted at the end stands before the cycles that were skipped by then",
+          "[cycle]") {
   DryRunController controller{{"none", 1}};
   const Grid grid{1h, 10ms};
   RecordRing ring{256};
