@@ -267,9 +267,11 @@ Figure ratio_of(const Figure& after, const Figure& before) {
                                  share(before.high - before.value, before.value));
   const double up = std::hypot(share(after.high - after.value, after.value),
                                share(before.value - before.low, before.value));
-  ratio.low = std::max(0.0, ratio.value * (1.0 - down));
+  // No farther than where both ends go the same way, which bounds a small `after` more closely.
+  ratio.low = std::max(after.low / before.high, ratio.value * (1.0 - down));
   // A range before that may be nothing at all bounds no ratio.
-  ratio.high = before.low > 0.0 ? ratio.value / std::max(0.05, 1.0 - up) : ratio.high;
+  if (before.low > 0.0)
+    ratio.high = std::min(after.high / before.low, ratio.value / std::max(0.05, 1.0 - up));
   return ratio;
 }
 

@@ -63,7 +63,8 @@ inline constexpr double settled_share = 0.15;
 /// The same with an earlier end of running, for a comparison with a shorter test.
 [[nodiscard]] TestFigures figures_until(const TestData& data, double running_s);
 
-/// `after` divided by `before`. Their errors count as independent: squares add.
+/// `after` divided by `before`. Their errors count as independent: squares add, as far as
+/// the ratios of their ends.
 [[nodiscard]] Figure ratio_of(const Figure& after, const Figure& before);
 
 }  // namespace thermocomp::thermal_test

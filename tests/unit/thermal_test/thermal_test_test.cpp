@@ -212,7 +212,7 @@ TEST_CASE("rare probings are figures too, with their own noise", "[thermal_test]
   const AxisFigures axis = figures_of(test_data(run, options)).axes.at(0);
   CHECK_FALSE(axis.smoothed);
   CHECK(axis.noise == 0.5);
-  CHECK(axis.until_end.high - axis.until_end.value == Approx(1.96 * std::sqrt(2.0) * 0.5));
+  CHECK(axis.until_end.high - axis.until_end.value == Approx(2.576 * std::sqrt(2.0) * 0.5));
 }
 
 TEST_CASE("values that are hours apart say nothing of an hour", "[thermal_test]") {
