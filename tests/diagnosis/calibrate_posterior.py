@@ -5,9 +5,8 @@ calibrate_posterior.py ANSWERS.json...     written by
     measured_campaign.py PROGRAM --weighed --json ANSWERS.json
     campaign.py PROGRAM --answers ANSWERS.json
 
-Prints the weights of modelling/diagnosis/evidence/posterior.cpp and the priors of
-modelling/diagnosis/causes/, and how well they do on the cases they come from and on machines that
-were left out of the fit one after the other.
+Prints the weights of modelling/diagnosis/evidence/posterior.cpp, and how well they do on the cases they
+come from and on machines that were left out of the fit one after the other.
 """
 
 import collections
@@ -22,11 +21,9 @@ import measured_campaign
 from measured_plants import FAMILIES
 
 WEIGHED = 12  # explanations of the first round that count
-PRICE = 2.0   # precision of the causes' priors
 SCORE_SCALE = 20.0
-CAUSES = sorted(FAMILIES)
 CROWD = 0.1   # what leaves as little within this, in ln, crowds an explanation
-SHARED = ("left_out", "likelihood", "first_place", "place", "behind", "share", "crowd")
+WEIGHTS = ("left_out", "likelihood", "first_place", "behind", "share", "crowd", "none")
 STEPS = 3000
 
 
@@ -48,18 +45,16 @@ def cases_of(paths):
 
 
 def features(weighed):
-    rows = np.zeros((len(weighed) + 1, len(SHARED) + len(CAUSES) + 1))
+    rows = np.zeros((len(weighed) + 1, len(WEIGHTS)))
     best = max((each["score"] for each in weighed), default=0.0)
     left = np.array([each["log_left"] for each in weighed])
     for place, each in enumerate(weighed):
         score = each["score"]
-        rows[place, :len(SHARED)] = (np.clip(-each["log_left"], -0.5, 3.0),
-                                     np.sign(score) * np.log1p(abs(score) / SCORE_SCALE),
-                                     place == 0, -np.log1p(place),
-                                     -np.log1p((best - score) / SCORE_SCALE),
-                                     np.clip(each["left_out_gain"], -0.5, 1.0),
-                                     -np.log(np.sum(left < each["log_left"] + CROWD)))
-        rows[place, len(SHARED) + CAUSES.index(each["cause"])] = 1.0
+        rows[place, :-1] = (np.clip(-each["log_left"], -0.5, 3.0),
+                            np.sign(score) * np.log1p(abs(score) / SCORE_SCALE), place == 0,
+                            -np.log1p((best - score) / SCORE_SCALE),
+                            np.clip(each["left_out_gain"], -0.5, 1.0),
+                            -np.log(np.sum(left < each["log_left"] + CROWD)))
     rows[-1, -1] = 1.0
     return rows
 
@@ -73,16 +68,14 @@ def probabilities(case, weights):
 def fitted(cases):
     """By steepest descent with the step length of Barzilai and Borwein, halved while it leads up."""
     def loss(weights):
-        of_causes = np.zeros_like(weights)
-        of_causes[len(SHARED):-1] = weights[len(SHARED):-1]
-        value, slope = 0.5 * PRICE * of_causes @ of_causes, PRICE * of_causes
+        value, slope = 0.0, np.zeros_like(weights)
         for case in cases:
             stated = probabilities(case, weights)
             right = stated @ case["hits"]
             value -= np.log(right)
             slope = slope - case["features"].T @ (stated * case["hits"] / right - stated)
         return value, slope
-    weights = np.zeros(len(SHARED) + len(CAUSES) + 1)
+    weights = np.zeros(len(WEIGHTS))
     value, slope = loss(weights)
     length = 1e-3
     for _ in range(STEPS):
@@ -130,9 +123,7 @@ def judged(cases, weights_of):
 def main():
     cases = cases_of(sys.argv[1:])
     weights = fitted(cases)
-    print(" ".join("%s %.2f" % of for of in zip((*SHARED, "none"), (*weights[:len(SHARED)], weights[-1]))))
-    for cause, prior in zip(CAUSES, weights[len(SHARED):-1]):
-        print("  %-22s %.2f" % (cause, prior))
+    print(" ".join("%s %.2f" % of for of in zip(WEIGHTS, weights)))
     print("cases it comes from")
     judged(cases, lambda _: weights)
     machines = sorted({case["machine"] for case in cases})

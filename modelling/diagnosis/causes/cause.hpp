@@ -72,9 +72,6 @@ using ErrorOfReading = Column (*)(const MeasuredData& data, const MeasuredRun& r
 struct Cause {
   std::string name;    ///< fixed: in answers and, as `kind`, in model files
   std::string family;  ///< what belongs together for a person: structure, heat, datum, sensor
-  /// How often it is right where all else is the same, in ln (tests/diagnosis/
-  /// calibrate_posterior.py); 0 in the thermal layer, which has no probabilities.
-  double prior{0.0};
   std::vector<CauseParameter> parameters{};  ///< in the order of the answer
   CauseTexts texts{};
   /// Where the subject is a signal and a place of a thermal network; none: the same.

@@ -25,7 +25,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// The datum creeps through a whole run.
 Cause displacement_drift() {
-  Cause cause{name, "datum", 0.38};
+  Cause cause{name, "datum"};
   cause.parameters = {{.name = "rate_um_per_h", .unit = "um/h", .says = "creep"}};
   cause.texts = {"The datum creeps", "the datum of the displacement creeps through the whole run",
                  "Do not fit to this run; look at the probe, its holder and its amplifier's "

@@ -26,7 +26,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// The datum jumps once in a run.
 Cause displacement_step() {
-  Cause cause{name, "datum", -0.08};
+  Cause cause{name, "datum"};
   cause.parameters = {{.name = "at_s",
                        .unit = "s",
                        .says = "from the start of the recording on",

@@ -62,7 +62,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 /// Play of a joint, of one temperature's effect or of the whole output: a loop that does not depend
 /// on speed.
 Cause hysteresis() {
-  Cause cause{name, "structure", 0.08};
+  Cause cause{name, "structure"};
   cause.parameters = {{.name = "width_K", .unit = "K", .low = 0.0, .says = "dead band"},
                       {.name = "width_um", .unit = "um", .low = 0.0, .says = "dead band"}};
   cause.texts = {

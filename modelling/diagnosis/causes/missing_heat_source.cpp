@@ -86,7 +86,7 @@ bool into_machine(MachineFile& machine, const std::string& subject,
 
 /// c LP(u^power): heat that no sensor sees.
 Cause missing_heat_source() {
-  Cause cause{name, "heat", 0.33};
+  Cause cause{name, "heat"};
   cause.parameters = {
       tau,
       power,

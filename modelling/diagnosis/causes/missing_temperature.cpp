@@ -31,7 +31,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// K LP(T) of a place that the model does not use; tau = 0: K T.
 Cause missing_temperature() {
-  Cause cause{name, "structure", 0.05};
+  Cause cause{name, "structure"};
   cause.parameters = {tau, {.name = "gain_um_per_K", .unit = "um/K", .says = "effect"}};
   cause.texts = {
       "A measured place that the model leaves out",

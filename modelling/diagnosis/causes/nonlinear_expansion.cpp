@@ -21,7 +21,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// c T^2.
 Cause nonlinear_expansion() {
-  Cause cause{name, "structure", -0.16};
+  Cause cause{name, "structure"};
   cause.parameters = {{.name = "gain_um_per_K2", .unit = "um/K^2", .says = "curvature"}};
   cause.texts = {
       "The effect of a temperature is curved", "the effect of this temperature is curved",

@@ -72,7 +72,7 @@ std::vector<Parameter> amplitude(const FoundGains& found) {
 
 /// A sine unrelated to any input, its phase another one in every run: a cooler's or a room's cycle.
 Cause periodic_disturbance() {
-  Cause cause{name, "datum", 0.28};
+  Cause cause{name, "datum"};
   cause.parameters = {{.name = "period_s", .unit = "s", .low = 0.0, .says = "period"},
                       {.name = "amplitude_um", .unit = "um", .low = 0.0, .says = "amplitude"}};
   cause.texts = {"A cycle of its own", "a cycle of its own, which no temperature here explains",

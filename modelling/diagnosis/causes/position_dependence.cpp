@@ -62,7 +62,7 @@ std::vector<Parameter> gains(const FoundGains& found) {
 
 /// c (p - p0) T: the effect of a temperature grows along an axis.
 Cause position_dependence() {
-  Cause cause{name, "structure", -0.60};
+  Cause cause{name, "structure"};
   cause.parameters = {
       {.name = "gain_um_per_K_mm", .unit = "um/(K mm)", .says = "effect along the axis"},
       {.name = "p0_mm", .unit = "mm", .says = "none at"}};

@@ -32,7 +32,7 @@ std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
 
 /// A reading creeps in a run.
 Cause sensor_drift() {
-  Cause cause{name, "sensor", -0.38};
+  Cause cause{name, "sensor"};
   cause.parameters = {{.name = "start_s", .unit = "s", .says = "creeps from"},
                       {.name = "rate_K_per_h", .unit = "K/h", .says = "creep"}};
   cause.texts = {"A reading creeps",

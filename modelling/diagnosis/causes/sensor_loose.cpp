@@ -59,7 +59,7 @@ std::vector<Parameter> gain(const FoundGains& found) {
 
 /// From a time on the reading is room + gain (T - room).
 Cause sensor_loose() {
-  Cause cause{name, "sensor", 0.60};
+  Cause cause{name, "sensor"};
   cause.parameters = {{.name = "at_s",
                        .unit = "s",
                        .says = "from the start of the recording on",

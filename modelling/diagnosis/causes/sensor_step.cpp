@@ -43,7 +43,7 @@ std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
 
 /// A reading jumps in a run and stays.
 Cause sensor_step() {
-  Cause cause{name, "sensor", -0.49};
+  Cause cause{name, "sensor"};
   cause.parameters = {{.name = "at_s",
                        .unit = "s",
                        .says = "from the start of the recording on",

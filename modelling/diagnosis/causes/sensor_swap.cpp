@@ -69,7 +69,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// Two channels are exchanged: the coefficient of each meets the temperature of the other.
 Cause sensor_swap() {
-  Cause cause{name, "sensor", 0.12};
+  Cause cause{name, "sensor"};
   cause.texts = {"Two channels are exchanged", "these two channels are exchanged",
                  "Exchange the two plugs or the two names in the configuration."};
   cause.experiment = Experiment::steady_levels;

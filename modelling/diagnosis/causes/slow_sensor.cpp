@@ -83,7 +83,7 @@ bool into_machine(MachineFile& machine, const std::string& subject,
 
 /// The reading is LP(T): the displacement leads it.
 Cause slow_sensor() {
-  Cause cause{name, "structure", 0.80};
+  Cause cause{name, "structure"};
   cause.parameters = {tau};
   cause.texts = {
       "A sensor follows its place late",

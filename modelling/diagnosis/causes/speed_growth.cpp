@@ -23,7 +23,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// c u^2 at once: centrifugal, or the seat of a bearing.
 Cause speed_growth() {
-  Cause cause{name, "heat", 0.64};
+  Cause cause{name, "heat"};
   cause.parameters = {{.name = "gain_um_per_unit2", .unit = "um/?^2", .says = "effect"}};
   cause.texts = {"Growth with speed, not with heat",
                  "the displacement jumps with the square of this signal",

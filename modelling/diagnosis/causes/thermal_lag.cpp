@@ -50,7 +50,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// g (LP(T) - T), 0 < g / K <= 1: a share of the structure follows late.
 Cause thermal_lag() {
-  Cause cause{name, "structure", -0.74};
+  Cause cause{name, "structure"};
   cause.parameters = {tau, {.name = "gain_um_per_K", .unit = "um/K", .says = "effect"}};
   cause.texts = {
       "Part of the structure follows late", "a part of the structure follows this temperature late",

@@ -40,7 +40,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// The displacement is logged late (shift > 0) or early.
 Cause time_shift() {
-  Cause cause{name, "datum", -0.60};
+  Cause cause{name, "datum"};
   cause.parameters = {shift};
   cause.texts = {
       "The recorders' clocks differ",

@@ -19,7 +19,7 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
 
 /// dK T: the coefficient of a place is off by dK.
 Cause wrong_coefficient() {
-  Cause cause{name, "structure", -0.23};
+  Cause cause{name, "structure"};
   cause.parameters = {{.name = "delta_um_per_K", .unit = "um/K", .says = "the coefficient lacks"}};
   cause.texts = {
       "The effect of a place has another size",

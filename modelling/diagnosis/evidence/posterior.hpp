@@ -26,8 +26,10 @@ struct Posterior {
 ///   - how many others, in ln, take about as much of them,
 ///   - its likelihood, sign(score) ln(1 + |score| / 20), since neighbouring rows say the same,
 ///   - how far that is behind the likeliest's, ln(1 + difference / 20),
-///   - its place in the order of Search::choose(),
-///   - how often its cause was right where all that was the same.
+///   - whether it is the first in the order of Search::choose().
+///
+/// No cause is likelier than another by itself: how often each was right in the cases that settled
+/// the weights did not carry over to machines that were left out of them.
 ///
 /// The weights are those under which effects planted in measured and in simulated machines are
 /// likeliest (tests/diagnosis/calibrate_posterior.py).

@@ -331,7 +331,7 @@ TEST_CASE("a cause is named with its size beside small errors of all coefficient
 TEST_CASE("a cause is named although errors of all coefficients could take most of it",
           "[diagnosis]") {
   Readings machine = six_readings({0.99, 1.007, 0.981, 0.993, 1.007, 0.986});
-  machine.heat_um = 5.0;
+  machine.heat_um = 12.0;
   const Diagnosis effect = diagnosis_of_machine(machine);
   REQUIRE(effect.findings.size() == 1);
   CHECK(effect.findings[0].cause == "missing_heat_source");

@@ -32,6 +32,7 @@ Explanation explanation(const Hypothesis& of, double score, double log_left) {
   each.hypothesis = &of;
   each.score = score;
   each.log_left = log_left;
+  each.left_out_gain = 1.0 - std::exp(log_left);
   return each;
 }
 
@@ -109,6 +110,23 @@ TEST_CASE("what takes nothing of rows left out is no explanation", "[diagnosis]"
   CHECK(posterior({}).none == 1.0);
   CHECK(posterior({explanation(lag, 10.0, -0.02)}).none > 0.9);
   CHECK(posterior({explanation(lag, 2000.0, -1.5)}).none < 0.1);
+}
+
+TEST_CASE("an explanation among others that do as well is less likely than one that is alone",
+          "[diagnosis]") {
+  const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
+  const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
+  const Hypothesis drift = hypothesis("displacement_drift", "z_um");
+  const auto odds_of_first = [](const std::vector<Explanation>& all) {
+    const Posterior of = posterior(all);
+    return of.of[0] / of.none;
+  };
+  const Explanation first = explanation(lag, 200.0, -0.8);
+  const double alone = odds_of_first({first});
+  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.78)}) < alone);
+  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.3)}) == Approx(alone));
+  // Far behind the likeliest.
+  CHECK(odds_of_first({first, explanation(drift, 2000.0, -0.1)}) < alone);
 }
 
 TEST_CASE("places that move alike are one group, whose probabilities add", "[diagnosis]") {
