@@ -109,10 +109,9 @@ RpcPending take_reference(const DeskActions& actions, const json& params) {
     refuse_unless(view.report.inputs[i].good,
                   "no reference can be taken: " + columns[i] + " has no good sensor now");
   const std::string why = why_no_reference(view);
-  refuse_unless(why.empty() || forced,
-                "no reference is taken: " + why +
-                    ". To take it all the same: thermocomp reference --force (on the socket "
-                    "params {\"force\": true})");
+  refuse_unless(
+      why.empty() || forced,
+      "no reference is taken: " + why + ". To take it all the same: thermocomp reference --force");
   return then(actions.command({CommandKind::reference, 0, 0.0}), [why, watched = watched_s(view)] {
     return json{{"done", true}, {"watched_s", watched}, {"although", why}};
   });
