@@ -205,6 +205,9 @@ void tell_next(const InitDraft& draft, const std::string& file) {
   if (draft.controller.is_modbus())
     std::cout << "  " << tool << " prove " << draft.axes.front()
               << " 5   # with an indicator, every axis\n";
+  // Without a displacement it makes no difference yet.
+  if (!draft.model_inputs.empty())
+    std::cout << "  " << tool << " reference   # cold and at an even temperature\n";
   std::cout << "  " << tool << " enable\n";
   if (draft.model_inputs.empty())
     std::cout

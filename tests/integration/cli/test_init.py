@@ -160,6 +160,7 @@ def test_a_model_that_is_there_is_bound_by_the_sensors_names(foreign, folder):
                  folder / "mill.toml"]
     answer = run(*arguments, "--names", "bed,column,spindle")
     assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert answer.stdout.index("reference") < answer.stdout.index("enable\n")
     text = config.read_text()
     assert text.count("[[block]]") == 2 and 'output = "y_um"' in text
     assert "in no block: column" in run("check", config).stdout
