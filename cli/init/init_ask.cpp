@@ -62,8 +62,8 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
   bool is_wanted = false;
   questions.ask_until(
       "Module of unit " + std::to_string(unit) +
-          ": its preset, or TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES]; ? lists the "
-          "presets, Enter: none",
+          ": its preset, or TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES] such as "
+          "input:int16:0.1:0-7; ? lists the presets, Enter: none",
       "", [&](const std::string& text) {
         is_wanted = !text.empty();
         if (!is_wanted) return;
@@ -105,7 +105,9 @@ void ask_for_places(InitController& controller, Questions& questions) {
     });
   };
   questions.ask_until(
-      "Offset of the first axis, the others behind it: TABLE:ADDRESS:TYPE:UM_A_COUNT",
+      "Offset of the first axis, the others behind it: TABLE:ADDRESS:TYPE:UM_A_COUNT (TYPE "
+      "int32/CDAB "
+      "where the low word comes first)",
       "holding:0:int32:0.01",
       [&](const std::string& text) { controller.offset = parse_place(text); });
   optional_place("Where it shows what it applies, or none", "input:0:int32:0.01",
@@ -129,14 +131,18 @@ void ask_for_controller(InitDraft& draft, Questions& questions) {
         if (text == "no" || text == "n") return ask_for_places(draft.controller, questions);
         if (text != "yes" && text != "y") throw Failure("yes or no");
       });
+  const std::vector<std::string> needed = missing_signals(draft);
   questions.ask_until(
       "What else to read from it, NAME=TABLE:ADDRESS[:TYPE[:SCALE]], such as "
-      "spindle_rpm=input:26:uint16, or none",
+      "spindle_rpm=input:26:uint16, or none" +
+          (needed.empty() ? "" : " (the model needs " + joined(needed) + ")"),
       "none", [&](const std::string& text) {
         std::vector<InitSignal> signals;
         for (const std::string& word : parse_words(text))
           if (word != "none") signals.push_back(parse_signal(word));
         draft.controller.signals = signals;
+        if (const std::vector<std::string> missing = missing_signals(draft); !missing.empty())
+          throw Failure("the model needs " + joined(missing));
       });
 }
 
@@ -166,6 +172,15 @@ void Questions::ask_until(const std::string& question, const std::string& otherw
 
 void Questions::say(const std::string& text) {
   out_ << text << '\n';
+}
+
+std::vector<std::string> missing_signals(const InitDraft& draft) {
+  std::vector<std::string> missing;
+  for (const std::string& name : draft.model_signals)
+    if (std::none_of(draft.controller.signals.begin(), draft.controller.signals.end(),
+                     [&](const InitSignal& signal) { return signal.name == name; }))
+      missing.push_back(name);
+  return missing;
 }
 
 std::string sensor_name(const InitDraft& draft, const InitModule& module, int number) {

@@ -45,6 +45,9 @@ struct InitEyes {
 void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
                   const InitEyes& eyes);
 
+/// Signals that the model needs and that nothing is said of yet.
+[[nodiscard]] std::vector<std::string> missing_signals(const InitDraft& draft);
+
 /// "3" and channel 2 -> "m3_2"; with several buses "b2m3_2".
 [[nodiscard]] std::string sensor_name(const InitDraft& draft, const InitModule& module, int number);
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <system_error>
 
 #include "cli/common/output_file.hpp"
 #include "cli/common/terminal.hpp"
@@ -60,6 +61,7 @@ void take_model(InitDraft& draft, const InitOptions& options, const fs::path& fo
   if (options.model.empty()) return;
   const ThermalModel model = load_model(options.model);
   draft.model_inputs = model.temperature_columns();
+  draft.model_signals = model.signal_columns();
   const fs::path path = fs::absolute(options.model).lexically_normal();
   draft.model_file = path.parent_path() == folder ? path.filename().string() : path.string();
   if (!options.axes.empty()) return;
@@ -142,10 +144,44 @@ void name_sensors(InitDraft& draft, const std::string& names) {
       }
   if (names.empty()) return;
   const std::vector<std::string> given = parse_words(names);
-  if (given.size() != unnamed.size())
+  if (given.size() != unnamed.size()) {
+    std::string sensors;
+    for (const InitChannel* channel : unnamed) sensors += " " + channel->sensor;
     throw Failure("--names: " + std::to_string(given.size()) + " names for " +
-                  std::to_string(unnamed.size()) + " sensors");
+                  std::to_string(unnamed.size()) + " sensors:" + sensors);
+  }
   for (std::size_t i = 0; i < given.size(); ++i) unnamed[i]->sensor = given[i];
+}
+
+/// What is read from a controller is said with it; a bridge has signals of its own.
+void refuse_missing_signals(const InitDraft& draft) {
+  const InitController& controller = draft.controller;
+  const std::vector<std::string> missing = missing_signals(draft);
+  if (missing.empty() || !(controller.is_modbus() || controller.kind == "dry_run")) return;
+  throw Failure("the model needs " + missing.front() + " from the controller: " +
+                (controller.is_modbus()
+                     ? "--signal " + missing.front() + "=TABLE:ADDRESS[:TYPE[:SCALE]]"
+                     : "give it by --controller (--dry-run writes nothing to it), or until there "
+                       "is one take a model that needs no signal"));
+}
+
+void refuse_missing_sensors(const InitDraft& draft) {
+  std::set<std::string> inputs;
+  for (const InitModule& module : draft.modules)
+    for (const InitChannel& channel : module.channels) inputs.insert(input_name(channel.sensor));
+  for (const std::string& input : draft.model_inputs)
+    if (!inputs.contains(input))
+      throw Failure("the model reads " + input + ": name a sensor " +
+                    input.substr(0, input.rfind("_degC")) + " (--names)");
+}
+
+/// What was edited by hand, or a fitted model, is not lost to a second init.
+void keep_old(const fs::path& path) {
+  std::error_code failed;
+  if (!fs::exists(path, failed)) return;
+  const fs::path old = path.string() + ".old";
+  fs::copy_file(path, old, fs::copy_options::overwrite_existing);
+  std::cout << path.string() << ": the one before is " << old.filename().string() << " now\n";
 }
 
 void write_file(const std::string& path, const std::string& text) {
@@ -169,6 +205,9 @@ void tell_next(const InitDraft& draft, const std::string& file) {
   if (draft.controller.is_modbus())
     std::cout << "  " << tool << " prove " << draft.axes.front()
               << " 5   # with an indicator, every axis\n";
+  // Without a displacement it makes no difference yet.
+  if (!draft.model_inputs.empty())
+    std::cout << "  " << tool << " reference   # cold and at an even temperature\n";
   std::cout << "  " << tool << " enable\n";
   if (draft.model_inputs.empty())
     std::cout
@@ -192,8 +231,10 @@ int run_init(const InitOptions& options) {
     ask_for_rest(draft, !options.controller.empty(), questions, eyes_of(folder));
   }
   if (draft.modules.empty()) throw Failure("init: a machine needs a module with a sensor");
+  refuse_missing_signals(draft);
   try_modules(draft, options, folder);
   name_sensors(draft, options.names);
+  refuse_missing_sensors(draft);
 
   bool is_all_there = true;
   if (!options.no_scan) {
@@ -201,7 +242,11 @@ int run_init(const InitOptions& options) {
     std::cout << scan_text(report, stdout_is_terminal());
     is_all_there = is_complete(report);
   }
-  if (draft.model_inputs.empty()) write_file(model.string(), first_model_text(draft));
+  if (draft.model_inputs.empty()) {
+    keep_old(model);
+    write_file(model.string(), first_model_text(draft));
+  }
+  keep_old(options.file);
   write_file(options.file, configuration_text(draft));
   const DaemonConfig written = load_daemon_config(options.file);  // what check says, now
   std::cout << options.file << ": written, OK; " << written.estimator.sensors.size() << " sensors, "
@@ -267,7 +312,8 @@ void add_init_command(CLI::App& app, Action& action) {
   sub->add_flag("--dry-run", options->dry_run,
                 "with dry_run = true: the controller is read and nothing is written to it");
   sub->add_flag("--no-scan", options->no_scan, "look at no bus; channels must then be named");
-  sub->add_flag("--force", options->force, "replace files that are there");
+  sub->add_flag("--force", options->force,
+                "replace files that are there; each is kept as FILE.old");
   sub->callback([&action, options] { action = [options] { return run_init(*options); }; });
 }
 

@@ -71,6 +71,8 @@ struct InitDraft {
   std::string model_file{"model.toml"};  ///< beside the configuration
   /// The model's inputs where it exists already; each must be the name of a sensor and `_degC`.
   std::vector<std::string> model_inputs;
+  /// What it reads from the controller.
+  std::vector<std::string> model_signals;
   double offset_um_max{5.0};
   double rate_um_per_s_max{0.5};
   /// State, history and socket beside the configuration, for one that is not the machine's own.

@@ -14,6 +14,7 @@
 #include "cli/scan/scan_modbus.hpp"
 #include "config/buses/presets.hpp"
 #include "config/daemon/daemon_config.hpp"
+#include "config/text/problems.hpp"
 #include "config/toml/toml_text.hpp"
 
 namespace thermocomp::cli {
@@ -100,6 +101,21 @@ void take_codes(const ScanDevice& device, InitModule& module, std::vector<std::s
   }
 }
 
+/// Problems without file and line, which nobody can look up: the files are gone with them.
+DaemonConfig load_trial(const fs::path& file) {
+  try {
+    return load_daemon_config(file);
+  } catch (const ConfigurationError& error) {
+    std::vector<Problem> problems = error.problems();
+    for (Problem& problem : problems) {
+      if (problem.file.find("/.thermocomp-init-") == std::string::npos) continue;
+      problem.file = "init";
+      problem.line = 0;
+    }
+    throw ConfigurationError(std::move(problems));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> preset_names(const fs::path& folder) {
@@ -114,7 +130,7 @@ std::vector<std::string> preset_names(const fs::path& folder) {
 
 ScanReport probe(const InitDraft& draft, const fs::path& folder) {
   const TrialFiles files(draft, folder);
-  const DaemonConfig config = load_daemon_config(files.config());
+  const DaemonConfig config = load_trial(files.config());
   const ScanSensors sensors = scan_sensors(config.estimator.sensors);
   ScanReport report{"", {}, {}};
   for (const BusConfig& bus : config.buses)

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <ctime>
 #include <pwd.h>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -68,9 +69,19 @@ std::string event_text(const json& event) {
 
 std::string events_text(const json& events) {
   std::string text;
-  for (const json& event : list_of(events, "events"))
-    text += local_time(number_of(event, "wall_s")) + "  " + padded(text_of(event, "kind"), 8) +
-            "  " + event_text(event) + "\n";
+  std::string of_daemon;  // the last of its own events
+  for (const json& event : list_of(events, "events")) {
+    const std::string kind = text_of(event, "kind");
+    text +=
+        local_time(number_of(event, "wall_s")) + "  " + padded(kind, 8) + "  " + event_text(event);
+    if (kind == "daemon") {
+      const std::string before = std::exchange(of_daemon, text_of(event, "what"));
+      // Nobody is there to write down a kill or a power cut.
+      if (of_daemon.starts_with("started") && before.starts_with("started"))
+        text += "; the run before was not stopped: killed, or the power failed";
+    }
+    text += "\n";
+  }
   return text.empty() ? "nothing has happened\n" : text;
 }
 

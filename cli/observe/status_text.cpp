@@ -85,16 +85,19 @@ std::string axes_lines(const json& status) {
 
 std::string inputs_lines(const json& status) {
   std::string result;
+  int width = key_width;  // the names one below the other, however long they are
+  for (const json& input : list_of(status, "inputs"))
+    width = std::max(width, std::min(40, static_cast<int>(text_of(input, "name").size())));
   for (const json& input : list_of(status, "inputs")) {
     const double temp_degC = number_of(input, "temp_degC");
     const double reference_degC = number_of(input, "reference_degC");
     const std::string lost = flag_of(input, "estimated")
                                  ? "  [estimated, +-" + fixed(number_of(input, "sd_K"), 2) + " K]"
                                  : "  [lost]";
-    result += line(text_of(input, "name"), fixed(temp_degC, 2, 8) + " degC, reference " +
-                                               fixed(reference_degC, 2, 8) + " degC, rise " +
-                                               fixed_signed(temp_degC - reference_degC, 2, 7) +
-                                               " K" + (flag_of(input, "good") ? "" : lost));
+    result += line(padded(text_of(input, "name"), width),
+                   fixed(temp_degC, 2, 8) + " degC, reference " + fixed(reference_degC, 2, 8) +
+                       " degC, rise " + fixed_signed(temp_degC - reference_degC, 2, 7) + " K" +
+                       (flag_of(input, "good") ? "" : lost));
   }
   return result;
 }

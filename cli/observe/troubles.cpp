@@ -38,6 +38,10 @@ constexpr std::string_view bus_off_remedy =
     "cable, termination, bit rate; then ip link set IF type can restart, or let restart-ms do it";
 constexpr std::string_view can_remedy = "cable, termination, bit rate";
 
+/// The switch outlives the dry run: left on, the first offsets go out unwatched.
+constexpr std::string_view dry_run_remedy =
+    "thermocomp enable shows the offsets; thermocomp disable before the dry run ends";
+
 using AddTrouble = std::function<void(const std::string& what, std::string_view remedy)>;
 
 void add_can_trouble(const std::string& name, const json& what, const AddTrouble& add) {
@@ -53,15 +57,22 @@ void add_bus_troubles(const json& status, const AddTrouble& add) {
       if (flag_of(unit, "answering") || !flag_of(bus, "connected")) continue;
       add(name + ": " + text_of(unit, "name") + " does not answer (" + text_of(unit, "last_error") +
               ")",
-          "");
+          fault_text("no_answer").remedy);
     }
     add_can_trouble(name, bus, add);
     if (!flag_of(bus, "connected") && text_of(bus, "state") != "bus_off")
-      add(name + " is not connected (" + text_of(bus, "last_error") + ")", "");
+      add(name + " is not connected (" + text_of(bus, "last_error") + ")",
+          bus_remedy(text_of(bus, "kind")));
   }
 }
 
 }  // namespace
+
+std::string_view bus_remedy(std::string_view kind) {
+  if (kind == "modbus_tcp") return "check the module's power, cable, address and port";
+  if (kind == "modbus_rtu") return "check that the adapter is plugged in and is the `device` named";
+  return "check the interface (ip -details link show) and its cable";
+}
 
 bool has_reason(const json& status, const char* name) {
   const json& reasons = list_of(status, "reasons");
@@ -147,7 +158,8 @@ std::vector<Trouble> troubles(const json& status) {
     // Signals come from the controller: where that is away, it is the cause.
     if (name == "signal_lost" && has_reason(status, "controller_offline")) continue;
     const ReasonText text = reason_text(name);
-    add(std::string(text.meaning), text.remedy);
+    const bool switched_off = name == "operator_disabled" && flag_of(status, "dry_run");
+    add(std::string(text.meaning), switched_off ? dry_run_remedy : text.remedy);
   }
   for (const std::string& estimate : estimate_lines(status)) add(estimate, "");
   std::vector<std::string> bad;

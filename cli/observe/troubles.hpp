@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -34,6 +35,10 @@ struct Trouble {
 /// "off by +2.0 K against its neighbours since 2026-03-01 08:30:11.1, used all the same"
 /// @param suspected  of the answer of `sensors`, or one of `sensors_suspected` of `status`
 [[nodiscard]] std::string suspicion_text(const nlohmann::json& suspected);
+
+/// What to do about a bus that is not connected.
+/// @param kind  of the bus, as in the configuration
+[[nodiscard]] std::string_view bus_remedy(std::string_view kind);
 
 [[nodiscard]] bool has_reason(const nlohmann::json& status, const char* name);
 [[nodiscard]] std::vector<std::string> axes_not_driven(const nlohmann::json& status);

@@ -46,6 +46,9 @@ int run_plain(const GlobalOptions& global, const PlainCommand& command) {
   std::cout << command.done;
   if (!checksum.empty()) std::cout << ", model SHA-256 " << checksum.substr(0, 16);
   std::cout << '\n';
+  if (flag_of(answer, "dry_run"))
+    std::cout << "DRY RUN: nothing is written to the controller. The switch outlives the dry run:\n"
+                 "thermocomp disable before you end it, so that no axis moves unwatched\n";
   return exit_success;
 }
 

@@ -15,7 +15,9 @@ bool same_file(const std::string& a, const std::string& b) {
 }
 
 [[noreturn]] void refuse(const RunFile& run, const RunFile& other, const char* rule) {
-  throw ConfigurationError({Problem{run.name, 0, "", other.name, rule}});
+  // The other one is named only where it is the same file by another path.
+  throw ConfigurationError(
+      {Problem{run.name, 0, "", other.name == run.name ? "" : other.name, rule}});
 }
 
 }  // namespace

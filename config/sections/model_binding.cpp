@@ -72,18 +72,26 @@ void check_travel(const TomlTable& table, const AxisConfig& axis, const ThermalM
                     "is no curve; give the axis an `offset`");
 }
 
+void check_signals(const TomlTable& root, const EstimatorConfig& config,
+                   const ThermalModel& model) {
+  const bool has_controller = root.table("controller").text("kind") != "dry_run";
+  std::string rule = "the model needs this signal";
+  rule += has_controller ? " from the controller"
+                         : ", and kind = \"dry_run\" has none: give the controller's own kind and "
+                           "dry_run = true, or until there is one a model that needs no signal";
+  for (const std::string& signal : model.signal_columns()) {
+    if (!is_operating(signal)) continue;  // a problem of the model file already
+    if (!contains(config.signals, signal)) root.problem("controller.signal", signal, rule);
+  }
+}
+
 }  // namespace
 
 void check_binding(const BindingTables& tables, const EstimatorConfig& config,
                    const ThermalModel& model) {
   check_blocks(tables, config, model.temperature_columns());
   check_weighing_down(tables, config, model);
-  for (const std::string& signal : model.signal_columns()) {
-    if (!is_operating(signal)) continue;  // a problem of the model file already
-    if (contains(config.signals, signal)) continue;
-    tables.root.problem("controller.signal", signal,
-                        "the model needs this signal from the controller");
-  }
+  check_signals(tables.root, config, model);
   const std::vector<AxisSpan> spans = axis_spans(config.axes);
   for (std::size_t i = 0; i < spans.size(); ++i) {
     const AxisConfig& axis = config.axes[spans[i].first];

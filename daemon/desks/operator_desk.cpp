@@ -109,10 +109,9 @@ RpcPending take_reference(const DeskActions& actions, const json& params) {
     refuse_unless(view.report.inputs[i].good,
                   "no reference can be taken: " + columns[i] + " has no good sensor now");
   const std::string why = why_no_reference(view);
-  refuse_unless(why.empty() || forced,
-                "no reference is taken: " + why +
-                    ". To take it all the same: thermocomp reference --force (on the socket "
-                    "params {\"force\": true})");
+  refuse_unless(
+      why.empty() || forced,
+      "no reference is taken: " + why + ". To take it all the same: thermocomp reference --force");
   return then(actions.command({CommandKind::reference, 0, 0.0}), [why, watched = watched_s(view)] {
     return json{{"done", true}, {"watched_s", watched}, {"although", why}};
   });
@@ -146,11 +145,13 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
 RpcPending prove(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::prove, axis_index(view, params), value_um(params)};
-  refuse_unless(!view.config.dry_run, "a dry run writes nothing: no axis would move");
+  refuse_unless(!view.config.dry_run,
+                "a dry run writes nothing: no axis would move. Take dry_run out of [controller] "
+                "and restart first");
   const double most_um = view.config.estimator.compensation.prove_um_max;
   refuse_unless(
       std::abs(command.value_um) <= most_um,
-      "a proving move is at most compensation.prove_um_max = " + std::to_string(most_um) + " um");
+      "a proving move is at most " + json(most_um).dump() + " um (compensation.prove_um_max)");
   const AxisReport& axis = view.report.axes[command.axis];
   refuse_unless(axis.driven, "the axis is not driven: the controller is offline or not in step");
   refuse_unless(!any_node(view, command.axis, &AxisReport::proving),
@@ -195,7 +196,11 @@ void add_operator_methods(StatusServer& server, const DeskActions& actions) {
   const auto simple = [&](const char* name, CommandKind kind) {
     add(name, [actions, kind](const json&) { return actions.command({kind, 0, 0.0}); });
   };
-  simple("enable", CommandKind::enable);
+  add("enable", [actions](const json&) {
+    RpcPending pending = actions.command({CommandKind::enable, 0, 0.0});
+    if (!actions.view().config.dry_run) return pending;
+    return then(std::move(pending), [] { return json{{"done", true}, {"dry_run", true}}; });
+  });
   simple("disable", CommandKind::disable);
   simple("cycle_end", CommandKind::cycle_end);
   add("reference", [actions](const json& params) { return take_reference(actions, params); });

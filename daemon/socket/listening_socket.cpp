@@ -110,9 +110,15 @@ void ListeningSocket::remove_stale() const {
   if (probe < 0) fail(path_);
   const int code = connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof address);
   const bool is_refused = code != 0 && errno == ECONNREFUSED;
+  struct ucred listener {};
+  socklen_t size = sizeof listener;
+  const bool is_known =
+      code == 0 && getsockopt(probe, SOL_SOCKET, SO_PEERCRED, &listener, &size) == 0;
   close(probe);
   if (!is_refused) {
-    throw SocketError("status socket " + path_.string() + ": another daemon listens there already");
+    throw SocketError("status socket " + path_.string() + ": " +
+                      (is_known ? "process " + std::to_string(listener.pid) : "another daemon") +
+                      " listens there already: stop it, or give this one another [socket] path");
   }
   if (unlink(path_.c_str()) != 0) fail(path_);
 }

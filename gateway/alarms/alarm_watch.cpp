@@ -71,7 +71,7 @@ std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot) {
       wrong.push_back(
           {"bus/" + text_of(bus, "name"),
            "bus " + text_of(bus, "name") + " is not connected (" + text_of(bus, "last_error") + ")",
-           "check its power, cable and address"});
+           std::string(cli::bus_remedy(text_of(bus, "kind")))});
   return wrong;
 }
 

@@ -1,8 +1,11 @@
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
+#include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
 #include "modelling/inspection/robust.hpp"
 
@@ -80,6 +83,19 @@ void judge_excitation(const Recording& recording, Inspection& inspection) {
   if (recording.time_s.size() == 0) return;
   const MatrixXd slow = from_means(recording, low_pass(recording, recording.values, structure_s));
   const MatrixXd products = slow.transpose() * slow;
+  std::set<std::pair<Index, Index>> told;
+  const auto add_pair = [&](Index i, Index nearest) {
+    if (told.contains({nearest, i})) return;
+    told.emplace(i, nearest);
+    const std::string& name = recording.signals[static_cast<std::size_t>(i)];
+    const std::string other =
+        nearest >= 0 ? recording.signals[static_cast<std::size_t>(nearest)] : "the others";
+    // Nobody runs a temperature by itself, not even one that is recorded in steps like a setpoint.
+    inspection.experiments.push_back(name + " always went with " + other +
+                                     (is_temperature(name)
+                                          ? ": a model cannot tell them apart."
+                                          : ": run one of them alone for an hour."));
+  };
   for (Index i = 0; i < signals; ++i) {
     const std::string& name = recording.signals[static_cast<std::size_t>(i)];
     const int changes = changes_of(recording.values.col(i));
@@ -112,10 +128,7 @@ void judge_excitation(const Recording& recording, Inspection& inspection) {
           " changed once: what it does cannot be told from anything that grows with time. "
           "Take it back and change it again, an hour each.");
     else
-      inspection.experiments.push_back(
-          name + " always went with " +
-          (nearest >= 0 ? recording.signals[static_cast<std::size_t>(nearest)] : "the others") +
-          ": run one of them alone for an hour.");
+      add_pair(i, nearest);
   }
   for (const auto& group : inspection.groups) {
     if (group.size() < 2) continue;

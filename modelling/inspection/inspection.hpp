@@ -30,6 +30,8 @@ struct Cleaned {
 [[nodiscard]] Cleaned cleaned(const std::vector<RunFile>& runs, const Inspection& inspection,
                               double probability_min = 0.9);
 
+/// "10 s", "3.71 h": the time between two rows.
+[[nodiscard]] std::string step_text(double step_s);
 [[nodiscard]] std::string inspection_json(const Inspection& inspection);
 /// What is printed for a person.
 [[nodiscard]] std::string inspection_text(const Inspection& inspection);

@@ -230,11 +230,11 @@ std::string finding_html(const std::vector<RunFile>& runs, const Inspection& ins
 
 std::string runs_table(const Inspection& inspection) {
   std::string html =
-      "<h2>The recordings</h2><table><tr><th>file</th><th>rows</th><th>one each</th>"
+      "<h2>The recordings</h2><table><tr><th>file</th><th>rows</th><th>one every</th>"
       "<th>gaps</th></tr>\n";
   for (const RunSampling& run : inspection.runs)
     html += "<tr><td>" + xml_text(run.file) + "</td><td>" + std::to_string(run.rows) + "</td><td>" +
-            number(run.step_s) + " s</td><td>" + std::to_string(run.gaps.size()) + "</td></tr>\n";
+            step_text(run.step_s) + "</td><td>" + std::to_string(run.gaps.size()) + "</td></tr>\n";
   return html + "</table>\n";
 }
 

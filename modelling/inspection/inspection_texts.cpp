@@ -36,6 +36,17 @@ Json json_of(const Finding& finding, const Inspection& inspection) {
 
 }  // namespace
 
+std::string step_text(double step_s) {
+  const bool in_hours = step_s >= 7200.0;
+  const bool in_minutes = !in_hours && step_s >= 120.0;
+  char text[32];
+  std::snprintf(text, sizeof text, in_hours || in_minutes ? "%.3g" : "%.4g",
+                step_s / (in_hours     ? 3600.0
+                          : in_minutes ? 60.0
+                                       : 1.0));
+  return std::string(text) + (in_hours ? " h" : in_minutes ? " min" : " s");
+}
+
 std::string inspection_json(const Inspection& inspection) {
   Json json;
   json["runs"] = Json::array();
@@ -59,9 +70,9 @@ std::string inspection_text(const Inspection& inspection) {
   std::string text;
   char line[160];
   for (const RunSampling& run : inspection.runs) {
-    std::snprintf(line, sizeof line, ": %zu rows, one each %.4g s, %zu gaps\n", run.rows,
-                  run.step_s, run.gaps.size());
-    text += run.file + line;
+    text += run.file + ": " + std::to_string(run.rows) + " rows, one every " +
+            step_text(run.step_s) + ", " + std::to_string(run.gaps.size()) +
+            (run.gaps.size() == 1 ? " gap\n" : " gaps\n");
   }
   text += "\n";
   if (inspection.findings.empty()) text += "No faults found in these recordings.\n";

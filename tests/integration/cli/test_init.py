@@ -142,6 +142,8 @@ def test_by_options_without_a_terminal(foreign, folder):
     assert answer.returncode == 2 and "--force" in answer.stderr
     assert config.read_text() == before
     assert run(*arguments, "--force").returncode == 0
+    assert (folder / "thermocompd.toml.old").read_text() == before
+    assert (folder / "model.toml.old").exists()
     arguments[5] = "bus1/" + arguments[5]  # as the configuration names it
     assert run(*arguments, "--force").returncode == 0
     assert config.read_text() == before
@@ -158,9 +160,35 @@ def test_a_model_that_is_there_is_bound_by_the_sensors_names(foreign, folder):
                  folder / "mill.toml"]
     answer = run(*arguments, "--names", "bed,column,spindle")
     assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert answer.stdout.index("reference") < answer.stdout.index("enable\n")
     text = config.read_text()
     assert text.count("[[block]]") == 2 and 'output = "y_um"' in text
     assert "in no block: column" in run("check", config).stdout
+
+
+def test_what_a_model_needs_is_asked_for(foreign, folder):
+    modules, plc = foreign
+    (folder / "mill.toml").write_text(
+        'format = 1\ninputs = ["bed_degC"]\noutputs = ["z_um"]\nreference = "first_sample"\n'
+        'matrix_um_per_K = [[1.0]]\n[[term]]\nkind = "speed_growth"\nsubject = "spindle_rpm"\n'
+        'gain_um_per_unit2 = { z_um = 1e-7 }\n')
+    config = folder / "thermocompd.toml"
+    arguments = ["init", config, "--bus", f"tcp:127.0.0.1:{modules}", "--module",
+                 "3=wago_750_458:1-2", "--model", folder / "mill.toml"]
+    plc_there = ["--controller", f"tcp:127.0.0.1:{plc}"]
+    for more, said in ((["--names", "bed,x", "--controller", "none"], "give it by --controller"),
+                       (["--names", "bed,x", *plc_there], "--signal spindle_rpm=TABLE:ADDRESS"),
+                       (["--names", "x", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
+                        "1 names for 2 sensors: m3_1 m3_2"),
+                       (["--names", "x,y", *plc_there, "--signal", "spindle_rpm=input:26:uint16"],
+                        "name a sensor bed (--names)")):
+        answer = run(*arguments, *more)
+        assert answer.returncode == 2 and said in answer.stderr, answer.stdout + answer.stderr
+        assert answer.stderr.count("\n") - answer.stderr.count("reading") <= 1, answer.stderr
+        assert not config.exists()
+    status, shown = converse(arguments, ["bed column", f"tcp:127.0.0.1:{plc}", "yes", "none",
+                                         "spindle_rpm=input:26:uint16"][1:])
+    assert "(the model needs spindle_rpm)" in shown and "the model needs spindle_rpm\r" in shown
 
 
 def test_the_code_of_an_open_circuit_is_taken_without_an_edit(foreign, folder):
@@ -196,6 +224,9 @@ def test_a_dry_run_from_the_first_start_on(foreign, folder):
     with running(config):
         shown = run("--socket", config.parent / "status.sock", "status")
         assert shown.returncode == 1 and "DRY RUN" in shown.stdout
+        assert "disable before the dry run ends" in shown.stdout
+        enabled = run("--socket", config.parent / "status.sock", "enable")
+        assert enabled.returncode == 0 and "thermocomp disable before" in enabled.stdout
     run(*arguments, "--force")
     assert "\n# dry_run = true" in config.read_text()
 

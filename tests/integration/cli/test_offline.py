@@ -34,8 +34,9 @@ def test_help_succeeds_and_bad_use_is_status_2():
     assert run("--help").returncode == 0
     assert run("predict", "--help").returncode == 0
     for arguments, said in (
-            ([], "subcommand"), (["nosuch"], "subcommand"), (["predict"], "required"),
-            (["measured", "z"], "required"), (["measured", "z", "much"], "much"),
+            ([], "subcommand"), (["nosuch"], "no command nosuch\n"),
+            (["enabel"], "no command enabel; did you mean enable?"),
+            (["predict"], "required"), (["measured", "z"], "required"), (["measured", "z", "much"], "much"),
             (["check", "a", "b"], "b"), (["watch", "--for", "-1"], "-1")):
         answer = run(*arguments)
         assert answer.returncode == 2, arguments

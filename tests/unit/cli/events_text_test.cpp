@@ -50,6 +50,19 @@ TEST_CASE("each kind of event has its words", "[cli][events]") {
   CHECK(events_text({{"events", json::array()}}) == "nothing has happened\n");
 }
 
+TEST_CASE("a run that nobody stopped is named at the start of the next", "[cli][events]") {
+  const auto said = [](const char* what) { return json{{"kind", "daemon"}, {"what", what}}; };
+  const json mode{{"kind", "mode"}, {"what", "holding"}};
+  const std::string killed =
+      events_text({{"events", {said("started, version 1"), mode, said("started, version 1")}}});
+  CHECK_THAT(killed, Catch::EndsWith("started, version 1; the run before was not stopped: killed, "
+                                     "or the power failed\n"));
+  const std::string stopped = events_text({{"events",
+                                            {said("started, version 1"), said("stopping: SIGTERM"),
+                                             mode, said("started, version 1")}}});
+  CHECK_THAT(stopped, !Catch::Contains("was not stopped"));
+}
+
 TEST_CASE("an answer of another shape is not trusted", "[cli][events]") {
   CHECK_NOTHROW(events_text({{"events", {1, "x", nullptr, {{"wall_s", 1e300}, {"user", -7}}}}}));
   CHECK_NOTHROW(events_text(json::array()));

@@ -134,6 +134,8 @@ TEST_CASE("a dry run is never said to compensate", "[cli][status]") {
     CHECK_THAT(text, !Contains("yes"));
     CHECK_THAT(watch_screen(status, nullptr, false), Contains("DRY RUN"));
   }
+  status["reasons"] = {"operator_disabled"};
+  CHECK_THAT(status_text(status, false), Contains("disable before the dry run ends"));
   status["controller"]["shown"] = {{"z", 3.0}};
   CHECK_THAT(status_text(status, false), Contains("online; applies by itself z +3.00 um"));
 }
@@ -149,7 +151,7 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
   CHECK_THAT(text, Contains("no (data lost: holding the last offsets"));
   CHECK_THAT(text, Contains("no good sensor left -> thermocomp sensors"));
   CHECK_THAT(text, Contains("bad sensors: table"));
-  CHECK_THAT(text, Contains("bus cabinet is not connected (refused)"));
+  CHECK_THAT(text, Contains("bus cabinet is not connected (refused) -> check the module's power"));
 }
 
 TEST_CASE("an estimated block is told with how sure it is", "[cli][status]") {

@@ -424,6 +424,14 @@ TEST_CASE("suspected sensors can be weighed down only where a covariance says by
   CHECK(parse(asked, able).estimator.compensation.suspected_sensors == SuspectedPolicy::weigh_down);
 }
 
+TEST_CASE("a model that needs a signal is refused where there is no controller", "[config]") {
+  const std::string model = example("column_model.toml") +
+                            "[[term]]\nkind = \"speed_growth\"\nsubject = \"spindle_rpm\"\n"
+                            "gain_um_per_unit2 = { z_um = 1e-7 }\n";
+  CHECK(mentions(problems_of([&] { return parse(example("modbus_rtu.toml"), model); }),
+                 "controller.signal", "own kind and dry_run = true"));
+}
+
 TEST_CASE("an edit that breaks several rules is told once a rule", "[config]") {
   const std::string good = example("small_machine.toml");
   const std::string model = example("small_machine_model.toml");

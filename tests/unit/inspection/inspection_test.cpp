@@ -164,6 +164,19 @@ TEST_CASE("a signal that never changed cannot be told of, and an experiment is p
   CHECK(inspection.experiments.front().find("spindle_rpm never changed") == 0);
 }
 
+TEST_CASE("two signals that always went together are told once", "[inspection]") {
+  RunFile run = recording();
+  run.columns.emplace_back("load_percent");
+  run.values.push_back(column(run, "spindle_rpm"));
+  for (double& value : run.values.back()) value /= 30.0;
+  const std::string text = inspection_text(inspect(std::vector<RunFile>{run}));
+  CHECK(text.find("spindle_rpm always went with load_percent: run") != std::string::npos);
+  CHECK(text.find("load_percent always went with") == std::string::npos);
+  CHECK(text.find("run.csv: 700 rows, one every 60 s, 0 gaps\n") == 0);
+  CHECK(step_text(33.4) == "33.4 s");
+  CHECK(step_text(13350.0) == "3.71 h");
+}
+
 TEST_CASE("the page shows each finding with its picture", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 400; row < rows; ++row) column(run, "t3_degC")[row] += 2.0;
