@@ -50,10 +50,9 @@ class Field {
  private:
   /// Explanations that leave about as little or less, itself among them.
   [[nodiscard]] double as_good_as(const Explanation& of) const {
-    return static_cast<double>(
-        std::count_if(weighed_.begin(), weighed_.end(), [&](const Explanation& other) {
-          return other.log_left < of.log_left + crowd;
-        }));
+    return static_cast<double>(std::count_if(
+        weighed_.begin(), weighed_.end(),
+        [&](const Explanation& other) { return other.log_left < of.log_left + crowd; }));
   }
 
   std::span<const Explanation> weighed_;
