@@ -109,7 +109,10 @@ std::string comparison_text(const ThermalModel& model) {
 }
 
 std::string first_start_text(const DaemonConfig& config) {
-  if (config.estimator.compensation.enabled_at_first_start)
+  const bool is_enabled = config.estimator.compensation.enabled_at_first_start;
+  if (is_enabled && config.dry_run)
+    return "first start: switched on, in a dry run: nothing is written";
+  if (is_enabled)
     return "first start: COMPENSATES AT ONCE (compensation.enabled_at_first_start = true)";
   return "first start: switched off until `thermocomp enable`";
 }
