@@ -76,7 +76,7 @@ def test_check_says_when_a_first_start_compensates_at_once(tmp_path):
     answer = run("check", "at_once.toml", cwd=tmp_path)
     assert answer.returncode == 0, answer.stderr
     assert "\nfirst start: COMPENSATES AT ONCE (compensation.enabled" in answer.stdout
-    dry = (tmp_path / "at_once.toml").read_text().replace("[controller]", "[controller]\ndry_run = true")
+    dry = (tmp_path / "at_once.toml").read_text().replace("dry_run = false", "dry_run = true ")
     (tmp_path / "dry.toml").write_text(dry)
     assert "\nfirst start: switched on, in a dry run: nothing is written" in run(
         "check", "dry.toml", cwd=tmp_path).stdout
