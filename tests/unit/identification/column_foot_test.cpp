@@ -1,3 +1,4 @@
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -54,7 +55,7 @@ StructureSpec clamped_column(double depth_mm, double poisson_ratio) {
 
 TEST_CASE("a foot that is held crosswise is what finite elements of a clamped column say",
           "[tiebar][fe][foot]") {
-  const double poisson_ratio = GENERATE(0.1, 0.3);
+  const double poisson_ratio = GENERATE(0.0, 0.1, 0.3);
   const double depth_mm = GENERATE(20.0, 60.0, 160.0);
   const StructureSpec spec = clamped_column(depth_mm, poisson_ratio);
   const Structure structure = build_structure(spec, [](std::string_view) {});
@@ -78,7 +79,10 @@ TEST_CASE("a foot that is held crosswise is what finite elements of a clamped co
                          beam.curvature_per_mm_K * (upper_mm * upper_mm - lower_mm * lower_mm) / 2;
   const double foot_mm = tilt_mm / (upper_mm - lower_mm) / beam.curvature_per_mm_K;
   CAPTURE(poisson_ratio, depth_mm, foot_mm, beam.foot_length_mm);
-  CHECK(beam.foot_length_mm == Approx(foot_mm).epsilon(0.06));
+  if (poisson_ratio > 0.0)
+    CHECK(beam.foot_length_mm == Approx(foot_mm).epsilon(0.06));
+  else
+    CHECK(std::abs(foot_mm) < 0.002 * width_mm);
 
   std::vector<double> force_N(3 * structure.mesh.nodes_m.size(), 0.0);
   for (const Functional::Entry& entry : structure.rows[1].entries)
