@@ -118,7 +118,7 @@ double read_thickness_mm(const TomlTable& table, double area_mm2, const Section&
                          const TiedColumns& columns) {
   if (!table.has("thickness_mm")) return 0.0;
   const double thickness_mm = table.number("thickness_mm", length());
-  if (!(columns.column_poisson_ratio > 0.0))
+  if (!(columns.column_shear_compliance_per_N > 0.0))  // as where poisson_ratio is given
     table.problem("thickness_mm", "needs poisson_ratio in [column]");
   if (section.depth_mm && area_mm2 / thickness_mm > *section.depth_mm * (1.0 + 1e-9))
     table.problem("thickness_mm", "makes the tie, area_mm2 / thickness_mm, deeper than the column");

@@ -86,7 +86,7 @@ TEST_CASE("a foot that is held crosswise is what finite elements of a clamped co
 
   std::vector<double> force_N(3 * structure.mesh.nodes_m.size(), 0.0);
   for (const Functional::Entry& entry : structure.rows[1].entries)
-    force_N[3 * entry.node] += entry.weight[0];
+    force_N[3 * std::size_t{entry.node}] += entry.weight[0];
   const double yielding_mm = 1e3 * structure.rows[0].of(statics.displacement_under_m(force_N));
   // A column that is twice as deep as wide bends somewhat as a plate does.
   const double near = depth_mm > width_mm ? 0.015 : 0.005;
