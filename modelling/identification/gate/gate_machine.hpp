@@ -2,8 +2,6 @@
 /// theta_C from dimensions and material (Teratani et al. 1995; beam theory by Castigliano).
 #pragma once
 
-#include <string>
-
 namespace thermocomp::identification {
 
 /// Lengths [mm], areas [mm^2], moduli [MPa], expansion [1/K].
@@ -37,17 +35,5 @@ struct TieCoefficients {
 
 /// km / kc: stiffness of a column at the tie beside that of the tie.
 [[nodiscard]] double stiffness_ratio(const GateMachine& machine);
-
-/// The height of the tie, of those from 0.2 l to 3 l, at which |Ki - Kc ratio| is smallest for
-/// ratio = theta_C / (theta_A - theta_B).
-struct BestHeight {
-  double tie_height_mm{0.0};
-  double displacement_um_per_K{0.0};  ///< Ki - Kc ratio there
-};
-[[nodiscard]] BestHeight best_tie_height(const GateMachine& machine, double ratio);
-
-/// Ki and Kc over l / l4, each relative to its value without a tie and to alpha_c lc, for this
-/// machine and for tie stiffnesses beside it (beta = 3 I lc / (Ac l^3) at one material).
-[[nodiscard]] std::string design_curves_svg(const GateMachine& machine);
 
 }  // namespace thermocomp::identification

@@ -14,6 +14,7 @@
 #include "cli/common/run_loader.hpp"
 #include "modelling/identification/gate/gate_file.hpp"
 #include "modelling/identification/gate/gate_machine.hpp"
+#include "modelling/identification/gate/one_tie.hpp"
 #include "modelling/identification/gate/tie_course.hpp"
 #include "modelling/identification/gate/tied_columns.hpp"
 #include "modelling/identification/printed.hpp"
@@ -46,16 +47,17 @@ void write(const std::string& destination, const std::string& text) {
   file.commit();
 }
 
-void say_one_tie(const Options& options, const GateMachine& machine, Answer& answer) {
-  const TieCoefficients k = tie_coefficients(machine);
-  if (!options.curves.empty()) write(options.curves, design_curves_svg(machine));
-  answer.json = {{"Ki_um_per_K", k.ki_um_per_K}, {"Kc_um_per_K", k.kc_um_per_K}};
-  answer.text = printed("Ki = %.6g um/K\nKc = %.6g um/K\n", k.ki_um_per_K, k.kc_um_per_K);
+void say_one_tie(const Options& options, const TiedColumns& columns, Answer& answer) {
+  const TiedCoefficients k = tied_coefficients(columns);
+  const GateMachine machine = machine_of(columns);
+  if (!options.curves.empty()) write(options.curves, design_curves_svg(columns));
+  answer.json = {{"Ki_um_per_K", k.ki_um_per_K}, {"Kc_um_per_K", k.kc_um_per_K.front()}};
+  answer.text = printed("Ki = %.6g um/K\nKc = %.6g um/K\n", k.ki_um_per_K, k.kc_um_per_K.front());
   answer.text +=
       printed("l / l4 = %.4g, km / kc = %.4g\n", machine.working_height_mm / machine.tie_height_mm,
               stiffness_ratio(machine));
   if (!options.ratio) return;
-  const BestHeight best = best_tie_height(machine, *options.ratio);
+  const BestHeight best = best_tie_height(columns, *options.ratio);
   answer.json["best_tie_height_mm"] = best.tie_height_mm;
   answer.json["displacement_um_per_K"] = best.displacement_um_per_K;
   answer.text += printed(
@@ -118,7 +120,7 @@ int run(const Options& options) {
   const GateFile file = load_gate_file(options.geometry);
   Answer answer;
   if (file.columns.ties.size() == 1) {
-    say_one_tie(options, machine_of(file.columns), answer);
+    say_one_tie(options, file.columns, answer);
   } else {
     if (options.ratio || !options.curves.empty())
       throw std::runtime_error("--ratio and --curves are for one tie; " + options.geometry +

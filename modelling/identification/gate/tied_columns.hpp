@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "modelling/identification/gate/column_beam.hpp"
 #include "modelling/identification/gate/gate_machine.hpp"
 
 namespace thermocomp::identification {
@@ -15,6 +16,9 @@ struct Tie {
   double area_mm2{0.0};
   double modulus_MPa{0.0};
   double expansion_per_K{0.0};
+  /// Of the section, upwards; its depth is area / thickness. Above 0 the tie is bonded to the inner
+  /// faces of the columns; 0: it is pinned to their axes.
+  double thickness_mm{0.0};
 };
 
 /// Equal columns, one of them heated on its outer side up to `heated_height_mm`.
@@ -26,6 +30,10 @@ struct TiedColumns {
   double column_modulus_MPa{0.0};
   double column_expansion_per_K{0.0};
   std::vector<Tie> ties;  ///< may be empty; several at one height share what they hold
+  /// All 0: the columns of the publication.
+  double column_poisson_ratio{0.0};
+  double column_shear_compliance_per_N{0.0};  ///< 1 / (G As), rectangle_shear_area_mm2()
+  double foot_length_mm{0.0};                 ///< held_foot_length_mm(); 0: free crosswise
 };
 
 struct TiedCoefficients {
@@ -33,18 +41,26 @@ struct TiedCoefficients {
   std::vector<double> kc_um_per_K;  ///< one a tie
 };
 
-/// Cantilevers of stiffness EI, pushed apart by X_j at the heights z_j of the ties:
-///   bending of the heated one, at 1 K of A - B:  w(z) = alpha/(2h) z^2          z <= l1
-///                                                     = alpha/(2h) l1 (2z - l1)  above
-///   influence of a force at a:                   f(z,a) = m^2 (3M - m) / (6EI), m, M: the lesser
-///                                                and the greater of z and a
-///   at each tie:  sum_m 2 f(z_j,z_m) X_m + X_j lc_j/(Ac_j Ec_j) = w(z_j) dAB + alpha_cj lc_j
-///   theta_Cj at the work:  delta = w(l) dAB - sum_m 2 f(l,z_m) X_m
-/// With one tie these are the three cases of tie_coefficients().
+/// The displacement that matters is that of two columns bent alike, each a mirror image of the
+/// other: ties then carry a force X_j and a moment M_j at both ends, and no shear. With the
+/// deflections of a cantilever (column_beam.hpp), f of a force and r of a moment, and the tilt t:
+///   at each tie:  sum_m [2 f(z_j,z_m) X_m + 2 r(z_j,z_m) M_m] + (lc_j/(Ac_j Ec_j) + 2 c_j) X_j
+///                   = w(z_j) dAB + alpha_cj lc_j theta_Cj
+///                 sum_m [2 r(z_m,z_j) X_m + 2 t(z_j,z_m) M_m] + lc_j/(Ec_j Ic_j) M_j = t(z_j) dAB
+///   at the work:  delta = w(l) dAB - sum_m [2 f(l,z_m) X_m + 2 r(l,z_m) M_m]
+/// A tie that is pinned (thickness 0) has no M_j and no c_j; pinned ties, columns rigid in shear
+/// and feet free crosswise give the publication's three cases, tie_coefficients().
+///
+/// A bonded tie meets the face of the column, which differs from its axis: it sinks in by c_j
+/// (bonded_end_compliance_mm_per_N()), and the section changes its width, as is known of bending
+/// (Timoshenko and Goodier, Theory of Elasticity, pure bending; Boley and Weiner, Theory of Thermal
+/// Stresses, free plate): towards the other column by
+///   h^2/8 (nu M/(EI) - alpha/h dAB in the heated zone).
 /// @pre all dimensions are positive
 [[nodiscard]] TiedCoefficients tied_coefficients(const TiedColumns& columns);
 
 [[nodiscard]] TiedColumns columns_of(const GateMachine& machine);
+/// Without what the publication does not have.
 /// @pre there is one tie
 [[nodiscard]] GateMachine machine_of(const TiedColumns& columns);
 

@@ -73,5 +73,58 @@ TEST_CASE("what a file does not say of the search has a default, and a fixed tie
   CHECK(file.side_a == std::vector<std::string>{"side_a_degC"});
 }
 
+const std::string heights = "working_height_mm = 600\nheated_height_mm = 300\n";
+const std::string steel = "modulus_MPa = 206000\nexpansion_per_K = 11.5e-6\n";
+const std::string tie = "[[tie]]\nheight_mm = 250\nlength_mm = 400\narea_mm2 = 150\n";
+
+TEST_CASE("a file without elasticity means the publication's columns and ties", "[tiebar]") {
+  const TiedColumns plain = parse_gate_file(columns + tie, "gate.toml").columns;
+  CHECK(plain.column_poisson_ratio == 0.0);
+  CHECK(plain.column_shear_compliance_per_N == 0.0);
+  CHECK(plain.foot_length_mm == 0.0);
+  CHECK(plain.ties[0].thickness_mm == 0.0);
+}
+
+TEST_CASE("shear, held feet and bonded ties are read", "[tiebar]") {
+  const TiedColumns read = parse_gate_file(columns + "poisson_ratio = 0.3\nfoot = \"held\"\n" +
+                                               tie + "thickness_mm = 12.5\n",
+                                           "gate.toml")
+                               .columns;
+  CHECK(read.column_poisson_ratio == 0.3);
+  CHECK(read.column_shear_compliance_per_N == Approx(2 * 1.3 / (206000 * 4000.0)));
+  CHECK(read.foot_length_mm == Approx(held_foot_length_mm(80, 60, 0.3)));
+  CHECK(read.ties[0].thickness_mm == 12.5);
+  SECTION("of a column known by its inertia with its shear area") {
+    const TiedColumns by_inertia =
+        parse_gate_file(heights +
+                            "[column]\nwidth_mm = 80\ninertia_mm4 = 2.56e6\nshear_area_mm2 = "
+                            "4000\npoisson_ratio = 0.3\n" +
+                            steel + tie,
+                        "gate.toml")
+            .columns;
+    CHECK(by_inertia.column_shear_compliance_per_N == Approx(read.column_shear_compliance_per_N));
+    CHECK(by_inertia.foot_length_mm == 0.0);
+  }
+}
+
+TEST_CASE("elasticity that lacks something is told with key and rule", "[tiebar]") {
+  refused(columns + "foot = \"held\"\n" + tie, {"column.foot", "needs poisson_ratio"});
+  refused(columns + "foot = \"bolted\"\n" + tie, {"column.foot", "bolted"});
+  refused(columns + "poisson_ratio = 0.6\n" + tie, {"poisson_ratio = 0.6"});
+  refused(columns + "wall_mm = 10\npoisson_ratio = 0.3\nfoot = \"held\"\n" + tie,
+          {"column.foot", "without wall_mm"});
+  refused(columns + "poisson_ratio = 0.45\nfoot = \"held\"\n" + tie, {"column.foot", "up to 0.4"});
+  refused(columns + "shear_area_mm2 = 4000\npoisson_ratio = 0.3\n" + tie,
+          {"shear_area_mm2", "where depth_mm is given"});
+  refused(columns + tie + "thickness_mm = 12.5\n", {"thickness_mm", "needs poisson_ratio"});
+  refused(columns + "poisson_ratio = 0.3\n" + tie + "thickness_mm = 2\n",
+          {"thickness_mm", "deeper than the column"});
+  const std::string by_inertia =
+      heights + "[column]\nwidth_mm = 80\ninertia_mm4 = 2.56e6\n" + steel;
+  refused(by_inertia + "poisson_ratio = 0.3\n" + tie, {"poisson_ratio", "shear_area_mm2"});
+  refused(by_inertia + "shear_area_mm2 = 4000\n" + tie,
+          {"shear_area_mm2", "there is no poisson_ratio"});
+}
+
 }  // namespace
 }  // namespace thermocomp::identification

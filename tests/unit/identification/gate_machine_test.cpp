@@ -4,6 +4,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "modelling/identification/gate/one_tie.hpp"
+
 namespace thermocomp::identification {
 namespace {
 
@@ -49,7 +51,7 @@ TEST_CASE("the three cases meet where the tie is at the heated zone's end and at
 TEST_CASE("at the best height of the tie no other height displaces less", "[tiebar]") {
   const double ratio = GENERATE(0.0, 0.1, 0.3);
   const GateMachine gate = machine(1.1, 0.1);
-  const BestHeight best = best_tie_height(gate, ratio);
+  const BestHeight best = best_tie_height(columns_of(gate), ratio);
   for (double height_mm = 120; height_mm <= 1800; height_mm += 1) {
     GateMachine other = gate;
     other.tie_height_mm = height_mm;

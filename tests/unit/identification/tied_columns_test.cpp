@@ -1,6 +1,8 @@
 #include "modelling/identification/gate/tied_columns.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
@@ -81,6 +83,78 @@ TEST_CASE("two rigid ties, one above the work and one below, leave less than eit
   const double both = ki({tie(400, 1e5), tie(750, 1e5)});
   CHECK(both < 0.5 * ki({tie(400, 1e5)}));
   CHECK(both < 0.5 * ki({tie(750, 1e5)}));
+}
+
+/// With all that the publication leaves out.
+TiedColumns elastic_gate() {
+  TiedColumns columns = gate();
+  columns.column_poisson_ratio = 0.3;
+  columns.column_shear_compliance_per_N = 2.0 * 1.3 / (206000 * 4000.0);
+  columns.foot_length_mm = held_foot_length_mm(80, 60, 0.3);
+  return columns;
+}
+
+Tie bonded_tie(double height_mm, double area_mm2, double thickness_mm) {
+  Tie bonded = tie(height_mm, area_mm2);
+  bonded.thickness_mm = thickness_mm;
+  return bonded;
+}
+
+TEST_CASE("shear, the foot and bonded ends each move Ki away from the published one", "[tiebar]") {
+  TiedColumns columns = gate();
+  columns.ties = {tie(250, 150)};
+  const double published = tied_coefficients(columns).ki_um_per_K;
+  const auto differs = [&](const TiedColumns& other) {
+    return std::abs(tied_coefficients(other).ki_um_per_K / published - 1);
+  };
+  TiedColumns other = columns;
+  other.column_shear_compliance_per_N = elastic_gate().column_shear_compliance_per_N;
+  CHECK(differs(other) > 0.005);
+  other = columns;
+  other.foot_length_mm = elastic_gate().foot_length_mm;
+  CHECK(differs(other) > 0.005);
+  other = columns;
+  other.ties = {bonded_tie(250, 150, 12.5)};
+  CHECK(differs(other) > 0.005);
+}
+
+TEST_CASE("a stiff bonded tie above the heated zone leaves nothing at the work or above the tie",
+          "[tiebar]") {
+  TiedColumns columns = gate();  // without Poisson's ratio the faces stay where the axes are
+  columns.column_poisson_ratio = 0.0;
+  const double free_um_per_K = tied_coefficients(columns).ki_um_per_K;
+  const double height_mm = GENERATE(400.0, 600.0);
+  Tie stiff = bonded_tie(height_mm, 12000, 200);  // too large to sink in
+  stiff.modulus_MPa = 1e12;
+  columns.ties = {stiff};
+  CHECK(std::abs(tied_coefficients(columns).ki_um_per_K) < 1e-5 * free_um_per_K);
+  SECTION("pinned it leaves the tilt") {
+    columns.ties[0].thickness_mm = 0;
+    const double ki_um_per_K = std::abs(tied_coefficients(columns).ki_um_per_K);
+    CHECK((ki_um_per_K > 0.01 * free_um_per_K) == (height_mm < 600));
+  }
+}
+
+TEST_CASE("bonded and pinned ties may be mixed in any order", "[tiebar]") {
+  TiedColumns columns = elastic_gate();
+  columns.ties = {bonded_tie(250, 150, 12.5), tie(500, 90), bonded_tie(750, 300, 12.5)};
+  TiedColumns turned = columns;
+  std::reverse(turned.ties.begin(), turned.ties.end());
+  const TiedCoefficients k = tied_coefficients(columns);
+  const TiedCoefficients other = tied_coefficients(turned);
+  CHECK(other.ki_um_per_K == Approx(k.ki_um_per_K).epsilon(1e-10));
+  for (std::size_t j = 0; j < 3; ++j)
+    CHECK(other.kc_um_per_K[j] == Approx(k.kc_um_per_K[2 - j]).epsilon(1e-10));
+}
+
+TEST_CASE("of a bonded tie at the end of the heated zone no jump is left", "[tiebar]") {
+  TiedColumns columns = elastic_gate();
+  const auto ki = [&](double height_mm) {
+    columns.ties = {bonded_tie(height_mm, 150, 12.5)};
+    return tied_coefficients(columns).ki_um_per_K;
+  };
+  CHECK(ki(300.001) == Approx(ki(299.999)).epsilon(1e-4));
+  CHECK(ki(306.251) == Approx(ki(306.249)).epsilon(1e-4));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "tied_structure.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -24,6 +25,11 @@ constexpr double width_mm = 80.0;
 constexpr double tie_length_mm = 400.0;
 constexpr double tie_high_mm = 12.5;  // as high as that of the file; wider where it is thicker
 constexpr double above_tie_mm = 40.0;
+// Where elements are refined: the first two at an edge, those of a tie, and what is too narrow.
+constexpr double edge_mm = 5.0;
+constexpr double edge_next_mm = 14.0;
+constexpr double tie_size_mm = 6.25;
+constexpr double nearest_planes_mm = 2.0;
 constexpr double mm = 1e3;
 constexpr double um = 1e6;
 constexpr Index first_tie_part = 2;
@@ -34,13 +40,22 @@ void replace(std::string& text, const std::string& what, const std::string& by) 
   text.replace(at, what.size(), by);
 }
 
+struct TieSection {
+  double wide_mm;
+  double high_mm;
+};
+
 /// As wide as its area asks for, then higher.
+TieSection section_of(const FiniteTie& tie) {
+  const double wide_mm = std::min(depth_mm, tie.area_mm2 / tie_high_mm);
+  return {wide_mm, tie.area_mm2 / wide_mm};
+}
+
 std::string box_of(const FiniteTie& tie) {
-  const double wide = std::min(depth_mm, tie.area_mm2 / tie_high_mm);
-  const double high = tie.area_mm2 / wide;
-  const auto corner = [&](double x, double sign) {
-    return identification::printed("[%f, %f, %f]", x, depth_mm / 2 + sign * wide / 2,
-                                   tie.height_mm + sign * high / 2);
+  const auto [wide, high] = section_of(tie);
+  const auto corner = [&tie, half_wide = wide / 2, half_high = high / 2](double x, double sign) {
+    return identification::printed("[%f, %f, %f]", x, depth_mm / 2 + sign * half_wide,
+                                   tie.height_mm + sign * half_high);
   };
   return "from_mm = " + corner(width_mm, -1) + "\nto_mm = " + corner(width_mm + tie_length_mm, 1) +
          "\n";
@@ -61,7 +76,54 @@ std::string text_of_tie(const std::string& name, const FiniteTie& tie) {
   return text;
 }
 
-StructureSpec spec_of(const std::vector<FiniteTie>& ties) {
+/// More planes of elements: boxes inside the part end at them.
+void add_planes(PartSpec& part, std::size_t axis, std::vector<double> planes_mm) {
+  Box whole = part.boxes.front().box;
+  whole.high_m[2] = part.boxes.back().box.high_m[2];
+  std::sort(planes_mm.begin(), planes_mm.end());
+  double last_mm = mm * whole.low_m[axis];
+  for (const double plane_mm : planes_mm) {
+    if (plane_mm - last_mm < nearest_planes_mm ||
+        mm * whole.high_m[axis] - plane_mm < nearest_planes_mm)
+      continue;
+    BoxShape box{whole, false};
+    box.box.high_m[axis] = plane_mm / mm;
+    part.boxes.push_back(box);
+    last_mm = plane_mm;
+  }
+}
+
+/// Small elements at the edges of the feet, which hold the columns crosswise, and at the ends of
+/// the ties.
+void refine(StructureSpec& spec, std::size_t ties) {
+  const auto between = [](double low_mm, double high_mm) {
+    return std::vector<double>{low_mm + edge_mm, low_mm + edge_next_mm, high_mm - edge_next_mm,
+                               high_mm - edge_mm};
+  };
+  std::vector<double> depth_planes_mm = between(0.0, depth_mm);
+  std::vector<double> height_planes_mm{edge_mm, edge_next_mm};
+  for (Index tie = first_tie_part; tie < first_tie_part + ties; ++tie) {
+    PartSpec& part = spec.parts[tie];
+    const Box box = part.boxes.front().box;
+    part.size_m = {part.size_m[0], tie_size_mm / mm, tie_size_mm / mm};
+    add_planes(part, 0, between(mm * box.low_m[0], mm * box.high_m[0]));
+    for (const double share : {0.0, 0.5, 1.0}) {
+      depth_planes_mm.push_back(mm * std::lerp(box.low_m[1], box.high_m[1], share));
+      height_planes_mm.push_back(mm * std::lerp(box.low_m[2], box.high_m[2], share));
+    }
+    height_planes_mm.push_back(mm * box.low_m[2] - edge_next_mm + edge_mm);
+    height_planes_mm.push_back(mm * box.high_m[2] + edge_next_mm - edge_mm);
+  }
+  for (const std::size_t column : {0U, 1U}) {
+    PartSpec& part = spec.parts[column];
+    const Box box = part.boxes.front().box;
+    add_planes(part, 0, between(mm * box.low_m[0], mm * box.high_m[0]));
+    add_planes(part, 1, depth_planes_mm);
+    add_planes(part, 2, height_planes_mm);
+  }
+}
+
+StructureSpec spec_of(const std::vector<FiniteTie>& ties, Elements elements) {
   std::string text = read_text_file(THERMOCOMP_GATE_STRUCTURE);
   replace(text, "from_mm = [80, 24, 243.75]   # 150 mm^2, its middle 250 mm above the ground\n",
           "");
@@ -76,6 +138,7 @@ StructureSpec spec_of(const std::vector<FiniteTie>& ties) {
     }
   std::erase_if(spec.sensors,
                 [](const SensorSpec& sensor) { return sensor.name.starts_with("tie_"); });
+  if (elements == Elements::refined) refine(spec, ties.size());
   return spec;
 }
 
@@ -89,17 +152,24 @@ identification::TiedColumns beams_of(const StructureSpec& spec,
   columns.column_inertia_mm4 = depth_mm * width_mm * width_mm * width_mm / 12.0;
   columns.column_modulus_MPa = 1e-6 * material.youngs_modulus_Pa;
   columns.column_expansion_per_K = material.expansion_per_K;
+  columns.column_poisson_ratio = material.poisson_ratio;
+  columns.column_shear_compliance_per_N =
+      2.0 * (1.0 + material.poisson_ratio) /
+      (columns.column_modulus_MPa *
+       identification::rectangle_shear_area_mm2(width_mm, depth_mm, depth_mm));
+  columns.foot_length_mm =
+      identification::held_foot_length_mm(width_mm, depth_mm, material.poisson_ratio);
   for (const FiniteTie& tie : ties)
     columns.ties.push_back({tie.height_mm, tie_length_mm, tie.area_mm2, columns.column_modulus_MPa,
-                            columns.column_expansion_per_K});
+                            columns.column_expansion_per_K, section_of(tie).high_mm});
   return columns;
 }
 
 }  // namespace
 
 struct TiedStructure::Parts {
-  Parts(const std::vector<FiniteTie>& ties, double each_step_s)
-      : spec(spec_of(ties)),
+  Parts(const std::vector<FiniteTie>& ties, double each_step_s, Elements elements)
+      : spec(spec_of(ties, elements)),
         beams(beams_of(spec, ties)),
         structure(build_structure(spec, [](std::string_view) {})),
         heat(build_heat_model(spec, structure)),
@@ -155,8 +225,8 @@ struct TiedStructure::Parts {
   bool oil_was_in{false};
 };
 
-TiedStructure::TiedStructure(const std::vector<FiniteTie>& ties, double step_s)
-    : parts_(std::make_unique<Parts>(ties, step_s)) {}
+TiedStructure::TiedStructure(const std::vector<FiniteTie>& ties, double step_s, Elements elements)
+    : parts_(std::make_unique<Parts>(ties, step_s, elements)) {}
 TiedStructure::~TiedStructure() = default;
 
 const identification::TiedColumns& TiedStructure::columns() const {

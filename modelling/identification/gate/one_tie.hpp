@@ -1,0 +1,24 @@
+/// One tie between two columns: where it displaces least, and how its height counts.
+#pragma once
+
+#include <string>
+
+#include "modelling/identification/gate/tied_columns.hpp"
+
+namespace thermocomp::identification {
+
+/// The height of the tie, of those from 0.2 l to 3 l, at which |Ki - Kc ratio| is smallest for
+/// ratio = theta_C / (theta_A - theta_B).
+struct BestHeight {
+  double tie_height_mm{0.0};
+  double displacement_um_per_K{0.0};  ///< Ki - Kc ratio there
+};
+/// @pre there is one tie
+[[nodiscard]] BestHeight best_tie_height(const TiedColumns& columns, double ratio);
+
+/// Ki and Kc over l / l4, relative to the published Ki without a tie and to alpha_c lc, for this
+/// machine and for tie stiffnesses beside it (beta = 3 I lc / (Ac l^3) at one material).
+/// @pre there is one tie
+[[nodiscard]] std::string design_curves_svg(const TiedColumns& columns);
+
+}  // namespace thermocomp::identification
