@@ -264,7 +264,7 @@ std::string method_part(const TestAnswer& answer) {
       "Settled: the range of the last hour of running is under 15 % of that of the first.",
       "In brackets stands what the figure would be in 99 of 100 cases without the noise of the "
       "probe. The noise is known from second differences of neighbouring values and from what "
-      "smoothing leaves; it was drawn 400 times, in blocks as long as the window. Noise makes a "
+      "smoothing leaves; it was drawn 1000 times, in blocks as long as the window. Noise makes a "
       "range larger, never smaller, so the lower bound lies further away. Errors of the probe that "
       "last longer than minutes (its own warming, its holder) are in no bracket.",
       "Of ratios the errors of both sides count as independent."};
