@@ -66,6 +66,13 @@ def curve_um(position_mm):
     return WARM_K * ((1 - share) * ROWS_UM_PER_K[i] + share * ROWS_UM_PER_K[i + 1])
 
 
+def left_um(form, at_mm):
+    """Of the curve, by the line nearest to it, which lies beside both ends; by the table nothing."""
+    if form == "table":
+        return 0.0
+    return curve_um(at_mm) - (LINE_DEVIATION_UM + 4.0 * WARM_K * at_mm / NODES_MM[-1])
+
+
 def position_mm(time_s):
     way_mm = max(0.0, time_s - REST_S - WARM_S) * SPEED_MM_PER_S % 1600.0
     return way_mm if way_mm <= 800.0 else 1600.0 - way_mm
@@ -113,8 +120,14 @@ class Moving:
         assert len(errors) > MOVING_S / ROW_S / 3
         return errors
 
-    def peak_error_um(self):
-        return max(self.errors_beside(lambda _at_mm: 0.0))
+    def assert_error_is_of(self, form):
+        """On a busy machine the simulator's own looks at the slide come late: of half of the rows none
+        was."""
+        off_um = sorted(self.errors_beside(lambda at_mm: left_um(form, at_mm)))
+        peak_um = max(self.errors_beside(lambda _at_mm: 0.0))
+        print(f"{form}: peak error {peak_um:.3f} um at 10 m/min, beside what is expected "
+              f"{off_um[len(off_um) // 2]:.3f} um (median), {off_um[-1]:.3f} um at most")
+        assert off_um[len(off_um) // 2] <= ROUNDING_UM
 
     def wait_for_warm_line(self):
         """Nearest to a curve of 0 to -40 um with its bend of 5 um: 2.5 um beside both ends."""

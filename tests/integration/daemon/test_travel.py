@@ -7,8 +7,7 @@ import pytest
 
 from lab import assert_replays_exactly, eventually, run_tool
 from moving_slide import (COMPENSATION, FILTER, LINE_DEVIATION_UM, MODEL, MOVING_S, NODES_MM, REST_S,
-                          ROUNDING_UM, WARM_K, WARM_S, Moving, axis_text, simulated_axis_text,
-                          write_standing_run)
+                          WARM_K, WARM_S, Moving, axis_text, simulated_axis_text, write_standing_run)
 
 
 def value(table, address, encoding="int32", scale=0.001):
@@ -126,10 +125,7 @@ def test_the_controller_interpolates_what_the_daemon_fitted(lab, form):
     assert names == (["x_1", "x_2"] if form == "line" else [f"x_{i + 1}" for i in range(5)])
     daemon.committed()
     daemon.end()
-    peak_um = moving.peak_error_um()
-    print(f"{form}: peak error {peak_um:.3f} um at 10 m/min")
-    expected_um = LINE_DEVIATION_UM if form == "line" else 0.0
-    assert abs(peak_um - expected_um) <= ROUNDING_UM
+    moving.assert_error_is_of(form)
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
