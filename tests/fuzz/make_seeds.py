@@ -101,14 +101,14 @@ def toml_seeds():
 
 
 def preset_seeds():
-    """Each preset in a configuration of its bus, with its first two channels."""
-    buses = {"modbus": ('kind = "modbus_tcp"\nhost = "10.0.0.2"\n', "unit = 3\n"),
-             "can": ('kind = "can"\ninterface = "can0"\n', ""),
-             "canopen": ('kind = "canopen"\ninterface = "can0"\n', "node = 5\n"),
-             "j1939": ('kind = "j1939"\ninterface = "can0"\n', "address = 128\n")}
+    """Each preset in a configuration of its bus, with its first two channels.
+
+    What bus and device need besides it: tests/example_buses/PROTOCOL.toml.
+    """
     for path in sorted((ROOT / "config" / "devices").glob("*.toml")):
         preset = tomllib.loads(path.read_text())
-        bus, unit = buses[preset["protocol"]]
+        protocol = ROOT / "tests/example_buses" / (preset["protocol"] + ".toml")
+        bus, unit = protocol.read_text().removeprefix("[bus]\n").split("[device]\n")
         channels = [each["channel"] for each in preset["channel"]][:2]
         types = [each["name"] for each in preset.get("thermocouple", [])][:1]
         needed = "".join(f'thermocouple = "{each}"\n' for each in types)
