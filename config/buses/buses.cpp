@@ -1,6 +1,7 @@
 #include "config/buses/buses.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 
@@ -156,10 +157,14 @@ void ChannelTables::check_period(double period_s, const std::string& period) con
 }
 
 const std::vector<BusKind>& bus_kinds() {
-#define THERMOCOMP_LIST_KINDS(protocol, Config) \
-  for (const char* name : Config::kinds) all.push_back({name, #protocol, open_##protocol});
+#define THERMOCOMP_LIST_KINDS(protocol, Config) add(Config::kinds, #protocol, open_##protocol);
   static const std::vector<BusKind> kinds = [] {
     std::vector<BusKind> all;
+    const auto add = [&all](const auto& names, const char* protocol, OpenBus* open) {
+      std::transform(names.begin(), names.end(), std::back_inserter(all), [&](const char* name) {
+        return BusKind{name, protocol, open};
+      });
+    };
     THERMOCOMP_BUSES(THERMOCOMP_LIST_KINDS)
     return all;
   }();
