@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <type_traits>
 #include <utility>
 
 #include "config/buses/canopen_bus.hpp"
@@ -211,14 +212,14 @@ std::optional<ChannelFault> channel_fault(NodeEventKind kind) {
 
 void read_field_nodes(const TomlTable& root, sections::Presets& presets, MachineConfig& machine) {
   NameList names;
-  const auto read_all = [&](const char* tables, const auto& kind) {
+  const auto read_all = [&]<class Node>(const char* tables, std::type_identity<Node> /*kind*/) {
     for (const TomlTable& table : root.tables(tables)) {
-      auto node = kind;
+      Node node;
       read_node(table, names, presets, machine, node);
       machine.field_nodes.push_back(std::move(node));
     }
   };
-#define THERMOCOMP_READ_NODES(table, Config) read_all(#table, Config{});
+#define THERMOCOMP_READ_NODES(table, Config) read_all(#table, std::type_identity<Config>());
   THERMOCOMP_FIELD_NODES(THERMOCOMP_READ_NODES)
 #undef THERMOCOMP_READ_NODES
 }
