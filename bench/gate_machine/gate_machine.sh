@@ -13,4 +13,8 @@ trap 'rm -rf "$out"' EXIT
 "$bin/bench_gate_machine" corrections "$out/model.toml"
 "$bin/bench_gate_machine" record
 here=$(cd "$(dirname "$0")" && pwd)
-python3 "$here/gate_experiment.py" "$bin" "$here/../../config/gate_machine" "$out/experiment"
+/usr/bin/python3 "$here/gate_experiment.py" "$bin" "$here/../../config/gate_machine" "$out/experiment"
+if [ -f "$out/experiment/courses.png" ]; then
+  cp "$out/experiment/courses.png" "$THERMOCOMP_BENCH_BUILD/gate_machine_courses.png"
+  echo "the courses as a picture: $THERMOCOMP_BENCH_BUILD/gate_machine_courses.png"
+fi
