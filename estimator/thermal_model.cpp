@@ -15,13 +15,9 @@ void add_once(std::vector<std::string>& names, const std::string& name) {
 void add_columns(std::vector<std::string>& names, const TermSpec& term, bool temperatures) {
   const TermKind* kind = find_term_kind(term.kind, term.subject);
   if (kind == nullptr || kind->subject == TermSubject::output) return;
-  for (const std::string& column : term.bank.subjects)
-    if (is_temperature_name(column) == temperatures) add_once(names, column);
-  const SubjectColumns columns = subject_columns(term.subject);
-  for (const std::string& column : {columns.first, columns.second}) {
-    if (column.empty()) continue;
-    const bool mixed = kind->subject == TermSubject::temperature_and_position ||
-                       kind->subject == TermSubject::column_and_temperature;
+  const bool mixed = kind->is_bank() || kind->subject == TermSubject::temperature_and_position ||
+                     kind->subject == TermSubject::column_and_temperature;
+  for (const std::string& column : term.subjects()) {
     const bool is_temperature =
         mixed ? is_temperature_name(column) : kind->subject != TermSubject::signal;
     if (is_temperature == temperatures) add_once(names, column);
@@ -50,6 +46,20 @@ SubjectColumns subject_columns(std::string_view subject) {
   const auto bar = subject.find('|');
   if (bar == std::string_view::npos) return {std::string(subject), ""};
   return {std::string(subject.substr(0, bar)), std::string(subject.substr(bar + 1))};
+}
+
+bool TermSpec::is_bank() const {
+  const TermKind* registered = find_term_kind(kind, subject);
+  return registered != nullptr && registered->is_bank();
+}
+
+std::vector<std::string> TermSpec::subjects() const {
+  if (is_bank()) return bank.subjects;
+  const SubjectColumns columns = subject_columns(subject);
+  std::vector<std::string> names;
+  for (const std::string& column : {columns.first, columns.second})
+    if (!column.empty()) names.push_back(column);
+  return names;
 }
 
 bool is_temperature_name(std::string_view column) noexcept {

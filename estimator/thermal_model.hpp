@@ -39,7 +39,12 @@ struct TermSpec {
   std::map<std::string, double> shared;  ///< e.g. tau_s
   std::map<std::string, std::map<std::string, double>>
       per_output;      ///< e.g. gain_um_per_K -> output
-  LagBankSpec bank{};  ///< of a lag_bank, which has no subject of its own
+  LagBankSpec bank{};  ///< of a bank, which has no subject of its own
+
+  /// Its kind names subjects, gains and time constants in `bank`.
+  [[nodiscard]] bool is_bank() const;
+  /// Columns or outputs that it names, as they stand there: of a bank all of them, else one or two.
+  [[nodiscard]] std::vector<std::string> subjects() const;
 };
 
 /// `[guideway.NAME]`: rows of the matrix at positions along an axis. Between two positions the row
@@ -176,6 +181,8 @@ struct TermKind {
   std::string name;
   TermSubject subject;
   std::vector<TermParameter> parameters;
+
+  [[nodiscard]] bool is_bank() const noexcept { return subject == TermSubject::several; }
 };
 
 /// The columns that a subject names: one, or two with `|` between.

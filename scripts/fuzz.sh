@@ -18,7 +18,7 @@ readonly input_seconds_max=20    # one input may take so long, by the clock of a
 readonly structured_bytes_max=131072  # of an input whose mutator builds it
 readonly memory_MB_max=2048      # of the process, with the sanitizer's own
 readonly allocation_MB_max=512   # asked for at once
-mapfile -t known < <(sed -n 's/^fuzz_target(\([a-z0-9_]*\).*/\1/p' tests/fuzz/CMakeLists.txt)
+mapfile -t known < <(basename -s .cpp -- tests/fuzz/*.cpp)
 
 fail() {
   echo "fuzz.sh: $*" >&2
@@ -73,7 +73,7 @@ build() {
 
 # run TARGET: its log tells how it went; nothing here fails.
 run() {
-  local target=$1 words=tests/fuzz/dictionaries/$1.dict options=()
+  local target=$1 words=$runs/dictionaries/$1.dict options=()
   mkdir -p "$runs/$target/corpus" "$runs/$target/artifacts"
   rm -f "$runs/$target/artifacts"/*
   if [[ -f $words ]]; then options=("-dict=$words"); fi
@@ -121,6 +121,8 @@ above=/dev/shm
 THERMOCOMP_FUZZ_SCRATCH=$(mktemp -d "$above/thermocomp-fuzz-XXXXXX")
 export THERMOCOMP_FUZZ_SCRATCH
 trap 'rm -rf "$THERMOCOMP_FUZZ_SCRATCH"; kill $(jobs -p) 2>/dev/null || true' EXIT
+
+/usr/bin/python3 -B tests/fuzz/make_seeds.py --dictionaries "$runs/dictionaries"
 
 began=$SECONDS
 for target in "${targets[@]}"; do

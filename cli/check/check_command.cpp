@@ -14,7 +14,7 @@
 #include "cli/common/json_fields.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/problems.hpp"
-#include "drivers/sensors/make_source.hpp"
+#include "drivers/sensors/bus_config.hpp"
 #include "estimator/axis_spans.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 

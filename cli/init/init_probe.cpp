@@ -10,8 +10,8 @@
 #include <system_error>
 
 #include "cli/common/json_fields.hpp"
+#include "cli/scan/scan_bus.hpp"
 #include "cli/scan/scan_controller.hpp"
-#include "cli/scan/scan_modbus.hpp"
 #include "config/buses/presets.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/problems.hpp"
@@ -132,10 +132,11 @@ ScanReport probe(const InitDraft& draft, const fs::path& folder) {
   const TrialFiles files(draft, folder);
   const DaemonConfig config = load_trial(files.config());
   const ScanSensors sensors = scan_sensors(config.estimator.sensors);
+  constexpr double listen_s = 1.0;
+  const ScanTask task{listen_s, {}, progress};
   ScanReport report{"", {}, {}};
   for (const BusConfig& bus : config.buses)
-    report.buses.push_back(scan_modbus(std::get<ModbusBusConfig>(bus), sensors, {}, progress));
-  constexpr double listen_s = 1.0;
+    report.buses.push_back(scan_bus(std::get<ModbusBusConfig>(bus), sensors, task));
   report.controller = scan_controller(config, listen_s, progress);
   return report;
 }
@@ -181,7 +182,7 @@ InitEyes eyes_of(const fs::path& folder) {
     config.name = bus.name;
     config.line = line_of(bus);
     constexpr int last = 32;
-    const ScanBus found = scan_modbus(config, {}, {true, 1, last}, progress);
+    const ScanBus found = scan_bus(config, {}, {0.0, {true, 1, last}, progress});
     if (!found.error.empty()) progress("bus " + bus.name + ": " + found.error);
     if (!found.found.empty()) progress("bus " + bus.name + ": " + found.found);
     // A device that answers to every number is one device.

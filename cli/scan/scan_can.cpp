@@ -7,6 +7,7 @@
 #include <poll.h>
 
 #include "cli/common/modbus_names.hpp"
+#include "cli/scan/scan_bus.hpp"
 #include "config/text/units.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
@@ -172,11 +173,12 @@ std::string place_name(const CanSignal& signal) {
   return text;
 }
 
-ScanBus scan_can(const CanBusConfig& config, const ScanSensors& sensors, double listen_s,
-                 const std::function<void(const std::string&)>& progress) {
+/// Sends nothing. Every channel gets the newest frame that carries its signal; where none came, the
+/// identifiers that did come are named.
+ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const ScanTask& task) {
   ScanBus bus;
   bus.name = config.name;
-  bus.kind = "can";
+  bus.kind = config.outline().kind;
   bus.where = config.interface;
   const std::vector<const CanSignal*> signals = signals_of(config);
   CanSocket socket(config.interface, {});
@@ -187,8 +189,8 @@ ScanBus scan_can(const CanBusConfig& config, const ScanSensors& sensors, double 
   if (!socket.open()) {
     bus.error = "cannot be opened: " + socket.error();
   } else {
-    progress("bus " + config.name + ": listening for " + number_text(listen_s) + " s");
-    heard = listen(socket, signals, listen_s);
+    task.progress("bus " + config.name + ": listening for " + number_text(task.listen_s) + " s");
+    heard = listen(socket, signals, task.listen_s);
     if (!socket.error().empty()) bus.error = socket.error();
     bus.note = heard_text(heard);
     if (heard.frames.empty() && bus.error.empty()) {

@@ -1,7 +1,6 @@
 #include "cli/scan/scan_command.hpp"
 
 #include <cstdio>
-#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -10,9 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common/terminal.hpp"
-#include "cli/scan/scan_can.hpp"
+#include "cli/scan/scan_bus.hpp"
 #include "cli/scan/scan_controller.hpp"
-#include "cli/scan/scan_modbus.hpp"
 #include "cli/scan/scan_report.hpp"
 #include "config/daemon/daemon_config.hpp"
 
@@ -47,39 +45,20 @@ std::string controller_name(const DaemonConfig& config) {
   return std::visit([](const auto& each) { return each.name; }, config.controller);
 }
 
-struct BusScanner {
-  const ScanOptions& options;
-  const ScanSensors& sensors;
-  const std::function<void(const std::string&)>& progress;
-
-  ScanBus operator()(const ModbusBusConfig& bus) const {
-    return scan_modbus(bus, sensors, options.search, progress);
-  }
-  ScanBus operator()(const CanBusConfig& bus) const {
-    return scan_can(bus, sensors, options.listen_s, progress);
-  }
-  ScanBus operator()(const CanopenBusConfig& bus) const {
-    return scan_canopen(bus, sensors, options.listen_s, options.search.wanted, progress);
-  }
-  ScanBus operator()(const J1939BusConfig& bus) const {
-    return scan_j1939(bus, sensors, options.listen_s, progress);
-  }
-};
-
 ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
   const ScanSensors sensors = scan_sensors(config.estimator.sensors);
-  const std::function<void(const std::string&)> progress = [](const std::string& line) {
-    std::fprintf(stderr, "%s\n", line.c_str());
-  };
+  const ScanTask task{options.listen_s, options.search,
+                      [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); }};
   const auto wanted = [&](const std::string& name) {
     return options.bus.empty() || options.bus == name;
   };
   ScanReport report{options.file, {}, {}};
   for (const BusConfig& bus : config.buses)
     if (wanted(name_of(bus)))
-      report.buses.push_back(std::visit(BusScanner{options, sensors, progress}, bus));
+      report.buses.push_back(
+          std::visit([&](const auto& each) { return scan_bus(each, sensors, task); }, bus));
   if (wanted(controller_name(config)))
-    report.controller = scan_controller(config, options.listen_s, progress);
+    report.controller = scan_controller(config, options.listen_s, task.progress);
   if (report.buses.empty() && !report.controller) {
     throw Failure(options.bus + ": no such bus in " + options.file + " that can be scanned");
   }

@@ -1,5 +1,6 @@
-#include "cli/scan/scan_modbus.hpp"
-
+// Every channel is read once, with the requests that the daemon would send; a unit without answer
+// is asked twice and then left alone. Where a value is not plausible or an address is refused, the
+// registers beside it are read too. Nothing is ever written.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -10,6 +11,7 @@
 
 #include "cli/common/modbus_names.hpp"
 #include "cli/common/reason_text.hpp"
+#include "cli/scan/scan_bus.hpp"
 #include "cli/scan/serial_holder.hpp"
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"
@@ -360,22 +362,11 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
 
 }  // namespace
 
-ScanSensors scan_sensors(std::span<const SensorConfig> sensors) {
-  ScanSensors known;
-  for (const SensorConfig& sensor : sensors) {
-    known.names.push_back(sensor.name);
-    known.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
-  }
-  return known;
-}
-
-ScanBus scan_modbus(const ModbusBusConfig& config, const ScanSensors& sensors,
-                    const UnitSearch& search,
-                    const std::function<void(const std::string&)>& progress) {
+ScanBus scan_bus(const ModbusBusConfig& config, const ScanSensors& sensors, const ScanTask& task) {
   ScanBus bus;
   bus.name = config.name;
   const auto* rtu = std::get_if<ModbusRtu>(&config.line.link);
-  bus.kind = rtu != nullptr ? "modbus_rtu" : "modbus_tcp";
+  bus.kind = config.outline().kind;
   bus.where = line_name(config.line);
   if (rtu != nullptr) {
     const SerialHolder holder = holder_of(rtu->device);
@@ -391,9 +382,9 @@ ScanBus scan_modbus(const ModbusBusConfig& config, const ScanSensors& sensors,
     if (!holder.name.empty()) bus.note = "also open in " + holder.name;
   }
   try {
-    ModbusScan scan(config, sensors, progress);
+    ModbusScan scan(config, sensors, task.progress);
     scan.run(bus);
-    if (search.wanted && bus.error.empty()) scan.find(search, bus);
+    if (task.search.wanted && bus.error.empty()) scan.find(task.search, bus);
   } catch (const DriverError& error) {
     bus.error = error.what();
   }

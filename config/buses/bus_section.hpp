@@ -1,12 +1,12 @@
-/// One bus of the daemon's file, of any kind, while it is read. A kind is a file NAME_bus.cpp that
-/// opens such sections, and its line in bus_kinds.
+/// One bus of the daemon's file, of any kind, while it is read. A kind's file PROTOCOL_bus.cpp
+/// opens such sections.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "config/buses/can_database.hpp"
 #include "config/buses/eds_files.hpp"
@@ -53,8 +53,10 @@ class BusSection {
 
 /// Opens the section of a [[bus]] whose keys name, kind are read.
 using OpenBus = std::unique_ptr<BusSection>(const TomlTable& bus, const std::string& name,
-                                            BusFiles& files);
-OpenBus open_modbus_tcp, open_modbus_rtu, open_can, open_canopen, open_j1939;
+                                            const std::string& kind, BusFiles& files);
+#define THERMOCOMP_DECLARE_SECTION(protocol, Config) OpenBus open_##protocol;
+THERMOCOMP_BUSES(THERMOCOMP_DECLARE_SECTION)
+#undef THERMOCOMP_DECLARE_SECTION
 
 struct BusKind {
   const char* name;      ///< in the key `kind`
@@ -62,9 +64,6 @@ struct BusKind {
   OpenBus* open;
 };
 /// In the order in which the message about a wrong kind names them.
-inline constexpr std::array bus_kinds{
-    BusKind{"modbus_tcp", "modbus", open_modbus_tcp},
-    BusKind{"modbus_rtu", "modbus", open_modbus_rtu}, BusKind{"can", "can", open_can},
-    BusKind{"canopen", "canopen", open_canopen}, BusKind{"j1939", "j1939", open_j1939}};
+[[nodiscard]] const std::vector<BusKind>& bus_kinds();
 
 }  // namespace thermocomp::sections

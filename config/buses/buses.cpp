@@ -1,6 +1,7 @@
 #include "config/buses/buses.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 
@@ -12,7 +13,7 @@ namespace {
 /// nullptr, and the problem told, where the table has none that there is.
 const BusKind* read_kind(const TomlTable& table) {
   Names<const BusKind*> names;
-  for (const BusKind& kind : bus_kinds) names.emplace_back(kind.name, &kind);
+  for (const BusKind& kind : bus_kinds()) names.emplace_back(kind.name, &kind);
   const BusKind* kind = table.choice<const BusKind*>("kind", names, nullptr);
   if (!table.has("kind")) table.problem("kind", "must be given");
   return kind;
@@ -83,7 +84,7 @@ class BusReader {
     if (bus.kind == nullptr) {
       table.ignore_rest();
     } else {
-      bus.section = bus.kind->open(table, name, files_);
+      bus.section = bus.kind->open(table, name, bus.kind->name, files_);
       sections_.push_back(bus.section);
     }
     buses_.try_emplace(name, bus);
@@ -153,6 +154,22 @@ void ChannelTables::check_period(double period_s, const std::string& period) con
   if (stale_after_s > period_s) return;
   own.problem("screening.stale_after_s", std::to_string(stale_after_s),
               "must be more than " + period);
+}
+
+const std::vector<BusKind>& bus_kinds() {
+#define THERMOCOMP_LIST_KINDS(protocol, Config) add(Config::kinds, #protocol, open_##protocol);
+  static const std::vector<BusKind> kinds = [] {
+    std::vector<BusKind> all;
+    const auto add = [&all](const auto& names, const char* protocol, OpenBus* open) {
+      std::transform(names.begin(), names.end(), std::back_inserter(all), [&](const char* name) {
+        return BusKind{name, protocol, open};
+      });
+    };
+    THERMOCOMP_BUSES(THERMOCOMP_LIST_KINDS)
+    return all;
+  }();
+#undef THERMOCOMP_LIST_KINDS
+  return kinds;
 }
 
 std::vector<BusConfig> read_buses(const TomlTable& root, const SensorTables& sensors,

@@ -46,7 +46,7 @@ class CanSection final : public BusSection {
 }  // namespace
 
 std::unique_ptr<BusSection> open_can(const TomlTable& bus, const std::string& name,
-                                     BusFiles& files) {
+                                     const std::string& /*kind*/, BusFiles& files) {
   return std::make_unique<CanSection>(bus, name, files.dbc);
 }
 

@@ -391,7 +391,7 @@ class CanopenSection final : public BusSection {
 }  // namespace
 
 std::unique_ptr<BusSection> open_canopen(const TomlTable& bus, const std::string& name,
-                                         BusFiles& files) {
+                                         const std::string& /*kind*/, BusFiles& files) {
   return std::make_unique<CanopenSection>(bus, name, files.eds);
 }
 

@@ -145,7 +145,8 @@ class J1939Section final : public BusSection {
 
 }  // namespace
 
-std::unique_ptr<BusSection> open_j1939(const TomlTable& bus, const std::string& name, BusFiles&) {
+std::unique_ptr<BusSection> open_j1939(const TomlTable& bus, const std::string& name,
+                                       const std::string& /*kind*/, BusFiles& /*files*/) {
   return std::make_unique<J1939Section>(bus, name);
 }
 

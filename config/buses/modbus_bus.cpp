@@ -62,14 +62,9 @@ class ModbusSection final : public BusSection {
 
 }  // namespace
 
-std::unique_ptr<BusSection> open_modbus_tcp(const TomlTable& bus, const std::string& name,
-                                            BusFiles& files) {
-  return std::make_unique<ModbusSection>(bus, name, true, files);
-}
-
-std::unique_ptr<BusSection> open_modbus_rtu(const TomlTable& bus, const std::string& name,
-                                            BusFiles& files) {
-  return std::make_unique<ModbusSection>(bus, name, false, files);
+std::unique_ptr<BusSection> open_modbus(const TomlTable& bus, const std::string& name,
+                                        const std::string& kind, BusFiles& files) {
+  return std::make_unique<ModbusSection>(bus, name, kind == "modbus_tcp", files);
 }
 
 }  // namespace thermocomp::sections

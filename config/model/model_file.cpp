@@ -277,9 +277,10 @@ TermSpec read_bank(const TomlTable& table, const ThermalModel& model) {
 }
 
 TermSpec read_term(const TomlTable& table, const ThermalModel& model) {
-  if (table.is_text("kind") && table.text("kind") == "lag_bank") return read_bank(table, model);
   TermSpec term;
   term.kind = table.text("kind");
+  if (const TermKind* named = find_term_kind(term.kind, ""); named != nullptr && named->is_bank())
+    return read_bank(table, model);
   term.subject = table.text("subject");
   const TermKind* kind = find_term_kind(term.kind, term.subject);
   if (kind == nullptr) {

@@ -21,9 +21,10 @@ std::string shared_value(const TermSpec& term, const std::string& name, double v
   return toml_number(value);
 }
 
-std::string bank_text(const LagBankSpec& bank) {
-  std::string text = "\n[[term]]\nkind = \"lag_bank\"\nsubjects = ";
-  text.append(toml_list(bank.subjects, toml_string));
+std::string bank_text(const TermSpec& term) {
+  const LagBankSpec& bank = term.bank;
+  std::string text = "\n[[term]]\nkind = " + toml_string(term.kind);
+  text.append("\nsubjects = ").append(toml_list(bank.subjects, toml_string));
   if (!bank.powers.empty()) text.append("\npowers = ").append(toml_list(bank.powers, toml_number));
   text.append("\ntau_s = ").append(toml_list(bank.taus_s, toml_number)).append("\n");
   for (const auto& [output, gains] : bank.gain_um_per_unit) {
@@ -36,7 +37,7 @@ std::string bank_text(const LagBankSpec& bank) {
 }
 
 std::string term_text(const TermSpec& term) {
-  if (term.kind == "lag_bank") return bank_text(term.bank);
+  if (term.is_bank()) return bank_text(term);
   std::string text = "\n[[term]]\nkind = " + toml_string(term.kind);
   text.append("\nsubject = ").append(toml_string(term.subject)).append("\n");
   for (const auto& [name, value] : term.shared) {

@@ -405,7 +405,7 @@ json timing_json(const StatusView& view) {
 json model_json(const StatusView& view) {
   json terms = json::array();
   for (const TermSpec& term : view.config.model.terms) {
-    if (term.kind == "lag_bank") {
+    if (term.is_bank()) {
       terms.push_back({{"kind", term.kind},
                        {"subjects", term.bank.subjects},
                        {"powers", term.bank.powers},

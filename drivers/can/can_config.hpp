@@ -2,12 +2,14 @@
 /// test.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "drivers/bus_outline.hpp"
 #include "drivers/sentinel.hpp"
 
 namespace thermocomp {
@@ -80,10 +82,14 @@ struct CanDeviceConfig {
 };
 
 struct CanBusConfig {
+  static constexpr std::array kinds{"can"};
   std::string name;
   std::string interface;    ///< "can0"
   double reconnect_s{0.5};  ///< pause before the interface is tried again
   std::vector<CanDeviceConfig> devices;
+  [[nodiscard]] BusOutline outline() const {
+    return {kinds[0], interface, devices.size(), "device"};
+  }
   bool operator==(const CanBusConfig&) const = default;
 };
 

@@ -2,6 +2,7 @@
 /// test.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "drivers/bus_outline.hpp"
 #include "drivers/sentinel.hpp"
 
 namespace thermocomp {
@@ -114,9 +116,13 @@ struct ModbusDeviceConfig {
 };
 
 struct ModbusBusConfig {
+  static constexpr std::array kinds{"modbus_tcp", "modbus_rtu"};  ///< in the order of `link`
   std::string name;
   ModbusLine line;
   std::vector<ModbusDeviceConfig> devices;
+  [[nodiscard]] BusOutline outline() const {
+    return {kinds.at(line.link.index()), "", devices.size(), "device"};
+  }
   bool operator==(const ModbusBusConfig&) const = default;
 };
 

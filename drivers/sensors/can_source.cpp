@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "drivers/monotonic_clock.hpp"
+#include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
@@ -39,9 +40,9 @@ std::vector<UnitHealth> units_of(const CanBusConfig& config) {
 CanSource::CanSource(const CanBusConfig& config) : CanSource(config, channels_of(config)) {}
 
 CanSource::CanSource(const CanBusConfig& config, std::vector<Channel> channels)
-    : CanInterfaceSource(
-          {config.name, "can", config.interface, config.reconnect_s, look_every, gather},
-          identifiers(config), sensors_of(channels), units_of(config)),
+    : CanInterfaceSource({config.name, config.outline().kind, config.interface, config.reconnect_s,
+                          look_every, gather},
+                         identifiers(config), sensors_of(channels), units_of(config)),
       channels_(std::move(channels)),
       readings_(channels_.size()),
       units_(units_of(config)),
@@ -151,6 +152,10 @@ void CanSource::take(const CanFrame& frame) {
     note_arrival(arrival, units_[channel->device]);
     if (arrival == Arrival::renewed) last_good_[channel->device] = frame.received_at;
   }
+}
+
+std::unique_ptr<SensorSource> make_bus_source(const CanBusConfig& bus) {
+  return std::make_unique<CanSource>(bus);
 }
 
 }  // namespace thermocomp

@@ -93,7 +93,7 @@ ModbusPoller::ModbusPoller(const ModbusBusConfig& config, ModbusConnection& conn
       readings_(channels_of(config)),
       slot_(readings_) {
   health_.name = config.name;
-  health_.kind = is_serial(config.line) ? "modbus_rtu" : "modbus_tcp";
+  health_.kind = config.outline().kind;
   for (const ModbusDeviceConfig& device_config : config.devices) {
     check_device(config.line, device_config);
     Device device{device_config,

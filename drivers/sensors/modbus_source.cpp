@@ -1,5 +1,7 @@
 #include "drivers/sensors/modbus_source.hpp"
 
+#include "drivers/sensors/make_source.hpp"
+
 namespace thermocomp {
 
 ModbusSource::ModbusSource(const ModbusBusConfig& config)
@@ -18,6 +20,10 @@ void ModbusSource::start() {
 void ModbusSource::stop() noexcept {
   connection_.cancel();
   thread_.join();
+}
+
+std::unique_ptr<SensorSource> make_bus_source(const ModbusBusConfig& bus) {
+  return std::make_unique<ModbusSource>(bus);
 }
 
 }  // namespace thermocomp

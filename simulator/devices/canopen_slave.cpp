@@ -338,4 +338,8 @@ std::optional<CanFrame> CanopenSlave::next_frame() {
   return frame;
 }
 
+std::unique_ptr<FieldNode> switch_on(const SimulatedCanopenNode& node, nanoseconds now) {
+  return std::make_unique<CanopenSlave>(node, now);
+}
+
 }  // namespace thermocomp

@@ -7,21 +7,19 @@
 #include <span>
 #include <vector>
 
-#include "drivers/can/can_socket.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
-#include "simulator/plant/field_node_config.hpp"
+#include "simulator/devices/field_node.hpp"
 
 namespace thermocomp {
 
-class CanopenSlave {
+class CanopenSlave final : public FieldNode {
  public:
   /// Switches it on: it is pre-operational after its boot-up message.
   CanopenSlave(const SimulatedCanopenNode& config, nanoseconds now);
 
-  void take(const CanFrame& frame, nanoseconds now);
-  /// @param temps_degC  one a channel
-  void update(nanoseconds now, std::span<const double> temps_degC);
-  [[nodiscard]] std::optional<CanFrame> next_frame();
+  void take(const CanFrame& frame, nanoseconds now) override;
+  void update(nanoseconds now, std::span<const double> temps_degC) override;
+  [[nodiscard]] std::optional<CanFrame> next_frame() override;
 
  private:
   using Key = std::pair<std::uint16_t, std::uint8_t>;

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "simulator/devices/field_node.hpp"
+
 namespace thermocomp {
 namespace {
 
@@ -30,10 +32,12 @@ std::vector<std::size_t> find_columns(const std::vector<Channel>& channels, cons
 
 }  // namespace
 
-/// One of the two, a socket, and where its values stand in a row.
+/// A node, its socket, and where its values stand in a row.
 struct FieldNodes::Node {
-  Node(std::string node_name, std::string on, std::vector<std::size_t> shown)
-      : name(std::move(node_name)),
+  Node(SimulatedNode simulated, std::string node_name, std::string on,
+       std::vector<std::size_t> shown)
+      : config(std::move(simulated)),
+        name(std::move(node_name)),
         interface(std::move(on)),
         columns(std::move(shown)),
         temps_degC(columns.size()),
@@ -43,19 +47,15 @@ struct FieldNodes::Node {
   }
 
   void take(const CanFrame& frame, nanoseconds now) {
-    if (canopen) canopen->take(frame, now);
-    if (j1939) j1939->take(frame);
+    if (node) node->take(frame, now);
   }
   void update(nanoseconds now, std::span<const double> row) {
     for (std::size_t i = 0; i < columns.size(); ++i) temps_degC[i] = row[columns[i]];
-    if (canopen) canopen->update(now, temps_degC);
-    if (j1939) j1939->update(now, temps_degC);
+    if (node) node->update(now, temps_degC);
   }
-  std::optional<CanFrame> next_frame() {
-    if (canopen) return canopen->next_frame();
-    return j1939 ? j1939->next_frame() : std::nullopt;
-  }
+  std::optional<CanFrame> next_frame() { return node ? node->next_frame() : std::nullopt; }
 
+  SimulatedNode config;
   std::string name;
   std::string interface;
   std::vector<std::size_t> columns;
@@ -63,33 +63,24 @@ struct FieldNodes::Node {
   CanSocket socket;
   bool measured{false};
   nanoseconds tried_at{};
-  std::optional<SimulatedCanopenNode> as_canopen;
-  std::optional<SimulatedJ1939Node> as_j1939;
-  std::optional<CanopenSlave> canopen;
-  std::optional<J1939Sender> j1939;
+  std::unique_ptr<FieldNode> node;  ///< nullptr: not switched on yet
 };
 
 FieldNodes::FieldNodes(const MachineConfig& config, const std::vector<std::string>& columns,
                        const std::string& source) {
-  for (const SimulatedCanopenNode& node : config.canopen_nodes) {
+  const auto add = [&](const auto& node) {
     const auto shown = find_columns(node.channels, node.name, columns, source);
-    nodes_.push_back(std::make_unique<Node>(node.name, node.interface, shown));
-    nodes_.back()->as_canopen = node;
-  }
-  for (const SimulatedJ1939Node& node : config.j1939_nodes) {
-    const auto shown = find_columns(node.channels, node.name, columns, source);
-    nodes_.push_back(std::make_unique<Node>(node.name, node.interface, shown));
-    nodes_.back()->as_j1939 = node;
-  }
+    nodes_.push_back(std::make_unique<Node>(node, node.name, node.interface, shown));
+  };
+  for (const SimulatedNode& node : config.field_nodes) std::visit(add, node);
 }
 
 FieldNodes::~FieldNodes() = default;
 
 void FieldNodes::switch_on(nanoseconds now) {
-  for (const auto& node : nodes_) {
-    if (node->as_canopen) node->canopen.emplace(*node->as_canopen, now);
-    if (node->as_j1939) node->j1939.emplace(*node->as_j1939, now);
-  }
+  for (const auto& node : nodes_)
+    node->node = std::visit([now](const auto& each) { return thermocomp::switch_on(each, now); },
+                            node->config);
 }
 
 std::vector<FieldNodes::Place> FieldNodes::places() const {

@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "drivers/can/can_socket.hpp"
-#include "simulator/devices/canopen_slave.hpp"
-#include "simulator/devices/j1939_sender.hpp"
 #include "simulator/plant/machine_config.hpp"
 
 namespace thermocomp {

@@ -75,7 +75,7 @@ void J1939Sender::claim() {
   put(pgn_address_claimed, name);
 }
 
-void J1939Sender::take(const CanFrame& frame) {
+void J1939Sender::take(const CanFrame& frame, nanoseconds /*now*/) {
   if (!frame.id.extended) return;
   const J1939Id id = read_identifier(frame.id.id);
   const bool for_us = id.destination == address_global || id.destination == config_.address;
@@ -130,6 +130,10 @@ std::optional<CanFrame> J1939Sender::next_frame() {
   const CanFrame frame = frames_.front();
   frames_.pop_front();
   return frame;
+}
+
+std::unique_ptr<FieldNode> switch_on(const SimulatedJ1939Node& node, nanoseconds now) {
+  return std::make_unique<J1939Sender>(node, now);
 }
 
 }  // namespace thermocomp

@@ -7,20 +7,18 @@
 #include <span>
 #include <vector>
 
-#include "drivers/can/can_socket.hpp"
-#include "simulator/plant/field_node_config.hpp"
+#include "simulator/devices/field_node.hpp"
 
 namespace thermocomp {
 
-class J1939Sender {
+class J1939Sender final : public FieldNode {
  public:
   /// Switches it on: it claims its address.
   J1939Sender(const SimulatedJ1939Node& config, nanoseconds now);
 
-  void take(const CanFrame& frame);
-  /// @param temps_degC  one a channel
-  void update(nanoseconds now, std::span<const double> temps_degC);
-  [[nodiscard]] std::optional<CanFrame> next_frame();
+  void take(const CanFrame& frame, nanoseconds now) override;
+  void update(nanoseconds now, std::span<const double> temps_degC) override;
+  [[nodiscard]] std::optional<CanFrame> next_frame() override;
 
  private:
   void claim();

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <type_traits>
+#include <utility>
 
 #include "config/buses/canopen_bus.hpp"
 #include "config/buses/j1939_bus.hpp"
@@ -113,10 +115,9 @@ void place_channel(const TomlTable& own, const TomlTable& device, const sections
   if (status.has("status")) channel.status = read_can_status_codes(status.table("status"));
 }
 
-SimulatedCanopenNode read_canopen_node(const TomlTable& table, NameList& names,
-                                       sections::Presets& presets, const MachineConfig& machine) {
+void read_node(const TomlTable& table, NameList& names, sections::Presets& presets,
+               const MachineConfig& machine, SimulatedCanopenNode& node) {
   constexpr std::size_t channels_max = 4;  // of 16 bits in TPDO 1
-  SimulatedCanopenNode node;
   node.name = names.read(table);
   node.interface = table.text("interface");
   node.node = table.integer("node", 1, 127);
@@ -141,7 +142,6 @@ SimulatedCanopenNode read_canopen_node(const TomlTable& table, NameList& names,
     table.problem("channel", "must be at most 4");
   }
   read_events(table, node);
-  return node;
 }
 
 /// In its group, or a temperature of two bytes as the standard has it.
@@ -169,9 +169,8 @@ J1939NodeChannel read_j1939_place(const TomlTable& own, const TomlTable& device,
   return channel;
 }
 
-SimulatedJ1939Node read_j1939_node(const TomlTable& table, NameList& names,
-                                   sections::Presets& presets, const MachineConfig& machine) {
-  SimulatedJ1939Node node;
+void read_node(const TomlTable& table, NameList& names, sections::Presets& presets,
+               const MachineConfig& machine, SimulatedJ1939Node& node) {
   node.name = names.read(table);
   node.interface = table.text("interface");
   node.address = table.integer("address", 0, 253);
@@ -187,7 +186,6 @@ SimulatedJ1939Node read_j1939_node(const TomlTable& table, NameList& names,
     node.channels.back().column = column;
   }
   read_events(table, node);
-  return node;
 }
 
 }  // namespace
@@ -214,12 +212,16 @@ std::optional<ChannelFault> channel_fault(NodeEventKind kind) {
 
 void read_field_nodes(const TomlTable& root, sections::Presets& presets, MachineConfig& machine) {
   NameList names;
-  for (const TomlTable& table : root.tables("canopen_node")) {
-    machine.canopen_nodes.push_back(read_canopen_node(table, names, presets, machine));
-  }
-  for (const TomlTable& table : root.tables("j1939_node")) {
-    machine.j1939_nodes.push_back(read_j1939_node(table, names, presets, machine));
-  }
+  const auto read_all = [&]<class Node>(const char* tables, std::type_identity<Node> /*kind*/) {
+    for (const TomlTable& table : root.tables(tables)) {
+      Node node;
+      read_node(table, names, presets, machine, node);
+      machine.field_nodes.push_back(std::move(node));
+    }
+  };
+#define THERMOCOMP_READ_NODES(table, Config) read_all(#table, std::type_identity<Config>());
+  THERMOCOMP_FIELD_NODES(THERMOCOMP_READ_NODES)
+#undef THERMOCOMP_READ_NODES
 }
 
 }  // namespace thermocomp

@@ -34,7 +34,7 @@ class NameList {
 [[nodiscard]] std::vector<std::string> plant_columns(const PlantConfig& plant);
 /// [[bus]], [[device]], [[channel]], [controller], [[axis]], [[event]].
 void read_devices(const TomlTable& root, sections::Presets& presets, MachineConfig& machine);
-/// [[canopen_node]] and [[j1939_node]]; after the plant.
+/// The tables of THERMOCOMP_FIELD_NODES; after the plant.
 void read_field_nodes(const TomlTable& root, sections::Presets& presets, MachineConfig& machine);
 
 }  // namespace thermocomp

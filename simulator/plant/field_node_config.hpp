@@ -1,15 +1,21 @@
-/// Simulated CANopen and J1939 nodes as the machine's file gives them: [[canopen_node]] and
-/// [[j1939_node]].
+/// Simulated nodes above CAN frames as the machine's file gives them.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"
 #include "simulator/plant/channel_fault.hpp"
+
+/// Every kind: its table in the machine's file and its configuration. A kind has besides, for its
+/// configuration, read_node() (simulator/files) and switch_on() (simulator/devices).
+#define THERMOCOMP_FIELD_NODES(NODE)       \
+  NODE(canopen_node, SimulatedCanopenNode) \
+  NODE(j1939_node, SimulatedJ1939Node)
 
 namespace thermocomp {
 
@@ -72,5 +78,14 @@ struct SimulatedJ1939Node {
   std::vector<J1939NodeChannel> channels;
   std::vector<NodeEvent> events;
 };
+
+namespace detail {
+template <class None, class... Nodes>
+using node_variant = std::variant<Nodes...>;
+}  // namespace detail
+
+#define THERMOCOMP_NODE_TYPE(table, Config) , Config
+using SimulatedNode = detail::node_variant<void THERMOCOMP_FIELD_NODES(THERMOCOMP_NODE_TYPE)>;
+#undef THERMOCOMP_NODE_TYPE
 
 }  // namespace thermocomp

@@ -171,8 +171,7 @@ struct MachineConfig {
   std::vector<SimulatedDevice> devices;
   std::optional<SimulatedController> controller;
   std::vector<EventConfig> events;
-  std::vector<SimulatedCanopenNode> canopen_nodes;
-  std::vector<SimulatedJ1939Node> j1939_nodes;
+  std::vector<SimulatedNode> field_nodes;  ///< by kind, those of one kind as in the file
 };
 
 }  // namespace thermocomp

@@ -17,7 +17,8 @@ def test_the_seeds_are_those_of_the_examples():
 
 
 def test_an_example_without_a_seed_is_found(tmp_path):
-    for folder in ("config", "tests/fuzz", "tests/integration/can"):
+    for folder in ("config", "tests/fuzz", "tests/example_buses", "tests/example_terms",
+                   "tests/integration/can"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
     assert check(tmp_path).returncode == 0
     examples = tmp_path / "config/examples"

@@ -1,12 +1,14 @@
 /// What a CANopen bus is built from: plain structures, filled by config/ or by a test.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "drivers/bus_outline.hpp"
 #include "drivers/can/can_config.hpp"
 
 namespace thermocomp {
@@ -90,6 +92,7 @@ struct CanopenNodeConfig {
 };
 
 struct CanopenBusConfig {
+  static constexpr std::array kinds{"canopen"};
   std::string name;
   std::string interface;    ///< "can0"
   double reconnect_s{0.5};  ///< pause before the interface is tried again
@@ -99,6 +102,7 @@ struct CanopenBusConfig {
   double sync_s{0.0};       ///< period of SYNC; 0: none is sent
   double sdo_timeout_s{0.5};
   std::vector<CanopenNodeConfig> nodes;
+  [[nodiscard]] BusOutline outline() const { return {kinds[0], interface, nodes.size(), "node"}; }
   bool operator==(const CanopenBusConfig&) const = default;
 };
 

@@ -1,12 +1,14 @@
 /// What a J1939 bus is built from: plain structures, filled by config/ or by a test.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "drivers/bus_outline.hpp"
 #include "drivers/sentinel.hpp"
 
 namespace thermocomp {
@@ -41,6 +43,7 @@ struct J1939NodeConfig {
 };
 
 struct J1939BusConfig {
+  static constexpr std::array kinds{"j1939"};
   std::string name;
   std::string interface;    ///< "can0"
   double reconnect_s{0.5};  ///< pause before the interface is tried again
@@ -49,6 +52,7 @@ struct J1939BusConfig {
   std::optional<int> own_address;
   std::uint64_t own_name{0};
   std::vector<J1939NodeConfig> nodes;
+  [[nodiscard]] BusOutline outline() const { return {kinds[0], interface, nodes.size(), "device"}; }
   bool operator==(const J1939BusConfig&) const = default;
 };
 

@@ -170,10 +170,13 @@ def test_the_registers_are_where_the_manual_has_them(simulate, name):
                                         if preset["protocol"] != "modbus"))
 def test_presets_for_other_buses_load_with_all_their_channels(tmp_path, name):
     preset = all_preset_files()[name]
-    keys = {"canopen": {"node": 5, "scale": 0.1}, "j1939": {"address": 0x80}, "can": {}}
+    needed = tomllib.loads(
+        (SOURCE / "tests/example_buses" / (preset["protocol"] + ".toml")).read_text())
+    if "scale" not in preset["device"]:
+        needed["device"]["scale"] = 0.1
     path = configuration(
-        tmp_path, table("[[bus]]", name="bus", kind=preset["protocol"], interface="can0"),
-        table("[[device]]", name="d", bus="bus", preset=name, **keys[preset["protocol"]]),
+        tmp_path, table("[[bus]]", name="bus", **needed["bus"]),
+        table("[[device]]", name="d", bus="bus", preset=name, **needed["device"]),
         [(f"s{c['channel']}", {"device": "d", "channel": c["channel"]})
          for c in preset["channel"]])
     done = thermocomp("check", path)

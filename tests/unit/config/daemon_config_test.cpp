@@ -1,7 +1,9 @@
 #include "config/daemon/daemon_config.hpp"
 
 #include <functional>
+#include <set>
 
+#include "config/buses/bus_section.hpp"
 #include "config/model/model_file.hpp"
 #include "files.hpp"
 
@@ -14,6 +16,19 @@ DaemonConfig parse(const std::string& text, const std::string& model = "small_ma
   return parse_daemon_config(text, "machine.toml", example(model), "model.toml");
 }
 
+/// The examples that are the daemon's; the others are models or another program's.
+std::vector<std::filesystem::path> configurations() {
+  std::vector<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(examples)) {
+    const std::string text = text_of(entry.path());
+    if (text.find("\n[[bus]]\n") != std::string::npos &&
+        text.find("\n[model]\n") != std::string::npos) {
+      paths.push_back(entry.path());
+    }
+  }
+  return paths;
+}
+
 DaemonConfig edited_machine(const std::string& from, const std::string& to) {
   return parse(edited(example("small_machine.toml"), from, to));
 }
@@ -21,18 +36,27 @@ DaemonConfig edited_machine(const std::string& from, const std::string& to) {
 }  // namespace
 
 TEST_CASE("every example loads", "[config]") {
-  std::size_t loaded = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(examples)) {
-    const std::string text = text_of(entry.path());
-    if (text.find("\n[[bus]]\n") == std::string::npos ||
-        text.find("\n[model]\n") == std::string::npos) {
-      continue;  // a model, or another program's file
-    }
-    INFO(entry.path());
-    CHECK_NOTHROW(load_daemon_config(entry.path()));
-    ++loaded;
+  const std::vector<std::filesystem::path> paths = configurations();
+  for (const auto& path : paths) {
+    INFO(path);
+    CHECK_NOTHROW(load_daemon_config(path));
   }
-  CHECK(loaded >= 4);
+  CHECK(paths.size() >= 4);
+}
+
+TEST_CASE("every kind of bus has a commented example, and can be told about", "[config]") {
+  std::set<std::string> kinds;
+  for (const auto& path : configurations())
+    for (const BusConfig& bus : load_daemon_config(path).buses) {
+      const BusOutline outline = outline_of(bus);
+      kinds.insert(outline.kind);
+      CHECK(outline.units > 0);
+    }
+  for (const sections::BusKind& kind : sections::bus_kinds()) {
+    INFO(kind.name);
+    CHECK(kinds.count(kind.name) == 1);
+  }
+  CHECK(kinds.size() == sections::bus_kinds().size());
 }
 
 TEST_CASE("the small machine is what its file says", "[config]") {

@@ -3,8 +3,10 @@
 #include <cmath>
 #include <iostream>
 #include <limits>
+#include <set>
 
 #include "config/runs/run_file.hpp"
+#include "estimator/model/displacement_model.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;
@@ -267,6 +269,31 @@ TEST_CASE("writing then reading a model changes no bit", "[config][model]") {
   }
   CHECK(back.covariance_K2 == model.covariance_K2);
   CHECK(write_model(back) == write_model(model));
+}
+
+TEST_CASE("every kind of term has an example, which is read, written and evaluated",
+          "[config][model]") {
+  const std::filesystem::path folder =
+      std::filesystem::path(THERMOCOMP_SOURCE) / "tests/example_terms";
+  const std::string before = text_of(folder / "model.toml");
+  std::set<const TermKind*> kinds;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().filename() == "model.toml") continue;
+    INFO(entry.path());
+    const ThermalModel model = parse_model(before + text_of(entry.path()), "model.toml");
+    REQUIRE(model.terms.size() == 1);
+    const TermSpec& term = model.terms[0];
+    kinds.insert(find_term_kind(term.kind, term.subject));
+    CHECK_FALSE(term.subjects().empty());
+    const ThermalModel back = parse_model(write_model(model), "written");
+    CHECK(back.terms[0].kind == term.kind);
+    CHECK(back.terms[0].subject == term.subject);
+    CHECK(back.terms[0].shared == term.shared);
+    CHECK(back.terms[0].per_output == term.per_output);
+    CHECK(back.terms[0].bank == term.bank);
+    CHECK_NOTHROW(DisplacementModel(model));
+  }
+  CHECK(kinds.size() == term_kinds().size());
 }
 
 namespace {

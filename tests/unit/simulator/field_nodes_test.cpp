@@ -167,7 +167,7 @@ TEST_CASE("a simulated J1939 node: single frames, packets, NAME and error code",
   line.opened(now);
   J1939Sender node(sender, now);
   const auto run = [&](nanoseconds time) {
-    exchange(line, now, time, {21.5, -3.25}, node, [&](const CanFrame& f) { node.take(f); });
+    exchange(line, now, time, {21.5, -3.25}, node, [&](const CanFrame& f) { node.take(f, now); });
   };
   run(1s);
   CHECK(line.readings()[0].temp_degC == Approx(21.5));

@@ -1,0 +1,14 @@
+#include "cli/scan/scan_bus.hpp"
+
+namespace thermocomp::cli {
+
+ScanSensors scan_sensors(std::span<const SensorConfig> sensors) {
+  ScanSensors known;
+  for (const SensorConfig& sensor : sensors) {
+    known.names.push_back(sensor.name);
+    known.ranges.push_back({sensor.screening.temp_degC_min, sensor.screening.temp_degC_max});
+  }
+  return known;
+}
+
+}  // namespace thermocomp::cli

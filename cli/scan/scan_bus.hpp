@@ -1,0 +1,47 @@
+/// A bus of any kind, looked at live: the values, and why there is none.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cli/scan/scan_hints.hpp"
+#include "cli/scan/scan_report.hpp"
+#include "drivers/sensors/bus_config.hpp"
+#include "estimator/estimator_config.hpp"
+
+namespace thermocomp::cli {
+
+/// What a scan needs to know of the sensors, in the order of the configuration.
+struct ScanSensors {
+  std::vector<std::string> names;
+  std::vector<PlausibleRange> ranges;
+};
+
+[[nodiscard]] ScanSensors scan_sensors(std::span<const SensorConfig> sensors);
+
+/// Units or nodes to look for besides those of the configuration; numbers are of Modbus.
+struct UnitSearch {
+  bool wanted{false};
+  int first{1};
+  int last{32};
+};
+
+struct ScanTask {
+  double listen_s{3.0};  ///< to a bus on which devices send by themselves
+  UnitSearch search{};
+  std::function<void(const std::string&)>
+      progress;  ///< called with a line about what is being done
+};
+
+/// Of one kind: its file scan_PROTOCOL.cpp. Every channel of the configuration gets the value that
+/// the daemon would have, or why it has none. Only what the daemon itself would send is sent, and
+/// nothing is ever set that the configuration does not set.
+#define THERMOCOMP_DECLARE_SCAN(protocol, Config)                                  \
+  [[nodiscard]] ScanBus scan_bus(const Config& config, const ScanSensors& sensors, \
+                                 const ScanTask& task);
+THERMOCOMP_BUSES(THERMOCOMP_DECLARE_SCAN)
+#undef THERMOCOMP_DECLARE_SCAN
+
+}  // namespace thermocomp::cli

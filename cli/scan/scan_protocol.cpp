@@ -1,0 +1,150 @@
+#include "cli/scan/scan_protocol.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <poll.h>
+
+#include "drivers/monotonic_clock.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+std::string number_text(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+struct Worked {
+  std::vector<Reading> readings;
+  std::vector<RawReading> raw;
+  std::vector<UnitHealth> units;
+  std::map<CanId, std::size_t> frames;
+  nanoseconds ended_at{};
+};
+
+/// Feeds the protocol with the bus for `listen_s`, and sends what it wants to send.
+Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s) {
+  Worked worked;
+  const nanoseconds end = monotonic_now() + from_seconds(listen_s);
+  protocol.opened(monotonic_now());
+  while (socket.is_open() && monotonic_now() < end) {
+    pollfd wait{socket.descriptor(), POLLIN, 0};
+    constexpr int slice_ms = 10;
+    static_cast<void>(::poll(&wait, 1, slice_ms));
+    for (const CanFrame& frame : socket.receive()) {
+      ++worked.frames[frame.id];
+      protocol.take(frame);
+    }
+    protocol.advance(monotonic_now());
+    while (const auto frame = protocol.next_frame()) {
+      if (!socket.send(*frame)) break;
+    }
+  }
+  worked.ended_at = monotonic_now();
+  worked.readings.assign(protocol.readings().begin(), protocol.readings().end());
+  worked.raw = protocol.raw();
+  worked.units = protocol.health(worked.ended_at);
+  return worked;
+}
+
+std::string heard_text(const Worked& worked) {
+  constexpr std::size_t text_max = 200;
+  std::string text = "identifiers on the bus:";
+  for (const auto& [id, count] : worked.frames) {
+    text.append(hexadecimal(" ", id.id, id.extended ? 8 : 3)).append(" (");
+    text.append(std::to_string(count)).append(")");
+    if (text.size() > text_max) return text + " ...";
+  }
+  if (worked.frames.empty()) {
+    text = "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
+  }
+  return text;
+}
+
+std::string raw_text(const RawReading& raw) {
+  std::string text = hex_bytes(raw.value);
+  if (!raw.status.empty()) text += ", status " + hex_bytes(raw.status);
+  return text;
+}
+
+ScanChannel show(const Reading& reading, const RawReading& raw, const Why& why, nanoseconds now,
+                 const PlausibleRange& range) {
+  ScanChannel result;
+  result.fault = reading.fault;
+  result.temp_degC = reading.temp_degC;
+  result.raw = raw_text(raw);
+  if (reading.taken_at != nanoseconds{0}) {
+    result.age_s = static_cast<double>((now - reading.taken_at).count()) * 1e-9;
+  }
+  if (reading.fault != Fault::none) {
+    result.why = raw.value.empty() ? "nothing came that carries it" : why(reading.fault, raw);
+    return result;
+  }
+  if (reading.temp_degC >= range.min_degC && reading.temp_degC <= range.max_degC) return result;
+  result.fault = Fault::out_of_range;
+  result.why = number_text(reading.temp_degC) + " degC is no temperature of [" +
+               number_text(range.min_degC) + ", " + number_text(range.max_degC) + "] ([screening])";
+  result.hints.emplace_back("compare type, scale and place with the manual");
+  return result;
+}
+
+}  // namespace
+
+std::string hexadecimal(const char* before, std::uint32_t value, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%s0x%0*X", before, digits, value);
+  return text;
+}
+
+std::string too_few(const RawReading& raw) {
+  return "only " + std::to_string(raw.value.size()) + " bytes came";
+}
+
+ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors& sensors,
+                      const ScanTask& task, const Afterwards& afterwards) {
+  ScanBus bus;
+  bus.name = what.name;
+  bus.kind = what.outline.kind;
+  bus.where = what.outline.interface;
+  CanSocket socket(bus.where, {});
+  socket.also_want({{0, false}, 0});  // everything: what is there beside what is looked for
+  socket.also_want({{0, true}, 0});
+  Worked worked;
+  if (socket.open()) {
+    task.progress("bus " + what.name + ": working it as the daemon would, for " +
+                  number_text(task.listen_s) + " s");
+    worked = work(protocol, socket, task.listen_s);
+    bus.error = socket.error();
+    bus.note = heard_text(worked);
+    if (afterwards) afterwards(socket, bus);
+  } else {
+    bus.error = "cannot be opened: " + socket.error();
+  }
+  const std::vector<std::size_t> order = protocol.sensors();
+  for (const Place& place : what.places) {
+    const auto at = static_cast<std::size_t>(std::find(order.begin(), order.end(), place.sensor) -
+                                             order.begin());
+    Reading reading;
+    reading.fault = Fault::no_answer;
+    RawReading raw;
+    if (at < worked.readings.size()) {
+      reading = worked.readings[at];
+      raw = worked.raw[at];
+    }
+    ScanChannel shown =
+        show(reading, raw, place.why, worked.ended_at, sensors.ranges.at(place.sensor));
+    shown.sensor = sensors.names.at(place.sensor);
+    shown.place = place.text;
+    what.devices[place.device].channels.push_back(std::move(shown));
+  }
+  for (std::size_t i = 0; i < what.devices.size() && i < worked.units.size(); ++i) {
+    what.devices[i].answers = worked.units[i].answering;
+    what.devices[i].note = worked.units[i].last_error;
+  }
+  bus.devices = std::move(what.devices);
+  return bus;
+}
+
+}  // namespace thermocomp::cli
