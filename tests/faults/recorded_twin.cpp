@@ -26,8 +26,7 @@ std::unique_ptr<CycleRecorder> RecordedTwin::make_recorder(const Estimator& esti
   auto recording = std::make_shared<RecordingSession>();
   recording->id = next_session_++;
   sessions_[recording->id] = {recording, estimator.config(), estimator.model()};
-  return std::make_unique<CycleRecorder>(ring_, recording, grid_, offsets_period,
-                                         estimator);
+  return std::make_unique<CycleRecorder>(ring_, recording, grid_, offsets_period, estimator);
 }
 
 std::optional<std::uint64_t> RecordedTwin::stepped(std::uint64_t cycle,
