@@ -150,9 +150,9 @@ class Life {
       disk_->kill(world_.now);
     } else if (!judge_.broken()) {  // a twin that has come out different goes on no further
       if (const auto different = twin_->finish())
-        judge_.demand(false, "replay_is_exact", world_.now,
-                      fmt::format("cycle {} came out different or was recorded out of order",
-                                  *different));
+        judge_.demand(
+            false, "replay_is_exact", world_.now,
+            fmt::format("cycle {} came out different or was recorded out of order", *different));
     }
     if (twin_) result_.replayed += twin_->replayed();
     twin_.reset();
