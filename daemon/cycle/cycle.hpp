@@ -114,9 +114,8 @@ class Cycle {
   std::vector<Reading> readings_;
   ControllerState controller_;
   OffsetCommand offsets_;
-  std::uint64_t cycle_{0};  ///< stepped last
-  std::uint64_t expected_{
-      0};  ///< the one after; what lies between it and the next step was skipped
+  std::uint64_t cycle_{0};     ///< stepped last
+  std::uint64_t expected_{0};  ///< the one after; what lies before the next step was skipped
   bool has_stepped_{false};
   std::uint64_t report_every_;
   std::uint64_t next_report_{0};
