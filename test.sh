@@ -1,9 +1,10 @@
 #!/bin/bash
 # Builds everything and runs the tests of one build. What .ci/run does besides: the sanitizers' builds,
 # format and static checks.
-#   ./test.sh [--quick | --all] [--preset PRESET] [-- CTEST_OPTION...]
+#   ./test.sh [--quick | --all | --build-only] [--preset PRESET] [-- CTEST_OPTION...]
 #   --quick: for daily work, the test programs alone: no packages, processes, guests or campaigns
 #   --all: those too that plant bugs in copies of the sources and try whether the tests find them
+#   --build-only: no tests
 #   --preset: debug, release (default), asan-ubsan, asan-ubsan-all (with the modelling), tsan, coverage
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
@@ -11,7 +12,7 @@ source scripts/common.sh
 exec </dev/null
 
 usage() {
-  sed -n 's/^# \{0,1\}//; 4,7p' "${BASH_SOURCE[0]}"
+  sed -n 's/^# \{0,1\}//; 4,8p' "${BASH_SOURCE[0]}"
 }
 
 preset=release
@@ -24,7 +25,7 @@ while (($#)); do
       preset=$2
       shift 2
       ;;
-    --quick | --all)
+    --quick | --all | --build-only)
       extent=${1#--}
       shift
       ;;
@@ -132,12 +133,13 @@ case $extent in
     ctest_options=(--label-regex '^quick$' "${ctest_options[@]}")
     build_options=(--target quick_tests)
     ;;
-  usual) ctest_options=(--label-exclude '^planted$' "${ctest_options[@]}") ;;
+  usual | build-only) ctest_options=(--label-exclude '^planted$' "${ctest_options[@]}") ;;
   all) build_options=(--target all planted_tests) ;;
 esac
 stage "packages" scripts/setup.sh test
 stage "configure $preset" cmake --preset "$preset"
 stage "build $preset" cmake --build --preset "$preset" -j "$(build_jobs)" "${build_options[@]}"
+if [[ $extent == build-only ]]; then exit 0; fi
 # The guest in which programs with sanitizers can run. Without it the tests on CAN fail and say so;
 # all others need not suffer.
 if [[ $extent != quick && ($preset == asan-ubsan* || $preset == tsan) ]]; then
