@@ -1,7 +1,7 @@
 """A slide at 10 m/min over a bed that bends: the machine of the tests of controllers that interpolate
 along the travel, on whatever bus."""
 
-from lab import read_columns
+from lab import assert_replays_exactly, read_columns
 
 # um/K along the travel; 10 K bend it by 40 um from end to end, and it is no straight line.
 NODES_MM = [0.0, 200.0, 400.0, 600.0, 800.0]
@@ -119,6 +119,17 @@ class Moving:
                   if time_s > REST_S + WARM_S]
         assert len(errors) > MOVING_S / ROW_S / 3
         return errors
+
+    def assert_interpolates(self, form, patience_s):
+        """The whole run, from the first start on: axes, error at the tool, replay."""
+        daemon = self.daemon.start()
+        self.simulator.wait(patience_s)
+        names = [axis["name"] for axis in daemon.status()["axes"]]
+        assert names == (["x_1", "x_2"] if form == "line" else [f"x_{i + 1}" for i in range(5)])
+        daemon.committed()
+        daemon.end()
+        self.assert_error_is_of(form)
+        assert_replays_exactly(daemon.history, self.lab.folder / "out.csv")
 
     def assert_error_is_of(self, form):
         """On a busy machine the simulator's own looks at the slide come late: of half of the rows none

@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from lab import assert_replays_exactly, eventually, run_tool
+from lab import eventually, run_tool
 from moving_slide import (COMPENSATION, FILTER, LINE_DEVIATION_UM, MODEL, MOVING_S, NODES_MM, REST_S,
                           WARM_K, WARM_S, Moving, axis_text, simulated_axis_text, write_standing_run)
 
@@ -118,15 +118,7 @@ def moving_slide(lab, form, stay=True):
 
 @pytest.mark.parametrize("form", ["line", "table"])
 def test_the_controller_interpolates_what_the_daemon_fitted(lab, form):
-    moving = moving_slide(lab, form, stay=False)
-    daemon = moving.daemon.start()
-    moving.simulator.wait(60 + REST_S + WARM_S + MOVING_S)
-    names = [axis["name"] for axis in daemon.status()["axes"]]
-    assert names == (["x_1", "x_2"] if form == "line" else [f"x_{i + 1}" for i in range(5)])
-    daemon.committed()
-    daemon.end()
-    moving.assert_error_is_of(form)
-    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+    moving_slide(lab, form, stay=False).assert_interpolates(form, 60 + REST_S + WARM_S + MOVING_S)
 
 
 def test_a_daemon_that_was_killed_goes_on_along_the_travel(lab):

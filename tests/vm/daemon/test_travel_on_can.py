@@ -13,7 +13,7 @@ import time
 import pytest
 
 import rig as rigs
-from lab import assert_replays_exactly, eventually, run_tool
+from lab import eventually, run_tool
 from moving_slide import (COMPENSATION, FILTER, LINE_DEVIATION_UM, NODES_MM, ROUNDING_UM, WARM_K,
                           Moving, axis_text, simulated_axis_text, write_standing_run)
 
@@ -156,15 +156,7 @@ class Listener:
 
 @pytest.mark.parametrize("form", ["line", "table"])
 def test_the_controller_interpolates_what_came_in_frames(lab, form):
-    moving = moving_slide(lab, form, stay=False)
-    daemon = moving.daemon.start()
-    moving.simulator.wait(240)
-    names = [axis["name"] for axis in daemon.status()["axes"]]
-    assert names == (["x_1", "x_2"] if form == "line" else [f"x_{i + 1}" for i in range(5)])
-    daemon.committed()
-    daemon.end()
-    moving.assert_error_is_of(form)
-    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+    moving_slide(lab, form, stay=False).assert_interpolates(form, 240)
 
 
 def test_a_daemon_that_was_killed_goes_on_half_way_round(lab):
