@@ -83,15 +83,27 @@ def fields(answer):
     return kind, sorted(answer[kind])
 
 
-def pruned(value):
+def pruned(value, seen):
     """Of lists the first element, which shows what there is."""
     if isinstance(value, dict):
-        return {key: pruned(each) for key, each in value.items()}
-    return [pruned(each) for each in value[:1]] if isinstance(value, list) else value
+        return {key: pruned(each, seen) for key, each in value.items()}
+    if isinstance(value, list):
+        return [once(pruned(each, seen), seen) for each in value[:1]]
+    return value
 
 
-def shown(answer, folder):
-    return json.dumps(pruned(answer)).replace(str(folder) + "/", "/etc/thermocomp/")
+def once(element, seen):
+    """Of an element with the fields of an earlier one its name alone."""
+    if not isinstance(element, dict):
+        return element
+    if tuple(element) in seen:
+        return {"name": element["name"], "...": "as above"}
+    seen.add(tuple(element))
+    return element
+
+
+def shown(answer, folder, seen):
+    return json.dumps(pruned(answer, seen)).replace(str(folder) + "/", "/etc/thermocomp/")
 
 
 def running(lab):
@@ -120,12 +132,12 @@ def write():
         lab = Lab(folder)
         try:
             daemon = running(lab)
-            text = ""
+            text, seen = "", set()
             for title, method, params in requests():
                 line = line_of(method, params)
                 text += f"{title}:\n\n    > {line}\n"
                 for answer in exchange(daemon, line):
-                    text += f"    < {shown(answer, folder)}\n"
+                    text += f"    < {shown(answer, folder, seen)}\n"
                 text += "\n"
         finally:
             lab.end()
