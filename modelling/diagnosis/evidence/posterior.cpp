@@ -22,13 +22,13 @@ constexpr double share_max = 1.0;
 constexpr double crowd = 0.1;
 
 // calibrate_posterior.py prints what follows.
-constexpr double weight_of_left_out = 1.40;
-constexpr double weight_of_likelihood = 0.42;
-constexpr double weight_of_first_place = 1.07;
-constexpr double weight_of_behind = 0.47;
-constexpr double weight_of_share = 5.33;
-constexpr double weight_of_crowd = 0.50;
-constexpr double utility_of_none = 3.86;
+constexpr double weight_of_left_out = 1.99;
+constexpr double weight_of_likelihood = 0.21;
+constexpr double weight_of_first_place = 1.05;
+constexpr double weight_of_behind = 0.48;
+constexpr double weight_of_share = 5.78;
+constexpr double weight_of_crowd = 0.54;
+constexpr double utility_of_none = 3.84;
 
 /// What the weighed explanations are told from each other by.
 class Field {

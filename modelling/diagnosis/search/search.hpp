@@ -82,6 +82,7 @@ struct SearchResult {
 };
 
 class LeftOut;
+struct LeftOutGain;
 struct Headroom;
 
 /// Seeks causes in the training rows.
@@ -179,6 +180,9 @@ class Search {
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
   void choose(std::vector<Explanation>& candidates) const;
   void measure_left_out(std::vector<Explanation>& candidates) const;
+  [[nodiscard]] Explanation in_white_noise(const Explanation& explanation) const;
+  /// In its own noise or in white noise, whichever leaves less.
+  [[nodiscard]] LeftOutGain left_out_gain(const Explanation& explanation, LeftOut& left_out) const;
   void measure_left_out(Explanation& explanation, LeftOut& left_out) const;
   void measure_without();
   void accept(const std::vector<Finding>& findings, std::size_t but);

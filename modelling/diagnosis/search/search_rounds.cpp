@@ -156,15 +156,10 @@ double Search::row_step_s() const {
   return steps > 0 ? length_s / steps : 0.0;
 }
 
-/// White noise instead of the likeliest, where rows left out are predicted better by it: what a
-/// model leaves is not quite the noise of this search either, and where it is small beside slow
-/// motion, weighing that motion down costs more than it saves.
+/// White noise instead of the likeliest, where rows left out are predicted better by it.
 void Search::settle_for_left_out_rows(Explanation& explanation) const {
   if (explanation.hypothesis->run) return;  // nothing of it stays in other rows
-  Explanation plain = explanation;
-  for (const std::size_t output : measured_)
-    if (plain.gains[output].size() > 0)
-      plain.settings[output] = outputs_[output].settings().front().get();
+  Explanation plain = in_white_noise(explanation);
   if (plain.settings == explanation.settings) return;
   refine(plain);
   if (!acts(plain)) return;
