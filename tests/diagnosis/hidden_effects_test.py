@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""The short campaign: every cause once, silence on untouched machines. Exit status 1 when it is
-worse than docs/measurements.md promises of these seeds.
+"""The short campaign: every cause once, silence on untouched machines, and a machine on which
+another peak of the right cause is likelier. Exit status 1 when more than WRONG_MAX causes are not
+named, that machine's is not, or an untouched machine is not left alone.
 
 hidden_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """
@@ -14,10 +15,20 @@ import hidden_effects as hidden
 LEVEL = 2
 WRONG_MAX = 3  # of 18
 NULLS = 6
+# A heat of 51 min; the model's own misfit makes one of 2 min likelier, which explains nothing.
+QUICK_PEAK = 1, 120003, "missing_heat_source"
 FEW = ("missing_heat_source", "sensor_swap", "displacement_step")
 
 
+def named_beside_quick_peak(program):
+    level, seed, cause = QUICK_PEAK
+    task = (program, None, "single", level, seed, [cause])
+    return campaign.counted([task], campaign.examine, [level], True, "um")[level].right["single"] == 1
+
+
 def main(program, few):
+    if not few and not named_beside_quick_peak(program):
+        return 1
     return campaign.short_campaign(program, campaign.examine, LEVEL, FEW if few else hidden.CAUSES,
                                    1 if few else NULLS, 0 if few else WRONG_MAX)
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """The short thermal campaign: everything that can be wrong with heat once, silence on untouched
-machines. Exit status 1 when it is worse than docs/measurements.md promises of these seeds.
+machines. Exit status 1 when more than WRONG_MAX are not named or an untouched one is not left alone.
 
 hidden_heat_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """

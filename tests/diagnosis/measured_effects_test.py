@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Some effects planted in measured machines, and machines that were left as they are. Exit status
-1 when fewer are named than docs/measurements.md promises of these seeds, 77 where there are no data.
+1 when more than WRONG_MAX are not named, 77 where there are no data.
 
 measured_effects_test.py PROGRAM
 """
