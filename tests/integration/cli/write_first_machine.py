@@ -37,19 +37,13 @@ def first_outputs(folder):
                "spindle_rpm=input:26:uint16", ""]
     status, shown = converse(["init", config], answers)
     assert status == 0, shown
-    folder_name = str(folder)
-    init = "$ thermocomp init thermocompd.toml\n" + shown.replace(folder_name + "/", "")
     socket = ["--socket", "status.sock"]
     with running(config):
-        first = said(folder, "check", "thermocompd.toml")
-        first += "\n$ thermocompd thermocompd.toml &\n" + said(folder, *socket, "sensors")
+        first = said(folder, *socket, "sensors")
         eventually(lambda: run("--socket", "status.sock", "prove", "z", "0.1",
                                            cwd=folder).returncode == 0, "the axis is in step")
         first += "\n" + said(folder, *socket, "prove", "z", "5")
-        first += "\n" + said(folder, *socket, "enable")
-        eventually(lambda: run(*socket, "status", cwd=folder).returncode == 0, "compensating")
-        first += "\n" + said(folder, *socket, "status")
-    return init, first.replace(folder_name + "/", "")
+    return first.replace(str(folder) + "/", "")
 
 
 def model_outputs(folder):
@@ -57,7 +51,6 @@ def model_outputs(folder):
     text = ""
     for day, seed in {"monday": 1, "tuesday": 2, "friday": 5}.items():
         text += said(folder, "simulate", "machine.toml", "--seed", seed, "-o", f"{day}.csv")
-    text += "\n" + said(folder, "inspect", "monday.csv", "tuesday.csv")
     text += "\n" + said(folder, "fit", "monday.csv", "tuesday.csv", "--outputs", "z_um", "-o",
                         "model.toml")
     text += "\n" + said(folder, "predict", "--model", "model.toml", "friday.csv", "-o",
@@ -78,13 +71,13 @@ def main():
         with tempfile.TemporaryDirectory(prefix="tc") as name:
             folder = pathlib.Path(name)
             (folder / "devices").symlink_to(SOURCE / "config" / "devices")
-            init, first = first_outputs(folder)
+            first = first_outputs(folder)
             model = model_outputs(folder)
     finally:
         machine.kill()
         machine.wait(30)
     text = DOCUMENT.read_text()
-    for part, output in (("init", init), ("first", first), ("model", model)):
+    for part, output in (("first", first), ("model", model)):
         text = fill(text, part, output)
     DOCUMENT.write_text(text)
     print(f"{DOCUMENT}: filled, by {PROGRAM}")
