@@ -1,6 +1,14 @@
 #include "cli/scan/scan_bus.hpp"
 
+#include <cstdio>
+
 namespace thermocomp::cli {
+
+std::string short_number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
 
 ScanSensors scan_sensors(std::span<const SensorConfig> sensors) {
   ScanSensors known;

@@ -13,6 +13,9 @@
 
 namespace thermocomp::cli {
 
+/// Of what was read: six digits.
+[[nodiscard]] std::string short_number(double value);
+
 /// What a scan needs to know of the sensors, in the order of the configuration.
 struct ScanSensors {
   std::vector<std::string> names;

@@ -18,12 +18,6 @@
 namespace thermocomp::cli {
 namespace {
 
-std::string number_text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
-
 /// What came while the bus was listened to.
 struct Heard {
   std::map<CanId, std::size_t> frames;             ///< how many of each identifier
@@ -90,8 +84,9 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
   }
   if (decoded.value >= range.min_degC && decoded.value <= range.max_degC) return;
   result.fault = Fault::out_of_range;
-  result.why = number_text(decoded.value) + " degC is no temperature of [" +
-               number_text(range.min_degC) + ", " + number_text(range.max_degC) + "] ([screening])";
+  result.why = short_number(decoded.value) + " degC is no temperature of [" +
+               short_number(range.min_degC) + ", " + short_number(range.max_degC) +
+               "] ([screening])";
   CanSignal other = signal;
   other.byte_order = signal.byte_order == ByteOrder::little_endian ? ByteOrder::big_endian
                                                                    : ByteOrder::little_endian;
@@ -111,7 +106,7 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
         std::string("byte_order = \"") +
         (other.byte_order == ByteOrder::big_endian ? "big_endian" : "little_endian") +
         "\" with start_bit = " + std::to_string(other.start_bit) + " would make it " +
-        number_text(swapped.value) + " degC");
+        short_number(swapped.value) + " degC");
   }
 }
 
@@ -169,7 +164,7 @@ std::string place_name(const CanSignal& signal) {
                      std::to_string(signal.start_bit) + " length " +
                      std::to_string(signal.length_bits);
   text += signal.byte_order == ByteOrder::little_endian ? " little_endian" : " big_endian";
-  if (signal.scale != 1.0) text += " x " + number_text(signal.scale);
+  if (signal.scale != 1.0) text += " x " + short_number(signal.scale);
   return text;
 }
 
@@ -189,7 +184,7 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
   if (!socket.open()) {
     bus.error = "cannot be opened: " + socket.error();
   } else {
-    task.progress("bus " + config.name + ": listening for " + number_text(task.listen_s) + " s");
+    task.progress("bus " + config.name + ": listening for " + short_number(task.listen_s) + " s");
     heard = listen(socket, signals, task.listen_s);
     if (!socket.error().empty()) bus.error = socket.error();
     bus.note = heard_text(heard);
@@ -242,7 +237,7 @@ ScanController scan_can_controller(const DaemonConfig& config,
   Heard heard;
   heard.of_signal.resize(signals.size());
   if (socket.open()) {
-    progress("controller " + controller.name + ": listening for " + number_text(listen_s) + " s");
+    progress("controller " + controller.name + ": listening for " + short_number(listen_s) + " s");
     heard = listen(socket, signals, listen_s);
     result.error = socket.error();
   } else {

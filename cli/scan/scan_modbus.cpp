@@ -5,7 +5,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <set>
 
@@ -23,12 +22,6 @@ namespace {
 
 constexpr int tries_max = 2;
 
-std::string number_text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
-
 std::string place_of(const ModbusChannel& channel) {
   std::string text = table_name(channel.table);
   text.append(" ").append(std::to_string(channel.address));
@@ -36,7 +29,7 @@ std::string place_of(const ModbusChannel& channel) {
   if (registers_of(channel.encoding) > 1 || channel.word_order != WordOrder::abcd) {
     text.append(" ").append(order_name(channel.word_order));
   }
-  if (channel.scale != 1.0) text.append(" x ").append(number_text(channel.scale));
+  if (channel.scale != 1.0) text.append(" x ").append(short_number(channel.scale));
   return text;
 }
 
@@ -131,7 +124,7 @@ std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchang
   }
   if (exchange.outcome == ExchangeOutcome::timeout) {
     return "unit " + std::to_string(device.unit) + " does not answer within " +
-           number_text(config_.line.timeout_ms) + " ms, asked twice";
+           short_number(config_.line.timeout_ms) + " ms, asked twice";
   }
   return exchange.detail;
 }
@@ -255,8 +248,8 @@ void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChann
   result.fault = Fault::out_of_range;
   result.why = std::isnan(decoded.value)
                    ? std::string(nan_text().meaning)
-                   : number_text(decoded.value) + " degC is no temperature of [" +
-                         number_text(range.min_degC) + ", " + number_text(range.max_degC) +
+                   : short_number(decoded.value) + " degC is no temperature of [" +
+                         short_number(range.min_degC) + ", " + short_number(range.max_degC) +
                          "] ([screening])";
   result.hints = hints_for_words(channel, words, range);
   result.likely_open_code = likely_open_code(channel, words);
@@ -288,7 +281,7 @@ void ModbusScan::hint_neighbours(const ModbusDeviceConfig& device, const ModbusC
     const int address = channel.address + step;
     if (const auto value = look_at(device, channel, address, channel.table)) {
       result.hints.push_back("address = " + std::to_string(address) + " would make it " +
-                             number_text(*value) + " degC: manuals often count from 1");
+                             short_number(*value) + " degC: manuals often count from 1");
     }
   }
 }
@@ -302,7 +295,7 @@ void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChan
       channel.table == ModbusTable::input ? ModbusTable::holding : ModbusTable::input;
   if (const auto value = look_at(device, channel, channel.address, other)) {
     result.hints.push_back("table = \"" + table_name(other) + "\" would make it " +
-                           number_text(*value) + " degC");
+                           short_number(*value) + " degC");
   }
   if (result.hints.empty()) {
     result.hints.emplace_back(
@@ -338,7 +331,7 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
   progress_("bus " + config_.name + ": asking units " + std::to_string(search.first) + " to " +
             std::to_string(search.last) +
             " for holding register 0 (function 3), one request each, at most " +
-            number_text(count * config_.line.timeout_ms / 1e3) + " s");
+            short_number(count * config_.line.timeout_ms / 1e3) + " s");
   std::string unknown;
   std::string numbers;
   for (int unit = search.first; unit <= search.last; ++unit) {

@@ -10,12 +10,6 @@
 namespace thermocomp::cli {
 namespace {
 
-std::string number_text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
-
 struct Worked {
   std::vector<Reading> readings;
   std::vector<RawReading> raw;
@@ -84,8 +78,9 @@ ScanChannel show(const Reading& reading, const RawReading& raw, const Why& why, 
   }
   if (reading.temp_degC >= range.min_degC && reading.temp_degC <= range.max_degC) return result;
   result.fault = Fault::out_of_range;
-  result.why = number_text(reading.temp_degC) + " degC is no temperature of [" +
-               number_text(range.min_degC) + ", " + number_text(range.max_degC) + "] ([screening])";
+  result.why = short_number(reading.temp_degC) + " degC is no temperature of [" +
+               short_number(range.min_degC) + ", " + short_number(range.max_degC) +
+               "] ([screening])";
   result.hints.emplace_back("compare type, scale and place with the manual");
   return result;
 }
@@ -114,7 +109,7 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
   Worked worked;
   if (socket.open()) {
     task.progress("bus " + what.name + ": working it as the daemon would, for " +
-                  number_text(task.listen_s) + " s");
+                  short_number(task.listen_s) + " s");
     worked = work(protocol, socket, task.listen_s);
     bus.error = socket.error();
     bus.note = heard_text(worked);
