@@ -1,6 +1,7 @@
 #!/bin/sh
 # The benchmarks. Without an argument: their names, one a line. With one: runs it; the last lines
-# of its output are "NAME VALUE UNIT". Exit status 0 when it could measure, 2 for an unknown name, 77
+# of its output are "NAME VALUE UNIT". Measured data: $THERMOCOMP_DATA, else shared/data beside the
+# source. Exit status 0 when it could measure, 2 for an unknown name, 77
 # where the measured data that it needs are not there.
 # Everything else (building, progress, what is compared with what) goes to stderr.
 set -eu
@@ -23,9 +24,9 @@ if [ $# -ne 1 ] || ! list | grep -qxF -- "$1"; then
 fi
 
 script=$(echo "$here"/*/"$1.sh")
-data=${THERMOCOMP_DATA:-$source_dir/../shared/data}
-if grep -q THERMOCOMP_DATA "$script" && [ ! -d "$data/spindle_46h" ]; then
-  echo "bench/run.sh: skipped: $1 needs data that are not in $data (THERMOCOMP_DATA)" >&2
+export THERMOCOMP_DATA="${THERMOCOMP_DATA:-$(dirname "$source_dir")/shared/data}"
+if grep -q THERMOCOMP_DATA "$script" && [ ! -d "$THERMOCOMP_DATA/spindle_46h" ]; then
+  echo "bench/run.sh: skipped: $1 needs data that are not in $THERMOCOMP_DATA (THERMOCOMP_DATA)" >&2
   exit 77
 fi
 

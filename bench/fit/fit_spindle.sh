@@ -1,10 +1,8 @@
 #!/usr/bin/env bash
 # The spindle data: four sensors a channel, chosen and fitted on hours 0 to 24.1, beside the static
-# model of all 16 sensors, on the hours after. The data: $THERMOCOMP_DATA, else shared/data beside
-# the source.
+# model of all 16 sensors, on the hours after.
 set -euo pipefail
-source_dir=$(cd "$(dirname "$0")/../.." && pwd)
-data=${THERMOCOMP_DATA:-$source_dir/../shared/data}/spindle_46h
+data=$THERMOCOMP_DATA/spindle_46h
 run=$data/hours_00_32.csv
 tool=$THERMOCOMP_BENCH_BUILD/bin/thermocomp
 out=$(mktemp -d)

@@ -1,12 +1,8 @@
 #!/usr/bin/env bash
 # Measured machines: test RMS of what people fit (ridge, LASSO, boosting, ARX) and of `thermocomp
-# fit`, on the splits of bench/measured/measured_data.py. The data: $THERMOCOMP_DATA. The peers need
-# python3-sklearn.
+# fit`, on the splits of bench/measured/measured_data.py. The peers need python3-sklearn.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-if [ -z "${THERMOCOMP_DATA:-}" ]; then
-  export THERMOCOMP_DATA="$here/../../../shared/data"
-fi
 if ! /usr/bin/python3 -c 'import sklearn' 2> /dev/null; then
   echo "measured: python3-sklearn is missing (scripts/packages.sh, packages_bench)" >&2
   exit 77
