@@ -116,8 +116,8 @@ LogForm log_form(std::string_view text) {
 }
 
 PlainTable plain_toa5(std::string_view text, const std::string& name) {
-  std::vector<std::vector<std::string>> head;
-  for (int i = 0; i < 4; ++i) head.push_back(fields_of(take_line(text)));
+  std::vector<std::vector<std::string>> head(4);
+  for (auto& line : head) line = fields_of(take_line(text));
   const auto& names = head[1];
   if (head[2].size() != names.size() || head[3].size() != names.size())
     refuse(name, 3, std::to_string(head[2].size()) + " units",
@@ -142,8 +142,8 @@ PlainTable plain_toa5(std::string_view text, const std::string& name) {
 
 PlainTable plain_kw_watcher(std::string_view text, const std::string& name) {
   // Numbers, names, stations, registers, kinds of value, data formats, units.
-  std::vector<std::vector<std::string>> head;
-  for (int i = 0; i < 7; ++i) head.push_back(fields_of(take_line(text)));
+  std::vector<std::vector<std::string>> head(7);
+  for (auto& line : head) line = fields_of(take_line(text));
   const std::size_t columns = head[0].size();
   for (std::size_t i = 1; i < head.size(); ++i)
     if (head[i].size() != columns)

@@ -158,14 +158,17 @@ std::string axes_text(const InitDraft& draft) {
   for (std::size_t i = 0; i < draft.axes.size(); ++i) {
     const std::string& axis = draft.axes[i];
     const auto index = static_cast<int>(i);
-    text += "[[axis]]\n" + key_text("name", axis) + key_text("output", axis + "_um") +
-            "sign = 1                 # prove it with an indicator: thermocomp prove " + axis +
-            " 5; -1 where the tool moves the other way\n"
-            "offset_um_max = " +
-            toml_number(draft.offset_um_max) +
-            "      # small to begin with; raise it when the model is trusted\n"
-            "rate_um_per_s_max = " +
-            toml_number(draft.rate_um_per_s_max) + "\n";
+    text.append("[[axis]]\n")
+        .append(key_text("name", axis))
+        .append(key_text("output", axis + "_um"))
+        .append("sign = 1                 # prove it with an indicator: thermocomp prove ")
+        .append(axis)
+        .append(" 5; -1 where the tool moves the other way\noffset_um_max = ")
+        .append(toml_number(draft.offset_um_max))
+        .append("      # small to begin with; raise it when the model is trusted\n")
+        .append("rate_um_per_s_max = ")
+        .append(toml_number(draft.rate_um_per_s_max))
+        .append("\n");
     if (!controller.is_modbus()) continue;
     const InitPlace& offset = controller.offset;
     text += "offset = " + place_text(offset, offset.address + index * words_of(offset)) + "\n";

@@ -71,6 +71,7 @@ class Lesson {
   void step(std::size_t row) {
     const auto values_at = [row](const auto& columns) {
       std::vector<double> values;
+      values.reserve(columns.size());
       for (const std::vector<double>* column : columns) values.push_back((*column)[row]);
       return values;
     };

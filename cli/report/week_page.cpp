@@ -143,10 +143,10 @@ std::string probings_part(const MachineWeek& week) {
     std::string unit = "µm";
     for (const AxisWeek& axis : week.axes)
       if (axis.name == probing.axis) unit = unit_words(axis.unit);
-    const std::string dry = probing.dry_run ? " (dry run)" : "";
+    if (probing.dry_run) unit += " (dry run)";
     rows.push_back({local_text(probing.wall_s), probing.axis,
-                    figure_text(probing.claimed_um) + " " + unit + dry,
-                    figure_text(probing.left_um) + " " + unit + dry});
+                    figure_text(probing.claimed_um).append(" ").append(unit),
+                    figure_text(probing.left_um).append(" ").append(unit)});
   }
   html += html_table(rows);
   return html + html_paragraph(
@@ -270,10 +270,10 @@ void add_offsets(const MachineWeek& week, const std::string& title, PointPlace p
 
 void add_temperatures(const MachineWeek& week, WeekPanels& all) {
   PlotPanel panel{"temperatures", "°C", {}, 150.0};
-  constexpr std::string_view degC = "_degC";
+  constexpr std::string_view ending = "_degC";
   for (const ThinnedColumn& column : week.course.columns) {
-    if (!column.name.ends_with(degC)) continue;
-    panel.lines.push_back({column.name.substr(0, column.name.size() - degC.size()),
+    if (!column.name.ends_with(ending)) continue;
+    panel.lines.push_back({column.name.substr(0, column.name.size() - ending.size()),
                            colours[panel.lines.size() % colours.size()], column.values});
   }
   if (panel.lines.size() > named_max)

@@ -141,8 +141,7 @@ double wildness(const std::vector<Expectation::Evidence>& steps) {
 
 class ChangeSearch {
  public:
-  ChangeSearch(Recording recording, const std::vector<RunFile>& runs)
-      : recording_(std::move(recording)), runs_(runs) {
+  explicit ChangeSearch(Recording recording) : recording_(std::move(recording)) {
     for (std::size_t i = 0; i < recording_.temps.size(); ++i)
       targets_.push_back({recording_.temps[i], false, static_cast<Index>(i)});
     for (std::size_t i = 0; i < recording_.outputs.size(); ++i)
@@ -365,7 +364,6 @@ class ChangeSearch {
   }
 
   Recording recording_;
-  const std::vector<RunFile>& runs_;
   std::vector<Target> targets_;
   std::vector<Finding> taken_;
   Suspicions offers_;
@@ -374,10 +372,10 @@ class ChangeSearch {
 
 }  // namespace
 
-void check_changes(Recording recording, const std::vector<RunFile>& runs, Suspicions& found,
+void check_changes(Recording recording, Suspicions& found,
                    const std::function<void(double)>& progress) {
   if (recording.temps.empty() && recording.outputs.empty()) return;
-  ChangeSearch(std::move(recording), runs).search(found, progress);
+  ChangeSearch(std::move(recording)).search(found, progress);
 }
 
 void check_exchanged(const Recording& recording, Suspicions& found) {

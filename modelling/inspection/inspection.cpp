@@ -51,6 +51,7 @@ RunFile of_machine(RunFile run) {
 Inspection inspect(const std::vector<RunFile>& given, double told_min,
                    const std::function<void(double)>& progress) {
   std::vector<RunFile> runs;
+  runs.reserve(given.size());
   for (const RunFile& run : given) runs.push_back(of_machine(run));
   Inspection inspection;
   Suspicions suspicions;
@@ -63,14 +64,14 @@ Inspection inspect(const std::vector<RunFile>& given, double told_min,
   check_values(runs, suspicions);
   for (const Suspicion& each : suspicions)
     if (each.finding.kind == "stuck") bridge(calm[each.finding.run], each.finding);
-  const Recording recording = make_recording(
+  Recording recording = make_recording(
       calm, std::min(rows_of_a_run_max,
                      std::max<Eigen::Index>(
                          100, rows_of_all_runs_max / static_cast<Eigen::Index>(runs.size()))));
   inspection.groups = groups_of(recording);
   judge_excitation(recording, inspection);
   check_exchanged(recording, suspicions);
-  check_changes(recording, calm, suspicions, progress);
+  check_changes(std::move(recording), suspicions, progress);
   for (Suspicion& each : suspicions) {
     each.finding.score = each.score;
     each.finding.probability = probability_of(each.finding.kind, each.score);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "config/text/units.hpp"
 #include "modelling/inspection/inspection.hpp"
@@ -76,8 +77,8 @@ class Picture {
     end_ = std::min(end_, time_s.size());
     origin_s_ = time_s.front();
     hours_ = axis_of(hour(begin_), hour(end_ - 1));
-    double low = INFINITY;
-    double high = -INFINITY;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
     for (std::size_t row = begin_; row < end_; ++row) {
       if (!std::isfinite(values_[row])) continue;
       low = std::min(low, values_[row]);

@@ -94,15 +94,15 @@ void check_clock(const RunFile& run, std::size_t index, const RunSampling& sampl
     const double jump_s = steps[i] - sampling.step_s;
     const double hours = std::round(jump_s / hour_s);
     const bool whole_hours = hours >= 1 && std::abs(jump_s - hours * hour_s) <= 2 * sampling.step_s;
-    if (gap && regular && whole_hours && goes_on(run, i + 1))
+    const bool set_forward = gap && regular && whole_hours && goes_on(run, i + 1);
+    // A little, without going back over a row.
+    const bool set_back = !gap && regular && steps[i] < 0.3 * sampling.step_s;
+    if (set_forward || set_back) {
       offer("clock", from_s, to_s, jump_s, 10.0);
-    else if (gap && steps[i] > longest_s) {
+    } else if (gap && steps[i] > longest_s) {
       longest_s = steps[i];
       longest_from_s = from_s;
     }
-    // A clock that was set back a little, without going back over a row.
-    else if (regular && steps[i] < 0.3 * sampling.step_s)
-      offer("clock", from_s, to_s, jump_s, 10.0);
   }
   if (longest_s > 0) offer("gap", longest_from_s, longest_from_s + longest_s, longest_s, 10.0);
 }

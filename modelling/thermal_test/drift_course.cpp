@@ -80,10 +80,10 @@ SmoothCourse::SmoothCourse(const MeasuredCourse& measured, std::span<const doubl
   place_windows(breaks_s);
   value_ = smoothed(raw_);
   keep_what_is_left(noise);
-  for (std::size_t i = 0; i < windows_.size(); ++i) {
+  for (const auto& window : windows_) {
     double squares = 0.0;
-    for (std::size_t j = 0; j < windows_[i].weights.size(); ++j)
-      squares += std::pow(windows_[i].weights[j] * share_[windows_[i].begin + j], 2);
+    for (std::size_t j = 0; j < window.weights.size(); ++j)
+      squares += std::pow(window.weights[j] * share_[window.begin + j], 2);
     noise_left_ = std::max(noise_left_, noise_ * std::sqrt(squares));
   }
 }

@@ -167,7 +167,7 @@ ReplaySummary replay_to_csv(const std::filesystem::path& history, std::ostream& 
     text.clear();
   };
   const DamageSink tell = [&](const HistoryDamage& damage) { text += damage_line(damage); };
-  const ReplaySummary summary = replay_all(reader, setups, sink, tell, progress);
+  ReplaySummary summary = replay_all(reader, setups, sink, tell, progress);
   out << text;
   return summary;
 }

@@ -163,6 +163,7 @@ std::vector<double> remainders_um(const MeasuredTests& tests, const ThermalModel
   for (const TestRun& run : tests.runs) {
     displacement.restart();
     std::vector<Course> courses;
+    courses.reserve(temperatures.size() + signals.size());
     for (const std::string& name : temperatures) courses.push_back(course_of(tests, run, name));
     for (const std::string& name : signals) courses.push_back(course_of(tests, run, name));
     std::vector<double> first_um;

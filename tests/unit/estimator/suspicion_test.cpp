@@ -91,12 +91,12 @@ EstimatorConfig config_of(SuspectedPolicy policy, std::size_t sensors_a_block = 
 }
 
 using Lie = std::function<double(std::size_t sensor, double true_degC, double time_s)>;
-double honest(std::size_t, double degC, double) {
-  return degC;
+double honest(std::size_t, double temp_degC, double) {
+  return temp_degC;
 }
 /// The sensor reads 2 K more from 20 h on.
-double jumped(std::size_t sensor, double degC, double time_s) {
-  return sensor == 2 && time_s >= 20.0 * hour_s ? degC + 2.0 : degC;
+double jumped(std::size_t sensor, double temp_degC, double time_s) {
+  return sensor == 2 && time_s >= 20.0 * hour_s ? temp_degC + 2.0 : temp_degC;
 }
 
 /// Steps of 12 s, beginning at 16 h.
@@ -112,8 +112,8 @@ struct Shop {
     time_s += 12.0;
     const nanoseconds now{static_cast<std::int64_t>(1e9 * time_s)};
     for (std::size_t i = 0; i < readings.size(); ++i) {
-      const double degC = lie(i, true_degC(i / per_block, time_s), time_s);
-      readings[i] = {degC, now, std::isnan(degC) ? Fault::open_circuit : Fault::none};
+      const double temp_degC = lie(i, true_degC(i / per_block, time_s), time_s);
+      readings[i] = {temp_degC, now, std::isnan(temp_degC) ? Fault::open_circuit : Fault::none};
     }
     controller.taken_at = now;
     const double before_um = command.offset_um[0];
@@ -190,26 +190,26 @@ TEST_CASE("day and night and the warm-up of all raise no suspicion", "[estimator
 
 TEST_CASE("what all sensors show at once is no lie", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
-  shop.run_until(24.0, [](std::size_t, double degC, double time_s) {
-    return time_s > 20.0 * hour_s ? degC + 2.0 : degC;
+  shop.run_until(24.0, [](std::size_t, double temp_degC, double time_s) {
+    return time_s > 20.0 * hour_s ? temp_degC + 2.0 : temp_degC;
   });
   CHECK_FALSE(shop.ever_any());
 }
 
 TEST_CASE("a spike of two minutes raises no suspicion", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
-  shop.run_until(24.0, [](std::size_t sensor, double degC, double time_s) {
+  shop.run_until(24.0, [](std::size_t sensor, double temp_degC, double time_s) {
     const bool spike = sensor == 4 && std::fmod(time_s, 1800.0) < 24.0;
-    return spike ? degC + 3.0 : degC;
+    return spike ? temp_degC + 3.0 : temp_degC;
   });
   CHECK_FALSE(shop.ever_any());
 }
 
 TEST_CASE("a sensor that creeps is suspected", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
-  shop.run_until(30.0, [](std::size_t sensor, double degC, double time_s) {
+  shop.run_until(30.0, [](std::size_t sensor, double temp_degC, double time_s) {
     const double hours = time_s / hour_s - 18.0;
-    return sensor == 5 && hours > 0 ? degC + 0.4 * hours : degC;
+    return sensor == 5 && hours > 0 ? temp_degC + 0.4 * hours : temp_degC;
   });
   CHECK(shop.ever(5));
   CHECK(shop.suspected() == Names{"s6"});
@@ -218,8 +218,9 @@ TEST_CASE("a sensor that creeps is suspected", "[estimator][suspicion]") {
 TEST_CASE("a sensor that works loose is suspected at a warm-up", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
   const double then_degC = true_degC(4, 20.0 * hour_s);
-  shop.run_until(30.0, [&](std::size_t sensor, double degC, double time_s) {
-    return sensor == 4 && time_s > 20.0 * hour_s ? then_degC + 0.4 * (degC - then_degC) : degC;
+  shop.run_until(30.0, [&](std::size_t sensor, double temp_degC, double time_s) {
+    return sensor == 4 && time_s > 20.0 * hour_s ? then_degC + 0.4 * (temp_degC - then_degC)
+                                                 : temp_degC;
   });
   CHECK(shop.ever(4));
   for (const std::size_t other : {0u, 1u, 2u, 3u, 5u}) CHECK_FALSE(shop.ever(other));
@@ -230,9 +231,9 @@ TEST_CASE("two that lie at once are both named, or nobody is", "[estimator][susp
   // themselves.
   const double second_K = GENERATE(1.5, -3.0);
   Shop shop(config_of(SuspectedPolicy::warn));
-  shop.run_until(20.5, [&](std::size_t sensor, double degC, double time_s) {
-    if (time_s < 20.0 * hour_s) return degC;
-    return sensor == 1 ? degC + 2.0 : sensor == 4 ? degC + second_K : degC;
+  shop.run_until(20.5, [&](std::size_t sensor, double temp_degC, double time_s) {
+    if (time_s < 20.0 * hour_s) return temp_degC;
+    return sensor == 1 ? temp_degC + 2.0 : sensor == 4 ? temp_degC + second_K : temp_degC;
   });
   for (const std::size_t other : {0u, 2u, 3u, 5u}) CHECK_FALSE(shop.ever(other));
   if (second_K < 0) return;
@@ -243,9 +244,9 @@ TEST_CASE("two that lie at once are both named, or nobody is", "[estimator][susp
 
 TEST_CASE("a second lie does not change the size of the first", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
-  shop.run_until(22.5, [](std::size_t sensor, double degC, double time_s) {
-    if (sensor == 1 && time_s > 20.0 * hour_s) return degC + 2.0;
-    return sensor == 0 && time_s > 21.5 * hour_s ? degC - 3.0 : degC;
+  shop.run_until(22.5, [](std::size_t sensor, double temp_degC, double time_s) {
+    if (sensor == 1 && time_s > 20.0 * hour_s) return temp_degC + 2.0;
+    return sensor == 0 && time_s > 21.5 * hour_s ? temp_degC - 3.0 : temp_degC;
   });
   REQUIRE(shop.suspected() == Names{"s1", "s2"});
   CHECK(shop.report.sensors[1].suspected_size_K == Approx(2.0).margin(0.4));
@@ -253,16 +254,17 @@ TEST_CASE("a second lie does not change the size of the first", "[estimator][sus
 
 TEST_CASE("a faulted neighbour says nothing, and the others still do", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::warn));
-  shop.run_until(20.5, [](std::size_t sensor, double degC, double time_s) {
-    return sensor == 3 && time_s > 19.95 * hour_s ? not_a_number : jumped(sensor, degC, time_s);
+  shop.run_until(20.5, [](std::size_t sensor, double temp_degC, double time_s) {
+    return sensor == 3 && time_s > 19.95 * hour_s ? not_a_number
+                                                  : jumped(sensor, temp_degC, time_s);
   });
   CHECK(shop.suspected() == Names{"s3"});
 }
 
 TEST_CASE("a suspicion ends when the sensor agrees again", "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down));
-  const auto back = [](std::size_t sensor, double degC, double time_s) {
-    return time_s < 21.0 * hour_s ? jumped(sensor, degC, time_s) : degC;
+  const auto back = [](std::size_t sensor, double temp_degC, double time_s) {
+    return time_s < 21.0 * hour_s ? jumped(sensor, temp_degC, time_s) : temp_degC;
   };
   shop.run_until(21.0, back);
   REQUIRE(shop.suspected() == Names{"s3"});
@@ -276,9 +278,9 @@ TEST_CASE("a suspicion ends when the sensor agrees again", "[estimator][suspicio
 TEST_CASE("a suspected sensor that is faulted for ten minutes starts anew when it is back",
           "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down));
-  shop.run_until(24.0, [](std::size_t sensor, double degC, double time_s) {
+  shop.run_until(24.0, [](std::size_t sensor, double temp_degC, double time_s) {
     const bool unplugged = time_s > 21.0 * hour_s && time_s < 21.5 * hour_s;
-    return sensor == 2 && unplugged ? not_a_number : jumped(sensor, degC, time_s);
+    return sensor == 2 && unplugged ? not_a_number : jumped(sensor, temp_degC, time_s);
   });
   CHECK(shop.ever(2));
   CHECK(shop.suspected().empty());
@@ -334,8 +336,8 @@ TEST_CASE("where an estimate would be too uncertain the suspected sensor is used
 TEST_CASE("a block of several sensors goes on without the one that lies",
           "[estimator][suspicion]") {
   Shop shop(config_of(SuspectedPolicy::weigh_down, 3));
-  const auto lie = [](std::size_t sensor, double degC, double time_s) {
-    return sensor == 7 && time_s > 20.0 * hour_s ? degC + 3.0 : degC;
+  const auto lie = [](std::size_t sensor, double temp_degC, double time_s) {
+    return sensor == 7 && time_s > 20.0 * hour_s ? temp_degC + 3.0 : temp_degC;
   };
   shop.run_until(22.0, lie);
   REQUIRE(shop.suspected() == Names{"s3x"});
@@ -418,20 +420,20 @@ class Liars {
       each = {static_cast<std::size_t>(dice_(0.0, 5.999)), dice_(0.0, 4.0),
               hour_s * dice_(17.0, 27.0), hour_s * dice_(0.1, 6.0), dice_(-6.0, 6.0)};
   }
-  double operator()(std::size_t sensor, double degC, double time_s) const {
+  double operator()(std::size_t sensor, double temp_degC, double time_s) const {
     for (const auto& each : liars_) {
       const double since_s = time_s - each.begin_s;
       if (each.sensor != sensor || since_s < 0.0 || since_s > each.lasts_s) continue;
       if (each.kind < 1.0)
-        degC += each.size_K;
+        temp_degC += each.size_K;
       else if (each.kind < 2.0)
-        degC += each.size_K * since_s / each.lasts_s;
+        temp_degC += each.size_K * since_s / each.lasts_s;
       else if (each.kind < 3.0)
-        degC = 0.4 * degC + 0.6 * true_degC(sensor, each.begin_s);
+        temp_degC = 0.4 * temp_degC + 0.6 * true_degC(sensor, each.begin_s);
       else if (since_s > 600.0)
-        degC = not_a_number;
+        temp_degC = not_a_number;
     }
-    return degC;
+    return temp_degC;
   }
 
  private:

@@ -240,7 +240,7 @@ TEST_CASE("what a cycle end holds is held along the whole travel", "[estimator][
 }
 
 TEST_CASE("nodes that cannot be are refused", "[estimator][travel]") {
-  const auto refused = [](EstimatorConfig config) {
+  const auto refused = [](const EstimatorConfig& config) {
     CHECK_THROWS_AS(TravelCurves(config, curved_model()), InvalidValue);
   };
   EstimatorConfig config = travel_config({0.0, 800.0}, TravelForm::line);

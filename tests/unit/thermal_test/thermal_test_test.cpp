@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -65,8 +66,8 @@ TestOptions options_of(TestKind kind) {
 /// Largest less smallest of the truth, by another way than the report: row by row.
 double true_range(const std::vector<double>& time_s, const std::vector<double>& values,
                   double from_s, double to_s) {
-  double low = INFINITY;
-  double high = -INFINITY;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
   for (std::size_t i = 0; i < time_s.size(); ++i) {
     if (time_s[i] < from_s || time_s[i] > to_s) continue;
     low = std::min(low, values[i]);
