@@ -85,7 +85,8 @@ void add_set(const ModbusTravel& travel, const AxisConfig& axis, std::vector<Row
                        std::vector<Row>& rows) {
     for (std::size_t i = 0; i < values.size(); ++i) {
       const TravelValueText text = travel_value_text(travel, unit_of_axis(axis), i);
-      rows.push_back({place_name(values[i]), type_name(values[i]), before + text.what + of_axis,
+      rows.push_back({place_name(values[i]), type_name(values[i]),
+                      std::string(before).append(text.what).append(of_axis),
                       scaled(text.unit, values[i].scale)});
     }
   };
@@ -190,11 +191,11 @@ void add_set(Frames& frames, const CanTravel& travel, const CanSet& set, const A
   const std::string of_axis = " of axis " + axis_name(axis);
   for (std::size_t i = 0; i < set.values.size(); ++i) {
     const TravelValueText text = travel_value_text(travel, unit_of_axis(axis), i);
-    add(frames, set.values[i], before + text.what + of_axis,
+    add(frames, set.values[i], std::string(before).append(text.what).append(of_axis),
         scaled(text.unit, set.values[i].scale, set.values[i].offset));
   }
   for (const CanSignal& number : set.numbers)
-    add(frames, number, before + "number of the set" + of_axis, "-", true);
+    add(frames, number, std::string(before).append("number of the set").append(of_axis), "-", true);
 }
 
 void add_axis(const CanAxis& place, const AxisConfig& axis, Frames& written, Frames& read) {

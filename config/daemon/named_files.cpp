@@ -24,7 +24,7 @@ fs::path followed(fs::path path, std::string& why) {
     const fs::path target = fs::read_symlink(path, error);
     path = target.is_absolute() ? target : path.parent_path() / target;
   }
-  const fs::path result = fs::weakly_canonical(path, error);
+  fs::path result = fs::weakly_canonical(path, error);
   if (!error) return result;
   why = error == std::errc::too_many_symbolic_link_levels ? "must not lead through a loop of links"
                                                           : "cannot be reached: " + error.message();

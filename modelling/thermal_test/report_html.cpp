@@ -120,6 +120,7 @@ class TestPicture {
   std::span<const double> keep(const std::vector<double>& time_s,
                                const std::vector<double>& values) {
     std::vector<double> since;
+    since.reserve(time_s.size());
     for (const double time : time_s) since.push_back(time - zero_s_);
     kept_.push_back(std::make_unique<std::vector<double>>(resampled(time_s_, since, values)));
     return *kept_.back();

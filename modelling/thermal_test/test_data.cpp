@@ -88,7 +88,7 @@ std::optional<std::string> column_of_unit(const RunFile& run, std::string_view s
   for (const std::string& column : run.columns) {
     if (unit_of(column).suffix != suffix) continue;
     if (!found.empty())
-      refuse(run, "--running", found + " or " + column,
+      refuse(run, "--running", std::string(found).append(" or ").append(column),
              "both may say when it ran: say which, --running " + found);
     found = column;
   }

@@ -75,7 +75,7 @@ TEST_CASE("where the newest segment is damaged an older one is told as such", "[
 TEST_CASE("what was once a history is no first start, what never was is one", "[history]") {
   const TempFolder folder;
   CHECK_FALSE(last_recorded_state(folder / "h.db", parse_test_setup).has_run);
-  std::ofstream(folder / "h.db");
+  { const std::ofstream empty(folder / "h.db"); }
   CHECK_FALSE(last_recorded_state(folder / "h.db", parse_test_setup).has_run);
   std::ofstream(folder / "h.db") << "garbage, but once a history";
   const RecordedState recorded = last_recorded_state(folder / "h.db", parse_test_setup);
