@@ -32,6 +32,7 @@ double end_s(const SegmentInfo& segment) {
 
 std::vector<WallSpan> recorded_spans(const std::vector<SegmentInfo>& segments) {
   std::vector<WallSpan> spans;
+  spans.reserve(segments.size());
   for (const SegmentInfo& segment : segments)
     spans.push_back({s_per_ns * static_cast<double>(segment.wall_ns), end_s(segment)});
   return spans;
@@ -308,6 +309,7 @@ std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) 
     kind.lasts = outages.lasts;
   }
   std::vector<Outages> sorted;
+  sorted.reserve(found.size());
   for (auto& [subject, outages] : found) sorted.push_back(std::move(outages));
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Outages& a, const Outages& b) { return a.lasted_s > b.lasted_s; });

@@ -38,7 +38,7 @@ std::filesystem::path followed(const std::filesystem::path& file) {
     }
     path = path.parent_path() / std::filesystem::read_symlink(path, error);
   }
-  const std::filesystem::path real = std::filesystem::weakly_canonical(path, error);
+  std::filesystem::path real = std::filesystem::weakly_canonical(path, error);
   if (error) throw DatabaseError(SQLITE_CANTOPEN, file.string() + ": " + error.message());
   return real;
 }

@@ -48,6 +48,7 @@ std::vector<Value> kept_of(const std::vector<Value>& values, const std::vector<b
 
 std::vector<bool> which_are(const std::vector<std::string>& columns, const Names& readings) {
   std::vector<bool> kept;
+  kept.reserve(columns.size());
   for (const std::string& column : columns) kept.push_back(readings.contains(column));
   return kept;
 }

@@ -364,7 +364,7 @@ TEST_CASE("the slope is what a small rise does in the end, whatever the terms", 
   DisplacementModel model(spec);
   REQUIRE(spec.temperature_columns().size() == 3);
   const Vector signals{60.0};
-  const auto z_um = [&](Vector rise_K) {
+  const auto z_um = [&](const Vector& rise_K) {
     model.restart();  // every lag is over
     return displacement(model, 1s, rise_K, Vector(3, 0.0), signals, 2)[1];
   };
