@@ -1,8 +1,8 @@
 #!/bin/sh
 # The benchmarks. Without an argument: their names, one a line. With one: runs it; the last lines
 # of its output are "NAME VALUE UNIT". Measured data: $THERMOCOMP_DATA, else shared/data beside the
-# source. Exit status 0 when it could measure, 2 for an unknown name, 77
-# where the measured data that it needs are not there.
+# source. Exit status 0 when it could measure, 2 for an unknown name, 77 where the data that it needs
+# are not there.
 # Everything else (building, progress, what is compared with what) goes to stderr.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
