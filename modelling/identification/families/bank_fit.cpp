@@ -20,7 +20,7 @@ constexpr std::size_t many_columns = 200;
 constexpr std::size_t folds_enough_inside = 4;
 constexpr double shortest_s = 300.0;
 constexpr double ratio = 3.0;
-constexpr std::size_t lags_max = 5;
+constexpr std::size_t lags_max = 6;
 // Of the mean square of a column, and of its correlation with the output.
 constexpr std::array<double, 7> ridge_penalties{1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0};
 constexpr std::array<double, 6> l1_prices{0.3, 0.1, 0.03, 0.01, 0.003, 0.001};
@@ -63,6 +63,32 @@ void descend(const Eigen::MatrixXd& a, const Eigen::VectorXd& c, double price, E
     }
     if (!(moved > l1_tolerance)) break;
   }
+}
+
+/// What the columns are multiplied by before they are fitted; 0 for what never moves.
+///
+/// Scaled by its own standard deviation, a place that hardly warmed in the runs is trusted with as
+/// much displacement as one that did, and carries it far where it warms another day; scaled alike
+/// per kelvin, a place is believed as little as it moved. Divided by the geometric mean of both,
+/// measured machines are predicted best (docs/measurements.md). A signal's unit says nothing: its
+/// own standard deviation stands for that of the temperatures.
+/// @param deviation  standard deviation of each column
+/// @param size       its RMS
+Eigen::VectorXd scales(const Eigen::VectorXd& deviation, const Eigen::VectorXd& size,
+                       std::size_t places, std::size_t subjects) {
+  const auto of_places = static_cast<Eigen::Index>(places);
+  const auto of_all = static_cast<Eigen::Index>(subjects);
+  const double usual_K = std::sqrt(deviation.head(of_places).squaredNorm() /
+                                   static_cast<double>(std::max<std::size_t>(places, 1)));
+  Eigen::VectorXd scale = Eigen::VectorXd::Zero(deviation.size());
+  for (Eigen::Index i = 0; i < deviation.size(); ++i) {
+    if (!(deviation[i] > 1e-12 * size[i])) continue;
+    const Eigen::Index subject = i % of_all;
+    const double kind = subject < of_places ? usual_K : deviation[subject];
+    const double product = deviation[i] * kind;
+    if (product > 0) scale[i] = 1.0 / std::sqrt(product);
+  }
+  return scale;
 }
 
 struct Rows {
@@ -120,7 +146,7 @@ BankColumns bank_columns(const MeasuredTests& tests) {
   const std::size_t lags = std::min(lags_max, columns_max / bank.subjects.size());
   bank.taus_s = {0.0};
   for (double tau_s = std::max(shortest_s, 2.0 * step_s);
-       tau_s <= longest_s / 3.0 && tau_s <= term_tau_s_max && bank.taus_s.size() < lags;
+       tau_s <= longest_s * 2.0 / 3.0 && tau_s <= term_tau_s_max && bank.taus_s.size() < lags;
        tau_s *= ratio)
     bank.taus_s.push_back(std::round(tau_s));
   return bank;
@@ -204,10 +230,8 @@ BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& colu
     }
   const auto rows = static_cast<double>(tests.rows());
   const Eigen::VectorXd variance = squares / rows - (sum / rows).cwiseAbs2();
-  scale_ = variance.cwiseMax(0.0).cwiseSqrt();
-  for (Eigen::Index i = 0; i < count; ++i)  // what never moves gets no gain
-    scale_[i] =
-        scale_[i] > 1e-12 * std::sqrt(squares[i] / rows) && scale_[i] > 0 ? 1.0 / scale_[i] : 0.0;
+  scale_ = scales(variance.cwiseMax(0.0).cwiseSqrt(), (squares / rows).cwiseSqrt(),
+                  tests.places.size(), columns.subjects.size());
   for (Sums& sums : pieces_) {
     sums.xx = scale_.asDiagonal() * sums.xx * scale_.asDiagonal();
     sums.xy = scale_.asDiagonal() * sums.xy;

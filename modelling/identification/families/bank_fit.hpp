@@ -22,9 +22,9 @@ struct BankColumns {
   [[nodiscard]] std::size_t size() const noexcept { return subjects.size() * taus_s.size(); }
 };
 
-/// Time constants by a ratio of three from 5 min up to a third of the longest run, at least twice
-/// the step; as many as leave no more than 600 columns. A signal that is only ever 0 or 1 has no
-/// square.
+/// Time constants by a ratio of three from 5 min up to two thirds of the longest run, at least
+/// twice the step; as
+/// many as leave no more than 600 columns. A signal that is only ever 0 or 1 has no square.
 [[nodiscard]] BankColumns bank_columns(const MeasuredTests& tests);
 
 /// The columns over all rows of a run, less their values at its first row; shape (rows, columns).
@@ -37,8 +37,8 @@ struct BankColumns {
                                  const std::vector<std::string>& outputs,
                                  const Eigen::MatrixXd& gains);
 
-/// X'X and X'Y of every fold, columns scaled to a standard deviation of 1. Rows in which an output
-/// is missing (NaN) do not count.
+/// X'X and X'Y of every fold, columns scaled between a standard deviation of 1 and 1 per kelvin.
+/// Rows in which an output is missing (NaN) do not count.
 class BankEquations {
  public:
   BankEquations(const MeasuredTests& tests, const BankColumns& columns);

@@ -9,8 +9,8 @@
 
 namespace thermocomp::identification {
 
-/// The simplest family within one standard error of the best: of the difference to it, fold by
-/// fold. Folds are the runs; of one run, and to choose among families with two or three, stretches.
+/// The family that leaves least of what is left out, the simplest of those alike to 1 %. Left out
+/// are runs; of one run, and to choose among families with two or three, stretches.
 /// @param forced    instead of it
 /// @param progress  is told the share of the work done
 /// @throws std::runtime_error when the forced family has no answer

@@ -76,7 +76,7 @@ const char* why(const MeasuredTests& tests, const FamiliesFit& fit) {
   if (fit.chosen_as_asked) return "as asked for";
   if (tests.runs.size() < 2) return "which leaves least";
   if (fit.chosen_by_stretches) return "which leaves least of stretches of the few runs";
-  return "the simplest within one standard error of the best";
+  return "which leaves least of runs left out";
 }
 
 }  // namespace

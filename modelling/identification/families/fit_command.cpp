@@ -141,9 +141,8 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
          "the daemon's, so that its blocks and axes stay; may be the file of -o")
       ->type_name("MODEL.toml");
   sub->add_option("--family", options->family,
-                  "none, static_few, lagged_few, physical or lag_bank; else of one to three runs "
-                  "what leaves "
-                  "least, of more the simplest within one standard error of the best")
+                  "none, static_few, lagged_few, physical or lag_bank; else what leaves least of "
+                  "what is left out")
       ->check(CLI::IsMember({"none", "static_few", "lagged_few", "physical", "lag_bank"}));
   const CLI::Option* terms =
       sub->add_option("--terms", options->terms,
