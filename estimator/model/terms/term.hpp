@@ -91,6 +91,7 @@ struct TermRegistration {
   KIND(temperature_hysteresis) \
   KIND(sensor_swap)            \
   KIND(lag_bank)               \
+  KIND(signal_hinge)           \
   KIND(start_dependence)
 
 #define THERMOCOMP_DECLARE_TERM(name) TermRegistration name##_registration();

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include <Eigen/Eigenvalues>
 
@@ -21,6 +22,10 @@ constexpr std::size_t folds_enough_inside = 4;
 constexpr double shortest_s = 300.0;
 constexpr double ratio = 3.0;
 constexpr std::size_t lags_max = 6;
+constexpr int hinges_a_signal = 8;
+constexpr std::size_t values_of_a_switch_max = 6;
+/// A hinge counts as half of what it moves: nothing but the recording says that it is there.
+constexpr double weight_of_hinge = 0.5;
 // Of the mean square of a column, and of its correlation with the output.
 constexpr std::array<double, 7> ridge_penalties{1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0};
 constexpr std::array<double, 6> l1_prices{0.3, 0.1, 0.03, 0.01, 0.003, 0.001};
@@ -75,14 +80,19 @@ void descend(const Eigen::MatrixXd& a, const Eigen::VectorXd& c, double price, E
 /// @param deviation  standard deviation of each column
 /// @param size       its RMS
 Eigen::VectorXd scales(const Eigen::VectorXd& deviation, const Eigen::VectorXd& size,
-                       std::size_t places, std::size_t subjects) {
+                       std::size_t places, const BankColumns& columns) {
   const auto of_places = static_cast<Eigen::Index>(places);
-  const auto of_all = static_cast<Eigen::Index>(subjects);
+  const auto of_all = static_cast<Eigen::Index>(columns.subjects.size());
+  const auto late = static_cast<Eigen::Index>(columns.late());
   const double usual_K = std::sqrt(deviation.head(of_places).squaredNorm() /
                                    static_cast<double>(std::max<std::size_t>(places, 1)));
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(deviation.size());
   for (Eigen::Index i = 0; i < deviation.size(); ++i) {
     if (!(deviation[i] > 1e-12 * size[i])) continue;
+    if (i >= late) {
+      scale[i] = weight_of_hinge / deviation[i];
+      continue;
+    }
     const Eigen::Index subject = i % of_all;
     const double kind = subject < of_places ? usual_K : deviation[subject];
     const double product = deviation[i] * kind;
@@ -152,6 +162,22 @@ BankColumns bank_columns(const MeasuredTests& tests) {
   return bank;
 }
 
+void add_hinges(const MeasuredTests& tests, BankColumns& columns) {
+  std::vector<Hinge> hinges;
+  for (std::size_t i = 0; i < tests.signals.size(); ++i) {
+    std::set<double> values;
+    for (const TestRun& run : tests.runs) {
+      const auto column = run.signals.col(static_cast<Eigen::Index>(i));
+      values.insert(column.begin(), column.end());
+    }
+    if (values.size() <= values_of_a_switch_max) continue;
+    const double low = *values.begin();
+    const double step = (*values.rbegin() - low) / (hinges_a_signal + 1);
+    for (int j = 1; j <= hinges_a_signal; ++j) hinges.push_back({tests.signals[i], low + j * step});
+  }
+  if (columns.late() + hinges.size() <= columns_max) columns.hinges = std::move(hinges);
+}
+
 Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
                         const BankColumns& columns) {
   const Eigen::Index rows = run.time_s.size();
@@ -175,6 +201,13 @@ Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
             values(row, i));
       column.array() -= values(0, i);
     }
+  auto at = static_cast<Eigen::Index>(columns.late());
+  for (const Hinge& hinge : columns.hinges) {
+    const auto signal = std::find(tests.signals.begin(), tests.signals.end(), hinge.signal);
+    auto column = bank.col(at++);
+    column = (run.signals.col(signal - tests.signals.begin()).array() - hinge.above).max(0.0);
+    column.array() -= double{column[0]};
+  }
   return bank;
 }
 
@@ -196,6 +229,23 @@ TermSpec bank_term(const BankColumns& columns, const std::vector<std::string>& o
     }
   }
   return term;
+}
+
+std::vector<TermSpec> hinge_terms(const BankColumns& columns,
+                                  const std::vector<std::string>& outputs,
+                                  const Eigen::MatrixXd& gains) {
+  std::vector<TermSpec> terms;
+  auto row = static_cast<Eigen::Index>(columns.late());
+  for (const Hinge& hinge : columns.hinges) {
+    TermSpec& term = terms.emplace_back();
+    term.kind = "signal_hinge";
+    term.subject = hinge.signal;
+    term.shared["above"] = hinge.above;
+    for (std::size_t o = 0; o < outputs.size(); ++o)
+      term.per_output["gain_um_per_unit"][outputs[o]] = gains(row, static_cast<Eigen::Index>(o));
+    ++row;
+  }
+  return terms;
 }
 
 BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& columns) {
@@ -231,7 +281,7 @@ BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& colu
   const auto rows = static_cast<double>(tests.rows());
   const Eigen::VectorXd variance = squares / rows - (sum / rows).cwiseAbs2();
   scale_ = scales(variance.cwiseMax(0.0).cwiseSqrt(), (squares / rows).cwiseSqrt(),
-                  tests.places.size(), columns.subjects.size());
+                  tests.places.size(), columns);
   for (Sums& sums : pieces_) {
     sums.xx = scale_.asDiagonal() * sums.xx * scale_.asDiagonal();
     sums.xy = scale_.asDiagonal() * sums.xy;

@@ -13,29 +13,45 @@
 
 namespace thermocomp::identification {
 
+/// max(u - above, 0) of a signal.
+struct Hinge {
+  std::string signal;
+  double above{0.0};
+};
+
 /// Columns of a bank: each subject to its power, at each time constant; subjects within a time
-/// constant side by side.
+/// constant side by side. Then the hinges.
 struct BankColumns {
   std::vector<std::string> subjects;  ///< temperatures (rises), then signals, then their squares
   std::vector<double> powers;
   std::vector<double> taus_s;  ///< 0 first
-  [[nodiscard]] std::size_t size() const noexcept { return subjects.size() * taus_s.size(); }
+  std::vector<Hinge> hinges;
+  [[nodiscard]] std::size_t late() const noexcept { return subjects.size() * taus_s.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return late() + hinges.size(); }
 };
 
 /// Time constants by a ratio of three from 5 min up to two thirds of the longest run, at least
-/// twice the step; as
-/// many as leave no more than 600 columns. A signal that is only ever 0 or 1 has no square.
+/// twice the step; as many as leave no more than 600 columns. A signal that is only ever 0 or 1 has
+/// no square. No hinges.
 [[nodiscard]] BankColumns bank_columns(const MeasuredTests& tests);
+
+/// Eight hinges a signal, evenly over its range; none where they would be more than 600 columns,
+/// nor on a signal of at most six values, which its size and square say well enough.
+void add_hinges(const MeasuredTests& tests, BankColumns& columns);
 
 /// The columns over all rows of a run, less their values at its first row; shape (rows, columns).
 [[nodiscard]] Eigen::MatrixXd bank_of(const TestRun& run, const MeasuredTests& tests,
                                       const BankColumns& columns);
 
-/// The term that the daemon evaluates.
+/// The term that the daemon evaluates, without the hinges.
 /// @param gains  [um per unit], shape (columns, outputs)
 [[nodiscard]] TermSpec bank_term(const BankColumns& columns,
                                  const std::vector<std::string>& outputs,
                                  const Eigen::MatrixXd& gains);
+/// Those of the hinges, one each.
+[[nodiscard]] std::vector<TermSpec> hinge_terms(const BankColumns& columns,
+                                                const std::vector<std::string>& outputs,
+                                                const Eigen::MatrixXd& gains);
 
 /// X'X and X'Y of every fold, columns scaled between a standard deviation of 1 and 1 per kelvin.
 /// Rows in which an output is missing (NaN) do not count.

@@ -260,7 +260,8 @@ ThermalModel bank_model(const MeasuredTests& tests, const BankColumns& columns,
     model.matrix_um_per_K.emplace_back(at_once.begin(), at_once.end());
   }
   gains.topRows(places).setZero();
-  model.terms.push_back(bank_term(columns, tests.outputs, gains));
+  model.terms = hinge_terms(columns, tests.outputs, gains);
+  model.terms.insert(model.terms.begin(), bank_term(columns, tests.outputs, gains));
   return model;
 }
 
@@ -319,7 +320,8 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
   const double steps = 4.0 * static_cast<double>(tests.folds.size() + choosing.folds.size());
   double step = 0.0;
   const auto done = [&] { progress(++step / steps); };
-  const BankColumns columns = bank_columns(tests);
+  BankColumns columns = bank_columns(tests);
+  add_hinges(tests, columns);
   const BankEquations bank(tests, columns);
   fit.results = judged(tests, options, bank, done);
   if (forced)

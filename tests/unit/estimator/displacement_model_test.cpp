@@ -146,6 +146,20 @@ TEST_CASE("speed growth follows the squared speed at once", "[displacement]") {
   CHECK(single(model, 2s, {0.0}, {0.0}) == 0.0);
 }
 
+TEST_CASE("hinges make a curve of straight pieces of a signal", "[displacement]") {
+  ThermalModel spec = without_matrix();
+  for (const auto& [above, gain] : {std::pair{1000.0, 2e-3}, std::pair{3000.0, -5e-3}})
+    spec.terms.push_back({"signal_hinge",
+                          "spindle_rpm",
+                          {{"above", above}},
+                          {{"gain_um_per_unit", {{"z_um", gain}}}}});
+  DisplacementModel model(spec);
+  CHECK(single(model, 0s, {0.0}, {-500.0}) == 0.0);
+  CHECK(single(model, 1s, {0.0}, {1000.0}) == 0.0);
+  CHECK(single(model, 2s, {0.0}, {3000.0}) == Approx(4.0));
+  CHECK(single(model, 3s, {0.0}, {5000.0}) == Approx(-2.0));
+}
+
 TEST_CASE("a term acts on the outputs it names, in their order", "[displacement]") {
   ThermalModel spec = without_matrix({"x_um", "y_um", "z_um"});
   spec.terms = {{"speed_growth",

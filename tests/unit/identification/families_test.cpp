@@ -257,6 +257,56 @@ TEST_CASE("the bank's columns are the low passes of what was recorded, from 0", 
   CHECK(bank.col(0).isApprox(tests.runs[0].places_K.col(0)));
 }
 
+TEST_CASE("a bank follows a signal whose displacement is a curve", "[families]") {
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  const auto runs = [](std::size_t first, std::size_t count) {
+    std::vector<RunFile> files;
+    for (std::size_t i = first; i < first + count; ++i) {
+      RunFile run = machine_run(std::string("run").append(std::to_string(i)), i + 1,
+                                [](double quick, double, double, double) { return quick; });
+      run.columns[3] = "x_mm";
+      for (std::size_t row = 0; row < run.values[3].size(); ++row) {
+        const double x_mm = 250.0 + 250.0 * std::sin(double(i) + double(row) / (9.0 + double(i)));
+        run.values[3][row] = x_mm;
+        run.values[4][row] += 4.0 * std::sin(x_mm / 60.0);
+      }
+      files.push_back(std::move(run));
+    }
+    return files;
+  };
+  const MeasuredTests tests = measured_tests(runs(0, 3), options);
+  BankColumns columns = bank_columns(tests);
+  CHECK(columns.hinges.empty());
+  const std::size_t late = columns.size();
+  add_hinges(tests, columns);
+  REQUIRE(columns.size() == late + 8);
+  CHECK(columns.hinges.front().above == Approx(500.0 / 9.0).epsilon(0.01));
+
+  const FamiliesFit fit = fitted(tests);
+  CHECK(fit.chosen == Family::lag_bank);
+  CHECK(fit.chosen_result().left_out_rms_um[0] < 1.2);  // the curve alone moves by 2.8
+  // The hinges are in the model, and carry the curve.
+  REQUIRE(fit.model.terms.size() == 9);
+  const auto curve_um = [&](double x_mm) {
+    double sum_um = 0.0;
+    for (std::size_t i = 1; i < 9; ++i)
+      sum_um += fit.model.terms[i].per_output.at("gain_um_per_unit").at("z_um") *
+                std::max(0.0, x_mm - fit.model.terms[i].shared.at("above"));
+    return sum_um;
+  };
+  CHECK(curve_um(280.0) - 0.5 * (curve_um(90.0) + curve_um(470.0)) < -4.0);
+}
+
+TEST_CASE("a speed of a few steps has no hinges", "[families]") {
+  const MeasuredTests tests =
+      machine_tests(4, [](double quick, double, double, double) { return quick; });
+  BankColumns columns = bank_columns(tests);
+  add_hinges(tests, columns);
+  CHECK(columns.hinges.empty());
+}
+
 TEST_CASE("a signal that lacks a few values costs those rows, not the signal", "[families]") {
   const auto moved = [](double quick, double, double, double rpm) {
     return 5.0 * quick + 2e-3 * rpm;
