@@ -59,7 +59,8 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
     Corrections more = corrections;
     if (term) longer.terms.push_back(*term);
     // Without what acts in every run the coefficients would be right for nothing.
-    if (fitted != nullptr && (term || name.run)) {
+    const bool new_coefficients = fitted != nullptr && (term || name.run);
+    if (new_coefficients) {
       add_terms(longer, fitted->corrections(finding));
       name.evidence +=
           "; the model was fitted to these rows, which hides most of a cause: its coefficients "
@@ -71,7 +72,7 @@ Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
           train.model.outputs.begin());
       const std::optional<Correction> correction = correction_of(name, index);
       if (correction) more.push_back(*correction);
-      if (!term && !correction) continue;
+      if (!term && !correction && !new_coefficients) continue;
       const Residuals before = residuals(diagnosis.extended, corrections, test, index);
       if (std::isfinite(root_mean_square(before)))
         name.test[output] = test_gain(before, residuals(longer, more, test, index));
@@ -98,22 +99,31 @@ Corrections train_corrections(const Diagnosis& diagnosis, const MeasuredData& tr
   return corrections;
 }
 
+/// The bank last.
+void add_remainder(ThermalModel& model, const RemainderBank& remainder) {
+  model.terms.insert(model.terms.end(), remainder.hinges.begin(), remainder.hinges.end());
+  model.terms.push_back(remainder.term);
+}
+
+void forget_output(RemainderBank& remainder, const std::string& output) {
+  remainder.term.bank.gain_um_per_unit.erase(output);
+  for (TermSpec& hinge : remainder.hinges) hinge.per_output["gain_um_per_unit"].erase(output);
+}
+
 /// Adds a bank of lags for the outputs of which enough can be predicted without a name.
 void carry_remainder(Diagnosis& diagnosis, const std::vector<Headroom>& headroom,
                      const Corrections& of_train, const Corrections& of_test,
                      const MeasuredData& train, const MeasuredData& test) {
-  std::vector<Residuals> left(headroom.size());
-  bool any = false;
+  std::vector<Residuals> left;
+  std::vector<double> predictable;
   for (std::size_t output = 0; output < headroom.size(); ++output) {
-    if (headroom[output].predictable < predictable_share_min) continue;
-    left[output] = residuals(diagnosis.extended, of_train, train, output);
-    any = true;
+    left.push_back(residuals(diagnosis.extended, of_train, train, output));
+    predictable.push_back(headroom[output].predictable);
   }
-  if (!any) return;
-  diagnosis.remainder = remainder_bank(train, left);
+  diagnosis.remainder = remainder_bank(train, left, predictable);
   if (!diagnosis.remainder) return;
   ThermalModel longer = diagnosis.extended;
-  longer.terms.push_back(diagnosis.remainder->term);
+  add_remainder(longer, *diagnosis.remainder);
   for (const auto& [name, gain] : diagnosis.remainder->left_out) {
     const auto output = static_cast<std::size_t>(
         std::find(train.model.outputs.begin(), train.model.outputs.end(), name) -
@@ -122,10 +132,10 @@ void carry_remainder(Diagnosis& diagnosis, const std::vector<Headroom>& headroom
     if (std::isfinite(root_mean_square(before)))
       diagnosis.remainder->test[name] = test_gain(before, residuals(longer, of_test, test, output));
   }
-  auto& gains = diagnosis.remainder->term.bank.gain_um_per_unit;
   for (const auto& [name, gain] : diagnosis.remainder->test)
-    if (!(gain.reduction > 0)) gains.erase(name);
-  if (!gains.empty()) diagnosis.extended.terms.push_back(diagnosis.remainder->term);
+    if (!(gain.reduction > 0)) forget_output(*diagnosis.remainder, name);
+  if (!diagnosis.remainder->term.bank.gain_um_per_unit.empty())
+    add_remainder(diagnosis.extended, *diagnosis.remainder);
 }
 
 }  // namespace

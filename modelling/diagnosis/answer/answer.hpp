@@ -48,10 +48,12 @@ struct LeftOutGain {
   double after_um{0.0};
 };
 
-/// The rest that is predictable and has no name, as one `lag_bank` term.
+/// The rest that is predictable and has no name, as a `lag_bank` term and hinges of signals.
 struct RemainderBank {
   TermSpec term;
+  std::vector<TermSpec> hinges;
   std::map<std::string, LeftOutGain> left_out;  ///< of the outputs that it serves
+  bool changes_coefficients{false};             ///< that had been fitted to the training rows
   /// Beside the findings; an output that does not gain goes without it.
   std::map<std::string, TestGain> test;
 };
@@ -74,7 +76,7 @@ struct Diagnosis {
   std::map<std::string, OutputFigures> outputs;
   /// With every finding that a term can carry and the test runs do not speak against.
   ThermalModel extended;
-  std::optional<RemainderBank> remainder;  ///< its term is the extended model's last
+  std::optional<RemainderBank> remainder;  ///< its terms are the extended model's last
   std::vector<Weighed> weighed;            ///< what came into question in every round of the search
   /// Probability of each family, whether it is named or not; empty where nothing was weighed so.
   std::map<std::string, double> families{};

@@ -14,6 +14,9 @@ using identification::MeasuredTests;
 
 constexpr std::size_t blocks = 8;
 constexpr double gain_min = 0.1;
+/// RMS that the matrix may leave, over that of a fit of its inputs, and count as fitted to the
+/// rows.
+constexpr double fitted_factor = 1.1;
 /// Of all runs; more are thinned. The shortest low pass is many times longer than the steps then.
 constexpr Eigen::Index rows_max = 6000;
 
@@ -81,6 +84,34 @@ void set_output(MeasuredTests& tests, const MeasuredData& data, const Residuals&
   }
 }
 
+Eigen::VectorXd matrix_row(const ThermalModel& model, std::size_t output) {
+  const std::vector<double>& row = model.matrix_um_per_K[output];
+  return Eigen::Map<const Eigen::VectorXd>(row.data(), std::ssize(row));
+}
+
+/// Adds what the matrix takes away: the coefficients are free again.
+void add_matrix(MeasuredTests& tests, const Eigen::VectorXd& row) {
+  for (identification::TestRun& run : tests.runs)
+    run.outputs_um += run.places_K.leftCols(row.size()) * row;
+}
+
+/// The model's inputs alone.
+MeasuredTests inputs_only(const MeasuredTests& tests, const ThermalModel& model) {
+  MeasuredTests few = tests;
+  few.places = model.inputs;
+  few.signals.clear();
+  for (identification::TestRun& run : few.runs) {
+    run.places_K = run.places_K.leftCols(std::ssize(model.inputs)).eval();
+    run.signals.resize(run.time_s.size(), 0);
+  }
+  return few;
+}
+
+/// As they are, without lags.
+BankColumns at_once(const ThermalModel& model) {
+  return {model.inputs, std::vector<double>(model.inputs.size(), 1.0), {0.0}, {}};
+}
+
 /// Sums over present rows.
 struct Sums {
   double rows{0.0};
@@ -109,9 +140,50 @@ struct Judged {
   bool helps{false};
 };
 
+/// What is left of a fold that a bank was not fitted to; without one the output itself.
+Eigen::VectorXd left_of(const MeasuredTests& tests, std::size_t f, const BankEquations* bank) {
+  const identification::Fold& fold = tests.folds[f];
+  const Eigen::Index count = fold.end - fold.begin;
+  Eigen::VectorXd y = tests.runs[fold.run].outputs_um.middleRows(fold.begin, count);
+  if (bank != nullptr) y -= bank->rows()[fold.run].middleRows(fold.begin, count) * bank->fit(f);
+  return y;
+}
+
+double squares_of(const MeasuredTests& tests, std::size_t f, const BankEquations* bank) {
+  Sums sums;
+  sums.add(left_of(tests, f, bank));
+  return sums.squares;
+}
+
+/// Static equations of the model's inputs, where the matrix leaves of the tests' rows no more than
+/// they would.
+std::optional<BankEquations> fit_like_the_matrix(const MeasuredTests& tests,
+                                                 const ThermalModel& model,
+                                                 const Eigen::VectorXd& row) {
+  MeasuredTests few = inputs_only(tests, model);
+  add_matrix(few, row);
+  std::optional<BankEquations> fit(std::in_place, few, at_once(model));
+  const Eigen::MatrixXd gains = fit->fit(few.folds.size());
+  double of_matrix = 0.0;
+  double of_fit = 0.0;
+  for (std::size_t f = 0; f < few.folds.size(); ++f) {
+    const identification::Fold& fold = few.folds[f];
+    const Eigen::Index count = fold.end - fold.begin;
+    Sums left;
+    left.add(few.runs[fold.run].outputs_um.middleRows(fold.begin, count) -
+             fit->rows()[fold.run].middleRows(fold.begin, count) * gains);
+    of_fit += left.squares;
+    of_matrix += squares_of(tests, f, nullptr);
+  }
+  if (of_matrix > of_fit * fitted_factor * fitted_factor) fit.reset();
+  return fit;
+}
+
 /// Of noise alone the first row's is left in all others, and a bank would carry that: so what is
 /// left must fall about each run's mean too.
-Judged judged(const MeasuredTests& tests, const BankEquations& bank) {
+/// @param static_fit  what it must be better than; none: than nothing
+Judged judged(const MeasuredTests& tests, const BankEquations& bank,
+              const BankEquations* static_fit) {
   std::vector<double> gains;
   std::vector<Sums> was(tests.runs.size());
   std::vector<Sums> is(tests.runs.size());
@@ -119,21 +191,19 @@ Judged judged(const MeasuredTests& tests, const BankEquations& bank) {
   double after = 0.0;
   double rows = 0.0;
   for (std::size_t f = 0; f < tests.folds.size(); ++f) {
-    const identification::Fold& fold = tests.folds[f];
-    const Eigen::Index count = fold.end - fold.begin;
-    const Eigen::VectorXd y = tests.runs[fold.run].outputs_um.middleRows(fold.begin, count);
-    const Eigen::VectorXd rest =
-        y - bank.rows()[fold.run].middleRows(fold.begin, count) * bank.fit(f);
-    Sums of_y;
-    Sums of_rest;
-    of_y.add(y);
-    of_rest.add(rest);
-    was[fold.run].add(y);
-    is[fold.run].add(rest);
-    before += of_y.squares;
-    after += of_rest.squares;
-    rows += of_y.rows;
-    gains.push_back(of_y.squares - of_rest.squares);
+    const std::size_t run = tests.folds[f].run;
+    const Eigen::VectorXd without = left_of(tests, f, static_fit);
+    const Eigen::VectorXd with = left_of(tests, f, &bank);
+    Sums of_without;
+    Sums of_with;
+    of_without.add(without);
+    of_with.add(with);
+    was[run].add(without);
+    is[run].add(with);
+    before += of_without.squares;
+    after += of_with.squares;
+    rows += of_without.rows;
+    gains.push_back(of_without.squares - of_with.squares);
   }
   Judged left;
   if (!(rows > 0) || !(before > 0)) return left;
@@ -152,30 +222,40 @@ Judged judged(const MeasuredTests& tests, const BankEquations& bank) {
 }  // namespace
 
 std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
-                                            const std::vector<Residuals>& left) {
+                                            const std::vector<Residuals>& left,
+                                            const std::vector<double>& predictable) {
   Eigen::Index rows = 0;
   for (const MeasuredRun& run : train.runs) rows += run.rows();
   const Eigen::Index apart = 1 + (rows - 1) / rows_max;
   MeasuredTests tests = inputs_of(train, apart);
   add_folds(tests);
-  const BankColumns columns = identification::bank_columns(tests);
+  BankColumns columns = identification::bank_columns(tests);
+  identification::add_hinges(tests, columns);
   std::vector<std::string> outputs;
   std::vector<Eigen::VectorXd> gains;
   RemainderBank bank;
   for (std::size_t output = 0; output < left.size(); ++output) {
-    if (left[output].by_run.empty()) continue;
     set_output(tests, train, left[output], apart);
+    const Eigen::VectorXd row = matrix_row(train.model, output);
+    const std::optional<BankEquations> static_fit = fit_like_the_matrix(tests, train.model, row);
+    if (!static_fit && predictable[output] < predictable_share_min) continue;
+    if (static_fit) add_matrix(tests, row);
     const BankEquations equations(tests, columns);
-    const Judged of_output = judged(tests, equations);
+    const Judged of_output = judged(tests, equations, static_fit ? &*static_fit : nullptr);
     if (!of_output.helps) continue;
     outputs.push_back(train.model.outputs[output]);
     gains.emplace_back(equations.fit(tests.folds.size()));
+    if (static_fit) {
+      gains.back().head(row.size()) -= row;
+      bank.changes_coefficients = true;
+    }
     bank.left_out[outputs.back()] = of_output.gain;
   }
   if (outputs.empty()) return std::nullopt;
   Eigen::MatrixXd all(std::ssize(gains.front()), std::ssize(gains));
   for (std::size_t i = 0; i < gains.size(); ++i) all.col(static_cast<Eigen::Index>(i)) = gains[i];
   bank.term = identification::bank_term(columns, outputs, all);
+  bank.hinges = identification::hinge_terms(columns, outputs, all);
   return bank;
 }
 

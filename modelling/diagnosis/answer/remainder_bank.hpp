@@ -20,10 +20,17 @@ inline constexpr double predictable_share_min = 0.1;
 /// run's mean too, and by more than the standard error over the blocks. Everything counts from the
 /// run's first row, as it will in use: with a free offset a run twice as many outputs get a bank,
 /// and some are worse for it. Columns, penalties and gains: identification::BankEquations.
-/// @param left  by the model with the findings, over the training runs, order of the outputs; empty
-///              where no bank is wanted
+///
+/// Coefficients that were fitted to these very rows say nothing of what they leave of others. Where
+/// the matrix leaves no more of them than a fit of its inputs would, the output is fitted anew
+/// without the blocks, from the inputs as they are and with the bank, and compared so; the bank
+/// then holds what the coefficients change by, too.
+/// @param left         by the model with the findings, over the training runs, order of the outputs
+/// @param predictable  share of each output's variance; less than predictable_share_min: no bank
+///                     unless it is fitted anew
 /// @return nullopt: no output gains
 [[nodiscard]] std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
-                                                          const std::vector<Residuals>& left);
+                                                          const std::vector<Residuals>& left,
+                                                          const std::vector<double>& predictable);
 
 }  // namespace thermocomp::diagnosis

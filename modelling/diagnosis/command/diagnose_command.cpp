@@ -51,6 +51,10 @@ void print_test_gain(const std::string& output, const TestGain& gain) {
 
 void print(const RemainderBank& remainder) {
   std::printf("predictable without a name: carried by a bank of lags, last term of the model\n");
+  if (remainder.changes_coefficients)
+    std::printf(
+        "  the model was fitted to these rows: its coefficients change with the bank, and both are "
+        "judged fitted anew\n");
   for (const auto& [output, gain] : remainder.left_out)
     std::printf("  %s, rows left out: RMS %.3f -> %.3f\n", output.c_str(), gain.before_um,
                 gain.after_um);

@@ -155,7 +155,11 @@ std::string next_steps(const Diagnosis& diagnosis) {
     all.push_back(
         {gain_um, "What can be predicted and has no name" + by(diagnosis, gain_um) +
                       ". The extended model carries it by readings and signals of the last hours; "
-                      "it holds for operation like that of the training runs."});
+                      "it holds for operation like that of the training runs." +
+                      (diagnosis.remainder->changes_coefficients
+                           ? " The model had been fitted to those runs; its coefficients change "
+                             "with it."
+                           : "")});
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const Advice& a, const Advice& b) { return a.gain_um > b.gain_um; });
