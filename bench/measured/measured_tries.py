@@ -3,9 +3,9 @@ over outputs (docs/measurements.md, "What was tried for the bank").
 
     measured_tries.py [--data FOLDER] [--splits TEXT] [--evidence]
 
-Columns as those of `thermocomp fit`: every temperature, signal and square of a signal, each at low
-passes by a ratio of three up to a third of the longest run, scaled to a standard deviation of 1.
-Nothing is chosen by test rows. The penalties p of a ridge regression are shares of the mean square
+Columns as those of `thermocomp fit`, but for its hinges: every temperature, signal and square of a
+signal, each at low passes by a ratio of three up to two thirds of the longest run, divided by the
+geometric mean of their own standard deviation and the usual one where nothing else is said. Nothing is chosen by test rows. The penalties p of a ridge regression are shares of the mean square
 of a column, prices p of L1 regression shares of its correlation with the output.
 """
 
@@ -25,6 +25,7 @@ import measured_data as data
 from measured_peers import blocks_of
 
 ROWS_OF_EVIDENCE = 300
+LAGS_MAX = 6
 PENALTIES = (1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 SETTLED = (1e-2, 3e-3, 1e-3)
 
@@ -37,16 +38,20 @@ def low_passes_s(split):
         longest_s = max(longest_s, time_s[-1] - time_s[0])
         steps.append(np.diff(time_s))
     taus, tau_s = [0.0], max(300.0, 2 * np.median(np.concatenate(steps)))
-    while tau_s <= longest_s / 3 and len(taus) < 5:
+    while tau_s <= longest_s * 2 / 3 and len(taus) < LAGS_MAX:
         taus.append(tau_s)
         tau_s *= 3
     return taus
 
 
 class Problem:
-    """Equations of a split in scaled columns; some blocks of rows left out, a free level or not."""
+    """Equations of a split in scaled columns; some blocks of rows left out, a free level or not.
 
-    def __init__(self, split):
+    @param own  what a column is divided by: its own standard deviation to this power times the
+                usual one, of the temperatures or of the signal, to the rest of 1
+    """
+
+    def __init__(self, split, own=0.5):
         taus = low_passes_s(split)
         train = data.Table(split.train, split.outputs, taus, True)
         test = data.Table(split.test, split.outputs, taus, True)
@@ -56,12 +61,16 @@ class Problem:
         self.x, self.y = self.x[whole], self.y[whole]
         deviation = self.x.std(axis=0)
         moves = deviation > 1e-9 * np.abs(self.x).max()
-        self.x, self.at = self.x[:, moves] / deviation[moves], self.at[:, moves] / deviation[moves]
-        self.scale = deviation[moves]
+        subjects = len(moves) // len(taus)
+        places = len(train.temperatures)
+        usual = np.tile(deviation[:subjects], len(taus))
+        usual[np.arange(len(moves)) % subjects < places] = np.sqrt(
+            np.mean(deviation[:places] ** 2))
+        self.scale = (deviation ** own * usual ** (1 - own))[moves]
+        self.x, self.at = self.x[:, moves] / self.scale, self.at[:, moves] / self.scale
         parts = [out[np.isfinite(out).all(axis=1)] for out in train.y]
         self.run = np.concatenate([np.full(len(p), i) for i, p in enumerate(parts)])
         self.blocks = blocks_of(parts)
-        subjects = len(moves) // len(taus)
         self.subject = np.arange(len(moves))[moves] % subjects
 
     def equations(self, left_out=(), free_level=False):
@@ -144,6 +153,14 @@ def by_evidence(problem):
     return gains
 
 
+def ridge_and_l1_of_records(problem):
+    lacking = [problem.equations(block) for block in problem.blocks]
+    whole = problem.equations()
+    return np.mean([ridge(whole, p) for p in SETTLED] +
+                   [np.mean([sparse(each, p) for each in lacking], axis=0) for p in SETTLED],
+                   axis=0)
+
+
 def tries(problem, with_evidence):
     whole = problem.equations()
     lacking = [problem.equations(block) for block in problem.blocks]
@@ -156,9 +173,8 @@ def tries(problem, with_evidence):
     result |= {f"ridge {p:g}, free level": ridge(level, p) for p in SETTLED}
     result["mean of ridge and L1"] = np.mean(
         [result[f"{kind} {p:g}"] for kind in ("ridge", "L1") for p in SETTLED], axis=0)
-    result["mean of ridge and L1 of records"] = np.mean(
-        [result[f"ridge {p:g}"] for p in SETTLED] + list(bagged.values()), axis=0)
-    result["the same and one sign"] = np.mean(
+    result["mean of ridge and L1 of records"] = ridge_and_l1_of_records(problem)
+    result["those and one sign"] = np.mean(
         [result[f"ridge {p:g}"] for p in SETTLED] + list(bagged.values()) +
         [result[f"ridge {p:g}, one sign a subject"] for p in SETTLED], axis=0)
     if with_evidence:
@@ -182,6 +198,10 @@ def main():
         problem = Problem(split)
         for what, gains in tries(problem, options.evidence).items():
             table.setdefault(what, []).append(problem.left(gains))
+        for own, what in ((1.0, "the same, scaled to a deviation of 1"),
+                          (0.0, "the same, scaled alike per kelvin")):
+            other = Problem(split, own)
+            table.setdefault(what, []).append(other.left(ridge_and_l1_of_records(other)))
     print("  ".join(names))
     for what, row in table.items():
         print(f"{what:36}" + " ".join(f"{value:7.2f}" for value in row))
