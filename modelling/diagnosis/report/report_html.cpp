@@ -106,7 +106,8 @@ std::string summary(const Diagnosis& diagnosis) {
 std::string gains_table(const Diagnosis& diagnosis) {
   std::string html =
       "<h2>Error before and after, on rows not used to find anything</h2><table>" +
-      row({"", "RMS before", "RMS after", "peak before", "peak after", "left unexplained"}, "th");
+      row({"", "RMS before", "RMS after", "peak before", "peak after", "of it without a name"},
+          "th");
   for (const auto& [output, of] : diagnosis.outputs)
     html += row({name_of_column(output) + ", " + unit_text(diagnosis, output),
                  figure(of.test_rms_um), figure(of.extended_test_rms_um), figure(of.test_peak_um),

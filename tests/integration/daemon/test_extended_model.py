@@ -68,8 +68,8 @@ def extended_model(folder):
 
 
 def as_bank(path):
-    """The same model with its terms as one bank of lags, and a temperature in it that adds
-    nothing at first and later takes part of its own displacement back."""
+    """The same model with its terms as one bank of lags, a temperature in it that adds nothing at
+    first and later takes part of its own displacement back, and a hinge of the speed."""
     text = path.read_text()
     model = tomllib.loads(text)
     term, = model["term"]
@@ -78,6 +78,8 @@ def as_bank(path):
              f"powers = [{term['power']}, 1]", f"tau_s = [0.0, {term['tau_s']!r}]"]
     for output, gain in term["gain_um_per_unit"].items():
         lines.append(f"gain_um_per_unit.{output} = [[0.0, {gain!r}], [0.1, -0.1]]")
+    lines += ["[[term]]", 'kind = "signal_hinge"', 'subject = "spindle_rpm"', "above = 2000.0"]
+    lines += [f"gain_um_per_unit.{output} = 1e-5" for output in term["gain_um_per_unit"]]
     bank = path.with_name("bank.toml")
     bank.write_text("\n".join(lines) + "\n")
     return bank
