@@ -4,7 +4,7 @@ over outputs (docs/measurements.md, "What was tried for the bank").
     measured_tries.py [--data FOLDER] [--splits TEXT] [--evidence]
 
 Columns as those of `thermocomp fit`, but for its hinges: every temperature, signal and square of a
-signal, each at low passes by a ratio of three up to two thirds of the longest run, divided by the
+signal, each at low passes by a ratio of three up to half of the longest run, divided by the
 geometric mean of their own standard deviation and the usual one where nothing else is said. Nothing is chosen by test rows. The penalties p of a ridge regression are shares of the mean square
 of a column, prices p of L1 regression shares of its correlation with the output.
 """
@@ -38,7 +38,7 @@ def low_passes_s(split):
         longest_s = max(longest_s, time_s[-1] - time_s[0])
         steps.append(np.diff(time_s))
     taus, tau_s = [0.0], max(300.0, 2 * np.median(np.concatenate(steps)))
-    while tau_s <= longest_s * 2 / 3 and len(taus) < LAGS_MAX:
+    while tau_s <= longest_s / 2 and len(taus) < LAGS_MAX:
         taus.append(tau_s)
         tau_s *= 3
     return taus

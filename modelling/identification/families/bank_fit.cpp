@@ -156,7 +156,7 @@ BankColumns bank_columns(const MeasuredTests& tests) {
   const std::size_t lags = std::min(lags_max, columns_max / bank.subjects.size());
   bank.taus_s = {0.0};
   for (double tau_s = std::max(shortest_s, 2.0 * step_s);
-       tau_s <= longest_s * 2.0 / 3.0 && tau_s <= term_tau_s_max && bank.taus_s.size() < lags;
+       tau_s <= longest_s / 2.0 && tau_s <= term_tau_s_max && bank.taus_s.size() < lags;
        tau_s *= ratio)
     bank.taus_s.push_back(std::round(tau_s));
   return bank;

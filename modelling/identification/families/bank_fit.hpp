@@ -30,7 +30,7 @@ struct BankColumns {
   [[nodiscard]] std::size_t size() const noexcept { return late() + hinges.size(); }
 };
 
-/// Time constants by a ratio of three from 5 min up to two thirds of the longest run, at least
+/// Time constants by a ratio of three from 5 min up to half of the longest run, at least
 /// twice the step; as many as leave no more than 600 columns. A signal that is only ever 0 or 1 has
 /// no square. No hinges.
 [[nodiscard]] BankColumns bank_columns(const MeasuredTests& tests);

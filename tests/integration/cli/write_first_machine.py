@@ -39,6 +39,8 @@ def first_outputs(folder):
     assert status == 0, shown
     socket = ["--socket", "status.sock"]
     with running(config):
+        eventually(lambda: run("--socket", "status.sock", "sensors",
+                               cwd=folder).stdout.count("  good") == 5, "readings have arrived")
         first = said(folder, *socket, "sensors")
         eventually(lambda: run("--socket", "status.sock", "prove", "z", "0.1",
                                            cwd=folder).returncode == 0, "the axis is in step")
