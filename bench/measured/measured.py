@@ -156,18 +156,20 @@ def main():
         print(f"no measured data in {options.data} (THERMOCOMP_DATA): nothing to measure")
         return 77
     names = options.peers.split(",")
-    ratios, lines, worse, stated = [], [], 0, []
+    ratios, lines, worse, stated = {"fit": [], "diagnose": []}, [], 0, []
     with tempfile.TemporaryDirectory() as folder:
         for split in data.all_splits(options.data):
             if options.splits not in split.name:
                 continue
             figures = judge(options.program, split, names, pathlib.Path(folder) / split.name)
             best = min(figures[name] for name in names)
-            ratios.append(figures["fit"] / best)
+            for name, of_splits in ratios.items():
+                of_splits.append(figures[name] / best)
             worse += figures["inside"] > figures["none_inside"]
             for name in [*names, "fit", "diagnose"]:
                 lines.append(f"{split.name}_{name} {figures[name]:.3f} um")
-            lines.append(f"{split.name}_fit_over_best_peer {ratios[-1]:.3f} ratio")
+            for name, of_splits in ratios.items():
+                lines.append(f"{split.name}_{name}_over_best_peer {of_splits[-1]:.3f} ratio")
             lines.append(f"{split.name}_diagnose_over_ridge "
                          f"{figures['diagnose'] / figures['ridge']:.3f} ratio")
             lines.append(f"{split.name}_family {figures['family']} name")
@@ -182,8 +184,9 @@ def main():
             lines.append(f"{split.name}_fit_seconds {figures['seconds']:.1f} s")
             lines.append(f"{split.name}_diagnose_seconds {figures['diagnose_seconds']:.1f} s")
     print("\n".join(lines))
-    print(f"fit_over_best_peer_median {np.median(ratios):.3f} ratio")
-    print(f"fit_over_best_peer_largest {max(ratios):.3f} ratio")
+    for name, of_splits in ratios.items():
+        print(f"{name}_over_best_peer_median {np.median(of_splits):.3f} ratio")
+        print(f"{name}_over_best_peer_largest {max(of_splits):.3f} ratio")
     print(f"splits_worse_than_none_inside {worse} splits")
     right = sum(0.7 <= ratio <= 1.5 for ratio in stated)
     print(f"stated_figures_right {right} of_{len(stated)}")
