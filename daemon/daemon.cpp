@@ -20,8 +20,8 @@
 #include "daemon/status/event_record.hpp"
 #include "daemon/supervisor.hpp"
 #include "daemon/system/log_setup.hpp"
-#include "drivers/controllers/dry_run_controller.hpp"
-#include "drivers/controllers/make_controller.hpp"
+#include "drivers/controllers/kinds/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"
 
