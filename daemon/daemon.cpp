@@ -17,10 +17,11 @@
 #include "daemon/locks/file_lock.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/start_state.hpp"
+#include "daemon/status/event_record.hpp"
 #include "daemon/supervisor.hpp"
 #include "daemon/system/log_setup.hpp"
-#include "drivers/controllers/dry_run_controller.hpp"
-#include "drivers/controllers/make_controller.hpp"
+#include "drivers/controllers/kinds/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"
 
@@ -52,19 +53,6 @@ std::vector<SensorSource*> pointers(const std::vector<std::unique_ptr<SensorSour
 std::unique_ptr<HistoryWriter> make_history(const HistoryConfig& config, const Grid& grid) {
   if (!config.enabled) return nullptr;
   return std::make_unique<HistoryWriter>(config, grid, THERMOCOMP_VERSION);
-}
-
-RecordedEvent recorded(const Event& event) {
-  RecordedEvent kept;
-  kept.number = static_cast<std::int64_t>(event.number);
-  kept.wall_ns = event.wall_ns;
-  kept.kind = event.kind;
-  kept.subject = event.subject;
-  kept.what = event.what;
-  if (std::isfinite(event.duration_s))
-    kept.duration_ns = static_cast<std::int64_t>(std::llround(1e9 * event.duration_s));
-  kept.user = event.user;
-  return kept;
 }
 
 DaemonConfig load(const std::filesystem::path& file) {

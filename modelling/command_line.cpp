@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/common/command_slip.hpp"
 #include "modelling/diagnosis/command/diagnose_command.hpp"
 #include "modelling/experiments/plan_command.hpp"
 #include "modelling/identification/equation/group_command.hpp"
@@ -54,8 +55,10 @@ void name_files(CLI::App& app) {
 void declare_modelling_command_line(CLI::App& app, std::function<int()>& action) {
   app.name("thermocomp-modelling");
   app.description("What leads to a model, and what a model gets wrong");
-  app.footer("Exit status: 0 success, 1 inspect found something, 2 bad use or bad input.");
   app.require_subcommand(1);
+  app.failure_message(cli::command_slip_text);
+  // Each command shows this one too, unless it has its own.
+  app.footer("Exit status: 0 success, 2 bad use or bad input.");
   diagnosis::add_diagnose_command(app, action);
   inspection::add_inspect_command(app, action);
   add_structure(app, action);

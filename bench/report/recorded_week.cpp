@@ -24,6 +24,7 @@
 #include "daemon/history/writing/history_writer.hpp"
 #include "daemon/status/event_journal.hpp"
 #include "daemon/status/event_log.hpp"
+#include "daemon/status/event_record.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 namespace {
@@ -112,7 +113,7 @@ class Run {
         readings_(config.estimator.sensors.size()),
         report_(estimator_.make_report()) {
     if (before != nullptr) estimator_.restore(*before);
-    journal_.tell([this](const Event& event) { note(event); });
+    journal_.tell([this](const Event& event) { writer_.note(recorded(event)); });
     writer_.open();
     recorder_ =
         writer_.make_recorder({config.text, config.model_text, config.model_checksum}, estimator_);
@@ -139,18 +140,6 @@ class Run {
     HistoryConfig history = config_.history;
     history.file = world_.history;
     return history;
-  }
-
-  void note(const Event& event) {
-    RecordedEvent kept;
-    kept.number = static_cast<std::int64_t>(event.number);
-    kept.wall_ns = event.wall_ns;
-    kept.kind = event.kind;
-    kept.subject = event.subject;
-    kept.what = event.what;
-    if (std::isfinite(event.duration_s)) kept.duration_ns = std::llround(1e9 * event.duration_s);
-    kept.user = event.user;
-    writer_.note(kept);
   }
 
   void step() {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <unistd.h>
 #include <vector>
 
@@ -199,19 +200,22 @@ void tell_next(const InitDraft& draft, const std::string& file) {
             << "  " << (is_own ? "thermocompd " + file : "systemctl start thermocompd") << "\n"
             << "  " << tool
             << " sensors     # warm each thermocouple by hand: its line must move\n";
-  if (draft.controller.dry_run && draft.controller.kind != "dry_run")
-    std::cout << "then, to let it move an axis: dry_run = false in " << file
-              << ", start it anew,\n";
+  const bool is_dry = draft.controller.dry_run && draft.controller.kind != "dry_run";
+  const std::string_view model =
+      draft.model_inputs.empty()
+          ? "the model gives no displacement yet: record, measure, fit (docs/first_machine.md)\n"
+          : "";
+  if (is_dry)
+    std::cout << model << "then, to let it move an axis:\n"
+              << "  " << tool << " disable\n"
+              << "  dry_run = false in " << file << ", start it anew\n";
   if (draft.controller.is_modbus())
     std::cout << "  " << tool << " prove " << draft.axes.front()
               << " 5   # with an indicator, every axis\n";
-  // Without a displacement it makes no difference yet.
-  if (!draft.model_inputs.empty())
-    std::cout << "  " << tool << " reference   # cold and at an even temperature\n";
-  std::cout << "  " << tool << " enable\n";
-  if (draft.model_inputs.empty())
-    std::cout
-        << "The model gives no displacement yet: record, measure, fit (docs/first_machine.md).\n";
+  if (!is_dry) std::cout << model;
+  std::cout << "  " << tool
+            << " reference   # with the model in place, cold and at an even temperature\n"
+            << "  " << tool << " enable\n";
 }
 
 int run_init(const InitOptions& options) {

@@ -11,7 +11,7 @@
 #include "cli/scan/serial_holder.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
-#include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"

@@ -106,7 +106,8 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.controller = std::move(controller.config);
   config.estimator.signals = std::move(controller.signals);
   config.dry_run = controller.dry_run;
-  // A dry run stands in for what would be applied (drivers/controllers/dry_run_controller.hpp).
+  // A dry run stands in for what would be applied
+  // (drivers/controllers/kinds/dry_run_controller.hpp).
   config.estimator.controller_reads_back = controller.reads_back || controller.dry_run;
   const TomlTable compensation = root.table_or_empty("compensation");
   config.estimator.compensation =

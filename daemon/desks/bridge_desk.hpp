@@ -5,7 +5,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "drivers/controllers/bridge_controller.hpp"
+#include "drivers/controllers/kinds/bridge_controller.hpp"
 
 namespace thermocomp {
 

@@ -109,6 +109,8 @@ std::string commands_section(const CLI::App& app) {
     }
     text += ".SS " + bold(name) + usage(*command) + '\n';
     text += escaped(command->get_description()) + ".\n" + options_list(*command);
+    if (command->get_footer() != app.get_footer())
+      text += ".PP\n" + paragraphs(command->get_footer());
   }
   return text;
 }

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "drivers/can/can_socket.hpp"
-#include "drivers/controllers/travel_frames.hpp"
+#include "drivers/controllers/kinds/can/travel_frames.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "estimator/checks.hpp"
 #include "simulator/devices/can_node.hpp"

@@ -35,7 +35,7 @@ BUGS = [
     ("older_look_is_sent", "drivers/controllers/write_gate.cpp",
      "command_.look < stands_since_[axis];",
      "!{P} && command_.look < stands_since_[axis];"),
-    ("write_repeated_blindly", "drivers/controllers/modbus_dialogue.cpp",
+    ("write_repeated_blindly", "drivers/controllers/kinds/modbus/modbus_dialogue.cpp",
      "  const Exchange exchange =\n"
      "      connection_.write_registers(config_.unit, request.address, request.words);\n",
      "  const auto once = [&] {\n"

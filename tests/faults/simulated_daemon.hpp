@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "daemon/cycle/cycle.hpp"
-#include "drivers/controllers/modbus_dialogue.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/sensors/modbus_poller.hpp"
 #include "simulated_line.hpp"

@@ -17,7 +17,7 @@
 #include "common/virtual_line.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
-#include "drivers/controllers/travel_frames.hpp"
+#include "drivers/controllers/kinds/can/travel_frames.hpp"
 #include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 

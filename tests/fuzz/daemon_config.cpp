@@ -12,7 +12,7 @@
 
 #include "common/fuzz.hpp"
 #include "common/model_promises.hpp"
-#include "drivers/controllers/make_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/pipeline/estimator.hpp"
 

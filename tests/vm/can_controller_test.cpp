@@ -1,5 +1,5 @@
 // Offsets sent to a controller on a real CAN interface.
-#include "drivers/controllers/can_controller.hpp"
+#include "drivers/controllers/kinds/can/can_controller.hpp"
 
 #include <atomic>
 #include <chrono>

@@ -149,6 +149,8 @@ void SegmentExport::fill(std::vector<double>& row, std::uint64_t cycle) {
     row[places_.measured[i]] = measured_um_[i];
     if (places_.displacement[i] != none) row[places_.displacement[i]] = displacement_um_[i];
   }
+  // The negative of no displacement: as text, "-0" only puzzles.
+  std::replace(row.begin(), row.end(), -0.0, 0.0);
   measured_um_.fill(not_a_number);
   displacement_um_.fill(not_a_number);
 }

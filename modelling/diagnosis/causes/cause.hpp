@@ -76,6 +76,8 @@ struct Cause {
   CauseTexts texts{};
   /// Where the subject is a signal and a place of a thermal network; none: the same.
   std::optional<CauseTexts> texts_in_network{};
+  /// Where the subject is a signal without a unit; none: the same.
+  std::optional<CauseTexts> texts_without_unit{};
   Experiment experiment{Experiment::other_duty};
   std::string term{};  ///< kind of the `[[term]]` that carries it; empty: none does
   TakenByFit taken_by_fit{TakenByFit::in_part};

@@ -28,6 +28,8 @@ Cause speed_growth() {
   cause.texts = {"Growth with speed, not with heat",
                  "the displacement jumps with the square of this signal",
                  "Use the extended model; this part is not thermal and no sensor will show it."};
+  cause.texts_without_unit = cause.texts;
+  cause.texts_without_unit->title = "Growth with the square of a signal, not with heat";
   cause.experiment = Experiment::standstill;
   cause.term = name;
   cause.hypotheses = of;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "config/text/units.hpp"
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/report/report_words.hpp"
@@ -10,12 +11,15 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-/// Of a thermal network where the subject is a signal and a place. Null: there is no such cause.
+/// Null: there is no such cause.
 const CauseTexts* texts_of(const NamedFinding& finding) {
   const Cause* const cause = find_cause(finding.cause);
   if (cause == nullptr) return nullptr;
   const bool two_names = finding.subject.find('|') != std::string::npos;
-  return two_names && cause->texts_in_network ? &*cause->texts_in_network : &cause->texts;
+  if (two_names && cause->texts_in_network) return &*cause->texts_in_network;
+  if (cause->texts_without_unit && unit_of(finding.subject).suffix.empty())
+    return &*cause->texts_without_unit;
+  return &cause->texts;
 }
 
 /// The experiment that the first of them (causes/cause.hpp) asks for.

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "config/text/units.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 
 namespace thermocomp::diagnosis {
@@ -25,9 +26,11 @@ std::string interval_words(const Interval& interval, double value, double scale,
   return " (" + low + " to " + high + ")";
 }
 
+/// As a divisor; a signal without unit stands for itself.
 std::string unit_of_column(const std::string& column) {
-  const std::size_t last = column.rfind('_');
-  return last == std::string::npos ? column : column.substr(last + 1);
+  const std::string_view suffix = unit_of(column).suffix;
+  if (suffix == "_mm_per_min") return "(mm/min)";
+  return suffix.empty() ? column : std::string(suffix.substr(1));
 }
 
 }  // namespace

@@ -96,6 +96,12 @@ def running(config):
         assert daemon.wait(PATIENCE_S) == 0
 
 
+def assert_in_this_order(shown, *steps):
+    """What is to be done next, as docs/first_machine.md and the README have it."""
+    places = [shown.find(step, shown.index("Next:")) for step in steps]
+    assert -1 not in places and places == sorted(places), (steps, places, shown)
+
+
 def assert_compensates(config):
     """No edit: check, start, enable, status."""
     answer = run("check", config)
@@ -136,6 +142,8 @@ def test_by_options_without_a_terminal(foreign, folder):
                  "--axes", "z"]
     answer = run(*arguments)
     assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert_in_this_order(answer.stdout, " check ", "thermocompd ", " sensors ", " prove z 5 ",
+                         "gives no displacement yet", " reference ", " enable\n")
     assert_compensates(config)
     before = config.read_text()
     answer = run(*arguments)
@@ -160,7 +168,8 @@ def test_a_model_that_is_there_is_bound_by_the_sensors_names(foreign, folder):
                  folder / "mill.toml"]
     answer = run(*arguments, "--names", "bed,column,spindle")
     assert answer.returncode == 0, answer.stdout + answer.stderr
-    assert answer.stdout.index("reference") < answer.stdout.index("enable\n")
+    assert_in_this_order(answer.stdout, " sensors ", " prove ", " reference ", " enable\n")
+    assert "no displacement yet" not in answer.stdout
     text = config.read_text()
     assert text.count("[[block]]") == 2 and 'output = "y_um"' in text
     assert "in no block: column" in run("check", config).stdout
@@ -220,7 +229,8 @@ def test_a_dry_run_from_the_first_start_on(foreign, folder):
                  "3=wago_750_458", "--controller", f"tcp:127.0.0.1:{plc}", "--axes", "z"]
     answer = run(*arguments, "--dry-run")
     assert answer.returncode == 0, answer.stdout + answer.stderr
-    assert "dry_run = false in " in answer.stdout
+    assert_in_this_order(answer.stdout, " sensors ", "gives no displacement yet", " disable\n",
+                         "dry_run = false in ", " prove z 5 ", " reference ", " enable\n")
     with running(config):
         shown = run("--socket", config.parent / "status.sock", "status")
         assert shown.returncode == 1 and "DRY RUN" in shown.stdout

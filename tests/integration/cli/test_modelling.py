@@ -16,6 +16,23 @@ pytestmark = pytest.mark.skipif(
     reason="thermocomp-modelling is not in this build")
 
 
+def test_a_slip_in_the_name_of_a_command_is_named():
+    modelling = pathlib.Path(PROGRAM).parent / "thermocomp-modelling"
+    answer = run("thermal-test", "plam", "-o", "sheet.csv")
+    assert answer.returncode == 2
+    assert "thermal-test: no command plam; did you mean plan?" in answer.stderr, answer.stderr
+    answer = run("diagnos", "--model", "m.toml", program=modelling)
+    assert answer.returncode == 2
+    assert "no command diagnos; did you mean diagnose?" in answer.stderr, answer.stderr
+
+
+def test_help_tells_the_exit_statuses_of_this_command():
+    for command in (["thermal-test", "plan"], ["thermal-test", "report"], ["plan"], ["fit"]):
+        said = run(*command, "--help").stdout
+        assert "Exit status: 0 success, 2 bad use or bad input.\n" in said, (command, said)
+    assert "Exit status: 0 nothing found, 1 something, 2" in run("inspect", "--help").stdout
+
+
 def write_tests(folder, count=4):
     """Runs of three places: t1 and t2 alike, t3 slow; z = 5 t1 - 2 t3."""
     files = []

@@ -35,7 +35,12 @@ def test_help_succeeds_and_bad_use_is_status_2():
     assert run("predict", "--help").returncode == 0
     for arguments, said in (
             ([], "subcommand"), (["nosuch"], "no command nosuch\n"),
-            (["enabel"], "no command enabel; did you mean enable?"),
+            (["enabel"], "thermocomp: no command enabel; did you mean enable?"),
+            (["history"], "subcommand"),
+            (["history", "chek", "h.db"],
+             "thermocomp history: no command chek; did you mean check?\nthermocomp history --help"),
+            (["history", "status"], "thermocomp history: no command status\n"),
+            (["history", "\x1b[31m"], "thermocomp history: no command  [31m\n"),
             (["predict"], "required"), (["measured", "z"], "required"), (["measured", "z", "much"], "much"),
             (["check", "a", "b"], "b"), (["watch", "--for", "-1"], "-1")):
         answer = run(*arguments)

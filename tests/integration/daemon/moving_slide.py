@@ -60,6 +60,17 @@ def simulated_axis_text(form_text):
     return axis
 
 
+def machine_text(bus, bed, controller, form_text):
+    """The simulator's file. bus: with its device; bed: the place of its temperature there."""
+    return ("format = 1\n" + bus + '[[channel]]\ncolumn = "bed_degC"\n' + bed + controller +
+            simulated_axis_text(form_text))
+
+
+def daemon_text(bus, bed, controller, form_text):
+    return ('format = 1\n@STATE@\n[loop]\nrate_hz = 100\n[model]\nfile = "model.toml"\n' + bus +
+            "[[sensor]]\n" + bed + FILTER + controller + axis_text(form_text) + COMPENSATION)
+
+
 def curve_um(position_mm):
     i = min(int(position_mm // 200.0), 3)
     share = (position_mm - NODES_MM[i]) / 200.0

@@ -5,9 +5,10 @@ import struct
 
 import pytest
 
+import moving_slide
 from lab import eventually, run_tool
-from moving_slide import (COMPENSATION, FILTER, LINE_DEVIATION_UM, MODEL, MOVING_S, NODES_MM, REST_S,
-                          WARM_K, WARM_S, Moving, axis_text, simulated_axis_text, write_standing_run)
+from moving_slide import (LINE_DEVIATION_UM, MODEL, MOVING_S, NODES_MM, REST_S, WARM_K, WARM_S,
+                          Moving, write_standing_run)
 
 
 def value(table, address, encoding="int32", scale=0.001):
@@ -45,12 +46,11 @@ table = "input"
 address = 20
 encoding = "float32"
 """
-MACHINE = """format = 1
-[[bus]]
+BUS = """[[bus]]
 name = "sensors"
 kind = "modbus_tcp"
 host = "127.0.0.1"
-port = 0
+port = {port}
 [[device]]
 name = "module"
 bus = "sensors"
@@ -58,38 +58,8 @@ unit = 1
 period_s = 0.02
 table = "input"
 encoding = "float32"
-[[channel]]
-name = "bed"
-column = "bed_degC"
-device = "module"
-address = 0
-[controller]
-name = "cnc"
-kind = "modbus_tcp"
-host = "127.0.0.1"
-port = 0
-unit = 1
 """
-DAEMON = """format = 1
-@STATE@
-[loop]
-rate_hz = 100
-[model]
-file = "model.toml"
-[[bus]]
-name = "sensors"
-kind = "modbus_tcp"
-host = "127.0.0.1"
-port = {sensors}
-[[device]]
-name = "module"
-bus = "sensors"
-unit = 1
-period_s = 0.02
-table = "input"
-encoding = "float32"
-[[sensor]]
-name = "bed"
+BED = """name = "bed"
 device = "module"
 address = 0
 """
@@ -97,32 +67,32 @@ CONTROLLER = """[controller]
 name = "cnc"
 kind = "modbus_tcp"
 host = "127.0.0.1"
-port = {cnc}
+port = {port}
 unit = 1
-period_s = 0.02
 """
 
 
 def machine_text(form):
-    return MACHINE + PLACES + simulated_axis_text(FORMS[form])
+    return moving_slide.machine_text(BUS.format(port=0), BED, CONTROLLER.format(port=0) + PLACES,
+                                     FORMS[form])
 
 
 def daemon_text(form, ports):
-    return (DAEMON.format(sensors=ports["sensors"]) + FILTER +
-            CONTROLLER.format(cnc=ports["cnc"]) + PLACES + axis_text(FORMS[form]) + COMPENSATION)
+    controller = CONTROLLER.format(port=ports["cnc"]) + "period_s = 0.02\n" + PLACES
+    return moving_slide.daemon_text(BUS.format(port=ports["sensors"]), BED, controller, FORMS[form])
 
 
-def moving_slide(lab, form, stay=True):
+def slide(lab, form, stay=True):
     return Moving(lab, machine_text(form), lambda ports: daemon_text(form, ports), stay)
 
 
 @pytest.mark.parametrize("form", ["line", "table"])
 def test_the_controller_interpolates_what_the_daemon_fitted(lab, form):
-    moving_slide(lab, form, stay=False).assert_interpolates(form, 60 + REST_S + WARM_S + MOVING_S)
+    slide(lab, form, stay=False).assert_interpolates(form, 60 + REST_S + WARM_S + MOVING_S)
 
 
 def test_a_daemon_that_was_killed_goes_on_along_the_travel(lab):
-    moving = moving_slide(lab, "line")
+    moving = slide(lab, "line")
     daemon = moving.daemon.start()
     moving.wait_for_warm_line()
     daemon.kill()

@@ -1,5 +1,5 @@
 // A controller behind a bridge: what the link makes of its reports, in a time of the test's own.
-#include "drivers/controllers/bridge_controller.hpp"
+#include "drivers/controllers/kinds/bridge_controller.hpp"
 
 #include <chrono>
 

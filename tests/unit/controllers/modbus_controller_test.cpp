@@ -1,5 +1,5 @@
 // The Modbus link against a libmodbus server.
-#include "drivers/controllers/modbus_controller.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
 
 #include <chrono>
 #include <cmath>

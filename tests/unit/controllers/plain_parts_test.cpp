@@ -5,10 +5,10 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/can/can_socket.hpp"
-#include "drivers/controllers/can_controller.hpp"
-#include "drivers/controllers/dry_run_controller.hpp"
-#include "drivers/controllers/make_controller.hpp"
-#include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/controllers/kinds/can/can_controller.hpp"
+#include "drivers/controllers/kinds/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/driver_error.hpp"
 #include "estimator/checks.hpp"

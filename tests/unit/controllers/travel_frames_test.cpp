@@ -1,5 +1,5 @@
 // Offsets along a travel as a set of CAN frames, and what a reader makes of frames that are lost.
-#include "drivers/controllers/travel_frames.hpp"
+#include "drivers/controllers/kinds/can/travel_frames.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "drivers/controllers/can_controller.hpp"
+#include "drivers/controllers/kinds/can/can_controller.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "estimator/checks.hpp"
 

@@ -1,5 +1,5 @@
 // Offsets along a travel as a set of registers, and the link that writes them.
-#include "drivers/controllers/travel_registers.hpp"
+#include "drivers/controllers/kinds/modbus/travel_registers.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <catch2/catch.hpp>
 
 #include "cycle_stub.hpp"
-#include "drivers/controllers/modbus_controller.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"

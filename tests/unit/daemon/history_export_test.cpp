@@ -2,6 +2,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <string>
 
 #include <catch2/catch.hpp>
 #include <sqlite3.h>
@@ -12,6 +13,14 @@
 
 using namespace thermocomp;
 using namespace thermocomp::testing;
+
+namespace {
+
+bool has_negative_zero(const std::string& text) {
+  return text.find(",-0,") != std::string::npos || text.find(",-0\n") != std::string::npos;
+}
+
+}  // namespace
 
 TEST_CASE("an export is a run file with the model's inputs as the daemon had them",
           "[history][export]") {
@@ -42,6 +51,7 @@ TEST_CASE("an export is a run file with the model's inputs as the daemon had the
   std::ostringstream all;
   REQUIRE(export_run(config.file, {}, {}, all, {}, parse_test_setup).damage.empty());
   const RunFile whole = parse_run(all.str(), "export");
+  CHECK_FALSE(has_negative_zero(all.str()));
   const auto columns = machine.estimator().model().temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const double told = whole.column(columns[i]).back();

@@ -169,6 +169,12 @@ TEST_CASE("a parameter is told in words with its unit, an interval only where it
   const Parameter heat{"gain_um_per_unit", {{"z_um", 0.0039628}}, {{"z_um", {0.00396, 0.00397}}}};
   CHECK(parameter_words("missing_heat_source", heat, "spindle_rpm") ==
         "effect 4.0 um/(1000 rpm) in z");
+  CHECK(parameter_words("missing_heat_source", heat, "x_mm_per_min") ==
+        "effect 0.0040 um/(mm/min) in z");
+  const Parameter growth{"gain_um_per_unit2", {{"z_um", 2.5}}, {}};
+  CHECK(parameter_words("speed_growth", growth, "x_mm_per_min") == "effect 2.5 um/(mm/min)^2 in z");
+  CHECK(parameter_words("speed_growth", growth, "cos_elevation") ==
+        "effect 2.5 um/cos_elevation^2 in z");
   const Parameter lag{"tau_s", {{"", 3162.6}}, {{"", {2800.0, 3500.0}}}};
   CHECK(parameter_words("thermal_lag", lag, "t1_degC") ==
         "time constant 53 min (47 min to 58 min)");
@@ -202,6 +208,20 @@ TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][repor
   REQUIRE(heat != std::string::npos);
   CHECK(bank < heat);
   CHECK(heat < html.find("<h2>What was found"));
+}
+
+TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report]") {
+  NamedFinding finding;
+  finding.cause = "speed_growth";
+  for (const char* speed : {"spindle_rpm", "x_mm_per_min"}) {
+    finding.subject = speed;
+    CHECK(title_of(finding) == std::string("Growth with speed, not with heat: ") + speed);
+  }
+  finding.subject = "cos_elevation";
+  CHECK(title_of(finding) == "Growth with the square of a signal, not with heat: cos_elevation");
+  CHECK(sentence_of(finding) ==
+        "cos_elevation: the displacement jumps with the square of this signal.");
+  CHECK_FALSE(what_to_do(finding).empty());
 }
 
 TEST_CASE("every cause that can be named has words of its own", "[diagnosis][report]") {

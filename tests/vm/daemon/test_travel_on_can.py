@@ -12,10 +12,11 @@ import time
 
 import pytest
 
+import moving_slide
 import rig as rigs
 from lab import eventually, run_tool
-from moving_slide import (COMPENSATION, FILTER, LINE_DEVIATION_UM, NODES_MM, ROUNDING_UM, WARM_K,
-                          Moving, axis_text, simulated_axis_text, write_standing_run)
+from moving_slide import (LINE_DEVIATION_UM, NODES_MM, ROUNDING_UM, WARM_K, Moving,
+                          write_standing_run)
 
 pytestmark = pytest.mark.skipif(not pathlib.Path("/sys/class/net/vcan1").exists(),
                                 reason="there is no vcan1 (tests/vm/run_with_can.sh makes one)")
@@ -94,17 +95,15 @@ def controller_text(interface):
 
 
 def machine_text(form, interface="vcan1"):
-    return ("format = 1\n" + BUS + 'period_s = 0.02\n[[channel]]\ncolumn = "bed_degC"\n' + BED +
-            controller_text(interface) + PLACES + simulated_axis_text(FORMS[form]))
+    return moving_slide.machine_text(BUS + "period_s = 0.02\n", BED,
+                                     controller_text(interface) + PLACES, FORMS[form])
 
 
 def daemon_text(form):
-    return ('format = 1\n@STATE@\n[loop]\nrate_hz = 100\n[model]\nfile = "model.toml"\n' + BUS +
-            "[[sensor]]\n" + BED + FILTER + controller_text("vcan1") + PLACES +
-            axis_text(FORMS[form]) + COMPENSATION)
+    return moving_slide.daemon_text(BUS, BED, controller_text("vcan1") + PLACES, FORMS[form])
 
 
-def moving_slide(lab, form, stay=True):
+def slide(lab, form, stay=True):
     return Moving(lab, machine_text(form), lambda _ports: daemon_text(form), stay, tick_ms=10)
 
 
@@ -156,11 +155,11 @@ class Listener:
 
 @pytest.mark.parametrize("form", ["line", "table"])
 def test_the_controller_interpolates_what_came_in_frames(lab, form):
-    moving_slide(lab, form, stay=False).assert_interpolates(form, 240)
+    slide(lab, form, stay=False).assert_interpolates(form, 240)
 
 
 def test_a_daemon_that_was_killed_goes_on_half_way_round(lab):
-    moving = moving_slide(lab, "line")
+    moving = slide(lab, "line")
     sets = lab.also_end(Listener("vcan1", K0, SLOPE))
     daemon = moving.daemon.start()
     moving.wait_for_warm_line()
@@ -300,7 +299,7 @@ def test_frames_of_two_sets_are_never_applied(lab):
 
 
 def test_check_and_scan_show_the_frames(lab):
-    moving = moving_slide(lab, "line")
+    moving = slide(lab, "line")
     config = moving.daemon.config
     status, said, _ = run_tool("check", config)
     assert status == 0 and "axes: x (2 nodes)" in said

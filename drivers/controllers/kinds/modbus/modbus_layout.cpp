@@ -1,4 +1,4 @@
-#include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 
 #include <algorithm>
 #include <numeric>

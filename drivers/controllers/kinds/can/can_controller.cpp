@@ -1,4 +1,4 @@
-#include "drivers/controllers/can_controller.hpp"
+#include "drivers/controllers/kinds/can/can_controller.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
-#include "drivers/controllers/modbus_dialogue.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/controllers/travel_registers.hpp"
+#include "drivers/controllers/kinds/modbus/travel_registers.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "drivers/monotonic_clock.hpp"

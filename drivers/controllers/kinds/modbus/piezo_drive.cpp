@@ -1,4 +1,4 @@
-#include "drivers/controllers/piezo_drive.hpp"
+#include "drivers/controllers/kinds/modbus/piezo_drive.hpp"
 
 #include <algorithm>
 #include <chrono>

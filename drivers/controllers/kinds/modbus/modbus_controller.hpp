@@ -6,7 +6,7 @@
 
 #include "drivers/bus_thread.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/controllers/modbus_dialogue.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/wake_event.hpp"
 

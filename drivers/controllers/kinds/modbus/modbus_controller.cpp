@@ -1,4 +1,4 @@
-#include "drivers/controllers/modbus_controller.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
 
 namespace thermocomp {
 namespace {

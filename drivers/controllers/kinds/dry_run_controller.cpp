@@ -1,4 +1,4 @@
-#include "drivers/controllers/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/dry_run_controller.hpp"
 
 #include <cmath>
 

@@ -1,9 +1,9 @@
-#include "drivers/controllers/make_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
 
-#include "drivers/controllers/bridge_controller.hpp"
-#include "drivers/controllers/can_controller.hpp"
-#include "drivers/controllers/dry_run_controller.hpp"
-#include "drivers/controllers/modbus_controller.hpp"
+#include "drivers/controllers/kinds/bridge_controller.hpp"
+#include "drivers/controllers/kinds/can/can_controller.hpp"
+#include "drivers/controllers/kinds/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
 
 namespace thermocomp {
 namespace {

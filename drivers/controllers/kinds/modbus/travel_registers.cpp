@@ -1,4 +1,4 @@
-#include "drivers/controllers/travel_registers.hpp"
+#include "drivers/controllers/kinds/modbus/travel_registers.hpp"
 
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "drivers/controllers/controller_config.hpp"
-#include "drivers/controllers/modbus_layout.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 
 namespace thermocomp {
 

@@ -1,4 +1,4 @@
-#include "drivers/controllers/travel_frames.hpp"
+#include "drivers/controllers/kinds/can/travel_frames.hpp"
 
 #include <algorithm>
 #include <map>

@@ -1,4 +1,4 @@
-#include "drivers/controllers/bridge_controller.hpp"
+#include "drivers/controllers/kinds/bridge_controller.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 #include "drivers/can/can_socket.hpp"
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/controllers/travel_frames.hpp"
+#include "drivers/controllers/kinds/can/travel_frames.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/wait_free_slot.hpp"
 #include "drivers/wake_event.hpp"

@@ -11,8 +11,8 @@
 
 #include "drivers/controllers/controller_config.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/controllers/modbus_layout.hpp"
-#include "drivers/controllers/piezo_drive.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
+#include "drivers/controllers/kinds/modbus/piezo_drive.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/wait_free_slot.hpp"

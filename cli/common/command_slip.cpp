@@ -1,0 +1,33 @@
+#include "cli/common/command_slip.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "config/text/printable_text.hpp"
+#include "config/toml/toml_reader.hpp"
+
+namespace thermocomp::cli {
+
+std::string command_slip_text(const CLI::App* app, const CLI::Error& error) {
+  const CLI::App* group = app;
+  std::string words = app->get_name();
+  while (!group->get_subcommands().empty()) {
+    group = group->get_subcommands().front();
+    words += " " + group->get_name();
+  }
+  std::vector<std::string> known;
+  for (const CLI::App* command : group->get_subcommands([](const CLI::App*) { return true; }))
+    known.push_back(command->get_name());
+  const std::vector<std::string> rest = group->remaining();
+  const auto word = std::find_if(rest.begin(), rest.end(),
+                                 [](const std::string& each) { return !each.starts_with('-'); });
+  if (known.empty() || word == rest.end()) return CLI::FailureMessage::simple(app, error);
+  const std::string meant = nearest_name(*word, known);
+  return words + ": no command " + printable_text(*word) +
+         (meant.empty() ? "" : "; did you mean " + meant + "?") + "\n" + words +
+         " --help lists them.\n";
+}
+
+}  // namespace thermocomp::cli
