@@ -11,6 +11,7 @@
 #include "modelling/diagnosis/evidence/evidence.hpp"
 #include "modelling/diagnosis/evidence/sensor_witness.hpp"
 #include "modelling/diagnosis/evidence/settings_together.hpp"
+#include "modelling/diagnosis/hypothesis/parameter.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -59,6 +60,8 @@ struct Finding {
   std::vector<double> shape_sd;
   std::vector<Eigen::VectorXd> gain_sd;   ///< one an output
   std::vector<Explanation> alternatives;  ///< best first, of other causes or subjects
+  /// Outermost values of each shape parameter, far from its own, that explain as much.
+  std::vector<Interval> rivals{};
 };
 
 /// What was weighed for a finding, whether it became one or not.
@@ -230,6 +233,8 @@ class Search {
                                 const Eigen::VectorXd& gains) const;
   [[nodiscard]] double step_of_values_s(const Explanation& explanation) const;
   [[nodiscard]] double shape_sd(const Explanation& explanation, std::size_t parameter) const;
+  [[nodiscard]] Interval rivals(const Explanation& explanation, std::size_t parameter,
+                                double wider) const;
   [[nodiscard]] double carried_share(const std::vector<Finding>& findings,
                                      std::size_t output) const;
   /// Whether any output has a share.

@@ -159,9 +159,9 @@ bool Search::each_likely(std::vector<Finding>& findings) {
     std::vector<Explanation> candidates = ranked();
     leave_out_others(candidates, findings, i);
     Explanation& each = findings[i].explanation;
-    const auto own = std::find_if(
-        candidates.begin(), candidates.end(),
-        [&](const Explanation& other) { return other.hypothesis == each.hypothesis; });
+    const auto own =
+        std::find_if(candidates.begin(), candidates.end(),
+                     [&](const Explanation& other) { return other.hypothesis == each.hypothesis; });
     if (own == candidates.end()) return false;
     const Posterior all = posterior(candidates, Round::later);
     each.probability = probability_of_group(candidates, all, groups_,

@@ -127,11 +127,13 @@ void Search::follow(Path& path, std::vector<Explanation> candidates, std::size_t
 /// probabilities.
 void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& path) const {
   if (!thresholds_.by_probability || candidates.empty()) return;
-  const Posterior all =
-      posterior(candidates, path.findings.empty() ? Round::first : Round::later);
+  const Posterior all = posterior(candidates, path.findings.empty() ? Round::first : Round::later);
+  // A fit takes most of a cause, as a finding does: names beside it are right as often as those of
+  // later rounds.
+  const Posterior told = thresholds_.by_gates ? posterior(candidates, Round::later) : all;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     candidates[i].probability = all.of[i];
-    candidates[i].family_probability = all.families.at(family_of(candidates[i].hypothesis->cause));
+    candidates[i].family_probability = told.families.at(family_of(candidates[i].hypothesis->cause));
   }
   std::size_t best = 0;
   double most = 0.0;
@@ -143,8 +145,11 @@ void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& pat
     most = of_group;
     best = i;
   }
+  if (most >= thresholds_.probability_min)
+    most = std::max(thresholds_.probability_min,
+                    probability_of_group(candidates, told, groups_, best));
   candidates[best].probability = most;
-  if (path.findings.empty()) path.families = all.families;
+  if (path.findings.empty()) path.families = told.families;
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const auto& a, const auto& b) { return a.probability > b.probability; });
 }
@@ -184,8 +189,7 @@ SearchResult Search::result_of(Path path) {
   for (const std::size_t output : measured_)
     result.unexplained_share[output] =
         std::clamp(1.0 - carried_share(result.findings, output), 0.0, 1.0);
-  const bool little =
-      thresholds_.by_gates && 1.0 - left_variance < thresholds_.carried_share_min;
+  const bool little = thresholds_.by_gates && 1.0 - left_variance < thresholds_.carried_share_min;
   if (!is_named || little) {
     result.findings.clear();
     for (const std::size_t output : measured_) result.unexplained_share[output] = 1.0;

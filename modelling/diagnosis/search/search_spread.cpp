@@ -15,6 +15,11 @@ namespace {
 /// Student's t of seven degrees of freedom over the normal distribution at 97.5 %: what eight
 /// blocks tell is itself uncertain.
 constexpr double few_blocks = 1.2;
+/// Chi squared of one degree of freedom at 95 %: by so much 2 ln L may be behind.
+constexpr double as_likely = 3.84;
+/// A point of the grid beside a peak has at least this share of its gain: of a period's grid, a
+/// fifth of a turn off, 2 of ln(amplitude^2 / noise^2).
+constexpr double near_peak = 0.2;
 
 }  // namespace
 
@@ -45,6 +50,29 @@ double Search::shape_sd(const Explanation& explanation, std::size_t parameter) c
     if (fall > 4.0) return step / std::sqrt(fall);
   }
   return range;
+}
+
+/// A sine that is probed rarely is one of other periods as well.
+/// @param wider  intervals than if whitened rows were independent
+Interval Search::rivals(const Explanation& explanation, std::size_t parameter, double wider) const {
+  const Hypothesis& hypothesis = *explanation.hypothesis;
+  const ShapeParameter& of = hypothesis.shape[parameter];
+  Interval outermost{explanation.shape[parameter], explanation.shape[parameter]};
+  if (of.discrete || hypothesis.run) return outermost;
+  Shapes shapes(of.grid.size(), explanation.shape);
+  for (std::size_t i = 0; i < of.grid.size(); ++i) shapes[i][parameter] = of.grid[i];
+  const std::vector<Trial> trials = weigh_all(hypothesis, shapes, explanation.settings);
+  const double peak = weigh(hypothesis, explanation.shape, explanation.settings).score;
+  const auto score = [&](std::size_t i) { return i < trials.size() ? trials[i].score : 0.0; };
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    if (score(i) < near_peak * peak || score(i) < score(i + 1) || score(i) < score(i - 1)) continue;
+    Explanation rival = explanation;
+    rival.shape[parameter] = of.grid[i];
+    if (!(refine(rival).score > peak - as_likely * wider * wider)) continue;
+    outermost.low = std::min(outermost.low, rival.shape[parameter]);
+    outermost.high = std::max(outermost.high, rival.shape[parameter]);
+  }
+  return outermost;
 }
 
 /// How many times wider intervals are than if whitened rows were independent, since no noise of
@@ -83,7 +111,8 @@ double Search::widening(const Setting& setting, const Panel& columns,
   return few_blocks * std::sqrt(std::max(1.0, wider));
 }
 
-/// Mean time between values of the run in which the explanation acts, in the output that has most [s].
+/// Mean time between values of the run in which the explanation acts, in the output that has most
+/// [s].
 double Search::step_of_values_s(const Explanation& explanation) const {
   const Block& run = rows_.runs[*explanation.hypothesis->run];
   const double length_s = rows_.time_s[run.end - 1] - rows_.time_s[run.begin];
@@ -140,7 +169,9 @@ void Search::measure_spread(std::vector<Finding>& findings) {
       finding.gain_sd[output] =
           times * (variance * Eigen::MatrixXd(of.square(0)).inverse().diagonal()).array().sqrt();
     }
+    finding.rivals.clear();
     for (std::size_t k = 0; k < finding.shape_sd.size(); ++k) {
+      finding.rivals.push_back(rivals(each, k, wider));
       finding.shape_sd[k] *= wider;
       // An onset is anywhere between two values.
       if (each.hypothesis->run && !each.hypothesis->shape[k].logarithmic)

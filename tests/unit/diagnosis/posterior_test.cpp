@@ -98,7 +98,8 @@ MeasuredData data_of(const ThermalModel& model, int rows) {
 TEST_CASE("probabilities of explanations, families and nothing add to one", "[diagnosis]") {
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
   const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
-  const Posterior all = posterior({explanation(heat, 200.0, -0.8), explanation(lag, 90.0, -0.5)}, Round::first);
+  const Posterior all =
+      posterior({explanation(heat, 200.0, -0.8), explanation(lag, 90.0, -0.5)}, Round::first);
   CHECK(all.of[0] + all.of[1] + all.none == Approx(1.0));
   CHECK(all.families.at("heat") == Approx(all.of[0]));
   CHECK(all.families.at("structure") == Approx(all.of[1]));
@@ -110,6 +111,16 @@ TEST_CASE("what takes nothing of rows left out is no explanation", "[diagnosis]"
   CHECK(posterior({}, Round::first).none == 1.0);
   CHECK(posterior({explanation(lag, 10.0, -0.02)}, Round::first).none > 0.9);
   CHECK(posterior({explanation(lag, 2000.0, -1.5)}, Round::first).none < 0.1);
+}
+
+TEST_CASE("beside what is named already the same evidence makes a cause less likely",
+          "[diagnosis]") {
+  const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
+  const std::vector<Explanation> alone = {explanation(heat, 200.0, -0.8)};
+  CHECK(posterior(alone, Round::first).of.front() > 0.85);
+  CHECK(posterior(alone, Round::later).of.front() < 0.65);
+  const std::vector<Explanation> plain = {explanation(heat, 2000.0, -2.0)};
+  CHECK(posterior(plain, Round::later).of.front() > 0.85);
 }
 
 TEST_CASE("an explanation among others that do as well is less likely than one that is alone",
