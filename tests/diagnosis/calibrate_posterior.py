@@ -23,7 +23,7 @@ from measured_plants import FAMILIES
 
 WEIGHED = 12  # explanations of a round that count
 SCORE_SCALE = 20.0
-CROWD = 0.1   # what leaves as little within this, in ln, crowds an explanation
+CROWD = 0.1   # what leaves as little within this, in ln, crowds an explanation of its cause
 WEIGHTS = ("left_out", "likelihood", "first_place", "behind", "share", "crowd", "none")
 STEPS = 3000
 # A second effect beside another on simulated machines, of which there are few cases, counts thrice:
@@ -69,14 +69,15 @@ def cases_of(paths, later):
 def features(weighed):
     rows = np.zeros((len(weighed) + 1, len(WEIGHTS)))
     best = max((each["score"] for each in weighed), default=0.0)
-    left = np.array([each["log_left"] for each in weighed])
     for place, each in enumerate(weighed):
         score = each["score"]
+        crowd = sum(other["cause"] == each["cause"] and
+                    other["log_left"] < each["log_left"] + CROWD for other in weighed)
         rows[place, :-1] = (np.clip(-each["log_left"], -0.5, 3.0),
                             np.sign(score) * np.log1p(abs(score) / SCORE_SCALE), place == 0,
                             -np.log1p((best - score) / SCORE_SCALE),
                             np.clip(each["left_out_gain"], -0.5, 1.0),
-                            -np.log(np.sum(left < each["log_left"] + CROWD)))
+                            -np.log(crowd))
     rows[-1, -1] = 1.0
     return rows
 

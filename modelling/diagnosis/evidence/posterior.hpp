@@ -27,7 +27,7 @@ enum class Round { first, later };
 ///
 ///   - what the explanation takes of rows that it was not fitted to, -log_left,
 ///   - the share that it takes of the RMS of the outputs on which it acts, in those rows,
-///   - how many others, in ln, take about as much of them,
+///   - how many of its cause, in ln, take about as much of them: which place it is cannot be told,
 ///   - its likelihood, sign(score) ln(1 + |score| / 20), since neighbouring rows say the same,
 ///   - how far that is behind the likeliest's, ln(1 + difference / 20),
 ///   - whether it is the first in the order of Search::choose().

@@ -123,9 +123,10 @@ TEST_CASE("beside what is named already the same evidence makes a cause less lik
   CHECK(posterior(plain, Round::later).of.front() > 0.85);
 }
 
-TEST_CASE("an explanation among others that do as well is less likely than one that is alone",
+TEST_CASE("a place among others at which the cause does as well is less likely than one alone",
           "[diagnosis]") {
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
+  const Hypothesis other_lag = hypothesis("thermal_lag", "t3_degC");
   const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
   const Hypothesis drift = hypothesis("displacement_drift", "z_um");
   const auto odds_of_first = [](const std::vector<Explanation>& all) {
@@ -134,8 +135,9 @@ TEST_CASE("an explanation among others that do as well is less likely than one t
   };
   const Explanation first = explanation(lag, 200.0, -0.8);
   const double alone = odds_of_first({first});
-  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.78)}) < alone);
-  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.3)}) == Approx(alone));
+  CHECK(odds_of_first({first, explanation(other_lag, 190.0, -0.78)}) < alone);
+  CHECK(odds_of_first({first, explanation(other_lag, 190.0, -0.3)}) == Approx(alone));
+  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.78)}) == Approx(alone));
   // Far behind the likeliest.
   CHECK(odds_of_first({first, explanation(drift, 2000.0, -0.1)}) < alone);
 }
