@@ -5,9 +5,9 @@ calibrate_posterior.py ANSWERS.json...     written by
     measured_campaign.py PROGRAM --weighed --json ANSWERS.json
     campaign.py PROGRAM --answers ANSWERS.json
 
-Prints the weights of modelling/diagnosis/evidence/posterior.cpp, for the first finding (from machines with
-one effect or none) and for later ones (from all), and how well they do on the cases they come from
-and on machines that were left out of the fit one after the other.
+Prints the weights of modelling/diagnosis/evidence/posterior.cpp, for the first finding (from
+machines with one effect or none) and for later ones (from all), and how well they do on the cases
+they come from and on machines that were left out of the fit one after the other.
 """
 
 import collections
@@ -38,12 +38,11 @@ def hidden_in(kept):
 def rounds_of(kept, later):
     """What was weighed in the first round, or in each one after something was named."""
     weighed = kept["answer"]["weighed"]
-    if not later:
-        return [[each for each in weighed if each["round"] == 1]] if len(hidden_in(kept)) < 2 else []
-    if not kept["answer"]["findings"]:
-        return []
-    return [[each for each in weighed if each["round"] == number]
-            for number in sorted({each["round"] for each in weighed} - {1})]
+    if later:
+        numbers = {each["round"] for each in weighed} - {1} if kept["answer"]["findings"] else ()
+    else:
+        numbers = (1,) if len(hidden_in(kept)) < 2 else ()
+    return [[each for each in weighed if each["round"] == number] for number in sorted(numbers)]
 
 
 def cases_of(paths, later):
@@ -53,8 +52,8 @@ def cases_of(paths, later):
     for path in paths:
         for kept in json.loads(pathlib.Path(path).read_text()):
             truths = hidden_in(kept)
-            right = measured_campaign.right if all("groups" in t for t in truths) else campaign.same
             simulated = kept["base"] == "simulated"
+            right = campaign.same if simulated else measured_campaign.right
             times = TIMES_SIMULATED_PAIR if later and simulated and len(truths) > 1 else 1
             for weighed in rounds_of(kept, later):
                 weighed = weighed[:WEIGHED]
@@ -96,7 +95,8 @@ def fitted(cases):
     absent = np.full(features.shape[:2], -np.inf)
     for i, case in enumerate(cases):
         count = len(case["hits"])
-        features[i, :count], hits[i, :count], absent[i, :count] = case["features"], case["hits"], 0.0
+        features[i, :count], hits[i, :count] = case["features"], case["hits"]
+        absent[i, :count] = 0.0
 
     def loss(weights):
         utility = features @ weights + absent

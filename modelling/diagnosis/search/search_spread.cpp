@@ -58,7 +58,8 @@ Interval Search::rivals(const Explanation& explanation, std::size_t parameter, d
   const Hypothesis& hypothesis = *explanation.hypothesis;
   const ShapeParameter& of = hypothesis.shape[parameter];
   Interval outermost{explanation.shape[parameter], explanation.shape[parameter]};
-  if (of.discrete || hypothesis.run) return outermost;
+  // Of a catalogue whose columns depend on what is accepted each is a simulation, with one peak.
+  if (of.discrete || hypothesis.run || accepted_) return outermost;
   Shapes shapes(of.grid.size(), explanation.shape);
   for (std::size_t i = 0; i < of.grid.size(); ++i) shapes[i][parameter] = of.grid[i];
   const std::vector<Trial> trials = weigh_all(hypothesis, shapes, explanation.settings);
