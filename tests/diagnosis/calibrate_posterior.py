@@ -26,9 +26,9 @@ SCORE_SCALE = 20.0
 CROWD = 0.1   # what leaves as little within this, in ln, crowds an explanation of its cause
 WEIGHTS = ("left_out", "likelihood", "first_place", "behind", "share", "crowd", "none")
 STEPS = 3000
-# A second effect beside another on simulated machines, of which there are few cases, counts thrice:
-# then about one case in six has one.
-TIMES_SIMULATED_PAIR = 3
+# A second effect beside another on simulated machines, of which there are few cases, counts so many
+# times: then two cases in five have one.
+TIMES_SIMULATED_PAIR = 6
 
 
 def hidden_in(kept):
