@@ -6,7 +6,7 @@ campaign.py PROGRAM [--cases N] [--null N] [--outside N] [--double N] [--levels 
 
 PROGRAM is thermocomp-modelling. Counts are for each level. --keep leaves the files in FOLDER and
 uses those that are there already; --show prints every answer that was not right; --answers keeps
-those to single effects and to untouched machines for calibrate_posterior.py.
+all but those to effects outside the catalogue for calibrate_posterior.py.
 """
 
 import os
@@ -184,12 +184,12 @@ def print_confusion(confusion):
 
 
 def kept_answer(task, truth, answer):
-    """As measured_campaign.py keeps it; None where none or several effects outside were hidden."""
-    if task[2] not in ("single", "null"):
+    """As measured_campaign.py keeps it; None where an effect outside the catalogue was hidden."""
+    if task[2] == "outside":
         return None
-    hidden_one = truth["hidden"][0] if truth["hidden"] else None
+    hidden_ones = truth["hidden"] or [None]
     return dict(machine="simulated level %d" % task[3], base="simulated", size="simulated",
-                seed=task[4], truth=hidden_one, answer=answer)
+                seed=task[4], truth=hidden_ones[0], truths=truth["hidden"], answer=answer)
 
 
 def counted(tasks, examine, levels, show, unit, jobs=2, answers=None):

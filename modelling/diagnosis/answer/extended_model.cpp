@@ -44,6 +44,11 @@ std::vector<Parameter> parameters_of(const Finding& finding, const MeasuredData&
       parameter.ci95[""] = {value * std::exp(-wide), value * std::exp(wide)};
     else if (!hypothesis.shape[i].discrete)
       parameter.ci95[""] = around(value, wide);
+    if (i < finding.rivals.size() && !parameter.ci95.empty()) {
+      Interval& interval = parameter.ci95.at("");
+      interval.low = std::min(interval.low, finding.rivals[i].low);
+      interval.high = std::max(interval.high, finding.rivals[i].high);
+    }
     all.push_back(std::move(parameter));
   }
   if (cause.gains == nullptr) return all;

@@ -21,41 +21,49 @@ constexpr double share_max = 1.0;
 /// Leaves of rows left out as little, in ln.
 constexpr double crowd = 0.1;
 
+struct Weights {
+  double left_out;
+  double likelihood;
+  double first_place;
+  double behind;
+  double share;
+  double crowd;
+  double none;  ///< utility of nothing
+};
 // calibrate_posterior.py prints what follows.
-constexpr double weight_of_left_out = 1.99;
-constexpr double weight_of_likelihood = 0.21;
-constexpr double weight_of_first_place = 1.05;
-constexpr double weight_of_behind = 0.48;
-constexpr double weight_of_share = 5.78;
-constexpr double weight_of_crowd = 0.54;
-constexpr double utility_of_none = 3.84;
+constexpr Weights for_first{2.37, 0.16, 1.03, 0.51, 6.23, 1.12, 4.38};
+constexpr Weights for_later{0.55, 0.35, 0.92, 0.13, 6.10, 0.67, 5.08};
 
 /// What the weighed explanations are told from each other by.
 class Field {
  public:
-  explicit Field(std::span<const Explanation> weighed) : weighed_(weighed) {
+  Field(std::span<const Explanation> weighed, const Weights& weights)
+      : weighed_(weighed), weights_(weights) {
     for (const Explanation& each : weighed) best_score_ = std::max(best_score_, each.score);
   }
 
   [[nodiscard]] double utility(std::size_t place) const {
     const Explanation& of = weighed_[place];
     const double likelihood = std::copysign(std::log1p(std::abs(of.score) / score_scale), of.score);
-    return weight_of_left_out * std::clamp(-of.log_left, left_min, left_max) +
-           weight_of_share * std::clamp(of.left_out_gain, share_min, share_max) -
-           weight_of_crowd * std::log(as_good_as(of)) + weight_of_likelihood * likelihood -
-           weight_of_behind * std::log1p((best_score_ - of.score) / score_scale) +
-           (place == 0 ? weight_of_first_place : 0.0);
+    return weights_.left_out * std::clamp(-of.log_left, left_min, left_max) +
+           weights_.share * std::clamp(of.left_out_gain, share_min, share_max) -
+           weights_.crowd * std::log(as_good_as(of)) + weights_.likelihood * likelihood -
+           weights_.behind * std::log1p((best_score_ - of.score) / score_scale) +
+           (place == 0 ? weights_.first_place : 0.0);
   }
 
  private:
-  /// Explanations that leave about as little or less, itself among them.
+  /// Explanations of its cause that leave about as little or less, itself among them.
   [[nodiscard]] double as_good_as(const Explanation& of) const {
-    return static_cast<double>(std::count_if(
-        weighed_.begin(), weighed_.end(),
-        [&](const Explanation& other) { return other.log_left < of.log_left + crowd; }));
+    return static_cast<double>(
+        std::count_if(weighed_.begin(), weighed_.end(), [&](const Explanation& other) {
+          return other.hypothesis->cause == of.hypothesis->cause &&
+                 other.log_left < of.log_left + crowd;
+        }));
   }
 
   std::span<const Explanation> weighed_;
+  const Weights& weights_;
   double best_score_{-std::numeric_limits<double>::infinity()};
 };
 
@@ -65,17 +73,18 @@ const std::string& family_of(const std::string& cause) {
   return cause_named(cause).family;
 }
 
-Posterior posterior(const std::vector<Explanation>& explanations) {
+Posterior posterior(const std::vector<Explanation>& explanations, Round round) {
   const std::size_t weighed = std::min(weighed_max, explanations.size());
+  const Weights& weights = round == Round::first ? for_first : for_later;
   std::vector<double> utilities;
-  const Field field(std::span<const Explanation>{explanations}.first(weighed));
+  const Field field(std::span<const Explanation>{explanations}.first(weighed), weights);
   for (std::size_t i = 0; i < weighed; ++i) utilities.push_back(field.utility(i));
-  double most = utility_of_none;
+  double most = weights.none;
   for (const double each : utilities) most = std::max(most, each);
-  double sum = std::exp(utility_of_none - most);
+  double sum = std::exp(weights.none - most);
   for (const double each : utilities) sum += std::exp(each - most);
   Posterior all;
-  all.none = std::exp(utility_of_none - most) / sum;
+  all.none = std::exp(weights.none - most) / sum;
   all.of.assign(explanations.size(), 0.0);
   for (const char* family : {"structure", "heat", "datum", "sensor"}) all.families[family] = 0.0;
   for (std::size_t i = 0; i < weighed; ++i) {

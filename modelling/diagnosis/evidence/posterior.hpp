@@ -19,11 +19,15 @@ struct Posterior {
   std::map<std::string, double> families{};
 };
 
+/// Beside what is named already, what a model leaves anyway is taken for an effect more easily:
+/// evidence counts less.
+enum class Round { first, later };
+
 /// P(h) = exp(u_h) / (exp(u_none) + sum of exp(u)), u a weighted sum of
 ///
 ///   - what the explanation takes of rows that it was not fitted to, -log_left,
 ///   - the share that it takes of the RMS of the outputs on which it acts, in those rows,
-///   - how many others, in ln, take about as much of them,
+///   - how many of its cause, in ln, take about as much of them: which place it is cannot be told,
 ///   - its likelihood, sign(score) ln(1 + |score| / 20), since neighbouring rows say the same,
 ///   - how far that is behind the likeliest's, ln(1 + difference / 20),
 ///   - whether it is the first in the order of Search::choose().
@@ -32,9 +36,9 @@ struct Posterior {
 /// the weights did not carry over to machines that were left out of them.
 ///
 /// The weights are those under which effects planted in measured and in simulated machines are
-/// likeliest (tests/diagnosis/calibrate_posterior.py).
+/// likeliest (tests/diagnosis/calibrate_posterior.py), for the first finding and for later ones.
 /// @param explanations  in the order of Search::choose()
-[[nodiscard]] Posterior posterior(const std::vector<Explanation>& explanations);
+[[nodiscard]] Posterior posterior(const std::vector<Explanation>& explanations, Round round);
 
 /// Of a cause with any place of the group of its subject: which of them it is cannot be told.
 [[nodiscard]] double probability_of_group(const std::vector<Explanation>& explanations,

@@ -11,6 +11,7 @@
 #include "modelling/diagnosis/evidence/evidence.hpp"
 #include "modelling/diagnosis/evidence/sensor_witness.hpp"
 #include "modelling/diagnosis/evidence/settings_together.hpp"
+#include "modelling/diagnosis/hypothesis/parameter.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -45,11 +46,12 @@ struct Thresholds {
   bool one_unit{false};
   /// Where one finding after another leaves a doubt, two are sought together.
   bool in_pairs{true};
-  /// What is likelier than everything else together is named, in place of the shares and scores
-  /// that make a first finding clear: calibrated for displacement beside a model that was fitted
-  /// elsewhere, not for temperatures nor for what an own fit leaves.
+  /// Only what is likelier than everything else together is named: calibrated for displacement, not
+  /// for temperatures.
   bool by_probability{true};
   double probability_min{0.5};
+  /// Only what the shares and scores above make clear is named.
+  bool by_gates{false};
 };
 
 struct Finding {
@@ -58,6 +60,8 @@ struct Finding {
   std::vector<double> shape_sd;
   std::vector<Eigen::VectorXd> gain_sd;   ///< one an output
   std::vector<Explanation> alternatives;  ///< best first, of other causes or subjects
+  /// Outermost values of each shape parameter, far from its own, that explain as much.
+  std::vector<Interval> rivals{};
 };
 
 /// What was weighed for a finding, whether it became one or not.
@@ -216,6 +220,7 @@ class Search {
   [[nodiscard]] std::vector<Path> pairs(const std::vector<Explanation>& firsts);
   [[nodiscard]] bool stands(Path& path);
   [[nodiscard]] bool each_earned(std::vector<Finding>& findings);
+  [[nodiscard]] bool each_likely(std::vector<Finding>& findings);
   void measure(Path& path);
   [[nodiscard]] SearchResult result_of(Path path);
   /// With all other candidates as alternatives.
@@ -226,9 +231,10 @@ class Search {
   void measure_spread(std::vector<Finding>& findings);
   [[nodiscard]] double widening(const Setting& setting, const Panel& columns,
                                 const Eigen::VectorXd& gains) const;
-  /// Mean time from row to row [s].
-  [[nodiscard]] double row_step_s() const;
+  [[nodiscard]] double step_of_values_s(const Explanation& explanation) const;
   [[nodiscard]] double shape_sd(const Explanation& explanation, std::size_t parameter) const;
+  [[nodiscard]] Interval rivals(const Explanation& explanation, std::size_t parameter,
+                                double wider) const;
   [[nodiscard]] double carried_share(const std::vector<Finding>& findings,
                                      std::size_t output) const;
   /// Whether any output has a share.

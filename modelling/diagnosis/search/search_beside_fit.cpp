@@ -83,7 +83,7 @@ SearchBesideFit::SearchBesideFit(const MeasuredData& data, const Thresholds& thr
       fit_(OwnFit::recognised(data, rows_)) {
   thresholds_.left_out_gain_min = left_out_gain_min;
   thresholds_.in_pairs = false;
-  thresholds_.by_probability = false;
+  thresholds_.by_gates = true;
 }
 
 std::unique_ptr<SearchBesideFit::Group> SearchBesideFit::searched(
@@ -196,6 +196,7 @@ void SearchBesideFit::take(std::unique_ptr<Group> group, SearchResult& result) {
   }
   result.weighed.insert(result.weighed.end(), group->result.weighed.begin(),
                         group->result.weighed.end());
+  if (result.families.empty()) result.families = group->result.families;
   groups_.push_back(std::move(group));
 }
 

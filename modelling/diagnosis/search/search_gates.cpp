@@ -73,13 +73,13 @@ bool Search::convincing(const std::vector<Finding>& findings) const {
 }
 
 bool Search::may_be_named(const Explanation& explanation, bool first) const {
-  if (!thresholds_.by_probability) return earned(explanation, first);
-  return explanation.probability >= thresholds_.probability_min &&
-         (first ? matters(explanation, first) : earned(explanation, first));
+  if (thresholds_.by_probability && !(explanation.probability >= thresholds_.probability_min))
+    return false;
+  return first && !thresholds_.by_gates ? matters(explanation, first) : earned(explanation, first);
 }
 
 bool Search::named(const Path& path) const {
-  return thresholds_.by_probability ? !path.findings.empty() : convincing(path.findings);
+  return thresholds_.by_gates ? convincing(path.findings) : !path.findings.empty();
 }
 
 bool Search::structure_left() const {

@@ -46,6 +46,16 @@ double twice_log_likelihood(const OutputEvidence& evidence) {
          static_cast<double>(free) * std::log(setting.present_rows());
 }
 
+/// What is found already is no candidate.
+void leave_out_others(std::vector<Explanation>& candidates, const std::vector<Finding>& findings,
+                      std::size_t but) {
+  std::erase_if(candidates, [&](const Explanation& each) {
+    for (std::size_t i = 0; i < findings.size(); ++i)
+      if (i != but && findings[i].explanation.hypothesis == each.hypothesis) return true;
+    return false;
+  });
+}
+
 bool same_causes(const std::vector<Finding>& a, const std::vector<Finding>& b) {
   return std::is_permutation(a.begin(), a.end(), b.begin(), b.end(),
                              [](const Finding& one, const Finding& other) {
@@ -99,7 +109,7 @@ bool Search::each_earned(std::vector<Finding>& findings) {
     measure_left_out(each, left_out);
     if (!earned(each, false)) return false;
     if (!thresholds_.by_probability) continue;
-    each.probability = each.family_probability = posterior({each}).of.front();
+    each.probability = each.family_probability = posterior({each}, Round::later).of.front();
     if (!(each.probability >= thresholds_.probability_min)) return false;
   }
   std::sort(findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
@@ -142,6 +152,26 @@ std::vector<Search::Path> Search::pairs(const std::vector<Explanation>& firsts) 
   return found;
 }
 
+/// Whether each of the findings is likelier beside the others than everything else together.
+bool Search::each_likely(std::vector<Finding>& findings) {
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    accept(findings, i);
+    std::vector<Explanation> candidates = ranked();
+    leave_out_others(candidates, findings, i);
+    Explanation& each = findings[i].explanation;
+    const auto own =
+        std::find_if(candidates.begin(), candidates.end(),
+                     [&](const Explanation& other) { return other.hypothesis == each.hypothesis; });
+    if (own == candidates.end()) return false;
+    const Posterior all = posterior(candidates, Round::later);
+    each.probability = probability_of_group(candidates, all, groups_,
+                                            static_cast<std::size_t>(own - candidates.begin()));
+    each.family_probability = all.families.at(family_of(each.hypothesis->cause));
+    if (!(each.probability >= thresholds_.probability_min)) return false;
+  }
+  return true;
+}
+
 /// Puts a pair, or what was found from a pair on, in the place of the path when that leaves less of
 /// rows left out; of those that leave nearly the same, the likeliest. In the place of a single
 /// clear finding it must leave less and be likelier by as much as a finding has to gain. Where
@@ -171,6 +201,7 @@ void Search::reconsider(Path& path, const std::vector<Explanation>& firsts) {
   const auto best = std::max_element(
       paths.begin(), paths.end(), [](const Path& a, const Path& b) { return a.score < b.score; });
   if (same_causes(best->findings, path.findings)) return;
+  if (thresholds_.by_probability && !each_likely(best->findings)) return;
   path.findings = std::move(best->findings);
   // Each was measured beside the others; all findings' sum is to be what they leave together.
   const double count = static_cast<double>(path.findings.size());

@@ -124,6 +124,7 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   thresholds.one_unit = true;
   thresholds.in_pairs = false;
   thresholds.by_probability = false;
+  thresholds.by_gates = true;
   thresholds.motion_share_min = motion_share_min;
   Search search(train_data, thresholds, NetworkHypotheses::all(catalogue),
                 [&](const std::vector<Explanation>& found) { catalogue->accept(found); });

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 #include <string>
 #include <utility>
@@ -207,6 +208,31 @@ TEST_CASE("play of the joint is named with the width of its dead band", "[diagno
   const Parameter& width = answer.findings[0].parameters.front();
   // With one input, play of the output and of the temperature are the same.
   CHECK(width.values.at("") * (width.name == "width_K" ? 5.0 : 1.0) == Approx(6.0).epsilon(0.05));
+}
+
+TEST_CASE("a cycle that is probed rarely has an interval that holds the periods it may have",
+          "[diagnosis]") {
+  const double period_s = 1500.0;
+  const auto hidden = [&](double, double, int row) {
+    return 8.0 * std::sin(2.0 * std::numbers::pi * 60.0 * row / period_s);
+  };
+  const auto probed = [&](int each) {
+    RunFile run = run_with(1, 1800, hidden);
+    for (std::size_t row = 0; row < run.values[3].size(); ++row)
+      if (row % static_cast<std::size_t>(each) != 0) run.values[3][row] = NAN;
+    return run;
+  };
+  const int each = GENERATE(1, 30);
+  CAPTURE(each);
+  const RunFile test = run_with(2, 400, hidden);
+  const Diagnosis answer =
+      diagnose(one_input(), {probed(each)}, {"train.csv"}, {test}, {"test.csv"});
+  REQUIRE_FALSE(answer.findings.empty());
+  REQUIRE(answer.findings[0].cause == "periodic_disturbance");
+  const Interval period = answer.findings[0].parameters.front().ci95.at("");
+  CHECK(period.low <= period_s);
+  CHECK(period.high >= period_s);
+  if (each == 1) CHECK(period.high - period.low < 0.1 * period_s);
 }
 
 TEST_CASE("of many sensors that one output cannot tell apart the faulty one is named",

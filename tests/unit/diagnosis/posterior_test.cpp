@@ -98,7 +98,8 @@ MeasuredData data_of(const ThermalModel& model, int rows) {
 TEST_CASE("probabilities of explanations, families and nothing add to one", "[diagnosis]") {
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
   const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
-  const Posterior all = posterior({explanation(heat, 200.0, -0.8), explanation(lag, 90.0, -0.5)});
+  const Posterior all =
+      posterior({explanation(heat, 200.0, -0.8), explanation(lag, 90.0, -0.5)}, Round::first);
   CHECK(all.of[0] + all.of[1] + all.none == Approx(1.0));
   CHECK(all.families.at("heat") == Approx(all.of[0]));
   CHECK(all.families.at("structure") == Approx(all.of[1]));
@@ -107,24 +108,36 @@ TEST_CASE("probabilities of explanations, families and nothing add to one", "[di
 
 TEST_CASE("what takes nothing of rows left out is no explanation", "[diagnosis]") {
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
-  CHECK(posterior({}).none == 1.0);
-  CHECK(posterior({explanation(lag, 10.0, -0.02)}).none > 0.9);
-  CHECK(posterior({explanation(lag, 2000.0, -1.5)}).none < 0.1);
+  CHECK(posterior({}, Round::first).none == 1.0);
+  CHECK(posterior({explanation(lag, 10.0, -0.02)}, Round::first).none > 0.9);
+  CHECK(posterior({explanation(lag, 2000.0, -1.5)}, Round::first).none < 0.1);
 }
 
-TEST_CASE("an explanation among others that do as well is less likely than one that is alone",
+TEST_CASE("beside what is named already the same evidence makes a cause less likely",
+          "[diagnosis]") {
+  const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
+  const std::vector<Explanation> alone = {explanation(heat, 200.0, -0.8)};
+  CHECK(posterior(alone, Round::first).of.front() > 0.85);
+  CHECK(posterior(alone, Round::later).of.front() < 0.65);
+  const std::vector<Explanation> plain = {explanation(heat, 2000.0, -2.0)};
+  CHECK(posterior(plain, Round::later).of.front() > 0.85);
+}
+
+TEST_CASE("a place among others at which the cause does as well is less likely than one alone",
           "[diagnosis]") {
   const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
+  const Hypothesis other_lag = hypothesis("thermal_lag", "t3_degC");
   const Hypothesis heat = hypothesis("missing_heat_source", "spindle_rpm");
   const Hypothesis drift = hypothesis("displacement_drift", "z_um");
   const auto odds_of_first = [](const std::vector<Explanation>& all) {
-    const Posterior of = posterior(all);
+    const Posterior of = posterior(all, Round::first);
     return of.of[0] / of.none;
   };
   const Explanation first = explanation(lag, 200.0, -0.8);
   const double alone = odds_of_first({first});
-  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.78)}) < alone);
-  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.3)}) == Approx(alone));
+  CHECK(odds_of_first({first, explanation(other_lag, 190.0, -0.78)}) < alone);
+  CHECK(odds_of_first({first, explanation(other_lag, 190.0, -0.3)}) == Approx(alone));
+  CHECK(odds_of_first({first, explanation(heat, 190.0, -0.78)}) == Approx(alone));
   // Far behind the likeliest.
   CHECK(odds_of_first({first, explanation(drift, 2000.0, -0.1)}) < alone);
 }
@@ -141,7 +154,7 @@ TEST_CASE("places that move alike are one group, whose probabilities add", "[dia
   const Hypothesis other = hypothesis("thermal_lag", "t2_degC");
   const std::vector<Explanation> both = {explanation(one, 300.0, -0.9),
                                          explanation(other, 290.0, -0.89)};
-  const Posterior all = posterior(both);
+  const Posterior all = posterior(both, Round::first);
   CHECK(probability_of_group(both, all, groups, 1) == Approx(all.of[0] + all.of[1]));
 }
 
