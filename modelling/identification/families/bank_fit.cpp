@@ -165,14 +165,17 @@ BankColumns bank_columns(const MeasuredTests& tests) {
 void add_hinges(const MeasuredTests& tests, BankColumns& columns) {
   std::vector<Hinge> hinges;
   for (std::size_t i = 0; i < tests.signals.size(); ++i) {
-    std::set<double> values;
-    for (const TestRun& run : tests.runs) {
-      const auto column = run.signals.col(static_cast<Eigen::Index>(i));
-      values.insert(column.begin(), column.end());
-    }
+    std::set<double> values;  // as many as tell a switch from what varies
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (const TestRun& run : tests.runs)
+      for (const double value : run.signals.col(static_cast<Eigen::Index>(i))) {
+        low = std::min(low, value);
+        high = std::max(high, value);
+        if (values.size() <= values_of_a_switch_max) values.insert(value);
+      }
     if (values.size() <= values_of_a_switch_max) continue;
-    const double low = *values.begin();
-    const double step = (*values.rbegin() - low) / (hinges_a_signal + 1);
+    const double step = (high - low) / (hinges_a_signal + 1);
     for (int j = 1; j <= hinges_a_signal; ++j) hinges.push_back({tests.signals[i], low + j * step});
   }
   if (columns.late() + hinges.size() <= columns_max) columns.hinges = std::move(hinges);
