@@ -149,12 +149,6 @@ Eigen::VectorXd left_of(const MeasuredTests& tests, std::size_t f, const BankEqu
   return y;
 }
 
-double squares_of(const MeasuredTests& tests, std::size_t f, const BankEquations* bank) {
-  Sums sums;
-  sums.add(left_of(tests, f, bank));
-  return sums.squares;
-}
-
 /// Static equations of the model's inputs, where the matrix leaves of the tests' rows no more than
 /// they would.
 std::optional<BankEquations> fit_like_the_matrix(const MeasuredTests& tests,
@@ -164,18 +158,16 @@ std::optional<BankEquations> fit_like_the_matrix(const MeasuredTests& tests,
   add_matrix(few, row);
   std::optional<BankEquations> fit(std::in_place, few, at_once(model));
   const Eigen::MatrixXd gains = fit->fit(few.folds.size());
-  double of_matrix = 0.0;
-  double of_fit = 0.0;
+  Sums of_matrix;
+  Sums of_fit;
   for (std::size_t f = 0; f < few.folds.size(); ++f) {
     const identification::Fold& fold = few.folds[f];
     const Eigen::Index count = fold.end - fold.begin;
-    Sums left;
-    left.add(few.runs[fold.run].outputs_um.middleRows(fold.begin, count) -
-             fit->rows()[fold.run].middleRows(fold.begin, count) * gains);
-    of_fit += left.squares;
-    of_matrix += squares_of(tests, f, nullptr);
+    of_matrix.add(left_of(tests, f, nullptr));
+    of_fit.add(few.runs[fold.run].outputs_um.middleRows(fold.begin, count) -
+               fit->rows()[fold.run].middleRows(fold.begin, count) * gains);
   }
-  if (of_matrix > of_fit * fitted_factor * fitted_factor) fit.reset();
+  if (of_matrix.squares > of_fit.squares * fitted_factor * fitted_factor) fit.reset();
   return fit;
 }
 

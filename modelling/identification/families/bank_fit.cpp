@@ -26,11 +26,13 @@ constexpr int hinges_a_signal = 8;
 constexpr std::size_t values_of_a_switch_max = 6;
 /// A hinge counts as half of what it moves: nothing but the recording says that it is there.
 constexpr double weight_of_hinge = 0.5;
-// Of the mean square of a column, and of its correlation with the output.
+// Of columns as scales() leaves them: added to a mean square, and of the correlation with the
+// output.
 constexpr std::array<double, 7> ridge_penalties{1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0};
 constexpr std::array<double, 6> l1_prices{0.3, 0.1, 0.03, 0.01, 0.003, 0.001};
-// Where nothing chooses: a column says what it stands for to 3, 5 and 10 % of its own motion,
-// errors of that size being what a ridge of 0.001, 0.003 and 0.01 stands for; L1 prices alike.
+// Where nothing chooses: a column says what it stands for to 3, 5 and 10 % of the motion that
+// scales() divides by, errors of that size being what a ridge of 0.001, 0.003 and 0.01 stands for;
+// L1 prices alike.
 constexpr std::array<double, 3> unchosen_penalties{1e-3, 3e-3, 1e-2};
 constexpr std::array<double, 3> unchosen_prices{1e-2, 3e-3, 1e-3};
 constexpr int l1_rounds_max = 300;

@@ -9,8 +9,9 @@
 
 namespace thermocomp::identification {
 
-/// The family that leaves least of what is left out, the simplest of those alike to 1 %. Left out
-/// are runs; of one run, and to choose among families with two or three, stretches.
+/// The family that leaves least of what is left out, the simplest of those alike to 1 %, and no
+/// model unless one leaves a tenth less. Left out are runs; of one run, and to choose among
+/// families with two or three, stretches.
 /// @param forced    instead of it
 /// @param progress  is told the share of the work done
 /// @throws std::runtime_error when the forced family has no answer
