@@ -23,8 +23,9 @@ from measured_plants import FAMILIES
 
 WEIGHED = 12  # explanations of a round that count
 SCORE_SCALE = 20.0
-CROWD = 0.1   # what leaves as little within this, in ln, crowds an explanation of its cause
-WEIGHTS = ("left_out", "likelihood", "first_place", "behind", "share", "crowd", "none")
+AS_LITTLE = 0.1  # left of rows left out, in ln
+WEIGHTS = ("left_out", "first_place", "behind", "witness", "share", "parameters", "same_cause",
+           "other_causes", "none")
 STEPS = 3000
 # A second effect beside another on simulated machines, of which there are few cases, counts so many
 # times: then two cases in five have one.
@@ -69,16 +70,27 @@ def features(weighed):
     rows = np.zeros((len(weighed) + 1, len(WEIGHTS)))
     best = max((each["score"] for each in weighed), default=0.0)
     for place, each in enumerate(weighed):
-        score = each["score"]
-        crowd = sum(other["cause"] == each["cause"] and
-                    other["log_left"] < each["log_left"] + CROWD for other in weighed)
-        rows[place, :-1] = (np.clip(-each["log_left"], -0.5, 3.0),
-                            np.sign(score) * np.log1p(abs(score) / SCORE_SCALE), place == 0,
-                            -np.log1p((best - score) / SCORE_SCALE),
-                            np.clip(each["left_out_gain"], -0.5, 1.0),
-                            -np.log(crowd))
+        witness = each["witness"]
+        same, others = rivals(each, weighed)
+        rows[place, :-1] = (np.clip(-each["log_left"], -0.5, 3.0), place == 0,
+                            -np.log1p((best - each["score"]) / SCORE_SCALE),
+                            np.sign(witness) * np.log1p(abs(witness) / SCORE_SCALE),
+                            np.clip(each["left_out_gain_of_best"], -0.5, 1.0),
+                            -each["free_parameters"], -np.log(same), -np.log1p(others))
     rows[-1, -1] = 1.0
     return rows
+
+
+def rivals(of, weighed):
+    """Of the same cause, itself among them, and of others."""
+    same, others = 0.0, 0.0
+    for other in weighed:
+        near = 1.0 / (1.0 + max(0.0, of["score"] - other["score"]) / SCORE_SCALE)
+        if other["cause"] == of["cause"]:
+            same += near * (other["log_left"] < of["log_left"] + AS_LITTLE)
+        else:
+            others += near * (other["log_left"] < of["log_left"])
+    return same, others
 
 
 def probabilities(case, weights):

@@ -95,7 +95,10 @@ Json weighed_json(const Diagnosis& diagnosis) {
                    {"subject", each.subject},
                    {"score", number(each.score)},
                    {"left_out_gain", number(each.left_out_gain)},
-                   {"log_left", number(each.log_left)}});
+                   {"left_out_gain_of_best", number(each.left_out_gain_of_best)},
+                   {"log_left", number(each.log_left)},
+                   {"witness", number(each.witness)},
+                   {"free_parameters", each.free_parameters}});
   return all;
 }
 

@@ -81,6 +81,23 @@ Eigen::MatrixXd coefficient_columns_of(const MeasuredData& data, const StackedRo
 
 }  // namespace
 
+void add_witness(Explanation& explanation, double says) {
+  explanation.score += says;
+  explanation.witness = says;
+}
+
+std::size_t free_parameters(const Explanation& explanation) {
+  const Hypothesis& of = *explanation.hypothesis;
+  auto free = static_cast<std::size_t>(
+      std::count_if(of.shape.begin(), of.shape.end(),
+                    [](const ShapeParameter& parameter) { return !parameter.discrete; }));
+  if (of.form == Form::shared_gain) ++free;
+  if (of.form == Form::own_gains)
+    for (const Eigen::VectorXd& gains : explanation.gains)
+      free += static_cast<std::size_t>(gains.size());
+  return free;
+}
+
 Setting::Setting(const NoiseShape& shape, const StackedRows& rows,
                  const Eigen::Array<bool, Eigen::Dynamic, 1>& present, const Column& residual,
                  const Eigen::MatrixXd& common, const Eigen::VectorXd& precision)

@@ -24,11 +24,19 @@ struct Explanation {
   double score{0.0};                     ///< gain of 2 ln L, the price of its parameters taken off
   std::vector<const Setting*> settings;  ///< one an output: under which it is likeliest
   double left_out_gain{0.0};  ///< share of the RMS that it takes from rows it was not fitted to
-  double log_left{0.0};       ///< ln of what it leaves of their RMS, summed over all outputs
+  double left_out_gain_of_best{0.0};  ///< the same of the output of which it takes most
+  double log_left{0.0};  ///< ln of what it leaves of their RMS, summed over all outputs
+  double witness{0.0};   ///< of the score: what the other sensors say of a fault of a reading
   /// Of its cause with any place of its subject's group, once it is chosen.
   double probability{0.0};
   double family_probability{0.0};
 };
+
+/// Takes what the other sensors say to the score.
+void add_witness(Explanation& explanation, double says);
+
+/// Of its shape and its gains, those that were not searched among a few values.
+[[nodiscard]] std::size_t free_parameters(const Explanation& explanation);
 
 /// One output's residual over the stacked rows under one noise shape, whitened, with everything
 /// that any hypothesis has to compete with.

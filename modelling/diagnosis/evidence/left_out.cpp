@@ -120,6 +120,7 @@ LeftOutGain gain_of(const std::vector<Squares>& by_output) {
   LeftOutGain gain;
   double left = 0.0;
   double left_alone = 0.0;
+  double least = std::numeric_limits<double>::infinity();
   double outputs = 0.0;
   double all_before = 0.0;
   double all_after = 0.0;
@@ -131,11 +132,15 @@ LeftOutGain gain_of(const std::vector<Squares>& by_output) {
     all_after += squares.after;
     if (!(before > 0)) continue;
     left += squares.after / before;
+    least = std::min(least, squares.after / before);
     left_alone += squares.alone / squares.measured;
     outputs += 1.0;
     gain.log_left += log_ratio(squares.after, squares.measured);
   }
-  if (outputs > 0) gain.share = 1.0 - std::sqrt(std::max(left, left_alone) / outputs);
+  if (outputs > 0) {
+    gain.share = 1.0 - std::sqrt(std::max(left, left_alone) / outputs);
+    gain.share_of_best = 1.0 - std::sqrt(least);
+  }
   if (all_before > 0) gain.share_of_all = 1.0 - std::sqrt(all_after / all_before);
   return gain;
 }

@@ -19,20 +19,22 @@ constexpr double left_max = 3.0;
 constexpr double share_min = -0.5;
 constexpr double share_max = 1.0;
 /// Leaves of rows left out as little, in ln.
-constexpr double crowd = 0.1;
+constexpr double as_little = 0.1;
 
 struct Weights {
   double left_out;
-  double likelihood;
   double first_place;
   double behind;
+  double witness;
   double share;
-  double crowd;
+  double parameters;
+  double same_cause;
+  double other_causes;
   double none;  ///< utility of nothing
 };
 // calibrate_posterior.py prints what follows.
-constexpr Weights for_first{2.37, 0.16, 1.03, 0.51, 6.23, 1.12, 4.38};
-constexpr Weights for_later{0.55, 0.35, 0.92, 0.13, 6.10, 0.67, 5.08};
+constexpr Weights for_first{0.99, 0.50, 0.31, 0.68, 9.98, 0.47, 2.03, 0.67, 3.79};
+constexpr Weights for_later{-0.02, 0.99, 0.32, -0.02, 7.29, 0.16, 1.18, 0.38, 4.26};
 
 /// What the weighed explanations are told from each other by.
 class Field {
@@ -44,22 +46,39 @@ class Field {
 
   [[nodiscard]] double utility(std::size_t place) const {
     const Explanation& of = weighed_[place];
-    const double likelihood = std::copysign(std::log1p(std::abs(of.score) / score_scale), of.score);
+    const double witness =
+        std::copysign(std::log1p(std::abs(of.witness) / score_scale), of.witness);
     return weights_.left_out * std::clamp(-of.log_left, left_min, left_max) +
-           weights_.share * std::clamp(of.left_out_gain, share_min, share_max) -
-           weights_.crowd * std::log(as_good_as(of)) + weights_.likelihood * likelihood -
+           weights_.share * std::clamp(of.left_out_gain_of_best, share_min, share_max) +
+           weights_.witness * witness -
+           weights_.parameters * static_cast<double>(free_parameters(of)) -
+           weights_.same_cause * std::log(rivals_of_cause(of)) -
+           weights_.other_causes * std::log1p(rivals_of_others(of)) -
            weights_.behind * std::log1p((best_score_ - of.score) / score_scale) +
            (place == 0 ? weights_.first_place : 0.0);
   }
 
  private:
-  /// Explanations of its cause that leave about as little or less, itself among them.
-  [[nodiscard]] double as_good_as(const Explanation& of) const {
-    return static_cast<double>(
-        std::count_if(weighed_.begin(), weighed_.end(), [&](const Explanation& other) {
-          return other.hypothesis->cause == of.hypothesis->cause &&
-                 other.log_left < of.log_left + crowd;
-        }));
+  /// How much of a rival another one is: 1 if its likelihood is as large.
+  [[nodiscard]] static double rival(const Explanation& other, const Explanation& of) {
+    return 1.0 / (1.0 + std::max(0.0, of.score - other.score) / score_scale);
+  }
+  /// Of its cause, leaving about as little or less; itself among them.
+  [[nodiscard]] double rivals_of_cause(const Explanation& of) const {
+    double sum = 0.0;
+    for (const Explanation& other : weighed_)
+      if (other.hypothesis->cause == of.hypothesis->cause &&
+          other.log_left < of.log_left + as_little)
+        sum += rival(other, of);
+    return sum;
+  }
+  /// Of other causes, leaving less.
+  [[nodiscard]] double rivals_of_others(const Explanation& of) const {
+    double sum = 0.0;
+    for (const Explanation& other : weighed_)
+      if (other.hypothesis->cause != of.hypothesis->cause && other.log_left < of.log_left)
+        sum += rival(other, of);
+    return sum;
   }
 
   std::span<const Explanation> weighed_;

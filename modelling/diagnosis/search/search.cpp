@@ -176,6 +176,7 @@ void Search::settle_anew(Explanation& explanation) const {
     explanation.settings[output] = outputs_[output].settings().front().get();
   explanation.gains = weigh(*explanation.hypothesis, explanation.shape, explanation.settings).gains;
   settle({&explanation});
+  explanation.witness = 0.0;
 }
 
 std::vector<Explanation> Search::ranked() {
@@ -237,6 +238,7 @@ void Search::measure_left_out(std::vector<Explanation>& candidates) const {
       measure_left_out(*each, left_out);
     } else {
       each->left_out_gain = twin->left_out_gain;
+      each->left_out_gain_of_best = twin->left_out_gain_of_best;
       each->log_left = twin->log_left;
     }
   }
@@ -264,6 +266,7 @@ LeftOutGain Search::left_out_gain(const Explanation& explanation, LeftOut& left_
 void Search::measure_left_out(Explanation& explanation, LeftOut& left_out) const {
   const LeftOutGain gain = left_out_gain(explanation, left_out);
   explanation.left_out_gain = thresholds_.one_unit ? gain.share_of_all : gain.share;
+  explanation.left_out_gain_of_best = gain.share_of_best;
   explanation.log_left = gain.log_left;
   for (const std::size_t output : measured_)
     if (explanation.gains[output].size() == 0) explanation.log_left += log_left_without_[output];

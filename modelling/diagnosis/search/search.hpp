@@ -71,7 +71,10 @@ struct Weighed {
   std::string subject{};
   double score{0.0};
   double left_out_gain{0.0};
+  double left_out_gain_of_best{0.0};
   double log_left{0.0};
+  double witness{0.0};
+  std::size_t free_parameters{0};
 };
 
 struct SearchResult {

@@ -104,7 +104,7 @@ bool Search::each_earned(std::vector<Finding>& findings) {
     settle_anew(each);
     if (!acts(each)) return false;
     if (each.hypothesis->sensor)
-      each.score += witness_.says(each, {{*each.hypothesis->sensor, 1.0}}).front();
+      add_witness(each, witness_.says(each, {{*each.hypothesis->sensor, 1.0}}).front());
     LeftOut left_out(rows_, outputs_);
     measure_left_out(each, left_out);
     if (!earned(each, false)) return false;

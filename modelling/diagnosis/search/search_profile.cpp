@@ -195,7 +195,7 @@ void Search::add_best_of_grid(const Hypothesis& hypothesis, const Equations& equ
     }
     if (!(best - cost > 0)) continue;
     Explanation explanation{
-        &hypothesis, point_of_grid(hypothesis, at), {}, best - cost, settings[under], 0.0, 0.0};
+        &hypothesis, point_of_grid(hypothesis, at), {}, best - cost, settings[under]};
     static_cast<void>(
         score_of(hypothesis, equations, under, at, settings[under], &explanation.gains));
     under_each[under].push_back(std::move(explanation));

@@ -106,10 +106,12 @@ void Search::follow(Path& path, std::vector<Explanation> candidates, std::size_t
         return found.explanation.hypothesis == each.hypothesis;
       });
     });
-    for (std::size_t i = 0; i < std::min(weighed_shown, candidates.size()); ++i)
-      path.weighed.push_back({round, candidates[i].hypothesis->cause,
-                              candidates[i].hypothesis->subject, candidates[i].score,
-                              candidates[i].left_out_gain, candidates[i].log_left});
+    for (std::size_t i = 0; i < std::min(weighed_shown, candidates.size()); ++i) {
+      const Explanation& each = candidates[i];
+      path.weighed.push_back({round, each.hypothesis->cause, each.hypothesis->subject, each.score,
+                              each.left_out_gain, each.left_out_gain_of_best, each.log_left,
+                              each.witness, free_parameters(each)});
+    }
     if (thresholds_.one_unit) {
       const auto first = std::find_if(
           candidates.begin(), candidates.end(),

@@ -84,7 +84,7 @@ std::vector<Explanation> witnessed(const Place& place, const std::vector<std::si
   for (std::size_t i = 0; i < all.size(); ++i)
     accused.push_back({*all[i].hypothesis->sensor, 1.0 / ratios[i]});
   const std::vector<double> support = witness.says(place.first, accused);
-  for (std::size_t i = 0; i < all.size(); ++i) all[i].score += support[i];
+  for (std::size_t i = 0; i < all.size(); ++i) add_witness(all[i], support[i]);
   std::stable_sort(all.begin(), all.end(),
                    [](const Explanation& a, const Explanation& b) { return a.score > b.score; });
   if (all.size() > twins_kept)
