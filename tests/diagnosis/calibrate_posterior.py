@@ -24,8 +24,8 @@ from measured_plants import FAMILIES
 WEIGHED = 12  # explanations of a round that count
 SCORE_SCALE = 20.0
 AS_LITTLE = 0.1  # left of rows left out, in ln
-WEIGHTS = ("left_out", "first_place", "behind", "witness", "share", "parameters", "same_cause",
-           "other_causes", "none")
+WEIGHTS = ("left_out", "first_place", "behind", "witness", "share", "share_of_best", "parameters",
+           "same_cause", "other_causes", "none")
 STEPS = 3000
 # A second effect beside another on simulated machines, of which there are few cases, counts so many
 # times: then two cases in five have one.
@@ -75,8 +75,9 @@ def features(weighed):
         rows[place, :-1] = (np.clip(-each["log_left"], -0.5, 3.0), place == 0,
                             -np.log1p((best - each["score"]) / SCORE_SCALE),
                             np.sign(witness) * np.log1p(abs(witness) / SCORE_SCALE),
+                            np.clip(each["left_out_gain"], -0.5, 1.0),
                             np.clip(each["left_out_gain_of_best"], -0.5, 1.0),
-                            -each["free_parameters"], -np.log(same), -np.log1p(others))
+                            -np.log1p(each["free_parameters"]), -np.log(same), -np.log1p(others))
     rows[-1, -1] = 1.0
     return rows
 

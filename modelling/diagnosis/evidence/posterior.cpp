@@ -27,14 +27,15 @@ struct Weights {
   double behind;
   double witness;
   double share;
+  double share_of_best;
   double parameters;
   double same_cause;
   double other_causes;
   double none;  ///< utility of nothing
 };
 // calibrate_posterior.py prints what follows.
-constexpr Weights for_first{0.99, 0.50, 0.31, 0.68, 9.98, 0.47, 2.03, 0.67, 3.79};
-constexpr Weights for_later{-0.02, 0.99, 0.32, -0.02, 7.29, 0.16, 1.18, 0.38, 4.26};
+constexpr Weights for_first{1.30, 0.47, 0.29, 0.74, 4.28, 5.48, 1.52, 2.00, 0.67, 3.25};
+constexpr Weights for_later{0.24, 0.83, 0.28, 0.01, 4.09, 3.29, 0.72, 1.19, 0.39, 3.71};
 
 /// What the weighed explanations are told from each other by.
 class Field {
@@ -49,9 +50,10 @@ class Field {
     const double witness =
         std::copysign(std::log1p(std::abs(of.witness) / score_scale), of.witness);
     return weights_.left_out * std::clamp(-of.log_left, left_min, left_max) +
-           weights_.share * std::clamp(of.left_out_gain_of_best, share_min, share_max) +
+           weights_.share * std::clamp(of.left_out_gain, share_min, share_max) +
+           weights_.share_of_best * std::clamp(of.left_out_gain_of_best, share_min, share_max) +
            weights_.witness * witness -
-           weights_.parameters * static_cast<double>(free_parameters(of)) -
+           weights_.parameters * std::log1p(static_cast<double>(free_parameters(of))) -
            weights_.same_cause * std::log(rivals_of_cause(of)) -
            weights_.other_causes * std::log1p(rivals_of_others(of)) -
            weights_.behind * std::log1p((best_score_ - of.score) / score_scale) +

@@ -26,13 +26,14 @@ enum class Round { first, later };
 /// P(h) = exp(u_h) / (exp(u_none) + sum of exp(u)), u a weighted sum of
 ///
 ///   - what the explanation takes of rows that it was not fitted to, -log_left,
-///   - the share that it takes of the RMS of the output that it explains best, in those rows,
+///   - the share that it takes of the RMS of the outputs on which it acts, in those rows, and of
+///     the one of them that it explains best: many a fault hardly moves the others,
 ///   - what the other sensors say of a fault of a reading, sign(w) ln(1 + |w| / 20), since
 ///     neighbouring rows say the same,
-///   - how many parameters it was free to choose,
+///   - how many parameters it was free to choose, ln(1 + free),
 ///   - ln of its rivals of the same cause that take about as much, itself among them, and ln of
-///     1 + those of other causes that take more: a rival behind in 2 ln L counts 1 / (1 + behind /
-///     20),
+///     1 + those of other causes that take more: one whose 2 ln L is behind by d counts
+///     1 / (1 + d / 20),
 ///   - how far its likelihood is behind the likeliest's, ln(1 + behind / 20),
 ///   - whether it is the first in the order of Search::choose().
 ///

@@ -147,6 +147,16 @@ TEST_CASE("a cause among rivals that take as much is less likely than one alone"
   CHECK(odds_of_first({first, explanation(drift, 2000.0, -0.1)}) < alone);
 }
 
+TEST_CASE("what helps one output and makes all together worse is doubted", "[diagnosis]") {
+  Hypothesis lag = hypothesis("thermal_lag", "spindle_degC");
+  lag.shape = {{"tau_s", {60.0, 600.0}}};
+  Explanation each = explanation(lag, 1475.0, -1.03);
+  each.gains = {Eigen::VectorXd::Ones(1)};
+  CHECK(posterior({each}, Round::first).none < 0.2);
+  each.left_out_gain = -0.31;
+  CHECK(posterior({each}, Round::first).none > 0.5);
+}
+
 TEST_CASE("what the other sensors say of a fault of a reading counts", "[diagnosis]") {
   const Hypothesis step = hypothesis("sensor_step", "t1_degC");
   const auto probability = [&](double witness) {
