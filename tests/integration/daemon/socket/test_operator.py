@@ -170,6 +170,8 @@ def test_only_a_latched_axis_is_released(machine, lab):
     assert abs(told["read_um"] - told["sent_um"] - 20.0) < 0.1
     assert "another writer" in told["likely"]  # it came while nothing was sent
     machine.controller.show_more_um(0.0)
+    # A release said while the other value is still read back is dropped.
+    eventually(lambda: abs(daemon.axis()["applied"] - told["sent_um"]) < 0.1, "shown as sent")
     assert daemon.cli("release", "z")[0] == 0
     eventually(lambda: daemon.axis()["driven"] and daemon.axis()["mismatch"] is None, "driven again")
     machine.warm_by(3.0)
