@@ -32,10 +32,11 @@ struct Explanation {
   double family_probability{0.0};
 };
 
-/// Takes what the other sensors say to the score.
+/// Adds what the other sensors say to the score, which must not have it yet.
+/// @param says  2 ln of a likelihood ratio, of SensorWitness
 void add_witness(Explanation& explanation, double says);
 
-/// Of its shape and its gains, those that were not searched among a few values.
+/// Parameters that were fitted: of its shape those that are not discrete, and its gains.
 [[nodiscard]] std::size_t free_parameters(const Explanation& explanation);
 
 /// One output's residual over the stacked rows under one noise shape, whitened, with everything

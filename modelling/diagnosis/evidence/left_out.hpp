@@ -16,7 +16,8 @@ struct LeftOutGain {
   /// 1 - RMS with the explanation / RMS without, over all outputs that it acts on, each in units of
   /// its own RMS.
   double share{0.0};
-  /// The same of the output of which it takes most.
+  /// 1 - RMS with / RMS without of the output of which it takes most, errors of the coefficients
+  /// beside it in both.
   double share_of_best{0.0};
   /// The same with all outputs in one unit: what is large counts.
   double share_of_all{0.0};
