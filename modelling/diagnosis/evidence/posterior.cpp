@@ -88,6 +88,12 @@ class Field {
   double best_score_{-std::numeric_limits<double>::infinity()};
 };
 
+/// The same cause with places that cannot be told apart.
+bool of_one_group(const Explanation& one, const Explanation& other, const PlaceGroups& groups) {
+  return other.hypothesis->cause == one.hypothesis->cause &&
+         same_places(groups, one.hypothesis->subject, other.hypothesis->subject);
+}
+
 }  // namespace
 
 const std::string& family_of(const std::string& cause) {
@@ -118,14 +124,28 @@ Posterior posterior(const std::vector<Explanation>& explanations, Round round) {
 double probability_of_group(const std::vector<Explanation>& explanations,
                             const Posterior& posterior, const PlaceGroups& groups,
                             std::size_t index) {
-  const Hypothesis& of = *explanations[index].hypothesis;
   double sum = 0.0;
-  for (std::size_t i = 0; i < explanations.size(); ++i) {
-    const Hypothesis& other = *explanations[i].hypothesis;
-    if (other.cause == of.cause && same_places(groups, of.subject, other.subject))
-      sum += posterior.of[i];
-  }
+  for (std::size_t i = 0; i < explanations.size(); ++i)
+    if (of_one_group(explanations[index], explanations[i], groups)) sum += posterior.of[i];
   return sum;
+}
+
+std::size_t likeliest(const std::vector<Explanation>& explanations, const Posterior& posterior,
+                      const PlaceGroups& groups) {
+  std::size_t centre = 0;
+  double most = 0.0;
+  for (std::size_t i = 0; i < explanations.size(); ++i) {
+    const double of_group = probability_of_group(explanations, posterior, groups, i);
+    if (of_group <= most) continue;
+    most = of_group;
+    centre = i;
+  }
+  std::size_t best = centre;
+  for (std::size_t i = 0; i < explanations.size(); ++i)
+    if (of_one_group(explanations[centre], explanations[i], groups) &&
+        posterior.of[i] > posterior.of[best])
+      best = i;
+  return best;
 }
 
 }  // namespace thermocomp::diagnosis

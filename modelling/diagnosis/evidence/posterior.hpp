@@ -50,4 +50,11 @@ enum class Round { first, later };
                                           const Posterior& posterior, const PlaceGroups& groups,
                                           std::size_t index);
 
+/// Place of what is to be named: of the likeliest group of places the explanation that is
+/// likeliest by itself. A group is that of one place: a place between two others has both in its
+/// group, they do not have each other.
+/// @param explanations  at least one
+[[nodiscard]] std::size_t likeliest(const std::vector<Explanation>& explanations,
+                                    const Posterior& posterior, const PlaceGroups& groups);
+
 }  // namespace thermocomp::diagnosis

@@ -43,6 +43,12 @@ struct ReadingShare {
   double weight{0.0};
 };
 
+/// A cause with its subject, by name.
+struct Named {
+  std::string cause;
+  std::string subject;
+};
+
 struct Hypothesis {
   std::string cause{};
   std::string subject{};
@@ -54,6 +60,8 @@ struct Hypothesis {
   std::optional<std::size_t> sensor{};  ///< a fault of the reading of this input
   /// 2 ln L that it must gain beyond others: for what contains a simpler cause as a special case.
   double handicap{0.0};
+  /// The simpler one, which explains all that this one does where what it adds is nothing.
+  std::optional<Named> special_case{};
   /// Least share of the RMS with which it is clear by itself, where likelihood shall not make it
   /// so; 0: as others.
   double clear_share{0.0};

@@ -33,6 +33,19 @@ const Setting* likeliest_of(const std::vector<const Setting*>& settings,
   return likeliest;
 }
 
+/// What adds nothing to a simpler explanation is no rival of it.
+void leave_out_no_likelier_than_special_case(std::vector<Explanation>& candidates) {
+  std::map<std::pair<std::string, std::string>, double> scores;
+  for (const Explanation& each : candidates)
+    scores[{each.hypothesis->cause, each.hypothesis->subject}] = each.score;
+  std::erase_if(candidates, [&](const Explanation& each) {
+    const std::optional<Named>& special = each.hypothesis->special_case;
+    if (!special) return false;
+    const auto simpler = scores.find({special->cause, special->subject});
+    return simpler != scores.end() && simpler->second >= each.score;
+  });
+}
+
 }  // namespace
 
 Search::Search(const MeasuredData& data, const Thresholds& thresholds)
@@ -210,6 +223,7 @@ std::vector<Explanation> Search::judged(std::vector<std::vector<Explanation>> un
     });
     if (!known) once.push_back(std::move(candidate));
   }
+  leave_out_no_likelier_than_special_case(once);
   return once;
 }
 

@@ -137,16 +137,8 @@ void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& pat
     candidates[i].probability = all.of[i];
     candidates[i].family_probability = told.families.at(family_of(candidates[i].hypothesis->cause));
   }
-  std::size_t best = 0;
-  double most = 0.0;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const double of_group = probability_of_group(candidates, all, groups_, i);
-    const bool likelier = of_group > most * (1.0 + 1e-9) ||
-                          (of_group > most * (1.0 - 1e-9) && all.of[i] > all.of[best]);
-    if (!likelier) continue;
-    most = of_group;
-    best = i;
-  }
+  const std::size_t best = likeliest(candidates, all, groups_);
+  double most = probability_of_group(candidates, all, groups_, best);
   if (most >= thresholds_.probability_min)
     most = std::max(thresholds_.probability_min,
                     probability_of_group(candidates, told, groups_, best));

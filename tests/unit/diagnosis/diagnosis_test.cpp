@@ -1,5 +1,6 @@
 #include "modelling/diagnosis/diagnosis.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -108,6 +109,25 @@ struct Readings {
     return model;
   }
 };
+
+/// With a position that goes to and fro in 23 minutes; the first reading's effect grows along it.
+RunFile along_axis(const Readings& machine, unsigned seed, double um_per_K_mm) {
+  RunFile run = machine.run(seed);
+  run.columns.emplace_back("x_mm");
+  run.values.emplace_back();
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    const double x_mm = 20.0 * static_cast<double>(row % 23);
+    run.values.back().push_back(x_mm);
+    run.values[2][row] += um_per_K_mm * x_mm * (run.values[3][row] - 20.0);
+  }
+  return run;
+}
+
+Diagnosis diagnosis_along_axis(const Readings& machine, double um_per_K_mm) {
+  return diagnose(machine.model(),
+                  {along_axis(machine, 1, um_per_K_mm), along_axis(machine, 2, um_per_K_mm)},
+                  {"a", "b"}, {along_axis(machine, 3, um_per_K_mm)}, {"c"});
+}
 
 /// A machine of six readings, which are more alike than the causes that they are to be told from.
 Readings six_readings(std::vector<double> factor) {
@@ -373,6 +393,27 @@ TEST_CASE("a small cause beside errors of all coefficients is left to them or na
     CHECK(finding.cause == "missing_heat_source");
     CHECK(finding.subject == "spindle_rpm");
   }
+}
+
+TEST_CASE("an effect along an axis is no rival of a wrong coefficient where no axis matters",
+          "[diagnosis]") {
+  const auto weighed = [](const Diagnosis& answer, const std::string& cause) {
+    return std::any_of(answer.weighed.begin(), answer.weighed.end(), [&](const Weighed& each) {
+      return each.cause == cause && each.subject.starts_with("t1_degC");
+    });
+  };
+  Readings machine{{0.05, 0.02}, {9.0, -12.0}, {1.0, 1.0}};
+  const Diagnosis along = diagnosis_along_axis(machine, 0.02);
+  REQUIRE(along.findings.size() == 1);
+  CHECK(along.findings[0].cause == "position_dependence");
+  CHECK(along.findings[0].subject == "t1_degC|x_mm");
+  machine.factor[0] = 1.5;
+  const Diagnosis wrong = diagnosis_along_axis(machine, 0.0);
+  REQUIRE(wrong.findings.size() == 1);
+  CHECK(wrong.findings[0].cause == "wrong_coefficient");
+  CHECK(wrong.findings[0].subject == "t1_degC");
+  CHECK(weighed(wrong, "wrong_coefficient"));
+  CHECK_FALSE(weighed(wrong, "position_dependence"));
 }
 
 TEST_CASE("nothing is said where there is nothing", "[diagnosis]") {

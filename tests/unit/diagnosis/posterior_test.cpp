@@ -205,6 +205,21 @@ TEST_CASE("places that move alike are one group, whose probabilities add", "[dia
   CHECK(probability_of_group(both, all, groups, 1) == Approx(all.of[0] + all.of[1]));
 }
 
+TEST_CASE("a place between two others is not named in their place", "[diagnosis]") {
+  const PlaceGroups groups = {{"t1_degC", {"t1_degC", "t2_degC"}},
+                              {"t2_degC", {"t2_degC", "t1_degC", "t3_degC"}},
+                              {"t3_degC", {"t3_degC", "t2_degC"}}};
+  const Hypothesis first = hypothesis("nonlinear_expansion", "t1_degC");
+  const Hypothesis between = hypothesis("nonlinear_expansion", "t2_degC");
+  const Hypothesis last = hypothesis("nonlinear_expansion", "t3_degC");
+  const std::vector<Explanation> all = {explanation(first, 1100.0, -3.0),
+                                        explanation(between, 600.0, -1.6),
+                                        explanation(last, 600.0, -1.5)};
+  const Posterior of = posterior(all, Round::first);
+  REQUIRE(probability_of_group(all, of, groups, 1) > probability_of_group(all, of, groups, 0));
+  CHECK(likeliest(all, of, groups) == 0);
+}
+
 TEST_CASE("what recorded places predict is told from what they do not", "[diagnosis]") {
   const MeasuredData data = data_of(model_of_one(), 900);
   const StackedRows rows = stacked_rows(data);
