@@ -1,7 +1,6 @@
 #include "cli/operate/operate_commands.hpp"
 
 #include <array>
-#include <cmath>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -12,6 +11,7 @@
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
 #include "cli/operate/prove_command.hpp"
+#include "cli/operate/release_command.hpp"
 
 namespace thermocomp::cli {
 
@@ -94,32 +94,6 @@ void add_reference_command(CLI::App& app, const GlobalOptions& global, Action& a
   sub->callback([&global, &action, force] {
     action = [&global, force] { return run_reference(global, *force); };
   });
-}
-
-/// Where what is read back is not what was sent last: what the release takes on trust.
-void warn_of_trust(const json& status, const std::string& name) {
-  constexpr double same_um = 0.3;
-  for (const json& axis : list_of(status, "axes")) {
-    const json& mismatch = object_of(axis, "mismatch");
-    if (text_of(axis, "name") != name || mismatch.empty()) continue;
-    const double sent_um = number_of(mismatch, "sent_um");
-    const double read_um = number_of(axis, "applied");
-    if (!(std::abs(read_um - sent_um) > same_um)) continue;
-    std::cout << "It reads back " << fixed_signed(read_um, 2) << " um where "
-              << fixed_signed(sent_um, 2)
-              << " um was sent last, and goes on from what it reads back.\nIf the controller adds "
-                 "the difference by itself, the tool moves by it once more: mend that first.\n";
-  }
-}
-
-int run_release(const GlobalOptions& global, const std::string& axis) {
-  const json before = ask_daemon(global.socket, "status", json::object());
-  ask_daemon(global.socket, "release", {{"axis", axis}});
-  std::cout << "axis " << axis
-            << ": released; it is driven again unless its next read-backs show the same fault\n"
-               "(thermocomp status)\n";
-  warn_of_trust(before, axis);
-  return exit_success;
 }
 
 using RunAxis = int (*)(const GlobalOptions&, const AxisValue&);

@@ -59,18 +59,34 @@ def test_operator_commands_ask_the_right_method(daemon):
         assert daemon.requests[-1].get("params", {}) == params
 
 
-def test_release_says_what_it_takes_on_trust(daemon):
+def latched(applied_um, releasing):
+    return status_answer(axes=[{"name": "z", "unit": "um", "driven": False, "applied": applied_um,
+                                "mismatch": {"sent_um": 14.67, "read_um": 26.67,
+                                             "likely": "changes without us",
+                                             "releasing": releasing}}])
+
+
+def test_release_waits_for_the_read_backs_and_says_what_it_takes_on_trust(daemon):
     daemon.answers["release"] = {"done": True}
-    axis = {"name": "z", "unit": "um", "driven": False, "applied": 26.67,
-            "mismatch": {"sent_um": 14.67, "read_um": 26.67, "likely": "changes without us"}}
-    daemon.answers["status"] = status_answer(axes=[axis])
-    said = run("--socket", daemon.path, "release", "z").stdout
-    assert "reads back +26.67 um where +14.67 um was sent last" in said
-    assert daemon.requests[-1] | {"id": 0} == {
-        "jsonrpc": "2.0", "id": 0, "method": "release", "params": {"axis": "z"}}
-    axis["applied"] = 14.6
-    daemon.answers["status"] = status_answer(axes=[axis])
-    assert "reads back" not in run("--socket", daemon.path, "release", "z").stdout
+    for applied_um, trusts in ((26.67, True), (14.6, False)):
+        daemon.requests.clear()
+        daemon.answers["status"] = [latched(applied_um, False), latched(applied_um, True),
+                                    latched(applied_um, True), status_answer()]
+        answer = run("--socket", daemon.path, "release", "z")
+        assert answer.returncode == 0 and answer.stdout.startswith("axis z: released\n")
+        assert ("read back +26.67 um where +14.67 um was sent last" in answer.stdout) == trusts
+        assert [request["method"] for request in daemon.requests] == [
+            "status", "release", "status", "status", "status"]
+        assert daemon.requests[1]["params"] == {"axis": "z"}
+
+
+def test_a_release_that_the_read_backs_contradict_is_told(daemon):
+    daemon.answers["release"] = {"done": True}
+    daemon.answers["status"] = [latched(26.67, False), latched(26.67, True), latched(26.67, False)]
+    answer = run("--socket", daemon.path, "release", "z")
+    assert answer.returncode == 1
+    assert ("NOT released: it reads back +26.67 um where +14.67 um was sent last (changes without "
+            "us)") in answer.stdout
 
 
 def test_measured_shows_what_is_left_beside_what_the_model_says_is_left(daemon):

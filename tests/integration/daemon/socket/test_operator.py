@@ -169,6 +169,10 @@ def test_only_a_latched_axis_is_released(machine, lab):
     told = daemon.axis()["mismatch"]
     assert abs(told["read_um"] - told["sent_um"] - 20.0) < 0.1
     assert "another writer" in told["likely"]  # it came while nothing was sent
+    machine.controller.show_more_um(500.0)  # beyond what an offset may be
+    eventually(lambda: daemon.axis()["applied"] > 400.0, "shown")
+    status, out, _ = daemon.cli("release", "z")
+    assert status == 1 and "axis z: NOT released: it reads back +506.00 um" in out, out
     machine.controller.show_more_um(0.0)
     # A release said while the other value is still read back is dropped.
     eventually(lambda: abs(daemon.axis()["applied"] - told["sent_um"]) < 0.1, "shown as sent")
