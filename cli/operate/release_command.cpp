@@ -21,8 +21,8 @@ constexpr auto look_period = 50ms;
 constexpr auto told_after = 2s;
 constexpr auto patience = 10s;
 
-/// Of the axis, or of the first of its nodes that has one: its mismatch with what it reads back now;
-/// empty where it has none.
+/// Of the axis, or of the first of its nodes that has one: its mismatch with what it reads back
+/// now; empty where it has none.
 json mismatch_now(const json& status, const std::string& name) {
   for (const json& axis : list_of(status, "axes")) {
     if (text_of(axis, "name") != name && text_of(axis, "axis") != name) continue;
@@ -87,7 +87,8 @@ int run_release(const GlobalOptions& global, const std::string& axis) {
   std::cout << "axis " << axis << ": NOT released: it reads back "
             << fixed_signed(number_of(after, "applied_um"), 2) << " um where "
             << fixed_signed(number_of(after, "sent_um"), 2) << " um was sent last ("
-            << text_of(after, "likely") << ").\nMend that, wait until it reads back what was sent, "
+            << text_of(after, "likely")
+            << ").\nMend that, wait until it reads back what was sent, "
                "and release again.\n";
   return exit_no;
 }
