@@ -14,8 +14,9 @@ Hypothesis along(const Material& material, const Subject& place, const Subject& 
   const std::string subject = std::min(temperature, axis) + "|" + std::max(temperature, axis);
   Hypothesis along{name, subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}};
   along.handicap = special_case_handicap;
-  along.special_case = {place.kind == SubjectKind::input ? "wrong_coefficient" : "missing_temperature",
-                        temperature};  // without the position
+  along.special_case = {
+      place.kind == SubjectKind::input ? "wrong_coefficient" : "missing_temperature",
+      temperature};  // without the position
   along.write_columns =
       one_by_one([&material, rise_K = material.values_of(place),
                   position_mm = material.values_of(position)](const Shape&, std::size_t) {
