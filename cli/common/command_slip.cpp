@@ -23,6 +23,13 @@ std::string command_slip_text(const CLI::App* app, const CLI::Error& error) {
   const std::vector<std::string> rest = group->remaining();
   const auto word = std::find_if(rest.begin(), rest.end(),
                                  [](const std::string& each) { return !each.starts_with('-'); });
+  const bool none = rest.empty() && error.get_name() == "RequiredError";
+  if (!known.empty() && none) {
+    std::string names;
+    for (const std::string& each : known) names += (names.empty() ? "" : ", ") + each;
+    return words + ": which command? One of: " + names + ".\n" + words +
+           " --help tells what they do.\n";
+  }
   if (known.empty() || word == rest.end()) return CLI::FailureMessage::simple(app, error);
   const std::string meant = nearest_name(*word, known);
   return words + ": no command " + printable_text(*word) +

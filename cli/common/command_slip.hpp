@@ -11,7 +11,8 @@ class Error;
 namespace thermocomp::cli {
 
 /// A word that should have been a command, of the program or of a group of commands: by that word
-/// and the command that was probably meant. Anything else as CLI11 says it.
+/// and the command that was probably meant. None at all: by those that there are. Anything else as
+/// CLI11 says it.
 /// For CLI::App::failure_message().
 [[nodiscard]] std::string command_slip_text(const CLI::App* app, const CLI::Error& error);
 

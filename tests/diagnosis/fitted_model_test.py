@@ -3,7 +3,10 @@
 must be named all the same, what it put into the coefficients taken out again, and nothing be named
 where nothing was hidden.
 
-fitted_model_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
+fitted_model_test.py PROGRAM [--few | --count N]
+
+--few: a handful of cases, for sanitizer builds. --count: no test; counts what is said of N machines
+with an effect and N untouched ones at each of the levels 1 and 2.
 """
 
 import os
@@ -11,7 +14,9 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # ruff: noqa: E402
+import collections
 import json
+import multiprocessing
 import pathlib
 import sys
 import tempfile
@@ -21,6 +26,7 @@ import numpy as np
 
 import campaign
 import hidden_effects as hidden
+import measured_campaign
 
 # (level, seed, cause, ridge of the fit, whether an offset of each run was free)
 CASES = ((1, 136, "thermal_lag", 0.0, False), (1, 140, "speed_growth", 0.0, True),
@@ -28,6 +34,8 @@ CASES = ((1, 136, "thermal_lag", 0.0, False), (1, 140, "speed_growth", 0.0, True
          (1, 118, "thermal_lag", 1e-3, False), (1, 131, "displacement_step", 1e-3, False))
 SILENT = ((2, 50100, 0.0, False), (2, 50102, 1e-3, False), (1, 50120, 0.0, True))
 GAIN_MIN = 0.3  # of the test RMS, in one output at least
+WAYS_TO_FIT = ((0.0, False), (1e-3, False), (0.0, True))  # ridge, offset of each run
+COUNTED_SEED = 909192
 
 
 def columns(path):
@@ -87,6 +95,38 @@ def named_and_gained(program, folder, case):
     return "" if max(gains) > GAIN_MIN else "gains %s only" % gains
 
 
+def said_of(task):
+    """@return whether something was hidden, whether the first name is right, its probability"""
+    program, level, seed, causes, way = task
+    with tempfile.TemporaryDirectory() as temporary:
+        truth, answer = examined(program, pathlib.Path(temporary), level, seed, causes, *way)
+    if not answer["findings"]:
+        return bool(causes), False, 0.0
+    first = answer["findings"][0]
+    return (bool(causes), bool(causes) and campaign.same(first, truth["hidden"][0]),
+            first["probability"])
+
+
+def count(program, machines):
+    tasks = [(program, level, COUNTED_SEED + 1000 * level + i,
+              [hidden.CAUSES[i % len(hidden.CAUSES)]] if planted else [],
+              WAYS_TO_FIT[i % len(WAYS_TO_FIT)])
+             for level in (1, 2) for planted in (True, False) for i in range(machines)]
+    total, stated = collections.Counter(), []
+    with multiprocessing.Pool(2) as pool:
+        for done, (planted, right, probability) in enumerate(pool.imap(said_of, tasks), 1):
+            campaign.progress(done, len(tasks))
+            total[planted, "all"] += 1
+            total[planted, "named"] += probability > 0
+            total[planted, "right"] += right
+            if probability > 0:
+                stated.append((probability, right))
+    print("planted: %d of %d named, %d right; untouched: %d of %d named" % (
+        total[True, "named"], total[True, "all"], total[True, "right"], total[False, "named"],
+        total[False, "all"]))
+    measured_campaign.print_reliability("names", stated)
+
+
 def main(program, few):
     failed = 0
     with tempfile.TemporaryDirectory() as temporary:
@@ -104,4 +144,8 @@ def main(program, few):
 
 
 if __name__ == "__main__":
-    sys.exit(main(str(pathlib.Path(sys.argv[1]).resolve()), "--few" in sys.argv[2:]))
+    PROGRAM = str(pathlib.Path(sys.argv[1]).resolve())
+    if sys.argv[2:3] == ["--count"]:
+        count(PROGRAM, int(sys.argv[3]))
+        sys.exit(0)
+    sys.exit(main(PROGRAM, "--few" in sys.argv[2:]))
