@@ -30,7 +30,6 @@ def test_where_a_command_is_missing_those_that_there_are_are_named():
     answer = run("thermal-test")
     assert answer.returncode == 2
     assert "thermal-test: which command? One of: report, plan.\n" in answer.stderr, answer.stderr
-    assert "status" in run().stderr
 
 
 def test_help_tells_the_exit_statuses_of_this_command():

@@ -34,9 +34,9 @@ def test_help_succeeds_and_bad_use_is_status_2():
     assert run("--help").returncode == 0
     assert run("predict", "--help").returncode == 0
     for arguments, said in (
-            ([], "subcommand"), (["nosuch"], "no command nosuch\n"),
+            ([], "thermocomp: which command? One of: init, "), (["nosuch"], "no command nosuch\n"),
             (["enabel"], "thermocomp: no command enabel; did you mean enable?"),
-            (["history"], "subcommand"),
+            (["history"], "thermocomp history: which command? One of: check.\n"),
             (["history", "chek", "h.db"],
              "thermocomp history: no command chek; did you mean check?\nthermocomp history --help"),
             (["history", "status"], "thermocomp history: no command status\n"),
