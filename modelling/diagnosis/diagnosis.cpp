@@ -49,11 +49,12 @@ void add_terms(ThermalModel& model, const std::vector<TermSpec>& terms) {
 /// @param fitted  if given, the search that they come from: what their causes had put into the
 ///                coefficients is taken out of them
 Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
-                   const SearchBesideFit* fitted, const MeasuredData& train,
-                   const MeasuredData& test) {
+                   const SearchBesideFit* fitted, const PlaceGroups& groups,
+                   const MeasuredData& train, const MeasuredData& test) {
   Corrections corrections;
   for (const Finding& finding : findings) {
     NamedFinding name = named_finding(finding, train, parameters_of(finding, train));
+    name.group = group_of(groups, name.subject, finding.explanation.other_subjects);
     const std::optional<TermSpec> term = term_of(finding, train);
     ThermalModel longer = diagnosis.extended;
     Corrections more = corrections;
@@ -160,12 +161,10 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   Diagnosis diagnosis;
   diagnosis.extended = model;
   diagnosis.weighed = result.weighed;
-  const Corrections corrections =
-      extend(diagnosis, result.findings, fitted ? &beside_fit : nullptr, train_data, test_data);
+  const Corrections corrections = extend(diagnosis, result.findings, fitted ? &beside_fit : nullptr,
+                                         search.groups(), train_data, test_data);
   diagnosis.verdict = verdict_of(result);
   diagnosis.families = result.families;
-  for (NamedFinding& finding : diagnosis.findings)
-    finding.group = group_of(search.groups(), finding.subject);
   const std::vector<Headroom> headroom = search.headrooms(result);
   carry_remainder(diagnosis, headroom, train_corrections(diagnosis, train_data), corrections,
                   train_data, test_data);

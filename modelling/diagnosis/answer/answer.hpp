@@ -39,7 +39,8 @@ struct NamedFinding {
   double probability{not_a_number};  ///< of the cause with any place of the group
   std::string family{};
   double family_probability{not_a_number};
-  std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
+  /// Places that cannot be told apart, the subject's first.
+  std::vector<std::string> group{};
 };
 
 /// RMS of training rows that were left out in turn.

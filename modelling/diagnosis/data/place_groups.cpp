@@ -68,16 +68,24 @@ bool same_places(const PlaceGroups& groups, const std::string& subject, const st
                       alike(groups, a.second, b.first));
 }
 
-std::vector<std::string> group_of(const PlaceGroups& groups, const std::string& subject) {
-  const SubjectColumns places = subject_columns(subject);
-  std::vector<std::string> all = {places.first};
-  if (!places.second.empty()) all.push_back(places.second);
-  for (const std::string& place : {places.first, places.second}) {
+std::vector<std::string> group_of(const PlaceGroups& groups, const std::string& subject,
+                                  const std::vector<std::string>& others) {
+  std::vector<std::string> all;
+  const auto add = [&all](const std::string& name) {
+    if (!name.empty() && std::find(all.begin(), all.end(), name) == all.end()) all.push_back(name);
+  };
+  const auto add_places = [&add](const std::string& of) {
+    const SubjectColumns places = subject_columns(of);
+    add(places.first);
+    add(places.second);
+  };
+  add_places(subject);
+  for (const std::string& place : std::vector<std::string>(all)) {
     const auto group = groups.find(place);
     if (group == groups.end()) continue;
-    for (const std::string& name : group->second)
-      if (std::find(all.begin(), all.end(), name) == all.end()) all.push_back(name);
+    for (const std::string& name : group->second) add(name);
   }
+  for (const std::string& other : others) add_places(other);
   return all;
 }
 

@@ -16,8 +16,10 @@ using PlaceGroups = std::map<std::string, std::vector<std::string>>;
 /// Whether two subjects are the same but for places of one group.
 [[nodiscard]] bool same_places(const PlaceGroups& groups, const std::string& subject,
                                const std::string& other);
-/// The group of every place of a subject, without repetition, the subject's own places first.
+/// The group of every place of a subject, without repetition, the subject's own places first; then
+/// the places of other subjects.
 [[nodiscard]] std::vector<std::string> group_of(const PlaceGroups& groups,
-                                                const std::string& subject);
+                                                const std::string& subject,
+                                                const std::vector<std::string>& others = {});
 
 }  // namespace thermocomp::diagnosis

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -27,8 +28,10 @@ struct Explanation {
   double left_out_gain_of_best{0.0};  ///< the same of the output of which it takes most
   double log_left{0.0};  ///< ln of what it leaves of their RMS, summed over all outputs
   double witness{0.0};   ///< of the score: what the other sensors say of a fault of a reading
-  /// Of its cause with any place of its subject's group, once it is chosen.
+  /// Of its cause with any place of its subject's group, or with any of `other_subjects`, once it
+  /// is chosen.
   double probability{0.0};
+  std::vector<std::string> other_subjects{};  ///< between which and its own nothing decides
   double family_probability{0.0};
 };
 

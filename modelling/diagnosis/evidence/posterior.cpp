@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <span>
 
 #include "modelling/diagnosis/causes/cause.hpp"
@@ -20,6 +21,8 @@ constexpr double share_min = -0.5;
 constexpr double share_max = 1.0;
 /// Leaves of rows left out as little, in ln.
 constexpr double as_little = 0.1;
+/// Of the likeliest subject's probability: below, another one is not worth telling.
+constexpr double as_likely_min = 0.1;
 
 struct Weights {
   double left_out;
@@ -146,6 +149,31 @@ std::size_t likeliest(const std::vector<Explanation>& explanations, const Poster
         posterior.of[i] > posterior.of[best])
       best = i;
   return best;
+}
+
+CauseAnywhere cause_anywhere(const std::vector<Explanation>& explanations,
+                             const Posterior& posterior) {
+  std::map<std::string, CauseAnywhere> causes;
+  for (std::size_t i = 0; i < explanations.size(); ++i) {
+    const Hypothesis& of = *explanations[i].hypothesis;
+    if (of.output) continue;
+    const auto [known, is_new] = causes.try_emplace(of.cause);
+    CauseAnywhere& cause = known->second;
+    if (is_new || posterior.of[i] > posterior.of[cause.likeliest]) cause.likeliest = i;
+    cause.probability += posterior.of[i];
+  }
+  CauseAnywhere most;
+  for (auto& [name, cause] : causes)
+    if (cause.probability > most.probability) most = std::move(cause);
+  if (explanations.empty()) return most;
+  const Hypothesis& of = *explanations[most.likeliest].hypothesis;
+  for (std::size_t i = 0; i < explanations.size(); ++i) {
+    const Hypothesis& other = *explanations[i].hypothesis;
+    if (other.cause == of.cause && other.subject != of.subject &&
+        posterior.of[i] > as_likely_min * posterior.of[most.likeliest])
+      most.others.push_back(other.subject);
+  }
+  return most;
 }
 
 }  // namespace thermocomp::diagnosis

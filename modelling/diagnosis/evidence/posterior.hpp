@@ -50,6 +50,15 @@ enum class Round { first, later };
                                           const Posterior& posterior, const PlaceGroups& groups,
                                           std::size_t index);
 
+/// Of the likeliest cause with any subject that is no output.
+struct CauseAnywhere {
+  std::size_t likeliest{0};         ///< place of its explanation that is likeliest by itself
+  double probability{0.0};          ///< of the cause with any of its subjects; 0: there is none
+  std::vector<std::string> others;  ///< its other subjects that are at least a tenth as likely
+};
+[[nodiscard]] CauseAnywhere cause_anywhere(const std::vector<Explanation>& explanations,
+                                           const Posterior& posterior);
+
 /// Place of what is to be named: of the likeliest group of places the explanation that is
 /// likeliest by itself. A group is that of one place: a place between two others has both in its
 /// group, they do not have each other.

@@ -193,7 +193,7 @@ std::string probability_text(const NamedFinding& finding) {
   if (!std::isfinite(finding.probability)) return "";
   std::string text = " It is this";
   if (finding.group.size() > 1) {
-    text += ", or the same at a place that moves alike (";
+    text += ", or the same at a place that these data do not tell from it (";
     for (std::size_t i = 1; i < finding.group.size(); ++i)
       text += (i > 1 ? ", " : "") + finding.group[i];
     text += "),";

@@ -126,7 +126,8 @@ void Search::follow(Path& path, std::vector<Explanation> candidates, std::size_t
 }
 
 /// The likeliest cause with its group of places, of them the likeliest; the others by their own
-/// probabilities.
+/// probabilities. Where no group is likely enough, the likeliest cause wherever it is: which of
+/// many places it is may be all that is not known.
 void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& path) const {
   if (!thresholds_.by_probability || candidates.empty()) return;
   const Posterior all = posterior(candidates, path.findings.empty() ? Round::first : Round::later);
@@ -137,8 +138,16 @@ void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& pat
     candidates[i].probability = all.of[i];
     candidates[i].family_probability = told.families.at(family_of(candidates[i].hypothesis->cause));
   }
-  const std::size_t best = likeliest(candidates, all, groups_);
+  std::size_t best = likeliest(candidates, all, groups_);
   double most = probability_of_group(candidates, all, groups_, best);
+  if (most < thresholds_.probability_min && path.findings.empty() && !thresholds_.by_gates) {
+    CauseAnywhere cause = cause_anywhere(candidates, all);
+    if (cause.probability >= thresholds_.probability_min) {
+      best = cause.likeliest;
+      most = cause.probability;
+      candidates[best].other_subjects = std::move(cause.others);
+    }
+  }
   if (most >= thresholds_.probability_min)
     most = std::max(thresholds_.probability_min,
                     probability_of_group(candidates, told, groups_, best));

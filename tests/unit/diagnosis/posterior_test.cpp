@@ -220,6 +220,28 @@ TEST_CASE("a place between two others is not named in their place", "[diagnosis]
   CHECK(likeliest(all, of, groups) == 0);
 }
 
+TEST_CASE("a cause that is clear at places that are not is named with them", "[diagnosis]") {
+  const Hypothesis first = hypothesis("missing_temperature", "t1_degC");
+  const Hypothesis other = hypothesis("missing_temperature", "t3_degC");
+  const Hypothesis unlikely = hypothesis("missing_temperature", "t4_degC");
+  const Hypothesis lag = hypothesis("thermal_lag", "t1_degC");
+  Hypothesis drift = hypothesis("displacement_drift", "z_um");
+  drift.output = 0;
+  const std::vector<Explanation> all = {
+      explanation(first, 300.0, -1.0), explanation(other, 298.0, -1.02),
+      explanation(drift, 290.0, -1.2), explanation(lag, 280.0, -0.8),
+      explanation(unlikely, 10.0, -0.1)};
+  const Posterior of = posterior(all, Round::first);
+  REQUIRE(of.of[2] > of.of[0]);
+  const CauseAnywhere cause = cause_anywhere(all, of);
+  CHECK(cause.likeliest == (of.of[0] > of.of[1] ? 0 : 1));
+  CHECK(cause.probability == Approx(of.of[0] + of.of[1] + of.of[4]));
+  CHECK(cause.others == std::vector<std::string>{cause.likeliest == 0 ? "t3_degC" : "t1_degC"});
+  CHECK(group_of({{"t1_degC", {"t1_degC", "t2_degC"}}}, "t1_degC", {"t3_degC", "t2_degC|x_mm"}) ==
+        std::vector<std::string>{"t1_degC", "t2_degC", "t3_degC", "x_mm"});
+  CHECK(cause_anywhere({}, posterior({}, Round::first)).probability == 0.0);
+}
+
 TEST_CASE("what recorded places predict is told from what they do not", "[diagnosis]") {
   const MeasuredData data = data_of(model_of_one(), 900);
   const StackedRows rows = stacked_rows(data);
