@@ -156,11 +156,13 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   const bool fitted =
       !of_fitted.findings.empty() &&
       (result.findings.empty() || log_left_by(of_fitted) < log_left_by(result) - fitted_share);
-  if (fitted) result = std::move(of_fitted);
 
   Diagnosis diagnosis;
   diagnosis.extended = model;
   diagnosis.weighed = result.weighed;
+  diagnosis.weighed.insert(diagnosis.weighed.end(), of_fitted.weighed.begin(),
+                           of_fitted.weighed.end());
+  if (fitted) result = std::move(of_fitted);
   const Corrections corrections = extend(diagnosis, result.findings, fitted ? &beside_fit : nullptr,
                                          search.groups(), train_data, test_data);
   diagnosis.verdict = verdict_of(result);

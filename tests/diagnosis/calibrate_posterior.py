@@ -4,10 +4,12 @@
 calibrate_posterior.py ANSWERS.json...     written by
     measured_campaign.py PROGRAM --weighed --json ANSWERS.json
     campaign.py PROGRAM --answers ANSWERS.json
+    fitted_model_test.py PROGRAM --count N --answers ANSWERS.json
 
 Prints the weights of modelling/diagnosis/evidence/posterior.cpp, for the first finding (from
-machines with one effect or none) and for later ones (from all), and how well they do on the cases
-they come from and on machines that were left out of the fit one after the other.
+machines with one effect or none), for later ones (from all), and for the first one beside a model
+that was fitted to the same rows (from those alone), and how well they do on the cases they come
+from and on machines that were left out of the fit one after the other.
 """
 
 import collections
@@ -27,6 +29,7 @@ AS_LITTLE = 0.1  # left of rows left out, in ln
 WEIGHTS = ("left_out", "first_place", "behind", "witness", "share", "share_of_best", "parameters",
            "same_cause", "other_causes", "none")
 STEPS = 3000
+PENALTY = 0.15  # of a weight's square: two features of single outputs are the same
 # A second effect beside another on simulated machines, of which there are few cases, counts so many
 # times: then two cases in five have one.
 TIMES_SIMULATED_PAIR = 6
@@ -36,30 +39,41 @@ def hidden_in(kept):
     return kept.get("truths") or ([kept["truth"]] if kept["truth"] else [])
 
 
-def rounds_of(kept, later):
-    """What was weighed in the first round, or in each one after something was named."""
+FITTED = "fitted"  # the base model of answers beside a fit
+ROUNDS = {"first": "first finding", "later": "later findings", "beside_fit": "beside a fit"}
+
+
+def rounds_of(kept, which):
+    """What was weighed in the first round, in each one after something was named, or in the first
+    one of each search beside the model's own fit."""
     weighed = kept["answer"]["weighed"]
-    if later:
-        numbers = {each["round"] for each in weighed} - {1} if kept["answer"]["findings"] else ()
+    if (kept["base"] == FITTED) != (which == "beside_fit"):
+        return []
+    if which == "beside_fit":
+        keys = {(each["beside_fit"], 1) for each in weighed} - {(0, 1)}
+    elif which == "later":
+        keys = {(0, each["round"]) for each in weighed} - {(0, 1)} if kept["answer"]["findings"] else ()
     else:
-        numbers = (1,) if len(hidden_in(kept)) < 2 else ()
-    return [[each for each in weighed if each["round"] == number] for number in sorted(numbers)]
+        keys = ((0, 1),) if len(hidden_in(kept)) < 2 else ()
+    rounds = [[each for each in weighed if (each["beside_fit"], each["round"]) == key]
+              for key in sorted(keys)]
+    return [each for each in rounds if each]
 
 
-def cases_of(paths, later):
+def cases_of(paths, which):
     """One dictionary a case: machine, size, features (the last row: nothing), which of them are
     right, families."""
     cases = []
     for path in paths:
         for kept in json.loads(pathlib.Path(path).read_text()):
             truths = hidden_in(kept)
-            simulated = kept["base"] == "simulated"
+            simulated = kept["base"] in ("simulated", FITTED)
             right = campaign.same if simulated else measured_campaign.right
-            times = TIMES_SIMULATED_PAIR if later and simulated and len(truths) > 1 else 1
-            for weighed in rounds_of(kept, later):
+            pair = which == "later" and simulated and len(truths) > 1
+            for weighed in rounds_of(kept, which):
                 weighed = weighed[:WEIGHED]
                 hits = [any(right(w, truth) for truth in truths) for w in weighed]
-                cases += times * [dict(
+                cases += (TIMES_SIMULATED_PAIR if pair else 1) * [dict(
                     machine=kept["machine"], size=kept["size"], truth=kept["truth"],
                     features=features(weighed), hits=np.array(hits + [not any(hits)]),
                     families=[FAMILIES[w["cause"]] for w in weighed])]
@@ -117,7 +131,7 @@ def fitted(cases):
         stated = odds / odds.sum(axis=1, keepdims=True)
         right = (stated * hits).sum(axis=1)
         slope = np.einsum("ij,ijk->k", stated * hits / right[:, None] - stated, features)
-        return -np.log(right).sum(), -slope
+        return -np.log(right).sum() + PENALTY * weights @ weights, -slope + 2 * PENALTY * weights
     weights = np.zeros(len(WEIGHTS))
     value, slope = loss(weights)
     length = 1e-3
@@ -164,11 +178,12 @@ def judged(cases, weights_of):
 
 
 def main():
-    for later in (False, True):
-        cases = cases_of(sys.argv[1:], later)
+    for which, text in ROUNDS.items():
+        cases = cases_of(sys.argv[1:], which)
+        if not cases:
+            continue
         weights = fitted(cases)
-        print("later findings" if later else "first finding",
-              " ".join("%s %.2f" % of for of in zip(WEIGHTS, weights)))
+        print(text, " ".join("%s %.2f" % of for of in zip(WEIGHTS, weights)))
         print("cases it comes from")
         judged(cases, lambda _: weights)
         machines = sorted({case["machine"] for case in cases})

@@ -3,10 +3,11 @@
 must be named all the same, what it put into the coefficients taken out again, and nothing be named
 where nothing was hidden.
 
-fitted_model_test.py PROGRAM [--few | --count N]
+fitted_model_test.py PROGRAM [--few | --count N [--seed S] [--answers FILE]]
 
 --few: a handful of cases, for sanitizer builds. --count: no test; counts what is said of N machines
-with an effect and N untouched ones at each of the levels 1 and 2.
+with an effect and N untouched ones at each of the levels 1 and 2. --answers keeps what was said and
+weighed for calibrate_posterior.py.
 """
 
 import os
@@ -14,6 +15,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # ruff: noqa: E402
+import argparse
 import collections
 import json
 import multiprocessing
@@ -24,18 +26,18 @@ import tomllib
 
 import numpy as np
 
+import calibrate_posterior
 import campaign
 import hidden_effects as hidden
 import measured_campaign
 
 # (level, seed, cause, ridge of the fit, whether an offset of each run was free)
 CASES = ((1, 136, "thermal_lag", 0.0, False), (1, 140, "speed_growth", 0.0, True),
-         (2, 121, "missing_heat_source", 0.0, False), (2, 141, "missing_temperature", 0.0, False),
+         (2, 121, "missing_heat_source", 0.0, False), (2, 160, "missing_temperature", 0.0, False),
          (1, 118, "thermal_lag", 1e-3, False), (1, 131, "displacement_step", 1e-3, False))
 SILENT = ((2, 50100, 0.0, False), (2, 50102, 1e-3, False), (1, 50120, 0.0, True))
 GAIN_MIN = 0.3  # of the test RMS, in one output at least
 WAYS_TO_FIT = ((0.0, False), (1e-3, False), (0.0, True))  # ridge, offset of each run
-COUNTED_SEED = 909192
 
 
 def columns(path):
@@ -76,7 +78,8 @@ def rms_of_written_um(program, folder):
 def examined(program, folder, level, seed, causes, ridge, offset):
     hidden.make(folder, seed, level, causes)
     fit(folder, ridge, offset)
-    answer = campaign.diagnose(program, folder, ("--model", "model.toml", "--out", "out"))
+    answer = campaign.diagnose(program, folder,
+                               ("--model", "model.toml", "--out", "out", "--weighed"))
     return json.loads((folder / "truth.json").read_text()), answer
 
 
@@ -95,36 +98,39 @@ def named_and_gained(program, folder, case):
     return "" if max(gains) > GAIN_MIN else "gains %s only" % gains
 
 
-def said_of(task):
-    """@return whether something was hidden, whether the first name is right, its probability"""
+def counted(task):
+    """@return as campaign.kept_answer()"""
     program, level, seed, causes, way = task
     with tempfile.TemporaryDirectory() as temporary:
         truth, answer = examined(program, pathlib.Path(temporary), level, seed, causes, *way)
-    if not answer["findings"]:
-        return bool(causes), False, 0.0
-    first = answer["findings"][0]
-    return (bool(causes), bool(causes) and campaign.same(first, truth["hidden"][0]),
-            first["probability"])
+    kept = campaign.kept_answer((None, None, "single", level, seed), truth, answer)
+    return kept | dict(base=calibrate_posterior.FITTED)
 
 
-def count(program, machines):
-    tasks = [(program, level, COUNTED_SEED + 1000 * level + i,
+def count(program, machines, seed, answers):
+    tasks = [(program, level, seed + 100000 * level + 10000 * planted + i,
               [hidden.CAUSES[i % len(hidden.CAUSES)]] if planted else [],
               WAYS_TO_FIT[i % len(WAYS_TO_FIT)])
              for level in (1, 2) for planted in (True, False) for i in range(machines)]
-    total, stated = collections.Counter(), []
+    total, stated, kept = collections.Counter(), [], []
     with multiprocessing.Pool(2) as pool:
-        for done, (planted, right, probability) in enumerate(pool.imap(said_of, tasks), 1):
+        for done, each in enumerate(pool.imap(counted, tasks), 1):
             campaign.progress(done, len(tasks))
-            total[planted, "all"] += 1
-            total[planted, "named"] += probability > 0
-            total[planted, "right"] += right
-            if probability > 0:
-                stated.append((probability, right))
+            kept.append(each)
+            planted, first = each["truth"], (each["answer"]["findings"] or [None])[0]
+            kind = "planted" if planted else "untouched"
+            right = bool(planted and first and campaign.same(first, planted))
+            total[kind] += 1
+            total[kind, "named"] += first is not None
+            total[kind, "right"] += right
+            if first:
+                stated.append((first["probability"], right))
     print("planted: %d of %d named, %d right; untouched: %d of %d named" % (
-        total[True, "named"], total[True, "all"], total[True, "right"], total[False, "named"],
-        total[False, "all"]))
+        total["planted", "named"], total["planted"], total["planted", "right"],
+        total["untouched", "named"], total["untouched"]))
     measured_campaign.print_reliability("names", stated)
+    if answers:
+        pathlib.Path(answers).write_text(json.dumps(kept))
 
 
 def main(program, few):
@@ -144,8 +150,15 @@ def main(program, few):
 
 
 if __name__ == "__main__":
-    PROGRAM = str(pathlib.Path(sys.argv[1]).resolve())
-    if sys.argv[2:3] == ["--count"]:
-        count(PROGRAM, int(sys.argv[3]))
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("program")
+    parser.add_argument("--few", action="store_true")
+    parser.add_argument("--count", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=909192)
+    parser.add_argument("--answers")
+    given = parser.parse_args()
+    PROGRAM = str(pathlib.Path(given.program).resolve())
+    if given.count:
+        count(PROGRAM, given.count, given.seed, given.answers)
         sys.exit(0)
-    sys.exit(main(PROGRAM, "--few" in sys.argv[2:]))
+    sys.exit(main(PROGRAM, given.few))

@@ -98,7 +98,8 @@ Json weighed_json(const Diagnosis& diagnosis) {
                    {"left_out_gain_of_best", number(each.left_out_gain_of_best)},
                    {"log_left", number(each.log_left)},
                    {"witness", number(each.witness)},
-                   {"free_parameters", each.free_parameters}});
+                   {"free_parameters", each.free_parameters},
+                   {"beside_fit", each.beside_fit}});
   return all;
 }
 

@@ -109,9 +109,9 @@ void print(const Diagnosis& diagnosis) {
 
 void print_weighed(const Diagnosis& diagnosis) {
   for (const Weighed& each : diagnosis.weighed)
-    std::printf("weighed %zu: %s of %s: 2 ln L %.0f, left-out rows %.0f %%, ln %.3f\n", each.round,
-                each.cause.c_str(), each.subject.c_str(), each.score, 100 * each.left_out_gain,
-                each.log_left);
+    std::printf("weighed %zu%s: %s of %s: 2 ln L %.0f, left-out rows %.0f %%, ln %.3f\n",
+                each.round, each.beside_fit > 0 ? " beside the fit" : "", each.cause.c_str(),
+                each.subject.c_str(), each.score, 100 * each.left_out_gain, each.log_left);
 }
 
 Diagnosis diagnosis_of(const Options& options, ReportData* report) {

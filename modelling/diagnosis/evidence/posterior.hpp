@@ -19,9 +19,13 @@ struct Posterior {
   std::map<std::string, double> families{};
 };
 
-/// Beside what is named already, what a model leaves anyway is taken for an effect more easily:
-/// evidence counts less.
-enum class Round { first, later };
+/// What the evidence stands for: beside what is named already, what a model leaves anyway is taken
+/// for an effect more easily, and a fit to the same rows has hidden most of what acted.
+enum class Round {
+  first,
+  later,
+  beside_fit,  ///< the first one beside a model that was fitted to these rows (SearchBesideFit)
+};
 
 /// P(h) = exp(u_h) / (exp(u_none) + sum of exp(u)), u a weighted sum of
 ///
@@ -41,7 +45,7 @@ enum class Round { first, later };
 /// the weights did not carry over to machines that were left out of them.
 ///
 /// The weights are those under which effects planted in measured and in simulated machines are
-/// likeliest (tests/diagnosis/calibrate_posterior.py), for the first finding and for later ones.
+/// likeliest (tests/diagnosis/calibrate_posterior.py), in each of the rounds.
 /// @param explanations  in the order of Search::choose()
 [[nodiscard]] Posterior posterior(const std::vector<Explanation>& explanations, Round round);
 

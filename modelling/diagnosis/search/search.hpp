@@ -75,6 +75,8 @@ struct Weighed {
   double log_left{0.0};
   double witness{0.0};
   std::size_t free_parameters{0};
+  /// Which search beside the model's own fit (SearchBesideFit) it was; 0: that of all outputs.
+  std::size_t beside_fit{0};
 };
 
 struct SearchResult {

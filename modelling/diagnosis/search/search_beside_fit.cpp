@@ -194,8 +194,6 @@ void SearchBesideFit::take(std::unique_ptr<Group> group, SearchResult& result) {
     spread(finding.gain_sd);
     result.findings.push_back(std::move(finding));
   }
-  result.weighed.insert(result.weighed.end(), group->result.weighed.begin(),
-                        group->result.weighed.end());
   if (result.families.empty()) result.families = group->result.families;
   groups_.push_back(std::move(group));
 }
@@ -204,9 +202,18 @@ SearchResult SearchBesideFit::run() {
   SearchResult result;
   result.unexplained_share.assign(data_.model.outputs.size(), 1.0);
   if (!fit_) return result;
+  std::size_t searches = 0;
+  const auto note_weighed = [&](const Group& group) {
+    ++searches;
+    for (Weighed each : group.result.weighed) {
+      each.beside_fit = searches;
+      result.weighed.push_back(std::move(each));
+    }
+  };
   std::vector<std::unique_ptr<Group>> alone;
   for (const std::size_t output : fit_->outputs()) {
     std::unique_ptr<Group> group = searched({output});
+    note_weighed(*group);
     if (!group->result.findings.empty()) alone.push_back(std::move(group));
   }
   while (!alone.empty()) {
@@ -218,6 +225,7 @@ SearchResult SearchBesideFit::run() {
       outputs.push_back((*each)->outputs.front());
     std::unique_ptr<Group> together;
     if (outputs.size() > 1) together = searched(outputs);
+    if (together) note_weighed(*together);
     if (together && !together->result.findings.empty())
       take(std::move(together), result);
     else

@@ -130,13 +130,11 @@ void Search::follow(Path& path, std::vector<Explanation> candidates, std::size_t
 /// many places it is may be all that is not known.
 void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& path) const {
   if (!thresholds_.by_probability || candidates.empty()) return;
-  const Posterior all = posterior(candidates, path.findings.empty() ? Round::first : Round::later);
-  // A fit takes most of a cause, as a finding does: names beside it are right as often as those of
-  // later rounds.
-  const Posterior told = thresholds_.by_gates ? posterior(candidates, Round::later) : all;
+  const Round first = thresholds_.by_gates ? Round::beside_fit : Round::first;
+  const Posterior all = posterior(candidates, path.findings.empty() ? first : Round::later);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     candidates[i].probability = all.of[i];
-    candidates[i].family_probability = told.families.at(family_of(candidates[i].hypothesis->cause));
+    candidates[i].family_probability = all.families.at(family_of(candidates[i].hypothesis->cause));
   }
   std::size_t best = likeliest(candidates, all, groups_);
   double most = probability_of_group(candidates, all, groups_, best);
@@ -148,11 +146,8 @@ void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& pat
       candidates[best].other_subjects = std::move(cause.others);
     }
   }
-  if (most >= thresholds_.probability_min)
-    most = std::max(thresholds_.probability_min,
-                    probability_of_group(candidates, told, groups_, best));
   candidates[best].probability = most;
-  if (path.findings.empty()) path.families = told.families;
+  if (path.findings.empty()) path.families = all.families;
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const auto& a, const auto& b) { return a.probability > b.probability; });
 }
