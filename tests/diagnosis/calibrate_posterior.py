@@ -2,7 +2,7 @@
 """Weights of the posterior of a diagnosis: those under which what was planted is likeliest.
 
 calibrate_posterior.py ANSWERS.json...     written by
-    measured_campaign.py PROGRAM --weighed --json ANSWERS.json
+    measured_campaign.py PROGRAM --weighed --json ANSWERS.json     also of --kind pair and fitted
     campaign.py PROGRAM --answers ANSWERS.json
     fitted_model_test.py PROGRAM --count N --answers ANSWERS.json
 
@@ -39,7 +39,6 @@ def hidden_in(kept):
     return kept.get("truths") or ([kept["truth"]] if kept["truth"] else [])
 
 
-FITTED = "fitted"  # the base model of answers beside a fit
 ROUNDS = {"first": "first finding", "later": "later findings", "beside_fit": "beside a fit"}
 
 
@@ -47,7 +46,7 @@ def rounds_of(kept, which):
     """What was weighed in the first round, in each one after something was named, or in the first
     one of each search beside the model's own fit."""
     weighed = kept["answer"]["weighed"]
-    if (kept["base"] == FITTED) != (which == "beside_fit"):
+    if kept.get("fitted", False) != (which == "beside_fit"):
         return []
     if which == "beside_fit":
         keys = {(each["beside_fit"], 1) for each in weighed} - {(0, 1)}
@@ -67,7 +66,7 @@ def cases_of(paths, which):
     for path in paths:
         for kept in json.loads(pathlib.Path(path).read_text()):
             truths = hidden_in(kept)
-            simulated = kept["base"] in ("simulated", FITTED)
+            simulated = kept["base"] == "simulated"
             right = campaign.same if simulated else measured_campaign.right
             pair = which == "later" and simulated and len(truths) > 1
             for weighed in rounds_of(kept, which):

@@ -38,7 +38,7 @@ struct Weights {
 };
 // calibrate_posterior.py prints what follows.
 constexpr Weights for_first{1.39, 0.47, 0.25, 0.74, 3.87, 4.84, 1.41, 1.99, 0.83, 2.99};
-constexpr Weights for_beside_fit{1.64, 1.14, -0.08, 0.28, 1.50, 1.64, 3.65, 0.77, 0.87, 0.77};
+constexpr Weights for_beside_fit{1.30, 0.42, 0.07, 0.49, 1.14, 1.49, 2.84, 1.00, 0.51, 0.59};
 constexpr Weights for_later{0.03, 0.74, 0.24, 0.07, 4.03, 4.06, 0.39, 1.19, 0.32, 4.20};
 
 const Weights& weights_of(Round round) {
