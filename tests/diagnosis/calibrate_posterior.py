@@ -2,14 +2,12 @@
 """Weights of the posterior of a diagnosis: those under which what was planted is likeliest.
 
 calibrate_posterior.py ANSWERS.json...     written by
-    measured_campaign.py PROGRAM --weighed --json ANSWERS.json     also of --kind pair and fitted
+    measured_campaign.py PROGRAM --weighed --json ANSWERS.json     also of --kind pair
     campaign.py PROGRAM --answers ANSWERS.json
-    fitted_model_test.py PROGRAM --count N --answers ANSWERS.json
 
 Prints the weights of modelling/diagnosis/evidence/posterior.cpp, for the first finding (from
-machines with one effect or none), for later ones (from all), and for the first one beside a model
-that was fitted to the same rows (from those alone), and how well they do on the cases they come
-from and on machines that were left out of the fit one after the other.
+machines with one effect or none) and for later ones (from all), and how well they do on the cases
+they come from and on machines that were left out of the fit one after the other.
 """
 
 import collections
@@ -39,27 +37,17 @@ def hidden_in(kept):
     return kept.get("truths") or ([kept["truth"]] if kept["truth"] else [])
 
 
-ROUNDS = {"first": "first finding", "later": "later findings", "beside_fit": "beside a fit"}
-
-
-def rounds_of(kept, which):
-    """What was weighed in the first round, in each one after something was named, or in the first
-    one of each search beside the model's own fit."""
-    weighed = kept["answer"]["weighed"]
-    if kept.get("fitted", False) != (which == "beside_fit"):
-        return []
-    if which == "beside_fit":
-        keys = {(each["beside_fit"], 1) for each in weighed} - {(0, 1)}
-    elif which == "later":
-        keys = {(0, each["round"]) for each in weighed} - {(0, 1)} if kept["answer"]["findings"] else ()
+def rounds_of(kept, later):
+    """What was weighed in the first round, or in each one after something was named."""
+    weighed = [each for each in kept["answer"]["weighed"] if not each["beside_fit"]]
+    if later:
+        numbers = {each["round"] for each in weighed} - {1} if kept["answer"]["findings"] else ()
     else:
-        keys = ((0, 1),) if len(hidden_in(kept)) < 2 else ()
-    rounds = [[each for each in weighed if (each["beside_fit"], each["round"]) == key]
-              for key in sorted(keys)]
-    return [each for each in rounds if each]
+        numbers = (1,) if len(hidden_in(kept)) < 2 else ()
+    return [[each for each in weighed if each["round"] == number] for number in sorted(numbers)]
 
 
-def cases_of(paths, which):
+def cases_of(paths, later):
     """One dictionary a case: machine, size, features (the last row: nothing), which of them are
     right, families."""
     cases = []
@@ -68,11 +56,11 @@ def cases_of(paths, which):
             truths = hidden_in(kept)
             simulated = kept["base"] == "simulated"
             right = campaign.same if simulated else measured_campaign.right
-            pair = which == "later" and simulated and len(truths) > 1
-            for weighed in rounds_of(kept, which):
+            times = TIMES_SIMULATED_PAIR if later and simulated and len(truths) > 1 else 1
+            for weighed in rounds_of(kept, later):
                 weighed = weighed[:WEIGHED]
                 hits = [any(right(w, truth) for truth in truths) for w in weighed]
-                cases += (TIMES_SIMULATED_PAIR if pair else 1) * [dict(
+                cases += times * [dict(
                     machine=kept["machine"], size=kept["size"], truth=kept["truth"],
                     features=features(weighed), hits=np.array(hits + [not any(hits)]),
                     families=[FAMILIES[w["cause"]] for w in weighed])]
@@ -177,12 +165,11 @@ def judged(cases, weights_of):
 
 
 def main():
-    for which, text in ROUNDS.items():
-        cases = cases_of(sys.argv[1:], which)
-        if not cases:
-            continue
+    for later in (False, True):
+        cases = cases_of(sys.argv[1:], later)
         weights = fitted(cases)
-        print(text, " ".join("%s %.2f" % of for of in zip(WEIGHTS, weights)))
+        print("later findings" if later else "first finding",
+              " ".join("%s %.2f" % of for of in zip(WEIGHTS, weights)))
         print("cases it comes from")
         judged(cases, lambda _: weights)
         machines = sorted({case["machine"] for case in cases})

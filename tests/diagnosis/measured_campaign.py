@@ -33,8 +33,7 @@ import measured_machines
 from measured_plants import CAUSES, FAMILIES, OUTSIDE, Impossible, Planted
 
 ATTEMPTS = 12
-# fitted: a single effect; then the base model is fitted anew to the training rows alone
-KINDS = ("single", "pair", "outside", "sparse", "outputs", "fitted")
+KINDS = ("single", "pair", "outside", "sparse", "outputs")
 PROBED_EACH_S = 1800.0
 STATED = 0.8  # a name with more than this probability on untouched data is an invention
 
@@ -72,27 +71,18 @@ def planted_case(seed, machines, base, cause, times, kind):
             if kind == "pair":
                 other = second_cause(cause, random)
                 truths.append(Planted(machine, model, other, times, random, first.size_um).truth)
-            return machine, as_recorded(machine, model, kind), truths
+            if kind == "sparse":
+                machine.keep_probings(PROBED_EACH_S)
+            return machine, model, truths
         except Impossible:
             continue
     raise Impossible
 
 
-def as_recorded(machine, model, kind):
-    """What the kind makes of the machine. @return its model"""
-    if kind == "sparse":
-        machine.keep_probings(PROBED_EACH_S)
-    if kind != "fitted":
-        return model
-    return model.fit([{name: values[rows] for name, values in run.items()}
-                      for run, rows in zip(machine.runs, machine.train) if rows.stop])
-
-
-def untouched_case(seed, machines, base, kind):
+def untouched_case(seed, machines, base):
     random = np.random.default_rng([seed, 0])
     machine = machine_of(str(random.choice(machines)), random)
-    model = measured_machines.base_model(machine, base, spared(machine, None, random))
-    return machine, as_recorded(machine, model, kind)
+    return machine, measured_machines.base_model(machine, base, spared(machine, None, random))
 
 
 def write(folder, machine, model):
@@ -139,7 +129,9 @@ def examine(task):
     program, seed, machines, base, cause, times, kind = task
     named = lambda machine: (program, seed, machine.name, base, cause, times, kind)
     if cause is None:
-        machine, model = untouched_case(seed, machines, base, kind)
+        machine, model = untouched_case(seed, machines, base)
+        if kind == "sparse":
+            machine.keep_probings(PROBED_EACH_S)
         return named(machine), None, diagnosed(program, machine, model)
     try:
         machine, model, truths = planted_case(seed, machines, base, cause, times, kind)
@@ -323,8 +315,7 @@ def main():
                 continue
             fine = count.add(task, truth, answer)
             kept.append(dict(machine=task[2], base=task[3], size=task[5], seed=task[1],
-                             truth=truth and truth[0], truths=truth, answer=answer,
-                             fitted=options.kind == "fitted"))
+                             truth=truth and truth[0], truths=truth, answer=answer))
             if options.show and not fine:
                 print("  %s %s %s %s x%g: %s -> %s" % (
                     task[1], *task[2:4], truth and [t["cause"] for t in truth], task[5],

@@ -38,20 +38,7 @@ struct Weights {
 };
 // calibrate_posterior.py prints what follows.
 constexpr Weights for_first{1.39, 0.47, 0.25, 0.74, 3.87, 4.84, 1.41, 1.99, 0.83, 2.99};
-constexpr Weights for_beside_fit{1.30, 0.42, 0.07, 0.49, 1.14, 1.49, 2.84, 1.00, 0.51, 0.59};
 constexpr Weights for_later{0.03, 0.74, 0.24, 0.07, 4.03, 4.06, 0.39, 1.19, 0.32, 4.20};
-
-const Weights& weights_of(Round round) {
-  switch (round) {
-    case Round::first:
-      return for_first;
-    case Round::later:
-      return for_later;
-    case Round::beside_fit:
-      return for_beside_fit;
-  }
-  return for_later;
-}
 
 /// What the weighed explanations are told from each other by.
 class Field {
@@ -118,7 +105,7 @@ const std::string& family_of(const std::string& cause) {
 
 Posterior posterior(const std::vector<Explanation>& explanations, Round round) {
   const std::size_t weighed = std::min(weighed_max, explanations.size());
-  const Weights& weights = weights_of(round);
+  const Weights& weights = round == Round::first ? for_first : for_later;
   std::vector<double> utilities;
   const Field field(std::span<const Explanation>{explanations}.first(weighed), weights);
   for (std::size_t i = 0; i < weighed; ++i) utilities.push_back(field.utility(i));

@@ -19,13 +19,9 @@ struct Posterior {
   std::map<std::string, double> families{};
 };
 
-/// What the evidence stands for: beside what is named already, what a model leaves anyway is taken
-/// for an effect more easily, and a fit to the same rows has hidden most of what acted.
-enum class Round {
-  first,
-  later,
-  beside_fit,  ///< the first one beside a model that was fitted to these rows (SearchBesideFit)
-};
+/// Beside what is named already, what a model leaves anyway is taken for an effect more easily:
+/// evidence counts less.
+enum class Round { first, later };
 
 /// P(h) = exp(u_h) / (exp(u_none) + sum of exp(u)), u a weighted sum of
 ///
@@ -45,7 +41,7 @@ enum class Round {
 /// the weights did not carry over to machines that were left out of them.
 ///
 /// The weights are those under which effects planted in measured and in simulated machines are
-/// likeliest (tests/diagnosis/calibrate_posterior.py), in each of the rounds.
+/// likeliest (tests/diagnosis/calibrate_posterior.py), for the first finding and for later ones.
 /// @param explanations  in the order of Search::choose()
 [[nodiscard]] Posterior posterior(const std::vector<Explanation>& explanations, Round round);
 

@@ -130,15 +130,17 @@ void Search::follow(Path& path, std::vector<Explanation> candidates, std::size_t
 /// many places it is may be all that is not known.
 void Search::put_likeliest_first(std::vector<Explanation>& candidates, Path& path) const {
   if (!thresholds_.by_probability || candidates.empty()) return;
-  const Round first = thresholds_.by_gates ? Round::beside_fit : Round::first;
-  const Posterior all = posterior(candidates, path.findings.empty() ? first : Round::later);
+  // A fit takes most of a cause, as a finding does: names beside it are right as often as those of
+  // later rounds.
+  const bool first = path.findings.empty() && !thresholds_.by_gates;
+  const Posterior all = posterior(candidates, first ? Round::first : Round::later);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     candidates[i].probability = all.of[i];
     candidates[i].family_probability = all.families.at(family_of(candidates[i].hypothesis->cause));
   }
   std::size_t best = likeliest(candidates, all, groups_);
   double most = probability_of_group(candidates, all, groups_, best);
-  if (most < thresholds_.probability_min && path.findings.empty() && !thresholds_.by_gates) {
+  if (most < thresholds_.probability_min && first) {
     CauseAnywhere cause = cause_anywhere(candidates, all);
     if (cause.probability >= thresholds_.probability_min) {
       best = cause.likeliest;
