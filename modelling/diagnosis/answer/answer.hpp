@@ -39,8 +39,7 @@ struct NamedFinding {
   double probability{not_a_number};  ///< of the cause with any place of the group
   std::string family{};
   double family_probability{not_a_number};
-  /// Places that cannot be told apart, the subject's first.
-  std::vector<std::string> group{};
+  std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
 };
 
 /// RMS of training rows that were left out in turn.

@@ -165,7 +165,7 @@ CauseAnywhere cause_anywhere(const std::vector<Explanation>& explanations,
   CauseAnywhere most;
   for (auto& [name, cause] : causes)
     if (cause.probability > most.probability) most = std::move(cause);
-  if (explanations.empty()) return most;
+  if (!(most.probability > 0)) return most;
   const Hypothesis& of = *explanations[most.likeliest].hypothesis;
   for (std::size_t i = 0; i < explanations.size(); ++i) {
     const Hypothesis& other = *explanations[i].hypothesis;

@@ -464,6 +464,7 @@ TEST_CASE("what came into question stands in the JSON where it is asked for", "[
   const std::string json = diagnosis_json(answer, true);
   CHECK(json.find("\"weighed\"") != std::string::npos);
   CHECK(json.find("\"log_left\"") != std::string::npos);
+  CHECK(json.find("\"beside_fit\": 0") != std::string::npos);
 }
 
 TEST_CASE("the answer as JSON has the parts that others read", "[diagnosis]") {
