@@ -99,11 +99,32 @@ Whiteness whiteness_of(const Column& time_s, const Column& residual) {
   return white;
 }
 
+namespace {
+
+/// Places in data.others of the temperatures that a finding names.
+std::vector<std::size_t> named_others(const Diagnosis& diagnosis, const MeasuredData& data) {
+  std::vector<std::size_t> named;
+  for (std::size_t other = 0; other < data.others.size(); ++other) {
+    const std::string& name = data.others[other];
+    if (std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                    [&](const NamedFinding& finding) {
+                      const SubjectColumns columns = subject_columns(finding.subject);
+                      return columns.first == name || columns.second == name;
+                    }))
+      named.push_back(other);
+  }
+  return named;
+}
+
+}  // namespace
+
 void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel& model,
               const Corrections& corrections, const MeasuredData& data, bool test) {
   report.outputs = model.outputs;
   report.signals = data.signals;
   report.inputs = model.inputs;
+  const std::vector<std::size_t> others = named_others(diagnosis, data);
+  for (const std::size_t other : others) report.inputs.push_back(data.others[other]);
   const std::size_t first = report.runs.size();
   for (const MeasuredRun& run : data.runs) {
     const Eigen::Index rows = run.rows() - run.begin;
@@ -112,6 +133,8 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel
       added.measured_um.emplace_back(measured.tail(rows));
     for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
     for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
+    for (const std::size_t other : others)
+      added.inputs_K.emplace_back(run.others_K[other].tail(rows));
     report.runs.push_back(std::move(added));
   }
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {

@@ -40,7 +40,7 @@ struct ReportRun {
 struct ReportData {
   std::vector<std::string> outputs;
   std::vector<std::string> signals;
-  std::vector<std::string> inputs;
+  std::vector<std::string> inputs;  ///< of the model, and the other temperatures that are named
   std::vector<ReportRun> runs;
 };
 

@@ -18,6 +18,7 @@
 #include "modelling/diagnosis/data/series.hpp"
 #include "modelling/diagnosis/evidence/coloured_noise.hpp"
 #include "modelling/diagnosis/hypothesis/hypothesis.hpp"
+#include "modelling/diagnosis/report/report_data.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;
@@ -414,6 +415,31 @@ TEST_CASE("an effect along an axis is no rival of a wrong coefficient where no a
   CHECK(wrong.findings[0].subject == "t1_degC");
   CHECK(weighed(wrong, "wrong_coefficient"));
   CHECK_FALSE(weighed(wrong, "position_dependence"));
+}
+
+TEST_CASE("a temperature that is named is shown beside those of the model", "[diagnosis]") {
+  const Readings machine{{0.05, 0.02, 0.01}, {9.0, -12.0, 10.0}, {1.0, 1.0, 1.0}};
+  ThermalModel model = machine.model();
+  model.inputs = {"t1_degC", "t3_degC"};
+  model.matrix_um_per_K = {{9.0, 10.0}};
+  // The second place moves by itself, not with the speed.
+  const auto run_of = [&](unsigned seed) {
+    RunFile run = machine.run(seed);
+    for (std::size_t row = 0; row < run.rows(); ++row) {
+      const double rise_K = 3.0 * std::sin(static_cast<double>(row) / 37.0);
+      run.values[2][row] += machine.um_per_K[1] * (20.0 + rise_K - run.values[4][row]);
+      run.values[4][row] = 20.0 + rise_K;
+    }
+    return run;
+  };
+  ReportData report;
+  const Diagnosis answer =
+      diagnose(model, {run_of(1), run_of(2)}, {"a", "b"}, {run_of(3)}, {"c"}, &report);
+  REQUIRE(answer.findings.size() == 1);
+  CHECK(answer.findings[0].cause == "missing_temperature");
+  CHECK(answer.findings[0].subject == "t2_degC");
+  CHECK(report.inputs == std::vector<std::string>{"t1_degC", "t3_degC", "t2_degC"});
+  for (const ReportRun& run : report.runs) CHECK(run.inputs_K.size() == 3);
 }
 
 TEST_CASE("nothing is said where there is nothing", "[diagnosis]") {
