@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <iostream>
 #include <thread>
 
@@ -10,7 +9,7 @@
 
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
-#include "cli/common/terminal.hpp"
+#include "cli/operate/progress_line.hpp"
 #include "cli/operate/prove_course.hpp"
 
 namespace thermocomp::cli {
@@ -21,8 +20,6 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto look_period = 50ms;
-/// A line, where stderr is no terminal.
-constexpr auto line_period = 2s;
 /// The last read-back of a slow controller comes so late.
 constexpr auto settles_within = 2s;
 /// A daemon that does not say how long it takes.
@@ -37,32 +34,6 @@ json axis_now(const GlobalOptions& global, const std::string& name) {
     if (text_of(axis, "name") == name || text_of(axis, "axis") == name) return axis;
   return json::object();
 }
-
-/// The line of progress: one that is overwritten, or one every two seconds.
-class ProgressLine {
- public:
-  explicit ProgressLine(std::string what) : what_(std::move(what)) {}
-  ~ProgressLine() {
-    if (shown_ && on_terminal_) std::fputs("\r\033[K", stderr);
-  }
-  ProgressLine(const ProgressLine&) = delete;
-  ProgressLine& operator=(const ProgressLine&) = delete;
-
-  void update(const std::string& text) {
-    const auto now = Clock::now();
-    if (!on_terminal_ && now - last_ < line_period) return;
-    last_ = now;
-    shown_ = true;
-    std::fprintf(stderr, on_terminal_ ? "\r%s: %s\033[K" : "%s: %s\n", what_.c_str(), text.c_str());
-    std::fflush(stderr);
-  }
-
- private:
-  std::string what_;
-  bool on_terminal_{stderr_is_terminal()};
-  bool shown_{false};
-  Clock::time_point last_{Clock::now()};
-};
 
 void watch(const GlobalOptions& global, const std::string& axis, double takes_s,
            ProveCourse& course) {

@@ -9,6 +9,7 @@
 
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
+#include "cli/operate/progress_line.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -18,12 +19,12 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto look_period = 50ms;
-constexpr auto told_after = 2s;
 constexpr auto patience = 10s;
 
 /// Of the axis, or of the first of its nodes that has one: its mismatch with what it reads back
 /// now; empty where it has none.
-json mismatch_now(const json& status, const std::string& name) {
+json mismatch_now(const GlobalOptions& global, const std::string& name) {
+  const json status = ask_daemon(global.socket, "status", json::object());
   for (const json& axis : list_of(status, "axes")) {
     if (text_of(axis, "name") != name && text_of(axis, "axis") != name) continue;
     json mismatch = object_of(axis, "mismatch");
@@ -34,21 +35,14 @@ json mismatch_now(const json& status, const std::string& name) {
   return json::object();
 }
 
-json mismatch_now(const GlobalOptions& global, const std::string& name) {
-  return mismatch_now(ask_daemon(global.socket, "status", json::object()), name);
-}
-
 /// While read-backs are awaited.
 /// @return as mismatch_now(); the release is under way still where its `releasing` is true
 json waited_for(const GlobalOptions& global, const std::string& name) {
   const auto began = Clock::now();
-  bool told = false;
+  ProgressLine line("axis " + name);
   json mismatch = mismatch_now(global, name);
   while (flag_of(mismatch, "releasing") && Clock::now() - began < patience) {
-    if (!told && Clock::now() - began > told_after) {
-      std::cerr << "axis " << name << ": waiting for what is read back\n";
-      told = true;
-    }
+    line.update("waiting for what is read back");
     std::this_thread::sleep_for(look_period);
     mismatch = mismatch_now(global, name);
   }

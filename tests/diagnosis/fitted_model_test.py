@@ -76,8 +76,7 @@ def rms_of_written_um(program, folder):
 def examined(program, folder, level, seed, causes, ridge, offset):
     hidden.make(folder, seed, level, causes)
     fit(folder, ridge, offset)
-    answer = campaign.diagnose(program, folder,
-                               ("--model", "model.toml", "--out", "out"))
+    answer = campaign.diagnose(program, folder, ("--model", "model.toml", "--out", "out"))
     return json.loads((folder / "truth.json").read_text()), answer
 
 

@@ -1,0 +1,34 @@
+#include "cli/operate/progress_line.hpp"
+
+#include <cstdio>
+#include <utility>
+
+#include "cli/common/terminal.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto line_period = 2s;
+
+}  // namespace
+
+ProgressLine::ProgressLine(std::string what)
+    : what_(std::move(what)), on_terminal_(stderr_is_terminal()), last_(Clock::now()) {}
+
+ProgressLine::~ProgressLine() {
+  if (shown_ && on_terminal_) std::fputs("\r\033[K", stderr);
+}
+
+void ProgressLine::update(const std::string& text) {
+  const auto now = Clock::now();
+  if (!on_terminal_ && now - last_ < line_period) return;
+  last_ = now;
+  shown_ = true;
+  std::fprintf(stderr, on_terminal_ ? "\r%s: %s\033[K" : "%s: %s\n", what_.c_str(), text.c_str());
+  std::fflush(stderr);
+}
+
+}  // namespace thermocomp::cli
