@@ -34,6 +34,8 @@ std::string_view to_string(Fault fault) noexcept {
       return "device_busy";
     case Fault::device_error:
       return "device_error";
+    case Fault::unconfirmed:
+      return "unconfirmed";
   }
   return "unknown";
 }
@@ -56,6 +58,8 @@ std::string_view to_string(CommandKind kind) noexcept {
       return "stop";
     case CommandKind::release:
       return "release";
+    case CommandKind::accept:
+      return "accept";
   }
   return "unknown";
 }

@@ -32,9 +32,10 @@ enum class Fault : std::uint8_t {
   no_answer,      ///< the unit does not answer or the bus is down
   bad_frame,      ///< the answer was garbled or of the wrong length
   device_busy,    ///< the device answered "busy"
-  device_error    ///< the device answered with an exception, or its status register says fault
+  device_error,   ///< the device answered with an exception, or its status register says fault
+  unconfirmed     ///< contradicts the past, or is too new, and nothing confirms it yet
 };
-inline constexpr std::size_t faults_count = 12;
+inline constexpr std::size_t faults_count = 13;
 
 /// The fault's name as it stands in JSON, history and logs.
 [[nodiscard]] std::string_view to_string(Fault fault) noexcept;
@@ -64,6 +65,9 @@ struct ControllerState {
   std::uint32_t link_epoch{0};
   std::uint64_t look{0};  ///< the link's number of this read-back, counted up
   bool online{false};
+  /// A write of the newest offsets was confirmed within the last few periods of the link: answered
+  /// on Modbus, sent on CAN, taken by the bridge.
+  bool written{false};
   std::array<double, axes_max> applied_um{};  ///< offset in effect, order of the axes [um]
   std::array<double, signals_max> signals{};  ///< order of the configuration, unit of the name
 
@@ -86,7 +90,7 @@ struct OffsetCommand {
 
 /// What an operator (or the CNC program) asks of the estimator, or the daemon that is about to end
 /// (`stop`: offsets to zero and nowhere else; the operator's switch stays as it is). `release` ends
-/// a latched mismatch of an axis.
+/// a latched mismatch of an axis; `accept` confirms the unconfirmed reading of a sensor.
 enum class CommandKind : std::uint8_t {
   enable,
   disable,
@@ -95,15 +99,17 @@ enum class CommandKind : std::uint8_t {
   cycle_end,
   prove,
   stop,
-  release
+  release,
+  accept
 };
-inline constexpr std::size_t command_kinds_count = 8;
+inline constexpr std::size_t command_kinds_count = 9;
 [[nodiscard]] std::string_view to_string(CommandKind kind) noexcept;
 
 struct Command {
   CommandKind kind{CommandKind::enable};
-  std::uint32_t axis{0};  ///< for `measured`, `prove`, `release`: index of the axis
-  double value_um{0.0};   ///< for `measured` and `prove` [um]
+  std::uint32_t axis{
+      0};  ///< `measured`, `prove`, `release`: index of the axis; `accept`: of the sensor
+  double value_um{0.0};  ///< for `measured` and `prove` [um]
 };
 
 }  // namespace thermocomp

@@ -7,7 +7,7 @@ namespace thermocomp::cli {
 
 namespace {
 
-constexpr std::array<ReasonText, 16> reasons{{
+constexpr std::array<ReasonText, 19> reasons{{
     {"operator_disabled", "switched off: by an operator, or never switched on yet",
      "thermocomp enable"},
     {"controller_disabled", "switched off at the controller",
@@ -40,9 +40,16 @@ constexpr std::array<ReasonText, 16> reasons{{
      "the offset may be wrong: measure, and make the model anew with a run of such a day"},
     {"sensor_suspected", "a sensor shows what its neighbours contradict",
      "check its contact, its place and its wiring; compare it with a hand-held thermometer"},
+    {"not_written", "the controller answers, but takes no offset",
+     "see below which write failed and how; check the function, the addresses and who may write"},
+    {"sensor_unconfirmed", "a reading jumped and nothing confirms the new value",
+     "compare it with a hand-held thermometer; where it is right: thermocomp accept SENSOR"},
+    {"start_unknown", "nothing tells which offset the controller was sent last: not driven",
+     "give the axis a read-back (`applied`), or set the offset at the controller to zero, then: "
+     "thermocomp release AXIS"},
 }};
 
-constexpr std::array<ReasonText, 12> faults{{
+constexpr std::array<ReasonText, 13> faults{{
     {"none", "good", ""},
     {"never_read", "nothing has arrived yet", "check the bus and the device's address"},
     {"stale", "not renewed in time", "check the device; compare stale_after_s with its period"},
@@ -55,6 +62,8 @@ constexpr std::array<ReasonText, 12> faults{{
     {"bad_frame", "the answer was garbled", "check shielding, termination and line settings"},
     {"device_busy", "the device was busy", "poll it less often"},
     {"device_error", "the device reports an error", "see its status register and manual"},
+    {"unconfirmed", "contradicts its past, and nothing confirms it yet",
+     "compare it with a hand-held thermometer; where it is right: thermocomp accept SENSOR"},
 }};
 
 template <class Table>

@@ -122,16 +122,18 @@ void CycleRecorder::push_readings(std::uint64_t cycle, std::span<const Reading> 
 void CycleRecorder::push_controller(std::uint64_t cycle,
                                     const ControllerState& controller) noexcept {
   if (controller.taken_at != controller_.taken_at ||
-      controller.link_epoch != controller_.link_epoch || controller.online != controller_.online) {
+      controller.link_epoch != controller_.link_epoch || controller.online != controller_.online ||
+      controller.written != controller_.written) {
     controller_.taken_at = controller.taken_at;
     controller_.link_epoch = controller.link_epoch;
     controller_.online = controller.online;
+    controller_.written = controller.written;
     Record record;
     record.cycle = cycle;
     record.time_ns = controller.taken_at.count();
     record.index = controller.link_epoch;
     record.kind = RecordKind::link;
-    record.detail = controller.online ? 1 : 0;
+    record.detail = link_bits(controller);
     push(record);
   }
   push_values(cycle, RecordKind::applied, controller.applied_um, controller_.applied_um);

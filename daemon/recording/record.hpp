@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <string_view>
 
+#include "estimator/types.hpp"
+
 namespace thermocomp {
 
 enum class RecordKind : std::uint8_t {
   reading,       ///< index: sensor; value: temp [degC]; time: taken_at; detail: Fault
-  link,          ///< index: link epoch; time: taken_at; detail: online
+  link,          ///< index: link epoch; time: taken_at; detail: link_bits()
   applied,       ///< index: axis; value: applied offset [um]
   signal,        ///< index: signal; value: in its unit
   command,       ///< index: axis; value [um]; detail: CommandKind. Applied before that cycle's step
@@ -43,5 +45,14 @@ static_assert(sizeof(Record) == 32);
 
 /// Equal to the last bit, so that NaN equals itself and -0 differs from 0.
 [[nodiscard]] bool same_bits(double a, double b) noexcept;
+
+/// What a record of kind `link` says of the controller: bit 0 online, bit 1 written.
+[[nodiscard]] constexpr std::uint8_t link_bits(const ControllerState& controller) noexcept {
+  return static_cast<std::uint8_t>((controller.online ? 1u : 0u) | (controller.written ? 2u : 0u));
+}
+constexpr void set_link_bits(std::uint8_t bits, ControllerState& controller) noexcept {
+  controller.online = (bits & 1u) != 0;
+  controller.written = (bits & 2u) != 0;
+}
 
 }  // namespace thermocomp

@@ -101,6 +101,8 @@ void Estimator::apply(const Command& command) noexcept {
     case CommandKind::release:
       if (has_axis) stages.axes.release(command.axis);
       return;
+    case CommandKind::accept:
+      return;
   }
 }
 

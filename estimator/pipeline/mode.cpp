@@ -52,6 +52,12 @@ std::string_view to_string(Reason reason) noexcept {
       return "outside_domain";
     case Reason::sensor_suspected:
       return "sensor_suspected";
+    case Reason::not_written:
+      return "not_written";
+    case Reason::sensor_unconfirmed:
+      return "sensor_unconfirmed";
+    case Reason::start_unknown:
+      return "start_unknown";
   }
   return "unknown";
 }

@@ -31,12 +31,15 @@ enum class Reason : std::uint32_t {
   applied_out_of_bound = 1u << 10,  ///< read-back beyond any bound of ours: axis is not driven
   block_estimated = 1u << 11,       ///< a warning: compensating, with an estimate for a lost block
   mismatch_latched =
-      1u << 12,                ///< read-backs that nothing sent explains: not driven until released
-  no_target = 1u << 13,        ///< the model's answer is not a finite number
-  outside_domain = 1u << 14,   ///< the machine is where its model was never made or judged
-  sensor_suspected = 1u << 15  ///< a warning: good values that the neighbours contradict
+      1u << 12,               ///< read-backs that nothing sent explains: not driven until released
+  no_target = 1u << 13,       ///< the model's answer is not a finite number
+  outside_domain = 1u << 14,  ///< the machine is where its model was never made or judged
+  sensor_suspected = 1u << 15,    ///< a warning: good values that the neighbours contradict
+  not_written = 1u << 16,         ///< the controller answers, but no write of offsets is confirmed
+  sensor_unconfirmed = 1u << 17,  ///< a reading contradicts the past and nothing confirms it
+  start_unknown = 1u << 18        ///< nothing tells the offset that the controller was sent last
 };
-inline constexpr std::size_t reasons_count = 16;
+inline constexpr std::size_t reasons_count = 19;
 [[nodiscard]] std::string_view to_string(Reason reason) noexcept;
 
 /// Whether a set of reasons (Report::reasons) holds one.

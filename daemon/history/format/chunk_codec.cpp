@@ -153,7 +153,7 @@ std::vector<std::byte> encode_inputs(std::span<const Reading> readings,
   }
   writer.varint(zigzag(controller.taken_at.count()));
   writer.varint(controller.link_epoch);
-  writer.u8(controller.online ? 1 : 0);
+  writer.u8(link_bits(controller));
   for (const double value : controller.applied_um) writer.f64(value);
   for (const double value : controller.signals) writer.f64(value);
   return std::move(writer.bytes());
@@ -172,7 +172,7 @@ void decode_inputs(std::span<const std::byte> bytes, std::vector<Reading>& readi
   }
   controller.taken_at = time_from(reader.varint());
   controller.link_epoch = static_cast<std::uint32_t>(reader.varint());
-  controller.online = reader.u8() != 0;
+  set_link_bits(reader.u8(), controller);
   for (double& value : controller.applied_um) value = reader.f64();
   for (double& value : controller.signals) value = reader.f64();
   if (!reader.at_end()) throw HistoryError("damaged: bytes after the inputs");

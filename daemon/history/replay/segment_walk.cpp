@@ -26,7 +26,7 @@ void InputsInForce::apply(const Record& record) {
     case RecordKind::link:
       controller.taken_at = nanoseconds(record.time_ns);
       controller.link_epoch = record.index;
-      controller.online = record.detail != 0;
+      set_link_bits(record.detail, controller);
       break;
     case RecordKind::applied:
       require_below(controller.applied_um.size());
