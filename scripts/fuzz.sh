@@ -73,9 +73,10 @@ build() {
 
 # run TARGET: its log tells how it went; nothing here fails.
 run() {
-  local target=$1 words=$runs/dictionaries/$1.dict options=()
+  local target=$1 words=$runs/dictionaries/$1.dict found=() options=()
   mkdir -p "$runs/$target/corpus" "$runs/$target/artifacts"
   rm -f "$runs/$target/artifacts"/*
+  if [[ -d tests/fuzz/seeds/$target ]]; then found=("tests/fuzz/seeds/$target"); fi
   if [[ -f $words ]]; then options=("-dict=$words"); fi
   # A mutator of the target's own makes deep and long inputs from the first one on.
   if grep -q "^fuzz_target($target SOURCES common/[a-z]*_mutator.cpp" tests/fuzz/CMakeLists.txt; then
@@ -84,7 +85,7 @@ run() {
   "build/fuzz/bin/fuzz_$target" -max_total_time="$seconds" -timeout="$input_seconds_max" \
     -rss_limit_mb="$memory_MB_max" -malloc_limit_mb="$allocation_MB_max" -print_final_stats=1 \
     "${options[@]}" -artifact_prefix="$runs/$target/artifacts/" \
-    "$runs/$target/corpus" "tests/fuzz/seeds/$target" >"$runs/$target/log" 2>&1 || true
+    "$runs/$target/corpus" "$runs/seeds/$target" "${found[@]}" >"$runs/$target/log" 2>&1 || true
 }
 
 # of TARGET STATISTIC: a number of libFuzzer's closing lines.
@@ -122,7 +123,9 @@ THERMOCOMP_FUZZ_SCRATCH=$(mktemp -d "$above/thermocomp-fuzz-XXXXXX")
 export THERMOCOMP_FUZZ_SCRATCH
 trap 'rm -rf "$THERMOCOMP_FUZZ_SCRATCH"; kill $(jobs -p) 2>/dev/null || true' EXIT
 
-/usr/bin/python3 -B tests/fuzz/make_seeds.py --dictionaries "$runs/dictionaries"
+mkdir -p "$runs"
+build/fuzz/bin/make_history_seed "$runs/history.db"
+/usr/bin/python3 -B tests/fuzz/make_seeds.py "$runs" "$runs/history.db"
 
 began=$SECONDS
 for target in "${targets[@]}"; do

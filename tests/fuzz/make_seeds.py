@@ -1,41 +1,32 @@
 #!/usr/bin/python3
-"""Writes the seeds of the fuzz targets from the examples, and their dictionaries from the sources.
+"""Writes the seeds of the fuzz targets, made from the examples, and their dictionaries, from the sources.
 
-    tests/fuzz/make_seeds.py [HISTORY.db]
-    tests/fuzz/make_seeds.py --check      writes nothing; exit status 1: a seed is missing or old
-    tests/fuzz/make_seeds.py --dictionaries FOLDER      writes those alone
+    tests/fuzz/make_seeds.py FOLDER [HISTORY.db]
 
-HISTORY.db: of the program make_history_seed; without it the seed of history_file stays. Inputs that
-were found to break something, seeds/TARGET/found-*, are never touched.
+A seed becomes FOLDER/seeds/TARGET/NAME, a dictionary FOLDER/dictionaries/TARGET.dict. HISTORY.db, of the
+program make_history_seed, is the seed of history_file. Inputs that were found to break something stay in
+git: tests/fuzz/seeds/TARGET/found-*.
 """
 
 import importlib
 import json
 import pathlib
 import re
+import shutil
 import struct
 import sys
 import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-SEEDS = HERE / "seeds"
+FOLDER = pathlib.Path(sys.argv[1])
 EXAMPLE_MODEL = ROOT / "tests/example_terms/model.toml"
 
 
-CHECK_ONLY = "--check" in sys.argv[1:]
-old_seeds = []
-
-
 def write(target, name, content):
-    seed = SEEDS / target / name
-    data = content if isinstance(content, bytes) else content.encode()
-    if CHECK_ONLY:
-        if not seed.is_file() or seed.read_bytes() != data:
-            old_seeds.append(seed.relative_to(ROOT))
-        return
+    seed = FOLDER / "seeds" / target / name
     seed.parent.mkdir(parents=True, exist_ok=True)
-    seed.write_bytes(data)
+    seed.write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
 def bare(path):
@@ -98,6 +89,9 @@ def toml_seeds():
                        "dotted.toml": "a.b.c.d = 1\n[a.b]\n[[a.b.e]]\n'' = {}\n"}.items():
         for target in ("model_file", "daemon_config", "machine_file"):
             write(target, name, text)
+    write("machine_file", "thousands_of_unknown_keys.toml",
+          'format = 1\n[[canopen_node]]\nname = "n"\ninterface = "vcan0"\n' +
+          "".join(f"k{number} = 1\n" for number in range(8000)))
 
 
 def preset_seeds():
@@ -444,9 +438,7 @@ def dictionaries(folder):
 
 
 def main():
-    if "--dictionaries" in sys.argv[1:]:
-        dictionaries(pathlib.Path(sys.argv[2]))
-        return
+    shutil.rmtree(FOLDER / "seeds", ignore_errors=True)
     toml_seeds()
     preset_seeds()
     run_seeds()
@@ -459,11 +451,8 @@ def main():
     bus_seeds()
     eds_seeds()
     dbc_seeds()
-    history_seeds(sys.argv[1] if len(sys.argv) > 1 and not CHECK_ONLY else None)
-    if CHECK_ONLY:
-        for seed in old_seeds:
-            print(f"{seed}: missing or old; run tests/fuzz/make_seeds.py")
-        sys.exit(1 if old_seeds else 0)
+    history_seeds(sys.argv[2] if len(sys.argv) > 2 else None)
+    dictionaries(FOLDER / "dictionaries")
 
 
 main()
