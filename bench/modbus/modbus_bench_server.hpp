@@ -1,4 +1,4 @@
-/// The servers of bench/modbus_poll and bench/coalesce: libmodbus' own server over TCP, and a paced
+/// The servers of the Modbus benchmarks: libmodbus' own server over TCP, and a paced
 /// serial line.
 #pragma once
 

@@ -1,19 +1,13 @@
 """Reloads, one after the other, while clients ask and operate: by socket and by SIGHUP, with a model
-that changes each time. Run by a test for a few rounds and by `bench/run.sh reloads` for many."""
+that changes each time."""
 
-import argparse
-import pathlib
 import statistics
-import sys
-import tempfile
 import threading
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent))
-
-from lab import Lab, Refused, assert_replays_exactly  # noqa: E402
-from plain_devices import MODEL, Machine  # noqa: E402
-from service_manager import WATCHDOG_S, ServiceManager, largest_gap_s  # noqa: E402
+from lab import Refused, assert_replays_exactly
+from plain_devices import MODEL, Machine
+from service_manager import WATCHDOG_S, ServiceManager, largest_gap_s
 
 OFFSET_UM = 6.0
 CLIENTS = 4
@@ -113,26 +107,3 @@ class ReloadRounds:
         print(f"wrong {len(self.wrong)} answers or states")
         for wrong in self.wrong:
             print("wrong:", wrong)
-
-
-def main():
-    options = argparse.ArgumentParser()
-    options.add_argument("--rounds", type=int, default=1000)
-    options.add_argument("--rates", default="1,100,1000")
-    given = options.parse_args()
-    failed = False
-    for rate_hz in map(int, given.rates.split(",")):
-        with tempfile.TemporaryDirectory() as folder:
-            lab = Lab(pathlib.Path(folder))
-            try:
-                rounds = ReloadRounds(lab, rate_hz)
-                rounds.run(given.rounds)
-                rounds.print_figures()
-            finally:
-                lab.end()
-        failed = failed or bool(rounds.wrong) or rounds.gap_s > 0.75 * WATCHDOG_S
-    return 1 if failed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
