@@ -83,7 +83,8 @@ class LinuxCnc:
             door.settimeout(0.2)
             with (self.folder / "linuxcnc.log").open("a") as log:
                 self.process = subprocess.Popen(
-                    [str(HERE / "in_private_namespaces.sh"), str(self.folder), f"{self.way}.ini"],
+                    [str(HERE / "in_private_namespaces.sh"), str(self.folder), f"{self.way}.ini",
+                     str(BIN)],
                     stdin=subprocess.DEVNULL, stdout=log, stderr=log)
             self.link = eventually(lambda: self.accepted(door), "LinuxCNC shows its screen")
         self.link.settimeout(4 * PATIENCE_S)
