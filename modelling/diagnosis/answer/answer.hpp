@@ -43,7 +43,7 @@ struct NamedFinding {
 };
 
 /// RMS of training rows that were left out in turn.
-struct LeftOutGain {
+struct LeftOutRms {
   double before_um{0.0};
   double after_um{0.0};
 };
@@ -52,7 +52,7 @@ struct LeftOutGain {
 struct RemainderBank {
   TermSpec term;
   std::vector<TermSpec> hinges;
-  std::map<std::string, LeftOutGain> left_out;  ///< of the outputs that it serves
+  std::map<std::string, LeftOutRms> left_out;  ///< of the outputs that it serves
   bool changes_coefficients{false};             ///< that had been fitted to the training rows
   /// Beside the findings; an output that does not gain goes without it.
   std::map<std::string, TestGain> test;

@@ -136,7 +136,7 @@ double total(const std::vector<Sums>& all) {
 }
 
 struct Judged {
-  LeftOutGain gain;
+  LeftOutRms gain;
   bool helps{false};
 };
 

@@ -74,7 +74,7 @@ double left_um(const ThermalModel& model, const RunFile& run) {
 TEST_CASE("what several lags at once leave is carried over to another run", "[diagnosis]") {
   const auto bank = bank_of(machine(1, 3.0, 0.1));
   REQUIRE(bank);
-  const LeftOutGain gain = bank->left_out.at("z_um");
+  const LeftOutRms gain = bank->left_out.at("z_um");
   CHECK(gain.after_um < 0.3 * gain.before_um);
   ThermalModel longer = one_input();
   longer.terms.push_back(bank->term);
