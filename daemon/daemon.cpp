@@ -137,7 +137,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
                   [this] { return status_line(supervisor.view()); }, start_state.state.offset_um,
                   &journal, [this] { return server.caller(); }, start_state.state.reference_degC}),
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
-                  operations, journal}) {
+                  operations, journal, locks.controller}) {
   if (history) journal.tell([this](const Event& event) { history->note(recorded(event)); });
   // A kill right now must not make this a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
@@ -205,6 +205,7 @@ void Daemon::Parts::stop() noexcept {
   }
   cycle.finish_recording();
   if (history) history->stop();
+  supervisor.note_history();
 }
 
 Daemon::Daemon(const std::filesystem::path& config_file)

@@ -127,7 +127,14 @@ void Supervisor::look_at_health() {
   events_.note_missed(cycle().timing().missed.load());
   events_.note_failed_sleeps(cycle().timing().failed_sleeps.load());
   events_.note_socket(parts_.server.statistics());
+  note_history();
+  for (NameLock& lock : parts_.locks) lock.drain();
   parts_.service.status(status_line(view()));
+}
+
+void Supervisor::note_history() {
+  if (parts_.history != nullptr)
+    events_.note_history(parts_.history->statistics(), parts_.history->take_news());
 }
 
 void Supervisor::ramp_to_zero() {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/locks/name_lock.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status/event_log.hpp"
@@ -28,13 +29,14 @@ class Supervisor {
     const DaemonConfig& config;
     const std::vector<std::unique_ptr<SensorSource>>& sources;
     const ControllerLink& link;
-    const HistoryWriter* history;  ///< none: no history
+    HistoryWriter* history;  ///< none: no history
     const StateKeeper& keeper;
     StatusServer& server;
     SignalFile& signals;
     ServiceManager& service;
     Operations& operations;
     EventJournal& journal;
+    std::vector<NameLock>& locks;
   };
   explicit Supervisor(const Parts& parts) : parts_(parts), events_(parts.journal) {}
 
@@ -46,6 +48,8 @@ class Supervisor {
   void wait_until_ready(Cycle& running);
   /// Runs until a signal ends it; then, if so configured, takes the offsets to zero.
   void run();
+  /// News of the history; once more after its end.
+  void note_history();
 
   [[nodiscard]] StatusView view();
 

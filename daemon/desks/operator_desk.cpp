@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <optional>
 #include <span>
 #include <utility>
@@ -117,12 +118,32 @@ RpcPending take_reference(const DeskActions& actions, const json& params) {
   });
 }
 
+/// A measured displacement cannot be further from the model's than the axis may be moved at all,
+/// beyond three standard deviations of the model's own claim: a slip of the keyboard, another unit,
+/// another axis.
+/// @param expected_um  the model's; NaN where it is not known: none is expected
+void require_possible(const StatusView& view, const Command& command, double expected_um) {
+  const AxisSpan span = span_of(view.config.estimator.axes, command.axis);
+  double allowed_um = 0.0;
+  for (std::size_t i = span.first; i < span.end(); ++i) {
+    const double sd_um = view.report.axes[i].claimed_sd_um;
+    allowed_um = std::max(allowed_um, view.config.estimator.axes[i].limiter.offset_um_max +
+                                          (std::isfinite(sd_um) ? 3.0 * sd_um : 0.0));
+  }
+  const double from_um = std::isfinite(expected_um) ? expected_um : 0.0;
+  if (!(std::abs(command.value_um - from_um) <= allowed_um))
+    throw RpcError(
+        rpc::invalid_params,
+        fmt::format(
+            "nothing is taken over: {:g} um was measured where the model expects {:.1f} um; "
+            "the axis' bound and three times the model's claimed error allow {:.1f} um of "
+            "difference. Check the axis, the sign and the unit",
+            command.value_um, from_um, allowed_um));
+}
+
 RpcPending note_measured(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
-  constexpr double most_um = 1000.0;  // no thermal displacement; a slip of the keyboard
-  if (!(std::abs(command.value_um) <= most_um))
-    throw RpcError(rpc::invalid_params, "params.value_um must be in [-1000, 1000]");
   const double displacement_um = where_it_stands(
       view, command.axis, [](const AxisReport& axis) { return axis.displacement_um; });
   const bool remains = view.config.estimator.correction.measured == MeasuredMeaning::remaining;
@@ -130,9 +151,10 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
     return std::isfinite(axis.applied_um) ? axis.applied_um : axis.offset_um;
   });
   const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;
-  return then(actions.command(command), [command, displacement_um, remains, effect_um] {
-    // What is left at the tool, where the model is right: nothing but what the offset still lacks.
-    const double left_um = displacement_um + effect_um;
+  // What is left at the tool, where the model is right: nothing but what the offset still lacks.
+  const double left_um = displacement_um + effect_um;
+  require_possible(view, command, remains ? left_um : displacement_um);
+  return then(actions.command(command), [command, displacement_um, remains, left_um] {
     return json{
         {"done", true},
         {"measured_um", command.value_um},

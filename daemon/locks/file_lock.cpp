@@ -42,7 +42,8 @@ std::string content(int fd) {
 FileLock::FileLock(const std::filesystem::path& file) : path_(lock_path(file)) {
   for (;;) {
     // NOFOLLOW: where others may write to the folder, a link must not lead us to a file of ours.
-    fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0640);
+    // 0600: whoever may read a file may lock it too, and so keep its owner out.
+    fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
     if (fd_ < 0) throw LockImpossible(path_.string() + ": " + std::strerror(errno));
     if (flock(fd_, LOCK_EX | LOCK_NB) != 0) {
       const int reason = errno;
@@ -56,6 +57,7 @@ FileLock::FileLock(const std::filesystem::path& file) : path_(lock_path(file)) {
     if (is_at(fd_, path_)) break;
     close(fd_);
   }
+  static_cast<void>(fchmod(fd_, 0600) == 0);  // one that was left by an earlier version
   // For people only: where it cannot be written (disk full), the lock holds all the same.
   const std::string holder = describe_process(getpid()) + "\n";
   if (ftruncate(fd_, 0) != 0 ||

@@ -1,17 +1,29 @@
 #include "daemon/locks/name_lock.hpp"
 
 #include <cerrno>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <thread>
 #include <unistd.h>
 #include <utility>
+#include <vector>
 
+#include <sys/random.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
 namespace thermocomp {
 namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t room = sizeof(sockaddr_un::sun_path) - 1;  // after the leading zero
+constexpr std::size_t random_digits = 16;
 
 struct Address {
   sockaddr_un socket{};
@@ -25,16 +37,33 @@ std::string short_text(const std::string& text) {
   return std::string("#").append(std::to_string(hash));
 }
 
-Address abstract_address(const std::string& name) {
-  Address address;
-  address.socket.sun_family = AF_UNIX;
-  constexpr std::size_t room = sizeof address.socket.sun_path - 1;  // after the leading zero
+/// What the addresses of all holders of a name begin with.
+std::string prefix_of(const std::string& name) {
   std::string text = "thermocomp/" + name;
-  if (text.size() > room) {
+  if (text.size() + 1 + random_digits > room) {
     const std::string end = short_text(text);
-    text.resize(room - end.size());
+    text.resize(room - 1 - random_digits - end.size());
     text += end;
   }
+  return text + "/";
+}
+
+/// @throws LockImpossible
+std::string random_text() {
+  std::uint64_t number = 0;
+  if (getrandom(&number, sizeof number, 0) != sizeof number)
+    throw LockImpossible(std::string("getrandom: ") + std::strerror(errno));
+  std::string text(random_digits, '0');
+  for (char& digit : text) {
+    digit = "0123456789abcdef"[number & 0xF];
+    number >>= 4;
+  }
+  return text;
+}
+
+Address abstract_address(const std::string& text) {
+  Address address;
+  address.socket.sun_family = AF_UNIX;
   std::memcpy(address.socket.sun_path + 1, text.data(), text.size());
   address.length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + text.size());
   return address;
@@ -44,35 +73,95 @@ int open_socket() {
   return socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 }
 
-std::string holder_of(const Address& address) {
+/// Who listens at the address; nothing where nobody does.
+std::optional<ucred> listener_at(const std::string& text) {
+  const Address address = abstract_address(text);
   const int fd = open_socket();
   ucred who{};
   socklen_t size = sizeof who;
   const bool known =
       fd >= 0 &&
       connect(fd, reinterpret_cast<const sockaddr*>(&address.socket), address.length) == 0 &&
-      getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &who, &size) == 0 && who.pid > 0;
+      getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &who, &size) == 0;
   if (fd >= 0) close(fd);
-  return known ? describe_process(who.pid) : "another process";
+  return known ? std::optional(who) : std::nullopt;
+}
+
+/// The random parts of the addresses with this prefix at which somebody listens. A line of the
+/// table ends with the address, in which "@" stands for the leading zero; the flag is that of a
+/// listener, since connections that wait for it have its address too.
+/// @throws LockImpossible
+std::vector<std::string> listened_with(const std::string& prefix) {
+  std::ifstream table("/proc/self/net/unix");
+  std::vector<std::string> found;
+  for (std::string line; std::getline(table, line);) {
+    const std::size_t at = line.find("@" + prefix);
+    const std::size_t rest = at + 1 + prefix.size();
+    if (at != std::string::npos && line.size() == rest + random_digits &&
+        line.find(" 00010000 ") < at)
+      found.emplace_back(line, rest);
+  }
+  if (!table.eof()) throw LockImpossible("/proc/self/net/unix cannot be read");
+  return found;
+}
+
+/// Of two that begin at the same moment the one with the lower number stays: the other one refuses
+/// at once, and whoever has the lower number waits for that. Whoever is still there after the
+/// wait has held the name before.
+/// @throws LockHeld, LockImpossible
+void refuse_if_held(const std::string& name, const std::string& prefix, const std::string& own) {
+  constexpr int looks_max = 20;
+  std::map<std::string, std::optional<ucred>> asked;  // once: each question waits in its backlog
+  for (int look = 1;; ++look) {
+    std::optional<ucred> holder;
+    bool must_refuse = look == looks_max;
+    for (const std::string& other : listened_with(prefix)) {
+      if (other == own) continue;
+      if (!asked.contains(other)) asked[other] = listener_at(prefix + other);
+      const std::optional<ucred>& who = asked[other];
+      if (!who || (who->uid != 0 && who->uid != geteuid())) continue;
+      holder = who;
+      must_refuse = must_refuse || other < own;
+    }
+    if (!holder) return;
+    if (must_refuse) {
+      const bool is_visible = holder->pid > 0;  // 0: in another process namespace
+      throw LockHeld(name + " is in use by " +
+                     (is_visible ? describe_process(holder->pid) : "another process"));
+    }
+    std::this_thread::sleep_for(25ms);
+  }
 }
 
 }  // namespace
 
 NameLock::NameLock(const std::string& name) : fd_(open_socket()) {
-  const Address address = abstract_address(name);
-  // Listening is only for whoever is refused: so it can ask the kernel who we are.
-  if (fd_ >= 0 &&
-      bind(fd_, reinterpret_cast<const sockaddr*>(&address.socket), address.length) == 0 &&
-      listen(fd_, SOMAXCONN) == 0)
-    return;
-  const int reason = errno;
-  if (fd_ >= 0) close(fd_);
-  if (reason == EADDRINUSE) throw LockHeld(name + " is in use by " + holder_of(address));
-  throw LockImpossible(name + ": " + std::strerror(reason));
+  const std::string prefix = prefix_of(name);
+  const std::string own = random_text();
+  const Address address = abstract_address(prefix + own);
+  try {
+    if (!(fd_ >= 0 &&
+          bind(fd_, reinterpret_cast<const sockaddr*>(&address.socket), address.length) == 0 &&
+          listen(fd_, SOMAXCONN) == 0))
+      throw LockImpossible(name + ": " + std::strerror(errno));
+    refuse_if_held(name, prefix, own);
+  } catch (...) {
+    if (fd_ >= 0) close(fd_);
+    throw;
+  }
 }
 
 NameLock::~NameLock() {
   if (fd_ >= 0) close(fd_);
+}
+
+void NameLock::drain() noexcept {
+  constexpr int questions_max = 1000;
+  for (int i = 0; i < questions_max; ++i) {
+    const int fd = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
+    if (fd < 0) return;
+    close(fd);
+  }
 }
 
 NameLock::NameLock(NameLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}

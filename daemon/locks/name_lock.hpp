@@ -7,9 +7,14 @@
 
 namespace thermocomp {
 
-/// For what is not a file: a controller's address. The name is bound as a Unix socket's in the
-/// abstract namespace: no folder and no rights are needed, the kernel frees it however the process
-/// ends, and knows who holds it. It counts within a network namespace, as the address does.
+/// For what is not a file: a controller's address. The lock is a Unix socket in the abstract
+/// namespace: it needs no folder and no rights, the kernel frees it however the process ends, and
+/// the kernel knows who holds it. It counts within a network namespace, as the address does.
+///
+/// Every user may bind any abstract name. Each holder therefore binds `thermocomp/<name>/<random>`,
+/// which nobody can take in advance, and only then looks for other holders of the name. A holder
+/// counts if it runs as this process's user or as root (SO_PEERCRED); one of another user is
+/// ignored.
 class NameLock {
  public:
   /// @throws LockHeld, LockImpossible
@@ -17,6 +22,10 @@ class NameLock {
   ~NameLock();
   NameLock(NameLock&& other) noexcept;
   NameLock& operator=(NameLock&&) = delete;
+
+  /// Takes what others have left who asked for the holder: once a second, say. Where thousands
+  /// wait, the kernel tells the next one nothing about the holder, which then does not count.
+  void drain() noexcept;
 
  private:
   int fd_{-1};

@@ -1,5 +1,6 @@
 #include "daemon/status/event_journal.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace thermocomp {
@@ -32,22 +33,79 @@ void EventJournal::add(const Moment& at, Event event) {
   if (events_.size() > kept_max) events_.pop_front();
 }
 
-void EventJournal::fault(const std::string& subject, const std::string& what) {
+bool EventJournal::fault(const std::string& subject, const std::string& what) {
   const Moment at = now_();
-  const auto [outage, is_new] = outages_.try_emplace(subject, Outage{at.monotonic, what});
-  if (!is_new && outage->second.what == what) return;
-  outage->second.what = what;
-  add(at, event_of("fault", subject, what));
+  const auto known = outages_.find(subject);
+  if (known != outages_.end() && is_over(known->second, at.monotonic)) outages_.erase(known);
+  Outage& outage = outages_.try_emplace(subject).first->second;
+  if (outage.told.empty()) outage.since = at.monotonic;
+  outage.what = what;
+  const bool is_back = std::exchange(outage.away_since, std::nullopt).has_value();
+  const bool was_ended = std::exchange(outage.is_end_told, false);
+  const bool is_known =
+      std::find(outage.told.begin(), outage.told.end(), what) != outage.told.end();
+  if (is_back && was_ended && !outage.comes_and_goes) {
+    outage.comes_and_goes = true;
+    add(at, event_of("fault", subject, what + ", comes and goes"));
+  } else if (!is_known && outage.told.size() < faults_of_outage_max) {
+    add(at, event_of("fault", subject, what));
+  } else {
+    return false;
+  }
+  if (!is_known) outage.told.push_back(what);
+  return true;
 }
 
-void EventJournal::recovery(const std::string& subject, std::chrono::nanoseconds ago) {
-  const auto outage = outages_.find(subject);
-  if (outage == outages_.end()) return;
-  const Moment at = now_();
-  Event event = event_of("recovery", subject, outage->second.what);
-  event.duration_s = seconds(at.monotonic - ago - outage->second.since);
-  outages_.erase(outage);
-  add(at, std::move(event));
+double EventJournal::recovery(const std::string& subject, std::chrono::nanoseconds hold) {
+  const auto found = outages_.find(subject);
+  if (found == outages_.end() || found->second.away_since)
+    return std::numeric_limits<double>::quiet_NaN();
+  Outage& outage = found->second;
+  outage.away_since = now_().monotonic;
+  outage.hold = hold;
+  if (outage.comes_and_goes) outage.hold = std::max<std::chrono::nanoseconds>(hold, returns_within);
+  return outage.hold > std::chrono::nanoseconds{} ? std::numeric_limits<double>::quiet_NaN()
+                                                  : end_of(subject, outage).duration_s;
+}
+
+Event EventJournal::end_of(const std::string& subject, Outage& outage) {
+  Event event = event_of("recovery", subject, outage.what);
+  event.duration_s = seconds(*outage.away_since - outage.since);
+  outage.is_end_told = true;
+  add(now_(), event);
+  return event;
+}
+
+std::vector<Event> EventJournal::settle() {
+  std::vector<Event> ended;
+  const std::chrono::nanoseconds now = now_().monotonic;
+  for (auto next = outages_.begin(); next != outages_.end();) {
+    const auto at = next++;
+    Outage& outage = at->second;
+    if (!outage.away_since) continue;
+    const std::chrono::nanoseconds away = now - *outage.away_since;
+    if (!outage.is_end_told && away >= outage.hold) ended.push_back(end_of(at->first, outage));
+    if (is_over(outage, now)) outages_.erase(at);
+  }
+  return ended;
+}
+
+bool EventJournal::is_over(const Outage& outage, std::chrono::nanoseconds now) {
+  return outage.is_end_told && now - *outage.away_since >= returns_within;
+}
+
+const EventJournal::Outage* EventJournal::find(const std::string& subject) const {
+  const auto found = outages_.find(subject);
+  return found == outages_.end() || found->second.is_end_told ? nullptr : &found->second;
+}
+
+bool EventJournal::lasts(const std::string& subject) const {
+  return find(subject) != nullptr;
+}
+
+bool EventJournal::comes_and_goes(const std::string& subject) const {
+  const Outage* outage = find(subject);
+  return outage != nullptr && outage->comes_and_goes;
 }
 
 void EventJournal::mode(const std::string& name) {

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,9 @@ struct Event {
   std::int64_t user{-1};  ///< command: who gave it, by the kernel; -1: nobody, or SIGHUP
 };
 
-/// Main's thread only. Every change is one event; the same fault told again is none.
+/// Main's thread only. Every change is one event; the same fault told again is none. A fault that
+/// returns within `returns_within` of its end comes and goes: that is one outage, which ends once
+/// it has stayed away for so long.
 class EventJournal {
  public:
   struct Moment {
@@ -34,16 +37,28 @@ class EventJournal {
   };
   using Now = std::function<Moment()>;
   static constexpr std::size_t kept_max = 1000;
+  static constexpr std::chrono::seconds returns_within{10};
+  static constexpr std::size_t faults_of_outage_max = 8;
 
   explicit EventJournal(Now now = system_now) : now_(std::move(now)) {}
   /// Is told every event from now on, such as the history's writer.
   void tell(std::function<void(const Event&)> listener) { listener_ = std::move(listener); }
 
-  /// The subject has this fault from now on. Another one than before is told, but the outage counts
-  /// from the first.
-  void fault(const std::string& subject, const std::string& what);
-  /// The subject has had none for the time `ago`; nothing where it had none.
-  void recovery(const std::string& subject, std::chrono::nanoseconds ago = {});
+  /// The subject has this fault from now on. Each kind of fault is told once in an outage, which
+  /// counts from the first.
+  /// @return whether it became an event
+  bool fault(const std::string& subject, const std::string& what);
+  /// The subject has none; nothing where it had none.
+  /// @param hold  the outage ends once it has had none for so long
+  /// @return how long the outage lasted [s] if its end became an event, else NaN
+  double recovery(const std::string& subject, std::chrono::nanoseconds hold = {});
+  /// Ends the outages whose faults have stayed away for long enough; often.
+  /// @return the events
+  std::vector<Event> settle();
+  /// An outage that has begun and of which no end is told yet.
+  [[nodiscard]] bool lasts(const std::string& subject) const;
+  /// Such a one whose faults come and go.
+  [[nodiscard]] bool comes_and_goes(const std::string& subject) const;
   /// A mode that begins; the same again is nothing.
   void mode(const std::string& name);
   void command(const std::string& what, std::int64_t user);
@@ -60,8 +75,17 @@ class EventJournal {
  private:
   struct Outage {
     std::chrono::nanoseconds since{};  ///< monotonic: a set clock must not change a duration
-    std::string what;
+    std::string what;                  ///< the newest fault
+    std::vector<std::string> told;     ///< faults that became events
+    std::optional<std::chrono::nanoseconds> away_since;  ///< none: it has a fault now
+    std::chrono::nanoseconds hold{};
+    bool is_end_told{false};
+    bool comes_and_goes{false};
   };
+  /// Its end is told, and what comes now is another outage.
+  [[nodiscard]] static bool is_over(const Outage& outage, std::chrono::nanoseconds now);
+  [[nodiscard]] const Outage* find(const std::string& subject) const;
+  Event end_of(const std::string& subject, Outage& outage);
   void add(const Moment& at, Event event);
 
   Now now_;

@@ -1,7 +1,6 @@
 #include "daemon/status/event_log.hpp"
 
-#include <algorithm>
-#include <bit>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 
@@ -15,7 +14,7 @@ constexpr std::uint32_t clipped_in_a_row_news = 5;
 
 /// What is beyond a limit by a little comes and goes with the noise: over is it after a minute
 /// without.
-nanoseconds over_after(Reason reason) {
+nanoseconds hold_of(Reason reason) {
   const bool has_limit = reason == Reason::at_bound || reason == Reason::outside_domain;
   return has_limit ? std::chrono::minutes(1) : nanoseconds{};
 }
@@ -35,28 +34,40 @@ std::string reason_names(std::uint32_t reasons) {
 
 void EventLog::note_estimates(const Report& report, const EstimatorConfig& config,
                               const std::vector<std::string>& columns) {
-  estimated_.resize(report.inputs.size(), false);
+  input_states_.resize(report.inputs.size());
+  bool any = false;
   for (std::size_t i = 0; i < report.inputs.size(); ++i) {
     const InputReport& input = report.inputs[i];
-    if (input.estimated == estimated_[i]) continue;
-    estimated_[i] = input.estimated;
-    if (input.estimated)
-      spdlog::warn("input {}: lost, estimated from the others", columns[i]);
-    else if (input.good)
-      spdlog::info("input {}: measured again", columns[i]);
-    else
-      spdlog::warn("input {}: lost, and no longer to be estimated", columns[i]);
+    any = any || input.estimated;
+    // One that was never estimated is its sensors' news.
+    const bool was_estimated = !input_states_[i].empty();
+    std::string state = input.estimated                ? "lost, estimated from the others"
+                        : !input.good && was_estimated ? "lost, and no longer to be estimated"
+                                                       : "";
+    if (state == input_states_[i]) continue;
+    const std::string subject = "input " + columns[i];
+    if (!state.empty()) {
+      if (journal_.fault(subject, state)) spdlog::warn("{}: {}", subject, state);
+    } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
+      spdlog::info("{}: measured again after {:.1f} s", subject, lasted_s);
+    }
+    input_states_[i] = std::move(state);
   }
-  const bool any = std::find(estimated_.begin(), estimated_.end(), true) != estimated_.end();
   const bool uncertain = any && has_reason(report.reasons, Reason::block_lost);
-  if (uncertain && !uncertain_)
-    for (std::size_t i = 0; i < report.axes.size(); ++i)
-      if (report.axes[i].offset_sd_um > config.compensation.offset_sd_um_max)
-        spdlog::warn("axis {}: the estimate is too uncertain, {:.2f} um where {:.2f} um is allowed",
-                     config.axes[i].name, report.axes[i].offset_sd_um,
-                     config.compensation.offset_sd_um_max);
-  if (!uncertain && uncertain_ && any) spdlog::info("the estimate is certain enough again");
+  if (uncertain == uncertain_) return;
   uncertain_ = uncertain;
+  for (std::size_t i = 0; i < report.axes.size(); ++i) {
+    const std::string subject = "estimate of axis " + config.axes[i].name;
+    const double sd_um_max = config.compensation.offset_sd_um_max;
+    if (!uncertain) {
+      if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0)
+        spdlog::info("{}: certain enough again after {:.1f} s", subject, lasted_s);
+    } else if (report.axes[i].offset_sd_um > sd_um_max) {
+      const std::string what = fmt::format("too uncertain, more than {:.2f} um", sd_um_max);
+      if (journal_.fault(subject, what))
+        spdlog::warn("{}: {} ({:.2f} um)", subject, what, report.axes[i].offset_sd_um);
+    }
+  }
 }
 
 void EventLog::note_report(const Report& report, const EstimatorConfig& config, bool dry_run) {
@@ -68,20 +79,34 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config, 
   const bool is_beginning = report.mode == Mode::starting ||
                             (report.mode == Mode::disabled && (report.reasons & ~off) != 0);
   if (first_ && is_beginning && report.now < settled_at_) return;
+  note_ended_outages();
   note_sensors(report, config);
   note_mismatches(report, config);
   note_mode(report, std::string(mode_name(report.mode, dry_run)));  // what comes of them
   first_ = false;
 }
 
+void EventLog::note_ended_outages() {
+  for (const Event& event : journal_.settle())
+    spdlog::info("{}: {}: over, lasted {:.1f} s", event.subject, event.what, event.duration_s);
+}
+
 void EventLog::note_mode(const Report& report, const std::string& mode) {
-  const std::uint32_t told = reasons_;
+  const std::uint32_t told = std::exchange(reasons_, 0);
+  bool may_return = false;
   for (std::size_t i = 0; i < reasons_count; ++i) {
-    const auto reason = static_cast<Reason>(1u << i);
+    const auto bit = std::uint32_t{1} << i;
+    const auto reason = static_cast<Reason>(bit);
     // Cutting comes and goes with every part; it is in the status, not in the log.
-    if (reason != Reason::cutting)
-      note_reason(reason, has_reason(report.reasons, reason), report.now);
+    if (reason == Reason::cutting) continue;
+    const bool is_given = has_reason(report.reasons, reason);
+    note_reason(reason, is_given);
+    const std::string subject = "reason " + std::string(to_string(reason));
+    if (is_given || journal_.lasts(subject)) reasons_ |= bit;
+    may_return = may_return || (!is_given && journal_.comes_and_goes(subject));
   }
+  // A mode that comes and goes with its reason is told once the reason stays away.
+  if (may_return && (reasons_ & ~told) == 0) return;
   if (first_ || report.mode != mode_ || reasons_ != told) {
     const bool good = report.mode == Mode::compensating && reasons_ == 0;
     spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "mode {}, reasons: {}", mode,
@@ -91,21 +116,14 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
   mode_ = report.mode;
 }
 
-void EventLog::note_reason(Reason reason, bool is_given, nanoseconds now) {
-  const auto bit = static_cast<std::uint32_t>(reason);
-  nanoseconds& last = given_last_[static_cast<std::size_t>(std::countr_zero(bit))];
-  const bool is_told = (reasons_ & bit) != 0;
-  const nanoseconds wanted = over_after(reason);
-  if (is_given) last = now;
-  if (is_given == is_told || (is_told && now - last < wanted)) return;
-  reasons_ ^= bit;
+void EventLog::note_reason(Reason reason, bool is_given) {
   // What an operator wanted is no fault; the command and the mode tell of it.
   if (reason == Reason::operator_disabled) return;
   const std::string name(to_string(reason));
   if (is_given)
     journal_.fault("reason " + name, name);
   else
-    journal_.recovery("reason " + name, wanted > nanoseconds{} ? now - last : wanted);
+    journal_.recovery("reason " + name, hold_of(reason));
 }
 
 void EventLog::note_sensors(const Report& report, const EstimatorConfig& config) {
@@ -116,12 +134,11 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
     const SensorReport& sensor = report.sensors[i];
     if (sensor.fault != faults_[i]) {
       const std::string subject = "sensor " + config.sensors[i].name;
-      if (sensor.fault == Fault::none) {
-        spdlog::info("{}: good again", subject);
-        journal_.recovery(subject);
-      } else {
-        spdlog::warn("{}: {}", subject, to_string(sensor.fault));
-        journal_.fault(subject, std::string(to_string(sensor.fault)));
+      if (sensor.fault != Fault::none) {
+        if (journal_.fault(subject, std::string(to_string(sensor.fault))))
+          spdlog::warn("{}: {}", subject, to_string(sensor.fault));
+      } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
+        spdlog::info("{}: good again after {:.1f} s", subject, lasted_s);
       }
       faults_[i] = sensor.fault;
     }
@@ -142,11 +159,10 @@ void EventLog::note_suspicion(std::size_t index, const SensorReport& sensor,
   if (sensor.suspected) {
     const std::string what =
         fmt::format("off by {:+.1f} K against its neighbours", sensor.suspected_size_K);
-    journal_.fault(subject, what);
-    spdlog::warn("{}: {}{}", subject, what, sensor.weighed_down ? ", not used" : "");
-  } else {
-    journal_.recovery(subject);
-    spdlog::info("sensor {}: no longer suspected", name);
+    if (journal_.fault(subject, what))
+      spdlog::warn("{}: {}{}", subject, what, sensor.weighed_down ? ", not used" : "");
+  } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
+    spdlog::info("sensor {}: no longer suspected, after {:.1f} s", name, lasted_s);
   }
 }
 
@@ -178,12 +194,12 @@ void EventLog::note_link(const std::string& what, bool connected, const std::str
   if (known != connected_.end() && known->second == connected) return;
   connected_[what] = connected;
   const std::string why = error.empty() ? "not connected" : error;
-  if (connected) {
+  if (!connected) {
+    if (journal_.fault(what, why)) spdlog::warn("{}: {}", what, why);
+  } else if (const double lasted_s = journal_.recovery(what); lasted_s >= 0.0) {
+    spdlog::info("{}: connected again after {:.1f} s", what, lasted_s);
+  } else if (!journal_.lasts(what)) {
     spdlog::info("{}: connected", what);
-    journal_.recovery(what);
-  } else {
-    spdlog::warn("{}: {}", what, why);
-    journal_.fault(what, why);
   }
 }
 
@@ -194,12 +210,11 @@ void EventLog::note_state(const std::string& what, bool connected, const std::st
   if (known == state) return;
   known = state;
   const std::string subject = what + ", errors";
-  if (state == "active") {
-    spdlog::info("{}: without errors again", what);
-    journal_.recovery(subject);
-  } else {
-    spdlog::warn("{}: error state {}", what, state);
-    journal_.fault(subject, "error state " + state);
+  if (state != "active") {
+    if (journal_.fault(subject, "error state " + state))
+      spdlog::warn("{}: error state {}", what, state);
+  } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
+    spdlog::info("{}: without errors again after {:.1f} s", what, lasted_s);
   }
 }
 
@@ -215,6 +230,23 @@ void EventLog::note_bus(const BusHealth& bus) {
 void EventLog::note_controller(const ControllerHealth& controller) {
   note_link("controller " + controller.name, controller.connected, controller.last_error);
   note_state("controller " + controller.name, controller.connected, controller.state);
+}
+
+void EventLog::note_history(const HistoryStatistics& history,
+                            const std::vector<std::string>& news) {
+  const std::string subject = "history";
+  for (const std::string& what : news) {
+    spdlog::warn("{}: {}", subject, what);
+    journal_.daemon(subject + ": " + what);
+  }
+  if (history.working) {
+    if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0)
+      spdlog::info("{}: written again after {:.1f} s, {} records lost in it", subject, lasted_s,
+                   history.lost - lost_);
+    lost_ = history.lost;
+  } else if (!history.last_error.empty() && journal_.fault(subject, history.last_error)) {
+    spdlog::warn("{}: {}; the compensation goes on, tried again", subject, history.last_error);
+  }
 }
 
 void EventLog::note_missed(std::uint64_t missed) {

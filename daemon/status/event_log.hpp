@@ -2,12 +2,12 @@
 /// has to log.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "daemon/history/writing/history_writer.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status/event_journal.hpp"
 #include "drivers/controllers/controller_link.hpp"
@@ -16,7 +16,8 @@
 
 namespace thermocomp {
 
-/// Main's thread only. Each change is one line; a state that stays is not repeated.
+/// Main's thread only. Each change is one line; a state that stays is not repeated, and an outage
+/// that comes and goes is one, with its length at its end (EventJournal).
 class EventLog {
  public:
   /// @param journal  gets the same changes; outlives this
@@ -31,6 +32,8 @@ class EventLog {
                       const std::vector<std::string>& columns);
   void note_bus(const BusHealth& bus);
   void note_controller(const ControllerHealth& controller);
+  /// @param news  HistoryWriter::take_news()
+  void note_history(const HistoryStatistics& history, const std::vector<std::string>& news);
   void note_missed(std::uint64_t missed);
   void note_failed_sleeps(std::uint64_t failed);
   /// Clients that were refused, cut off or missed notifications: at most one line a minute, since
@@ -39,7 +42,8 @@ class EventLog {
 
  private:
   void note_mode(const Report& report, const std::string& mode);
-  void note_reason(Reason reason, bool is_given, nanoseconds now);
+  void note_reason(Reason reason, bool is_given);
+  void note_ended_outages();
   void note_sensors(const Report& report, const EstimatorConfig& config);
   void note_suspicion(std::size_t index, const SensorReport& sensor, const std::string& name);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
@@ -51,15 +55,15 @@ class EventLog {
   nanoseconds settled_at_{};  ///< of the reports
   Mode mode_{Mode::starting};
   std::uint32_t reasons_{0};  ///< told, and not yet over
-  std::array<nanoseconds, reasons_count> given_last_{};
   std::vector<bool> suspected_;
   std::vector<Fault> faults_;
   std::vector<bool> clipping_;
-  std::vector<bool> estimated_;
+  std::vector<std::string> input_states_;
   std::vector<bool> latched_;
   bool uncertain_{false};
   std::map<std::string, bool> connected_;
   std::map<std::string, std::string> states_;  ///< of CAN interfaces
+  std::uint64_t lost_{0};                      ///< records of the history
   std::uint64_t missed_{0};
   std::uint64_t failed_sleeps_{0};
   SocketStatistics socket_;

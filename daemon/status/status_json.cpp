@@ -219,6 +219,8 @@ json history(const StatusView& view) {
           {"last_commit_age_s", number(statistics.last_commit_age_s)},
           {"lost_records", statistics.lost},
           {"errors", statistics.errors},
+          {"deleted_segments", statistics.deleted},
+          {"files_replaced", statistics.replaced},
           {"last_error", statistics.last_error}};
 }
 

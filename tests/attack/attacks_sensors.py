@@ -72,10 +72,12 @@ def measured_without_end(rig):
     `step_um_max` with each, and nothing becomes infinite."""
     if not rig.start(BEFORE_UM):
         return
-    values = (1e308, -1e308, 1e300, 1e39, -1e17)
+    values = (1e308, -1e308, 1e300, 1e39, -1e17, 900.0, -400.0, 3.0 * rig.axis.bound_um)
     for _ in range(20):
+        value_um = rig.random.choice(values)
         try:
-            rig.daemon.call("measured", axis="z", value_um=rig.random.choice(values))
+            rig.daemon.call("measured", axis="z", value_um=value_um)
+            rig.broke(f"measured z {value_um:g} is taken")
         except (watch.Refused, OSError, ValueError):
             pass
         axis = rig.daemon.axis()
@@ -83,8 +85,9 @@ def measured_without_end(rig):
                         "target or displacement is no number any more"):
             break
         time.sleep(0.05)
-    status, said = rig.tool("--socket", rig.daemon.socket, "measured", "z", "1e308")
-    rig.must(status == 2, f"thermocomp measured z 1e308 is taken (exit status {status})")
+    for value in ("1e308", "900"):
+        status, _ = rig.tool("--socket", rig.daemon.socket, "measured", "z", value)
+        rig.must(status == 2, f"thermocomp measured z {value} is taken (exit status {status})")
     rig.daemon.kill()
     rig.restart()
     rig.must(rig.daemon.wait_for("compensating"), "does not compensate after a restart")

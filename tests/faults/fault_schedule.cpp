@@ -37,7 +37,8 @@ constexpr std::array<std::string_view, fault_kinds> names{"sensor_open",
                                                           "cycle_overrun",
                                                           "model_reload",
                                                           "daemon_killed",
-                                                          "history_disk_full"};
+                                                          "history_disk_full",
+                                                          "history_files_removed"};
 
 nanoseconds seconds_of(double time_s) {
   return nanoseconds{static_cast<nanoseconds::rep>(time_s * 1e9)};

@@ -49,9 +49,10 @@ enum class FaultKind : std::uint8_t {
   cycle_overrun,
   model_reload,
   daemon_killed,
-  history_disk_full
+  history_disk_full,
+  history_files_removed
 };
-inline constexpr std::size_t fault_kinds = 33;
+inline constexpr std::size_t fault_kinds = 34;
 /// Unordered, a kind with itself (another subject or time) among them.
 inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 

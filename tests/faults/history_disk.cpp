@@ -30,6 +30,8 @@ struct HistoryDisk::Parts {
   Chance chance;
   DiskState disk;
   nanoseconds now{};
+  nanoseconds wrong_for_good{};          ///< of the wall clock
+  std::uint64_t files_removed_event{0};  ///< the last one that was carried out
   Grid grid;
   std::unique_ptr<HistoryWriter> writer;
   std::vector<ReplaySetup> setups;
@@ -44,7 +46,8 @@ struct HistoryDisk::Parts {
   Parts(std::uint64_t seed, const FaultSchedule& fault_schedule)
       : schedule(fault_schedule), chance(seed, 11) {}
 
-  [[nodiscard]] nanoseconds wall() const {
+  /// Every other step that is wide is never set right again.
+  [[nodiscard]] nanoseconds wall() {
     const FaultEvent* step = schedule.find(FaultKind::wall_clock_stepped, now);
     nanoseconds stepped{0};
     if (step != nullptr) {
@@ -54,8 +57,18 @@ struct HistoryDisk::Parts {
         stepped = -std::chrono::hours(1);
       else
         stepped = std::chrono::hours(step->strength < 0.75 ? 1 : 24 * 400);
+      if (step->strength >= 0.75 && step->number % 2 == 0) wrong_for_good = stepped;
     }
-    return wall_at_begin + now + stepped;
+    return wall_at_begin + now + (step != nullptr ? stepped : wrong_for_good);
+  }
+  /// Somebody tidies up.
+  void remove_files() {
+    const FaultEvent* event = schedule.find(FaultKind::history_files_removed, now);
+    if (event == nullptr || event->number == files_removed_event) return;
+    files_removed_event = event->number;
+    std::error_code ignored;
+    if (event->strength < 0.7) std::filesystem::remove(folder / "history.db-wal", ignored);
+    if (event->strength > 0.4) std::filesystem::remove(folder / "history.db-shm", ignored);
   }
   [[nodiscard]] HistoryConfig config() const {
     HistoryConfig history;
@@ -110,6 +123,7 @@ void HistoryDisk::work(nanoseconds now) {
   Parts& parts = *parts_;
   parts.now = now;
   parts.disk.full = parts.schedule.find(FaultKind::history_disk_full, now) != nullptr;
+  parts.remove_files();
   parts.writer->work();
   const auto cycle_now = static_cast<std::uint64_t>((now - parts.grid.start) / parts.grid.period);
   while (++parts.last_step < cycle_now)

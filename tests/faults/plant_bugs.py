@@ -117,8 +117,9 @@ BUGS = [
      "    ++statistics.errors;\n"
      "    if ({P}) pending.clear();\n"),
     ("wall_clock_step_deletes_history", "daemon/history/writing/history_store.cpp",
-     "return now - *steady_since_ >= steady_min;",
-     "return {P} || now - *steady_since_ >= steady_min;"),
+     "const bool is_old = oldest.age_ns > config_.age_days_max * 86400e9;",
+     "const bool is_old = oldest.age_ns > config_.age_days_max * 86400e9 ||\n"
+     "        ({P} && wall_now_ns() > 1'800'000'000'000'000'000);"),
     ("signal_not_recorded", "daemon/recording/cycle_recorder.cpp",
      "  push_values(cycle, RecordKind::signal, controller.signals, controller_.signals);\n",
      "  if (!{P} || cycle % 3 != 0)\n"

@@ -151,6 +151,7 @@ def socket_seeds():
     for method in ("status", "sensors", "offsets", "timing", "model", "reference", "enable",
                    "disable", "cycle_end", "reload", "controller_state"):
         write("socket_request", method, request(method, {}))
+    write("socket_request", "measured_too_far", request("measured", {"axis": "z", "value_um": 900}))
     write("socket_request", "measured", request("measured", {"axis": "z", "value_um": -3.5}))
 
     # Of a model that corrects itself: often, far off and then agreeing, cycle ends between.

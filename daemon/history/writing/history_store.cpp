@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <fmt/format.h>
 #include <utility>
 
-#include <spdlog/spdlog.h>
 #include <sys/stat.h>
 #include <system_error>
 
+#include "daemon/history/format/history_time.hpp"
 #include "daemon/history/format/row_checksum.hpp"
 
 namespace thermocomp {
@@ -16,8 +17,13 @@ namespace {
 
 /// Deletion starts before the bound, so that the next commits do not pass it.
 constexpr double delete_at = 0.9;
-/// A clock that says it is before 2020 has not been set: such stamps say nothing about age.
-constexpr std::int64_t clock_unset_before_ns = 1'577'836'800'000'000'000;
+/// A segment is ended after `segment_h`, or a little later: a longer one has a damaged row, which
+/// must not make the others old.
+constexpr double segment_lengths_max = 2.0;
+
+/// What SQLite adds to the name of the database: itself, the write-ahead log, its index.
+constexpr std::array<const char*, 3> file_ends{"", "-wal", "-shm"};
+enum FileOf : std::size_t { database_file, wal_file, index_file };
 
 constexpr const char* tables =
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;"
@@ -108,19 +114,39 @@ bool PendingRows::begins(std::int64_t segment_token) const noexcept {
   });
 }
 
-bool HistoryStore::is_same_file() const noexcept {
-  struct stat status {};
-  return stat(config_.file.c_str(), &status) == 0 && status.st_dev == device_ &&
-         status.st_ino == inode_;
+HistoryStore::Files HistoryStore::look_at_files() const {
+  Files files{};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    struct stat status {};
+    if (stat((config_.file.string() + file_ends[i]).c_str(), &status) == 0)
+      files[i] = {status.st_dev, status.st_ino, i == wal_file ? status.st_size : 0};
+  }
+  return files;
+}
+
+/// The file that is not as this left it; empty: none.
+std::string HistoryStore::changed_file() const {
+  const Files now = look_at_files();
+  for (std::size_t i = 0; i < now.size(); ++i)
+    if (!now[i].is_same_file(files_[i]) || now[i].bytes < files_[i].bytes)
+      return config_.file.string() + file_ends[i];
+  return {};
+}
+
+void HistoryStore::note_files() {
+  const Files now = look_at_files();
+  for (std::size_t i = 0; i < now.size(); ++i)
+    if (now[i].is_same_file(files_[i])) files_[i] = now[i];
 }
 
 bool HistoryStore::open_if_closed(std::int64_t needed_token) {
-  // Somebody may have moved or deleted the file: SQLite would go on writing into the void.
-  if (database_ && !is_same_file()) close();
+  if (const std::string changed = database_ ? changed_file() : ""; !changed.empty())
+    rescue(changed);
   if (!database_) {
-    if (!is_same_file()) {
+    if (!look_at_files()[database_file].is_same_file(files_[database_file])) {
       run_ = 0;
       tokens_.clear();
+      chunks_before_ = 0;
     }
     try {
       prepare();
@@ -130,6 +156,38 @@ bool HistoryStore::open_if_closed(std::int64_t needed_token) {
     }
   }
   return needed_token == 0 || tokens_.count(needed_token) != 0;
+}
+
+/// SQLite would go on writing into files that nobody finds any more. The open connection still has
+/// them: what is committed goes into the database, if that is still in its place; then -wal and
+/// -shm, whosever they are, hold nothing that it needs, and an older one would spoil it.
+void HistoryStore::rescue(const std::string& changed) {
+  const Files now = look_at_files();
+  const bool has_database = now[database_file].is_same_file(files_[database_file]);
+  const bool is_wal_ours = now[wal_file].is_same_file(files_[wal_file]);
+  const bool is_cut = is_wal_ours && now[wal_file].bytes < files_[wal_file].bytes;
+  int in_log = 0;
+  int moved = -1;
+  try {
+    if (has_database) chunks_before_ = database_->number("SELECT count(*) FROM chunk");
+    if (!is_cut)
+      sqlite3_wal_checkpoint_v2(database_->handle(), nullptr, SQLITE_CHECKPOINT_FULL, &in_log,
+                                &moved);
+  } catch (const DatabaseError&) {
+    // The log cannot be read any more: what is in the database is what is left.
+  }
+  // Closing would read the log once more, and remove whatever bears its name.
+  sqlite3_db_config(database_->handle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  close();
+  const bool is_moved = in_log == moved;
+  if (has_database ? is_moved || is_cut || !is_wal_ours : is_wal_ours) {
+    std::error_code ignored;
+    for (const char* end : {"-wal", "-shm"})
+      std::filesystem::remove(config_.file.string() + end, ignored);
+  }
+  ++replaced_;
+  news_.push_back(changed + " was removed, replaced or cut while the history was written; " +
+                  (has_database ? "opened anew" : "a new history begins"));
 }
 
 /// Held until the end: also while the file is closed, moved aside or missing.
@@ -167,8 +225,9 @@ void HistoryStore::prepare() {
   database_->run("PRAGMA cache_size = -512; PRAGMA synchronous = FULL; PRAGMA temp_store = MEMORY");
   if (is_empty) create();
   database_->run(
+      // Every commit goes on into the database at once: a -wal that somebody removes holds nothing.
       "PRAGMA journal_mode = WAL; PRAGMA journal_size_limit = 1048576;"
-      "PRAGMA wal_autocheckpoint = 500");
+      "PRAGMA wal_autocheckpoint = 1");
   if (!has_checksum_columns(*database_)) add_checksum_columns(*database_);
   database_->run(event_table);
   if (run_ == 0)
@@ -176,11 +235,23 @@ void HistoryStore::prepare() {
                "SELECT max((SELECT ifnull(max(run), 0) FROM segment),"
                " (SELECT ifnull(max(run), 0) FROM event))") +
            1;
-  struct stat status {};
-  if (stat(config_.file.c_str(), &status) == 0) {
-    device_ = status.st_dev;
-    inode_ = status.st_ino;
+  forget_lost_tokens();
+  files_ = look_at_files();
+}
+
+/// A segment whose rows are not all in the file any more gets no further ones.
+void HistoryStore::forget_lost_tokens() {
+  const std::int64_t chunks = database_->number("SELECT count(*) FROM chunk");
+  if (chunks < chunks_before_) {
+    tokens_.clear();
+    news_.push_back(fmt::format("{} of {} committed parts are lost with it",
+                                chunks_before_ - chunks, chunks_before_));
   }
+  chunks_before_ = 0;
+  std::erase_if(tokens_, [this](const Tokens::value_type& token) {
+    Statement known(*database_, "SELECT 1 FROM segment WHERE id = ? AND run = ? AND token = ?");
+    return !known.bind(token.second).bind(run_).bind(token.first).step();
+  });
 }
 
 void HistoryStore::create() {
@@ -206,14 +277,15 @@ void HistoryStore::move_aside(const std::string& why) noexcept {
     for (int i = 2; std::filesystem::exists(to); ++i) {
       to = from + ".damaged-" + utc_stamp() + "-" + std::to_string(i);
     }
-    spdlog::error("history: {}; moved to {}, a new history begins", why, to);
+    ++replaced_;
+    news_.push_back(why + "; moved to " + to + ", a new history begins");
     std::error_code ignored;
     std::filesystem::rename(from, to, ignored);
     for (const char* end : {"-wal", "-shm"}) {
       std::filesystem::rename(from + end, to + end, ignored);
     }
   } catch (const std::exception& error) {
-    spdlog::error("history: a damaged file could not be moved aside: {}", error.what());
+    news_.push_back(std::string("a damaged file could not be moved aside: ") + error.what());
   }
 }
 
@@ -238,6 +310,31 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
   // Only the newest segment can still get rows.
   if (!tokens.empty()) tokens.erase(tokens.begin(), std::prev(tokens.end()));
   tokens_ = std::move(tokens);
+  note_files();
+  read_back(pending);
+}
+
+void HistoryStore::read_back(const PendingRows& pending) {
+  Database reader(config_.file, DatabaseMode::read_only);
+  const auto require = [this](Statement& row) {
+    if (!row.step())
+      throw HistoryError(config_.file.string() + ": what was committed cannot be read back");
+  };
+  for (const PendingRows::Row& row : pending.rows()) {
+    if (const auto* segment = std::get_if<SegmentRow>(&row)) {
+      Statement known(reader, "SELECT 1 FROM segment WHERE run = ? AND token = ?");
+      require(known.bind(run_).bind(segment->token));
+    } else if (const auto* chunk = std::get_if<ChunkRow>(&row)) {
+      Statement known(reader,
+                      "SELECT 1 FROM chunk JOIN segment ON segment.id = chunk.segment"
+                      " WHERE run = ? AND token = ? AND number = ? AND chunk.records = ?");
+      known.bind(run_).bind(chunk->segment_token).bind(chunk->number);
+      require(known.bind(std::span<const std::byte>(chunk->records)));
+    } else {
+      Statement known(reader, "SELECT 1 FROM event WHERE run = ? AND number = ?");
+      require(known.bind(run_).bind(std::get<RecordedEvent>(row).number));
+    }
+  }
 }
 
 std::int64_t HistoryStore::setup_id(const HistorySetup& setup) {
@@ -337,13 +434,14 @@ void HistoryStore::forget_old_events() {
   statement.bind(kept - kept / 10).run();
 }
 
-std::int64_t HistoryStore::oldest_other_than(std::int64_t current, std::int64_t& last_wall_ns) {
+HistoryStore::OldSegment HistoryStore::oldest_other_than(std::int64_t current) {
   Statement oldest(*database_,
-                   "SELECT id, last_wall_ns FROM segment WHERE id <> ? ORDER BY id LIMIT 1");
-  oldest.bind(current);
-  if (!oldest.step()) return 0;
-  last_wall_ns = oldest.number(1);
-  return oldest.number(0);
+                   "SELECT id, records, (SELECT total(min(max(last_cycle - first_cycle + 1, 0)"
+                   " * period_ns, ?)) FROM segment AS later WHERE later.id > segment.id)"
+                   " FROM segment WHERE id <> ? ORDER BY id LIMIT 1");
+  oldest.bind(static_cast<std::int64_t>(segment_lengths_max * config_.segment_h * 3600e9));
+  if (!oldest.bind(current).step()) return {};
+  return {oldest.number(0), oldest.number(1), static_cast<double>(oldest.number(2))};
 }
 
 void HistoryStore::delete_segment(std::int64_t id) {
@@ -356,15 +454,11 @@ void HistoryStore::delete_segment(std::int64_t id) {
   transaction.commit();
 }
 
-bool HistoryStore::wall_clock_is_steady() {
-  constexpr nanoseconds step_min = std::chrono::minutes(1);
-  constexpr nanoseconds steady_min = std::chrono::hours(1);
-  const nanoseconds now = clocks_.monotonic();
-  const nanoseconds difference = clocks_.wall() - now;
-  const nanoseconds change = difference - wall_minus_monotonic_;
-  if (!steady_since_ || change > step_min || change < -step_min) steady_since_ = now;
-  wall_minus_monotonic_ = difference;
-  return now - *steady_since_ >= steady_min;
+void HistoryStore::say_deleted(std::int64_t count, std::int64_t records, const std::string& why) {
+  if (count == 0) return;
+  deleted_ += static_cast<std::uint64_t>(count);
+  news_.push_back(
+      fmt::format("the oldest {} segments ({} records) deleted: {}", count, records, why));
 }
 
 void HistoryStore::keep_within_bounds(std::int64_t current_token) {
@@ -373,19 +467,26 @@ void HistoryStore::keep_within_bounds(std::int64_t current_token) {
   const std::int64_t current = token == tokens_.end() ? 0 : token->second;
   const double page_bytes = static_cast<double>(database_->number("PRAGMA page_size"));
   const double bytes_max = config_.size_MB_max * 1e6;
-  const double age_ns_max = config_.age_days_max * 86400e9;
-  const bool age_counts = wall_clock_is_steady();
+  std::int64_t old_count = 0;
+  std::int64_t old_records = 0;
+  std::int64_t much_count = 0;
+  std::int64_t much_records = 0;
   for (;;) {
     const auto used = static_cast<double>(database_->number("PRAGMA page_count") -
                                           database_->number("PRAGMA freelist_count"));
-    std::int64_t last_wall_ns = 0;
-    const std::int64_t oldest = oldest_other_than(current, last_wall_ns);
-    if (oldest == 0) break;
-    const bool is_old = age_counts && last_wall_ns > clock_unset_before_ns &&
-                        static_cast<double>(wall_now_ns() - last_wall_ns) > age_ns_max;
-    if (!(used * page_bytes > delete_at * bytes_max) && !is_old) break;
-    delete_segment(oldest);
+    const OldSegment oldest = oldest_other_than(current);
+    const bool is_old = oldest.age_ns > config_.age_days_max * 86400e9;
+    const bool is_much = used * page_bytes > delete_at * bytes_max;
+    if (oldest.id == 0 || !(is_old || is_much)) break;
+    (is_old ? old_count : much_count) += 1;
+    (is_old ? old_records : much_records) += oldest.records;
+    delete_segment(oldest.id);
   }
+  say_deleted(old_count, old_records,
+              fmt::format("more than {} days were recorded after them (history.age_days_max)",
+                          config_.age_days_max));
+  say_deleted(much_count, much_records,
+              fmt::format("the file reaches {} MB (history.size_MB_max)", config_.size_MB_max));
   // Free pages are used again; only what would be beyond the bound is given back.
   if (static_cast<double>(database_->number("PRAGMA page_count")) * page_bytes > bytes_max) {
     database_->run("PRAGMA incremental_vacuum");
@@ -393,6 +494,7 @@ void HistoryStore::keep_within_bounds(std::int64_t current_token) {
   bytes_ = static_cast<std::uint64_t>(static_cast<double>(database_->number("PRAGMA page_count")) *
                                       page_bytes);
   segments_ = static_cast<std::uint64_t>(database_->number("SELECT count(*) FROM segment"));
+  note_files();
 }
 
 }  // namespace thermocomp

@@ -15,12 +15,13 @@
 /// when they are opened for writing.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -83,33 +84,58 @@ class HistoryStore {
   HistoryStore(const HistoryConfig& config, WriterClocks clocks)
       : config_(config), clocks_(std::move(clocks)) {}
 
+  /// The database, its -wal and its -shm are watched together: where one of them was removed,
+  /// replaced or cut by another program, what is committed is brought into the database, which is
+  /// then opened anew with fresh companions; a database that is gone is begun anew.
   /// @param needed_token  a segment that must be in the file already; 0: none
   /// @return false when that segment is not in the file: its rows have no place there
   /// @throws DatabaseError; HistoryError when the file is not ours or of a newer version, or
   ///         another process writes it
   [[nodiscard]] bool open_if_closed(std::int64_t needed_token);
   void close() noexcept;
-  /// Renames the file (and its log) to `<file>.damaged-<UTC>` and says so in the log.
+  /// After a change of our own, one that failed too: so the files are left. What another program
+  /// has put in the place of one stays to be noticed.
+  void note_files();
+  /// Renames the file (and its log) to `<file>.damaged-<UTC>`.
   void move_aside(const std::string& why) noexcept;
 
-  /// All rows in one transaction.
+  /// All rows in one transaction. They count as written once a second connection, which opens the
+  /// files by their names, has read them back.
   /// @param prove  writes something even without rows, to see whether the disk works
   void write(const PendingRows& pending, bool prove);
-  /// Deletes the oldest whole segments until size and age are in bounds. Age counts only while the
-  /// wall clock has gone as steadily as the monotonic one for an hour: a clock set wrong for a
-  /// moment must not cost the history.
+  /// Deletes the oldest whole segments until size and age are in bounds. The age of a segment is
+  /// the time that was recorded after it, by the monotonic clock: no wall clock, however wrong,
+  /// makes it older.
   void keep_within_bounds(std::int64_t current_token);
 
+  /// What somebody must know who looks for rows: segments deleted, files replaced or moved aside;
+  /// one sentence each, since the last call.
+  [[nodiscard]] std::vector<std::string> take_news() noexcept { return std::exchange(news_, {}); }
+  [[nodiscard]] std::uint64_t deleted() const noexcept { return deleted_; }    ///< segments
+  [[nodiscard]] std::uint64_t replaced() const noexcept { return replaced_; }  ///< times
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
   [[nodiscard]] std::uint64_t segments() const noexcept { return segments_; }
 
  private:
   using Tokens = std::map<std::int64_t, std::int64_t>;  ///< token -> segment.id
+  struct FileIdentity {
+    dev_t device{0};
+    ino_t inode{0};  ///< 0: there is none
+    off_t bytes{0};  ///< of the -wal, which shrinks only by its owner
+    [[nodiscard]] bool is_same_file(const FileIdentity& other) const noexcept {
+      return device == other.device && inode == other.inode;
+    }
+  };
+  using Files = std::array<FileIdentity, 3>;  ///< the database, its -wal, its -shm
 
   void lock();
   void prepare();
   void create();
-  [[nodiscard]] bool is_same_file() const noexcept;
+  [[nodiscard]] Files look_at_files() const;
+  [[nodiscard]] std::string changed_file() const;
+  void rescue(const std::string& changed);
+  void forget_lost_tokens();
+  void read_back(const PendingRows& pending);
   void insert(const SegmentRow& row, Tokens& tokens);
   void insert(const ChunkRow& row, const Tokens& tokens);
   void insert(const RecordedEvent& row);
@@ -118,21 +144,27 @@ class HistoryStore {
   [[nodiscard]] std::int64_t setup_id(const HistorySetup& setup);
   void delete_segment(std::int64_t id);
   [[nodiscard]] std::int64_t wall_now_ns() const { return clocks_.wall().count(); }
-  [[nodiscard]] bool wall_clock_is_steady();
-  [[nodiscard]] std::int64_t oldest_other_than(std::int64_t current, std::int64_t& last_wall_ns);
+  struct OldSegment {
+    std::int64_t id{0};  ///< 0: there is none
+    std::int64_t records{0};
+    double age_ns{0.0};
+  };
+  [[nodiscard]] OldSegment oldest_other_than(std::int64_t current);
+  void say_deleted(std::int64_t count, std::int64_t records, const std::string& why);
 
   HistoryConfig config_;
   WriterClocks clocks_;
   std::unique_ptr<FileLock> lock_;
   std::unique_ptr<Database> database_;
-  dev_t device_{0};
-  ino_t inode_{0};
+  Files files_{};                  ///< as this left them
+  std::int64_t chunks_before_{0};  ///< in the file as it was left; 0: not known
   std::int64_t run_{0};
   Tokens tokens_;
   std::uint64_t bytes_{0};
   std::uint64_t segments_{0};
-  std::optional<nanoseconds> steady_since_;  ///< monotonic
-  nanoseconds wall_minus_monotonic_{};
+  std::uint64_t deleted_{0};
+  std::uint64_t replaced_{0};
+  std::vector<std::string> news_;
 };
 
 }  // namespace thermocomp

@@ -4,12 +4,12 @@
 #include <array>
 #include <atomic>
 #include <condition_variable>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <pthread.h>
 #include <vector>
 
-#include <spdlog/spdlog.h>
 #include <sys/statvfs.h>
 
 #include "daemon/history/format/chunk_codec.hpp"
@@ -26,6 +26,8 @@ constexpr milliseconds drain_period{50};
 constexpr double commit_s_max = 9.5;
 constexpr std::size_t chunk_bytes_max = std::size_t{512} * 1024;
 constexpr double backoff_s_max = 60.0;
+/// More than anybody misses who asks every second.
+constexpr std::ptrdiff_t news_max = 100;
 /// SQLite needs little; the default of 8 MB would count fully once memory is locked.
 constexpr std::size_t stack_bytes = std::size_t{512} * 1024;
 
@@ -76,6 +78,7 @@ struct HistoryWriter::Parts {
   std::vector<RecordedEvent> events;  ///< that no commit has taken yet
   std::uint16_t next_session{1};
   HistoryStatistics statistics;
+  std::vector<std::string> news;
   std::optional<nanoseconds> last_commit;
 
   // The writer's thread only (and start() before it runs).
@@ -115,6 +118,7 @@ struct HistoryWriter::Parts {
   void take_events();
   void commit();
   bool write();
+  void take_from_store();
   [[nodiscard]] bool is_working() const;
   void written(std::uint64_t records);
   void failed(const std::string& why);
@@ -261,7 +265,10 @@ bool HistoryWriter::Parts::write() {
   } catch (const DatabaseError& error) {
     if (error.is_damage()) store.move_aside(error.what());
     // On a full disk it stays open: opening anew would need room, for this thread as for a reader.
-    if (!error.is_full()) store.close();
+    if (error.is_full())
+      store.note_files();
+    else
+      store.close();
     failed(error.what());
     return false;
   } catch (const std::exception& error) {
@@ -269,10 +276,19 @@ bool HistoryWriter::Parts::write() {
     failed(error.what());
     return false;
   }
+  take_from_store();
+  return true;
+}
+
+void HistoryWriter::Parts::take_from_store() {
+  std::vector<std::string> fresh = store.take_news();
   const std::lock_guard lock(mutex);
+  std::move(fresh.begin(), fresh.end(), std::back_inserter(news));
+  if (std::ssize(news) > news_max) news.erase(news.begin(), news.end() - news_max);
   statistics.segments = store.segments();
   statistics.bytes = store.bytes();
-  return true;
+  statistics.deleted = store.deleted();
+  statistics.replaced = store.replaced();
 }
 
 bool HistoryWriter::Parts::is_working() const {
@@ -284,7 +300,6 @@ bool HistoryWriter::Parts::is_working() const {
 void HistoryWriter::Parts::written(std::uint64_t records) {
   pending.clear();
   const std::lock_guard lock(mutex);
-  if (!statistics.working) spdlog::info("history: writing {}", config.file.string());
   statistics.working = true;
   statistics.last_error.clear();
   statistics.records += records;
@@ -294,17 +309,12 @@ void HistoryWriter::Parts::written(std::uint64_t records) {
 }
 
 void HistoryWriter::Parts::failed(const std::string& why) {
-  const std::string message = why + disk_note(config.file);
-  bool is_news = false;
-  {
-    const std::lock_guard lock(mutex);
-    is_news = statistics.last_error != message;
-    statistics.working = false;
-    statistics.last_error = message;
-    ++statistics.errors;
-    statistics.lost = ring.lost() + dropped;
-  }
-  if (is_news) spdlog::warn("history: {}; the compensation goes on, tried again", message);
+  take_from_store();
+  const std::lock_guard lock(mutex);
+  statistics.working = false;
+  statistics.last_error = why + disk_note(config.file);
+  ++statistics.errors;
+  statistics.lost = ring.lost() + dropped;
 }
 
 void HistoryWriter::Parts::drop_pending() {
@@ -417,6 +427,11 @@ void HistoryWriter::stop() noexcept {
   parts_->wake.notify_all();
   pthread_join(parts_->thread, nullptr);
   parts_->running = false;
+}
+
+std::vector<std::string> HistoryWriter::take_news() {
+  const std::lock_guard lock(parts_->mutex);
+  return std::exchange(parts_->news, {});
 }
 
 HistoryStatistics HistoryWriter::statistics() const {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/history/format/recorded_event.hpp"
@@ -23,6 +24,8 @@ struct HistoryStatistics {
   std::uint64_t lost{0};      ///< records lost: ring or memory full
   std::uint64_t gaps{0};      ///< segments that begin after a loss
   std::uint64_t segments{0};  ///< in the file
+  std::uint64_t deleted{0};   ///< segments, for size or age
+  std::uint64_t replaced{0};  ///< times that the file, its -wal or its -shm was not ours any more
   std::uint64_t bytes{0};     ///< of the file, without its write-ahead log
   double last_commit_age_s{not_a_number};
   std::string last_error;  ///< empty when the last attempt was good
@@ -54,7 +57,7 @@ class HistoryWriter {
                                                              const Estimator& estimator);
   /// Something has happened; it is on disk with the next commit. Any ordinary thread.
   void note(RecordedEvent event);
-  /// Opens the file and starts the thread. A damaged file is moved aside with a warning in the log;
+  /// Opens the file and starts the thread. A damaged file is moved aside, which is among the news;
   /// a disk that does not work is tried again for ever.
   /// @throws HistoryError when the file is of a newer version or of another program, or another
   ///         process writes it
@@ -66,6 +69,8 @@ class HistoryWriter {
   /// Writes what is left and closes the file. Gives up on a disk that does not work after one try.
   void stop() noexcept;
   [[nodiscard]] HistoryStatistics statistics() const;
+  /// What happened to rows or files since the last call, one sentence each. Any ordinary thread.
+  [[nodiscard]] std::vector<std::string> take_news();
 
  private:
   struct Parts;

@@ -1,6 +1,9 @@
 """Two real daemons that were given the same thing: the second is refused and says who has it."""
 
+import os
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -94,3 +97,51 @@ def test_after_an_end_or_a_kill_the_next_may_have_it(machine, other):
     other.daemon.start().wait_for_mode("compensating")
     other.daemon.end()
     assert not list(daemon.folder.glob("*.lock"))
+
+
+# Takes names as any user may: those that a holder has now or had, and the beginning of them.
+SQUATTER = """
+import os, socket, sys, time
+os.setgid(65534)
+os.setuid(65534)
+taken = []
+for name in sys.argv[1:]:
+    for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM, socket.SOCK_SEQPACKET):
+        link = socket.socket(socket.AF_UNIX, kind)
+        try:
+            link.bind(b"\\0" + name.encode())
+            if kind != socket.SOCK_DGRAM:
+                link.listen(1)
+            taken.append(link)
+        except OSError:
+            pass
+print(len(taken), flush=True)
+time.sleep(600)
+"""
+
+
+def abstract_names(word):
+    with open("/proc/self/net/unix") as table:
+        lines = [line.rstrip("\n") for line in table]
+    return sorted({line[line.index("@") + 1:] for line in lines if "@thermoc" in line and
+                   word in line})
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can be another user")
+def test_another_user_cannot_keep_the_daemon_from_starting(machine, other):
+    daemon = machine.start()
+    names = abstract_names(f":{machine.controller.port} ")
+    assert names
+    daemon.end()
+    names += [name.rpartition("/")[0] for name in names]
+    squatter = subprocess.Popen([sys.executable, "-c", SQUATTER, *names], text=True,
+                                stdout=subprocess.PIPE)
+    try:
+        assert int(squatter.stdout.readline()) > 0
+        daemon.start().wait_for_mode("compensating")
+        # And the two of one user still exclude each other.
+        change(other, (f"port = {other.controller.port}", f"port = {machine.controller.port}"))
+        assert_refused(other.daemon, daemon, "controller")
+    finally:
+        squatter.kill()
+        squatter.wait()

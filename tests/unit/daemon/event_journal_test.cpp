@@ -42,6 +42,49 @@ TEST_CASE("an outage is a fault, a recovery, and how long it lasted", "[daemon][
   CHECK(events[2].wall_ns == (1'700'000'028s / 1ns));
 }
 
+TEST_CASE("a fault that comes and goes is one outage of four events", "[daemon][events]") {
+  Bench bench;
+  int told = 0;
+  for (int i = 0; i < 1200; ++i) {  // four times a second for five minutes
+    told += bench.journal.fault("sensor bed", i % 4 == 0 ? "no_answer" : "stale") ? 1 : 0;
+    bench.pass(125ms);
+    CHECK(std::isnan(bench.journal.recovery("sensor bed")) == (i > 0));
+    bench.pass(125ms);
+    CHECK(bench.journal.settle().empty());
+  }
+  CHECK(told == 2);
+  CHECK(bench.journal.comes_and_goes("sensor bed"));
+  bench.pass(9s);
+  CHECK(bench.journal.settle().empty());
+  bench.pass(1s);
+  const auto ended = bench.journal.settle();
+  REQUIRE(ended.size() == 1);
+  CHECK(ended[0].kind == "recovery");
+  CHECK(ended[0].duration_s == Approx(300.0).margin(0.2));  // to where it went away
+  CHECK_FALSE(bench.journal.lasts("sensor bed"));
+  const auto& events = bench.journal.events();
+  REQUIRE(events.size() == 4);
+  CHECK(events[0].what == "no_answer");
+  CHECK(events[1].kind == "recovery");
+  CHECK(events[2].what == "stale, comes and goes");
+  // What comes later is another outage.
+  bench.pass(60s);
+  CHECK(bench.journal.fault("sensor bed", "no_answer"));
+  bench.pass(1s);
+  CHECK(bench.journal.recovery("sensor bed") == Approx(1.0));
+}
+
+TEST_CASE("each kind of fault is told once in an outage", "[daemon][events]") {
+  Bench bench;
+  for (int i = 0; i < 1000; ++i) {
+    bench.journal.fault("sensor bed", i % 2 == 0 ? "no_answer" : "stale");
+    bench.journal.fault("bus a", "error " + std::to_string(i));
+    bench.pass(250ms);
+  }
+  CHECK(bench.journal.events().size() == 2 + EventJournal::faults_of_outage_max);
+  CHECK(bench.journal.recovery("sensor bed") == Approx(250.0));
+}
+
 TEST_CASE("a clock that is set changes no duration", "[daemon][events]") {
   Bench bench;
   bench.journal.mode("compensating");

@@ -1,7 +1,12 @@
 // What of the reports becomes an event, in a time of the test's own.
 #include "daemon/status/event_log.hpp"
 
+#include <algorithm>
+#include <sstream>
+
 #include <catch2/catch.hpp>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 using namespace thermocomp;
 using namespace std::chrono_literals;
@@ -68,13 +73,50 @@ TEST_CASE("a target that flickers about its bound is one outage", "[daemon][even
     bench.pass(20s);
   }
   REQUIRE(bench.about("reason at_bound").size() == 1);
-  bench.pass(20s);
+  bench.pass(40s);
   CHECK(bench.about("reason at_bound").size() == 1);
   bench.pass(20s);
   const auto told = bench.about("reason at_bound");
   REQUIRE(told.size() == 2);
   CHECK(told[1].kind == "recovery");
-  CHECK(told[1].duration_s == Approx(98 * 20.0));  // to where it was last
+  CHECK(told[1].duration_s == Approx(99 * 20.0));  // to where it went away
+}
+
+TEST_CASE("a block that is lost and back four times a second makes a few lines an outage",
+          "[daemon][events]") {
+  std::ostringstream text;
+  auto before = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text)));
+  Bench bench;
+  AxisConfig axis;
+  axis.name = "z";
+  bench.config.axes.push_back(axis);
+  bench.config.compensation.offset_sd_um_max = 1.0;
+  bench.report.axes.resize(1);
+  bench.report.axes[0].offset_sd_um = 2.0;
+  bench.report.inputs.resize(2);
+  bench.report.inputs[0].good = bench.report.inputs[1].good = true;
+  const auto lost = static_cast<std::uint32_t>(Reason::block_lost);
+  for (int i = 0; i < 2400; ++i) {  // of ten minutes
+    const bool is_lost = i % 2 == 0;
+    bench.report.sensors[0].fault = is_lost ? Fault::no_answer : Fault::none;
+    bench.report.inputs[0].good = !is_lost;
+    bench.report.inputs[0].estimated = i % 4 == 0;
+    bench.report.reasons = is_lost ? lost : 0;
+    bench.report.mode = is_lost ? Mode::holding : Mode::compensating;
+    bench.pass(250ms);
+    bench.log.note_estimates(bench.report, bench.config, {"bed_degC", "head_degC"});
+  }
+  bench.report.inputs[0] = bench.report.inputs[1];
+  bench.pass(20s);
+  bench.log.note_estimates(bench.report, bench.config, {"bed_degC", "head_degC"});
+  spdlog::set_default_logger(before);
+  const std::string said = text.str();
+  CHECK(std::count(said.begin(), said.end(), '\n') < 30);
+  CHECK(said.find("sensor bed: no_answer: over, lasted 600.0 s") != std::string::npos);
+  CHECK(bench.journal.events().size() < 30);
+  CHECK(bench.journal.events().back().what == "compensating");
 }
 
 TEST_CASE("what has no limit is over at once", "[daemon][events]") {

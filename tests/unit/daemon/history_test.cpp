@@ -37,6 +37,12 @@ std::string told(const std::vector<HistoryDamage>& damage) {
   return text;
 }
 
+std::string told(const std::vector<std::string>& news) {
+  std::string text;
+  for (const std::string& line : news) text += line + "\n";
+  return text;
+}
+
 void run_sql(const std::filesystem::path& file, const char* sql) {
   sqlite3* handle = nullptr;
   REQUIRE(sqlite3_open(file.c_str(), &handle) == SQLITE_OK);
@@ -338,45 +344,167 @@ TEST_CASE("the file keeps to its size by losing the oldest segments", "[history]
   CHECK(replay_quietly(config.file).different == 0);
 }
 
-TEST_CASE("a wall clock that is set wrong for a moment costs no history, age does", "[history]") {
+TEST_CASE("no wall clock costs history, however long it is wrong; recorded time does",
+          "[history]") {
   using std::chrono::hours;
   using std::chrono::minutes;
   using std::chrono::seconds;
   const TempFolder folder;
   HistoryConfig config = history_config(folder / "h.db");
   config.segment_h = 10.0 / 3600.0;
-  config.age_days_max = 90.0;
+  config.age_days_max = 150.0 / 86400.0;
   nanoseconds now = hours(7);
   nanoseconds stepped{0};
   const nanoseconds wall_minus_now = seconds(1'780'000'000);
   RecordedMachine machine(config, 9, 65536,
                           {[&] { return now; }, [&] { return wall_minus_now + now + stepped; }});
   const auto segments_after = [&](nanoseconds time) {
-    machine.run(1100);
+    machine.run(1100);  // 11 s are recorded
     now += time;
     machine.writer().work();
     return machine.writer().statistics().segments;
   };
   machine.open();
   std::uint64_t segments = 0;
-  for (int i = 0; i < 10; ++i) segments = segments_after(minutes(10));
-  REQUIRE(segments >= 8);
-  for (const nanoseconds wrong : {nanoseconds(hours(24 * 400)), nanoseconds(-wall_minus_now)}) {
+  for (const nanoseconds wrong :
+       {nanoseconds{0}, nanoseconds(hours(24 * 3650)), nanoseconds(-wall_minus_now)}) {
     stepped = wrong;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 4; ++i) {
       const std::uint64_t before = segments;
-      segments = segments_after(minutes(10));
+      segments = segments_after(minutes(61));
       CHECK(segments >= before);
     }
-    stepped = nanoseconds{0};
-    segments = segments_after(minutes(10));
   }
-  // Ahead for good: then the old segments are old.
-  stepped = hours(24 * 400);
-  static_cast<void>(segments_after(minutes(10)));
-  CHECK(segments_after(minutes(61)) < segments);
+  CHECK(machine.writer().statistics().deleted == 0);
+  CHECK(machine.writer().take_news().empty());
+  stepped = nanoseconds{0};
+  for (int i = 0; i < 12; ++i) segments = segments_after(minutes(1));
+  const HistoryStatistics statistics = machine.writer().statistics();
+  CHECK(statistics.deleted >= 8);
+  CHECK(segments <= 16);
+  const std::vector<std::string> news = machine.writer().take_news();
+  REQUIRE_FALSE(news.empty());
+  CHECK_THAT(news.front(),
+             Catch::Contains("deleted: more than") && Catch::Contains("recorded after them"));
   machine.stop();
   CHECK(replay_quietly(config.file).different == 0);
+}
+
+TEST_CASE("a segment whose length is damaged does not make the others old", "[history]") {
+  const TempFolder folder;
+  HistoryConfig config = history_config(folder / "h.db");
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    RecordedMachine machine(config, seed);
+    machine.start();
+    machine.run(500);
+    machine.stop();
+  }
+  run_sql(config.file, "UPDATE segment SET last_cycle = 1000000000000000 WHERE id = 3");
+  RecordedMachine machine(config, 4);
+  machine.start();
+  machine.run(500);
+  machine.stop();
+  CHECK(machine.writer().statistics().deleted == 0);
+  CHECK(machine.writer().statistics().segments == 4);
+}
+
+TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, and it is told",
+          "[history][files]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  const std::string wal = config.file.string() + "-wal";
+  const std::string shm = config.file.string() + "-shm";
+  nanoseconds now = std::chrono::hours(7);
+  RecordedMachine machine(config, 11, 65536, {[&] { return now; }, [&] { return now; }});
+  machine.open();
+  const auto commit = [&] {
+    machine.run(300);
+    now += std::chrono::seconds(1);
+    machine.writer().work();
+  };
+  for (int i = 0; i < 5; ++i) commit();
+  std::filesystem::copy_file(wal, folder / "old-wal");
+  for (int i = 0; i < 5; ++i) commit();
+  SECTION("both removed") {
+    std::filesystem::remove(wal);
+    std::filesystem::remove(shm);
+  }
+  SECTION("-wal removed") {
+    std::filesystem::remove(wal);
+  }
+  SECTION("-shm removed") {
+    std::filesystem::remove(shm);
+  }
+  SECTION("-wal cut") {
+    std::filesystem::resize_file(wal, 0);
+  }
+  SECTION("an older -wal put in its place") {
+    std::filesystem::rename(folder / "old-wal", wal);
+  }
+  SECTION("a reader that comes in between") {
+    std::filesystem::remove(wal);
+    std::filesystem::remove(shm);
+    const HistoryReader reader(config.file);
+    CHECK(reader.segments().size() == 1);
+  }
+  const std::uint64_t written = machine.writer().statistics().records;
+  // As kill -9 would leave it at this moment: committed rows are in the database already.
+  std::filesystem::copy_file(config.file, folder / "killed.db");
+  std::uint64_t held = 0;
+  for (const SegmentInfo& segment : HistoryReader(folder / "killed.db").segments())
+    held += segment.records;
+  CHECK(held == written);
+  commit();
+  CHECK(machine.writer().statistics().replaced == 1);
+  CHECK(machine.writer().statistics().working);
+  CHECK(machine.writer().statistics().lost == 0);
+  CHECK_THAT(told(machine.writer().take_news()),
+             Catch::Contains("opened anew") && !Catch::Contains("lost"));
+  commit();
+  held = 0;
+  for (const SegmentInfo& segment : HistoryReader(config.file).segments()) held += segment.records;
+  CHECK(held == machine.writer().statistics().records);
+  CHECK(machine.writer().statistics().replaced == 1);
+  machine.stop();
+  const ReplaySummary summary = replay_quietly(config.file);
+  CHECK(summary.damage.empty());
+  CHECK(summary.different == 0);
+  CHECK(summary.segments == 1);
+}
+
+TEST_CASE("a history that is moved away, or its folder, is told and begun anew",
+          "[history][files]") {
+  const TempFolder folder;
+  std::filesystem::create_directory(folder / "place");
+  const HistoryConfig config = history_config(folder / "place/h.db");
+  nanoseconds now = std::chrono::hours(7);
+  RecordedMachine machine(config, 12, 65536, {[&] { return now; }, [&] { return now; }});
+  machine.open();
+  const auto commit = [&] {
+    machine.run(300);
+    now += std::chrono::seconds(70);
+    machine.writer().work();
+  };
+  for (int i = 0; i < 5; ++i) commit();
+  const std::uint64_t written = machine.writer().statistics().records;
+  std::filesystem::path moved = folder / "moved.db";
+  SECTION("the database alone") {
+    std::filesystem::rename(config.file, moved);
+  }
+  SECTION("the folder") {
+    std::filesystem::rename(folder / "place", folder / "elsewhere");
+    std::filesystem::create_directory(folder / "place");
+    moved = folder / "elsewhere/h.db";
+  }
+  for (int i = 0; i < 4; ++i) commit();
+  CHECK(machine.writer().statistics().replaced == 1);
+  CHECK_THAT(told(machine.writer().take_news()), Catch::Contains("a new history begins"));
+  std::uint64_t held = 0;
+  for (const SegmentInfo& segment : HistoryReader(moved).segments()) held += segment.records;
+  CHECK(held == written);
+  machine.stop();
+  CHECK(replay_quietly(config.file).different == 0);
+  CHECK(replay_quietly(config.file).segments >= 1);
 }
 
 TEST_CASE("a file that is no database is moved aside and a new one begun", "[history]") {

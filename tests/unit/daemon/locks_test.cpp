@@ -1,9 +1,13 @@
 // What one process may have alone: who is refused, what they are told, and when it is free again.
+#include <algorithm>
 #include <csignal>
+#include <cstddef>
 #include <fstream>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 
 #include "daemon/controller_lock.hpp"
@@ -126,6 +130,81 @@ TEST_CASE("a name that is held is refused with who has it", "[locks]") {
     CHECK(refusal([&] { NameLock second(name); }).find(this_process()) != std::string::npos);
     const NameLock other(name + "2");
   }
+}
+
+TEST_CASE("a lock answers however often it was asked for", "[locks]") {
+  const std::string name = own_name();
+  NameLock lock(name);
+  for (int i = 0; i < 50; ++i) {
+    CHECK_FALSE(refusal([&] { NameLock second(name); }).empty());
+    lock.drain();
+  }
+}
+
+TEST_CASE("of two that begin at the same moment exactly one gets the name", "[locks]") {
+  for (int round = 0; round < 20; ++round) {
+    const std::string name = own_name() + " " + std::to_string(round);
+    int go[2];
+    int told[2];
+    REQUIRE(pipe(go) == 0);
+    REQUIRE(pipe(told) == 0);
+    std::vector<pid_t> children;
+    for (int i = 0; i < 2; ++i) {
+      children.push_back(fork());
+      if (children.back() != 0) continue;
+      char byte = 0;
+      static_cast<void>(read(go[0], &byte, 1) == 1);
+      try {
+        new NameLock(name);
+        byte = 'x';
+      } catch (const LockHeld&) {
+        byte = '-';
+      }
+      static_cast<void>(write(told[1], &byte, 1) == 1);
+      for (;;) pause();
+    }
+    REQUIRE(write(go[1], "ab", 2) == 2);
+    std::string results(2, '?');
+    for (char& result : results) CHECK(read(told[0], &result, 1) == 1);
+    CHECK(std::count(results.begin(), results.end(), 'x') == 1);
+    for (const pid_t child : children) {
+      ::kill(child, SIGKILL);
+      waitpid(child, nullptr, 0);
+    }
+    for (const int fd : {go[0], go[1], told[0], told[1]}) close(fd);
+  }
+}
+
+TEST_CASE("another user's process that takes the name keeps nobody out", "[locks]") {
+  if (geteuid() != 0) return;  // only root can be another user
+  const std::string name = own_name();
+  constexpr uid_t nobody = 65534;
+  const auto take = [](const std::string& text) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    text.copy(address.sun_path + 1, sizeof address.sun_path - 1);
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + text.size());
+    if (bind(fd, reinterpret_cast<const sockaddr*>(&address), length) != 0 || listen(fd, 8) != 0)
+      _exit(1);
+  };
+  Child foreign([&] {
+    if (setgid(nobody) != 0 || setuid(nobody) != 0) _exit(1);
+    take("thermocomp/" + name);
+    for (const char* end : {"/0000000000000000", "/ffffffffffffffff", "/x", "/"})
+      take("thermocomp/" + name + end);
+  });
+  const NameLock lock(name);
+  CHECK(refusal([&] { NameLock second(name); }).find(this_process()) != std::string::npos);
+}
+
+TEST_CASE("the lock of a file is not for those who may only read it", "[locks]") {
+  const TempFolder folder;
+  std::ofstream(folder / "state.json.lock") << "of an earlier version";
+  const FileLock lock(folder / "state.json");
+  const auto rights = std::filesystem::status(folder / "state.json.lock").permissions();
+  CHECK((rights & (std::filesystem::perms::group_all | std::filesystem::perms::others_all)) ==
+        std::filesystem::perms::none);
 }
 
 TEST_CASE("controllers are the same where the same registers or frames are written", "[locks]") {

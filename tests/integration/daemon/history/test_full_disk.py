@@ -103,7 +103,7 @@ def test_a_full_disk_stops_the_history_and_nothing_else(machine, disk, lab):
     history = daemon.status()["history"]
     assert history["lost_records"] == 0  # all of it had waited in memory
     assert history["last_error"] == ""
-    assert "history: writing" in daemon.log_text()
+    eventually(lambda: "history: written again after" in daemon.log_text(), "it is told")
     assert before <= chunks(daemon.history)
     daemon.end()
     columns = assert_replays_exactly(daemon.history, lab.folder / "out.csv")

@@ -195,6 +195,20 @@ def test_measured_and_cycle_end_are_noted(machine, lab):
     recorded(machine, lab)
 
 
+@pytest.mark.parametrize("value_um", (900.0, -900.0, 60.5, 1e9))
+def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_um):
+    """The bound is 60 um, the model claims no error, and expects nothing to be left."""
+    daemon = machine.start()
+    with pytest.raises(Refused, match="nothing is taken over: .*Check the axis, the sign"):
+        daemon.call("measured", axis="z", value_um=value_um)
+    status, _, said = daemon.cli("measured", "z", str(value_um))
+    assert status == 2 and "60.0 um" in said, said
+    assert daemon.axis()["measured"] is None
+    daemon.call("measured", axis="z", value_um=-59.0)
+    assert daemon.axis()["measured"] == -59.0
+    recorded(machine, lab)
+
+
 def test_a_second_daemon_on_the_same_socket_is_refused(machine, lab):
     daemon = machine.start()
     second = lab.daemon(machine.config, "second")
