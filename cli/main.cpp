@@ -10,6 +10,7 @@
 #include "cli/commands.hpp"
 #include "cli/common/command.hpp"
 #include "cli/common/daemon_client.hpp"
+#include "config/text/clean_output.hpp"
 #include "config/text/problems.hpp"
 
 namespace {
@@ -32,6 +33,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  thermocomp::clean_standard_output();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of writing, reported as one
   try {
     return run(argc, argv);

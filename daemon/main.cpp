@@ -6,12 +6,14 @@
 
 #include <CLI/CLI.hpp>
 
+#include "config/text/clean_output.hpp"
 #include "config/text/problems.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/system/log_setup.hpp"
 
 int main(int argc, char** argv) {
+  thermocomp::clean_standard_output();
   CLI::App app;
   std::string config_file = "/etc/thermocomp/thermocompd.toml";
   thermocomp::declare_daemon_command_line(app, config_file);

@@ -3,9 +3,11 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -31,6 +33,16 @@ sigset_t ending_signals() {
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
   return signals;
+}
+
+/// Whatever others do not answer (a name server, a disk, a broker), the process ends. What can be
+/// closed in order is closed by then.
+void end_within(std::chrono::seconds time) {
+  std::thread([time] {
+    std::this_thread::sleep_for(time);
+    spdlog::warn("stopped without waiting any longer");
+    std::_Exit(0);
+  }).detach();
 }
 
 class Gateway {
@@ -137,6 +149,8 @@ void run_gateway(const GatewaySettings& settings) {
   }
   sd_notify(0, "STOPPING=1");
   spdlog::info("stopped as asked");
+  constexpr std::chrono::seconds end_max(5);
+  end_within(end_max);
 }
 
 }  // namespace thermocomp::gateway

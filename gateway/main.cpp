@@ -11,6 +11,7 @@
 #include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
 
+#include "config/text/clean_output.hpp"
 #include "config/text/problems.hpp"
 #include "gateway/command_line.hpp"
 #include "gateway/gateway.hpp"
@@ -57,6 +58,7 @@ int run(const GatewayOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  thermocomp::clean_standard_output();
   CLI::App app;
   GatewayOptions options;
   declare_gateway_command_line(app, options);

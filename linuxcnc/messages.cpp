@@ -17,15 +17,28 @@ json number(double value) {
 }
 
 /// Brackets within brackets are copied and destroyed recursively: no deeper than any answer is.
+/// Brackets in strings do not count, in either direction.
 bool is_flat(std::string_view line) {
   constexpr int depth_max = 16;
   int depth = 0;
-  for (const char c : line) {
+  bool in_string = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (c == '"') in_string = !in_string;
+    if (in_string && c == '\\') ++i;
+    if (in_string) continue;
     if (c == '{' || c == '[') ++depth;
     if (c == '}' || c == ']') --depth;
     if (depth > depth_max) return false;
   }
   return true;
+}
+
+/// The daemon's words end on a terminal: what is not plain there becomes a blank.
+std::string plain(std::string text) {
+  for (char& c : text)
+    if (c < ' ' || c > '~') c = ' ';
+  return text;
 }
 
 const json& member(const json& object, const char* key) {
@@ -79,7 +92,7 @@ Answer read_answer(std::string_view line, std::uint64_t id, std::string_view axe
   if (const auto error = message.find("error"); error != message.end() && error->is_object()) {
     const auto text = error->find("message");
     throw BadAnswer("the daemon refuses: " + (text != error->end() && text->is_string()
-                                                  ? text->get<std::string>()
+                                                  ? plain(text->get<std::string>())
                                                   : std::string("no reason given")));
   }
   if (member(message, "id") != id) throw BadAnswer("the answer is of another request");

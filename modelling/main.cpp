@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "config/text/clean_output.hpp"
 #include "config/text/problems.hpp"
 #include "modelling/command_line.hpp"
 
@@ -28,6 +29,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  thermocomp::clean_standard_output();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of writing, reported as one
   try {
     return run(argc, argv);

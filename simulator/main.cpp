@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "config/text/clean_output.hpp"
 #include "simulator/command_line.hpp"
 #include "simulator/files/machine_file.hpp"
 #include "simulator/session/session.hpp"
@@ -90,6 +91,7 @@ void apply(const SimulatorArguments& arguments, MachineConfig& machine, SessionO
 }  // namespace
 
 int main(int argc, char** argv) {
+  thermocomp::clean_standard_output();
   CLI::App app;
   SimulatorArguments arguments;
   thermocomp::declare_simulator_command_line(app, arguments);

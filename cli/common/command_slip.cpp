@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "config/text/printable_text.hpp"
 #include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::cli {
@@ -32,9 +31,8 @@ std::string command_slip_text(const CLI::App* app, const CLI::Error& error) {
   }
   if (known.empty() || word == rest.end()) return CLI::FailureMessage::simple(app, error);
   const std::string meant = nearest_name(*word, known);
-  return words + ": no command " + printable_text(*word) +
-         (meant.empty() ? "" : "; did you mean " + meant + "?") + "\n" + words +
-         " --help lists them.\n";
+  return words + ": no command " + *word + (meant.empty() ? "" : "; did you mean " + meant + "?") +
+         "\n" + words + " --help lists them.\n";
 }
 
 }  // namespace thermocomp::cli

@@ -49,7 +49,10 @@ std::uint64_t count_of(const json& object, const char* key) {
 
 std::string text_of(const json& object, const char* key) {
   const json& value = field(object, key);
-  return value.is_string() ? value.get<std::string>() : std::string();
+  std::string text = value.is_string() ? value.get<std::string>() : std::string();
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' '; }, ' ');
+  return text;
 }
 
 bool flag_of(const json& object, const char* key) {

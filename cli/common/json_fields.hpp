@@ -11,7 +11,7 @@ namespace thermocomp::cli {
 
 [[nodiscard]] double number_of(const nlohmann::json& object, const char* key);
 [[nodiscard]] std::uint64_t count_of(const nlohmann::json& object, const char* key);
-[[nodiscard]] std::string text_of(const nlohmann::json& object, const char* key);
+[[nodiscard]] std::string text_of(const nlohmann::json& object, const char* key);  ///< one line
 [[nodiscard]] bool flag_of(const nlohmann::json& object, const char* key);
 /// An empty array where there is none.
 [[nodiscard]] const nlohmann::json& list_of(const nlohmann::json& object, const char* key);

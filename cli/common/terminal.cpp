@@ -5,6 +5,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "config/text/clean_output.hpp"
+
 namespace thermocomp::cli {
 
 namespace {
@@ -14,13 +16,13 @@ using std::chrono::steady_clock;
 const char* code_of(Colour colour) {
   switch (colour) {
     case Colour::green:
-      return "\033[32m";
+      return "[32m";
     case Colour::yellow:
-      return "\033[33m";
+      return "[33m";
     case Colour::red:
-      return "\033[31m";
+      return "[31m";
     case Colour::bold:
-      return "\033[1m";
+      return "[1m";
     case Colour::none:
       break;
   }
@@ -38,7 +40,11 @@ bool stderr_is_terminal() noexcept {
 
 std::string coloured(std::string_view text, Colour colour, bool on) {
   if (!on || colour == Colour::none) return std::string(text);
-  return std::string(code_of(colour)) + std::string(text) + "\033[0m";
+  return terminal_code(code_of(colour)).append(text).append(terminal_code("[0m"));
+}
+
+std::string rewritten_line(std::string_view text) {
+  return terminal_code("[G").append(terminal_code("[K")).append(text);
 }
 
 Progress::Progress(std::string what)
@@ -48,7 +54,7 @@ Progress::Progress(std::string what)
       on_terminal_(stderr_is_terminal()) {}
 
 Progress::~Progress() {
-  if (visible_) std::fputs("\r\033[K", stderr);
+  if (visible_) std::fputs(rewritten_line("").c_str(), stderr);
 }
 
 void Progress::update(double fraction) {
@@ -59,10 +65,10 @@ void Progress::update(double fraction) {
   shown_ = now;
   visible_ = true;
   if (fraction >= 0.0 && fraction <= 1.0) {
-    std::fprintf(stderr, "\r%s: %.0f %%\033[K", what_.c_str(), 100.0 * fraction);
+    std::fprintf(stderr, "%s: %.0f %%", rewritten_line(what_).c_str(), 100.0 * fraction);
   } else {
     const std::chrono::duration<double> elapsed = now - began_;
-    std::fprintf(stderr, "\r%s: %.0f s\033[K", what_.c_str(), elapsed.count());
+    std::fprintf(stderr, "%s: %.0f s", rewritten_line(what_).c_str(), elapsed.count());
   }
   std::fflush(stderr);
 }

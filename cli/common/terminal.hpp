@@ -14,6 +14,9 @@ enum class Colour { none, green, yellow, red, bold };
 /// @return `text` between the terminal's codes of `colour`; plain when `on` is false
 [[nodiscard]] std::string coloured(std::string_view text, Colour colour, bool on);
 
+/// `text` from the first column on, in the place of what the line shows.
+[[nodiscard]] std::string rewritten_line(std::string_view text);
+
 /// One line on stderr, overwritten, for work of more than 2 s; nothing where stderr is no terminal.
 class Progress {
  public:

@@ -14,7 +14,6 @@
 #include "cli/common/terminal.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/runs/run_file.hpp"
-#include "config/text/printable_text.hpp"
 #include "daemon/history/replay/history_check.hpp"
 #include "daemon/history/replay/replay.hpp"
 #include "daemon/history/replay/run_replay.hpp"
@@ -40,7 +39,7 @@ std::optional<HistoryTime> time_or_none(const std::string& text) {
 int tell_damage(const std::string& history, const std::vector<HistoryDamage>& damage) {
   constexpr std::size_t told_max = 20;
   for (std::size_t i = 0; i < std::min(damage.size(), told_max); ++i) {
-    std::fprintf(stderr, "%s: %s\n", history.c_str(), printable_text(to_string(damage[i])).c_str());
+    std::fprintf(stderr, "%s: %s\n", history.c_str(), to_string(damage[i]).c_str());
   }
   if (damage.size() > told_max) {
     std::fprintf(stderr, "%s: and %zu more\n", history.c_str(), damage.size() - told_max);
@@ -148,12 +147,12 @@ int run_history_check(const std::string& history) {
                 static_cast<unsigned long long>(part.records),
                 part.damage.empty() ? "sound" : "damaged");
     for (const HistoryDamage& damage : part.damage) {
-      std::printf("  %s\n", printable_text(damage.why).c_str());
+      std::printf("  %s\n", damage.why.c_str());
     }
     if (part.damage.empty()) ++sound;
   }
   for (const HistoryDamage& damage : check.damage) {
-    std::printf("%s: cannot be read\n", printable_text(to_string(damage)).c_str());
+    std::printf("%s: cannot be read\n", to_string(damage).c_str());
   }
   std::printf("%s: %zu of %zu segments sound\n", history.c_str(), sound,
               check.segments.size() + check.damage.size());

@@ -7,6 +7,7 @@
 #include "cli/import/log_form.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/text/number_text.hpp"
+#include "config/text/outer_json.hpp"
 #include "config/text/problems.hpp"
 
 namespace thermocomp::cli {
@@ -74,8 +75,12 @@ void add_series(const std::string& name, const std::string& full, const std::str
 
 RunFile read_temperature_store(std::string_view text, const std::string& name,
                                const LogOptions& options) {
-  json store = json::parse(text, nullptr, false);
-  if (store.is_discarded()) refuse(name, "", "(no JSON)", "must be JSON to its end");
+  json store;
+  try {
+    store = parse_outer_json(text);
+  } catch (const JsonError& error) {
+    refuse(name, "", "(no JSON)", error.what());
+  }
   if (store.is_object() && store.contains("result")) store = store["result"];
   const bool is_store = store.is_object() && !store.empty() &&
                         std::any_of(store.begin(), store.end(), [](const json& object) {

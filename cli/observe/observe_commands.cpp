@@ -21,6 +21,7 @@
 #include "cli/observe/status_text.hpp"
 #include "cli/observe/truth_file.hpp"
 #include "cli/observe/watch_text.hpp"
+#include "config/text/clean_output.hpp"
 #include "daemon/history/format/recorded_event.hpp"
 #include "daemon/socket/status_client.hpp"
 
@@ -125,7 +126,8 @@ void end_watch(int) {
 void show(const json& status, const TruthRow* truth, const AxisTrends& trends, bool terminal,
           bool first) {
   if (terminal) {
-    std::cout << "\033[H\033[J" << watch_screen(status, truth, true, &trends);
+    std::cout << terminal_code("[H") << terminal_code("[J")
+              << watch_screen(status, truth, true, &trends);
   } else {
     if (first) std::cout << watch_header(status, truth);
     std::cout << watch_line(status, truth);

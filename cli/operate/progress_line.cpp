@@ -19,7 +19,7 @@ ProgressLine::ProgressLine(std::string what)
     : what_(std::move(what)), on_terminal_(stderr_is_terminal()), last_(Clock::now()) {}
 
 ProgressLine::~ProgressLine() {
-  if (shown_ && on_terminal_) std::fputs("\r\033[K", stderr);
+  if (shown_ && on_terminal_) std::fputs(rewritten_line("").c_str(), stderr);
 }
 
 void ProgressLine::update(const std::string& text) {
@@ -27,7 +27,8 @@ void ProgressLine::update(const std::string& text) {
   if (!on_terminal_ && now - last_ < line_period) return;
   last_ = now;
   shown_ = true;
-  std::fprintf(stderr, on_terminal_ ? "\r%s: %s\033[K" : "%s: %s\n", what_.c_str(), text.c_str());
+  const std::string line = what_ + ": " + text;
+  std::fputs((on_terminal_ ? rewritten_line(line) : line + "\n").c_str(), stderr);
   std::fflush(stderr);
 }
 

@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "cli/common/terminal.hpp"
-#include "config/text/printable_text.hpp"
 #include "daemon/history/replay/replay.hpp"
 
 namespace thermocomp::cli {
@@ -32,7 +31,7 @@ RunFile load_record(const std::string& argument, RunLoader& loader) {
       export_run(file, std::nullopt, std::nullopt, text,
                  [&progress](double fraction) { progress.update(fraction); });
   for (const HistoryDamage& damage : summary.damage) {
-    std::fprintf(stderr, "%s: %s\n", file.c_str(), printable_text(to_string(damage)).c_str());
+    std::fprintf(stderr, "%s: %s\n", file.c_str(), to_string(damage).c_str());
   }
   return parse_run(text.str(), argument, selection);  // the stretch is a part of its name
 }

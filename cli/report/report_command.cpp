@@ -11,7 +11,6 @@
 #include "cli/common/output_file.hpp"
 #include "cli/report/machine_week.hpp"
 #include "cli/report/week_page.hpp"
-#include "config/text/printable_text.hpp"
 #include "daemon/history/format/history_time.hpp"
 
 namespace thermocomp::cli {
@@ -56,8 +55,7 @@ int run_report(const ReportOptions& options) {
   file.stream() << week_html(week);
   file.commit();
   for (const HistoryDamage& damage : week.damage)
-    std::fprintf(stderr, "%s: %s\n", options.history.c_str(),
-                 printable_text(to_string(damage)).c_str());
+    std::fprintf(stderr, "%s: %s\n", options.history.c_str(), to_string(damage).c_str());
   return exit_success;
 }
 

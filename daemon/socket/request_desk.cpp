@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "config/text/outer_json.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {
@@ -36,28 +37,6 @@ bool is_allowed(const PeerAccess& access, AccessClass needed) {
   return false;
 }
 
-/// Of brackets outside strings, whether or not they match. Before anything is built from the line:
-/// copying and destroying what is nested 30,000 deep would need a stack as deep.
-int depth_of(std::string_view line) noexcept {
-  int depth = 0;
-  int deepest = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '[' || c == '{') {
-      deepest = std::max(deepest, ++depth);
-    } else if (c == ']' || c == '}') {
-      --depth;
-    }
-  }
-  return deepest;
-}
-
 /// A request that has the shape of one.
 struct Request {
   json id;  ///< null where there is none
@@ -81,12 +60,12 @@ void take_id(const json& id, Request& out) {
 
 /// @throws RpcError; `out.id` is set as soon as it is known
 void parse_request(std::string_view line, Request& out) {
-  if (depth_of(line) > RequestDesk::depth_max) {
-    throw RpcError(rpc::parse_error, "arrays and objects may be nested at most " +
-                                         std::to_string(RequestDesk::depth_max) + " deep");
+  json message;
+  try {
+    message = parse_outer_json(line);
+  } catch (const JsonError& error) {
+    throw RpcError(rpc::parse_error, std::string("a line ") + error.what());
   }
-  json message = json::parse(line, nullptr, false);
-  if (message.is_discarded()) throw RpcError(rpc::parse_error, "this line is no JSON in UTF-8");
   if (message.is_array()) {
     throw RpcError(rpc::invalid_request, "batches are not supported: send one object a line");
   }

@@ -35,8 +35,6 @@ struct Answer {
 /// ignored, as it asks.
 class RequestDesk {
  public:
-  /// Nesting of arrays and objects; the deepest meaningful request has 3.
-  static constexpr int depth_max = 16;
   static constexpr std::size_t id_bytes_max = 256;
   static constexpr double period_s_min = 0.1;
   static constexpr double period_s_max = 60.0;

@@ -5,11 +5,16 @@
 #include <cstring>
 #include <deque>
 #include <poll.h>
+#include <string_view>
+#include <thread>
 #include <unistd.h>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 #include <sys/socket.h>
 #include <sys/un.h>
+
+#include "config/text/outer_json.hpp"
 
 namespace thermocomp {
 namespace {
@@ -17,8 +22,8 @@ namespace {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-/// Far more than any answer has; a peer that sends more without a line's end is no daemon of ours.
-constexpr std::size_t line_bytes_max = 64u << 20;
+/// While the server's queue of connections is full.
+constexpr std::chrono::milliseconds connected_again_every(20);
 
 [[noreturn]] void no_daemon(const std::string& path, int error) {
   std::string why = std::strerror(error);
@@ -27,17 +32,28 @@ constexpr std::size_t line_bytes_max = 64u << 20;
   throw ClientError("no daemon at " + path + ": " + why);
 }
 
-int connect_to(const std::filesystem::path& path) {
+[[noreturn]] void no_answer(const std::string& path) {
+  throw ClientError("no answer in time from the daemon at " + path);
+}
+
+/// Never waits in the kernel: a server that stands still leaves its queue of connections full.
+int connect_to(const std::filesystem::path& path, Clock::time_point deadline) {
   const std::string text = path.string();
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (text.empty() || text.size() >= sizeof address.sun_path) no_daemon(text, ENAMETOOLONG);
   std::memcpy(address.sun_path, text.data(), text.size());
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0) no_daemon(text, errno);
-  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+  while (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int error = errno;
+    const bool is_full = error == EAGAIN || error == EINTR;
+    if (is_full && Clock::now() < deadline) {
+      std::this_thread::sleep_for(connected_again_every);
+      continue;
+    }
     close(fd);
+    if (is_full) no_answer(text);
     no_daemon(text, error);
   }
   return fd;
@@ -46,8 +62,8 @@ int connect_to(const std::filesystem::path& path) {
 }  // namespace
 
 struct StatusClient::Parts {
-  explicit Parts(const std::filesystem::path& path_in)
-      : path(path_in.string()), fd(connect_to(path_in)) {}
+  Parts(const std::filesystem::path& path_in, Clock::time_point deadline)
+      : path(path_in.string()), fd(connect_to(path_in, deadline)) {}
   ~Parts() { close(fd); }
   Parts(const Parts&) = delete;
   Parts& operator=(const Parts&) = delete;
@@ -61,12 +77,14 @@ struct StatusClient::Parts {
   void wait_for(short events, Clock::time_point deadline) const;
   void send_all(const std::string& text, Clock::time_point deadline) const;
   [[nodiscard]] json receive(Clock::time_point deadline);
+  [[nodiscard]] json parse(std::string_view line) const;
+  void keep(json notification);
 };
 
 void StatusClient::Parts::wait_for(short events, Clock::time_point deadline) const {
   for (;;) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
-    if (left <= 0) throw ClientError("no answer in time from the daemon at " + path);
+    if (left <= 0) no_answer(path);
     pollfd entry{fd, events, 0};
     const int code = poll(&entry, 1, static_cast<int>(std::min<std::int64_t>(left, 1 << 30)));
     if (code > 0) return;
@@ -91,13 +109,12 @@ json StatusClient::Parts::receive(Clock::time_point deadline) {
   for (std::size_t searched = 0;;) {
     const std::size_t end = input.find('\n', searched);
     if (end != std::string::npos) {
-      json message = json::parse(input.substr(0, end), nullptr, false);
+      const std::string line = input.substr(0, end);
       input.erase(0, end + 1);
-      if (!message.is_object()) throw ClientError(path + ": answers something else than JSON-RPC");
-      return message;
+      return parse(line);
     }
     searched = input.size();
-    if (searched > line_bytes_max) throw ClientError(path + ": answers without an end");
+    if (searched > JsonLimits{}.bytes_max) throw ClientError(path + ": answers without an end");
     wait_for(POLLIN, deadline);
     std::array<char, std::size_t{64} * 1024> bytes{};
     const ssize_t count = recv(fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
@@ -109,8 +126,23 @@ json StatusClient::Parts::receive(Clock::time_point deadline) {
   }
 }
 
-StatusClient::StatusClient(const std::filesystem::path& path)
-    : parts_(std::make_unique<Parts>(path)) {}
+json StatusClient::Parts::parse(std::string_view line) const {
+  try {
+    json message = parse_outer_json(line);
+    if (message.is_object()) return message;
+  } catch (const JsonError& error) {
+    throw ClientError(path + ": answers something else than JSON-RPC: " + error.what());
+  }
+  throw ClientError(path + ": answers something else than JSON-RPC");
+}
+
+void StatusClient::Parts::keep(json notification) {
+  notifications.push_back(std::move(notification));
+  if (notifications.size() > notifications_max) notifications.pop_front();
+}
+
+StatusClient::StatusClient(const std::filesystem::path& path, std::chrono::milliseconds timeout)
+    : parts_(std::make_unique<Parts>(path, Clock::now() + timeout)) {}
 StatusClient::~StatusClient() = default;
 StatusClient::StatusClient(StatusClient&&) noexcept = default;
 
@@ -126,15 +158,21 @@ json StatusClient::call(const std::string& method, const json& params,
   for (;;) {
     json message = parts_->receive(deadline);
     if (message.contains("method")) {
-      parts_->notifications.push_back(std::move(message));
+      parts_->keep(std::move(message));
       continue;
     }
     const json answered = message.value("id", json());
     if (!answered.is_null() && answered != id) continue;  // of a call that ran out of time
     if (const auto error = message.find("error"); error != message.end() && error->is_object()) {
-      throw RemoteError(error->value("code", 0), error->value("message", std::string("error")));
+      const auto code = error->find("code");
+      const auto text = error->find("message");
+      const bool is_known = code != error->end() && code->is_number_integer();
+      const bool is_told = text != error->end() && text->is_string();
+      throw RemoteError(is_known ? code->get<int>() : 0,
+                        is_told ? text->get<std::string>() : std::string("error"));
     }
-    return message.value("result", json());
+    const auto result = message.find("result");
+    return result == message.end() ? json() : std::move(*result);
   }
 }
 
@@ -142,7 +180,7 @@ json StatusClient::next(std::chrono::milliseconds timeout) {
   const Clock::time_point deadline = Clock::now() + timeout;
   while (parts_->notifications.empty()) {
     json message = parts_->receive(deadline);
-    if (message.contains("method")) parts_->notifications.push_back(std::move(message));
+    if (message.contains("method")) parts_->keep(std::move(message));
   }
   json message = std::move(parts_->notifications.front());
   parts_->notifications.pop_front();

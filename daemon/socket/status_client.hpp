@@ -1,7 +1,10 @@
-/// The other end of the status socket, for the command line: small and blocking.
+/// The other end of the status socket, for command and gateway: small, blocking, and as careful as
+/// the server. Whoever listens there, no call outlasts its time, and no answer costs more memory
+/// than JsonLimits allow.
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -29,15 +32,20 @@ class RemoteError : public std::runtime_error {
 
 class StatusClient {
  public:
-  /// @throws ClientError "no daemon at PATH: ..."
-  explicit StatusClient(const std::filesystem::path& path);
+  static constexpr std::chrono::seconds patience{5};
+  /// Beyond these the oldest notification is dropped.
+  static constexpr std::size_t notifications_max = 256;
+
+  /// @throws ClientError "no daemon at PATH: ...", or the connection is not taken in time
+  explicit StatusClient(const std::filesystem::path& path,
+                        std::chrono::milliseconds timeout = patience);
   ~StatusClient();
   StatusClient(StatusClient&&) noexcept;
 
   /// One request and its answer; notifications that come in between are kept for next().
   /// @throws ClientError, RemoteError
   nlohmann::json call(const std::string& method, const nlohmann::json& params,
-                      std::chrono::milliseconds timeout = std::chrono::seconds(5));
+                      std::chrono::milliseconds timeout = patience);
   /// The next notification, {"method": ..., "params": ...}, after call("subscribe", ...).
   /// @throws ClientError when the connection ends or nothing comes in time
   nlohmann::json next(std::chrono::milliseconds timeout);

@@ -84,7 +84,7 @@ void DaemonFeed::Parts::run() {
 
 /// Until the connection ends. @throws ClientError, RemoteError
 void DaemonFeed::Parts::follow() {
-  StatusClient client(settings.socket);
+  StatusClient client(settings.socket, silence_max);
   const json subscription = {{"methods", {"status", "sensors"}}, {"period_s", period_s}};
   static_cast<void>(client.call("subscribe", subscription, silence_max));
   while (!stops) {

@@ -10,6 +10,7 @@
 #include <sys/random.h>
 
 #include "cli/common/json_fields.hpp"
+#include "config/text/outer_json.hpp"
 #include "daemon/socket/status_client.hpp"
 
 namespace thermocomp::gateway {
@@ -102,10 +103,12 @@ json CommandDesk::offered(const std::string& user) const {
 JsonAnswer CommandDesk::take(const std::string& user, const std::string& body,
                              const Snapshot& snapshot) {
   try {
-    const json asked = json::parse(body, nullptr, false);
+    const json asked = parse_outer_json(body);
     if (!asked.is_object()) return error(400, "the body must be a JSON object");
     if (asked.contains("token")) return carry_out(user, text_of(asked, "token"));
     return confirm(user, asked, snapshot);
+  } catch (const JsonError& problem) {
+    return error(400, std::string("the body ") + problem.what());
   } catch (const std::invalid_argument& problem) {
     return error(400, problem.what());
   } catch (const std::exception& problem) {
@@ -126,9 +129,21 @@ JsonAnswer CommandDesk::confirm(const std::string& user, const json& asked,
   const std::string token = random_token();
   const std::lock_guard lock(mutex_);
   std::erase_if(waiting_, [now](const auto& entry) { return entry.second.until < now; });
-  if (waiting_.size() >= confirmations_max) return error(503, "too many commands wait");
+  make_room(user);
   waiting_[token] = {user, method, params.dump(), now + confirmation_max};
   return answer(200, {{"token", token}, {"text", text}});
+}
+
+/// Only in the places of this user: nobody's unconfirmed commands are in another's way.
+void CommandDesk::make_room(const std::string& user) {
+  std::size_t count = 0;
+  auto oldest = waiting_.end();
+  for (auto each = waiting_.begin(); each != waiting_.end(); ++each) {
+    if (each->second.user != user) continue;
+    ++count;
+    if (oldest == waiting_.end() || each->second.until < oldest->second.until) oldest = each;
+  }
+  if (count >= confirmations_max) waiting_.erase(oldest);
 }
 
 JsonAnswer CommandDesk::carry_out(const std::string& user, const std::string& token) {
@@ -145,8 +160,7 @@ JsonAnswer CommandDesk::carry_out(const std::string& user, const std::string& to
   spdlog::info("command {} {} by {}", asked.method, asked.params, asked.user);
   try {
     StatusClient client(settings_.socket);
-    constexpr std::chrono::seconds patience(10);
-    return answer(200, client.call(asked.method, json::parse(asked.params), patience));
+    return answer(200, client.call(asked.method, json::parse(asked.params)));
   } catch (const RemoteError& refused) {
     spdlog::warn("command {}: {}", asked.method, refused.what());
     return error(409, refused.what());

@@ -18,7 +18,8 @@ namespace thermocomp::gateway {
 class CommandDesk {
  public:
   static constexpr std::chrono::seconds confirmation_max{60};
-  static constexpr std::size_t confirmations_max = 64;
+  /// Of one user; beyond them the oldest of the same user counts no more.
+  static constexpr std::size_t confirmations_max = 4;
 
   explicit CommandDesk(const GatewaySettings& settings);
 
@@ -43,6 +44,7 @@ class CommandDesk {
   [[nodiscard]] bool may(const std::string& user, const std::string& method) const;
   [[nodiscard]] JsonAnswer confirm(const std::string& user, const nlohmann::json& asked,
                                    const Snapshot& snapshot);
+  void make_room(const std::string& user);
   [[nodiscard]] JsonAnswer carry_out(const std::string& user, const std::string& token);
 
   const GatewaySettings& settings_;

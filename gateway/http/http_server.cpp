@@ -66,8 +66,11 @@ std::string_view argument(MHD_Connection* connection, const char* name) {
   return value != nullptr ? value : "";
 }
 
-MHD_Result count_host(void* cls, MHD_ValueKind /*kind*/, const char* key, const char* /*value*/) {
-  if (strcasecmp(key, "Host") == 0) ++*static_cast<std::size_t*>(cls);
+MHD_Result count_once(void* cls, MHD_ValueKind /*kind*/, const char* key, const char* /*value*/) {
+  auto& facts = *static_cast<RequestFacts*>(cls);
+  if (strcasecmp(key, MHD_HTTP_HEADER_HOST) == 0) ++facts.hosts_given;
+  for (const char* name : {MHD_HTTP_HEADER_CONTENT_LENGTH, MHD_HTTP_HEADER_TRANSFER_ENCODING})
+    if (strcasecmp(key, name) == 0) ++facts.lengths_given;
   return MHD_YES;
 }
 
@@ -87,6 +90,12 @@ int socket_of(MHD_Connection* connection) {
   std::array<char, 300> text{};
   std::vsnprintf(text.data(), text.size(), format, arguments);
   spdlog::debug("http: {}", text.data());
+}
+
+/// The connection ends with this answer: what follows a refused request may be its body, and must
+/// not be taken for the next request.
+void end_with(MHD_Response* response) {
+  MHD_add_response_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
 }
 
 /// What is kept of one request while it is served.
@@ -158,7 +167,8 @@ struct HttpServer::Parts {
                    MHD_Response* response);
   MHD_Result of_daemon(MHD_Connection* connection, json Snapshot::*part);
   MHD_Result history(MHD_Connection* connection, Request& request);
-  MHD_Result later(MHD_Connection* connection, Request& request, WorkDesk::Work work);
+  MHD_Result later(MHD_Connection* connection, Request& request, WorkDesk& desk,
+                   WorkDesk::Work work);
   MHD_Result stream(MHD_Connection* connection);
   [[nodiscard]] GatewayFigures figures() const;
 
@@ -169,7 +179,8 @@ struct HttpServer::Parts {
   std::optional<PasswordFile> passwords;
   CommandDesk commands;
   AddFigures add_figures;
-  WorkDesk desk;
+  WorkDesk history_desk;
+  WorkDesk command_desk;  ///< of its own: nobody's charts are in the way of a command
   EventStreams streams;
   SlowConnections connections;
   std::atomic<std::uint64_t> requests{0};
@@ -198,7 +209,8 @@ HttpServer::Parts::Parts(const GatewaySettings& settings_in, DaemonFeed& feed_in
 }
 
 HttpServer::Parts::~Parts() {
-  desk.stop();
+  history_desk.stop();
+  command_desk.stop();
   streams.stop();
   if (daemon != nullptr) MHD_stop_daemon(daemon);
 }
@@ -208,6 +220,7 @@ MHD_Result HttpServer::Parts::queue(MHD_Connection* connection, unsigned status,
   if (response == nullptr) return MHD_NO;
   for (const auto& [name, value] : headers_of_all) MHD_add_response_header(response, name, value);
   MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type);
+  if (status >= MHD_HTTP_BAD_REQUEST) end_with(response);
   if (settings.http.has_tls())
     MHD_add_response_header(response, "Strict-Transport-Security", "max-age=31536000");
   const MHD_Result queued = MHD_queue_response(connection, status, response);
@@ -233,7 +246,7 @@ std::optional<Refusal> HttpServer::Parts::judge(MHD_Connection* connection, cons
                      header(connection, "Sec-Fetch-Site"),
                      0,
                      0};
-  MHD_get_connection_values(connection, MHD_HEADER_KIND, &count_host, &facts.hosts_given);
+  MHD_get_connection_values(connection, MHD_HEADER_KIND, &count_once, &facts);
   MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, &add_size, &facts.query_bytes);
   return judge_request(facts, hosts);
 }
@@ -260,6 +273,7 @@ std::optional<MHD_Result> HttpServer::Parts::refuse_stranger(MHD_Connection* con
   MHD_Response* response = MHD_create_response_from_buffer(
       text.size(), const_cast<char*>(text.data()), MHD_RESPMEM_MUST_COPY);
   if (response == nullptr) return MHD_NO;
+  end_with(response);
   const MHD_Result queued = MHD_queue_basic_auth_fail_response(connection, "thermocomp", response);
   MHD_destroy_response(response);
   return queued;
@@ -324,7 +338,7 @@ MHD_Result HttpServer::Parts::post(MHD_Connection* connection, std::string_view 
   if (header(connection, MHD_HTTP_HEADER_CONTENT_TYPE) != json_type)
     return answer(connection, MHD_HTTP_UNSUPPORTED_MEDIA_TYPE, json_type,
                   error_text("the body must be application/json"));
-  return later(connection, request, [this, user = request.user, body = request.body] {
+  return later(connection, request, command_desk, [this, user = request.user, body = request.body] {
     JsonAnswer done = commands.take(user, body, *feed.newest());
     if (done.status != MHD_HTTP_OK) ++refused;
     return done;
@@ -347,11 +361,12 @@ MHD_Result HttpServer::Parts::history(MHD_Connection* connection, Request& reque
       parse_history_request(argument(connection, "from"), argument(connection, "to"),
                             argument(connection, "points"), static_cast<double>(now.tv_sec), why);
   if (!asked) return answer(connection, MHD_HTTP_BAD_REQUEST, json_type, error_text(why));
-  return later(connection, request, [this, asked = *asked] { return history_answer(feed, asked); });
+  return later(connection, request, history_desk,
+               [this, asked = *asked] { return history_answer(feed, asked); });
 }
 
 /// Called again with the answer, when the desk has it; before that nothing ends the connection.
-MHD_Result HttpServer::Parts::later(MHD_Connection* connection, Request& request,
+MHD_Result HttpServer::Parts::later(MHD_Connection* connection, Request& request, WorkDesk& desk,
                                     WorkDesk::Work work) {
   MHD_suspend_connection(connection);
   const auto done = [&request, connection](JsonAnswer made) {

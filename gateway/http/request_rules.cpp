@@ -89,6 +89,8 @@ std::optional<Refusal> judge_request(const RequestFacts& request, const HostRule
   if (request.path.empty() || request.path.front() != '/')
     return Refusal{400, "the path must begin with /"};
   if (request.hosts_given != 1) return Refusal{400, "one header Host is needed"};
+  // Where a proxy reads another length than this library, the rest is a request of somebody else.
+  if (request.lengths_given > 1) return Refusal{400, "the length of a body must be given once"};
   if (!hosts.allows(request.host))
     return Refusal{421, "this gateway is not known by that name: http.names of its configuration"};
   // Only pages of this very gateway may ask for anything from within a browser.

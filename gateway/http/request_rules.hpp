@@ -11,12 +11,13 @@ namespace thermocomp::gateway {
 
 struct RequestFacts {
   std::string_view method;
-  std::string_view path;        ///< without the query, percent-decoded
-  std::string_view host;        ///< header Host; empty: none
-  std::string_view origin;      ///< header Origin; empty: none
-  std::string_view fetch_site;  ///< header Sec-Fetch-Site; empty: none
-  std::size_t query_bytes{0};   ///< names and values together
-  std::size_t hosts_given{0};   ///< how many headers Host there are
+  std::string_view path;         ///< without the query, percent-decoded
+  std::string_view host;         ///< header Host; empty: none
+  std::string_view origin;       ///< header Origin; empty: none
+  std::string_view fetch_site;   ///< header Sec-Fetch-Site; empty: none
+  std::size_t query_bytes{0};    ///< names and values together
+  std::size_t hosts_given{0};    ///< how many headers Host there are
+  std::size_t lengths_given{0};  ///< headers Content-Length and Transfer-Encoding together
 };
 
 struct Refusal {

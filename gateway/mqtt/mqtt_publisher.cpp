@@ -30,6 +30,11 @@ constexpr int unacknowledged_max = 20;
 constexpr milliseconds again_after_min(1000);
 constexpr milliseconds again_after_max(30000);
 
+/// The library has no words for the first.
+std::string text_of(int code) {
+  return code == MOSQ_ERR_KEEPALIVE ? "no answer in time" : mosquitto_strerror(code);
+}
+
 void require(int code, const std::string& what) {
   if (code != MOSQ_ERR_SUCCESS) throw std::runtime_error(what + ": " + mosquitto_strerror(code));
 }
@@ -135,7 +140,10 @@ void MqttPublisher::Parts::sleep(milliseconds time) const {
 
 void MqttPublisher::Parts::run() {
   constexpr int wait_ms = 100;
-  int code = mosquitto_connect(client, settings.mqtt.host.c_str(), settings.mqtt.port, keepalive_s);
+  // Connecting waits in mosquitto_loop(), which has its time; only a name server is waited for
+  // here.
+  int code =
+      mosquitto_connect_async(client, settings.mqtt.host.c_str(), settings.mqtt.port, keepalive_s);
   while (!stops) {
     if (code == MOSQ_ERR_SUCCESS) code = mosquitto_loop(client, wait_ms, 1);
     if (code == MOSQ_ERR_SUCCESS) {
@@ -143,12 +151,12 @@ void MqttPublisher::Parts::run() {
       continue;
     }
     const std::string problem =
-        last_problem.empty() ? mosquitto_strerror(code) : std::exchange(last_problem, "");
+        last_problem.empty() ? text_of(code) : std::exchange(last_problem, "");
     if (is_connected.exchange(false) || again_after == again_after_min)
       spdlog::warn("mqtt: {} port {}: {}", settings.mqtt.host, settings.mqtt.port, problem);
     sleep(again_after);
     again_after = std::min(2 * again_after, again_after_max);
-    if (!stops) code = mosquitto_reconnect(client);
+    if (!stops) code = mosquitto_reconnect_async(client);
   }
   if (is_connected) say_goodbye();
 }

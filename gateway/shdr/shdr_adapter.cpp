@@ -1,8 +1,10 @@
 #include "gateway/shdr/shdr_adapter.hpp"
 
+#include <algorithm>
 #include <arpa/inet.h>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <list>
 #include <mutex>
@@ -22,6 +24,8 @@
 
 namespace thermocomp::gateway {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t line_bytes_max = 256;
 constexpr std::size_t unread_bytes_max = std::size_t{256} * 1024;
@@ -59,6 +63,7 @@ struct Agent {
   std::string in;
   std::string out;
   bool is_lost{false};
+  Clock::time_point heard_at{Clock::now()};
 };
 
 }  // namespace
@@ -69,6 +74,7 @@ struct ShdrAdapter::Parts {
 
   void run();
   void take_agent();
+  [[nodiscard]] bool drop_silent();
   void take_snapshot();
   void read_from(Agent& agent) const;
   static void write_to(Agent& agent);
@@ -131,12 +137,25 @@ void ShdrAdapter::Parts::run() {
 void ShdrAdapter::Parts::take_agent() {
   const int fd = accept4(listener, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (fd < 0) return;
-  if (agents.size() >= settings.agents_max) {
+  if (agents.size() >= settings.agents_max && !drop_silent()) {
     close(fd);
     return;
   }
-  agents.push_back({fd, "", "", false});
+  agents.push_back({fd, "", "", false, Clock::now()});
   agents.back().out = shdr_lines({}, told, told_wall_s);
+}
+
+/// An agent pings once a heartbeat; who has been silent for two gives its place to a new one.
+bool ShdrAdapter::Parts::drop_silent() {
+  const auto silent =
+      std::min_element(agents.begin(), agents.end(),
+                       [](const Agent& a, const Agent& b) { return a.heard_at < b.heard_at; });
+  if (silent == agents.end() ||
+      Clock::now() - silent->heard_at < std::chrono::duration<double>(2.0 * settings.heartbeat_s))
+    return false;
+  close(silent->fd);
+  agents.erase(silent);
+  return true;
 }
 
 void ShdrAdapter::Parts::take_snapshot() {
@@ -161,7 +180,10 @@ void ShdrAdapter::Parts::read_from(Agent& agent) const {
   const ssize_t count = recv(agent.fd, bytes.data(), bytes.size(), 0);
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return;
   agent.is_lost = agent.is_lost || count <= 0;
-  if (count > 0) agent.in.append(bytes.data(), static_cast<std::size_t>(count));
+  if (count > 0) {
+    agent.in.append(bytes.data(), static_cast<std::size_t>(count));
+    agent.heard_at = Clock::now();
+  }
   for (std::size_t end = 0; (end = agent.in.find('\n')) != std::string::npos;) {
     agent.out += shdr_answer(std::string_view(agent.in).substr(0, end), settings.heartbeat_s);
     agent.in.erase(0, end + 1);

@@ -72,14 +72,29 @@ json alarm_json(const Alarm& alarm) {
 
 }  // namespace
 
+std::string distinct_name(std::string_view name, bool (*is_allowed)(char)) {
+  constexpr std::string_view mark = "_0x";
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string made;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (is_allowed(name[i]) && !name.substr(i).starts_with(mark)) {
+      made += name[i];
+      continue;
+    }
+    const auto byte = static_cast<unsigned char>(name[i]);
+    made.append(mark) += digits[byte >> 4U];
+    made += digits[byte & 0xFU];
+  }
+  return made;
+}
+
 std::string topic_of(const std::string& machine, const std::string& kind, const std::string& name) {
   std::string topic = "thermocomp/" + machine + "/" + kind;
   if (name.empty()) return topic;
   topic += '/';
-  for (const char c : name) {
-    const bool is_plain = static_cast<unsigned char>(c) > ' ' && c != '/' && c != '+' && c != '#';
-    topic += is_plain ? c : '_';
-  }
+  topic += distinct_name(name, [](char c) {
+    return static_cast<unsigned char>(c) > ' ' && c != '/' && c != '+' && c != '#' && c != 127;
+  });
   return topic;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "gateway/alarms/alarm_watch.hpp"
@@ -9,7 +10,12 @@
 
 namespace thermocomp::gateway {
 
-/// `thermocomp/<machine>/<rest>`; what a topic must not have in a name becomes `_`.
+/// A name for a place that allows fewer characters. Two names never become alike, and what a name
+/// becomes depends on it alone: each byte that is not allowed is `_0x` and two digits ("a b" is
+/// a_0x20b), and so is the `_` of a `_0x` that a name has itself.
+[[nodiscard]] std::string distinct_name(std::string_view name, bool (*is_allowed)(char));
+
+/// `thermocomp/<machine>/<rest>`; a topic's name has neither `/`, `+`, `#` nor blanks.
 [[nodiscard]] std::string topic_of(const std::string& machine, const std::string& kind,
                                    const std::string& name = "");
 

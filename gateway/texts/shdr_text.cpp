@@ -107,14 +107,10 @@ constexpr ItemKind condition_item{"CONDITION", "SYSTEM", ""};
 }  // namespace
 
 std::string item_name(const std::string& kind, const std::string& name) {
-  std::string made = kind;
-  made += '_';
-  for (const char c : name) {
-    const bool is_plain =
-        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    made += is_plain ? c : '_';
-  }
-  return made;
+  return kind + "_" + distinct_name(name, [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  c == '_';
+         });
 }
 
 ShdrStates shdr_states(const Snapshot& snapshot) {

@@ -29,7 +29,7 @@ using ShdrStates = std::map<std::string, std::vector<std::string>>;
 /// `* PONG 10000` for `* PING`; empty for anything else.
 [[nodiscard]] std::string shdr_answer(std::string_view line, double heartbeat_s);
 
-/// Letters, digits and `_`: a name as an item of SHDR and an id of XML may have it.
+/// Letters, digits and `_`, as an item of SHDR and an id of XML may have them: distinct_name().
 [[nodiscard]] std::string item_name(const std::string& kind, const std::string& name);
 
 /// The device file (MTConnectDevices 1.8) of a machine with these sensors, axes and buses.

@@ -16,6 +16,7 @@
 #include <sys/signalfd.h>
 
 #include "config/runs/run_file.hpp"
+#include "config/text/clean_output.hpp"
 #include "simulator/devices/event_loop.hpp"
 #include "simulator/devices/field_nodes.hpp"
 #include "simulator/plant/plant.hpp"
@@ -85,7 +86,8 @@ class StatusLine {
     if (!on_terminal_ || now < next_) return;
     next_ = now + from_seconds(0.25);
     shown_ = true;
-    std::fprintf(stderr, "\r\033[Kplant %7.3f h   error at the tool", plant_s / 3600.0);
+    std::fprintf(stderr, "%s%splant %7.3f h   error at the tool", terminal_code("[G").c_str(),
+                 terminal_code("[K").c_str(), plant_s / 3600.0);
     for (const double error : truth.last_error_um()) std::fprintf(stderr, " %7.2f", error);
     std::fprintf(stderr, " um   rms %.2f um, uncompensated %.2f um", truth.compensated_rms_um(),
                  truth.uncompensated_rms_um());

@@ -228,7 +228,27 @@ def bridge_seeds():
     write("bridge_answer", "refused", json.dumps(
         {"jsonrpc": "2.0", "id": 7, "error": {"code": -32001, "message": "another bridge"}}))
     write("bridge_answer", "deep", "[" * 20)
+    write("bridge_answer", "hidden_depth", '{"a":"' + "]" * 30000 + '","id":7,"result":' +
+          "[" * 30000 + "]" * 30000 + "}")
     write("bridge_answer", "numbers", struct.pack("<B11d", 7, *range(10), float("nan")))
+
+
+def answer_seeds():
+    sensor = {"name": "bed", "bus": "cabinet", "blocks": ["bed"], "fault": "none", "raw_degC": 21.0,
+              "smoothed_degC": 21.0, "age_s": 0.1, "suspected": None}
+    answer = {"mode": "compensating", "mode_since_s": 65.0, "enabled": True, "reasons": ["at_bound"],
+              "version": "1", "uptime_s": 70.0, "cycle": {"count": 7000, "rate_hz": 100.0},
+              "axes": [{"name": "z", "unit": "um", "displacement": -3.0, "target": 3.0, "offset": 3.0,
+                        "applied": None, "driven": True}],
+              "inputs": [{"name": "bed_degC", "temp_degC": 22.0, "good": True}],
+              "sensors": [dict(sensor, name=name) for name in ("bed", "床前", "床后", "a b", "a_b")],
+              "buses": [{"name": "cabinet", "kind": "can", "connected": False, "last_error": "x"}],
+              "events": [{"number": 1, "wall_s": 1.0, "kind": "command", "text": "\x1b]0;x\x07"}],
+              "controller": {"online": True}, "history": {"enabled": False}, "warnings": ["w"]}
+    write("daemon_answer", "all", json.dumps(answer))
+    write("daemon_answer", "deep", json.dumps({"result": 0}).replace("0", "[" * 30000 + "]" * 30000))
+    write("daemon_answer", "types", json.dumps({"axes": {"a": 1}, "mode": 5, "reasons": 7,
+                                                "sensors": [1, None], "events": [[]]}))
 
 
 def state_seeds():
@@ -433,6 +453,8 @@ def dictionaries(folder):
                literals("daemon/desks/bridge_desk.cpp"))
     dictionary(folder, "bridge_answer", {"1e308", "null", "true", '"x"'} |
                literals("linuxcnc/messages.cpp"))
+    dictionary(folder, "daemon_answer", {"1e308", "null", "true", "_0x20", "\\u202e"} |
+               literals("cli/observe/*.cpp", "gateway/texts/*.cpp", "gateway/feed/*.cpp"))
     dictionary(folder, "state_file", {"1e300", "null", "\\ud800", '{"'} |
                literals("daemon/state/state_file.cpp"))
     dictionary(folder, "history_file", {"SQLite format 3", "thco", "segment", "chunk", "setup", "meta"})
@@ -445,6 +467,7 @@ def main():
     run_seeds()
     socket_seeds()
     gateway_seeds()
+    answer_seeds()
     bridge_seeds()
     state_seeds()
     modbus_seeds()

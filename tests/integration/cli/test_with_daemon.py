@@ -1,8 +1,13 @@
 """Commands over the status socket, against answers chosen by the test."""
+import contextlib
 import json
+import os
+import pty
+import re
+import subprocess
 
 import pytest
-from conftest import run, status_answer
+from conftest import PROGRAM, run, status_answer
 
 
 def test_without_a_daemon_the_answer_is_one_line_and_status_2(tmp_path):
@@ -167,3 +172,67 @@ def test_watch_shows_what_comes(daemon):
     answer = run("--socket", daemon.path, "watch", "--period", "0.1")
     assert answer.returncode == 2 and daemon.path in answer.stderr, answer.stderr
     assert answer.stdout.count("compensating") == 3
+
+
+HOSTILE = "\x1b]0;owned\x07\x1b[2J\x1b[31mEVIL\u202e\u009b\x7f"
+COMMANDS = (["status"], ["status", "--json"], ["sensors"], ["sensors", "--json"], ["events"],
+            ["events", "--json"], ["watch", "--for", "1"], ["enable"], ["disable"], ["reload"],
+            ["reference"], ["measured", "z", "1"], ["prove", "z", "1"], ["release", "z"],
+            ["cycle-end"])
+
+
+def is_clean(answer):
+    return not any(c in answer.stdout + answer.stderr
+                   for c in ("\x1b", "\x07", "\x7f", "\u202e", "\u009b"))
+
+
+def with_hostile_texts(value):
+    if isinstance(value, dict):
+        return {key: with_hostile_texts(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [with_hostile_texts(each) for each in value]
+    return value + HOSTILE if isinstance(value, str) else value
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_no_text_of_the_socket_commands_the_terminal(daemon, command):
+    whole = status_answer(
+        reasons=["block_lost", "odd"], warnings=["w"], sensors_bad=["bed"],
+        buses=[{"name": "cabinet", "kind": "modbus_tcp", "connected": False, "last_error": "e"}])
+    sensors = {"sensors": [{"name": "bed", "bus": "cabinet", "blocks": ["bed"], "fault": "stale",
+                            "raw_degC": 20.0, "smoothed_degC": 20.0, "age_s": 1.0}]}
+    events = {"events": [{"number": 1, "wall_s": 1.0, "kind": "command", "subject": "s",
+                          "text": "t", "by": "b"}]}
+    daemon.answers = with_hostile_texts({"status": whole, "sensors": sensors, "events": events})
+    assert is_clean(run("--socket", daemon.path, *command)), command
+    for method in ("status", "sensors", "events", "enable", "disable", "reload", "reference",
+                   "measured", "prove", "release", "cycle_end", "subscribe"):
+        daemon.answers[method] = (-32002, "because " + HOSTILE)
+    answer = run("--socket", daemon.path, *command)
+    assert is_clean(answer) and "EVIL" in answer.stderr, command
+    assert answer.returncode in (1, 2)
+
+
+def test_no_name_of_a_file_commands_the_terminal(tmp_path):
+    for command in (["check", HOSTILE], ["status", "--socket", HOSTILE], ["verify", HOSTILE],
+                    ["replay", HOSTILE, "-o", HOSTILE], ["predict", "--model", HOSTILE, HOSTILE],
+                    ["scan", HOSTILE], ["fit", HOSTILE, "--outputs", HOSTILE], [HOSTILE],
+                    ["inspect", HOSTILE], ["simulate", HOSTILE, "-o", "x.csv"]):
+        answer = run(*command, cwd=tmp_path)
+        assert answer.returncode != 0 and is_clean(answer), command
+
+
+def test_a_terminal_gets_colours_and_nothing_else(daemon):
+    daemon.answers["status"] = with_hostile_texts(status_answer(reasons=["block_lost"]))
+    master, slave = pty.openpty()
+    with os.fdopen(master, "rb", buffering=0) as screen:
+        subprocess.run([PROGRAM, "--socket", daemon.path, "status"], stdout=slave, stderr=slave,
+                       stdin=subprocess.DEVNULL, timeout=60)
+        os.close(slave)
+        shown = b""
+        with contextlib.suppress(OSError):
+            while block := screen.read(65536):
+                shown += block
+    codes = set(re.findall(rb"\x1b(.{1,4}?m|.)", shown))
+    assert codes and codes <= {b"[0m", b"[1m", b"[31m", b"[32m", b"[33m"}, codes
+    assert b"\x1b[31mEVIL" not in shown and b"EVIL" in shown

@@ -4,13 +4,15 @@ import base64
 import contextlib
 import http.client
 import json
+import signal
 import socket
+import threading
 import time
 
 import pytest
 
 from gateway_lab import Gateway, make_certificate, password_line, trusting
-from lab import eventually
+from lab import eventually, run_tool
 
 
 @pytest.fixture(autouse=True)
@@ -203,6 +205,150 @@ def post(gateway, body, headers):
     status, _, answer = gateway.ask("/api/command", method="POST", body=json.dumps(body),
                                     headers={"Content-Type": "application/json", **headers})
     return status, json.loads(answer)
+
+
+def test_nobodys_unconfirmed_commands_are_in_anothers_way(lab, machine):
+    passwords = lab.folder / "passwords"
+    passwords.write_text(password_line("maria", "long and secret") +
+                         password_line("otto", "asks and asks"))
+    certificate, key = make_certificate(lab.folder)
+    gateway = lab.also_end(Gateway(
+        lab, machine.daemon,
+        f'certificate = "{certificate}"\nkey = "{key}"\npasswords = "{passwords}"',
+        '[commands]\nusers = ["maria", "otto"]\nmethods = ["disable"]'))
+    gateway.context = trusting(certificate)
+    gateway.start()
+    otto = as_user("otto", "asks and asks")
+    eventually(lambda: post(gateway, {"method": "disable"}, MARIA)[0] == 200, "the daemon is here")
+    asked = [post(gateway, {"method": "disable"}, otto) for _ in range(100)]
+    assert {status for status, _ in asked} == {200}
+    assert post(gateway, {"method": "disable"}, MARIA)[0] == 200
+    assert post(gateway, {"token": asked[0][1]["token"]}, otto)[0] == 410  # no longer
+    assert machine.daemon.status()["enabled"]
+
+
+INNER = b"GET /api/status HTTP/1.1\r\nHost: localhost\r\n\r\n"
+ONE_LENGTH = b"Content-Length: %d\r\n" % len(INNER)
+CHUNKED = b"Transfer-Encoding: chunked\r\n"
+
+
+BODIES_OF_TWO_LENGTHS = (b"Content-Length: 0\r\n" + ONE_LENGTH + b"\r\n",
+                         ONE_LENGTH + b"Content-Length: 0\r\n\r\n",
+                         ONE_LENGTH + CHUNKED + b"\r\n0\r\n\r\n")
+
+
+def test_the_rest_of_a_refused_request_is_no_request(gateway):
+    for start in (b"GET /api/status HTTP/1.1\r\nHost: evil.example\r\n",
+                  b"GET / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://evil.example\r\n",
+                  b"GET /nothing HTTP/1.1\r\nHost: localhost\r\n",
+                  b"POST /api/command HTTP/1.1\r\nHost: localhost\r\nOrigin: http://evil.example\r\n",
+                  b"POST /api/command HTTP/1.1\r\nHost: localhost\r\n",
+                  b"POST / HTTP/1.1\r\nHost: localhost\r\n",
+                  b"PUT / HTTP/1.1\r\nHost: localhost\r\n",
+                  b"GET /" + b"a" * 300 + b" HTTP/1.1\r\nHost: localhost\r\n"):
+        for body in (b"\r\n", ONE_LENGTH + b"\r\n", CHUNKED + b"\r\n0\r\n\r\n",
+                     *BODIES_OF_TWO_LENGTHS):
+            answer = gateway.raw(start + body + INNER)
+            assert answer.count(b"HTTP/1.1 ") == 1, (start, body, answer[:2000])
+            assert status_of(answer) >= 400, (start, body, answer[:2000])
+
+
+def test_a_body_of_two_lengths_is_refused(gateway):
+    for body in BODIES_OF_TWO_LENGTHS:
+        answer = gateway.raw(b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n" + body + INNER)
+        assert answer.count(b"HTTP/1.1 ") == 1 and status_of(answer) == 400, answer[:2000]
+
+
+def test_what_follows_a_body_that_is_too_large_is_no_request(gateway):
+    answer = gateway.raw(b"POST /api/command HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5000\r\n"
+                         b"Content-Type: application/json\r\n\r\n" + b"x" * 5000 + INNER)
+    assert answer.count(b"HTTP/1.1 ") == 1 and status_of(answer) == 413, answer[:2000]
+
+
+def test_a_stranger_gets_one_answer_a_connection(guarded):
+    """Also where the next request in the connection would be somebody's else, by a proxy."""
+    inner = b"GET /api/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
+    for first in (b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
+                  b"POST /api/command HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n" %
+                  len(inner)):
+        with socket.create_connection(("127.0.0.1", guarded.port), 10) as link, \
+                guarded.context.wrap_socket(link, server_hostname="localhost") as secure:
+            secure.sendall(first + inner)
+            answer = b""
+            with contextlib.suppress(OSError):
+                while block := secure.recv(65536):
+                    answer += block
+        assert answer.count(b"HTTP/1.1 ") == 1 and status_of(answer) == 401, answer[:500]
+
+
+def fill_queue(path):
+    """Connections until the listener's queue is full."""
+    links = []
+    for _ in range(2000):
+        link = socket.socket(socket.AF_UNIX)
+        link.setblocking(False)
+        try:
+            link.connect(str(path))
+        except BlockingIOError:
+            link.close()
+            return links
+        links.append(link)
+    raise AssertionError("the queue is never full")
+
+
+def test_it_ends_although_the_daemon_stands_still(machine, gateway):
+    serves(gateway)
+    machine.daemon.process.send_signal(signal.SIGSTOP)
+    try:
+        links = fill_queue(machine.daemon.socket)
+        eventually(lambda: gateway.ask("/api/status")[0] == 503, "the daemon is away")
+        time.sleep(3.0)  # it tries to connect again
+        began = time.monotonic()
+        gateway.end()
+        assert time.monotonic() - began < 6.0
+        began = time.monotonic()
+        status, out, err = machine.daemon.cli("status")
+        assert status == 2 and "no answer in time" in err and time.monotonic() - began < 12.0
+        for link in links:
+            link.close()
+    finally:
+        machine.daemon.process.send_signal(signal.SIGCONT)
+
+    def goes_on():
+        with contextlib.suppress(OSError):  # its queue is emptied first
+            return machine.daemon.status()["mode"] == "compensating"
+
+    eventually(goes_on, "it goes on")
+    gateway.start()
+
+
+def test_a_deep_answer_ends_neither_gateway_nor_command(lab, machine):
+    path = lab.folder / "deep.sock"
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        listener.listen(50)
+
+        def serve(link):
+            with link, link.makefile("rb") as lines, contextlib.suppress(OSError):
+                for line in lines:
+                    link.sendall(b'{"id":%d,"result":' % json.loads(line)["id"] + b"[" * 400000 +
+                                 b"]" * 400000 + b"}\n")
+
+        def accept():
+            with contextlib.suppress(OSError):
+                while True:
+                    threading.Thread(target=serve, args=(listener.accept()[0],), daemon=True).start()
+
+        threading.Thread(target=accept, daemon=True).start()
+        gateway = Gateway(lab, machine.daemon)
+        gateway.config.write_text(gateway.config.read_text().replace(str(machine.daemon.socket),
+                                                                     str(path)))
+        lab.also_end(gateway).start()
+        eventually(lambda: "at most 16 deep" in gateway.log.read_text(), "it is refused in words")
+        assert gateway.ask("/api/status")[0] == 503
+        status, _, err = run_tool("--socket", path, "status")
+        assert status == 2 and "at most 16 deep" in err
+        listener.shutdown(socket.SHUT_RDWR)
 
 
 def test_a_named_user_confirms_what_will_move(guarded, machine):

@@ -1,6 +1,9 @@
 """MQTT by a real mosquitto: everything arrives, and an end of whatever kind is seen."""
 
+import contextlib
+import socket
 import subprocess
+import time
 
 import pytest
 
@@ -111,3 +114,23 @@ def test_user_password_and_certificate_are_asked_for(lab, machine):
     wrong.end()
     gateway = publisher(lab, machine, broker, options.format(certificate))
     eventually(lambda: connected(gateway), "connected by TLS with a password")
+
+
+def test_a_broker_that_takes_no_connection_keeps_it_from_nothing(lab, machine):
+    """Its queue of connections is full: nothing answers, as where a firewall drops."""
+    with socket.socket() as listener, contextlib.ExitStack() as stack:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen(0)
+        for _ in range(4):
+            link = stack.enter_context(socket.socket())
+            link.setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                link.connect(listener.getsockname())
+        gateway = Gateway(lab, machine.daemon, "", f'[mqtt]\nhost = "127.0.0.1"\n'
+                          f'port = {listener.getsockname()[1]}').start()
+        eventually(lambda: "no answer in time" in gateway.log.read_text(), "it is said")
+        gateway.wait_for(lambda s: any("MQTT" in p["what"] for p in s["problems"]), "shown")
+        time.sleep(2.0)  # it tries again
+        began = time.monotonic()
+        gateway.end()
+        assert time.monotonic() - began < 3.0

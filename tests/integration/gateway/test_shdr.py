@@ -1,6 +1,7 @@
 """The adapter port, read by the protocol that MTConnect publishes for adapters, not by ours (no MTConnect
 agent is to be had as a package of Debian)."""
 
+import contextlib
 import socket
 import subprocess
 
@@ -126,3 +127,20 @@ def test_the_reader_refuses_what_is_none(machine, gateway, lab, line, why):
     agent = lab.also_end(Agent(gateway.ready["shdr"], device_file(gateway)))
     with pytest.raises(Refused, match=why):
         agent.take(line)
+
+
+def test_agents_that_are_silent_give_their_places_to_new_ones(lab, machine):
+    gateway = lab.also_end(Gateway(lab, machine.daemon, "",
+                                   "[shdr]\nport = 0\nheartbeat_s = 1\nagents_max = 3")).start()
+    with contextlib.ExitStack() as stack:
+        for _ in range(3):
+            stack.enter_context(socket.create_connection(("127.0.0.1", gateway.ready["shdr"])))
+
+        def is_served():
+            with socket.create_connection(("127.0.0.1", gateway.ready["shdr"]), 5) as link:
+                with contextlib.suppress(OSError):
+                    link.sendall(b"* PING\n")
+                    return link.recv(100)
+
+        assert not is_served()
+        eventually(is_served, "a place is free")

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -84,7 +85,8 @@ TEST_CASE("metrics of any answer are lines of the format", "[gateway][metrics]")
 }
 
 TEST_CASE("topics have no character that a topic gives a meaning to", "[gateway][mqtt]") {
-  CHECK(topic_of("mill", "sensor", "bed front/+#") == "thermocomp/mill/sensor/bed_front___");
+  CHECK(topic_of("mill", "sensor", "bed front/+#") ==
+        "thermocomp/mill/sensor/bed_0x20front_0x2F_0x2B_0x23");
   CHECK(topic_of("mill", "status") == "thermocomp/mill/status");
   CHECK(utc_text(1772353800.125) == "2026-03-01T08:30:00.125Z");
   CHECK(utc_text(std::nan("")) == "1970-01-01T00:00:00.000Z");
@@ -94,13 +96,57 @@ TEST_CASE("topics have no character that a topic gives a meaning to", "[gateway]
   CHECK(states[3].state["offset_urad"] == 4.0);
 }
 
+TEST_CASE("different names stay different and a name stays what it was", "[gateway][names]") {
+  CHECK(item_name("temp", "bed_front2") == "temp_bed_front2");
+  CHECK(item_name("temp", "a b") == "temp_a_0x20b");
+  CHECK(topic_of("mill", "sensor", "床前") == "thermocomp/mill/sensor/床前");
+  // Short names of the characters that could be confused: all of them.
+  const std::string alphabet = "_0x2A /\xE5";
+  std::vector<std::string> names{""};
+  for (std::size_t i = 0; names.size() < 60000; ++i)
+    for (const char c : alphabet) names.push_back(names[i] + c);
+  for (const char* name : {"床前", "床后", "主轴", "立柱", "шпиндель", "станина"})
+    names.emplace_back(name);
+  std::set<std::string> items;
+  std::set<std::string> topics;
+  const std::regex plain("temp_[A-Za-z0-9_]*");
+  for (const std::string& name : names) {
+    const std::string item = item_name("temp", name);
+    if (items.size() % 100 == 0) CHECK(std::regex_match(item, plain));
+    items.insert(item);
+    topics.insert(topic_of("mill", "sensor", name));
+  }
+  CHECK(items.size() == names.size());
+  CHECK(topics.size() == names.size());
+}
+
+TEST_CASE("every sensor has an item of its own in lines and device file", "[gateway][names]") {
+  Snapshot snapshot = snapshot_of_two_axes();
+  json sensors = json::array();
+  for (const char* name : {"床前", "床后", "主轴", "立柱", "a b", "a_b"})
+    sensors.push_back({{"name", name}, {"fault", "none"}, {"smoothed_degC", 20.0}});
+  sensors[1]["fault"] = "open_circuit";
+  snapshot.sensors = {{"sensors", sensors}};
+  const ShdrStates states = shdr_states(snapshot);
+  const std::string file = device_file(snapshot, "mill");
+  std::size_t faulty = 0;
+  std::size_t found = 0;
+  for (const auto& [item, entries] : states) {
+    CHECK_THAT(file, Contains(" id=\"" + item + "\""));
+    found += item.starts_with("sensor_") ? 1u : 0u;
+    faulty += entries.front().starts_with("FAULT") ? 1u : 0u;
+  }
+  CHECK(found == 6);
+  CHECK(faulty == 1);
+}
+
 TEST_CASE("adapter lines tell everything once, then what changes", "[gateway][shdr]") {
   Snapshot snapshot = snapshot_of_two_axes();
   const ShdrStates first = shdr_states(snapshot);
   const std::string all = shdr_lines({}, first, snapshot.wall_s);
   CHECK_THAT(all, Contains("2026-03-01T08:30:00.125Z|avail|AVAILABLE"));
   CHECK_THAT(all, Contains("|offset_z|-0.003500"));
-  CHECK_THAT(all, Contains("|temp_bed_front|21.500000"));
+  CHECK_THAT(all, Contains("|temp_bed_0x20front|21.500000"));
   CHECK_THAT(all, Contains("|displacement_b|UNAVAILABLE"));
   CHECK_THAT(all, Contains("Z|system|NORMAL||||\n"));
   CHECK(shdr_lines(first, first, snapshot.wall_s).empty());

@@ -56,6 +56,11 @@ TEST_CASE("what is no plain request is refused", "[gateway][http]") {
   request.hosts_given = 2;
   CHECK(status_of(request) == 400);
   request = plain_request();
+  request.lengths_given = 1;
+  CHECK(status_of(request) == 200);
+  request.lengths_given = 2;
+  CHECK(status_of(request) == 400);
+  request = plain_request();
   request.method = "PUT";
   CHECK(status_of(request) == 405);
   request = plain_request();

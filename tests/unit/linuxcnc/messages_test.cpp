@@ -107,3 +107,17 @@ TEST_CASE("an answer that must not be acted on is refused", "[linuxcnc]") {
   }
   CHECK_NOTHROW(read_answer(answer_line({{"x", 200.0}}), 3, "x", 0.2));
 }
+
+TEST_CASE("brackets in a string hide no depth, and words of the daemon command no terminal",
+          "[linuxcnc]") {
+  const std::string hidden = R"({"a":")" + std::string(400000, ']') + R"(","id":3,"result":)" +
+                             std::string(400000, '[') + std::string(400000, ']') + "}";
+  CHECK_THROWS_WITH(read_answer(hidden, 3, "x", 0.2), Catch::Contains("no JSON object"));
+  const std::string words = std::string(100, '[') + "\\\"";
+  CHECK_NOTHROW(read_answer(
+      R"({"id":3,"note":")" + words + R"(","result":{"anew":true,"mode":"m","offsets_um":{}}})", 3,
+      "x", 0.2));
+  CHECK_THROWS_WITH(
+      read_answer(R"({"id":3,"error":{"message":"\u001b]0;x\u0007 \u202e!"}})", 3, "x", 0.2),
+      Catch::EndsWith(" ]0;x     !"));
+}

@@ -1,0 +1,89 @@
+/// What command and gateway make of an answer of the daemon, whatever comes: it is refused in
+/// words, or every view of it can be made, and what its names become stays different.
+#include <set>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/common/json_fields.hpp"
+#include "cli/observe/events_text.hpp"
+#include "cli/observe/status_text.hpp"
+#include "cli/observe/watch_text.hpp"
+#include "common/fuzz.hpp"
+#include "config/text/outer_json.hpp"
+#include "gateway/feed/page_state.hpp"
+#include "gateway/texts/metrics_text.hpp"
+#include "gateway/texts/mqtt_texts.hpp"
+#include "gateway/texts/shdr_text.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::gateway;
+using nlohmann::json;
+
+namespace {
+
+/// Copied and printed, as the callers do: a depth without a bound ends the process here.
+json taken(std::string_view line) {
+  const json message = parse_outer_json(line);
+  const json copy = message;
+  FUZZ_PROMISE(!copy.dump(-1, ' ', false, json::error_handler_t::replace).empty());
+  return copy;
+}
+
+void look_at(const json& answer) {
+  static_cast<void>(cli::status_text(answer, true));
+  static_cast<void>(cli::sensors_text(answer, true));
+  static_cast<void>(cli::events_text(answer));
+  static_cast<void>(cli::watch_screen(answer, nullptr, true, nullptr));
+  static_cast<void>(cli::why_not(answer, true));
+}
+
+std::set<std::string> names_in(const json& answer, const char* list) {
+  std::set<std::string> names;
+  for (const json& each : cli::list_of(answer, list)) names.insert(cli::text_of(each, "name"));
+  return names;
+}
+
+void check_gateway(const json& answer) {
+  Snapshot snapshot;
+  snapshot.is_here = true;
+  snapshot.status = answer;
+  snapshot.sensors = answer;
+  snapshot.events = std::make_shared<const json>(cli::list_of(answer, "events"));
+  static_cast<void>(page_state(snapshot, "mill"));
+  static_cast<void>(page_events(snapshot, 12));
+  static_cast<void>(metrics_text(snapshot, {}));
+
+  const ShdrStates states = shdr_states(snapshot);
+  std::size_t sensors = 0;
+  for (const auto& [item, entries] : states) {
+    FUZZ_PROMISE(!entries.empty());
+    sensors += item.starts_with("temp_") ? 1u : 0u;
+    for (const char c : item) FUZZ_PROMISE(c == '_' || std::isalnum(static_cast<unsigned char>(c)));
+  }
+  FUZZ_PROMISE(sensors == names_in(answer, "sensors").size());
+  for (const char c : shdr_lines({}, states, 0.0))
+    FUZZ_PROMISE(c == '\n' || static_cast<unsigned char>(c) >= ' ');
+
+  std::set<std::string> topics;
+  for (const TopicState& state : topic_states(snapshot, "mill")) {
+    FUZZ_PROMISE(state.topic.find_first_of("+# \n") == std::string::npos);
+    topics.insert(state.topic);
+  }
+  FUZZ_PROMISE(topics.size() ==
+               1 + names_in(answer, "sensors").size() + names_in(answer, "axes").size());
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    const json answer = taken({reinterpret_cast<const char*>(data), size});
+    look_at(answer);
+    check_gateway(answer);
+  } catch (const JsonError& error) {
+    FUZZ_PROMISE(*error.what() != '\0');
+  }
+  return 0;
+}
