@@ -46,8 +46,9 @@ struct HistoryDisk::Parts {
   Parts(std::uint64_t seed, const FaultSchedule& fault_schedule)
       : schedule(fault_schedule), chance(seed, 11) {}
 
-  /// Every other step that is wide is never set right again.
+  /// Every other step that is wide is never set right again, nor stepped again.
   [[nodiscard]] nanoseconds wall() {
+    if (wrong_for_good != nanoseconds{}) return wall_at_begin + now + wrong_for_good;
     const FaultEvent* step = schedule.find(FaultKind::wall_clock_stepped, now);
     nanoseconds stepped{0};
     if (step != nullptr) {
@@ -59,7 +60,7 @@ struct HistoryDisk::Parts {
         stepped = std::chrono::hours(step->strength < 0.75 ? 1 : 24 * 400);
       if (step->strength >= 0.75 && step->number % 2 == 0) wrong_for_good = stepped;
     }
-    return wall_at_begin + now + (step != nullptr ? stepped : wrong_for_good);
+    return wall_at_begin + now + stepped;
   }
   /// Somebody tidies up.
   void remove_files() {
