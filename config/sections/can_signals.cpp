@@ -1,6 +1,7 @@
 #include "config/sections/can_signals.hpp"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 
 #include "config/sections/common.hpp"
@@ -192,8 +193,16 @@ bool TakenBits::has_frame_of(const CanSignal& signal) const {
   return used_.contains({signal.id, signal.extended_id});
 }
 
+double count_of(const CanSignal& signal) {
+  if (!signal.is_float) return std::abs(signal.scale);
+  return (signal.length_bits == 32 ? FLT_TRUE_MIN : DBL_TRUE_MIN) * std::abs(signal.scale);
+}
+
 Range reach(const CanSignal& signal) {
-  if (signal.is_float) return {};
+  if (signal.is_float) {
+    const double most = signal.length_bits == 32 ? FLT_MAX : DBL_MAX;
+    return Range::between(-most * std::abs(signal.scale), most * std::abs(signal.scale));
+  }
   const double counts = std::ldexp(1.0, signal.length_bits);
   const double low = signal.is_signed ? -counts / 2 : 0.0;
   const double high = signal.is_signed ? counts / 2 - 1 : counts - 1;

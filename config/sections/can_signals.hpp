@@ -67,5 +67,7 @@ class TakenBits {
 
 /// The smallest and greatest value of raw * scale + offset.
 [[nodiscard]] Range reach(const CanSignal& signal);
+/// What one count of the raw value is; of a float the least step that it can make.
+[[nodiscard]] double count_of(const CanSignal& signal);
 
 }  // namespace thermocomp::sections

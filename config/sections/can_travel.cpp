@@ -19,7 +19,7 @@ FrameId id_of(const CanSignal& signal) {
 }
 
 Carried carried(const CanSignal& signal) {
-  return {reach(signal), signal.is_float ? 0.0 : std::abs(signal.scale)};
+  return {reach(signal), count_of(signal)};
 }
 
 /// Sets that follow one another, in so many bits.
@@ -37,8 +37,9 @@ std::vector<CanSignal> signals_of(const Places& places) {
 
 }  // namespace
 
-CanTravelSection::CanTravelSection(const TomlTable& axis, double offset_um_max, TakenBits& sent)
-    : section_(axis, offset_um_max), travel_{section_.shape(), {}, {}} {
+CanTravelSection::CanTravelSection(const TomlTable& axis, const LimiterConfig& limiter,
+                                   TakenBits& sent)
+    : section_(axis, limiter), travel_{section_.shape(), {}, {}} {
   const TomlTable& table = section_.table();
   refuse_registers(table);
   const std::vector<Place> values = read_values(table);

@@ -15,7 +15,7 @@ namespace thermocomp::sections {
 class CanTravelSection {
  public:
   /// @param axis  has a travel_table()
-  CanTravelSection(const TomlTable& axis, double offset_um_max, TakenBits& sent);
+  CanTravelSection(const TomlTable& axis, const LimiterConfig& limiter, TakenBits& sent);
 
   void read_applied(const TakenBits& sent);
   /// The numbers must not come round while a frame of the controller still counts.

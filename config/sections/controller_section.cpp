@@ -26,10 +26,10 @@ void refuse_travel(const TomlTable& axis) {
              "\"modbus_rtu\" or \"can\"); with `offset` the daemon itself follows the position");
 }
 
-/// The bound of the axis must be something that the value can carry, or offsets would be cut off.
-void check_reach(const TomlTable& table, std::string_view key, const Range& reach,
+template <class Place>
+void check_place(const TomlTable& table, std::string_view key, const Place& place,
                  const AxisConfig& axis) {
-  sections::check_reach(table, key, reach, axis.limiter.offset_um_max);
+  check_offset_place(table, key, {reach(place), count_of(place)}, axis.limiter);
 }
 
 void check_bits(const TomlTable& table, double greatest, std::size_t axes) {
@@ -206,7 +206,7 @@ class ControllerReader {
     if (!travel_table(table)) return read_modbus_axis(table, axis, written);
     refuse_plain_places(table);
     ModbusAxis place;
-    place.travel = read_modbus_travel(table, axis.limiter.offset_um_max, written);
+    place.travel = read_modbus_travel(table, axis.limiter, written);
     return place;
   }
 
@@ -241,8 +241,9 @@ class ControllerReader {
       own.problem(error.key(), error.value(), error.rule());
       return place;
     }
-    check_reach(table, "piezo", Range::between(piezo.curve_um.front(), piezo.curve_um.back()),
-                axis);
+    check_offset_place(table, "piezo",
+                       {Range::between(piezo.curve_um.front(), piezo.curve_um.back()), 0.0},
+                       axis.limiter);
     if (offset) check_volts(table, "offset", place.offset, piezo);
     if (place.applied) check_volts(table, "applied", *place.applied, piezo);
     return place;
@@ -254,6 +255,9 @@ class ControllerReader {
     if (!volts.contains(piezo.curve_V.back()))
       table.problem(key, "must be able to hold the curve's voltages, but reaches from " +
                              number_text(volts.min) + " to " + number_text(volts.max));
+    if (count_of(value) <= piezo.tolerance_V) return;
+    table.problem(key, "one count of " + number_text(count_of(value)) + " V",
+                  "must be at most tolerance_V = " + number_text(piezo.tolerance_V));
   }
 
   static ModbusAxis read_modbus_axis(const TomlTable& table, const AxisConfig& axis,
@@ -263,11 +267,11 @@ class ControllerReader {
     place.offset = read_modbus_value(offset, RegisterUse::written);
     if (offset) {
       written.add(table, "offset", place.offset);
-      check_reach(table, "offset", reach(place.offset), axis);
+      check_place(table, "offset", place.offset, axis);
     }
     if (table.has("applied")) {
       place.applied = read_modbus_value(table.table("applied"), RegisterUse::number);
-      check_reach(table, "applied", reach(*place.applied), axis);
+      check_place(table, "applied", *place.applied, axis);
     }
     return place;
   }
@@ -326,7 +330,7 @@ class ControllerReader {
     const TomlTable& axis = axis_tables_[index];
     if (!travel_table(axis)) return std::nullopt;
     refuse_plain_places(axis);
-    return CanTravelSection(axis, axes_[index].limiter.offset_um_max, sent);
+    return CanTravelSection(axis, axes_[index].limiter, sent);
   }
 
   [[nodiscard]] CanSignal read_can_offset(std::size_t index, TakenBits& sent) const {
@@ -335,7 +339,7 @@ class ControllerReader {
     CanSignal signal = read_can_signal(offset, offset, CanUse::offset);
     if (!offset) return signal;
     sent.add(table, "offset", signal);
-    check_reach(table, "offset", reach(signal), axes_[index]);
+    check_place(table, "offset", signal, axes_[index]);
     return signal;
   }
 
@@ -346,7 +350,7 @@ class ControllerReader {
     if (!applied) return std::nullopt;
     CanSignal signal = read_can_signal(applied, applied, CanUse::offset);
     refuse_sent(table, "applied", signal, sent);
-    check_reach(table, "applied", reach(signal), axes_[index]);
+    check_place(table, "applied", signal, axes_[index]);
     return signal;
   }
 

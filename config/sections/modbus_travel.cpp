@@ -10,8 +10,7 @@ namespace thermocomp::sections {
 namespace {
 
 Carried carried(const ModbusValue& value) {
-  const bool is_float = value.encoding == Encoding::float32 || value.encoding == Encoding::float64;
-  return {reach(value), is_float ? 0.0 : std::abs(value.scale)};
+  return {reach(value), count_of(value)};
 }
 
 struct TravelReader {
@@ -110,9 +109,9 @@ void WrittenRegisters::add(const TomlTable& table, std::string_view key, const M
   }
 }
 
-ModbusTravel read_modbus_travel(const TomlTable& axis, double offset_um_max,
+ModbusTravel read_modbus_travel(const TomlTable& axis, const LimiterConfig& limiter,
                                 WrittenRegisters& written) {
-  TravelReader reader{TravelSection(axis, offset_um_max), written};
+  TravelReader reader{TravelSection(axis, limiter), written};
   reader.section.table().refuse("set_numbers",
                                 "makes no sense in registers: `begin` and `end` hold the number");
   reader.section.is_line() ? reader.read_line() : reader.read_table();

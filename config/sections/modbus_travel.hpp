@@ -7,6 +7,7 @@
 
 #include "config/toml/toml_reader.hpp"
 #include "drivers/controllers/controller_config.hpp"
+#include "estimator/estimator_config.hpp"
 
 namespace thermocomp::sections {
 
@@ -20,7 +21,7 @@ class WrittenRegisters {
 };
 
 /// @param axis  has a travel_table()
-[[nodiscard]] ModbusTravel read_modbus_travel(const TomlTable& axis, double offset_um_max,
+[[nodiscard]] ModbusTravel read_modbus_travel(const TomlTable& axis, const LimiterConfig& limiter,
                                               WrittenRegisters& written);
 
 }  // namespace thermocomp::sections

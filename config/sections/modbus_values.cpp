@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <arpa/inet.h>
 #include <array>
+#include <cfloat>
+#include <cmath>
 
 #include "config/sections/common.hpp"
 
@@ -249,8 +251,17 @@ ModbusRenewal read_modbus_renewal(const TomlTable& table) {
   return renewal;
 }
 
+double count_of(const ModbusValue& value) {
+  if (value.encoding == Encoding::float32) return FLT_TRUE_MIN * std::abs(value.scale);
+  if (value.encoding == Encoding::float64) return DBL_TRUE_MIN * std::abs(value.scale);
+  return std::abs(value.scale);
+}
+
 Range reach(const ModbusValue& value) {
-  if (value.encoding == Encoding::float32 || value.encoding == Encoding::float64) return {};
+  if (value.encoding == Encoding::float32 || value.encoding == Encoding::float64) {
+    const double most = value.encoding == Encoding::float32 ? FLT_MAX : DBL_MAX;
+    return Range::between(-most * std::abs(value.scale), most * std::abs(value.scale));
+  }
   const Codes codes = codes_of(value.encoding);
   const double a = static_cast<double>(codes.low) * value.scale;
   const double b = static_cast<double>(codes.high) * value.scale;

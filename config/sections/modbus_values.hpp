@@ -27,5 +27,7 @@ enum class RegisterUse {
 
 /// The smallest and greatest value of raw * scale.
 [[nodiscard]] Range reach(const ModbusValue& value);
+/// What one count of the raw value is; of a float the least step that it can make.
+[[nodiscard]] double count_of(const ModbusValue& value);
 
 }  // namespace thermocomp::sections

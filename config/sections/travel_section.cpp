@@ -12,21 +12,37 @@ constexpr double mm_per_m = 1000.0;
 /// As much as a read-back may differ from what was sent because values are rounded to counts.
 constexpr double rounding_um_max = 0.1;
 
+/// Controllers count offsets in um at the coarsest. Beyond that one count may be what the slew
+/// allows in a second, and a quarter of the bound.
+double count_um_max(const LimiterConfig& limiter) {
+  constexpr double coarsest_um = 1.0;
+  constexpr double share_of_bound = 0.25;
+  return std::min(std::max(coarsest_um, limiter.rate_um_per_s_max),
+                  share_of_bound * limiter.offset_um_max);
+}
+
 }  // namespace
 
-void check_reach(const TomlTable& table, std::string_view key, const Range& reach,
-                 double offset_um_max) {
-  if (reach.contains(offset_um_max) && reach.contains(-offset_um_max)) return;
-  table.problem(key, "must be able to hold -offset_um_max ... offset_um_max, but reaches from " +
-                         number_text(reach.min) + " to " + number_text(reach.max));
+void check_offset_place(const TomlTable& table, std::string_view key, const Carried& place,
+                        const LimiterConfig& limiter) {
+  const Range& reach = place.reach;
+  if (!reach.contains(limiter.offset_um_max) || !reach.contains(-limiter.offset_um_max))
+    table.problem(key, "must be able to hold -offset_um_max ... offset_um_max, but reaches from " +
+                           number_text(reach.min) + " to " + number_text(reach.max));
+  if (place.count <= count_um_max(limiter)) return;
+  table.problem(key, "one count of " + number_text(place.count) + " um",
+                "must be at most " + number_text(count_um_max(limiter)) +
+                    " um beside offset_um_max = " + number_text(limiter.offset_um_max) +
+                    " and rate_um_per_s_max = " + number_text(limiter.rate_um_per_s_max) +
+                    ": check `scale`");
 }
 
 TomlTable travel_table(const TomlTable& axis) {
   return axis.has("line") ? axis.table("line") : axis.table_or_empty("table");
 }
 
-TravelSection::TravelSection(const TomlTable& axis, double offset_um_max)
-    : table_(travel_table(axis)), offset_um_max_(offset_um_max) {
+TravelSection::TravelSection(const TomlTable& axis, const LimiterConfig& limiter)
+    : table_(travel_table(axis)), limiter_(limiter) {
   axis.has("line") ? read_line() : read_table();
 }
 
@@ -50,14 +66,14 @@ void TravelSection::read_table() {
 
 void TravelSection::check_offset(const TomlTable& own, std::string_view key,
                                  const Carried& place) const {
-  check_reach(own, key, place.reach, offset_um_max_);
+  check_offset_place(own, key, place, limiter_);
 }
 
 void TravelSection::check_slope(const TomlTable& own, std::string_view key,
                                 const Carried& place) const {
   if (!is_travel_) return;
   const double length_m = (shape_.nodes_mm.back() - shape_.nodes_mm.front()) / mm_per_m;
-  const double steepest = 2.0 * offset_um_max_ / length_m;
+  const double steepest = 2.0 * limiter_.offset_um_max / length_m;
   const Range& can = place.reach;
   if (!can.contains(steepest) || !can.contains(-steepest))
     own.problem(key, "must be able to hold +-" + number_text(steepest) +

@@ -6,18 +6,20 @@
 
 #include "config/toml/toml_reader.hpp"
 #include "drivers/controllers/controller_config.hpp"
+#include "estimator/estimator_config.hpp"
 
 namespace thermocomp::sections {
 
 /// What a value's place can carry.
 struct Carried {
   Range reach;
-  double count{0.0};  ///< what one count is, in the value's unit; 0: a float
+  double count{0.0};  ///< what one count is, in the value's unit; of a float the least step
 };
 
-/// The largest offset must be something that the value can carry, or it would be cut off.
-void check_reach(const TomlTable& table, std::string_view key, const Range& reach,
-                 double offset_um_max);
+/// The value of an offset must be able to carry the bound, or the offset would be cut off, and one
+/// count of it must be small enough beside bound and slew, or the axis would leap or stand still.
+void check_offset_place(const TomlTable& table, std::string_view key, const Carried& place,
+                        const LimiterConfig& limiter);
 
 /// [axis.line] or [axis.table] of an axis; not there: it has neither.
 [[nodiscard]] TomlTable travel_table(const TomlTable& axis);
@@ -26,7 +28,7 @@ void check_reach(const TomlTable& table, std::string_view key, const Range& reac
 class TravelSection {
  public:
   /// @param axis  has a travel_table(); what the estimator needs of it is read with the axis
-  TravelSection(const TomlTable& axis, double offset_um_max);
+  TravelSection(const TomlTable& axis, const LimiterConfig& limiter);
 
   [[nodiscard]] const TomlTable& table() const noexcept { return table_; }
   [[nodiscard]] const TravelShape& shape() const noexcept { return shape_; }
@@ -41,7 +43,7 @@ class TravelSection {
   void read_table();
 
   TomlTable table_;
-  double offset_um_max_;
+  LimiterConfig limiter_;
   TravelShape shape_;
   bool is_travel_{true};  ///< the ends of the travel could be read
 };

@@ -371,6 +371,30 @@ TEST_CASE("a travel that cannot be is refused, with key and rule", "[config][tra
                     Catch::Contains("is no curve"));
 }
 
+TEST_CASE("a register that cannot carry the offset in sensible steps is refused", "[config]") {
+  const std::string text = example("small_machine.toml");
+  const std::size_t line = text.find("\noffset = { table");
+  REQUIRE(line != std::string::npos);
+  const auto with = [&](const std::string& place) {
+    std::string changed = text;
+    changed.replace(line + 1, text.find('\n', line + 1) - line - 1,
+                    "offset = { table = \"holding\", address = 900, " + place + " }");
+    return parse(changed);
+  };
+  CHECK_THROWS_WITH(with("encoding = \"int16\", scale = 5.0"),
+                    Catch::Contains("one count of 5 um: must be at most"));
+  CHECK_THROWS_WITH(with("encoding = \"int32\", scale = 1e10"), Catch::Contains("one count of"));
+  CHECK_THROWS_WITH(with("encoding = \"int32\", scale = -1e10"), Catch::Contains("one count of"));
+  CHECK_THROWS_WITH(with("encoding = \"float32\", scale = 1e-40"),
+                    Catch::Contains("must be able to hold -offset_um_max"));
+  CHECK_THROWS_WITH(with("encoding = \"float32\", scale = 1e46"), Catch::Contains("one count of"));
+  for (const char* works :
+       {"encoding = \"int16\", scale = 1.0", "encoding = \"int16\", scale = -0.01",
+        "encoding = \"float32\"", "encoding = \"float32\", scale = 1000.0",
+        "encoding = \"float64\", scale = 1e-3"})
+    CHECK_NOTHROW(with(works));
+}
+
 TEST_CASE("keys of cycles make no sense where the offset follows the model", "[config]") {
   CHECK_THROWS_WITH(
       edited_machine("update = \"continuous\"", "update = \"continuous\"\ncycles_per_update = 2"),
