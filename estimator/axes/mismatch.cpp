@@ -17,6 +17,8 @@ constexpr double share_of_mismatch = 0.35;
 constexpr double sure_share_of_mismatch = 0.1;
 /// Below so little sent a factor says nothing.
 constexpr double sent_um_min = 0.2;
+/// A sign that flips while running is told from a coincidence from here on.
+constexpr double negative_um_min = 3.0;
 /// What was sent must have changed by so much, and by so much of the mismatch, before a factor is
 /// no coincidence.
 constexpr double spread_um_min = 0.5;
@@ -135,10 +137,16 @@ bool SentAndRead::stands_still(double sent_um, double read_um) const noexcept {
 
 Mismatch SentAndRead::judge(double sent_um, double read_um) const noexcept {
   const Mismatch found = judge_newest(kept(), sent_um, read_um);
+  if (found.likely != MismatchCause::changes_alone) return found;
   const std::size_t since_it_began = disagreeing();
-  if (found.likely != MismatchCause::changes_alone || since_it_began == 0) return found;
-  const Mismatch lately = judge_newest(since_it_began, sent_um, read_um);
-  return lately.sure && lately.likely == MismatchCause::constant ? lately : found;
+  Mismatch lately = judge_newest(since_it_began, sent_um, read_um);
+  // Another writer would hardly hit the negative of what is sent.
+  const bool is_negative =
+      lately.likely == MismatchCause::opposite_sign && std::abs(sent_um) >= negative_um_min;
+  if (is_negative && std::abs(read_um + sent_um) <= noise_um) lately.sure = true;
+  if (since_it_began == 0 && !is_negative) return found;
+  const bool is_constant = lately.sure && lately.likely == MismatchCause::constant;
+  return is_negative || is_constant ? lately : found;
 }
 
 Mismatch SentAndRead::judge_newest(std::size_t pairs, double sent_um,

@@ -50,7 +50,8 @@ class SentAndRead {
   void note(double sent_um, double read_um) noexcept;
   /// The likeliest cause of a pair that does not agree. A factor or constant is taken from that
   /// pair and must hold for the older ones too, allowing for the lag of a moving offset. A constant
-  /// may have begun lately: then for those since a pair last agreed, at least two.
+  /// may have begun lately: then for those since a pair last agreed, at least two. So may an
+  /// opposite sign, which this pair alone shows where it is the exact negative.
   [[nodiscard]] Mismatch judge(double sent_um, double read_um) const noexcept;
 
   void visit_state(StateArchive& archive) { archive(sent_um_, read_um_, count_); }

@@ -186,6 +186,23 @@ TEST_CASE("the usual mistakes of commissioning are told by their names", "[axis]
   CHECK(said(bench) == "changes without us: another writer?");
 }
 
+TEST_CASE("a sign that flips while running is told by its name", "[axis]") {
+  for (const bool moves : {false, true}) {
+    Bench bench;
+    bench.steps(100, 10.0);
+    bench.obeys = false;
+    for (int i = 0; i < 5; ++i) {
+      bench.input.applied_um = -bench.axis().offset_um();
+      bench.step(moves ? 30.0 : 10.0);
+    }
+    REQUIRE(bench.axis().latched());
+    CHECK(said(bench) == "opposite sign: check sign");
+    bench.release();
+    bench.steps(50, 10.0);
+    CHECK(bench.axis().latched());  // it still is opposite
+  }
+}
+
 TEST_CASE("a release does not believe what is still as wrong as it was", "[axis]") {
   Bench bench = lied_to(-30.0, [](double um) { return 2.0 * um; });
   const double sent_um = bench.axis().offset_um();
