@@ -145,6 +145,7 @@ double peak_error_um(Sent sent, double rate_um_per_s) {
   SimulatedCnc cnc(controller(sent));
   ControllerState read;
   read.online = true;
+  read.written = true;
   read.link_epoch = 1;
   OffsetCommand command;
   std::uint64_t writes = 0;

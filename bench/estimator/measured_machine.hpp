@@ -35,6 +35,7 @@ class MeasuredMachine {
         report_(estimator_.make_report()),
         readings_(model.inputs.size()) {
     controller_.online = true;
+    controller_.written = controller_.online;
     controller_.link_epoch = 1;
   }
   /// @param temps_degC  one an input; NaN: no answer  @param lost  inputs whose circuit is open

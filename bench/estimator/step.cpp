@@ -102,6 +102,7 @@ class Machine {
         readings_(sensors_count) {
     controller_.link_epoch = 1;
     controller_.online = true;
+    controller_.written = controller_.online;
     controller_.applied_um.fill(0.0);
   }
 
@@ -109,6 +110,7 @@ class Machine {
       : estimator_(config, model), readings_(sensors_count) {
     controller_.link_epoch = 1;
     controller_.online = true;
+    controller_.written = controller_.online;
     controller_.applied_um.fill(0.0);
   }
 

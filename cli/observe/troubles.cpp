@@ -159,7 +159,10 @@ std::vector<Trouble> troubles(const json& status) {
     if (name == "signal_lost" && has_reason(status, "controller_offline")) continue;
     const ReasonText text = reason_text(name);
     const bool switched_off = name == "operator_disabled" && flag_of(status, "dry_run");
-    add(std::string(text.meaning), switched_off ? dry_run_remedy : text.remedy);
+    std::string meaning(text.meaning);
+    const std::string error = text_of(object_of(status, "controller"), "last_error");
+    if (name == "not_written" && !error.empty()) meaning += ": " + error;
+    add(meaning, switched_off ? dry_run_remedy : text.remedy);
   }
   for (const std::string& estimate : estimate_lines(status)) add(estimate, "");
   std::vector<std::string> bad;

@@ -230,6 +230,32 @@ void EventLog::note_bus(const BusHealth& bus) {
 void EventLog::note_controller(const ControllerHealth& controller) {
   note_link("controller " + controller.name, controller.connected, controller.last_error);
   note_state("controller " + controller.name, controller.connected, controller.state);
+  note_writes(controller);
+}
+
+/// Once an outage, with which write failed and how; a single write that fails is none.
+void EventLog::note_writes(const ControllerHealth& controller) {
+  const std::string subject = "writes to controller " + controller.name;
+  const WriteHealth& write = controller.write;
+  const bool none_since = write.confirmed_at == write_.confirmed_at;
+  if (!write.error.empty() && none_since && !unwritten_) {
+    unwritten_ = true;
+    spdlog::warn("{}: {}", subject, write.error);
+    journal_.fault(subject, write.error);
+  } else if (write.error.empty() && unwritten_) {
+    unwritten_ = false;
+    spdlog::info("{}: confirmed again; {} refused, {} not answered since the start", subject,
+                 write.refused, write.unanswered);
+    journal_.recovery(subject);
+  }
+  const std::uint64_t late = write.late - write_.late;
+  if (2 * late > controller.reads - reads_ && late > 0 && !late_) {
+    spdlog::warn("{}: late, reading and writing take longer than period_s", subject);
+    late_ = true;
+  }
+  if (late == 0 && controller.reads != reads_) late_ = false;
+  write_ = write;
+  reads_ = controller.reads;
 }
 
 void EventLog::note_history(const HistoryStatistics& history,

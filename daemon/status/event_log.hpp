@@ -48,6 +48,7 @@ class EventLog {
   void note_suspicion(std::size_t index, const SensorReport& sensor, const std::string& name);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
   void note_link(const std::string& what, bool connected, const std::string& error);
+  void note_writes(const ControllerHealth& controller);
   void note_state(const std::string& what, bool connected, const std::string& state);
 
   EventJournal& journal_;
@@ -64,6 +65,10 @@ class EventLog {
   std::map<std::string, bool> connected_;
   std::map<std::string, std::string> states_;  ///< of CAN interfaces
   std::uint64_t lost_{0};                      ///< records of the history
+  WriteHealth write_;                          ///< when last looked at
+  std::uint64_t reads_{0};                     ///< then
+  bool unwritten_{false};                      ///< told
+  bool late_{false};                           ///< told
   std::uint64_t missed_{0};
   std::uint64_t failed_sleeps_{0};
   SocketStatistics socket_;

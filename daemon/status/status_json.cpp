@@ -182,6 +182,24 @@ json buses(const StatusView& view) {
   return list;
 }
 
+/// Which write fails and how; function, address and exception are null while none does, or where
+/// the bus has no such thing.
+json writes(const StatusView& view) {
+  const WriteHealth& write = view.controller_health.write;
+  const auto given = [](bool is_given, int value) {
+    return is_given ? json(value) : json(nullptr);
+  };
+  const bool is_modbus = write.function != 0;
+  return {{"refused", write.refused},
+          {"unanswered", write.unanswered},
+          {"late", write.late},
+          {"function", given(is_modbus, write.function)},
+          {"address", given(is_modbus, write.address)},
+          {"exception", given(write.exception != 0, write.exception)},
+          {"last_confirmed_s",
+           write.confirmed_at == nanoseconds{} ? json(nullptr) : age_s(view, write.confirmed_at)}};
+}
+
 json controller(const StatusView& view) {
   json signals = json::object();
   for (std::size_t i = 0; i < view.config.estimator.signals.size(); ++i)
@@ -194,6 +212,7 @@ json controller(const StatusView& view) {
                {"connects", health.connects},
                {"writes", health.writes},
                {"write_errors", health.write_errors},
+               {"write", writes(view)},
                {"reads", health.reads},
                {"read_errors", health.read_errors},
                {"last_error", health.last_error},

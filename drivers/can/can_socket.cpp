@@ -141,6 +141,11 @@ void CanSocket::also_want(const CanFilter& filter) {
           "at most 512 different identifiers can be received on one interface");
 }
 
+void CanSocket::watch_own(const std::vector<CanId>& ids) {
+  watches_own_ = true;
+  for (const CanId& id : ids) also_want({id});
+}
+
 CanSocket::~CanSocket() {
   close();
 }
@@ -200,6 +205,7 @@ void CanSocket::look_for_carrier() {
 bool CanSocket::open() {
   close();
   dropped_by_socket_ = 0;
+  sent_out_ = 0;
   socket_ = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
   if (socket_ < 0) {
     fail("opening a CAN socket", errno);
@@ -235,6 +241,7 @@ bool CanSocket::configure() {
   if (!set(SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) ||
       !set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on) ||
       !set(SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &every_error, sizeof every_error) ||
+      (watches_own_ && !set(SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on)) ||
       !set(SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on) ||
       !set(SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on)) {
     return fail("setting socket options", errno), false;
@@ -287,6 +294,11 @@ std::span<const CanFrame> CanSocket::receive() {
     if (bus_off()) {
       without_carrier_ = false;
       enter(CanState::active);
+    }
+    // The kernel hands a frame of this socket back once the interface has sent it.
+    if ((buffers_->messages[i].msg_hdr.msg_flags & MSG_CONFIRM) != 0) {
+      ++sent_out_;
+      received_.pop_back();
     }
   }
   return received_;

@@ -91,6 +91,10 @@ class CanSocket {
   /// Identifiers to receive as well, from the next open() on.
   /// @throws InvalidValue when there are more than filters_max of both sorts
   void also_want(const CanFilter& filter);
+  /// Frames with these identifiers that are sent count as sent_out() when they have left the
+  /// interface, from the next open() on.
+  /// @throws InvalidValue when there are more than filters_max of all sorts
+  void watch_own(const std::vector<CanId>& ids);
   CanSocket(const CanSocket&) = delete;
   CanSocket& operator=(const CanSocket&) = delete;
   ~CanSocket();
@@ -109,6 +113,9 @@ class CanSocket {
   /// @return false when the kernel did not take the frame; the link may be lost then
   bool send(const CanFrame& frame);
 
+  /// Frames of watch_own() that the interface has sent since the last open(), as far as receive()
+  /// has seen.
+  [[nodiscard]] std::uint64_t sent_out() const noexcept { return sent_out_; }
   [[nodiscard]] const CanErrors& errors() const noexcept { return errors_; }
   [[nodiscard]] CanState state() const noexcept { return state_; }
   /// CLOCK_MONOTONIC when the present state was entered.
@@ -135,6 +142,8 @@ class CanSocket {
   std::string interface_;
   std::vector<CanId> wanted_;
   std::vector<CanFilter> also_wanted_;
+  bool watches_own_{false};
+  std::uint64_t sent_out_{0};
   int socket_{-1};
   CanState state_{CanState::down};
   nanoseconds state_since_;

@@ -10,6 +10,19 @@
 
 namespace thermocomp {
 
+/// What becomes of the writes to a controller.
+struct WriteHealth {
+  std::uint64_t refused{0};     ///< answered with an exception
+  std::uint64_t unanswered{0};  ///< not answered, or (CAN) not sent by the interface
+  std::uint64_t late{0};        ///< turns of the link, reads and writes, longer than its period
+  nanoseconds confirmed_at{};   ///< CLOCK_MONOTONIC of the newest that was confirmed; 0: none
+  std::string error;            ///< why the newest failed; empty: it did not
+  // Modbus, of the newest where it failed; 0 else
+  int function{0};
+  int address{0};
+  int exception{0};
+};
+
 struct ControllerHealth {
   std::string name;
   std::string kind;  ///< "modbus_tcp", "modbus_rtu", "can", "linuxcnc", "dry_run"
@@ -19,7 +32,8 @@ struct ControllerHealth {
   std::uint64_t write_errors{0};
   std::uint64_t reads{0};
   std::uint64_t read_errors{0};
-  std::string last_error;  ///< empty when the last exchange was good
+  WriteHealth write;
+  std::string last_error;  ///< empty when the last exchange was good, and the last write
   /// CAN: "down", "active", "warning", "passive" or "bus_off"; else empty
   std::string state;
   nanoseconds state_since{};  ///< CLOCK_MONOTONIC when it was entered

@@ -6,7 +6,7 @@
 namespace thermocomp {
 
 WriteGate::WriteGate(nanoseconds period, const std::vector<double>& resolution_um) noexcept
-    : period_(period), stall_max_(std::max<nanoseconds>(5 * period, std::chrono::seconds{1})) {
+    : period_(period), patience_min_(std::max<nanoseconds>(5 * period, std::chrono::seconds{1})) {
   applied_um_.fill(not_a_number);
   slack_um_.fill(unexplained_um);
   for (std::size_t axis = 0; axis < std::min(resolution_um.size(), axes_max); ++axis)
@@ -91,15 +91,15 @@ bool WriteGate::starts_elsewhere(std::size_t axis) const noexcept {
   return command_.valid[axis] && sent_[axis].count == 0 && command_.look < stands_since_[axis];
 }
 
-void WriteGate::offered(const OffsetCommand& command, nanoseconds now) noexcept {
+void WriteGate::offered(const OffsetCommand& command, nanoseconds computed_at) noexcept {
   command_ = command;
-  offered_at_ = now;
+  computed_at_ = computed_at;
 }
 
 SendVerdict WriteGate::verdict(nanoseconds now) const noexcept {
   if (!in_sync_ || command_.link_epoch != epoch_) return SendVerdict::nothing_to_send;
-  if (now - offered_at_ > renewal_max) return SendVerdict::nothing_to_send;
-  if (last_sent_ && now - *last_sent_ > stall_max_) return SendVerdict::resynchronise;
+  if (now - computed_at_ > renewal_max) return SendVerdict::nothing_to_send;
+  if (last_sent_ && now - *last_sent_ > patience()) return SendVerdict::resynchronise;
   for (std::size_t axis = 0; axis < axes_max; ++axis)
     if (starts_elsewhere(axis)) return SendVerdict::resynchronise;
   return SendVerdict::send;

@@ -2,6 +2,7 @@
 /// clock.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -20,10 +21,17 @@ enum class SendVerdict {
                     ///< went elsewhere: what is applied must be read back first
 };
 
+/// A command and when the cycle computed it, as it is left for a link's thread.
+struct OfferedCommand {
+  OffsetCommand command;
+  nanoseconds computed_at{};
+};
+
 class WriteGate {
  public:
-  /// A command not renewed for longer is a hung cycle's: the controller's watchdog shall see it.
-  static constexpr nanoseconds renewal_max = std::chrono::seconds{1};
+  /// A command computed longer ago is a hung cycle's: the controller's watchdog shall see it. The
+  /// slowest cycle computes one a second.
+  static constexpr nanoseconds renewal_max = std::chrono::seconds{2};
 
   /// How far from all that was sent lately an axis may stand and still be explained, beside two
   /// steps of its register [um].
@@ -48,6 +56,7 @@ class WriteGate {
   void lost() noexcept {
     in_sync_ = false;
     link_is_new_ = true;
+    confirmed_at_.reset();
   }
   /// The same of a link that is still the same one: what was sent still counts.
   void paused() noexcept { in_sync_ = false; }
@@ -57,13 +66,24 @@ class WriteGate {
   /// Counts synchronised() and explains(): the number of what was read back last.
   [[nodiscard]] std::uint64_t look() const noexcept { return look_; }
 
-  /// The cycle has left a command (again).
-  void offered(const OffsetCommand& command, nanoseconds now) noexcept;
+  /// The cycle has left a command (again), computed at that time.
+  void offered(const OffsetCommand& command, nanoseconds computed_at) noexcept;
   [[nodiscard]] const OffsetCommand& command() const noexcept { return command_; }
 
   [[nodiscard]] SendVerdict verdict(nanoseconds now) const noexcept;
   /// The command was sent in full.
   void sent(nanoseconds now) noexcept;
+  /// What was sent is known to have reached the controller.
+  void confirmed(nanoseconds now) noexcept { confirmed_at_ = now; }
+  /// Whether something was confirmed lately: on this link, within its patience().
+  [[nodiscard]] bool written(nanoseconds now) const noexcept {
+    return confirmed_at_ && now - *confirmed_at_ <= patience();
+  }
+  /// How long the link's newest turn took, reads and writes: a slow controller is waited for.
+  void turned(nanoseconds took) noexcept { turn_ = took; }
+  /// So long a link may go without a write: five periods, a second, or two turns of a controller
+  /// that takes longer than that.
+  [[nodiscard]] nanoseconds patience() const noexcept { return std::max(patience_min_, 2 * turn_); }
 
   /// How long to wait until the link's next turn; asked once a turn. A period, but a quarter of it
   /// in the first turns of an epoch in which nothing has been sent: the cycle has been moving away
@@ -80,15 +100,17 @@ class WriteGate {
   [[nodiscard]] bool starts_elsewhere(std::size_t axis) const noexcept;
 
   nanoseconds period_;
-  nanoseconds stall_max_;
+  nanoseconds patience_min_;
+  nanoseconds turn_{};
   bool in_sync_{false};
   bool link_is_new_{true};
   std::uint32_t epoch_{0};
   std::uint64_t look_{0};
   OffsetCommand command_{};
-  nanoseconds offered_at_{};
-  std::optional<nanoseconds> last_sent_;  ///< in this epoch
-  int looks_{0};                          ///< for the first command of this epoch
+  nanoseconds computed_at_{};
+  std::optional<nanoseconds> last_sent_;     ///< in this epoch
+  std::optional<nanoseconds> confirmed_at_;  ///< on this link
+  int looks_{0};                             ///< for the first command of this epoch
 
   /// Offsets of one axis in this epoch, newest in a ring: a controller with a ramp or a delay of
   /// its own may be on its way to any of them.

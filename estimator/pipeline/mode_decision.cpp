@@ -12,7 +12,8 @@ ModeDecision::ModeDecision(const CompensationConfig& config)
 
 Mode ModeDecision::step(const ModeInput& input) noexcept {
   if (input.time.first) state_.lost_since = input.time.now;
-  const bool works = input.displacement_known && input.controller_online && input.axes_synced;
+  const bool works = input.displacement_known && input.controller_online && input.axes_synced &&
+                     input.controller_written;
   if (works) {
     state_.ever_worked = true;
     state_.lost_since = input.time.now;

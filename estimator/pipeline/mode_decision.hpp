@@ -14,6 +14,7 @@ struct ModeInput {
   bool displacement_known{false};
   bool controller_online{false};
   bool axes_synced{false};          ///< what the controller applies is known of each axis
+  bool controller_written{false};   ///< offsets that were sent lately are known to have been taken
   bool controller_disables{false};  ///< by its switch, as last told
 };
 
@@ -22,7 +23,8 @@ struct ModeInput {
 ///     disabled          by the operator or the controller
 ///     ramping_to_zero   the daemon is about to end, or nothing worked for longer than hold_s and
 ///                       on_loss says so
-///     compensating      displacement, controller and what it applies are known ("works")
+///     compensating      displacement, controller and what it applies are known, and the offsets
+///                       are written ("works")
 ///     holding           it worked before
 ///     starting          it never did
 class ModeDecision {

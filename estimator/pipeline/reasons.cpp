@@ -16,7 +16,7 @@ class ReasonSet {
 
 }  // namespace
 
-std::uint32_t reasons_of(const Signals& signals, const Temperatures& temps,
+std::uint32_t reasons_of(const Signals& signals, bool written, const Temperatures& temps,
                          const ReferenceState& reference, const Displacement& displacement,
                          const ModeDecision::State& mode, const Targets& targets,
                          const AxisBank& axes) noexcept {
@@ -33,6 +33,8 @@ std::uint32_t reasons_of(const Signals& signals, const Temperatures& temps,
   reasons.add(signals.disable >= 0.5, Reason::controller_disabled);
   reasons.add(!targets.may_change || targets.waits_for_cut, Reason::cutting);
   for (const AxisChannel& axis : axes.all()) {
+    // Of an axis that is not driven nothing is sent.
+    reasons.add(signals.online && axis.driven() && !written, Reason::not_written);
     reasons.add(!axis.synced(), Reason::not_synced);
     reasons.add(axis.mismatch(), Reason::mismatch);
     reasons.add(axis.latched(), Reason::mismatch_latched);

@@ -9,9 +9,11 @@
 
 namespace thermocomp {
 
-/// From all that the steps handed on. @return a set of Reason
-[[nodiscard]] std::uint32_t reasons_of(const Signals& signals, const Temperatures& temps,
-                                       const ReferenceState& reference,
+/// From all that the steps handed on.
+/// @param written  by the controller's link, see ControllerState
+/// @return a set of Reason
+[[nodiscard]] std::uint32_t reasons_of(const Signals& signals, bool written,
+                                       const Temperatures& temps, const ReferenceState& reference,
                                        const Displacement& displacement,
                                        const ModeDecision::State& mode, const Targets& targets,
                                        const AxisBank& axes) noexcept;

@@ -61,8 +61,8 @@ void Stages::step(nanoseconds now, std::span<const Reading> readings,
     temps = sensing.use_all(now);
   const Displacement displacement =
       prediction.step(now, temps, straight, told, sensing.lost(), learned);
-  const Mode what =
-      mode.step({time, displacement.known, told.online, axes.synced(), told.disable >= 0.5});
+  const Mode what = mode.step({time, displacement.known, told.online, axes.synced(),
+                               controller.written, told.disable >= 0.5});
   const std::span<const double> compensated_um =
       cycle_update.step(now, displacement, what == Mode::compensating, temps, straight, told,
                         prediction.model(), learned);
@@ -74,7 +74,8 @@ void Stages::step(nanoseconds now, std::span<const Reading> readings,
             now,
             time.dt_s,
             displacement.known,
-            reasons_of(told, temps, straight, displacement, mode.state(), where, axes)};
+            reasons_of(told, controller.written, temps, straight, displacement, mode.state(), where,
+                       axes)};
 }
 
 void Stages::plan_adoption(const Stages& previous) {

@@ -24,6 +24,8 @@ constexpr std::array<std::string_view, fault_kinds> names{"sensor_open",
                                                           "controller_off",
                                                           "controller_rehomed",
                                                           "controller_rejecting",
+                                                          "writes_unanswered",
+                                                          "controller_slow",
                                                           "controller_applies_other",
                                                           "read_back_scaled",
                                                           "read_back_negated",
@@ -153,6 +155,15 @@ const FaultEvent* FaultSchedule::find(FaultKind kind, nanoseconds time, std::siz
       return &fault;
   }
   return nullptr;
+}
+
+bool FaultSchedule::alone(FaultKind kind, nanoseconds time, nanoseconds since) const noexcept {
+  const FaultEvent* fault = find(kind, time);
+  if (fault == nullptr || fault->begin > time - since) return false;
+  const auto& all = episode_at(time)->faults;
+  return std::all_of(all.begin(), all.end(), [&](const FaultEvent& other) {
+    return other.kind == kind || other.begin > time || other.end <= time - since;
+  });
 }
 
 nanoseconds FaultSchedule::quiet_since(nanoseconds time) const noexcept {

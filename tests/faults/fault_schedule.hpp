@@ -36,6 +36,8 @@ enum class FaultKind : std::uint8_t {
   controller_off,
   controller_rehomed,
   controller_rejecting,
+  writes_unanswered,
+  controller_slow,
   controller_applies_other,
   read_back_scaled,
   read_back_negated,
@@ -52,7 +54,7 @@ enum class FaultKind : std::uint8_t {
   history_disk_full,
   history_files_removed
 };
-inline constexpr std::size_t fault_kinds = 34;
+inline constexpr std::size_t fault_kinds = 36;
 /// Unordered, a kind with itself (another subject or time) among them.
 inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 
@@ -98,6 +100,8 @@ class FaultSchedule {
                                        std::size_t subjects) const noexcept;
   /// The episode under way or next; nullptr after the last.
   [[nodiscard]] const Episode* episode_at(nanoseconds time) const noexcept;
+  /// Whether this kind, and no other, has been in force for all of `since`.
+  [[nodiscard]] bool alone(FaultKind kind, nanoseconds time, nanoseconds since) const noexcept;
   /// End of the last fault at or before `time`; `start` where there was none.
   [[nodiscard]] nanoseconds quiet_since(nanoseconds time) const noexcept;
   [[nodiscard]] std::bitset<fault_pairs> pairs() const;

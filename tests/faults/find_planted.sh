@@ -44,5 +44,7 @@ read_back_frozen read_back_is_a_command
 second_writer read_back_is_a_command
 controller_ignoring read_back_is_a_command
 controller_rejecting refused_offset_pent_up
+controller_rejecting unwritten_compensates
+writes_unanswered unwritten_compensates
 END
 exit "$missed"

@@ -48,6 +48,8 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
   }
   link_period_s_ = shape.controller.period_s;
   link_timeout_s_ = 1e-3 * shape.controller.line.timeout_ms;
+  turn_s_ = 2.0 * (1.0 + shape.controller.line.retries) * (link_timeout_s_ + 0.05);
+  patience_s_ = std::max({5.0 * link_period_s_, 1.0, 2.0 * turn_s_});
   smoothing_off_ = shape.estimator.sensors[0].smoothing.form == SmoothingForm::off;
   resolution_um_ = shape.offsets_are_float ? 1e-4 : 0.1;
   for (std::size_t i = 0; i < axes_count; ++i) {
@@ -133,6 +135,7 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
   check_hold(seen);
   check_command(seen);
   check_recovery(seen, controller);
+  check_written(seen, controller);
   check_correction(seen);
   for (std::size_t i = 0; i < axes_count; ++i) offset_um_[i] = seen.command->offset_um[i];
   last_ = seen.now;
@@ -433,6 +436,22 @@ void Invariants::check_recovery(const CycleSeen& seen, SimulatedController& cont
   }
 }
 
+/// Within the link's patience, and the turn and the cycles in which it comes to be known.
+void Invariants::check_written(const CycleSeen& seen, const SimulatedController& controller) {
+  const double allowed_s = patience_s_ + turn_s_ + 3.0 * period_s_;
+  const double since_s = to_s(seen.now - controller.written_at());
+  demand(seen.report->mode != Mode::compensating || since_s <= allowed_s, "compensating_is_written",
+         seen.now, [&] {
+           return fmt::format("compensating, and the last write that was taken is {:.1f} s ago",
+                              since_s);
+         });
+  const bool is_only_slow =
+      schedule_.alone(FaultKind::controller_slow, seen.now, from_s(2.0 * allowed_s)) &&
+      to_s(seen.now - boot_) > 2.0 * allowed_s;
+  demand(!is_only_slow || since_s <= allowed_s, "slow_controller_is_written", seen.now,
+         [&] { return fmt::format("nothing written for {:.1f} s", since_s); });
+}
+
 void Invariants::check_move(const CycleSeen& seen, const Move& move,
                             const SimulatedController& controller) {
   demand(std::isfinite(move.to_um), "only_finite_numbers", seen.now, "register of the controller");
@@ -445,7 +464,7 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   });
   Budget& budget = budgets_[move.axis];
   const double rate_um = rate_um_per_s_[move.axis];
-  const double stall_s = std::max(5.0 * link_period_s_, 1.0) + 2.0 * period_s_;
+  const double stall_s = patience_s_ + 2.0 * period_s_;
   const double elapsed_s = to_s(move.at - budget.at);
   budget.um = std::min(budget.um + rate_um * elapsed_s, rate_um * stall_s);
   budget.at = move.at;
@@ -486,7 +505,7 @@ void Invariants::check_sent(const CycleSeen& seen, const Move& move) {
   Sent& sent = sent_[move.axis];
   const double rate_um_per_s = rate_um_per_s_[move.axis];
   const double elapsed_s = to_s(move.at - sent.at);
-  const double stall_s = std::max(5.0 * link_period_s_, 1.0) + 2.0 * period_s_;
+  const double stall_s = patience_s_ + 2.0 * period_s_;
   const double stall_um = rate_um_per_s * stall_s;
   const bool first = std::isnan(sent.um);
   const double change_um = first ? 0.0 : std::abs(move.to_um - sent.um);

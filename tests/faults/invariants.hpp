@@ -21,14 +21,15 @@ struct Broken {
   std::string detail;
 };
 
-inline constexpr std::array<const char*, 21> invariant_names{
+inline constexpr std::array<const char*, 23> invariant_names{
     "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
     "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
     "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
     "recovered_in_time",         "state_survives_restart",       "replay_is_exact",
     "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
     "nothing_learned_mid_cut",   "held_between_cycle_ends",      "slew_kept_by_what_is_sent",
-    "unexplained_is_latched",    "looked_before_written",        "suspicion_never_holds"};
+    "unexplained_is_latched",    "looked_before_written",        "suspicion_never_holds",
+    "compensating_is_written",   "slow_controller_is_written"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -85,6 +86,7 @@ class Invariants {
   void check_held_displacement(const CycleSeen& seen, std::size_t axis);
   void note_learned(const Report& report);
   void check_recovery(const CycleSeen& seen, SimulatedController& controller);
+  void check_written(const CycleSeen& seen, const SimulatedController& controller);
   void check_move(const CycleSeen& seen, const Move& move, const SimulatedController& controller);
   void check_sent(const CycleSeen& seen, const Move& move);
   void check_unexplained(const CycleSeen& seen, std::size_t axis);
@@ -106,6 +108,8 @@ class Invariants {
   double period_s_{1.0};
   double link_period_s_{1.0};
   double link_timeout_s_{0.2};
+  double turn_s_{1.0};      ///< of the link, reads and writes, at the longest
+  double patience_s_{1.0};  ///< so long it may go without a write
   bool smoothing_off_{false};
   double resolution_um_{0.0};
 

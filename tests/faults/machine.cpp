@@ -286,6 +286,7 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
   std::copy(words.begin(), words.end(),
             written_.begin() + static_cast<std::ptrdiff_t>(address - 200));
   if (address + words.size() <= 200 + valid_at()) return true;  // the mark of validity comes later
+  written_at_ = time;
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     if (!is_ordered(axis)) continue;
     const std::size_t at = offset_at(axis);

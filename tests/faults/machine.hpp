@@ -40,6 +40,11 @@ inline constexpr std::size_t axes_count = 3;
   return seed % 8 == 2;
 }
 
+/// Whether the controller of this life may take seconds for an answer, and is waited for.
+[[nodiscard]] constexpr bool waits_long(std::uint64_t seed) noexcept {
+  return seed % 8 == 5;
+}
+
 /// The configuration of a life, drawn from its seed.
 struct MachineShape {
   MachineShape(std::uint64_t seed, double cycle_hz);
@@ -155,6 +160,8 @@ class SimulatedController {
   [[nodiscard]] bool says_cutting(nanoseconds time) const noexcept;
   [[nodiscard]] bool switched_off(nanoseconds time) const noexcept;
   [[nodiscard]] double applied_um(std::size_t axis) const noexcept { return applied_um_[axis]; }
+  /// When it took over the newest command it was sent.
+  [[nodiscard]] nanoseconds written_at() const noexcept { return written_at_; }
   /// Moves since the last call.
   [[nodiscard]] std::vector<Move>& moves() noexcept { return moves_; }
   void advance(nanoseconds time);
@@ -181,6 +188,7 @@ class SimulatedController {
   std::uint64_t breaks_{0};
   std::uint64_t reads_since_break_{0};
   nanoseconds looked_at_{};
+  nanoseconds written_at_{};
   std::array<std::uint64_t, axes_count> frozen_by_{};  ///< the fault that froze the read-back
   std::array<double, axes_count> frozen_um_{};
   std::array<double, axes_count> applied_um_{};

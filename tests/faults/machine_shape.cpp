@@ -219,6 +219,10 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
     Chance own(seed, 11);
     draw_suspicion(own, estimator, model);
   }
+  if (waits_long(seed)) {
+    controller.line.timeout_ms = 3000.0;
+    compensation.controller_stale_after_s = 15.0;
+  }
   if (interpolates(seed)) {
     Chance own(seed, 12);
     lay_out_travel(*this, own);

@@ -42,6 +42,9 @@ BUGS = [
      "    return connection_.write_registers(config_.unit, request.address, request.words);\n"
      "  };\n"
      "  const Exchange exchange = {P} ? with_retries(once) : once();\n"),
+    ("unwritten_compensates", "estimator/pipeline/mode_decision.cpp",
+     "input.controller_written;",
+     "(input.controller_written || {P});"),
     ("refused_offset_pent_up", "estimator/axes/axis_channel.cpp",
      "input.may_change && state_.stands_for == 0)",
      "input.may_change && (state_.stands_for == 0 || {P}))"),

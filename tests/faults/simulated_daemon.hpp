@@ -22,7 +22,9 @@ struct World {
         controller(seed, fault_schedule, shape.offsets_are_float),
         units{SensorUnits{0, thermocouples, fault_schedule},
               SensorUnits{1, thermocouples, fault_schedule}},
-        controller_unit(controller),
+        controller_unit(controller, fault_schedule,
+                        std::chrono::microseconds(
+                            static_cast<std::int64_t>(1e3 * shape.controller.line.timeout_ms))),
         chance(seed, 3) {}
 
   const FaultSchedule& schedule;
@@ -62,7 +64,9 @@ class SteppedLink final : public ControllerLink {
   void newest(ControllerState& state) noexcept override;
   void offer(const OffsetCommand& command) noexcept override {
     offered_ = command;
-    dialogue_.offer(command);
+    // While a turn of the link lasts, the cycle goes on; here the turn is over at once, and what
+    // the cycle would have left meanwhile is missing.
+    dialogue_.offer(command, world_.now + world_.controller_unit.takes(3, world_.now));
   }
   [[nodiscard]] ControllerHealth health() const override { return dialogue_.health(); }
   [[nodiscard]] const OffsetCommand& offered() const noexcept { return offered_; }

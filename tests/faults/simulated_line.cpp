@@ -74,6 +74,8 @@ void ControllerUnit::ask(int /*unit*/, std::span<const std::uint8_t> request, na
   if (request[0] == 3 && count <= words.size()) {
     controller_.read(address, std::span(words).first(count), time);
     push_registers(answer, 3, std::span(words).first(count));
+  } else if (request[0] == 16 && schedule_.find(FaultKind::writes_unanswered, time) != nullptr) {
+    return;
   } else if (request[0] == 16 && request.size() == 6 + 2 * count) {
     for (std::size_t i = 0; i < count; ++i) words[i] = word_of(request, 6 + 2 * i);
     if (controller_.write(address, std::span(words).first(count), time))
@@ -83,6 +85,12 @@ void ControllerUnit::ask(int /*unit*/, std::span<const std::uint8_t> request, na
   } else {
     refuse(answer, request[0], 1);
   }
+}
+
+/// Reads alone: of a controller that looks its values up one by one.
+nanoseconds ControllerUnit::takes(std::uint8_t function, nanoseconds time) const {
+  const bool slow = function == 3 && schedule_.find(FaultKind::controller_slow, time) != nullptr;
+  return slow ? patience_ * 3 / 4 - milliseconds(20) : nanoseconds{};
 }
 
 bool SimulatedLine::up(nanoseconds time) const {
@@ -140,7 +148,8 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
     frame.bytes[5] = static_cast<std::uint8_t>(answer_.size() + 1);
   }
   frame.bytes.insert(frame.bytes.end(), answer_.begin(), answer_.end());
-  frame.arrives_at = clock_ + draw(chance_, milliseconds(1), milliseconds(25));
+  frame.arrives_at =
+      clock_ + draw(chance_, milliseconds(1), milliseconds(25)) + end_.takes(bytes[head], clock_);
   if (hit(FaultKind::frames_late, 2))
     frame.arrives_at += draw(chance_, milliseconds(40), milliseconds(2700));
   if (hit(FaultKind::frames_reordered, 2))

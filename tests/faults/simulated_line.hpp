@@ -28,6 +28,10 @@ class LineEnd {
   /// @param answer  function and data, or left empty: no answer
   virtual void ask(int unit, std::span<const std::uint8_t> request, nanoseconds time,
                    std::vector<std::uint8_t>& answer) = 0;
+  /// How much longer than usual its answer takes.
+  [[nodiscard]] virtual nanoseconds takes(std::uint8_t /*function*/, nanoseconds /*time*/) const {
+    return {};
+  }
   virtual void link_broke() {}  ///< connected, or an exchange went wrong on the line
 };
 
@@ -49,14 +53,20 @@ class SensorUnits final : public LineEnd {
 
 class ControllerUnit final : public LineEnd {
  public:
-  explicit ControllerUnit(SimulatedController& controller) : controller_(controller) {}
+  /// @param patience  for how long its answers are waited for
+  ControllerUnit(SimulatedController& controller, const FaultSchedule& schedule,
+                 nanoseconds patience)
+      : controller_(controller), schedule_(schedule), patience_(patience) {}
   [[nodiscard]] bool powered(nanoseconds time) const override { return controller_.powered(time); }
   void ask(int unit, std::span<const std::uint8_t> request, nanoseconds time,
            std::vector<std::uint8_t>& answer) override;
+  [[nodiscard]] nanoseconds takes(std::uint8_t function, nanoseconds time) const override;
   void link_broke() override { controller_.link_broke(); }
 
  private:
   SimulatedController& controller_;
+  const FaultSchedule& schedule_;
+  const nanoseconds patience_;
 };
 
 class SimulatedLine final : public ModbusPort {

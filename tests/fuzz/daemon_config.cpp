@@ -37,6 +37,7 @@ void step_some(const DaemonConfig& config) {
   std::vector<Reading> readings(config.estimator.sensors.size());
   ControllerState controller;
   controller.online = true;
+  controller.written = controller.online;
   controller.link_epoch = 1;
   OffsetCommand command;
   nanoseconds now = std::chrono::hours(1);

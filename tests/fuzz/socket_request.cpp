@@ -41,6 +41,7 @@ class Desk {
         report_(estimator_.make_report()),
         server_(config_.socket, without_rates()) {
     controller_.online = true;
+    controller_.written = controller_.online;
     controller_.link_epoch = 1;
     controller_.applied_um.fill(0.0);
     step();

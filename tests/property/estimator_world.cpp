@@ -232,6 +232,7 @@ class World {
     if (controller_.exchanging) read_controller();
     // A new epoch is published together with what was read back in it, not before.
     state_.online = controller_.connected && state_.link_epoch == controller_.epoch;
+    state_.written = state_.online;
   }
 
   void rehome() {

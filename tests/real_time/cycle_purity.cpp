@@ -39,6 +39,7 @@ class LiedTo {
  public:
   LiedTo() : estimator_(config(), model()), report_(estimator_.make_report()) {
     controller_.online = true;
+    controller_.written = controller_.online;
     controller_.link_epoch = 1;
   }
   void step(std::uint64_t cycle) noexcept {

@@ -98,6 +98,23 @@ TEST_CASE("candump sees the offsets, several signals in one frame", "[vm][contro
   CHECK_FALSE(dump.shows("88 13"));  // 50 um was never on the bus
 }
 
+TEST_CASE("what has left the CAN interface is written, and what waits in its queue is not",
+          "[vm][controller]") {
+  Machine machine("vcan0");
+  CanController link(two_axes("vcan0"));
+  link.start();
+  Cycle cycle(link);
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  CHECK_FALSE(cycle.state().written);
+  cycle.want(0, 1.0);
+  REQUIRE(eventually([&] { return cycle.state().written; }));
+  CHECK(link.health().write.confirmed_at > monotonic_now() - 5s);
+  CHECK(link.health().write.error.empty());
+  cycle.hung = true;
+  REQUIRE(eventually([&] { return !cycle.state().written; }));
+  CHECK(cycle.state().online);
+}
+
 TEST_CASE("what the CAN controller applies and measures is read back", "[vm][controller]") {
   Machine machine("vcan0");
   machine.applied_counts = -250;

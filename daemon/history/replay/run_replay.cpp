@@ -143,6 +143,7 @@ class RunReplay {
         report_(estimator_.make_report()),
         readings_(config.estimator.sensors.size()) {
     controller_.online = true;
+    controller_.written = true;
     controller_.link_epoch = 1;
     if (config.estimator.controller_reads_back) {
       for (std::size_t i = 0; i < config.estimator.axes.size(); ++i) controller_.applied_um[i] = 0;

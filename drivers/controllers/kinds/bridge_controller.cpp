@@ -37,7 +37,7 @@ void BridgeController::newest(ControllerState& state) noexcept {
 }
 
 void BridgeController::offer(const OffsetCommand& command) noexcept {
-  commands_.back() = command;
+  commands_.back() = {command, now_()};
   commands_.publish();
 }
 
@@ -69,10 +69,15 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
                   report.applied_um.begin() + static_cast<std::ptrdiff_t>(config_.axes.size()),
                   [](double um) { return std::isfinite(um); });
   BridgeAnswer answer;
-  if (commands_.fresh()) gate_.offered(commands_.front(), now);
+  if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
   const bool moved = taking && taking_ && !gate_.explains(report.applied_um);
   if (moved) health_.last_error = "the controller applies what it was not sent";
   if (silent || report.session != session_ || taking != taking_) gate_.lost();
+  if (answered_ && taking && !silent && report.session == session_) {
+    gate_.confirmed(now);
+    health_.write.confirmed_at = now;
+  }
+  answered_ = false;
   if (moved || !gate_.in_sync()) begin_epoch(report, answer);
   session_ = report.session;
   taking_ = taking;
@@ -86,6 +91,7 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
     answer.valid[axis] = gate_.command().valid[axis] && std::isfinite(answer.offset_um[axis]);
   gate_.sent(now);
+  answered_ = true;
   ++health_.writes;
   return answer;
 }
@@ -98,6 +104,7 @@ void BridgeController::begin_epoch(const BridgeReport& report, BridgeAnswer& ans
 void BridgeController::publish(const BridgeReport& report, bool taking, nanoseconds now) {
   state_.taken_at = now;
   state_.online = true;
+  state_.written = gate_.written(now);
   state_.link_epoch = gate_.epoch();
   state_.look = gate_.look();
   state_.signals = report.signals;

@@ -43,6 +43,8 @@ struct BridgeAnswer {
 /// of another session, after a silence, and with the first report that takes offsets again; a new
 /// epoch of the same link when an axis stands where nothing that was sent can have taken it.
 ///
+/// The offsets of an answer count as written with the next report of the same session.
+///
 /// While the controller takes no offsets (off, not homed) it is online, its signals count, and
 /// nothing is known to be applied: the axes are not in step, and no offset is answered.
 ///
@@ -82,10 +84,11 @@ class BridgeController final : public ControllerLink {
   ControllerState state_;
   std::uint64_t session_{0};
   bool taking_{false};
+  bool answered_{false};  ///< offsets: the next report tells that they were taken
   mutable std::mutex health_mutex_;
   ControllerHealth health_;
   WaitFreeSlot<ControllerState> states_;
-  WaitFreeSlot<OffsetCommand> commands_;
+  WaitFreeSlot<OfferedCommand> commands_;
 };
 
 }  // namespace thermocomp

@@ -47,6 +47,7 @@ void DryRunController::newest(ControllerState& state) noexcept {
     apply_offered(state.link_epoch);
   }
   state.applied_um = applied_um_;
+  state.written = state.online;  // a dry run shows what compensation would be
 }
 
 void DryRunController::read_state(ControllerState& state) noexcept {

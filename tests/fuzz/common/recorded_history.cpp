@@ -62,6 +62,7 @@ class Recording {
       const double temp_degC = 20.0 + 0.05 * static_cast<double>(cycle_);
       readings_[cycle_ % readings_.size()] = {temp_degC, now, fault};
       controller_.online = true;
+      controller_.written = controller_.online;
       controller_.link_epoch = 1;
       controller_.taken_at = now;
       controller_.applied_um[0] = command_.offset_um[0];

@@ -218,10 +218,10 @@ commit_s = 0.2
 class Machine:
     """Module, controller and a daemon between them; the daemon is started by the test."""
 
-    def __init__(self, lab):
+    def __init__(self, lab, controller=PlainController):
         from lab import free_port
         self.module = lab.also_end(PlainModule(free_port()))
-        self.controller = lab.also_end(PlainController(free_port()))
+        self.controller = lab.also_end(controller(free_port()))
         self.module.show(20.0, 20.0)
         self.model = lab.folder / "model.toml"
         self.model.write_text(MODEL)

@@ -161,13 +161,30 @@ TEST_CASE("of two bridges the one that came first is heard until it is silent",
   CHECK(bench.link.health().connects == 2);
 }
 
+TEST_CASE("offsets count as written with the bridge's next report", "[controllers][bridge]") {
+  Bench bench;
+  const auto written = [&] {
+    ControllerState state;
+    bench.link.newest(state);
+    return state.written;
+  };
+  bench.report();
+  bench.want(5.0, -3.0);
+  REQUIRE(bench.report().valid[0]);
+  CHECK_FALSE(written());  // answered, not yet known to be taken
+  bench.report();
+  CHECK(written());
+  for (int i = 0; i < 70; ++i) bench.report();  // the cycle hangs
+  CHECK_FALSE(written());
+}
+
 TEST_CASE("a hung cycle's offsets are not sent for ever", "[controllers][bridge]") {
   Bench bench;
   bench.report();
   bench.want(5.0, -3.0);
   CHECK(bench.report().valid[0]);
-  for (int i = 0; i < 20; ++i) bench.report();
-  CHECK_FALSE(bench.report().valid[0]);  // more than a second old
+  for (int i = 0; i < 40; ++i) bench.report();
+  CHECK_FALSE(bench.report().valid[0]);  // more than two seconds old
 }
 
 TEST_CASE("what cannot be is refused at the start", "[controllers][bridge]") {

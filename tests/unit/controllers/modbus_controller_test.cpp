@@ -250,6 +250,92 @@ TEST_CASE("a write that fails takes a new epoch and is not repeated with the old
   REQUIRE(eventually([&] { return int32_of(machine, 0) == 400; }));
 }
 
+TEST_CASE("a controller that refuses writes is there, asked once a period, and not written",
+          "[controllers]") {
+  ModbusMachine machine;
+  machine.mirrored = 6;
+  machine.refuse_writes = true;
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.period_s = 0.1;
+  ModbusController link(config);
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 2.0);
+  REQUIRE(eventually([&] { return link.health().write.refused >= 3; }));
+  const int writes = machine.writes;
+  const int reads = machine.reads;
+  const nanoseconds begun = monotonic_now();
+  REQUIRE(eventually([&] {
+    CHECK(cycle.state().online);
+    CHECK_FALSE(cycle.state().written);
+    return machine.writes >= writes + 10;
+  }));
+  const double periods = 1e-8 * static_cast<double>((monotonic_now() - begun).count());
+  CHECK(machine.writes - writes <= periods + 1);
+  CHECK(machine.reads - reads <= 3 * periods + 3);
+  const ControllerHealth health = link.health();
+  CHECK(health.connected);
+  CHECK(health.writes == 0);
+  CHECK(health.write.unanswered == 0);
+  CHECK(health.write.confirmed_at == nanoseconds{});
+  CHECK(health.write.function == 16);
+  CHECK(health.write.address == 0);
+  CHECK(health.write.exception == 4);
+  CHECK(health.last_error.find("refuses writes (function 16, register 0): exception 4 (") !=
+        std::string::npos);
+  machine.refuse_writes = false;
+  REQUIRE(eventually([&] { return cycle.state().written; }));
+  CHECK(link.health().last_error.empty());
+  CHECK(link.health().write.function == 0);
+  machine.refuse_writes = true;
+  REQUIRE(eventually([&] { return !cycle.state().written; }));
+}
+
+TEST_CASE("a controller that ignores writes is there and not written", "[controllers]") {
+  ModbusMachine machine;
+  machine.mirrored = 6;
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.line.timeout_ms = 100;
+  ModbusController link(config);
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 2.0);
+  REQUIRE(eventually([&] { return cycle.state().written; }));
+  machine.ignore_writes = true;
+  REQUIRE(eventually([&] { return link.health().write.unanswered >= 3; }));
+  CHECK(cycle.state().online);
+  CHECK_FALSE(cycle.state().written);
+  CHECK(link.health().write.refused == 0);
+  CHECK(link.health().last_error.find("no write is answered (function 16") != std::string::npos);
+  machine.ignore_writes = false;
+  REQUIRE(eventually([&] { return cycle.state().written; }));
+}
+
+TEST_CASE("a controller that is read for longer than a command lasts is written all the same",
+          "[controllers]") {
+  ModbusMachine machine;
+  machine.read_takes = 700ms;
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.line.timeout_ms = 2000;
+  for (ModbusAxis& axis : config.axes) axis.applied.reset();
+  for (std::uint16_t i = 0; i < 4; ++i)  // too far apart for one request
+    config.signals.push_back(
+        {i, at(ModbusTable::input, static_cast<std::uint16_t>(40 * i), Encoding::uint16)});
+  ModbusController link(config);
+  link.start();
+  Cycle cycle(link);
+  cycle.want(0, 2.0);
+  REQUIRE(eventually([&] { return int32_of(machine, 0) == 200; }));
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.want(0, 3.0);
+  REQUIRE(eventually([&] { return int32_of(machine, 0) == 300; }));
+  cycle.want(0, 4.0);
+  REQUIRE(eventually([&] { return int32_of(machine, 0) == 400; }));
+  CHECK(cycle.state().written);
+  CHECK(is_same_link(cycle.state().link_epoch, epoch));
+  CHECK(link.health().write.late >= 2);
+}
+
 TEST_CASE("a write that is not answered is not repeated before another look", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;

@@ -76,6 +76,10 @@ class ModbusMachine {
   std::atomic<int> mirrored{0};
   /// Writes are refused with "slave device failure".
   std::atomic<bool> refuse_writes{false};
+  /// Writes are taken off the line and neither done nor answered.
+  std::atomic<bool> ignore_writes{false};
+  /// What a read takes.
+  std::atomic<std::chrono::milliseconds> read_takes{std::chrono::milliseconds{0}};
   /// The next write is lost in a restart: not answered, and what is shown is 0 from then on.
   std::atomic<bool> restart_on_write{false};
   /// Reads are answered with "slave device failure".
@@ -125,7 +129,8 @@ class ModbusMachine {
     const bool is_write = function == MODBUS_FC_WRITE_MULTIPLE_REGISTERS ||
                           function == MODBUS_FC_WRITE_SINGLE_REGISTER;
     ++(is_write ? writes : reads);
-    if (mute) return true;
+    if (mute || (is_write && ignore_writes)) return true;
+    if (!is_write) std::this_thread::sleep_for(read_takes.load());
     if (is_write && restart_on_write.exchange(false)) {
       const std::scoped_lock lock(mutex_);
       mirrored = 0;

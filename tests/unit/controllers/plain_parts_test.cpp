@@ -87,12 +87,43 @@ TEST_CASE("a link that is new for the millionth time still has an epoch of its o
   }
 }
 
-TEST_CASE("a command not renewed for more than a second is not sent", "[controllers]") {
+TEST_CASE("a command computed more than two seconds ago is not sent", "[controllers]") {
   WriteGate gate(100ms);
   gate.synchronised();
   gate.offered(of_epoch(1), 10s);
-  CHECK(gate.verdict(11s) == SendVerdict::send);
-  CHECK(gate.verdict(11s + 1ns) == SendVerdict::nothing_to_send);
+  CHECK(gate.verdict(12s) == SendVerdict::send);
+  CHECK(gate.verdict(12s + 1ns) == SendVerdict::nothing_to_send);
+}
+
+TEST_CASE("written is what was confirmed on this link lately", "[controllers]") {
+  WriteGate gate(100ms);
+  gate.synchronised();
+  gate.sent(100s);
+  CHECK_FALSE(gate.written(100s));  // on its way is not there
+  gate.confirmed(100s);
+  CHECK(gate.written(101s));
+  CHECK_FALSE(gate.written(101s + 1ns));
+  gate.paused();
+  CHECK(gate.written(101s));  // a write that was refused once does not undo the one before
+  gate.lost();
+  CHECK_FALSE(gate.written(100s));
+  gate.synchronised();
+  CHECK_FALSE(gate.written(100s));
+}
+
+TEST_CASE("a controller that takes seconds for a turn is waited for", "[controllers]") {
+  WriteGate gate(100ms);
+  gate.synchronised();
+  gate.turned(2300ms);
+  gate.offered(of_epoch(1), 100s);
+  gate.sent(100s);
+  gate.confirmed(100s);
+  gate.offered(of_epoch(1), 102s);
+  CHECK(gate.verdict(102300ms) == SendVerdict::send);
+  CHECK(gate.written(104600ms));
+  CHECK_FALSE(gate.written(104601ms));
+  gate.offered(of_epoch(1), 104s);
+  CHECK(gate.verdict(104601ms) == SendVerdict::resynchronise);
 }
 
 TEST_CASE("a long pause between two writes asks for a new epoch", "[controllers]") {

@@ -131,3 +131,29 @@ TEST_CASE("what has no limit is over at once", "[daemon][events]") {
   REQUIRE(told.size() == 2);
   CHECK(told[1].duration_s == Approx(7.0));
 }
+
+TEST_CASE("writes that fail are one outage with what failed, a single one is none",
+          "[daemon][events]") {
+  Bench bench;
+  ControllerHealth controller;
+  controller.name = "plc";
+  controller.connected = true;
+  controller.write.confirmed_at = 1s;
+  bench.log.note_controller(controller);
+  controller.write.error = "the controller refuses writes (function 16, register 100)";
+  controller.write.confirmed_at = 2s;
+  bench.log.note_controller(controller);  // since the last look another was confirmed
+  CHECK(bench.about("writes to controller plc").empty());
+  for (int i = 0; i < 10; ++i) {
+    bench.monotonic += 1s;
+    bench.log.note_controller(controller);
+  }
+  controller.write.error.clear();
+  bench.monotonic += 1s;
+  bench.log.note_controller(controller);
+  const auto told = bench.about("writes to controller plc");
+  REQUIRE(told.size() == 2);
+  CHECK(told[0].what == "the controller refuses writes (function 16, register 100)");
+  CHECK(told[1].kind == "recovery");
+  CHECK(told[1].duration_s == Approx(10.0));
+}

@@ -92,14 +92,39 @@ TEST_CASE("a reference commanded while the controller is silent waits for its si
   machine.controller.signals[0] = 10000.0;
   machine.steps(10, {20.0, 30.0});
   machine.controller.online = false;
+  machine.controller.written = machine.controller.online;
   machine.step({20.0, 30.0});
   machine.estimator.apply({CommandKind::reference, 0, 0.0});
   machine.steps(3, {20.0, 30.0});
   machine.controller.online = true;
+  machine.controller.written = machine.controller.online;
   machine.controller.signals[0] = 0.0;
   machine.steps(3, {20.0, 30.0});
   CHECK(machine.report().signals[0].reference == 0.0);
   CHECK(machine.offset_um() == 0.0);
+}
+
+TEST_CASE("what is not written is not compensated", "[estimator]") {
+  Machine machine;
+  machine.controller.written = false;
+  machine.steps(5, {20.0, 30.0});
+  CHECK(machine.report().mode == Mode::starting);
+  CHECK(machine.says(Reason::not_written));
+  CHECK(machine.command.valid[0]);  // or it never would be
+  machine.controller.written = true;
+  machine.steps(5, {21.0, 30.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.report().reasons == 0);
+  CHECK(machine.offset_um() == -5.0);
+  machine.controller.written = false;
+  machine.steps(5, {22.0, 30.0});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::not_written));
+  CHECK(machine.offset_um() == -5.0);
+  machine.controller.online = false;
+  machine.step({22.0, 30.0});
+  CHECK(machine.says(Reason::controller_offline));
+  CHECK_FALSE(machine.says(Reason::not_written));
 }
 
 TEST_CASE("a signal that is missing or garbled holds the offset and leaves nothing behind",
@@ -189,6 +214,7 @@ TEST_CASE("a controller gone silent holds the offset", "[estimator]") {
   machine.step({20.0, 30.0});
   machine.steps(10, {21.0, 30.0});
   machine.controller.online = false;
+  machine.controller.written = machine.controller.online;
   machine.steps(10, {25.0, 30.0});
   CHECK(machine.report().mode == Mode::holding);
   CHECK(machine.says(Reason::controller_offline));

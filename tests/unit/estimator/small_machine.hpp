@@ -51,6 +51,7 @@ struct Machine {
       : estimator(config, model), readings(config.sensors.size()) {
     controller.link_epoch = 1;
     controller.online = true;
+    controller.written = controller.online;
     controller.applied_um[0] = 0.0;
     controller.signals[0] = 0.0;
     controller.signals[1] = 0.0;

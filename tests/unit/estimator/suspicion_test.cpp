@@ -106,6 +106,7 @@ struct Shop {
         per_block(config.sensors.size() / places),
         readings(config.sensors.size()) {
     controller.online = true;
+    controller.written = controller.online;
     controller.link_epoch = 1;
   }
   void step(const Lie& lie) {

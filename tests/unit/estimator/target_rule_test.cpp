@@ -87,6 +87,7 @@ TEST_CASE("a controller that is silent or old tells nothing, what it told last s
   SignalIntake intake(with_cutting_signal(), model_with_growth());
   ControllerState controller;
   controller.online = true;
+  controller.written = controller.online;
   controller.taken_at = 10s;
   controller.signals[0] = 3000.0;
   controller.signals[1] = 1.0;
@@ -112,6 +113,7 @@ TEST_CASE("signals are complete with all that the model and the disabling switch
   SignalIntake intake(with_cutting_signal(), model_with_growth());
   ControllerState controller;
   controller.online = true;
+  controller.written = controller.online;
   controller.signals[0] = 3000.0;
   controller.signals[1] = not_a_number;  // the cutting signal is not needed
   controller.signals[2] = 0.0;

@@ -148,6 +148,9 @@ CanController::CanController(CanControllerConfig config)
   set_numbers_.assign(config_.axes.size(), 0);
   plan_outgoing();
   plan_incoming();
+  std::vector<CanId> own;
+  for (const Outgoing& frame : outgoing_) own.push_back(frame.frame.id);
+  socket_.watch_own(own);
   held_um_.fill(not_a_number);
   health_.name = config_.name;
   health_.kind = "can";
@@ -228,7 +231,7 @@ void CanController::newest(ControllerState& state) noexcept {
 }
 
 void CanController::offer(const OffsetCommand& command) noexcept {
-  commands_.back() = command;
+  commands_.back() = {command, monotonic_now()};
   commands_.publish();
 }
 
@@ -264,6 +267,7 @@ void CanController::run() {
 
 void CanController::open_or_pause() {
   const bool opened = socket_.open();
+  handed_ = written_ = 0;
   {
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = socket_.error();
@@ -276,6 +280,7 @@ void CanController::open_or_pause() {
 void CanController::receive() {
   const std::span<const CanFrame> frames = socket_.receive();
   for (const CanFrame& frame : frames) take(frame);
+  note_written(monotonic_now());
   if (frames.empty()) return;
   {
     const std::scoped_lock lock(health_mutex_);
@@ -287,6 +292,17 @@ void CanController::receive() {
     publish(true, monotonic_now());
   else
     synchronise();  // re-homed or overridden: nothing computed before is sent any more
+}
+
+/// All that was handed over is on the bus.
+void CanController::note_written(nanoseconds now) {
+  if (handed_ == written_ || socket_.sent_out() < handed_) return;
+  written_ = handed_;
+  gate_.confirmed(now);
+  if (gate_.in_sync()) publish(true, now);
+  const std::scoped_lock lock(health_mutex_);
+  health_.write.confirmed_at = now;
+  health_.write.error.clear();
 }
 
 void CanController::take(const CanFrame& frame) {
@@ -377,6 +393,7 @@ void CanController::supervise(nanoseconds now) {
 void CanController::tell_error() {
   const std::scoped_lock lock(health_mutex_);
   health_.last_error = socket_.error();
+  if (health_.last_error.empty()) health_.last_error = health_.write.error;
   if (!health_.last_error.empty() || gate_.in_sync()) return;
   if (all_frames_seen() && !all_sets_seen())
     health_.last_error = "the frames that show what is applied along a travel are of two sets";
@@ -449,7 +466,7 @@ std::span<double> CanController::held_um(std::size_t axis) noexcept {
 }
 
 void CanController::send_command(nanoseconds now) {
-  if (commands_.fresh()) gate_.offered(commands_.front(), now);
+  if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
   const SendVerdict verdict = gate_.verdict(now);
   if (verdict == SendVerdict::resynchronise) return lose(true);
   // Without frames of the controller nothing else would renew the published time.
@@ -462,13 +479,21 @@ void CanController::send_command(nanoseconds now) {
     ++set_numbers_[axis];
   }
   ++heartbeat_;
+  const bool waits = handed_ > socket_.sent_out() && !gate_.written(now);
+  // What will never be sent any more (a queue that was emptied) is not waited for.
+  if (waits) handed_ = written_ = socket_.sent_out();
   const bool sent = std::all_of(outgoing_.begin(), outgoing_.end(),
                                 [this](Outgoing& frame) { return compose_and_send(frame); });
-  if (!sent) lose();
+  if (!sent) lose(false, socket_.is_open());
   if (sent) gate_.sent(now);
   const std::scoped_lock lock(health_mutex_);
   ++(sent ? health_.writes : health_.write_errors);
-  if (!sent) health_.last_error = socket_.error();
+  if (sent && !waits) return;
+  ++health_.write.unanswered;
+  health_.write.error =
+      sent ? config_.interface + ": frames wait and are not sent: nobody takes them"
+           : socket_.error();
+  health_.last_error = health_.write.error;
 }
 
 /// Only sets are in it, and none of them may be followed: a controller that goes by the valid bits
@@ -503,11 +528,14 @@ bool CanController::compose_and_send(Outgoing& outgoing) {
     insert_raw(data, *config_.valid_bits, bits);
   }
   if (outgoing.has_heartbeat) insert_raw(data, *config_.heartbeat, heartbeat_);
-  return socket_.send(outgoing.frame);
+  if (!socket_.send(outgoing.frame)) return false;
+  ++handed_;
+  return true;
 }
 
 void CanController::publish(bool online, nanoseconds now) {
   state_.online = online;
+  state_.written = gate_.written(now);
   state_.link_epoch = gate_.epoch();
   state_.look = gate_.look();
   state_.taken_at = now;
@@ -520,15 +548,15 @@ void CanController::publish(bool online, nanoseconds now) {
 }
 
 /// Everything has to come anew before the next epoch.
-void CanController::lose(bool same_link) {
+void CanController::lose(bool same_link, bool online) {
   if (same_link)
     gate_.paused();
   else
     gate_.lost();
   await_all();
-  publish(false, monotonic_now());
+  publish(online, monotonic_now());
   const std::scoped_lock lock(health_mutex_);
-  health_.connected = false;
+  health_.connected = online;
 }
 
 }  // namespace thermocomp

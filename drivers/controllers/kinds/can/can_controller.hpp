@@ -19,7 +19,8 @@ namespace thermocomp {
 /// Sends its frames each period while there is a command of this epoch. In sync once every frame it
 /// listens for has come since the link was (re)established; out of sync as soon as one of them has
 /// been missing for silent_after_s, the interface is down or bus-off, or a frame could not be sent.
-/// The published time is that of the oldest of these frames.
+/// The published time is that of the oldest of these frames. What is sent counts as written once
+/// the interface has sent it: where nobody acknowledges, it never does.
 ///
 /// An axis whose command is not valid keeps the value sent last (at first, and on a new link where
 /// it can have come from that: what the controller applies); its valid bit is 0. A frame with an
@@ -96,8 +97,9 @@ class CanController final : public ControllerLink {
   void send_command(nanoseconds now);
   [[nodiscard]] bool may_be_left_out(const Outgoing& outgoing) const noexcept;
   bool compose_and_send(Outgoing& outgoing);
+  void note_written(nanoseconds now);
   void publish(bool online, nanoseconds now);
-  void lose(bool same_link = false);
+  void lose(bool same_link = false, bool online = false);
 
   const CanControllerConfig config_;
   std::vector<std::size_t> first_;  ///< one an axis: its first offset in command and state
@@ -112,11 +114,13 @@ class CanController final : public ControllerLink {
   WriteGate gate_;
   std::uint64_t heartbeat_{0};
   std::uint64_t bus_offs_{0};  ///< as the socket counts, up to the newest look
+  std::uint64_t handed_{0};    ///< frames given to the interface, as the socket counts sent_out()
+  std::uint64_t written_{0};   ///< of them, sent when the newest write was confirmed
   bool silent_{false};         ///< lost because frames were missing, and not back
   nanoseconds next_send_{};
   std::array<double, axes_max> held_um_{};  ///< what an axis that is not valid goes on sending
   WaitFreeSlot<ControllerState> states_;
-  WaitFreeSlot<OffsetCommand> commands_;
+  WaitFreeSlot<OfferedCommand> commands_;
   WakeEvent wake_;
   std::atomic<bool> stopping_{false};
   mutable std::mutex health_mutex_;

@@ -8,6 +8,7 @@
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 #include "drivers/modbus/connection.hpp"
+#include "drivers/monotonic_clock.hpp"
 #include "drivers/wake_event.hpp"
 
 namespace thermocomp {
@@ -21,7 +22,9 @@ class ModbusController final : public ControllerLink {
   void start() override;
   void stop() noexcept override;
   void newest(ControllerState& state) noexcept override { dialogue_.newest(state); }
-  void offer(const OffsetCommand& command) noexcept override { dialogue_.offer(command); }
+  void offer(const OffsetCommand& command) noexcept override {
+    dialogue_.offer(command, monotonic_now());
+  }
   [[nodiscard]] ControllerHealth health() const override { return dialogue_.health(); }
 
  private:

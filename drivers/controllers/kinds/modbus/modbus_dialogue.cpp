@@ -24,6 +24,9 @@ NumberFormat raw_format(const ModbusValue& value) noexcept {
 constexpr int gateway_path_unavailable = 10;
 constexpr int gateway_target_silent = 11;
 
+/// Write multiple registers.
+constexpr int function_of_writes = 16;
+
 /// The first count that the register cannot hold exactly.
 std::uint64_t counts_of(Encoding encoding) noexcept {
   switch (encoding) {
@@ -158,8 +161,8 @@ void ModbusDialogue::newest(ControllerState& state) noexcept {
   state = states_.front();
 }
 
-void ModbusDialogue::offer(const OffsetCommand& command) noexcept {
-  commands_.back() = command;
+void ModbusDialogue::offer(const OffsetCommand& command, nanoseconds computed_at) noexcept {
+  commands_.back() = {command, computed_at};
   commands_.publish();
 }
 
@@ -173,6 +176,8 @@ nanoseconds ModbusDialogue::next_action_at() const noexcept {
 }
 
 void ModbusDialogue::act() {
+  const nanoseconds began = connection_.now();
+  const nanoseconds period = from_seconds(config_.period_s);
   if (!gate_.in_sync()) {
     if (!synchronise()) {
       retry_at_ = connection_.now() + from_seconds(config_.line.reconnect_s);
@@ -182,7 +187,12 @@ void ModbusDialogue::act() {
   }
   exchange();
   const nanoseconds now = connection_.now();
-  retry_at_ = now;
+  gate_.turned(now - began);
+  if (now - began > period) {
+    const std::scoped_lock lock(health_mutex_);
+    ++health_.write.late;
+  }
+  retry_at_ = write_failed_ ? std::max(began + period, now) : now;
   // A slow line sets the pace; nothing is caught up.
   next_exchange_at_ = std::max(next_exchange_at_ + gate_.next_pause(), now);
 }
@@ -216,7 +226,7 @@ bool ModbusDialogue::synchronise() {
   publish(true);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
-  health_.last_error.clear();
+  health_.last_error = health_.write.error;
   return true;
 }
 
@@ -241,20 +251,25 @@ bool ModbusDialogue::read_set_numbers() {
 }
 
 /// One period: read, and write only while what was read can be explained by what was written. In
-/// this order nothing computed before a re-homing was seen is written after it was. A write that
-/// was not answered is not repeated before another look either: in the time that an answer is
-/// waited for a controller can restart.
+/// this order nothing computed before a re-homing was seen is written after it was (a command tells
+/// which look it knew of), and a controller that is slowly read gets the newest command all the
+/// same. A write that was not answered is not repeated before another look either: in the time that
+/// an answer is waited for a controller can restart. One that was refused waits for the next
+/// period.
 void ModbusDialogue::exchange() {
+  write_failed_ = false;
   look_for_command();
   for (int retries = config_.line.retries;; --retries) {
     if (!look()) {
       if (!ending_.load()) lose(refused_);
       return;
     }
+    look_for_command();
     const SendVerdict verdict = gate_.verdict(connection_.now());
     if (verdict == SendVerdict::resynchronise) lose(true);
     if (verdict != SendVerdict::send || write_command()) return;
-    if (retries == 0 || !connection_.connected() || ending_.load()) return lose(refused_);
+    if (refused_ || retries == 0 || !connection_.connected() || ending_.load())
+      return lose_by_write();
   }
 }
 
@@ -271,7 +286,7 @@ bool ModbusDialogue::look() {
 }
 
 void ModbusDialogue::look_for_command() {
-  if (commands_.fresh()) gate_.offered(commands_.front(), connection_.now());
+  if (commands_.fresh()) gate_.offered(commands_.front().command, commands_.front().computed_at);
 }
 
 double ModbusDialogue::written_value(std::size_t axis, double offset_um) {
@@ -315,13 +330,27 @@ void ModbusDialogue::add_axis(std::size_t axis, const OffsetCommand& command,
 
 bool ModbusDialogue::write_command() {
   if (config_.heartbeat) heartbeat_ = (heartbeat_ + 1) % counts_of(config_.heartbeat->encoding);
-  for (const WriteField& request : join_writes(fields_of(gate_.command()))) {
+  const std::vector<WriteField> requests = join_writes(fields_of(gate_.command()));
+  for (const WriteField& request : requests) {
     if (!write(request)) return false;
   }
-  gate_.sent(connection_.now());
+  const nanoseconds now = connection_.now();
+  gate_.sent(now);
+  if (requests.empty()) return true;  // no axis is driven, and nothing else tells so
+  gate_.confirmed(now);
+  note_confirmed(now);
+  publish(true);
+  return true;
+}
+
+void ModbusDialogue::note_confirmed(nanoseconds now) {
   const std::scoped_lock lock(health_mutex_);
   ++health_.writes;
-  return true;
+  WriteHealth& told = health_.write;
+  if (health_.last_error == told.error) health_.last_error.clear();
+  told.confirmed_at = now;
+  told.function = told.address = told.exception = 0;
+  told.error.clear();
 }
 
 bool ModbusDialogue::write(const WriteField& request) {
@@ -331,8 +360,15 @@ bool ModbusDialogue::write(const WriteField& request) {
   if (exchange.ok()) return true;
   const std::scoped_lock lock(health_mutex_);
   ++health_.write_errors;
-  health_.last_error =
-      "writing registers from " + std::to_string(request.address) + ": " + describe(exchange);
+  WriteHealth& told = health_.write;
+  ++(refused_ ? told.refused : told.unanswered);
+  told.function = function_of_writes;
+  told.address = request.address;
+  told.exception = exchange.exception_code;
+  told.error = std::string(refused_ ? "the controller refuses writes" : "no write is answered") +
+               " (function " + std::to_string(told.function) + ", register " +
+               std::to_string(told.address) + "): " + describe(exchange);
+  health_.last_error = told.error;
   return false;
 }
 
@@ -357,7 +393,7 @@ void ModbusDialogue::note_refusal(const Exchange& exchange) noexcept {
 
 std::string ModbusDialogue::describe(const Exchange& exchange) const {
   if (exchange.outcome == ExchangeOutcome::exception) {
-    return "exception " + std::to_string(exchange.exception_code);
+    return "exception " + std::to_string(exchange.exception_code) + " (" + exchange.detail + ")";
   }
   if (*exchange.detail != '\0') return exchange.detail;
   return connection_.last_error();
@@ -385,7 +421,7 @@ bool ModbusDialogue::read_all() {
   state_.taken_at = taken_at;
   const std::scoped_lock lock(health_mutex_);
   ++health_.reads;
-  health_.last_error.clear();
+  health_.last_error = health_.write.error;
   return true;
 }
 
@@ -442,10 +478,19 @@ std::array<double, axes_max> ModbusDialogue::without_leaps_um() const noexcept {
 
 void ModbusDialogue::publish(bool online) {
   state_.online = online;
+  state_.written = gate_.written(connection_.now());
   state_.link_epoch = gate_.epoch();
   state_.look = gate_.look();
   states_.back() = state_;
   states_.publish();
+}
+
+/// It has just been read, and may be again: it is there, it only does not take what is written.
+void ModbusDialogue::lose_by_write() {
+  write_failed_ = true;
+  if (!connection_.connected() || ending_.load()) return lose(false);
+  refused_ ? gate_.paused() : gate_.lost();
+  publish(true);
 }
 
 void ModbusDialogue::lose(bool same_link) {

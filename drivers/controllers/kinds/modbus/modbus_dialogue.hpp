@@ -23,7 +23,9 @@ namespace thermocomp {
 /// then valid bits, then heartbeat, neighbours in one request) - unless an axis stands where
 /// nothing sent lately can have taken it: that begins a new epoch and nothing is written
 /// (WriteGate); the link is still the same one. After a time-out or a lost connection it is
-/// another, after an exception or a pause of the cycle it is not. A piezo leaps to every new offset
+/// another, after an exception or a pause of the cycle it is not. A controller that reads well and
+/// refuses or ignores a write stays online and is asked again a period later: that nothing is
+/// written is told by ControllerState::written. A piezo leaps to every new offset
 /// by way of 0 V: whether it stands where it was told is left to its drive and to the estimator's
 /// comparison.
 ///
@@ -51,9 +53,10 @@ class ModbusDialogue {
   /// Writes the last command, if it may be written, and disconnects.
   void end();
 
-  void newest(ControllerState& state) noexcept;       ///< wait-free; one reader
-  void offer(const OffsetCommand& command) noexcept;  ///< wait-free; one writer
-  [[nodiscard]] ControllerHealth health() const;      ///< any ordinary thread
+  void newest(ControllerState& state) noexcept;  ///< wait-free; one reader
+  /// Wait-free; one writer.
+  void offer(const OffsetCommand& command, nanoseconds computed_at) noexcept;
+  [[nodiscard]] ControllerHealth health() const;  ///< any ordinary thread
 
  private:
   bool synchronise();
@@ -65,6 +68,7 @@ class ModbusDialogue {
   void look_for_command();
   bool write_command();
   bool write(const WriteField& request);
+  void note_confirmed(nanoseconds now);
   std::vector<WriteField> fields_of(const OffsetCommand& command);
   void add_axis(std::size_t axis, const OffsetCommand& command, std::vector<WriteField>& fields,
                 double& valid_bits);
@@ -78,6 +82,7 @@ class ModbusDialogue {
   [[nodiscard]] std::array<double, axes_max> without_leaps_um() const noexcept;
   void publish(bool online);
   void lose(bool same_link);
+  void lose_by_write();
   /// Repeats `exchange` as the line's `retries` say. Notes why it failed in the end.
   template <class Request>
   Exchange with_retries(Request&& request);
@@ -98,10 +103,11 @@ class ModbusDialogue {
   std::uint64_t heartbeat_{0};
   ControllerState state_;  ///< the thread's own
   WaitFreeSlot<ControllerState> states_;
-  WaitFreeSlot<OffsetCommand> commands_;
+  WaitFreeSlot<OfferedCommand> commands_;
   nanoseconds next_exchange_at_;
   nanoseconds retry_at_;  ///< while not in sync
   bool refused_{false};   ///< the controller itself answered the last exchange, with an exception
+  bool write_failed_{false};  ///< in the newest turn
   std::atomic<bool> ending_{false};
   mutable std::mutex health_mutex_;
   ControllerHealth health_;
