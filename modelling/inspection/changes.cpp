@@ -314,12 +314,12 @@ class ChangeSearch {
       step.tail(rows - from).setOnes();
       VectorXd motion = VectorXd::Zero(rows);
       motion.tail(rows - from) = (moved.array() - moved.mean()).matrix();
-      const auto evidence = judged.expectation.two_shapes(run, step, motion);
-      const double gain = 1.0 + evidence.size_second;
+      const auto evidence = judged.expectation.second_shape(run, step, motion);
+      const double gain = 1.0 + evidence.size;
       if (!(gain > loose_gain_min && gain < loose_gain_max)) {
-        z_of_others = std::max(z_of_others, evidence.z_second);
-      } else if (evidence.z_second > z_best) {
-        z_best = evidence.z_second;
+        z_of_others = std::max(z_of_others, evidence.z);
+      } else if (evidence.z > z_best) {
+        z_best = evidence.z;
         best.at_s = time_at(judged, run, from);
         best.size = gain;
       }

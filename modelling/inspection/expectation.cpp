@@ -147,8 +147,8 @@ Expectation::Evidence Expectation::shape(std::size_t run, const VectorXd& shape,
   return evidence;
 }
 
-Expectation::PairEvidence Expectation::two_shapes(std::size_t run, const VectorXd& first,
-                                                  const VectorXd& second) const {
+Expectation::Evidence Expectation::second_shape(std::size_t run, const VectorXd& first,
+                                                const VectorXd& second) const {
   const Index begin = begins_[run];
   MatrixXd white(first.size(), 2);
   white << whitened_shape(run, first), whitened_shape(run, second);
@@ -163,7 +163,7 @@ Expectation::PairEvidence Expectation::two_shapes(std::size_t run, const VectorX
   const double variance = sigma_ * sigma_ * slow_share(run, rest);
   const double both = product.dot(size) / variance;
   const double alone = product[0] * product[0] / energy(0, 0) / variance;
-  return {std::sqrt(std::max(0.0, both)), std::sqrt(std::max(0.0, both - alone)), size[0], size[1]};
+  return {std::sqrt(std::max(0.0, both - alone)), size[1]};
 }
 
 }  // namespace thermocomp::inspection

@@ -30,21 +30,14 @@ class Expectation {
   /// A shape given on a run's rows (zero elsewhere). `coloured`: the remainder's slow part, which
   /// the whitening did not take, counts too (batch means).
   [[nodiscard]] Evidence shape(std::size_t run, const Eigen::VectorXd& shape, bool coloured) const;
-  /// Two shapes together.
-  struct PairEvidence {
-    double z_both{0.0};    ///< root of the gain in 2 ln L of both
-    double z_second{0.0};  ///< ... of the second beside the first
-    double size_first{0.0};
-    double size_second{0.0};
-  };
-  [[nodiscard]] PairEvidence two_shapes(std::size_t run, const Eigen::VectorXd& first,
-                                        const Eigen::VectorXd& second) const;
+  /// The second of two shapes that are fitted together; z: root of its gain in 2 ln L.
+  [[nodiscard]] Evidence second_shape(std::size_t run, const Eigen::VectorXd& first,
+                                      const Eigen::VectorXd& second) const;
 
   [[nodiscard]] const Eigen::VectorXd& expected() const noexcept { return expected_; }
   [[nodiscard]] const Eigen::VectorXd& remainder() const noexcept { return remainder_; }
   [[nodiscard]] const Eigen::VectorXd& coefficients() const noexcept { return coefficients_; }
   [[nodiscard]] double rho() const noexcept { return rho_; }
-  [[nodiscard]] double sigma() const noexcept { return sigma_; }  ///< of the white part
 
  private:
   [[nodiscard]] Eigen::MatrixXd whitened(const Eigen::MatrixXd& columns) const;
