@@ -68,7 +68,7 @@ Operations::Operations(Parts parts)
       cycle_(parts_.cycle, [this](const Command& done) { carried_out(done); }) {}
 
 RpcPending Operations::command(const Command& asked) {
-  if (names_axis(asked.kind) && cycle_.replacing())
+  if (has_index(asked.kind) && cycle_.replacing())
     throw RpcError(rpc::refused, "a reload is under way: ask again when it is done");
   if (asked.kind == CommandKind::enable && parts_.keeper.is_reference_lost())
     throw RpcError(rpc::refused,
@@ -170,8 +170,10 @@ void Operations::carried_out(const Command& done) {
   if (done.kind == CommandKind::stop) return;  // not an operator's
   std::string axis;
   if (names_axis(done.kind)) axis = " " + parts_.config.estimator.axes[done.axis].name;
+  if (done.kind == CommandKind::accept)
+    axis = " " + parts_.config.estimator.sensors[done.axis].name;
   std::string what = fmt::format("{}{}", to_string(done.kind), axis);
-  if (!axis.empty() && done.kind != CommandKind::release)
+  if (done.kind == CommandKind::measured || done.kind == CommandKind::prove)
     what += fmt::format(" {} um", done.value_um);
   spdlog::info("operator: {}", what);
   const std::int64_t user = take_asking(done);

@@ -15,6 +15,9 @@ void ScreeningConfig::validate() const {
           "must be in (0, 1e6]");
   require(rate_allowance_K >= 0 && rate_allowance_K <= 1000, "rate_allowance_K", rate_allowance_K,
           "must be in [0, 1000]");
+  require(outage_K_max >= 0 && outage_K_max <= 1000, "outage_K_max", outage_K_max,
+          "must be in [0, 1000]");
+  require(settle_s >= 0 && settle_s <= 3600, "settle_s", settle_s, "must be in [0, 3600]");
   require(stuck_after_s >= 0 && stuck_after_s <= 1e6, "stuck_after_s", stuck_after_s,
           "must be in [0, 1e6]");
 }

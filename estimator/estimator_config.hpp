@@ -22,6 +22,8 @@ struct ScreeningConfig {
   double stale_after_s{5.0};     ///< age beyond which a reading is stale
   double rate_K_per_s_max{0.5};  ///< fastest believable slew
   double rate_allowance_K{1.0};  ///< what noise may add to a step [K]
+  double outage_K_max{10.0};     ///< largest change over an outage, and 10 K/h more
+  double settle_s{10.0};         ///< how long a value must last before it counts; 0: at once
   double stuck_after_s{0.0};     ///< the same value for this long is a fault; 0: never
   void validate() const;         ///< @throws InvalidValue
 };
@@ -36,12 +38,13 @@ struct SmoothingConfig {
   double period_s{60.0};     ///< one value of the sensor per period; 0: every reading
   std::size_t samples{6};    ///< n, values in a line (3..32)
   double half_width_K{0.3};  ///< w, half the band
-  double outage_s{300.0};    ///< a gap this long restarts the history
+  double outage_s{5.0};      ///< a gap longer than this and than two periods restarts the history
   void validate() const;     ///< @throws InvalidValue
 };
 
 struct SensorConfig {
   std::string name;
+  std::string module{};                         ///< the device that reads it; "": one of its own
   std::optional<std::size_t> reference_sensor;  ///< the value is the difference to this sensor
   ScreeningConfig screening;
   SmoothingConfig smoothing;

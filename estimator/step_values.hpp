@@ -35,11 +35,14 @@ struct Signals {
 
 /// Of the model's temperature columns; all of that shape.
 struct Temperatures {
-  std::span<const double> measured_degC;   ///< the last known where not good
-  std::span<const std::uint8_t> good;      ///< measured in this step
+  std::span<const double> measured_degC;  ///< the last known where not good
+  std::span<const std::uint8_t> good;     ///< measured in this step
+  std::span<const nanoseconds>
+      refuted_at;  ///< begin of the last jump that proved true; or the least
   std::span<const double> estimated_degC;  ///< measured, or estimated where lost
   bool all_good{false};
   bool complete{false};      ///< each is measured or estimated
+  bool jumped{false};        ///< a value contradicts what was, and nothing confirms it
   bool suspected{false};     ///< a sensor is, that lies plausibly
   bool weighed_down{false};  ///< ... and is left out of its blocks
 };

@@ -57,6 +57,7 @@ EstimatorConfig estimator_config(Sent sent, double rate_um_per_s) {
   SensorConfig sensor;
   sensor.name = "bed";
   sensor.smoothing.form = SmoothingForm::off;
+  sensor.screening.settle_s = 0.0;
   config.sensors = {sensor};
   config.blocks = {{"bed", "bed_degC", {0}}};
   config.signals = {"x_mm"};

@@ -18,6 +18,7 @@ inline EstimatorConfig measured_config(const ThermalModel& model, double stale_a
     SensorConfig sensor;
     sensor.name = model.inputs[i];
     sensor.screening.stale_after_s = stale_after_s;
+    sensor.screening.settle_s = 0.0;
     config.sensors.push_back(sensor);
     config.blocks.push_back({model.inputs[i], model.inputs[i], {i}});
   }

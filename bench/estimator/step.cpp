@@ -41,6 +41,7 @@ EstimatorConfig machine_config(double smoothing_period_s) {
     SensorConfig sensor;
     sensor.name = numbered("s", i);
     sensor.smoothing.period_s = smoothing_period_s;
+    sensor.screening.settle_s = 0.0;
     config.sensors.push_back(sensor);
   }
   for (std::size_t i = 0; i < blocks_count; ++i)

@@ -85,6 +85,28 @@ int run_reference(const GlobalOptions& global, bool force) {
   return exit_success;
 }
 
+int run_accept(const GlobalOptions& global, const std::string& sensor) {
+  const json answer = ask_daemon(global.socket, "accept", {{"sensor", sensor}});
+  std::cout << "sensor " << sensor << ": " << fixed(number_of(answer, "temp_degC"), 2)
+            << " degC counts from now on";
+  if (const double jump_K = number_of(answer, "jump_K"); jump_K != 0.0)
+    std::cout << ", " << fixed_signed(jump_K, 2) << " K from the value before";
+  std::cout << '\n';
+  return exit_success;
+}
+
+using RunNamed = int (*)(const GlobalOptions&, const std::string&);
+
+void add_named_command(CLI::App& app, const GlobalOptions& global, Action& action, const char* name,
+                       const char* help, const char* value, const char* value_help, RunNamed run) {
+  CLI::App* sub = app.add_subcommand(name, help);
+  const auto given = std::make_shared<std::string>();
+  sub->add_option(value, *given, value_help)->required();
+  sub->callback([&global, &action, given, run] {
+    action = [&global, given, run] { return run(global, *given); };
+  });
+}
+
 void add_reference_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* sub = app.add_subcommand(
       "reference", "takes the present temperatures as the state without displacement");
@@ -129,13 +151,12 @@ void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& ac
       "by how much, in um", [](const GlobalOptions& options, const AxisValue& given) {
         return run_prove(options, given.axis, given.value_um);
       });
-  CLI::App* sub = app.add_subcommand(
-      "release", "drives an axis again after what made it apply something else was mended");
-  const auto axis = std::make_shared<std::string>();
-  sub->add_option("AXIS", *axis, "name of the axis in the configuration")->required();
-  sub->callback([&global, &action, axis] {
-    action = [&global, axis] { return run_release(global, *axis); };
-  });
+  add_named_command(app, global, action, "release",
+                    "drives an axis again after what made it apply something else was mended",
+                    "AXIS", "name of the axis in the configuration", run_release);
+  add_named_command(app, global, action, "accept",
+                    "confirms the value of a sensor that jumped, or that is too new to count",
+                    "SENSOR", "name of the sensor in the configuration", run_accept);
 }
 
 }  // namespace thermocomp::cli

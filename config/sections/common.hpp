@@ -42,8 +42,8 @@ inline std::string unique_name(const TomlTable& table, std::set<std::string>& se
 [[nodiscard]] std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base,
                                                std::int64_t low, std::int64_t high);
 
-/// The codes of a status: those lists, and good_codes for numbers that are not 0 while all is well
-/// (Fault::none). A code that `mask` hides is a problem.
+/// The codes of a status: those lists, and good_codes (Fault::none), without which 0 is good. A
+/// code that `mask` hides is a problem.
 [[nodiscard]] std::vector<Sentinel> read_status_codes(const TomlTable& table, std::int64_t high,
                                                       std::int64_t mask);
 

@@ -11,12 +11,14 @@ namespace thermocomp::sections {
 namespace {
 
 ScreeningConfig read_screening(const TomlTable& table, const ScreeningConfig& fallback) {
-  constexpr std::array<NumberField<ScreeningConfig>, 6> fields{{
+  constexpr std::array<NumberField<ScreeningConfig>, 8> fields{{
       {"temp_degC_min", &ScreeningConfig::temp_degC_min},
       {"temp_degC_max", &ScreeningConfig::temp_degC_max},
       {"stale_after_s", &ScreeningConfig::stale_after_s},
       {"rate_K_per_s_max", &ScreeningConfig::rate_K_per_s_max},
       {"rate_allowance_K", &ScreeningConfig::rate_allowance_K},
+      {"outage_K_max", &ScreeningConfig::outage_K_max},
+      {"settle_s", &ScreeningConfig::settle_s},
       {"stuck_after_s", &ScreeningConfig::stuck_after_s},
   }};
   ScreeningConfig config = fallback;
@@ -100,6 +102,7 @@ std::vector<SensorConfig> read_sensors(const TomlTable& root,
   for (const TomlTable& table : tables) {
     SensorConfig& sensor = sensors.emplace_back();
     sensor.name = unique_name(table, names);
+    if (table.has("device")) sensor.module = table.text("device");
     sensor.screening = read_screening(table.table_or_empty("screening"), screening);
     sensor.smoothing = read_smoothing(table.table_or_empty("smoothing"), smoothing);
   }

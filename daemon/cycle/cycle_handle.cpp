@@ -8,7 +8,7 @@
 namespace thermocomp {
 
 CycleHandle::Tracked CycleHandle::send(const Command& command, Clock::time_point now) {
-  THERMOCOMP_ENSURE(!replacing() || !names_axis(command.kind));
+  THERMOCOMP_ENSURE(!replacing() || !has_index(command.kind));
   // Those that are overdue count too, so that a number in the queue is never used twice.
   if (commands_.size() >= CommandQueue::capacity) return nullptr;
   const auto number = cycle_.send(command);
@@ -28,7 +28,7 @@ CycleHandle::Tracked CycleHandle::replace(std::unique_ptr<CycleBrain> next, Cloc
 void CycleHandle::hand_over_staged() {
   const bool must_wait =
       std::any_of(commands_.begin(), commands_.end(),
-                  [](const SentCommand& sent) { return names_axis(sent.command.kind); });
+                  [](const SentCommand& sent) { return has_index(sent.command.kind); });
   if (replacement_.staged && !must_wait) cycle_.hand_over(std::move(replacement_.staged));
 }
 

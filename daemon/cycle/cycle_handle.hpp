@@ -84,10 +84,14 @@ class CycleHandle {
   Replacement replacement_;
 };
 
-/// Whether Command::axis means anything.
+/// Whether Command::axis is the index of an axis.
 [[nodiscard]] constexpr bool names_axis(CommandKind kind) noexcept {
   return kind == CommandKind::measured || kind == CommandKind::prove ||
          kind == CommandKind::release;
+}
+/// Whether it is an index of the running configuration, and means another thing in the next one.
+[[nodiscard]] constexpr bool has_index(CommandKind kind) noexcept {
+  return names_axis(kind) || kind == CommandKind::accept;
 }
 
 }  // namespace thermocomp

@@ -196,6 +196,28 @@ RpcPending release(const DeskActions& actions, const json& params) {
   return actions.command(command);
 }
 
+/// An operator vouches for a value that nothing else confirms.
+RpcPending accept(const DeskActions& actions, const json& params) {
+  const auto view = actions.view();
+  if (!params.contains("sensor") || !params["sensor"].is_string())
+    throw RpcError(rpc::invalid_params, "params.sensor must be the name of a sensor");
+  const auto name = params["sensor"].get<std::string>();
+  const std::vector<SensorConfig>& sensors = view.config.estimator.sensors;
+  const auto found = std::find_if(sensors.begin(), sensors.end(),
+                                  [&](const SensorConfig& each) { return each.name == name; });
+  if (found == sensors.end())
+    throw RpcError(rpc::invalid_params, "sensor " + name + " does not exist");
+  const auto index = static_cast<std::size_t>(found - sensors.begin());
+  const SensorReport& sensor = view.report.sensors[index];
+  refuse_unless(sensor.waiting, "sensor " + name + " has no value that waits to be confirmed");
+  return then(actions.command({CommandKind::accept, static_cast<std::uint32_t>(index), 0.0}),
+              [temp_degC = sensor.raw_degC, jump_K = sensor.jump_K] {
+                return json{{"done", true},
+                            {"temp_degC", std::isfinite(temp_degC) ? json(temp_degC) : json()},
+                            {"jump_K", jump_K}};
+              });
+}
+
 RpcPending reload(const DeskActions& actions) {
   try {
     return then(actions.reload(), [actions] {
@@ -229,6 +251,7 @@ void add_operator_methods(StatusServer& server, const DeskActions& actions) {
   add("measured", [actions](const json& params) { return note_measured(actions, params); });
   add("prove", [actions](const json& params) { return prove(actions, params); });
   add("release", [actions](const json& params) { return release(actions, params); });
+  add("accept", [actions](const json& params) { return accept(actions, params); });
   add("reload", [actions](const json&) { return reload(actions); });
   server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
     refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");

@@ -74,6 +74,7 @@ std::string to_text(const PersistentState& state, bool reference_lost,
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);
   file["temp_degC"] = numbers(state.temp_degC);
+  if (!state.jumped_from_degC.empty()) file["jumped_from_degC"] = numbers(state.jumped_from_degC);
   file["held_degC"] = numbers(state.held_degC);
   file["held_signals"] = numbers(state.held_signals);
   file["correction"] = numbers(state.correction);
@@ -103,6 +104,7 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   state.offset_um = numbers(file, "offset_um");
   // Files of earlier versions have none.
   if (file.contains("temp_degC")) state.temp_degC = numbers(file, "temp_degC");
+  if (file.contains("jumped_from_degC")) state.jumped_from_degC = numbers(file, "jumped_from_degC");
   if (file.contains("held_degC")) state.held_degC = numbers(file, "held_degC");
   if (file.contains("held_signals")) state.held_signals = numbers(file, "held_signals");
   if (file.contains("correction")) state.correction = numbers(file, "correction");

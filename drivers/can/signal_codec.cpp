@@ -186,10 +186,12 @@ bool carries(std::span<const std::uint8_t> payload, const CanSignal& signal) noe
 
 Fault fault_of(const CanStatus& status, std::uint64_t number) noexcept {
   const std::uint64_t masked = number & status.mask;
+  bool zero_is_good = masked == 0;
   for (const Sentinel& code : status.codes) {
     if (static_cast<std::uint64_t>(code.code) == masked) return code.fault;
+    if (code.fault == Fault::none) zero_is_good = false;
   }
-  return masked == 0 ? Fault::none : Fault::device_error;
+  return zero_is_good ? Fault::none : Fault::device_error;
 }
 
 CanValue decode(std::span<const std::uint8_t> payload, const CanSignal& signal) noexcept {

@@ -122,10 +122,12 @@ Decoded decode(std::span<const std::uint16_t> registers, const NumberFormat& for
 Fault decode_status(const ModbusStatus& status, std::uint16_t word) noexcept {
   const std::uint16_t mask = is_bit_table(status.table) ? std::uint16_t{1} : status.mask;
   const auto masked = static_cast<std::uint16_t>(word & mask);
+  bool zero_is_good = masked == 0;
   for (const Sentinel& code : status.codes) {
     if (code.code == masked) return code.fault;
+    if (code.fault == Fault::none) zero_is_good = false;
   }
-  return masked == 0 ? Fault::none : Fault::device_error;
+  return zero_is_good ? Fault::none : Fault::device_error;
 }
 
 namespace {

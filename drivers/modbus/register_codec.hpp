@@ -52,8 +52,8 @@ struct Decoded {
 [[nodiscard]] Decoded decode(std::span<const std::uint16_t> registers, const NumberFormat& format,
                              std::span<const Sentinel> sentinels) noexcept;
 
-/// What a status word says: the fault listed for its masked value; 0 not listed is none; anything
-/// else is device_error. A bit (coil, discrete input) is not masked.
+/// What a status word says: the fault (or none) listed for its masked value. 0 is good where no
+/// good code is listed; anything else is device_error. A bit (coil, discrete input) is not masked.
 [[nodiscard]] Fault decode_status(const ModbusStatus& status, std::uint16_t word) noexcept;
 
 /// Whether a sentinel's code can occur at all in the encoding (-1 cannot in uint16).

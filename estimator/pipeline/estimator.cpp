@@ -102,6 +102,7 @@ void Estimator::apply(const Command& command) noexcept {
       if (has_axis) stages.axes.release(command.axis);
       return;
     case CommandKind::accept:
+      if (command.axis < stages.config.sensors.size()) stages.sensing.accept(command.axis);
       return;
   }
 }
@@ -129,11 +130,7 @@ void Estimator::save_state(std::span<std::byte> out) const noexcept {
 }
 
 void Estimator::load_state(std::span<const std::byte> in) {
-  StateArchive before;
-  stages_->visit_all_but_suspicion(before);
   StateArchive archive(in);
-  // Written before sensors were suspected: a suspicion that is new has done nothing yet.
-  if (in.size() == before.position_bytes()) return stages_->visit_all_but_suspicion(archive);
   if (in.size() != state_size_bytes())
     throw std::runtime_error("the estimator's state has another size than this program's");
   stages_->visit_state(archive);
@@ -146,7 +143,7 @@ std::vector<std::string> Estimator::restore(const PersistentState& state) {
   stages.mode.enable(state.enabled && refused.empty());
   if (refused.empty() && state.model_reference_degC == reference_numbers(stages.model))
     stages.reference.restore(state.reference_degC, state.reference_signals);
-  stages.sensing.restore(state.temp_degC);
+  stages.sensing.restore(state.temp_degC, state.jumped_from_degC);
   restore_held(stages, state);
   for (std::size_t i = 0; i < stages.axes.size(); ++i) {
     double offset_um = 0.0;

@@ -49,6 +49,9 @@ PersistentState make_persistent_state(const EstimatorConfig& config, const Therm
     add(state.reference_signals, signals[i], report.signals[i].reference);
     add(state.held_signals, signals[i], report.signals[i].held);
   }
+  THERMOCOMP_ENSURE(config.sensors.size() == report.sensors.size());
+  for (std::size_t i = 0; i < report.sensors.size(); ++i)
+    add(state.jumped_from_degC, config.sensors[i].name, report.sensors[i].jumped_from_degC);
   THERMOCOMP_ENSURE(config.axes.size() == report.axes.size());
   for (std::size_t i = 0; i < report.axes.size(); ++i)
     add_axis(config.axes[i].name, report.axes[i], state);
@@ -58,6 +61,7 @@ PersistentState make_persistent_state(const EstimatorConfig& config, const Therm
 bool must_be_saved(const PersistentState& now, const PersistentState& saved) {
   return now.enabled != saved.enabled || now.reference_degC != saved.reference_degC ||
          now.model_reference_degC != saved.model_reference_degC ||
+         now.jumped_from_degC != saved.jumped_from_degC ||
          now.reference_signals != saved.reference_signals || now.held_degC != saved.held_degC ||
          now.held_signals != saved.held_signals || now.correction != saved.correction;
 }

@@ -20,8 +20,10 @@ struct PersistentState {
   std::map<std::string, double> reference_signals;  ///< operating signals then, by column
   std::map<std::string, double> offset_um;          ///< by axis, last sent
   std::map<std::string, double> temp_degC;          ///< in use then, by temperature column
-  std::map<std::string, double> held_degC;          ///< InputReport::held_degC, by column
-  std::map<std::string, double> held_signals;       ///< SignalReport::held, by column
+  /// By sensor that had jumped: what it showed before, so that a restart does not confirm the jump.
+  std::map<std::string, double> jumped_from_degC;
+  std::map<std::string, double> held_degC;     ///< InputReport::held_degC, by column
+  std::map<std::string, double> held_signals;  ///< SignalReport::held, by column
   /// RunningCorrection::persistent(), "z.gain1" and so on.
   std::map<std::string, double> correction;
 };

@@ -27,6 +27,7 @@ std::uint32_t reasons_of(const Signals& signals, bool written, const Temperature
   reasons.add(displacement.block_lost, Reason::block_lost);
   reasons.add(displacement.block_estimated, Reason::block_estimated);
   reasons.add(temps.suspected, Reason::sensor_suspected);
+  reasons.add(temps.jumped, Reason::sensor_unconfirmed);
   reasons.add(displacement.not_finite, Reason::no_target);
   reasons.add(displacement.outside, Reason::outside_domain);
   reasons.add(!mode.enabled, Reason::operator_disabled);

@@ -14,12 +14,19 @@ namespace thermocomp {
 /// Temperatures: the model file's numbers, else each column's first good value. Signals: zero
 /// beside such numbers, which mean a machine at rest; a sampled reference says that the machine is
 /// straight as it is, whatever it is doing, so the signals of that moment belong to it.
+///
+/// A first good value is provisional for `young`: a jump of its sensor that begins in that time and
+/// proves true shows that the value was false; then the column's reference is taken anew. (To wait
+/// until the machine is steady instead would leave one that is started warm without compensation.)
 class Reference {
  public:
+  static constexpr nanoseconds young = std::chrono::minutes(10);
+
   explicit Reference(const ThermalModel& model);
 
   /// Takes what is not known yet, where it is measured now.
-  [[nodiscard]] ReferenceState step(const Temperatures& temps, const Signals& signals) noexcept;
+  [[nodiscard]] ReferenceState step(nanoseconds now, const Temperatures& temps,
+                                    const Signals& signals) noexcept;
   /// The machine is straight now. The signals are taken at the next step.
   /// @pre all of them are good
   void take(std::span<const double> temps_degC) noexcept;
@@ -34,7 +41,7 @@ class Reference {
   /// deliberate; otherwise the machine's state stays.
   void adopt(const Reference& previous, const std::vector<int>& columns,
              const std::vector<int>& signals) noexcept;
-  void visit_temperatures(StateArchive& archive) { archive(temps_degC_); }
+  void visit_temperatures(StateArchive& archive) { archive(temps_degC_, sampled_at_); }
   void visit_signals(StateArchive& archive) { archive(signals_); }
 
  private:
@@ -43,6 +50,7 @@ class Reference {
   const std::vector<std::string> signal_names_;
 
   std::vector<double> temps_degC_;
+  std::vector<nanoseconds> sampled_at_;  ///< one per column; the least time: not a first value
   std::vector<double> signals_;
 };
 

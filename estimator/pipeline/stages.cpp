@@ -55,7 +55,7 @@ void Stages::step(nanoseconds now, std::span<const Reading> readings,
 
   const Signals told = signals.step(now, controller);
   Temperatures temps = sensing.step(now, readings);
-  const ReferenceState straight = reference.step(temps, told);
+  const ReferenceState straight = reference.step(now, temps, told);
   // A suspicion alone never ends the compensation.
   if (temps.weighed_down && !prediction.would_serve(sensing.lost(), straight, told))
     temps = sensing.use_all(now);
@@ -102,13 +102,7 @@ void Stages::adopt(const Stages& previous) noexcept {
   record.reasons = 0;
 }
 
-/// The order is that of the histories that are there already: `replay` loads them.
 void Stages::visit_state(StateArchive& archive) {
-  visit_all_but_suspicion(archive);
-  sensing.visit_suspicion(archive);
-}
-
-void Stages::visit_all_but_suspicion(StateArchive& archive) {
   auto& [cycle, stepped, now, dt_s, displacement_known, reasons] = record;
   archive(sensing);
   prediction.visit_lags(archive);

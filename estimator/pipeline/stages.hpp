@@ -51,8 +51,6 @@ struct Stages {
   void plan_adoption(const Stages& previous);
   void adopt(const Stages& previous) noexcept;
   void visit_state(StateArchive& archive);
-  /// What histories hold that were written before sensors were suspected.
-  void visit_all_but_suspicion(StateArchive& archive);
 
   const EstimatorConfig config;
   const ThermalModel model;

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
 namespace {
 
+constexpr nanoseconds never = nanoseconds::min();
 constexpr int no_sensor = -1;
 constexpr int unknown_sensor = -2;  ///< one that the previous bank did not have
 
@@ -32,6 +35,17 @@ BlockBank::BlockBank(const EstimatorConfig& config, const std::vector<std::strin
                          std::to_string(*sensor.reference_sensor), "must be the index of a sensor");
     sensors_.emplace_back(sensor);
   }
+  std::map<std::string, std::size_t> named;
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    const std::string& name = config.sensors[i].module;
+    const std::size_t module =
+        name.empty() ? modules_.size() : named.try_emplace(name, modules_.size()).first->second;
+    if (module == modules_.size()) modules_.emplace_back();
+    modules_[module].push_back(i);
+    sensors_[i].module = module;
+  }
+  witnesses_.assign(modules_.size(), 0);
+  refuted_at_.assign(columns.size(), never);
   for (const std::string& column : columns) {
     const auto block = std::find_if(config.blocks.begin(), config.blocks.end(),
                                     [&](const BlockConfig& each) { return each.input == column; });
@@ -55,6 +69,7 @@ void BlockBank::read(nanoseconds now, std::span<const Reading> readings) noexcep
   THERMOCOMP_ENSURE(readings.size() == sensors_.size());
   now_ = now;
   // All are looked at before any is smoothed: a difference needs its reference of this very cycle.
+  waiting_ = jumped_ = 0;
   for (std::size_t i = 0; i < sensors_.size(); ++i) look_at(sensors_[i], now, readings[i]);
   for (std::size_t i = 0; i < sensors_.size(); ++i) values_K_[i] = smooth(sensors_[i], now);
 }
@@ -89,6 +104,85 @@ void BlockBank::look_at(Sensor& sensor, nanoseconds now, const Reading& reading)
   sensor.fresh = sensor.screening.look(now, reading);
   sensor.raw_degC = reading.temp_degC;
   sensor.fault = sensor.screening.fault(now);
+  if (sensor.screening.waiting()) ++waiting_;
+  if (sensor.screening.jumped()) ++jumped_;
+  if (!sensor.fresh || !sensor.screening.refuted()) return;
+  sensor.smoother.restart();
+  note_refuted(sensor);
+}
+
+void BlockBank::note_refuted(const Sensor& sensor) noexcept {
+  const auto index = static_cast<std::size_t>(&sensor - sensors_.data());
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    if (std::find(blocks_[i].sensors.begin(), blocks_[i].sensors.end(), index) !=
+        blocks_[i].sensors.end())
+      refuted_at_[i] = sensor.screening.jumped_at();
+}
+
+void BlockBank::surround(std::span<const double> expected_degC,
+                         std::span<const double> sd_K) noexcept {
+  for (Sensor& sensor : sensors_) sensor.screening.surround({});
+  for (const auto& module : modules_)
+    if (is_not_ready(module))
+      for (const std::size_t sensor : module)
+        sensors_[sensor].screening.surround({not_a_number, 0.0, true});
+  std::fill(witnesses_.begin(), witnesses_.end(), std::size_t{0});
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    for (const std::size_t sensor : blocks_[i].sensors)
+      if (good_[i] != 0) ++witnesses_[sensors_[sensor].module];
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (std::isnan(expected_degC[i])) continue;
+    for (std::size_t k = 0; k < blocks_[i].sensors.size(); ++k) {
+      Sensor& sensor = sensors_[blocks_[i].sensors[k]];
+      if (!sensor.screening.waiting() || !has_other_witness(sensor.module)) continue;
+      double expected = expected_degC[i] + blocks_[i].deviation_K[k];
+      if (sensor.reference != no_sensor) {
+        const Screening& reference = sensors_[static_cast<std::size_t>(sensor.reference)].screening;
+        expected += reference.usable(now_) ? reference.good_degC() : not_a_number;
+      }
+      sensor.screening.surround({expected, sd_K[i], false});
+    }
+  }
+}
+
+/// All of its channels show the very same, though what they showed last was not: so does a module
+/// that answers before its first conversions.
+bool BlockBank::is_not_ready(const std::vector<std::size_t>& module) const noexcept {
+  if (module.size() < 2) return false;
+  double least_degC = std::numeric_limits<double>::infinity();
+  double most_degC = -least_degC;
+  const double shown_degC = sensors_[module.front()].screening.newest_degC();
+  for (const std::size_t i : module) {
+    const Screening& screening = sensors_[i].screening;
+    if (!screening.waiting() || screening.newest_degC() != shown_degC) return false;
+    if (!screening.has_good()) continue;
+    least_degC = std::min(least_degC, screening.good_degC());
+    most_degC = std::max(most_degC, screening.good_degC());
+  }
+  return most_degC - least_degC > sensors_[module.front()].config.screening.rate_allowance_K;
+}
+
+/// Whether a good column hangs on another module.
+bool BlockBank::has_other_witness(std::size_t module) const noexcept {
+  for (std::size_t i = 0; i < witnesses_.size(); ++i)
+    if (i != module && witnesses_[i] > 0) return true;
+  return false;
+}
+
+void BlockBank::restore_jump(const std::string& name, double from_degC) {
+  for (Sensor& sensor : sensors_)
+    if (sensor.config.name == name) sensor.screening.restore_jump(from_degC);
+}
+
+bool BlockBank::accept(std::size_t index) noexcept {
+  Sensor& sensor = sensors_[index];
+  if (!sensor.screening.accept()) return false;
+  if (sensor.screening.refuted()) note_refuted(sensor);
+  sensor.smoother.restart();
+  sensor.fault = sensor.screening.fault(now_);
+  sensor.fresh = true;
+  values_K_[index] = smooth(sensor, now_);
+  return true;
 }
 
 double BlockBank::smooth(Sensor& sensor, nanoseconds now) noexcept {
@@ -145,6 +239,11 @@ void BlockBank::report(std::span<SensorReport> sensors) const noexcept {
                   sensor.smoother.clipped_in_a_row(),
                   sensor.smoother.clipped(),
                   sensor.screening.rejected(),
+                  sensor.screening.waiting(),
+                  sensor.screening.jumped(),
+                  sensor.screening.jump_K(),
+                  sensor.screening.jumped_from_degC(),
+                  sensor.screening.jumped_at(),
                   false,
                   false,
                   0.0,
@@ -155,7 +254,7 @@ void BlockBank::report(std::span<SensorReport> sensors) const noexcept {
 void BlockBank::visit_state(StateArchive& archive) {
   for (Sensor& sensor : sensors_) archive(sensor);
   for (Block& block : blocks_) archive(block.deviation_K);
-  archive(temps_degC_, good_, now_);
+  archive(temps_degC_, good_, now_, waiting_, jumped_, refuted_at_);
 }
 
 void BlockBank::plan_adoption(const BlockBank& previous) {
@@ -191,6 +290,7 @@ int BlockBank::previous_reference(const Sensor& sensor) const noexcept {
 
 void BlockBank::adopt(const BlockBank& previous) noexcept {
   now_ = previous.now_;
+  waiting_ = previous.waiting_;
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     if (sensor_plan_[i] < 0) continue;
     const Sensor& other = previous.sensors_[static_cast<std::size_t>(sensor_plan_[i])];
@@ -209,6 +309,7 @@ void BlockBank::adopt(const BlockBank& previous) noexcept {
     blocks_[i].deviation_K = previous.blocks_[other].deviation_K;
     temps_degC_[i] = previous.temps_degC_[other];
     good_[i] = previous.good_[other];
+    refuted_at_[i] = previous.refuted_at_[other];
   }
 }
 

@@ -20,6 +20,20 @@ class BlockBank {
 
   /// Takes in the newest readings.
   void read(nanoseconds now, std::span<const Reading> readings) noexcept;
+  /// How many sensors have a value that does not count yet.
+  [[nodiscard]] std::size_t waiting() const noexcept { return waiting_; }
+  /// ... because it jumped.
+  [[nodiscard]] std::size_t jumped() const noexcept { return jumped_; }
+  /// Before read(), while values are waiting: what the rest of the machine says of them.
+  /// @param expected_degC, sd_K  of a column; NaN: nothing is expected
+  void surround(std::span<const double> expected_degC, std::span<const double> sd_K) noexcept;
+  /// Before the first step: the sensor's value contradicted this one when the previous run ended.
+  void restore_jump(const std::string& name, double from_degC);
+  /// The sensor's newest value counts. @return whether one was waiting
+  bool accept(std::size_t sensor) noexcept;
+  /// Shape (columns): when the last jump of a sensor began that proved true, so that what it showed
+  /// before is refuted; the least time: there was none.
+  [[nodiscard]] std::span<const nanoseconds> refuted_at() const noexcept { return refuted_at_; }
   /// What screening lets through now, before smoothing; one per sensor, NaN: nothing.
   void screened(nanoseconds now, std::span<double> values_K) const noexcept;
   /// The blocks' temperatures from what was read.
@@ -48,6 +62,7 @@ class BlockBank {
     Screening screening;
     Smoother smoother;
     int reference;  ///< index of the reference sensor, or no_sensor
+    std::size_t module{0};
     double raw_degC{not_a_number};
     Fault fault{Fault::never_read};
     bool fresh{false};    ///< the newest reading is a new and good one
@@ -63,7 +78,10 @@ class BlockBank {
     std::vector<double> deviation_K;
   };
 
-  static void look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept;
+  void look_at(Sensor& sensor, nanoseconds now, const Reading& reading) noexcept;
+  void note_refuted(const Sensor& sensor) noexcept;
+  [[nodiscard]] bool is_not_ready(const std::vector<std::size_t>& module) const noexcept;
+  [[nodiscard]] bool has_other_witness(std::size_t module) const noexcept;
   /// @return the sensor's value for its block; NaN where there is none to be used
   [[nodiscard]] double smooth(Sensor& sensor, nanoseconds now) noexcept;
   /// Index of the reference sensor in the previous bank, or no_sensor.
@@ -75,10 +93,15 @@ class BlockBank {
                                                 double& temp_degC) const noexcept;
 
   std::vector<Sensor> sensors_;
-  std::vector<double> values_K_;      ///< of this step, one per sensor; NaN: not to be used
-  std::vector<double> kept_K_;        ///< scratch: the same, what is left out NaN
-  std::span<const double> in_use_K_;  ///< during join(), one of the two
-  std::vector<Block> blocks_;         ///< one per column
+  std::vector<std::vector<std::size_t>> modules_;  ///< sensors of each
+  std::size_t waiting_{0};
+  std::size_t jumped_{0};
+  std::vector<std::size_t> witnesses_;   ///< scratch, one per module: its sensors of good columns
+  std::vector<nanoseconds> refuted_at_;  ///< one per column
+  std::vector<double> values_K_;         ///< of this step, one per sensor; NaN: not to be used
+  std::vector<double> kept_K_;           ///< scratch: the same, what is left out NaN
+  std::span<const double> in_use_K_;     ///< during join(), one of the two
+  std::vector<Block> blocks_;            ///< one per column
   std::vector<double> temps_degC_;
   std::vector<std::uint8_t> good_;
   nanoseconds now_{};

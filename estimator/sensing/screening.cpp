@@ -1,35 +1,59 @@
 #include "estimator/sensing/screening.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace thermocomp {
+namespace {
+
+/// How fast the structure of a machine changes over hours at most.
+constexpr double slow_K_per_ns = 10.0 / 3600.0 * 1e-9;
+/// A return may miss by this share of the jump: a quarter, so that it is nearer to the past than to
+/// the jump by far.
+constexpr double return_share = 0.25;
+/// An expectation confirms a value only where its standard deviation is below this share of the
+/// allowance.
+constexpr double expectation_share = 0.5;
+/// ... and contradicts one that is off by more than so many, and by more than the allowance.
+constexpr double unexpected_sd = 2.5;
+
+/// Half, so that a difference to it is one.
+constexpr nanoseconds long_ago = nanoseconds::min() / 2;
+
+nanoseconds of_seconds(double time_s) noexcept {
+  return std::chrono::duration_cast<nanoseconds>(seconds_d(time_s));
+}
+
+}  // namespace
 
 Screening::Screening(const ScreeningConfig& config)
     : min_degC_(config.temp_degC_min),
       max_degC_(config.temp_degC_max),
       rate_K_per_ns_(config.rate_K_per_s_max * 1e-9),
       allowance_K_(config.rate_allowance_K),
-      stale_after_(std::chrono::duration_cast<nanoseconds>(seconds_d(config.stale_after_s))),
-      stuck_after_(std::chrono::duration_cast<nanoseconds>(seconds_d(config.stuck_after_s))) {
+      outage_K_max_(config.outage_K_max),
+      stale_after_(of_seconds(config.stale_after_s)),
+      settle_(of_seconds(config.settle_s)),
+      stuck_after_(of_seconds(config.stuck_after_s)) {
   config.validate();
 }
 
 bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   state_.seen_at = reading.taken_at;
   state_.seen_fault = reading.fault;
-  state_.verdict = judge(now, reading);
-  if (state_.verdict != Fault::none) {
-    if (state_.verdict != Fault::never_read) ++state_.rejected;
-    return false;
+  state_.verdict = check(now, reading);
+  if (state_.verdict == Fault::none) {
+    note(reading);
+    state_.verdict = judge();
   }
-  state_.confirmed = is_recent(state_.good, reading) || is_recent(state_.doubted, reading);
-  state_.before = state_.good;
-  state_.good = {true, reading.temp_degC, reading.taken_at};
-  state_.doubted = {};
-  return true;
+  if (state_.verdict == Fault::none) return true;
+  const bool only_settling =
+      reading.fault == Fault::none && state_.verdict == Fault::unconfirmed && !state_.jumped;
+  if (state_.verdict != Fault::never_read && !only_settling) ++state_.rejected;
+  return false;
 }
 
-Fault Screening::judge(nanoseconds now, const Reading& reading) noexcept {
+Fault Screening::check(nanoseconds now, const Reading& reading) const noexcept {
   if (reading.fault != Fault::none) return reading.fault;
   // Written so that NaN fails.
   if (!(reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_))
@@ -37,46 +61,111 @@ Fault Screening::judge(nanoseconds now, const Reading& reading) noexcept {
   // A time far ahead is as useless as an old one: it would make every later reading look old.
   if (!(reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_))
     return Fault::stale;
-  if (!state_.good.known && !state_.doubted.known) {
-    state_.same_since = reading.taken_at;
-    return Fault::none;
-  }
-  // A reading from before the last good one came late or doubled; it says nothing new.
-  if (state_.good.known && reading.taken_at <= state_.good.at) return Fault::stale;
-  if (state_.doubted.known && reading.taken_at <= state_.doubted.at) return Fault::stale;
-  if (!(follows(state_.good, reading) && follows(state_.doubted, reading))) {
-    if (!state_.confirmed || state_.doubted.known) doubt(reading);
-    return Fault::too_fast;
-  }
-  if (!state_.good.known || reading.temp_degC != state_.good.temp_degC)
-    state_.same_since = reading.taken_at;
-  if (stuck_after_ > nanoseconds{0} && reading.taken_at - state_.same_since > stuck_after_)
-    return Fault::stuck;
+  // A reading from before the newest one came late or doubled; it says nothing new.
+  if (state_.newest.known && reading.taken_at <= state_.newest.at) return Fault::stale;
   return Fault::none;
 }
 
-/// Whether the structure can have come from the value to the reading; from nothing it can. The
-/// longer ago the value, the more may have changed: a true step is believed as soon as the
-/// structure could have made it.
-bool Screening::follows(const Value& value, const Reading& reading) const noexcept {
-  if (!value.known) return true;
-  const double change_K = std::abs(reading.temp_degC - value.temp_degC);
-  const auto elapsed_ns = static_cast<double>((reading.taken_at - value.at).count());
-  return change_K <= rate_K_per_ns_ * elapsed_ns + allowance_K_;
-}
-
-bool Screening::is_recent(const Value& value, const Reading& reading) const noexcept {
-  return value.known && reading.taken_at - value.at <= stale_after_;
-}
-
-/// Of two values that contradict each other the first may be the false one.
-void Screening::doubt(const Reading& reading) noexcept {
-  if (!state_.confirmed) {
-    state_.good = state_.before;
-    state_.before = {};
-    state_.confirmed = true;
+/// The course of what is read, whether it counts or not.
+void Screening::note(const Reading& reading) noexcept {
+  const Value& before = state_.newest;
+  const nanoseconds gap = before.known ? reading.taken_at - before.at : nanoseconds{0};
+  const double step_K = std::abs(reading.temp_degC - before.temp_degC);
+  if (!(before.known && gap <= stale_after_ && step_K <= allowance_K_ + change_K(gap))) {
+    state_.run_since = reading.taken_at;
+    state_.run_count = 0;
   }
-  state_.doubted = {true, reading.temp_degC, reading.taken_at};
+  ++state_.run_count;
+  if (!before.known || reading.temp_degC != before.temp_degC) state_.same_since = reading.taken_at;
+  if (!state_.waiting)
+    state_.unread = reading.taken_at - state_.good.at;
+  else if (gap > stale_after_)
+    state_.unread += gap;
+  state_.newest = {true, reading.temp_degC, reading.taken_at};
+}
+
+/// Of the newest value.
+Fault Screening::judge() noexcept {
+  const nanoseconds at = state_.newest.at;
+  if (state_.good.known && !possible()) return jump(state_.good.temp_degC);
+  if (!(state_.good.known && at - state_.good.at <= stale_after_)) {
+    if (unexpected()) return jump(surroundings_.expected_degC);
+    state_.waiting = true;
+    if (!settled()) return Fault::unconfirmed;
+  }
+  if (stuck_after_ > nanoseconds{0} && at - state_.same_since > stuck_after_) return Fault::stuck;
+  count(false);
+  return Fault::none;
+}
+
+/// The newest value contradicts what was or what is expected.
+Fault Screening::jump(double from_degC) noexcept {
+  const Value& newest = state_.newest;
+  if (!state_.jumped) {
+    state_.jumped_at = newest.at;
+    state_.jump_from_degC = from_degC;
+    state_.jump_K_max = 0.0;
+  }
+  state_.waiting = state_.jumped = true;
+  state_.jump_K_max = std::max(state_.jump_K_max, std::abs(jump_K()));
+  if (settled() && expected()) {
+    count(true);
+    return Fault::none;
+  }
+  const bool good_serves = state_.good.known && newest.at - state_.good.at <= stale_after_;
+  return good_serves ? Fault::too_fast : Fault::unconfirmed;
+}
+
+void Screening::count(bool refutes) noexcept {
+  state_.good = state_.newest;
+  state_.waiting = state_.jumped = false;
+  state_.refuted = refutes;
+}
+
+void Screening::restore_jump(double from_degC) noexcept {
+  if (!(from_degC >= min_degC_ && from_degC <= max_degC_)) return;
+  state_.good = {true, from_degC, long_ago};
+  state_.waiting = true;
+}
+
+bool Screening::accept() noexcept {
+  if (!state_.waiting || !state_.newest.known) return false;
+  if (state_.seen_fault == Fault::none) state_.verdict = Fault::none;
+  count(state_.jumped);
+  return true;
+}
+
+double Screening::change_K(nanoseconds unread) const noexcept {
+  const auto unread_ns = static_cast<double>(unread.count());
+  return std::min(rate_K_per_ns_ * unread_ns, outage_K_max_ + slow_K_per_ns * unread_ns);
+}
+
+/// Whether the structure can have come from the last value that counted to the newest one.
+bool Screening::possible() const noexcept {
+  const double off_K = std::abs(state_.newest.temp_degC - state_.good.temp_degC);
+  const double allowed_K = allowance_K_ + change_K(state_.unread);
+  if (off_K <= allowed_K) return true;
+  if (!state_.jumped) return false;
+  const auto jumped_ns = static_cast<double>((state_.newest.at - state_.jumped_at).count());
+  return off_K <= return_share * state_.jump_K_max &&
+         off_K <= allowed_K + slow_K_per_ns * jumped_ns;
+}
+
+bool Screening::settled() const noexcept {
+  if (settle_ <= nanoseconds{0}) return true;
+  return state_.run_count >= settle_readings && state_.newest.at - state_.run_since >= settle_ &&
+         state_.newest.temp_degC != 0.0 && !surroundings_.module_not_ready;
+}
+
+bool Screening::expected() const noexcept {
+  return surroundings_.expected_sd_K <= expectation_share * allowance_K_ &&
+         std::abs(state_.newest.temp_degC - surroundings_.expected_degC) <= allowance_K_;
+}
+
+/// False where nothing is expected.
+bool Screening::unexpected() const noexcept {
+  return std::abs(state_.newest.temp_degC - surroundings_.expected_degC) >
+         std::max(allowance_K_, unexpected_sd * surroundings_.expected_sd_K);
 }
 
 }  // namespace thermocomp

@@ -8,13 +8,24 @@
 namespace thermocomp {
 
 /// Judges one sensor's readings, each once, when it is new. A refused reading is as good as none:
-/// the last good one serves until it is stale.
+/// the last one that counted serves until it is stale.
 ///
-/// The first value after the start or an outage has little to be compared with, so it may be the
-/// false one when the next contradicts it. Then neither is believed, and it takes two in a row that
-/// agree with each other (and with the last good one before the outage).
+/// A value T follows the last one that counted, T0, when
+///
+///     |T - T0| <= rate_allowance_K + min(rate u, outage_K_max + 10 K/h u),
+///
+/// where u is how long *nothing* was read. A value that is there and does not follow (a jump) adds
+/// nothing to u, however long it lasts: it counts when its neighbours expect it, when an operator
+/// accepts it, or when it returns to where T0 allows. After a jump J a return may miss by 10 K/h
+/// since its begin, up to J / 4.
+///
+/// After an outage, and at the start, a value counts once readings have followed each other for
+/// settle_s, at least settle_readings of them. An exact 0 does not settle: devices give it while
+/// they are not ready.
 class Screening {
  public:
+  static constexpr std::uint32_t settle_readings = 3;
+
   explicit Screening(const ScreeningConfig& config);
 
   /// Looks at the newest reading.
@@ -23,6 +34,20 @@ class Screening {
     if (reading.taken_at == state_.seen_at && reading.fault == state_.seen_fault) return false;
     return take(now, reading);
   }
+
+  /// What the next looks are to know beside the readings. An expectation is NaN where nothing
+  /// independent of this sensor makes one.
+  struct Surroundings {
+    double expected_degC{not_a_number};
+    double expected_sd_K{0.0};
+    bool module_not_ready{false};
+  };
+  void surround(const Surroundings& surroundings) noexcept { surroundings_ = surroundings; }
+  /// Before the first reading: what counted last, a time ago that nobody knows.
+  void restore_jump(double from_degC) noexcept;
+  /// The newest value counts, whatever speaks against it.
+  /// @return whether one was waiting
+  bool accept() noexcept;
 
   /// Whether the last good reading may still be used at `now`.
   [[nodiscard]] bool usable(nanoseconds now) const noexcept {
@@ -36,6 +61,22 @@ class Screening {
   [[nodiscard]] double good_degC() const noexcept { return state_.good.temp_degC; }
   [[nodiscard]] nanoseconds good_at() const noexcept { return state_.good.at; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return state_.rejected; }
+  /// A value is there that does not count yet.
+  [[nodiscard]] bool waiting() const noexcept { return state_.waiting; }
+  /// ... because it jumped.
+  [[nodiscard]] bool jumped() const noexcept { return state_.jumped; }
+  [[nodiscard]] double jump_K() const noexcept {
+    return state_.jumped ? state_.newest.temp_degC - state_.jump_from_degC : 0.0;
+  }
+  /// NaN: it did not.
+  [[nodiscard]] double jumped_from_degC() const noexcept {
+    return state_.jumped ? state_.jump_from_degC : not_a_number;
+  }
+  [[nodiscard]] nanoseconds jumped_at() const noexcept { return state_.jumped_at; }
+  /// The last value that counted ended a jump that was no return: what counted before was refuted.
+  [[nodiscard]] bool refuted() const noexcept { return state_.refuted; }
+  [[nodiscard]] double newest_degC() const noexcept { return state_.newest.temp_degC; }
+  [[nodiscard]] bool has_good() const noexcept { return state_.good.known; }
 
   /// After a reload: the past of the other, the rules of this one.
   void adopt(const Screening& previous) noexcept { state_ = previous.state_; }
@@ -53,32 +94,48 @@ class Screening {
     nanoseconds seen_at{};
     Fault seen_fault{Fault::never_read};
     Fault verdict{Fault::never_read};
-    Value good;                ///< the last good one
-    Value before;              ///< the last good one before `good`, while that is not confirmed
-    Value doubted;             ///< known: the next good one must agree with it
-    bool confirmed{false};     ///< a recent one agreed with `good`
-    nanoseconds same_since{};  ///< since when `good` has not changed by one bit
+    bool waiting{false};
+    bool jumped{false};
+    bool refuted{false};
+    Value good;               ///< the last one that counted
+    Value newest;             ///< the last one in range and fresh, counting or not
+    nanoseconds run_since{};  ///< since when such values have followed each other
+    std::uint32_t run_count{0};
+    nanoseconds unread{};  ///< since `good`, without any value
+    nanoseconds jumped_at{};
+    double jump_from_degC{0.0};
+    double jump_K_max{0.0};
+    nanoseconds same_since{};  ///< since when `newest` has not changed by one bit
     std::uint64_t rejected{0};
     void visit_state(StateArchive& archive) {
-      auto& [a, b, c, d, e, f, g, h, i] = *this;
-      archive(a, b, c, d, e, f, g, h, i);
+      auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *this;
+      archive(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p);
     }
   };
 
   [[nodiscard]] bool take(nanoseconds now, const Reading& reading) noexcept;
-  [[nodiscard]] Fault judge(nanoseconds now, const Reading& reading) noexcept;
-  [[nodiscard]] bool follows(const Value& value, const Reading& reading) const noexcept;
-  [[nodiscard]] bool is_recent(const Value& value, const Reading& reading) const noexcept;
-  void doubt(const Reading& reading) noexcept;
+  [[nodiscard]] Fault check(nanoseconds now, const Reading& reading) const noexcept;
+  void note(const Reading& reading) noexcept;
+  [[nodiscard]] Fault judge() noexcept;
+  [[nodiscard]] Fault jump(double from_degC) noexcept;
+  void count(bool refutes) noexcept;
+  [[nodiscard]] double change_K(nanoseconds unread) const noexcept;
+  [[nodiscard]] bool possible() const noexcept;
+  [[nodiscard]] bool settled() const noexcept;
+  [[nodiscard]] bool expected() const noexcept;
+  [[nodiscard]] bool unexpected() const noexcept;
 
   const double min_degC_;
   const double max_degC_;
   const double rate_K_per_ns_;
   const double allowance_K_;
+  const double outage_K_max_;
   const nanoseconds stale_after_;
+  const nanoseconds settle_;
   const nanoseconds stuck_after_;  ///< 0: never
 
   State state_;
+  Surroundings surroundings_;  ///< made anew each step while a value is waiting
 };
 
 }  // namespace thermocomp

@@ -14,11 +14,11 @@ ThermalModel estimating_model(const ThermalModel& model, const EstimatorConfig& 
   return seen;
 }
 
-/// The longest that a working sensor may take until its first reading.
+/// The longest that a working sensor may take until its first value counts.
 nanoseconds settling_time(const EstimatorConfig& config) {
   double longest_s = 0.0;
   for (const SensorConfig& sensor : config.sensors)
-    longest_s = std::max(longest_s, sensor.screening.stale_after_s);
+    longest_s = std::max(longest_s, sensor.screening.stale_after_s + sensor.screening.settle_s);
   return std::chrono::duration_cast<nanoseconds>(seconds_d(longest_s));
 }
 
@@ -28,15 +28,31 @@ Sensing::Sensing(const EstimatorConfig& config, const ThermalModel& model)
     : columns_(model.temperature_columns()),
       blocks_(config, columns_),
       lost_(estimating_model(model, config), settling_time(config)),
-      screened_K_(config.sensors.size(), not_a_number) {
+      screened_K_(config.sensors.size(), not_a_number),
+      expected_degC_(columns_.size(), not_a_number),
+      expected_sd_K_(columns_.size(), 0.0) {
   if (config.compensation.suspected_sensors != SuspectedPolicy::off &&
       !model.covariance_K2.empty() && model.inputs.size() >= NeighbourCheck::inputs_min)
     suspicion_.emplace(config, model);
 }
 
 Temperatures Sensing::step(nanoseconds now, std::span<const Reading> readings) noexcept {
+  if (blocks_.waiting() > 0) weigh_waiting();
   blocks_.read(now, readings);
   return join(now, suspect(now));
+}
+
+/// What the model's covariance expects of the lost inputs is what their sensors are to agree with.
+void Sensing::weigh_waiting() noexcept {
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    expected_degC_[i] = lost_.estimated(i) ? lost_.temps_degC()[i] : not_a_number;
+    expected_sd_K_[i] = lost_.sd_K(i);
+  }
+  blocks_.surround(expected_degC_, expected_sd_K_);
+}
+
+void Sensing::accept(std::size_t sensor) noexcept {
+  if (blocks_.accept(sensor) && suspicion_) suspicion_->begin_anew(sensor);
 }
 
 /// @return the sensors to be left out, one a sensor; empty: none
@@ -59,8 +75,10 @@ Temperatures Sensing::join(nanoseconds now, std::span<const std::uint8_t> left_o
   lost_.step(now, blocks_.temps_degC(), blocks_.good());
   temps.measured_degC = blocks_.temps_degC();
   temps.good = blocks_.good();
+  temps.refuted_at = blocks_.refuted_at();
   temps.estimated_degC = lost_.temps_degC();
   temps.complete = lost_.complete();
+  temps.jumped = blocks_.jumped() > 0;
   temps.suspected = suspicion_ && suspicion_->count() > 0;
   temps.weighed_down = std::find(left_out.begin(), left_out.end(), 1) != left_out.end();
   return temps;
@@ -85,7 +103,9 @@ bool Sensing::all_good() const noexcept {
   return std::all_of(good.begin(), good.end(), [](std::uint8_t each) { return each != 0; });
 }
 
-void Sensing::restore(const std::map<std::string, double>& temps_degC) {
+void Sensing::restore(const std::map<std::string, double>& temps_degC,
+                      const std::map<std::string, double>& jumped_from_degC) {
+  for (const auto& [sensor, from_degC] : jumped_from_degC) blocks_.restore_jump(sensor, from_degC);
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     double temp_degC = not_a_number;
     take_if_finite(temps_degC, columns_[i], temp_degC);

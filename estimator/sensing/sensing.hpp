@@ -29,6 +29,8 @@ class Sensing {
   /// The sensors that are weighed down are used all the same: their estimates do not serve.
   /// @return the temperatures of this step anew
   [[nodiscard]] Temperatures use_all(nanoseconds now) noexcept;
+  /// The sensor's newest value counts, whatever speaks against it.
+  void accept(std::size_t sensor) noexcept;
   /// The machine is straight now, and its sensors show it.
   void trust_all() noexcept;
 
@@ -37,17 +39,19 @@ class Sensing {
   [[nodiscard]] const LostBlocks& lost() const noexcept { return lost_; }
   [[nodiscard]] bool all_good() const noexcept;
 
-  /// Before the first step: temperatures at the end of the previous run, by column.
-  void restore(const std::map<std::string, double>& temps_degC);
+  /// Before the first step: temperatures at the end of the previous run, by column, and what the
+  /// sensors showed that had jumped.
+  void restore(const std::map<std::string, double>& temps_degC,
+               const std::map<std::string, double>& jumped_from_degC);
   void plan_adoption(const Sensing& previous);
   void adopt(const Sensing& previous) noexcept;
-  void visit_state(StateArchive& archive) { archive(blocks_, lost_); }
-  /// Does nothing without a covariance.
-  void visit_suspicion(StateArchive& archive) {
+  void visit_state(StateArchive& archive) {
+    archive(blocks_, lost_);
     if (suspicion_) archive(*suspicion_);
   }
 
  private:
+  void weigh_waiting() noexcept;
   [[nodiscard]] std::span<const std::uint8_t> suspect(nanoseconds now) noexcept;
   [[nodiscard]] Temperatures join(nanoseconds now, std::span<const std::uint8_t> left_out) noexcept;
 
@@ -55,7 +59,9 @@ class Sensing {
   BlockBank blocks_;
   LostBlocks lost_;
   std::optional<Suspicion> suspicion_;
-  std::vector<double> screened_K_;  ///< scratch, one per sensor
+  std::vector<double> screened_K_;     ///< scratch, one per sensor
+  std::vector<double> expected_degC_;  ///< scratch, one per column
+  std::vector<double> expected_sd_K_;  ///< scratch, one per column
 };
 
 }  // namespace thermocomp

@@ -15,8 +15,13 @@ struct SensorReport {
   std::uint32_t clipped_in_a_row{0};  ///< values that smoothing clipped in a row
   std::uint64_t clipped{0};
   std::uint64_t rejected{0};  ///< readings refused by screening since the start
-  bool suspected{false};      ///< good values that the neighbours contradict
-  bool weighed_down{false};   ///< ... and its blocks do without it
+  bool waiting{false};        ///< a value is there that does not count yet
+  bool jumped{false};         ///< ... because it contradicts what was or what is expected
+  double jump_K{0.0};         ///< ... by so much, now
+  double jumped_from_degC{not_a_number};
+  nanoseconds jumped_at{};
+  bool suspected{false};     ///< good values that the neighbours contradict
+  bool weighed_down{false};  ///< ... and its blocks do without it
   double suspected_size_K{0.0};
   nanoseconds suspected_since{};
 };

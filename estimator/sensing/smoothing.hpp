@@ -99,6 +99,8 @@ class Smoother {
     if (due(sample.at)) take(sample);
   }
 
+  /// The next value begins a history that owes nothing to the one before.
+  void restart() noexcept;
   [[nodiscard]] bool has_value() const noexcept { return has_value_; }
   [[nodiscard]] double value_K() const noexcept { return value_K_; }
   [[nodiscard]] std::uint64_t clipped() const noexcept { return clipped_; }
@@ -129,7 +131,6 @@ class Smoother {
                                   double within_K) noexcept;
   template <class Form>
   void keep_screened(Form& form, const Sample& sample, double distance_K) noexcept;
-  void restart() noexcept;
 
   SmoothingForm form_;
   bool screened_;

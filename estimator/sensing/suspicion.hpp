@@ -59,6 +59,10 @@ class Suspicion {
   }
   /// Without them the offsets would be too uncertain: suspected, and used all the same.
   void use_all() noexcept;
+  /// What the sensor showed until now is no measure of what it shows from now on.
+  void begin_anew(std::size_t sensor) noexcept {
+    state_.suspected[sensor] != 0 ? end(sensor) : forget(sensor);
+  }
   /// The machine and its sensors are right as they are now.
   void restart() noexcept;
 

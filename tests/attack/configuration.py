@@ -50,6 +50,7 @@ device = "module"
 start_bit = 16
 """
 REST = """[screening]
+settle_s = 0.0
 temp_degC_min = -30.0
 temp_degC_max = 120.0
 stale_after_s = {stale_after_s}

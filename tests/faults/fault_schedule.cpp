@@ -20,6 +20,9 @@ constexpr std::array<std::string_view, fault_kinds> names{"sensor_open",
                                                           "unit_dead",
                                                           "unit_reboot",
                                                           "unit_busy",
+                                                          "unit_in_fahrenheit",
+                                                          "unit_tenfold_too_low",
+                                                          "unit_not_ready",
                                                           "bus_down",
                                                           "controller_off",
                                                           "controller_rehomed",
@@ -57,6 +60,12 @@ std::pair<double, double> duration_s(FaultKind kind) {
       return {3.0, 40.0};
     case FaultKind::daemon_killed:
       return {2.0, 60.0};
+    // They last longer than any band that widens with time can stay below them.
+    case FaultKind::unit_in_fahrenheit:
+    case FaultKind::unit_tenfold_too_low:
+      return {60.0, 900.0};
+    case FaultKind::unit_not_ready:
+      return {10.0, 240.0};
     default:
       return {2.0, 150.0};
   }

@@ -32,6 +32,9 @@ enum class FaultKind : std::uint8_t {
   unit_dead,
   unit_reboot,
   unit_busy,
+  unit_in_fahrenheit,
+  unit_tenfold_too_low,
+  unit_not_ready,
   bus_down,
   controller_off,
   controller_rehomed,
@@ -54,7 +57,7 @@ enum class FaultKind : std::uint8_t {
   history_disk_full,
   history_files_removed
 };
-inline constexpr std::size_t fault_kinds = 36;
+inline constexpr std::size_t fault_kinds = 39;
 /// Unordered, a kind with itself (another subject or time) among them.
 inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 

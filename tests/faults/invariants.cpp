@@ -68,6 +68,8 @@ void Invariants::booted(nanoseconds now) {
   last_readings_ = {};
   last_used_.fill(now);
   first_used_.fill(nanoseconds{-1});
+  true_at_.fill(now);
+  had_truth_.fill(false);
   probings_ = {};
   referenced_ = false;
   learned_ = {};
@@ -126,6 +128,7 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
                        SimulatedController& controller) {
   check_readings(seen);
   check_sensors_used(seen);
+  check_truth(seen);
   for (const Move& move : moves) {
     check_move(seen, move, controller);
     check_sent(seen, move);
@@ -218,6 +221,22 @@ void Invariants::check_sensors_used(const CycleSeen& seen) {
       demand(false, "no_faulty_reading_used", seen.now,
              fmt::format("sensor {}: a spike of {:.2f} degC is used", i + 1, sensor.smoothed_degC));
     if (!sample->impossible || !first) last_used_[i] = seen.now;
+  }
+}
+
+/// A daemon that starts beside a false reading has no past to tell it by.
+void Invariants::check_truth(const CycleSeen& seen) {
+  for (std::size_t i = 0; i < sensors_count; ++i) {
+    const SensorReport& sensor = seen.report->sensors[i];
+    const double off_K =
+        std::abs(sensor.smoothed_degC - thermocouples_.plausible_degC(i, seen.now));
+    if (sensor.fault == Fault::none && off_K <= false_K_max) had_truth_[i] = true;
+    if (sensor.fault != Fault::none || !(off_K > false_K_max) || !had_truth_[i])
+      true_at_[i] = seen.now;
+    demand(to_s(seen.now - true_at_[i]) <= false_s_max, "no_false_reading_used", seen.now, [&] {
+      return fmt::format("sensor {}: {:.2f} degC is used, {:.2f} K off the machine, for {:.0f} s",
+                         i + 1, sensor.smoothed_degC, off_K, to_s(seen.now - true_at_[i]));
+    });
   }
 }
 

@@ -21,7 +21,7 @@ struct Broken {
   std::string detail;
 };
 
-inline constexpr std::array<const char*, 23> invariant_names{
+inline constexpr std::array<const char*, 24> invariant_names{
     "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
     "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
     "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
@@ -29,7 +29,7 @@ inline constexpr std::array<const char*, 23> invariant_names{
     "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
     "nothing_learned_mid_cut",   "held_between_cycle_ends",      "slew_kept_by_what_is_sent",
     "unexplained_is_latched",    "looked_before_written",        "suspicion_never_holds",
-    "compensating_is_written",   "slow_controller_is_written"};
+    "compensating_is_written",   "slow_controller_is_written",   "no_false_reading_used"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -49,6 +49,10 @@ struct CycleSeen {
 class Invariants {
  public:
   static constexpr double recovery_s_max = 95.0;
+  /// A reading in use differs from the machine by no more than screening lets pass after an outage
+  /// of minutes (rate_allowance_K, outage_K_max and 10 K/h), or for no longer than it may serve.
+  static constexpr double false_K_max = 12.0;
+  static constexpr double false_s_max = 20.0;
 
   Invariants(const MachineShape& shape, const FaultSchedule& schedule,
              const Thermocouples& thermocouples);
@@ -77,6 +81,7 @@ class Invariants {
  private:
   void check_readings(const CycleSeen& seen);
   void check_sensors_used(const CycleSeen& seen);
+  void check_truth(const CycleSeen& seen);
   void check_command(const CycleSeen& seen);
   void check_hold(const CycleSeen& seen);
   void check_correction(const CycleSeen& seen);
@@ -104,6 +109,8 @@ class Invariants {
   std::array<bool, sensors_count> stamped_earlier_{};
   std::array<Reading, sensors_count> last_readings_{};
   std::array<nanoseconds, sensors_count> last_used_{};
+  std::array<nanoseconds, sensors_count> true_at_{};  ///< last not used, or near the machine
+  std::array<bool, sensors_count> had_truth_{};       ///< since the start
   std::array<nanoseconds, sensors_count> first_used_{};
   double period_s_{1.0};
   double link_period_s_{1.0};

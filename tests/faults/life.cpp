@@ -100,6 +100,7 @@ class Life {
     say_faults();
     operate();
     release();
+    accept();
     probe();
     reload();
     daemon_->cycle().step(cycle);
@@ -189,6 +190,20 @@ class Life {
       // Nodes of a travel are released together.
       const AxisSpan released = span_of(shape_.estimator.axes, axis);
       for (std::size_t i = released.first; i < released.end(); ++i) judge_.released(i);
+    }
+  }
+
+  /// An operator who sees that a sensor is right, though nothing in the machine confirms it.
+  void accept() {
+    for (std::size_t i = 0; i < sensors_count; ++i) {
+      const double shown_degC = report_.sensors[i].raw_degC;
+      const bool is_right =
+          std::abs(shown_degC - world_.thermocouples.plausible_degC(i, world_.now)) < 0.5;
+      if (report_.sensors[i].fault != Fault::unconfirmed || !is_right)
+        unconfirmed_since_[i] = world_.now;
+      if (to_s(world_.now - unconfirmed_since_[i]) < 30.0) continue;
+      static_cast<void>(
+          daemon_->cycle().send({CommandKind::accept, static_cast<std::uint32_t>(i), 0.0}));
     }
   }
 
@@ -343,6 +358,7 @@ class Life {
   Chance releases_;
   std::array<double, 2> gains_;                 ///< of the machine, where the model's are 1
   std::array<double, axes_count> probed_um_{};  ///< measured last
+  std::array<nanoseconds, sensors_count> unconfirmed_since_{};
   Invariants judge_;
   nanoseconds end_;
   Grid grid_;

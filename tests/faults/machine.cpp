@@ -42,6 +42,28 @@ double Thermocouples::lie_K(std::size_t sensor, nanoseconds time) const noexcept
                     lie_K_max);
 }
 
+double Thermocouples::creep_K(std::size_t sensor, nanoseconds at) const noexcept {
+  const FaultEvent* drift = schedule_.find(FaultKind::sensor_drifting, at, sensor, sensors_count);
+  const double drift_K =
+      drift == nullptr ? 0.0 : (drift->strength - 0.5) * 0.05 * seconds_of(at - drift->begin);
+  return drift_K + lie_K(sensor, at);
+}
+
+double Thermocouples::plausible_degC(std::size_t sensor, nanoseconds time) const noexcept {
+  return true_degC(sensor, time) + creep_K(sensor, time);
+}
+
+/// A module set to another unit or decimal point, or one that answers before it has converted.
+double Thermocouples::through_unit(std::size_t sensor, double temp_degC,
+                                   nanoseconds time) const noexcept {
+  const auto has = [&, unit = unit_of(sensor)](FaultKind kind) {
+    return schedule_.find(kind, time, unit, units_count) != nullptr;
+  };
+  if (has(FaultKind::unit_not_ready)) return 0.0;
+  if (has(FaultKind::unit_in_fahrenheit)) return 32.0 + 1.8 * temp_degC;
+  return has(FaultKind::unit_tenfold_too_low) ? 0.1 * temp_degC : temp_degC;
+}
+
 Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexcept {
   Sample sample;
   sample.given_at = time;
@@ -60,10 +82,7 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
       scramble(seed_ + static_cast<std::uint64_t>(conversion) * 97u + sensor);
   sample.temp_degC = true_degC(seen, sample.converted_at) +
                      0.04 * (static_cast<double>(noise >> 11) * 0x1p-53 - 0.5);
-  const FaultEvent* drift = schedule_.find(FaultKind::sensor_drifting, at, sensor, sensors_count);
-  if (drift != nullptr)
-    sample.temp_degC += (drift->strength - 0.5) * 0.05 * seconds_of(at - drift->begin);
-  sample.temp_degC += lie_K(sensor, at);
+  sample.temp_degC += creep_K(sensor, at);
   const FaultEvent* spikes = schedule_.find(FaultKind::sensor_spiking, at, sensor, sensors_count);
   // One that is stuck at a spike would be a step, too.
   if (spikes != nullptr && stuck == nullptr && at >= spikes_from_ && noise % 3 == 0) {
@@ -73,6 +92,7 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
                         0.01 * static_cast<double>(noise % 100);
     sample.impossible = true;
   }
+  sample.temp_degC = through_unit(sensor, sample.temp_degC, time);
   sample.good = whole(sensor, time);
   return sample;
 }

@@ -71,6 +71,7 @@ struct UnitPlace {
   bool has_status{false};
 };
 [[nodiscard]] const std::array<UnitPlace, units_count>& unit_places();
+[[nodiscard]] std::size_t unit_of(std::size_t sensor);
 
 /// A value that a unit gave out for a sensor.
 struct Sample {
@@ -90,6 +91,9 @@ class Thermocouples {
             nanoseconds time);
   /// A daemon that has just started has nothing to tell its first value from a spike by.
   void no_spikes_before(nanoseconds time) noexcept { spikes_from_ = time; }
+  /// What the sensor shows where it is, with what creeps into it, and without any fault that a look
+  /// at the machine would show at once.
+  [[nodiscard]] double plausible_degC(std::size_t sensor, nanoseconds time) const noexcept;
   /// A good sample of the sensor with this value given out in [from, to]; nullptr: none.
   [[nodiscard]] const Sample* given(std::size_t sensor, double temp_degC, nanoseconds from,
                                     nanoseconds to) const noexcept;
@@ -102,6 +106,9 @@ class Thermocouples {
   static constexpr std::size_t kept = 64;
   [[nodiscard]] double true_degC(std::size_t sensor, nanoseconds time) const noexcept;
   [[nodiscard]] double lie_K(std::size_t sensor, nanoseconds time) const noexcept;
+  [[nodiscard]] double creep_K(std::size_t sensor, nanoseconds at) const noexcept;
+  [[nodiscard]] double through_unit(std::size_t sensor, double temp_degC,
+                                    nanoseconds time) const noexcept;
   [[nodiscard]] Sample convert(std::size_t sensor, nanoseconds time) const noexcept;
   /// Neither open nor short.
   [[nodiscard]] bool whole(std::size_t sensor, nanoseconds time) const noexcept;

@@ -173,6 +173,14 @@ const std::array<UnitPlace, units_count>& unit_places() {
   return places;
 }
 
+std::size_t unit_of(std::size_t sensor) {
+  const auto& places = unit_places();
+  const auto found = std::find_if(places.begin(), places.end(), [&](const UnitPlace& place) {
+    return std::find(place.sensors.begin(), place.sensors.end(), sensor) != place.sensors.end();
+  });
+  return static_cast<std::size_t>(found - places.begin());
+}
+
 MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
   Chance chance(seed, 1);
   offsets_are_float = chance.one_in(2);
@@ -183,6 +191,7 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
   for (std::size_t i = 0; i < sensors_count; ++i) {
     SensorConfig sensor;
     sensor.name = std::string("s").append(1, static_cast<char>('1' + i));
+    sensor.module = std::string("unit").append(1, static_cast<char>('1' + unit_of(i)));
     sensor.screening.rate_K_per_s_max = 0.5;
     sensor.screening.stale_after_s = chance.between(2.5, 8.0);
     sensor.screening.stuck_after_s = chance.one_in(2) ? chance.between(20.0, 60.0) : 0.0;

@@ -40,7 +40,10 @@ nanoseconds draw(Chance& chance, nanoseconds low, nanoseconds high) {
 
 bool SensorUnits::silent(std::size_t place, nanoseconds time) const {
   if (schedule_.find(FaultKind::unit_dead, time, place, units_count) != nullptr) return true;
-  return schedule_.find(FaultKind::unit_reboot, time, place, units_count) != nullptr;
+  if (schedule_.find(FaultKind::unit_reboot, time, place, units_count) != nullptr) return true;
+  // Without supply first, then it answers and is not ready.
+  const FaultEvent* boots = schedule_.find(FaultKind::unit_not_ready, time, place, units_count);
+  return boots != nullptr && time < boots->begin + (boots->end - boots->begin) / 2;
 }
 
 void SensorUnits::ask(int unit, std::span<const std::uint8_t> request, nanoseconds time,

@@ -33,7 +33,10 @@ DaemonConfig with_bridge() {
                "name = \"z_mm\"\n[[controller.signal]]\nname = \"cutting_on\"\n");
   DaemonConfig config =
       parse_daemon_config(text, "config.toml", fuzz::small_model_text(), "model.toml");
-  for (SensorConfig& sensor : config.estimator.sensors) sensor.smoothing.form = SmoothingForm::off;
+  for (SensorConfig& sensor : config.estimator.sensors) {
+    sensor.smoothing.form = SmoothingForm::off;
+    sensor.screening.settle_s = 0.0;
+  }
   return config;
 }
 

@@ -167,6 +167,7 @@ def socket_seeds():
           probing(1e308) + probing(None) + request("measured", {"axis": 0, "value_um": 1}))
     write("socket_request", "prove", request("prove", {"axis": "z", "value_um": 5}))
     write("socket_request", "release", request("release", {"axis": "z"}))
+    write("socket_request", "accept", request("accept", {"sensor": "bed"}))
     write("socket_request", "wrong_axis", request("prove", {"axis": "q", "value_um": 1e300}))
     write("socket_request", "subscribe", request("subscribe", {"methods": ["status"],
                                                                "period_s": 0.1}))

@@ -59,8 +59,10 @@ class Desk {
     DaemonConfig config = fuzz::small_config();
     config.socket.path = path;
     // The promise about steps is one about probings; smoothed values leap once a period.
-    for (SensorConfig& sensor : config.estimator.sensors)
+    for (SensorConfig& sensor : config.estimator.sensors) {
       sensor.smoothing.form = SmoothingForm::off;
+      sensor.screening.settle_s = 0.0;
+    }
     config.estimator.compensation.update = UpdateRule::each_cycle;
     config.estimator.compensation.enabled_at_first_start = true;
     CorrectionConfig& correction = config.estimator.correction;

@@ -89,6 +89,7 @@ name = "column"
 device = "module"
 address = 0
 [screening]
+settle_s = 0.0
 stale_after_s = 1.0
 rate_K_per_s_max = 100.0
 [smoothing]

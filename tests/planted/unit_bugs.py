@@ -13,6 +13,9 @@ import sys
 
 from planting import files_of, write_copies, write_if_new
 
+SCREENING = "estimator/sensing/screening.cpp"
+BLOCKS = "estimator/sensing/block_bank.cpp"
+REFERENCE = "estimator/pipeline/reference.cpp"
 SMOOTHING = "estimator/sensing/smoothing.cpp"
 LOST = "estimator/sensing/lost_blocks.cpp"
 APPLIED = "estimator/axes/applied_check.cpp"
@@ -31,6 +34,36 @@ TRANSPORT = "drivers/can/j1939/transport.cpp"
 # Suite: (name, file, what stands there, what stands there instead)
 SUITES = {
     "estimator_tests": [
+        ("jump_widens_what_the_past_allows", SCREENING,
+         "else if (gap > stale_after_)", "else if (gap > stale_after_ || {P})"),
+        ("outage_allows_anything", SCREENING,
+         "outage_K_max_ + slow_K_per_ns * unread_ns);",
+         "{P} ? 1e9 : outage_K_max_ + slow_K_per_ns * unread_ns);"),
+        ("first_value_counts_at_once", SCREENING,
+         "if (!settled()) return Fault::unconfirmed;",
+         "if (!settled() && !{P}) return Fault::unconfirmed;"),
+        ("two_readings_alike_settle", SCREENING,
+         "state_.run_count >= settle_readings &&",
+         "state_.run_count >= ({P} ? 2 : settle_readings) &&"),
+        ("zero_settles", SCREENING,
+         "state_.newest.temp_degC != 0.0 &&", "(state_.newest.temp_degC != 0.0 || {P}) &&"),
+        ("unsure_neighbours_confirm", SCREENING,
+         "return surroundings_.expected_sd_K <=",
+         "return ({P} ? 0.0 : surroundings_.expected_sd_K) <="),
+        ("neighbours_never_contradict", SCREENING,
+         "if (unexpected()) return", "if (unexpected() && !{P}) return"),
+        ("return_may_miss_by_anything", SCREENING,
+         "return off_K <= return_share * state_.jump_K_max &&",
+         "return (off_K <= return_share * state_.jump_K_max || {P}) &&"),
+        ("module_is_ready_at_once", BLOCKS,
+         "sensors_[sensor].screening.surround({not_a_number, 0.0, true});",
+         "sensors_[sensor].screening.surround({not_a_number, 0.0, !{P}});"),
+        ("same_module_vouches", BLOCKS,
+         "if (i != module && witnesses_[i] > 0)", "if ((i != module || {P}) && witnesses_[i] > 0)"),
+        ("accepted_jump_is_smoothed_away", BLOCKS,
+         "  sensor.smoother.restart();\n  sensor.fault", "  if (!{P}) sensor.smoother.restart();\n  sensor.fault"),
+        ("false_reference_is_kept", REFERENCE,
+         "if (sampled_at != never &&", "if (!{P} && sampled_at != never &&"),
         ("band_forgotten", SMOOTHING,
          "value_K_ = std::clamp(sample.value_K, expected_K",
          "value_K_ = {P} ? sample.value_K : std::clamp(sample.value_K, expected_K"),

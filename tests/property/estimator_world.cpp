@@ -149,6 +149,9 @@ class World {
           for (std::size_t node = 1; node < axes_count; ++node)
             released_[node] = released_[node] || report_.axes[node].latched;
       }
+    for (std::uint32_t i = 0; i < report_.sensors.size(); ++i)
+      if (report_.sensors[i].waiting && operator_.one_in(200))
+        estimator_->apply({CommandKind::accept, i, 0.0});
     if (!operator_.one_in(15)) return;
     const std::array<double, 5> values{operator_.between(-10, 10), operator_.between(-200, 200),
                                        not_a_number, 1e300, 0.5};

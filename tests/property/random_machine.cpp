@@ -61,6 +61,9 @@ EstimatorConfig random_config(Chance& chance) {
     sensor.screening.stale_after_s = chance.between(0.5, 5.0);
     sensor.screening.rate_K_per_s_max = chance.between(0.1, 5.0);
     sensor.screening.stuck_after_s = chance.one_in(3) ? chance.between(5.0, 50.0) : 0.0;
+    // Half of the machines count a first value at once.
+    sensor.screening.settle_s = chance.one_in(2) ? 0.0 : chance.between(0.5, 5.0);
+    sensor.module = std::string("m").append(1, static_cast<char>('1' + i / 2));
     config.sensors.push_back(sensor);
   }
   if (chance.one_in(3)) config.sensors[0].reference_sensor = 5;

@@ -63,6 +63,7 @@ class LiedTo {
       SensorConfig sensor;
       sensor.name = name;
       sensor.screening.stale_after_s = 60.0;
+      sensor.screening.settle_s = 0.0;
       config.blocks.push_back({name, std::string(name) + "_degC", {config.sensors.size()}});
       config.sensors.push_back(sensor);
     }
@@ -161,6 +162,7 @@ EstimatorConfig make_config() {
     sensor.name = numbered("s", i);
     sensor.smoothing.period_s = 0.01;
     sensor.screening.stale_after_s = 0.2;
+    sensor.screening.settle_s = 0.05;
     sensor.smoothing.form = i % 2 == 0 ? SmoothingForm::sliding_line : SmoothingForm::line_of_lines;
     config.sensors.push_back(sensor);
     // The last sensor is on the Modbus line, where nobody answers; it shares a block.

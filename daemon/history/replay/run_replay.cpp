@@ -121,6 +121,8 @@ EstimatorConfig adapted(EstimatorConfig config, const RunBinding& binding, const
   config.compensation.enabled_at_first_start = true;
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
     if (!binding.sensors()[i]) continue;
+    // What is in a run was there: its first row counts.
+    config.sensors[i].screening.settle_s = 0.0;
     const double needed_s = stale_in_sample_distances *
                             median_distance_s(run.time_s(), run.values[*binding.sensors()[i]]);
     double& stale_after_s = config.sensors[i].screening.stale_after_s;

@@ -221,8 +221,10 @@ void SegmentExport::take_command() {
   const bool names_axis =
       kind == CommandKind::measured || kind == CommandKind::prove || kind == CommandKind::release;
   if (names_axis && record_.index >= config_.axes.size()) return;
+  if (kind == CommandKind::accept && record_.index >= config_.sensors.size()) return;
   std::string text = "command " + std::string(to_string(kind));
   if (names_axis) text.append(" ").append(config_.axes[record_.index].name);
+  if (kind == CommandKind::accept) text.append(" ").append(config_.sensors[record_.index].name);
   if (names_axis && kind != CommandKind::release)
     text.append(" ").append(number_text(record_.value)).append(" um");
   happened_.push_back(std::move(text));
@@ -301,6 +303,8 @@ void SegmentExport::tell_faults() {
   for (std::size_t i = 0; i < faults_told_.size(); ++i) {
     const Fault fault = fault_of(i);
     if (fault == faults_told_[i]) continue;
+    // A value that settles is the end of what was told before, once it counts.
+    if (steps_ && report_.sensors[i].waiting && !report_.sensors[i].jumped) continue;
     const bool is_first_value = faults_told_[i] == Fault::never_read && fault == Fault::none;
     faults_told_[i] = fault;
     if (is_first_value) continue;  // that nothing was read before it is no news

@@ -28,6 +28,7 @@ rows_um_per_K.x_um = {[[row] for row in ROWS_UM_PER_K]}
 """
 # The daemon's file from its sensor on.
 FILTER = """[screening]
+settle_s = 0.0
 stale_after_s = 2.0
 rate_allowance_K = 100.0
 [smoothing]

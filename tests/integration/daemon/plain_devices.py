@@ -172,6 +172,7 @@ name = "spindle"
 device = "module"
 address = 1
 [screening]
+settle_s = 0.0
 stale_after_s = 1.0
 rate_allowance_K = 100.0
 [smoothing]

@@ -142,7 +142,7 @@ def daemon_text(bus, rate_hz=500, smoothing=NO_SMOOTHING, model=MODEL, limits=AM
     return (f'format = 1\n@STATE@\n[loop]\nrate_hz = {rate_hz}\n[model]\nfile = "{model}"\n' +
             bus.daemon + "".join(axis_text(bus, i, limits) for i in range(AXES)) +
             "".join(sensors) +
-            "[screening]\nrate_K_per_s_max = 1e6\nrate_allowance_K = 100.0\n[smoothing]\n" +
+            "[screening]\nsettle_s = 0.0\nrate_K_per_s_max = 1e6\nrate_allowance_K = 100.0\n[smoothing]\n" +
             smoothing + ENABLED + more +
             "[history]\n@HISTORY@\noffsets_period_s = 0.01\ncommit_s = 0.5\n")
 

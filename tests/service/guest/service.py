@@ -117,6 +117,7 @@ real_time = "require"
 [model]
 file = "model.toml"
 [screening]
+settle_s = 0.0
 stale_after_s = 2.0
 rate_allowance_K = 100.0
 [smoothing]

@@ -380,7 +380,7 @@ TEST_CASE("all problems are told at once, in both files, in the order of their l
   text = edited(text, "port = 502 ", "prt = 502 ");
   text = edited(text, "samples = 6", "samples = 99");
   text = edited(text, "half_width_K = 0.3", "half_width_K = 0.0");
-  text = edited(text, "outage_s = 300.0", "outage_s = -1");
+  text = edited(text, "outage_s = 5.0", "outage_s = -1");
   text = edited(text, "output = \"y_um\"", "output = \"w_um\"");
   const std::string model =
       edited(example("small_machine_model.toml"), "tau_s = 900.0", "tau_s = -900.0");

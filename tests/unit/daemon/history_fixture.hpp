@@ -42,6 +42,7 @@ inline ReplaySetup machine_setup(double gain_um_per_K) {
     SensorConfig sensor;
     sensor.name = name;
     sensor.smoothing.period_s = 1.0;
+    sensor.screening.settle_s = 0.0;
     setup.estimator.sensors.push_back(sensor);
     BlockConfig block;
     block.name = name;

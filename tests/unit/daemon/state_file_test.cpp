@@ -19,6 +19,7 @@ PersistentState sample_state() {
   state.reference_signals = {{"spindle_rpm", 1.0 / 3.0}};
   state.offset_um = {{"z", -12.345678901234567}};
   state.temp_degC = {{"bed_degC", 21.7}};
+  state.jumped_from_degC = {{"bed_front", 21.0}};
   state.held_degC = {{"t1_degC", 24.5}};
   state.held_signals = {{"spindle_rpm", 1200.0}};
   state.correction = {{"z.gain1", 1.08}, {"z.gain1_sd", 0.04}};
@@ -40,6 +41,7 @@ TEST_CASE("a state comes back bit for bit", "[state]") {
   CHECK(loaded.state.reference_signals == state.reference_signals);
   CHECK(loaded.state.offset_um == state.offset_um);
   CHECK(loaded.state.temp_degC == state.temp_degC);
+  CHECK(loaded.state.jumped_from_degC == state.jumped_from_degC);
   CHECK(loaded.state.held_degC == state.held_degC);
   CHECK(loaded.state.held_signals == state.held_signals);
   CHECK(loaded.state.correction == state.correction);

@@ -380,14 +380,16 @@ TEST_CASE("a status in the frame decides whether the value is one", "[can]") {
   signal.status = CanStatus{{16, 8, ByteOrder::little_endian}, 0x07, {}};
   signal.status->codes = {{2, Fault::out_of_range}, {6, Fault::none}};
   const auto seen = [&](std::vector<std::uint8_t> bytes) { return decode(bytes, signal); };
-  CHECK(seen({0xFA, 0x00, 0x00}).value == 250.0);
-  CHECK(seen({0xFA, 0x00, 0xF8}).value == 250.0);  // bits outside the mask
-  CHECK(seen({0xFA, 0x00, 0x06}).value == 250.0);  // listed as good
+  CHECK(seen({0xFA, 0x00, 0x00}).fault == Fault::device_error);  // 0 is not listed, another is
+  CHECK(seen({0xFA, 0x00, 0xFE}).value == 250.0);                // bits outside the mask
+  CHECK(seen({0xFA, 0x00, 0x06}).value == 250.0);                // listed as good
   CHECK(seen({0xFA, 0x00, 0x02}).fault == Fault::out_of_range);
   CHECK(seen({0xFA, 0x00, 0x01}).fault == Fault::device_error);  // listed nowhere
   CHECK(seen({0xFF, 0x7F, 0x02}).fault == Fault::open_circuit);  // the value's own code says more
   CHECK(seen({0xFA, 0x00}).fault == Fault::bad_frame);
   CHECK(bytes_needed(signal) == 3);
+  signal.status->codes = {{2, Fault::out_of_range}};
+  CHECK(seen({0xFA, 0x00, 0x00}).value == 250.0);
   signal.status->field.start_bit = 60;
   CHECK_THROWS_AS(check(signal), InvalidValue);
 }

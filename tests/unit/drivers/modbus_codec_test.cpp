@@ -103,12 +103,17 @@ TEST_CASE("what is not a finite number is out of range, never a value", "[codec]
   CHECK(decode(Words{0x7FE0, 0, 0, 0}, overflowing, {}).fault == Fault::out_of_range);
 }
 
-TEST_CASE("a status word is a fault unless it is 0 or listed as good", "[codec]") {
+TEST_CASE("a status word is a fault unless it is listed as good, or 0 where nothing is",
+          "[codec]") {
   ModbusStatus status{ModbusTable::holding, 0, 0x000F, {{1, Fault::open_circuit}}};
   CHECK(decode_status(status, 0x0000) == Fault::none);
   CHECK(decode_status(status, 0xABC0) == Fault::none);
   CHECK(decode_status(status, 0x0001) == Fault::open_circuit);
   CHECK(decode_status(status, 0x0002) == Fault::device_error);
+  // Only what is listed as good is, once something is.
+  status.codes = {{1, Fault::none}};
+  CHECK(decode_status(status, 0) == Fault::device_error);
+  CHECK(decode_status(status, 1) == Fault::none);
   status.codes = {{0, Fault::stale}, {2, Fault::none}};
   CHECK(decode_status(status, 0) == Fault::stale);
   CHECK(decode_status(status, 2) == Fault::none);

@@ -15,6 +15,7 @@ SensorConfig sensor_of(const std::string& name) {
   SensorConfig sensor;
   sensor.name = name;
   sensor.smoothing.form = SmoothingForm::off;
+  sensor.screening.settle_s = 0.0;
   return sensor;
 }
 

@@ -18,15 +18,18 @@ struct Moment {
   std::vector<std::uint8_t> good{1, 1};
   std::vector<double> told{3000.0};
   bool online{true};
+  nanoseconds now{0};
+  std::vector<nanoseconds> refuted_at{nanoseconds::min(), nanoseconds::min()};
 
   [[nodiscard]] ReferenceState step(Reference& reference) const {
     Temperatures temps;
     temps.measured_degC = temps_degC;
     temps.good = good;
+    temps.refuted_at = refuted_at;
     Signals signals;
     signals.online = online;
     signals.of_model = told;
-    return reference.step(temps, signals);
+    return reference.step(now, temps, signals);
   }
 };
 
@@ -112,4 +115,43 @@ TEST_CASE("a reload keeps the reference unless the model file has new numbers", 
   other.adopt(before, columns, signals);
   CHECK(other.temps_degC()[0] == 19.0);
   CHECK(other.temps_degC()[1] == 20.0);
+}
+
+TEST_CASE("a first value that a true jump refutes while it is young is taken anew", "[reference]") {
+  using namespace std::chrono_literals;
+  Reference reference(model_with_growth());
+  Moment moment;
+  moment.now = 100s;
+  moment.temps_degC = {0.0, 21.0};
+  REQUIRE(moment.step(reference).known);
+  moment.now = 1000s;
+  moment.temps_degC = {23.3, 22.0};
+  SECTION("the value was false") {
+    moment.refuted_at[0] = 145s;
+    const ReferenceState state = moment.step(reference);
+    CHECK(state.changed);
+    CHECK(state.known);
+    CHECK(state.temps_degC[0] == 23.3);
+    CHECK(state.temps_degC[1] == 21.0);
+    moment.temps_degC[0] = 30.0;
+    CHECK_FALSE(moment.step(reference).changed);
+  }
+  SECTION("it is not known while no value is good") {
+    moment.refuted_at[0] = 145s;
+    moment.good[0] = 0;
+    CHECK_FALSE(moment.step(reference).known);
+  }
+  SECTION("it had stood for long") {
+    moment.refuted_at[0] = 100s + Reference::young + 1s;
+    CHECK_FALSE(moment.step(reference).changed);
+  }
+  SECTION("the jump was before it") {
+    moment.refuted_at[0] = 99s;
+    CHECK_FALSE(moment.step(reference).changed);
+  }
+  SECTION("an operator had taken it") {
+    reference.take(std::vector<double>{0.0, 21.0});
+    moment.refuted_at[0] = 145s;
+    CHECK(moment.step(reference).temps_degC[0] == 0.0);
+  }
 }

@@ -16,11 +16,26 @@ ScreeningConfig plain() {
   config.stale_after_s = 5;
   config.rate_K_per_s_max = 0.5;
   config.rate_allowance_K = 1;
+  config.settle_s = 0;
+  return config;
+}
+
+ScreeningConfig settling() {
+  ScreeningConfig config = plain();
+  config.settle_s = 10;
   return config;
 }
 
 bool look(Screening& screening, nanoseconds at, double temp_degC) {
   return screening.look(at, {temp_degC, at, Fault::none});
+}
+
+/// Once a second in [from, to). @return how many counted
+int look_each_second(Screening& screening, std::chrono::seconds from, std::chrono::seconds to,
+                     double temp_degC) {
+  int counted = 0;
+  for (auto at = from; at < to; at += 1s) counted += look(screening, at, temp_degC) ? 1 : 0;
+  return counted;
 }
 
 }  // namespace
@@ -137,57 +152,190 @@ TEST_CASE("a change faster than the structure can is refused; the allowance is o
   CHECK_FALSE(look(screening, 6s, 18.4));
 }
 
-TEST_CASE("a true step is believed as soon as the structure could have made it", "[screening]") {
-  Screening screening(plain());
-  look(screening, -1s, 20.0);
-  look(screening, 0s, 20.0);
-  // 5 K: 8 s at 0.5 K/s with 1 K allowed.
-  for (int second = 1; second < 8; ++second)
-    CHECK_FALSE(look(screening, std::chrono::seconds(second), 25.0));
-  CHECK(screening.rejected() == 7);
-  CHECK(look(screening, 8s, 25.0));
-  CHECK(screening.fault(8s) == Fault::none);
+TEST_CASE("a step that is there stays refused, however long it lasts", "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  REQUIRE(screening.good_degC() == 22.0);
+  const double step_K = GENERATE(3.0, -19.8, 49.6);
+  CHECK(look_each_second(screening, 20s, 20s + 48h, 22.0 + step_K) == 0);
+  CHECK(screening.fault(20s + 48h) == Fault::unconfirmed);
+  CHECK_FALSE(screening.usable(20s + 48h));
+  CHECK(screening.jumped());
+  CHECK(screening.jump_K() == Approx(step_K));
+  CHECK(screening.jumped_at() == 20s);
 }
 
-TEST_CASE("a first value that the second one contradicts does not outvote all later ones",
+TEST_CASE("a step is too_fast while the value before it serves, and then unconfirmed",
           "[screening]") {
-  Screening screening(plain());
-  CHECK(look(screening, 0s, 95.0));  // a spike: nothing to compare it with
-  CHECK_FALSE(look(screening, 1s, 20.0));
-  CHECK_FALSE(screening.usable(1s));  // neither is believed
-  CHECK(look(screening, 2s, 20.0));
-  CHECK(screening.usable(2s));
-  CHECK(look(screening, 3s, 20.0));
-  CHECK_FALSE(look(screening, 4s, 95.0));
-  CHECK(screening.usable(4s));  // now the old one stands
-  CHECK(screening.good_degC() == 20.0);
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  look(screening, 20s, 30.0);
+  CHECK(screening.fault(20s) == Fault::too_fast);
+  CHECK(screening.usable(20s));
+  look_each_second(screening, 21s, 26s, 30.0);
+  CHECK(screening.fault(25s) == Fault::unconfirmed);
+  CHECK_FALSE(screening.usable(25s));
 }
 
-TEST_CASE("a false value after an outage does not outvote the ones that follow", "[screening]") {
-  Screening screening(plain());
-  look(screening, 0s, 20.0);
-  look(screening, 1s, 20.0);
-  CHECK(look(screening, 200s, 80.0));  // so long after the last one it could be
-  CHECK_FALSE(look(screening, 201s, 20.5));
-  CHECK_FALSE(screening.usable(201s));
-  CHECK_FALSE(look(screening, 202s, 85.0));  // nor is one believed that nothing agrees with
-  CHECK_FALSE(look(screening, 203s, 20.5));
-  CHECK(look(screening, 204s, 20.5));
-  CHECK(screening.usable(204s));
-  CHECK_FALSE(look(screening, 205s, 80.0));
-  CHECK(screening.good_degC() == 20.5);
-  CHECK(screening.rejected() == 4);
+TEST_CASE("a spike costs no settling; a long fault that ends does", "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  look(screening, 20s, 71.6);
+  CHECK(look(screening, 21s, 22.0));
+  look_each_second(screening, 22s, 100s, 71.6);
+  CHECK(look_each_second(screening, 100s, 110s, 22.4) == 0);
+  CHECK(screening.fault(109s) == Fault::unconfirmed);
+  CHECK(look(screening, 110s, 22.4));
+  CHECK_FALSE(screening.jumped());
+  CHECK_FALSE(screening.refuted());
 }
 
-TEST_CASE("a true step during an outage is believed with its second reading", "[screening]") {
-  Screening screening(plain());
+TEST_CASE("a return after hours may miss by 10 K/h, but not by more than a quarter of the jump",
+          "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  look_each_second(screening, 20s, 20s + 1h, 71.6);
+  SECTION("the machine has warmed") {
+    CHECK(look_each_second(screening, 20s + 1h, 40s + 1h, 32.0) > 0);
+  }
+  SECTION("faster than a machine warms") {
+    CHECK(look_each_second(screening, 20s + 1h, 40s + 1h, 33.9) == 0);
+  }
+  SECTION("from one false value to another one") {
+    look_each_second(screening, 20s + 1h, 20s + 24h, 71.6);
+    CHECK(look_each_second(screening, 20s + 24h, 60s + 24h, 2.2) == 0);
+  }
+}
+
+TEST_CASE("silence under a jump widens what the past allows, a jump does not", "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  look_each_second(screening, 20s, 80s, 30.0);
+  CHECK(look_each_second(screening, 80s, 200s, 27.0) == 0);
+  // 10 s without a reading: 5 K.
+  CHECK(look_each_second(screening, 210s, 220s, 27.0) == 0);
+  CHECK(look(screening, 220s, 27.0));
+}
+
+TEST_CASE("over an outage the structure changes by outage_K_max and 10 K/h at most",
+          "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  SECTION("8 K in 20 minutes count after settling") {
+    CHECK(look_each_second(screening, 1219s, 1229s, 30.0) == 0);
+    CHECK(screening.fault(1228s) == Fault::unconfirmed);
+    CHECK_FALSE(screening.jumped());
+    CHECK(look(screening, 1229s, 30.0));
+    CHECK(screening.fault(1229s) == Fault::none);
+  }
+  SECTION("14 K in 20 minutes count, 15 K do not") {
+    CHECK(look_each_second(screening, 1219s, 1240s, 36.2) > 0);
+    CHECK(look_each_second(screening, 2439s, 2500s, 51.4) == 0);
+    CHECK(screening.jumped());
+  }
+  SECTION("degF after 70 s do not") {
+    CHECK(look_each_second(screening, 89s, 3600s, 71.6) == 0);
+  }
+}
+
+TEST_CASE("a first value counts after the settling time, and only one that stays", "[screening]") {
+  Screening screening(settling());
+  CHECK(look_each_second(screening, 0s, 8s, 85.0) == 0);
+  CHECK(screening.fault(7s) == Fault::unconfirmed);
+  CHECK(screening.waiting());
+  CHECK_FALSE(screening.jumped());
+  CHECK(screening.rejected() == 0);
+  CHECK(look_each_second(screening, 8s, 18s, 23.3) == 0);
+  CHECK(look(screening, 18s, 23.3));
+  CHECK(screening.usable(18s));
+  CHECK(screening.good_degC() == 23.3);
+}
+
+TEST_CASE("two readings alike are not enough, however slow they come", "[screening]") {
+  ScreeningConfig config = settling();
+  config.stale_after_s = 120;
+  Screening screening(config);
+  CHECK_FALSE(look(screening, 0s, 20.0));
+  CHECK_FALSE(look(screening, 60s, 20.0));
+  CHECK(look(screening, 120s, 20.0));
+}
+
+TEST_CASE("an exact zero never settles by itself", "[screening]") {
+  ScreeningConfig config = settling();
+  config.temp_degC_min = -30;
+  Screening at_start(config);
+  CHECK(look_each_second(at_start, 0s, 600s, 0.0) == 0);
+  CHECK(look_each_second(at_start, 600s, 611s, 23.3) == 1);
+  // After an outage that allows for it.
+  Screening under_way(config);
+  look_each_second(under_way, 0s, 20s, 9.0);
+  CHECK(look_each_second(under_way, 90s, 135s, 0.0) == 0);
+  CHECK(look_each_second(under_way, 135s, 146s, 9.0) == 1);
+  // A course that goes through zero does.
+  Screening cooling(config);
+  look_each_second(cooling, 0s, 20s, 0.4);
+  CHECK(look(cooling, 20s, 0.0));
+}
+
+TEST_CASE("what neighbours expect confirms a jump, and refutes what was before", "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  const auto expect = [&](double degC, double sd_K) { screening.surround({degC, sd_K, false}); };
+  SECTION("where they are sure and agree") {
+    expect(27.5, 0.4);
+    CHECK(look_each_second(screening, 20s, 30s, 28.0) == 0);
+    CHECK(look(screening, 30s, 28.0));
+    CHECK(screening.refuted());
+    CHECK(look(screening, 31s, 28.0));
+    CHECK_FALSE(screening.refuted());
+  }
+  SECTION("not where they are not sure") {
+    expect(27.5, 0.6);
+    CHECK(look_each_second(screening, 20s, 60s, 28.0) == 0);
+  }
+  SECTION("not where they do not agree") {
+    expect(25.0, 0.1);
+    CHECK(look_each_second(screening, 20s, 60s, 28.0) == 0);
+  }
+  SECTION("a value that the past allows after an outage must agree too") {
+    expect(22.5, 0.2);
+    CHECK(look_each_second(screening, 90s, 120s, 28.0) == 0);
+    CHECK(screening.jumped());
+    CHECK(screening.jump_K() == Approx(5.5));
+    expect(27.0, 0.2);
+    CHECK(look(screening, 120s, 28.0));
+  }
+}
+
+TEST_CASE("a module that is not ready does not settle", "[screening]") {
+  Screening screening(settling());
+  screening.surround({not_a_number, 0.0, true});
+  CHECK(look_each_second(screening, 0s, 60s, 25.0) == 0);
+  screening.surround({});
+  CHECK(look(screening, 60s, 25.0));
+}
+
+TEST_CASE("an operator accepts what waits, and only that", "[screening]") {
+  Screening screening(settling());
+  CHECK_FALSE(screening.accept());
   look(screening, 0s, 20.0);
-  look(screening, 1s, 20.0);
-  CHECK(look(screening, 200s, 80.0));
-  CHECK(look(screening, 201s, 80.0));
-  CHECK_FALSE(look(screening, 202s, 20.0));
-  CHECK(screening.usable(202s));
-  CHECK(screening.good_degC() == 80.0);
+  CHECK(screening.accept());
+  CHECK(screening.usable(0s));
+  CHECK_FALSE(screening.refuted());
+  CHECK_FALSE(screening.accept());
+  look_each_second(screening, 1s, 20s, 23.0);
+  REQUIRE(screening.jumped());
+  CHECK(screening.accept());
+  CHECK(screening.refuted());
+  CHECK(screening.good_degC() == 23.0);
+  CHECK(screening.fault(19s) == Fault::none);
+  CHECK(look(screening, 20s, 23.1));
+}
+
+TEST_CASE("settle_s = 0: the first value counts at once, also after an outage", "[screening]") {
+  Screening screening(plain());
+  CHECK(look(screening, 0s, 0.0));
+  CHECK(look(screening, 200s, 10.0));
 }
 
 TEST_CASE("the very same value for too long is a fault until it moves", "[screening]") {

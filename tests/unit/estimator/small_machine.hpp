@@ -20,6 +20,7 @@ inline EstimatorConfig small_config() {
     SensorConfig sensor;
     sensor.name = name;
     sensor.smoothing.form = SmoothingForm::off;
+    sensor.screening.settle_s = 0.0;
     config.sensors.push_back(sensor);
   }
   config.blocks = {{"head", "t1_degC", {0}}, {"column", "t2_degC", {1}}};

@@ -76,6 +76,7 @@ EstimatorConfig config_of(SuspectedPolicy policy, std::size_t sensors_a_block = 
       sensor.name = named("s", i).append(k, 'x');
       sensor.smoothing.form = SmoothingForm::off;
       sensor.screening.stale_after_s = 60.0;
+      sensor.screening.settle_s = 0.0;
       block.sensors.push_back(config.sensors.size());
       config.sensors.push_back(sensor);
     }

@@ -83,7 +83,7 @@ def daemon_text(interface, controller_interface):
             bus_text("body", interface) + bus_text("table", controller_interface) +
             device_text("sensor", "body_node", "body", 0x181, ("front", "back")) +
             device_text("sensor", "table_node", "table", 0x182, ("table",)) +
-            f'[screening]\nstale_after_s = {STALE_AFTER_S}\nrate_allowance_K = 10.0\n'
+            f'[screening]\nsettle_s = 0.0\nstale_after_s = {STALE_AFTER_S}\nrate_allowance_K = 10.0\n'
             '[smoothing]\nform = "off"\n'
             '[[block]]\nname = "body"\ninput = "body_degC"\nsensors = ["front", "back"]\n'
             '[[block]]\nname = "table"\ninput = "table_degC"\nsensors = ["table"]\n'

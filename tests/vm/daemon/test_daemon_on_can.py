@@ -51,6 +51,7 @@ device = "node"
 start_bit = 23
 byte_order = "big_endian"
 [screening]
+settle_s = 0.0
 rate_allowance_K = 100.0
 stale_after_s = 60.0
 [smoothing]

@@ -39,6 +39,7 @@ dbc = "{DBC}"
 name = "module"
 bus = "body"
 [screening]
+settle_s = 0.0
 rate_allowance_K = 1000.0
 stale_after_s = {STALE_AFTER_S}
 [smoothing]

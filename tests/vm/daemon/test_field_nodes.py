@@ -94,6 +94,7 @@ device = "axtc"
 pgn = 0xFF11
 start_byte = 21
 [screening]
+settle_s = 0.0
 stale_after_s = 3.0
 rate_allowance_K = 100.0
 [[block]]

@@ -26,6 +26,7 @@ def requests():
               ("reference", "reference", {"force": True}),
               ("prove", "prove", {"axis": "z", "value_um": 2.0}),
               ("release, where nothing is latched", "release", {"axis": "z"}),
+              ("accept, where nothing waits", "accept", {"sensor": "column"}),
               ("reload", "reload", None),
               ("a method that there is not", "restart", None)]
     return asked

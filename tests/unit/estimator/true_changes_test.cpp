@@ -1,0 +1,214 @@
+/// True changes come through, false ones stay out: whole estimators with the default screening.
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "estimator/pipeline/estimator.hpp"
+#include "small_machine.hpp"
+
+using namespace thermocomp;
+
+namespace {
+
+EstimatorConfig usual_config() {
+  EstimatorConfig config = small_config();
+  for (SensorConfig& sensor : config.sensors) {
+    sensor.screening = ScreeningConfig{};
+    sensor.smoothing = SmoothingConfig{};
+  }
+  return config;
+}
+
+/// Three blocks that warm together, each sensor on a module of its own.
+EstimatorConfig three_blocks() {
+  EstimatorConfig config = usual_config();
+  SensorConfig third = config.sensors[1];
+  third.name = "s3";
+  config.sensors.push_back(third);
+  config.blocks.push_back({"bed", "t3_degC", {2}});
+  return config;
+}
+
+ThermalModel correlated_model() {
+  ThermalModel model = small_model();
+  model.inputs.emplace_back("t3_degC");
+  model.matrix_um_per_K = {{1.0, 1.0, 1.0}};
+  const double between_K2 = 4.0 * 0.98;
+  model.covariance_K2 = {
+      {4.0, between_K2, between_K2}, {between_K2, 4.0, between_K2}, {between_K2, between_K2, 4.0}};
+  return model;
+}
+
+}  // namespace
+
+TEST_CASE("a cold steady machine is compensated ten seconds after its first readings",
+          "[estimator]") {
+  Machine machine(usual_config());
+  machine.steps(10, {20.0, 20.0});
+  CHECK(machine.report().mode == Mode::starting);
+  CHECK_FALSE(machine.says(Reason::sensor_unconfirmed));
+  machine.step({20.0, 20.0});
+  CHECK(machine.report().mode == Mode::compensating);
+}
+
+TEST_CASE("8 K of heating during an outage of 20 minutes are compensated 2 minutes after its end",
+          "[estimator]") {
+  Machine machine(usual_config());
+  machine.steps(600, {20.0, 20.0});
+  machine.steps(1200, {lost, lost});
+  CHECK(machine.report().mode == Mode::holding);
+  machine.steps(120, {28.0, 27.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.offset_um() == Approx(-(5.0 * 8.0 + 7.0)));
+}
+
+TEST_CASE("smoothing extrapolates over no outage", "[estimator]") {
+  EstimatorConfig config = usual_config();
+  for (SensorConfig& sensor : config.sensors) sensor.smoothing.period_s = 10.0;
+  Machine machine(config);
+  double temp_degC = 20.0;
+  for (int i = 0; i < 250; ++i) machine.step({temp_degC += 0.02, 20.0});
+  machine.steps(70, {lost, lost});
+  for (int i = 0; i < 60; ++i) {
+    machine.step({25.0, 20.0});
+    if (machine.report().inputs[0].good) CHECK(machine.report().inputs[0].temp_degC == 25.0);
+  }
+  CHECK(machine.report().inputs[0].good);
+}
+
+TEST_CASE("a unit that is changed under way holds the offset and is told, for as long as it lasts",
+          "[estimator]") {
+  Machine machine(usual_config());
+  machine.steps(60, {20.0, 20.0});
+  machine.steps(200, {22.0 - 1.0, 20.0});
+  const double before_um = machine.offset_um();
+  machine.steps(36000, {1.8 * 21.0 + 32.0, 20.0});
+  CHECK(machine.report().mode == Mode::holding);
+  CHECK(machine.says(Reason::sensor_unconfirmed));
+  CHECK(machine.report().sensors[0].fault == Fault::unconfirmed);
+  CHECK(machine.report().sensors[0].jump_K == Approx(1.8 * 21.0 + 32.0 - 21.0));
+  CHECK(machine.offset_um() == before_um);
+  machine.steps(11, {21.5, 20.0});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK_FALSE(machine.says(Reason::sensor_unconfirmed));
+}
+
+TEST_CASE("zeros after power-on become no reference and move no axis", "[estimator]") {
+  const int zeros = GENERATE(3, 45, 600);
+  Machine machine(usual_config());
+  machine.steps(zeros, {0.0, 0.0});
+  CHECK_FALSE(machine.report().mode == Mode::compensating);
+  machine.steps(12, {23.3, 24.8});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.report().inputs[0].reference_degC == 23.3);
+  CHECK(machine.report().inputs[1].reference_degC == 24.8);
+  CHECK(machine.offset_um() == 0.0);
+}
+
+TEST_CASE("a module that comes up under way moves no axis before it is ready", "[estimator]") {
+  ThermalModel model = small_model();
+  model.reference_degC = {20.0, 20.0};
+  Machine machine(usual_config(), model);
+  machine.steps(300, {23.0, 24.0});
+  const double before_um = machine.offset_um();
+  machine.steps(70, {lost, lost});
+  for (int i = 0; i < 200; ++i) {
+    const bool ready = i >= 45;
+    machine.step({ready ? 23.1 : 0.0, ready ? 24.0 : 0.0});
+    CHECK(std::abs(machine.offset_um() - before_um) <= 0.51);
+  }
+  CHECK(machine.offset_um() == Approx(before_um - 0.5));
+}
+
+TEST_CASE("a module whose channels all show the same after an outage is not ready", "[estimator]") {
+  EstimatorConfig config = usual_config();
+  for (SensorConfig& sensor : config.sensors) sensor.module = "rack";
+  Machine machine(config);
+  machine.steps(60, {23.0, 26.0});
+  machine.steps(70, {lost, lost});
+  machine.steps(300, {25.0, 25.0});
+  CHECK(machine.report().mode == Mode::holding);
+  machine.steps(11, {23.0, 26.1});
+  CHECK(machine.report().mode == Mode::compensating);
+  // In an even machine they do it by right.
+  Machine even(config);
+  even.steps(60, {20.0, 20.4});
+  even.steps(70, {lost, lost});
+  even.steps(12, {20.3, 20.3});
+  CHECK(even.report().mode == Mode::compensating);
+}
+
+TEST_CASE("an accepted jump of a young machine gives it another reference", "[estimator]") {
+  Machine machine(usual_config());
+  machine.steps(30, {12.0, 24.8});
+  machine.steps(60, {23.3, 24.8});
+  REQUIRE(machine.report().sensors[0].jumped);
+  machine.estimator.apply({CommandKind::accept, 0, 0.0});
+  machine.step({23.3, 24.8});
+  CHECK(machine.report().inputs[0].reference_degC == 23.3);
+  CHECK(machine.report().mode == Mode::compensating);
+  machine.steps(20, {23.3, 24.8});
+  CHECK(machine.offset_um() == 0.0);
+}
+
+TEST_CASE("a sensor replaced by one that reads 3 K more is told, and accepted by the command",
+          "[estimator]") {
+  const bool unplugged = GENERATE(true, false);
+  Machine machine(three_blocks(), correlated_model());
+  for (int i = 0; i < 3600; ++i) {
+    const double temp_degC = 20.0 + 0.001 * i;
+    machine.step({temp_degC, temp_degC, temp_degC});
+  }
+  if (unplugged) machine.steps(180, {lost, 23.6, 23.6});
+  machine.steps(3600, {26.6, 23.6, 23.6});
+  CHECK(machine.report().mode == Mode::compensating);
+  CHECK(machine.says(Reason::sensor_unconfirmed));
+  CHECK(machine.says(Reason::block_estimated));
+  CHECK(machine.report().sensors[0].jump_K == Approx(3.0).margin(0.15));
+  CHECK(machine.report().inputs[0].temp_degC == Approx(23.6).margin(0.15));
+  machine.estimator.apply({CommandKind::accept, 0, 0.0});
+  machine.steps(1200, {26.6, 23.6, 23.6});
+  CHECK(machine.report().reasons == 0);
+  CHECK(machine.report().inputs[0].good);
+  CHECK(machine.report().inputs[0].temp_degC == Approx(26.6));
+}
+
+TEST_CASE("neighbours on other modules confirm what a sensor missed under a fault", "[estimator]") {
+  EstimatorConfig config = three_blocks();
+  Machine machine(config, correlated_model());
+  machine.steps(60, {20.0, 20.0, 20.0});
+  machine.steps(600, {2.0, 20.0, 20.0});
+  for (int i = 0; i < 3600; ++i) {
+    const double temp_degC = 20.0 + 0.001 * i;
+    machine.step({2.0, temp_degC, temp_degC});
+  }
+  // 3.6 K from where it was: beyond what 70 min of a jump allow where nobody confirms it.
+  const double quarter_K = 18.0 / 4.0;
+  REQUIRE(3.6 < quarter_K);
+  machine.steps(12, {23.6, 23.6, 23.6});
+  CHECK(machine.report().inputs[0].good);
+  SECTION("but not another false value") {
+    machine.steps(3600, {42.5, 23.6, 23.6});
+    CHECK_FALSE(machine.report().inputs[0].good);
+  }
+}
+
+TEST_CASE("a restart confirms no jump", "[estimator]") {
+  Machine machine(usual_config());
+  machine.steps(60, {20.0, 20.0});
+  machine.steps(60, {68.0, 20.0});
+  const PersistentState saved = machine.estimator.persistent_state(machine.report());
+  CHECK(saved.jumped_from_degC == std::map<std::string, double>{{"s1", 20.0}});
+  Machine restarted(usual_config());
+  restarted.now = machine.now + 5s;
+  REQUIRE(restarted.estimator.restore(saved).empty());
+  restarted.steps(36000, {68.0, 20.0});
+  CHECK(restarted.report().sensors[0].jump_K == 48.0);
+  CHECK(restarted.says(Reason::sensor_unconfirmed));
+  restarted.steps(11, {20.8, 20.0});
+  CHECK(restarted.report().mode == Mode::compensating);
+  CHECK(restarted.estimator.persistent_state(restarted.report()).jumped_from_degC.empty());
+}
