@@ -62,7 +62,7 @@ constexpr std::array<ReasonText, 13> faults{{
     {"bad_frame", "the answer was garbled", "check shielding, termination and line settings"},
     {"device_busy", "the device was busy", "poll it less often"},
     {"device_error", "the device reports an error", "see its status register and manual"},
-    {"unconfirmed", "contradicts its past, and nothing confirms it yet",
+    {"unconfirmed", "too new, or contradicts its past, and nothing confirms it yet",
      "compare it with a hand-held thermometer; where it is right: thermocomp accept SENSOR"},
 }};
 

@@ -325,6 +325,8 @@ std::string sensors_text(const json& sensors, bool colours) {
     std::string state = coloured(text.meaning, good ? Colour::green : Colour::red, colours);
     if (const json& suspected = object_of(sensor, "suspected"); good && !suspected.empty())
       state = coloured("suspected: " + suspicion_text(suspected), Colour::yellow, colours);
+    if (const json& jump = object_of(sensor, "jump"); !jump.empty())
+      state += " (by " + fixed_signed(number_of(jump, "size_K"), 2) + " K)";
     if (!text.remedy.empty()) state += " -> " + std::string(text.remedy);
     result +=
         padded(text_of(sensor, "name"), width) + "  " + fixed(number_of(sensor, "raw_degC"), 2, 8) +

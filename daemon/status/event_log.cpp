@@ -132,7 +132,9 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
   suspected_.resize(report.sensors.size(), false);
   for (std::size_t i = 0; i < report.sensors.size(); ++i) {
     const SensorReport& sensor = report.sensors[i];
-    if (sensor.fault != faults_[i]) {
+    // One that settles ends what was told before only once it counts.
+    const bool settles = sensor.fault == Fault::unconfirmed && !sensor.jumped;
+    if (sensor.fault != faults_[i] && !settles) {
       const std::string subject = "sensor " + config.sensors[i].name;
       if (sensor.fault != Fault::none) {
         if (journal_.fault(subject, std::string(to_string(sensor.fault))))

@@ -140,6 +140,13 @@ json suspected(const StatusView& view, const SensorReport& sensor) {
           {"weighed_down", sensor.weighed_down}};
 }
 
+/// The unconfirmed change of a sensor; null: none.
+json jump(const StatusView& view, const SensorReport& sensor) {
+  if (!sensor.jumped) return nullptr;
+  return {{"size_K", number(sensor.jump_K)},
+          {"since", number(view.wall_s - seconds(view.report.now - sensor.jumped_at))}};
+}
+
 json sensors_suspected(const StatusView& view) {
   json list = json::array();
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
@@ -396,7 +403,8 @@ json sensors_json(const StatusView& view) {
          {"clipped_in_a_row", sensor.clipped_in_a_row},
          {"clipped", sensor.clipped},
          {"rejected", sensor.rejected},
-         {"suspected", suspected(view, sensor)}});
+         {"suspected", suspected(view, sensor)},
+         {"jump", jump(view, sensor)}});
   }
   return {{"sensors", list}, {"inputs", inputs(view)}, {"axes", axes(view)}};
 }

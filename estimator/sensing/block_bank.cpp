@@ -104,8 +104,11 @@ void BlockBank::look_at(Sensor& sensor, nanoseconds now, const Reading& reading)
   sensor.fresh = sensor.screening.look(now, reading);
   sensor.raw_degC = reading.temp_degC;
   sensor.fault = sensor.screening.fault(now);
-  if (sensor.screening.waiting()) ++waiting_;
-  if (sensor.screening.jumped()) ++jumped_;
+  if (sensor.screening.waiting()) {
+    ++waiting_;
+    if (sensor.screening.jumped()) ++jumped_;
+    return;
+  }
   if (!sensor.fresh || !sensor.screening.refuted()) return;
   sensor.smoother.restart();
   note_refuted(sensor);

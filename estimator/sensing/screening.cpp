@@ -41,6 +41,13 @@ Screening::Screening(const ScreeningConfig& config)
 bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   state_.seen_at = reading.taken_at;
   state_.seen_fault = reading.fault;
+  if (goes_on(now, reading)) {
+    if (reading.temp_degC != state_.good.temp_degC) state_.same_since = reading.taken_at;
+    state_.good = {true, reading.temp_degC, reading.taken_at};
+    state_.verdict = Fault::none;
+    state_.refuted = false;
+    return true;
+  }
   state_.verdict = check(now, reading);
   if (state_.verdict == Fault::none) {
     note(reading);
@@ -53,6 +60,16 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   return false;
 }
 
+/// Nearly every reading: beside the one before, which counted.
+bool Screening::goes_on(nanoseconds now, const Reading& reading) const noexcept {
+  const nanoseconds gap = reading.taken_at - state_.good.at;
+  return reading.fault == Fault::none && !state_.waiting && state_.good.known &&
+         std::abs(reading.temp_degC - state_.good.temp_degC) <= allowance_K_ &&
+         reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_ && gap > nanoseconds{0} &&
+         gap <= stale_after_ && reading.taken_at >= now - stale_after_ &&
+         reading.taken_at <= now + stale_after_ && stuck_after_ <= nanoseconds{0};
+}
+
 Fault Screening::check(nanoseconds now, const Reading& reading) const noexcept {
   if (reading.fault != Fault::none) return reading.fault;
   // Written so that NaN fails.
@@ -62,13 +79,13 @@ Fault Screening::check(nanoseconds now, const Reading& reading) const noexcept {
   if (!(reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_))
     return Fault::stale;
   // A reading from before the newest one came late or doubled; it says nothing new.
-  if (state_.newest.known && reading.taken_at <= state_.newest.at) return Fault::stale;
+  if (newest().known && reading.taken_at <= newest().at) return Fault::stale;
   return Fault::none;
 }
 
 /// The course of what is read, whether it counts or not.
 void Screening::note(const Reading& reading) noexcept {
-  const Value& before = state_.newest;
+  const Value before = newest();
   const nanoseconds gap = before.known ? reading.taken_at - before.at : nanoseconds{0};
   const double step_K = std::abs(reading.temp_degC - before.temp_degC);
   if (!(before.known && gap <= stale_after_ && step_K <= allowance_K_ + change_K(gap))) {
@@ -100,9 +117,9 @@ Fault Screening::judge() noexcept {
 
 /// The newest value contradicts what was or what is expected.
 Fault Screening::jump(double from_degC) noexcept {
-  const Value& newest = state_.newest;
+  const nanoseconds at = state_.newest.at;
   if (!state_.jumped) {
-    state_.jumped_at = newest.at;
+    state_.jumped_at = at;
     state_.jump_from_degC = from_degC;
     state_.jump_K_max = 0.0;
   }
@@ -112,7 +129,7 @@ Fault Screening::jump(double from_degC) noexcept {
     count(true);
     return Fault::none;
   }
-  const bool good_serves = state_.good.known && newest.at - state_.good.at <= stale_after_;
+  const bool good_serves = state_.good.known && at - state_.good.at <= stale_after_;
   return good_serves ? Fault::too_fast : Fault::unconfirmed;
 }
 

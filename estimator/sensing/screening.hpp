@@ -98,7 +98,7 @@ class Screening {
     bool jumped{false};
     bool refuted{false};
     Value good;               ///< the last one that counted
-    Value newest;             ///< the last one in range and fresh, counting or not
+    Value newest;             ///< while waiting: the last one in range and fresh
     nanoseconds run_since{};  ///< since when such values have followed each other
     std::uint32_t run_count{0};
     nanoseconds unread{};  ///< since `good`, without any value
@@ -114,6 +114,11 @@ class Screening {
   };
 
   [[nodiscard]] bool take(nanoseconds now, const Reading& reading) noexcept;
+  [[nodiscard]] bool goes_on(nanoseconds now, const Reading& reading) const noexcept;
+  /// The last one in range and fresh, counting or not.
+  [[nodiscard]] const Value& newest() const noexcept {
+    return state_.waiting ? state_.newest : state_.good;
+  }
   [[nodiscard]] Fault check(nanoseconds now, const Reading& reading) const noexcept;
   void note(const Reading& reading) noexcept;
   [[nodiscard]] Fault judge() noexcept;
