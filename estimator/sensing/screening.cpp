@@ -137,6 +137,7 @@ void Screening::count(bool refutes) noexcept {
   state_.good = state_.newest;
   state_.waiting = state_.jumped = false;
   state_.refuted = refutes;
+  surroundings_ = {};  // those of the next wait are made anew
 }
 
 void Screening::restore_jump(double from_degC) noexcept {

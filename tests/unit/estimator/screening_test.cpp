@@ -307,6 +307,14 @@ TEST_CASE("what neighbours expect confirms a jump, and refutes what was before",
   }
 }
 
+TEST_CASE("what was expected once says nothing after the next outage", "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 22.0);
+  screening.surround({22.0, 0.1, false});
+  CHECK(look_each_second(screening, 90s, 101s, 22.3) == 1);
+  CHECK(look_each_second(screening, 300s, 311s, 29.0) == 1);
+}
+
 TEST_CASE("a module that is not ready does not settle", "[screening]") {
   Screening screening(settling());
   screening.surround({not_a_number, 0.0, true});
