@@ -17,13 +17,14 @@
 #include "daemon/locks/file_lock.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/start_state.hpp"
-#include "daemon/status/event_record.hpp"
 #include "daemon/supervisor.hpp"
 #include "daemon/system/log_setup.hpp"
 #include "drivers/controllers/kinds/dry_run_controller.hpp"
 #include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"
+#include "status/codes.hpp"
+#include "status/status_json.hpp"
 
 namespace thermocomp {
 namespace {
@@ -138,7 +139,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
                   &journal, [this] { return server.caller(); }, start_state.state.reference_degC}),
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal, locks.controller}) {
-  if (history) journal.tell([this](const Event& event) { history->note(recorded(event)); });
+  if (history) journal.tell([this](const Event& event) { history->note(event); });
   // A kill right now must not make this a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   if (!locks.warning.empty()) supervisor.add_warning(locks.warning);
@@ -154,15 +155,19 @@ std::unique_ptr<CycleBrain> Daemon::Parts::first_brain() const {
 }
 
 DeskActions Daemon::Parts::actions() {
-  DeskActions all{[this] { return supervisor.view(); },
-                  [this](const Command& asked) { return operations.command(asked); },
-                  [this] { return operations.reload(); },
-                  {},
-                  [this] { return events_json(journal.events()); }};
+  DeskActions all{
+      [this] { return supervisor.view(); },
+      [this](const Command& asked) { return operations.command(asked); },
+      [this] { return operations.reload(); },
+      {},
+      [this] {
+        return json_of(EventsAnswer{{journal.events().begin(), journal.events().end()}});
+      }};
   if (auto* bridge = dynamic_cast<BridgeController*>(real_link(*link)))
     all.controller_state = [this, bridge](const nlohmann::json& params) {
       return answer_bridge(*bridge, std::get<BridgeControllerConfig>(config.controller),
-                           mode_name(operations.cycle().report().mode, config.dry_run), params);
+                           code_text(operations.cycle().report().mode, config.dry_run).name,
+                           params);
     };
   return all;
 }
@@ -215,7 +220,7 @@ Daemon::~Daemon() = default;
 void Daemon::run() {
   try {
     parts_->start();
-    parts_->journal.daemon("started, version " THERMOCOMP_VERSION);
+    parts_->journal.daemon("started", THERMOCOMP_VERSION);
     parts_->supervisor.wait_until_ready(parts_->cycle);
     parts_->supervisor.run();
   } catch (...) {

@@ -47,6 +47,14 @@ bool is_done(Outcome outcome, const char* asked) {
                   asked));
 }
 
+Event command_event(std::string_view code, std::int64_t user) {
+  Event event;
+  event.kind = EventKind::command;
+  event.code = code;
+  event.user = user;
+  return event;
+}
+
 bool is_reference_whole(const Report& report) {
   return std::all_of(report.inputs.begin(), report.inputs.end(), [](const InputReport& input) {
     return input.good && std::isfinite(input.reference_degC);
@@ -152,7 +160,7 @@ void Operations::finish_reload() {
     parts_.config = std::move(reload_->next);
     set_log_level(parts_.config.log_level);
     note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::reload);
-    if (parts_.journal != nullptr) parts_.journal->command("reload", reload_->user);
+    if (parts_.journal != nullptr) parts_.journal->command(command_event("reload", reload_->user));
     spdlog::info("reloaded: model {} (SHA-256 {})", parts_.config.model_file.string(),
                  parts_.config.model_checksum);
   } else {
@@ -168,16 +176,15 @@ void Operations::finish_reload() {
 
 void Operations::carried_out(const Command& done) {
   if (done.kind == CommandKind::stop) return;  // not an operator's
-  std::string axis;
-  if (names_axis(done.kind)) axis = " " + parts_.config.estimator.axes[done.axis].name;
+  Event event = command_event(to_string(done.kind), take_asking(done));
+  if (names_axis(done.kind))
+    event.subject = {SubjectKind::axis, parts_.config.estimator.axes[done.axis].name};
   if (done.kind == CommandKind::accept)
-    axis = " " + parts_.config.estimator.sensors[done.axis].name;
-  std::string what = fmt::format("{}{}", to_string(done.kind), axis);
+    event.subject = {SubjectKind::sensor, parts_.config.estimator.sensors[done.axis].name};
   if (done.kind == CommandKind::measured || done.kind == CommandKind::prove)
-    what += fmt::format(" {} um", done.value_um);
-  spdlog::info("operator: {}", what);
-  const std::int64_t user = take_asking(done);
-  if (parts_.journal != nullptr) parts_.journal->command(what, user);
+    event.value = done.value_um;
+  spdlog::info("operator: {}", what_text(event));
+  if (parts_.journal != nullptr) parts_.journal->command(std::move(event));
   if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report())) {
     parts_.keeper.reference_taken();
     // Also where the temperatures are those of the reference before.

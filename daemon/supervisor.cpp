@@ -89,7 +89,7 @@ bool Supervisor::take_signals() {
   if (asked.stop != 0) {
     const std::string why = asked.stop == SIGTERM ? "SIGTERM" : "SIGINT";
     spdlog::info("stopping: {}", why);
-    parts_.journal.daemon("stopping: " + why);
+    parts_.journal.daemon("stopping", why);
   }
   if (asked.reload && asked.stop == 0) parts_.operations.hang_up();
   return asked.stop != 0;

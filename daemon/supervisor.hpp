@@ -11,7 +11,7 @@
 #include "daemon/operations.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "daemon/status/event_log.hpp"
-#include "daemon/status/status_json.hpp"
+#include "daemon/status/status_view.hpp"
 #include "daemon/status/temperature_trend.hpp"
 #include "daemon/system/service_manager.hpp"
 #include "daemon/system/signal_file.hpp"

@@ -23,6 +23,7 @@
 #include "gateway/mqtt/mqtt_publisher.hpp"
 #include "gateway/shdr/shdr_adapter.hpp"
 #include "gateway/texts/shdr_text.hpp"
+#include "status/status_json.hpp"
 
 namespace thermocomp::gateway {
 namespace {
@@ -125,8 +126,8 @@ std::string ask_device_file(const GatewaySettings& settings) {
   StatusClient client(settings.socket);
   Snapshot snapshot;
   snapshot.is_here = true;
-  snapshot.status = client.call("status", nlohmann::json::object());
-  snapshot.sensors = client.call("sensors", nlohmann::json::object());
+  snapshot.status = part_from<Status>(client.call("status", nlohmann::json::object()));
+  snapshot.sensors = part_from<SensorsAnswer>(client.call("sensors", nlohmann::json::object()));
   snapshot.wall_s = static_cast<double>(std::time(nullptr));
   return device_file(snapshot, settings.machine);
 }

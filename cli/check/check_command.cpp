@@ -11,12 +11,12 @@
 
 #include "cli/check/register_table.hpp"
 #include "cli/check/travel_deviation.hpp"
-#include "cli/common/json_fields.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/problems.hpp"
 #include "drivers/sensors/bus_config.hpp"
 #include "estimator/axis_spans.hpp"
 #include "gateway/settings/gateway_settings.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 

@@ -6,11 +6,11 @@
 #include <map>
 #include <vector>
 
-#include "cli/common/json_fields.hpp"
 #include "cli/common/modbus_names.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
 #include "estimator/axis_spans.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -9,13 +9,13 @@
 
 #include <system_error>
 
-#include "cli/common/json_fields.hpp"
 #include "cli/scan/scan_bus.hpp"
 #include "cli/scan/scan_controller.hpp"
 #include "config/buses/presets.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/text/problems.hpp"
 #include "config/toml/toml_text.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {

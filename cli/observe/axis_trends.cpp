@@ -5,10 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 
-#include <nlohmann/json.hpp>
-
-#include "cli/common/json_fields.hpp"
-
 namespace thermocomp::cli {
 namespace {
 
@@ -21,15 +17,14 @@ constexpr double fast_um_per_min = 1.0;
 
 }  // namespace
 
-void AxisTrends::add(const nlohmann::json& status) {
-  const double now_s = number_of(status, "uptime_s");
+void AxisTrends::add(const Status& status) {
+  const double now_s = status.uptime_s;
   if (!std::isfinite(now_s)) return;
-  for (const nlohmann::json& axis : list_of(status, "axes")) {
-    std::deque<Sample>& samples = axes_[text_of(axis, "name")];
+  for (const AxisStatus& axis : status.axes) {
+    std::deque<Sample>& samples = axes_[axis.name];
     // The daemon was started anew.
     if (!samples.empty() && now_s < samples.back().time_s) samples.clear();
-    const double offset = number_of(axis, "offset");
-    if (std::isfinite(offset)) samples.push_back({now_s, offset});
+    if (std::isfinite(axis.offset)) samples.push_back({now_s, axis.offset});
     while (!samples.empty() && samples.front().time_s < now_s - window_s) samples.pop_front();
   }
 }

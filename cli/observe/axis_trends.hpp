@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include <nlohmann/json_fwd.hpp>
+#include "status/status.hpp"
 
 namespace thermocomp::cli {
 
@@ -19,8 +19,8 @@ class AxisTrends {
   /// @param wide  whether the terminal shows more than ASCII
   explicit AxisTrends(bool wide) : wide_(wide) {}
 
-  /// @param status  result of the method `status`; its uptime is the time
-  void add(const nlohmann::json& status);
+  /// The status' uptime is the time.
+  void add(const Status& status);
   /// "▁▂▃▅▇ ↗": the oldest left, as high as the window's range lets it; empty before two values.
   [[nodiscard]] std::string text(const std::string& axis) const;
 

@@ -17,13 +17,14 @@
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/terminal.hpp"
 #include "cli/observe/axis_trends.hpp"
-#include "cli/observe/events_text.hpp"
 #include "cli/observe/status_text.hpp"
 #include "cli/observe/truth_file.hpp"
 #include "cli/observe/watch_text.hpp"
 #include "config/text/clean_output.hpp"
 #include "daemon/history/format/recorded_event.hpp"
 #include "daemon/socket/status_client.hpp"
+#include "status/status_json.hpp"
+#include "status/verdict.hpp"
 
 namespace thermocomp::cli {
 
@@ -38,13 +39,14 @@ struct StatusOptions {
 };
 
 int run_status(const GlobalOptions& global, const StatusOptions& options) {
-  json status = ask_daemon(global.socket, "status", json::object());
+  json answer = ask_daemon(global.socket, "status", json::object());
+  const auto status = part_from<Status>(answer);
   const std::vector<std::string> why = why_not(status, options.strict);
   const int exit_status = why.empty() ? exit_success : exit_no;
   if (options.as_json) {
-    status["exit_status"] = exit_status;
-    status["why"] = why;
-    std::cout << status.dump(2) << '\n';
+    answer["exit_status"] = exit_status;
+    answer["why"] = why;
+    std::cout << answer.dump(2) << '\n';
   } else {
     std::cout << status_text(status, stdout_is_terminal());
   }
@@ -58,28 +60,12 @@ struct EventsOptions {
   bool as_json{false};
 };
 
-/// In the shape of the daemon's answer, with the run beside each.
-json recorded_events_json(const RecordedEvents& recorded) {
-  json list = json::array();
-  for (const RecordedEvent& event : recorded.events)
-    list.push_back({{"run", event.run},
-                    {"number", event.number},
-                    {"wall_s", 1e-9 * static_cast<double>(event.wall_ns)},
-                    {"kind", event.kind},
-                    {"subject", event.subject},
-                    {"what", event.what},
-                    {"duration_s", event.duration_ns < 0
-                                       ? json(nullptr)
-                                       : json(1e-9 * static_cast<double>(event.duration_ns))},
-                    {"user", event.user < 0 ? json(nullptr) : json(event.user)}});
-  return {{"events", list}};
-}
-
 std::optional<HistoryTime> time_or_none(const std::string& text) {
   if (text.empty()) return std::nullopt;
   return parse_history_time(text);
 }
 
+/// @return the daemon's answer, or the same of a history with the run beside each
 json events_of(const GlobalOptions& global, const EventsOptions& options) {
   if (options.history.empty()) {
     if (!options.from.empty() || !options.to.empty())
@@ -90,13 +76,13 @@ json events_of(const GlobalOptions& global, const EventsOptions& options) {
       read_events(options.history, time_or_none(options.from), time_or_none(options.to));
   if (!recorded.are_kept)
     throw Failure(options.history + ": was written by a version that kept no events");
-  return recorded_events_json(recorded);
+  return {{"events", json_of(recorded.events)}};
 }
 
 int run_events(const GlobalOptions& global, const EventsOptions& options) {
   const json events = events_of(global, options);
   std::cout << (options.as_json ? events.dump(2, ' ', false, json::error_handler_t::replace) + "\n"
-                                : events_text(events));
+                                : events_text(part_from<EventsAnswer>(events).events));
   return exit_success;
 }
 
@@ -105,7 +91,7 @@ int run_sensors(const GlobalOptions& global, bool as_json) {
   if (as_json) {
     std::cout << sensors.dump(2) << '\n';
   } else {
-    std::cout << sensors_text(sensors, stdout_is_terminal());
+    std::cout << sensors_text(part_from<SensorsAnswer>(sensors), stdout_is_terminal());
   }
   return exit_success;
 }
@@ -123,7 +109,7 @@ void end_watch(int) {
   ::_exit(exit_success);
 }
 
-void show(const json& status, const TruthRow* truth, const AxisTrends& trends, bool terminal,
+void show(const Status& status, const TruthRow* truth, const AxisTrends& trends, bool terminal,
           bool first) {
   if (terminal) {
     std::cout << terminal_code("[H") << terminal_code("[J")
@@ -161,7 +147,7 @@ void watch_until_end(const GlobalOptions& global, const WatchOptions& options) {
     }
     if (notification.value("method", "") != "status") continue;
     const TruthRow* row = truth ? truth->newest() : nullptr;
-    const json status = notification.value("params", json::object());
+    const auto status = part_from<Status>(notification.value("params", json::object()));
     trends.add(status);
     show(status, row, trends, terminal, first);
     first = false;

@@ -3,19 +3,18 @@
 
 #include <string>
 
-#include <nlohmann/json_fwd.hpp>
-
 #include "cli/observe/axis_trends.hpp"
 #include "cli/observe/truth_file.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp::cli {
 
 /// A whole screen. @param truth  what the tool really does, where it is simulated; else nullptr
 /// @param trends  how the offsets went; nullptr: not shown
-[[nodiscard]] std::string watch_screen(const nlohmann::json& status, const TruthRow* truth,
-                                       bool colours, const AxisTrends* trends = nullptr);
+[[nodiscard]] std::string watch_screen(const Status& status, const TruthRow* truth, bool colours,
+                                       const AxisTrends* trends = nullptr);
 /// Two lines: what the columns of watch_line() are.
-[[nodiscard]] std::string watch_header(const nlohmann::json& status, const TruthRow* truth);
-[[nodiscard]] std::string watch_line(const nlohmann::json& status, const TruthRow* truth);
+[[nodiscard]] std::string watch_header(const Status& status, const TruthRow* truth);
+[[nodiscard]] std::string watch_line(const Status& status, const TruthRow* truth);
 
 }  // namespace thermocomp::cli

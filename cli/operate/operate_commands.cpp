@@ -12,6 +12,7 @@
 #include "cli/common/json_fields.hpp"
 #include "cli/operate/prove_command.hpp"
 #include "cli/operate/release_command.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 

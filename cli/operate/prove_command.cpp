@@ -11,6 +11,7 @@
 #include "cli/common/json_fields.hpp"
 #include "cli/operate/progress_line.hpp"
 #include "cli/operate/prove_course.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common/json_fields.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {

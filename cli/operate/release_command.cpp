@@ -10,6 +10,7 @@
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
 #include "cli/operate/progress_line.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 
 #include "daemon/history/replay/replay_setup.hpp"
 
@@ -18,10 +17,6 @@ constexpr double point_s_min = 10.0;
 constexpr double at_bound_share = 0.995;
 /// Around a probing: offsets change by a fraction of a micrometre in that time.
 constexpr double probing_half_s = 2.0;
-
-double wall_s(const RecordedEvent& event) {
-  return s_per_ns * static_cast<double>(event.wall_ns);
-}
 
 double end_s(const SegmentInfo& segment) {
   const double cycles =
@@ -42,14 +37,6 @@ const std::vector<double>* column_of(const ThinnedHistory& course, const std::st
   for (const ThinnedColumn& column : course.columns)
     if (column.name == name) return &column.values;
   return nullptr;
-}
-
-/// "measured z 1.5 um"
-bool parse_measured(const std::string& what, std::string& axis, double& value_um) {
-  char name[64];
-  if (std::sscanf(what.c_str(), "measured %63s %lf um", name, &value_um) != 2) return false;
-  axis = name;
-  return true;
 }
 
 /// The setup in force at a moment: that of the last segment that began before it.
@@ -265,45 +252,45 @@ std::vector<ModeSpell> mode_spells(const WeekEvents& events, const WallSpan& spa
   std::vector<ModeSpell> spells;
   const auto& list = events.events;
   for (std::size_t i = 0; i < list.size(); ++i) {
-    if (list[i].kind != "mode") continue;
+    if (list[i].kind != EventKind::mode) continue;
     const auto end = events.run_ends_s.find(list[i].run);
     double until_s = end == events.run_ends_s.end() ? span.to_s : end->second;
     for (std::size_t j = i + 1; j < list.size(); ++j) {
       if (list[j].run != list[i].run) break;
-      if (list[j].kind != "mode") continue;
-      until_s = wall_s(list[j]);
+      if (list[j].kind != EventKind::mode) continue;
+      until_s = list[j].wall_s;
       break;
     }
-    const WallSpan within = WallSpan{wall_s(list[i]), until_s}.within(span);
-    if (within.length_s() > 0.0) spells.push_back({within, list[i].what});
+    const WallSpan within = WallSpan{list[i].wall_s, until_s}.within(span);
+    if (within.length_s() > 0.0) spells.push_back({within, list[i].code});
   }
   return spells;
 }
 
 std::vector<Outages> outages_of(const WeekEvents& events, const WallSpan& span) {
-  std::map<std::string, Outages> found;
+  std::map<Subject, Outages> found;
   const auto& list = events.events;
   for (std::size_t i = 0; i < list.size(); ++i) {
-    if (list[i].kind != "fault") continue;
+    if (list[i].kind != EventKind::fault) continue;
     const auto end = events.run_ends_s.find(list[i].run);
     double until_s = end == events.run_ends_s.end() ? span.to_s : end->second;
     bool ended = false;
     for (std::size_t j = i + 1; j < list.size(); ++j) {
       if (list[j].run != list[i].run) break;
       if (list[j].subject != list[i].subject) continue;
-      until_s = wall_s(list[j]);  // recovery, or another fault of the same subject
+      until_s = list[j].wall_s;  // recovery, or another fault of the same subject
       ended = true;
       break;
     }
-    const WallSpan within = WallSpan{wall_s(list[i]), until_s}.within(span);
+    const WallSpan within = WallSpan{list[i].wall_s, until_s}.within(span);
     if (!(within.to_s >= within.from_s)) continue;
     Outages& outages = found[list[i].subject];
     outages.subject = list[i].subject;
-    outages.what = list[i].what;
+    outages.last = list[i];
     ++outages.count;
     outages.lasted_s += within.length_s();
     outages.lasts = !ended && until_s >= span.to_s - 1.0;
-    Outages::Kind& kind = outages.kinds[list[i].what];
+    Outages::Kind& kind = outages.kinds[list[i].code];
     ++kind.count;
     kind.lasted_s += within.length_s();
     kind.lasts = outages.lasts;
@@ -408,16 +395,14 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
       week.axes.push_back(axis_week(axis, week.course, places));
   }
   for (const RecordedEvent& event : events.events) {
-    const double at_s = wall_s(event);
-    if (at_s < span.from_s || at_s >= span.to_s) continue;
-    if (event.kind == "daemon" && event.what.starts_with("started")) ++week.starts;
-    if (event.kind != "command") continue;
+    if (event.wall_s < span.from_s || event.wall_s >= span.to_s) continue;
+    if (event.kind == EventKind::daemon && event.code == "started") ++week.starts;
+    if (event.kind != EventKind::command) continue;
     week.commands.push_back(event);
-    std::string axis;
-    double value_um = 0.0;
-    const ReplaySetup* setup = setups.at(at_s);
-    if (setup != nullptr && parse_measured(event.what, axis, value_um))
-      week.probings.push_back(probing_of(history, *setup, at_s, axis, value_um, parser));
+    const ReplaySetup* setup = setups.at(event.wall_s);
+    if (setup != nullptr && event.code == to_string(CommandKind::measured))
+      week.probings.push_back(
+          probing_of(history, *setup, event.wall_s, event.subject.name, event.value, parser));
   }
   return week;
 }

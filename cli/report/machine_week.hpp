@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "daemon/history/format/recorded_event.hpp"
@@ -30,14 +29,10 @@ struct WallSpan {
 
 struct ModeSpell {
   WallSpan span;
-  std::string mode;  ///< "compensating", "holding", ...
+  std::string mode;  ///< name of a mode: "compensating", "holding", ...
 };
 
-/// Before a sensor's name: it shows what its neighbours contradict.
-inline constexpr std::string_view suspected_sensor = "suspected sensor ";
-
-/// Faults of one subject ("sensor bed", "suspected sensor bed", "bus cabinet",
-/// "reason controller_offline").
+/// Faults of one subject.
 struct Outages {
   struct Kind {
     std::size_t count{0};
@@ -45,12 +40,12 @@ struct Outages {
     bool lasts{false};
     bool operator==(const Kind&) const = default;
   };
-  std::string subject;
-  std::string what;  ///< the last one
+  Subject subject;
+  Event last;
   std::size_t count{0};
   double lasted_s{0.0};
   bool lasts{false};                  ///< at the end of the stretch
-  std::map<std::string, Kind> kinds;  ///< the same, by what
+  std::map<std::string, Kind> kinds;  ///< the same, by code
 };
 
 struct OffsetRange {

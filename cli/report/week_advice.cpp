@@ -1,13 +1,14 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
-#include "cli/common/json_fields.hpp"
-#include "cli/common/reason_text.hpp"
 #include "cli/report/week_page.hpp"
 #include "modelling/markup/html_page.hpp"
+#include "status/codes.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -52,31 +53,33 @@ std::string as_a_sentence(std::string text) {
   return text;
 }
 
-std::string what_to_do(const ReasonText& text) {
+std::string what_to_do(const CodeText& text) {
   return text.remedy.empty() ? "" : " Do: " + std::string(text.remedy) + ".";
 }
 
 void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
-    if (!outages.subject.starts_with("reason ")) continue;
+    const auto reason = reason_named(outages.last.code);
+    if (outages.subject.kind != SubjectKind::reason || !reason) continue;
     // Lines of sensors and axes say which.
-    if (outages.what == "sensor_suspected" || outages.what == "at_bound") continue;
+    if (reason == Reason::sensor_suspected || reason == Reason::at_bound) continue;
     const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
-    const ReasonText text = reason_text(outages.what);
+    const CodeText text = code_text(*reason);
     if (is_told(all))
       lines.push_back(as_a_sentence(std::string(text.meaning)) + ", " + how_often(all) +
                       what_to_do(text));
   }
 }
 
-/// Buses, axes, the controller.
-void add_devices(const MachineWeek& week, const std::string& kind,
+/// Buses, the controller.
+void add_devices(const MachineWeek& week, std::initializer_list<SubjectKind> kinds,
                  std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
-    if (!outages.subject.starts_with(kind)) continue;
+    if (std::find(kinds.begin(), kinds.end(), outages.subject.kind) == kinds.end()) continue;
     const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
     if (is_told(all))
-      lines.push_back(as_a_sentence(outages.subject) + ": " + outages.what + ", " + how_often(all) +
+      lines.push_back(as_a_sentence(subject_text(outages.subject)) + ": " +
+                      what_text(outages.last) + ", " + how_often(all) +
                       " Look at its cable, its supply and its address.");
   }
 }
@@ -84,24 +87,23 @@ void add_devices(const MachineWeek& week, const std::string& kind,
 /// Those with the same fault for the same time are one line: a bus takes all its sensors with it.
 void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines) {
   struct Group {
-    std::string what;
+    std::string code;
     Outages::Kind kind;
     std::vector<std::string> sensors;
   };
-  const std::string sensor = "sensor ";
   std::vector<Group> groups;
   for (const Outages& outages : week.outages) {
-    if (!outages.subject.starts_with(sensor)) continue;
-    for (const auto& [what, kind] : outages.kinds) {
+    if (outages.subject.kind != SubjectKind::sensor) continue;
+    for (const auto& [code, kind] : outages.kinds) {
       if (!is_told(kind)) continue;
-      const auto alike = [&what = what, &kind = kind](const Group& group) {
-        return group.what == what && group.kind.count == kind.count &&
+      const auto alike = [&code = code, &kind = kind](const Group& group) {
+        return group.code == code && group.kind.count == kind.count &&
                group.kind.lasts == kind.lasts &&
                std::abs(group.kind.lasted_s - kind.lasted_s) < outage_told_s;
       };
       auto group = std::find_if(groups.begin(), groups.end(), alike);
-      if (group == groups.end()) group = groups.insert(group, {what, kind, {}});
-      group->sensors.push_back(outages.subject.substr(sensor.size()));
+      if (group == groups.end()) group = groups.insert(group, {code, kind, {}});
+      group->sensors.push_back(outages.subject.name);
     }
   }
   std::stable_sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
@@ -110,7 +112,7 @@ void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines)
   for (const Group& group : groups) {
     std::string names;
     for (const std::string& name : group.sensors) names += (names.empty() ? "" : ", ") + name;
-    const ReasonText text = fault_text(group.what);
+    const CodeText text = code_text(fault_named(group.code).value_or(Fault::device_error));
     lines.push_back((group.sensors.size() == 1 ? "Sensor " : "Sensors ") + names + ": " +
                     std::string(text.meaning) + ", " + how_often(group.kind) + what_to_do(text));
   }
@@ -118,20 +120,19 @@ void add_sensor_faults(const MachineWeek& week, std::vector<std::string>& lines)
 
 void add_suspicions(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
-    if (!outages.subject.starts_with(suspected_sensor)) continue;
-    const std::string name = outages.subject.substr(suspected_sensor.size());
-    lines.push_back("Sensor " + name + " is suspected: " + outages.what + ", " +
-                    std::to_string(outages.count) + (outages.count == 1 ? " time, " : " times, ") +
-                    duration_text(outages.lasted_s) + " in all" +
-                    (outages.lasts ? ", and still" : "") +
-                    ". Do: check its contact, its place and its wiring; hold a thermometer beside "
-                    "it. Where it is right as it is, take a new reference: thermocomp reference.");
+    if (outages.subject.kind != SubjectKind::suspected_sensor) continue;
+    lines.push_back(
+        "Sensor " + outages.subject.name + " is suspected: " + what_text(outages.last) + ", " +
+        std::to_string(outages.count) + (outages.count == 1 ? " time, " : " times, ") +
+        duration_text(outages.lasted_s) + " in all" + (outages.lasts ? ", and still" : "") +
+        ". Do: check its contact, its place and its wiring; hold a thermometer beside "
+        "it. Where it is right as it is, take a new reference: thermocomp reference.");
   }
 }
 
 bool is_suspected(const MachineWeek& week, const std::string& sensor) {
   return std::any_of(week.outages.begin(), week.outages.end(), [&](const Outages& outages) {
-    return outages.subject == std::string(suspected_sensor) + sensor;
+    return outages.subject == Subject{SubjectKind::suspected_sensor, sensor};
   });
 }
 
@@ -172,9 +173,9 @@ void add_axes(const MachineWeek& week, std::vector<std::string>& lines) {
 std::vector<std::string> advice(const MachineWeek& week) {
   std::vector<std::string> lines;
   add_reasons(week, lines);
-  add_devices(week, "axis ", lines);
-  add_devices(week, "controller ", lines);
-  add_devices(week, "bus ", lines);
+  add_devices(week, {SubjectKind::axis}, lines);
+  add_devices(week, {SubjectKind::controller, SubjectKind::controller_errors}, lines);
+  add_devices(week, {SubjectKind::bus, SubjectKind::bus_errors}, lines);
   add_sensor_faults(week, lines);
   add_suspicions(week, lines);
   add_axes(week, lines);

@@ -8,10 +8,10 @@
 #include <string_view>
 #include <utility>
 
-#include "cli/common/json_fields.hpp"
-#include "cli/common/reason_text.hpp"
 #include "modelling/markup/html_page.hpp"
 #include "modelling/markup/svg_plot.hpp"
+#include "status/codes.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -33,14 +33,9 @@ std::string hours(double seconds) {
   return figure_text(seconds / 3600.0) + " h";
 }
 
-std::string mode_words(const std::string& mode) {
-  if (mode == "compensating") return "compensating";
-  if (mode == "holding") return "data lost, last offsets held";
-  if (mode == "ramping_to_zero") return "data lost, offsets taken back to zero";
-  if (mode == "disabled") return "switched off";
-  if (mode == "starting") return "starting";
-  if (mode == "dry_run") return "dry run, nothing written";
-  return mode;
+std::string mode_words(const std::string& name) {
+  const auto mode = mode_named(name);
+  return mode ? std::string(code_text(*mode, name == "dry_run").meaning) : name;
 }
 
 std::string unit_words(const std::string& unit) {
@@ -106,8 +101,9 @@ std::string why_part(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"why it did less than it could", "times", "in all"}};
   for (const Outages& outages : week.outages)
     // A suspicion stands with its sensor; by itself it takes nothing away.
-    if (outages.subject.starts_with("reason ") && outages.what != "sensor_suspected")
-      rows.push_back({std::string(reason_text(outages.what).meaning), std::to_string(outages.count),
+    if (const auto reason = reason_named(outages.last.code);
+        outages.subject.kind == SubjectKind::reason && reason && reason != Reason::sensor_suspected)
+      rows.push_back({std::string(code_text(*reason).meaning), std::to_string(outages.count),
                       duration_text(outages.lasted_s)});
   return html_table(rows);
 }
@@ -165,8 +161,8 @@ std::string sensors_part(const MachineWeek& week) {
     std::size_t faults = 0;
     std::string suspected = "-";
     for (const Outages& outages : week.outages) {
-      if (outages.subject == "sensor " + sensor.name) faults = outages.count;
-      if (outages.subject == std::string(suspected_sensor) + sensor.name)
+      if (outages.subject == Subject{SubjectKind::sensor, sensor.name}) faults = outages.count;
+      if (outages.subject == Subject{SubjectKind::suspected_sensor, sensor.name})
         suspected = duration_text(outages.lasted_s) + (outages.lasts ? ", still" : "");
     }
     const bool known = std::isfinite(sensor.drift_sd_K);
@@ -188,10 +184,12 @@ std::string sensors_part(const MachineWeek& week) {
 std::string outages_part(const MachineWeek& week) {
   std::vector<std::vector<std::string>> rows{{"buses, units, axes", "last", "times", "in all"}};
   for (const Outages& outages : week.outages) {
-    if (outages.subject.starts_with("reason ") || outages.subject.starts_with("sensor ") ||
-        outages.subject.starts_with(suspected_sensor))
+    const SubjectKind kind = outages.subject.kind;
+    if (kind == SubjectKind::reason || kind == SubjectKind::sensor ||
+        kind == SubjectKind::suspected_sensor)
       continue;
-    rows.push_back({outages.subject, outages.what, std::to_string(outages.count),
+    rows.push_back({subject_text(outages.subject), what_text(outages.last),
+                    std::to_string(outages.count),
                     duration_text(outages.lasted_s) + (outages.lasts ? ", still" : "")});
   }
   const std::string table = html_table(rows);

@@ -5,8 +5,8 @@
 #include <cstdio>
 
 #include "cli/common/modbus_names.hpp"
-#include "cli/common/reason_text.hpp"
 #include "drivers/modbus/register_codec.hpp"
+#include "status/codes.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -9,13 +9,13 @@
 #include <set>
 
 #include "cli/common/modbus_names.hpp"
-#include "cli/common/reason_text.hpp"
 #include "cli/scan/scan_bus.hpp"
 #include "cli/scan/serial_holder.hpp"
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "drivers/sensors/modbus_plan.hpp"
+#include "status/codes.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -13,6 +13,7 @@
 #include "config/text/problems.hpp"
 #include "daemon/desks/reference_rules.hpp"
 #include "estimator/axis_spans.hpp"
+#include "status/status_json.hpp"
 
 namespace thermocomp {
 namespace {
@@ -73,17 +74,17 @@ void refuse_unless(bool holds, const std::string& why) {
 }
 
 void add_reads(StatusServer& server, const DeskActions& actions) {
-  const auto add = [&](const char* name, json (*make)(const StatusView&)) {
+  const auto add = [&](const char* name, auto answer) {
     server.add_method(name, AccessClass::read,
-                      [actions, make](const json&) { return make(actions.view()); });
+                      [actions, answer](const json&) { return answer(actions.view()); });
   };
-  add("status", status_json);
-  add("sensors", sensors_json);
-  add("offsets", offsets_json);
-  add("timing", timing_json);
-  add("model", model_json);
+  add("status", [](const StatusView& view) { return json_of(status_of(view)); });
+  add("sensors", [](const StatusView& view) { return json_of(sensors_of(view)); });
+  add("offsets", [](const StatusView& view) { return json_of(offsets_of(view)); });
+  add("timing", [](const StatusView& view) { return json_of(timing_of(view)); });
+  add("model", [](const StatusView& view) { return model_json(view.config); });
   server.add_method("events", AccessClass::read, [actions](const json&) {
-    return actions.events ? actions.events() : json{{"events", json::array()}};
+    return actions.events ? actions.events() : json_of(EventsAnswer{});
   });
 }
 

@@ -7,7 +7,7 @@
 
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/socket/status_server.hpp"
-#include "daemon/status/status_json.hpp"
+#include "daemon/status/status_view.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "daemon/status/status_json.hpp"
+#include "daemon/status/status_view.hpp"
 
 namespace thermocomp {
 

@@ -1,6 +1,8 @@
 #include "daemon/status/event_journal.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 namespace thermocomp {
@@ -10,12 +12,9 @@ double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
-Event event_of(const char* kind, const std::string& subject, const std::string& what) {
-  Event event;
-  event.kind = kind;
-  event.subject = subject;
-  event.what = what;
-  return event;
+bool is_same_fault(const Event& a, const Event& b) {
+  const bool is_same_value = a.value == b.value || (std::isnan(a.value) && std::isnan(b.value));
+  return a.code == b.code && a.detail == b.detail && is_same_value;
 }
 
 }  // namespace
@@ -27,36 +26,35 @@ EventJournal::Moment EventJournal::system_now() {
 
 void EventJournal::add(const Moment& at, Event event) {
   event.number = ++number_;
-  event.wall_ns = at.wall.count();
+  event.wall_s = seconds(at.wall);
   if (listener_) listener_(event);
   events_.push_back(std::move(event));
   if (events_.size() > kept_max) events_.pop_front();
 }
 
-bool EventJournal::fault(const std::string& subject, const std::string& what) {
+bool EventJournal::fault(Event fault) {
   const Moment at = now_();
-  const auto known = outages_.find(subject);
+  fault.kind = EventKind::fault;
+  const auto known = outages_.find(fault.subject);
   if (known != outages_.end() && is_over(known->second, at.monotonic)) outages_.erase(known);
-  Outage& outage = outages_.try_emplace(subject).first->second;
+  Outage& outage = outages_.try_emplace(fault.subject).first->second;
   if (outage.told.empty()) outage.since = at.monotonic;
-  outage.what = what;
+  outage.newest = fault;
   const bool is_back = std::exchange(outage.away_since, std::nullopt).has_value();
   const bool was_ended = std::exchange(outage.is_end_told, false);
   const bool is_known =
-      std::find(outage.told.begin(), outage.told.end(), what) != outage.told.end();
-  if (is_back && was_ended && !outage.comes_and_goes) {
-    outage.comes_and_goes = true;
-    add(at, event_of("fault", subject, what + ", comes and goes"));
-  } else if (!is_known && outage.told.size() < faults_of_outage_max) {
-    add(at, event_of("fault", subject, what));
-  } else {
-    return false;
-  }
-  if (!is_known) outage.told.push_back(what);
+      std::any_of(outage.told.begin(), outage.told.end(),
+                  [&fault](const Event& told) { return is_same_fault(told, fault); });
+  const bool begins_to_return = is_back && was_ended && !outage.comes_and_goes;
+  if (!begins_to_return && (is_known || outage.told.size() >= faults_of_outage_max)) return false;
+  if (begins_to_return) outage.comes_and_goes = true;
+  if (!is_known) outage.told.push_back(fault);
+  fault.comes_and_goes = begins_to_return;
+  add(at, std::move(fault));
   return true;
 }
 
-double EventJournal::recovery(const std::string& subject, std::chrono::nanoseconds hold) {
+double EventJournal::recovery(const Subject& subject, std::chrono::nanoseconds hold) {
   const auto found = outages_.find(subject);
   if (found == outages_.end() || found->second.away_since)
     return std::numeric_limits<double>::quiet_NaN();
@@ -65,11 +63,12 @@ double EventJournal::recovery(const std::string& subject, std::chrono::nanosecon
   outage.hold = hold;
   if (outage.comes_and_goes) outage.hold = std::max<std::chrono::nanoseconds>(hold, returns_within);
   return outage.hold > std::chrono::nanoseconds{} ? std::numeric_limits<double>::quiet_NaN()
-                                                  : end_of(subject, outage).duration_s;
+                                                  : end_of(outage).duration_s;
 }
 
-Event EventJournal::end_of(const std::string& subject, Outage& outage) {
-  Event event = event_of("recovery", subject, outage.what);
+Event EventJournal::end_of(Outage& outage) {
+  Event event = outage.newest;
+  event.kind = EventKind::recovery;
   event.duration_s = seconds(*outage.away_since - outage.since);
   outage.is_end_told = true;
   add(now_(), event);
@@ -84,7 +83,7 @@ std::vector<Event> EventJournal::settle() {
     Outage& outage = at->second;
     if (!outage.away_since) continue;
     const std::chrono::nanoseconds away = now - *outage.away_since;
-    if (!outage.is_end_told && away >= outage.hold) ended.push_back(end_of(at->first, outage));
+    if (!outage.is_end_told && away >= outage.hold) ended.push_back(end_of(outage));
     if (is_over(outage, now)) outages_.erase(at);
   }
   return ended;
@@ -94,16 +93,16 @@ bool EventJournal::is_over(const Outage& outage, std::chrono::nanoseconds now) {
   return outage.is_end_told && now - *outage.away_since >= returns_within;
 }
 
-const EventJournal::Outage* EventJournal::find(const std::string& subject) const {
+const EventJournal::Outage* EventJournal::find(const Subject& subject) const {
   const auto found = outages_.find(subject);
   return found == outages_.end() || found->second.is_end_told ? nullptr : &found->second;
 }
 
-bool EventJournal::lasts(const std::string& subject) const {
+bool EventJournal::lasts(const Subject& subject) const {
   return find(subject) != nullptr;
 }
 
-bool EventJournal::comes_and_goes(const std::string& subject) const {
+bool EventJournal::comes_and_goes(const Subject& subject) const {
   const Outage* outage = find(subject);
   return outage != nullptr && outage->comes_and_goes;
 }
@@ -111,29 +110,34 @@ bool EventJournal::comes_and_goes(const std::string& subject) const {
 void EventJournal::mode(const std::string& name) {
   if (name == mode_) return;
   const Moment at = now_();
-  Event event = event_of("mode", mode_, name);
+  Event event;
+  event.kind = EventKind::mode;
+  event.code = name;
+  event.subject.name = mode_;
   if (!mode_.empty()) event.duration_s = seconds(at.monotonic - mode_since_);
   mode_ = name;
   mode_since_ = at.monotonic;
   add(at, std::move(event));
 }
 
-void EventJournal::command(const std::string& what, std::int64_t user) {
-  Event event = event_of("command", "", what);
-  event.user = user;
-  add(now_(), std::move(event));
+void EventJournal::command(Event command) {
+  command.kind = EventKind::command;
+  add(now_(), std::move(command));
 }
 
-void EventJournal::daemon(const std::string& what) {
-  add(now_(), event_of("daemon", "", what));
+void EventJournal::daemon(const std::string& code, const std::string& detail) {
+  Event event;
+  event.code = code;
+  event.detail = detail;
+  add(now_(), std::move(event));
 }
 
 std::vector<Event> EventJournal::ended_within(std::chrono::seconds age,
                                               std::size_t count_max) const {
-  const std::int64_t since_ns = (now_().wall - std::chrono::nanoseconds(age)).count();
+  const double since_s = seconds(now_().wall - age);
   std::vector<Event> ended;
   for (auto event = events_.rbegin(); event != events_.rend() && ended.size() < count_max; ++event)
-    if (event->kind == "recovery" && event->wall_ns >= since_ns) ended.push_back(*event);
+    if (event->kind == EventKind::recovery && event->wall_s >= since_s) ended.push_back(*event);
   return ended;
 }
 

@@ -6,25 +6,14 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-namespace thermocomp {
+#include "status/event.hpp"
 
-/// What happened, for a person: faults with their ends, changes of mode, what operators did.
-struct Event {
-  std::uint64_t number{0};  ///< counts up from 1 in a run of the daemon
-  std::int64_t wall_ns{0};  ///< since 1970
-  std::string kind;         ///< "fault", "recovery", "mode", "command" or "daemon"
-  std::string subject;      ///< "sensor bed_front", "bus cabinet", ...; mode: the one before
-  std::string what;         ///< the fault (of a recovery: which has ended), the mode, the command
-  /// recovery: how long the fault lasted; mode: how long the one before it did [s]. NaN: neither
-  double duration_s{std::numeric_limits<double>::quiet_NaN()};
-  std::int64_t user{-1};  ///< command: who gave it, by the kernel; -1: nobody, or SIGHUP
-};
+namespace thermocomp {
 
 /// Main's thread only. Every change is one event; the same fault told again is none. A fault that
 /// returns within `returns_within` of its end comes and goes: that is one outage, which ends once
@@ -46,23 +35,25 @@ class EventJournal {
 
   /// The subject has this fault from now on. Each kind of fault is told once in an outage, which
   /// counts from the first.
+  /// @param fault  its subject, code, detail and value; the journal sets the rest
   /// @return whether it became an event
-  bool fault(const std::string& subject, const std::string& what);
+  bool fault(Event fault);
   /// The subject has none; nothing where it had none.
   /// @param hold  the outage ends once it has had none for so long
   /// @return how long the outage lasted [s] if its end became an event, else NaN
-  double recovery(const std::string& subject, std::chrono::nanoseconds hold = {});
+  double recovery(const Subject& subject, std::chrono::nanoseconds hold = {});
   /// Ends the outages whose faults have stayed away for long enough; often.
   /// @return the events
   std::vector<Event> settle();
   /// An outage that has begun and of which no end is told yet.
-  [[nodiscard]] bool lasts(const std::string& subject) const;
+  [[nodiscard]] bool lasts(const Subject& subject) const;
   /// Such a one whose faults come and go.
-  [[nodiscard]] bool comes_and_goes(const std::string& subject) const;
+  [[nodiscard]] bool comes_and_goes(const Subject& subject) const;
   /// A mode that begins; the same again is nothing.
   void mode(const std::string& name);
-  void command(const std::string& what, std::int64_t user);
-  void daemon(const std::string& what);
+  /// @param command  its code, subject, value and user
+  void command(Event command);
+  void daemon(const std::string& code, const std::string& detail);
 
   /// Oldest first; at most kept_max.
   [[nodiscard]] const std::deque<Event>& events() const noexcept { return events_; }
@@ -75,8 +66,8 @@ class EventJournal {
  private:
   struct Outage {
     std::chrono::nanoseconds since{};  ///< monotonic: a set clock must not change a duration
-    std::string what;                  ///< the newest fault
-    std::vector<std::string> told;     ///< faults that became events
+    Event newest;                      ///< fault
+    std::vector<Event> told;           ///< faults that became events
     std::optional<std::chrono::nanoseconds> away_since;  ///< none: it has a fault now
     std::chrono::nanoseconds hold{};
     bool is_end_told{false};
@@ -84,15 +75,15 @@ class EventJournal {
   };
   /// Its end is told, and what comes now is another outage.
   [[nodiscard]] static bool is_over(const Outage& outage, std::chrono::nanoseconds now);
-  [[nodiscard]] const Outage* find(const std::string& subject) const;
-  Event end_of(const std::string& subject, Outage& outage);
+  [[nodiscard]] const Outage* find(const Subject& subject) const;
+  Event end_of(Outage& outage);
   void add(const Moment& at, Event event);
 
   Now now_;
   std::function<void(const Event&)> listener_;
   std::uint64_t number_{0};
   std::deque<Event> events_;
-  std::map<std::string, Outage> outages_;
+  std::map<Subject, Outage> outages_;
   std::string mode_;
   std::chrono::nanoseconds mode_since_{};
 };

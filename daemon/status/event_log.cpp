@@ -4,7 +4,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "daemon/status/status_json.hpp"
+#include "status/codes.hpp"
 
 namespace thermocomp {
 namespace {
@@ -20,14 +20,9 @@ nanoseconds hold_of(Reason reason) {
 }
 
 std::string reason_names(std::uint32_t reasons) {
-  std::string names;
-  for (std::size_t i = 0; i < reasons_count; ++i) {
-    const auto reason = static_cast<Reason>(1u << i);
-    if (!has_reason(reasons, reason)) continue;
-    if (!names.empty()) names += ", ";
-    names += to_string(reason);
-  }
-  return names.empty() ? "none" : names;
+  std::vector<std::string> names;
+  for (const Reason reason : members_of(reasons)) names.emplace_back(to_string(reason));
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 }  // namespace
@@ -41,15 +36,13 @@ void EventLog::note_estimates(const Report& report, const EstimatorConfig& confi
     any = any || input.estimated;
     // One that was never estimated is its sensors' news.
     const bool was_estimated = !input_states_[i].empty();
-    std::string state = input.estimated                ? "lost, estimated from the others"
-                        : !input.good && was_estimated ? "lost, and no longer to be estimated"
-                                                       : "";
+    std::string state = input.estimated ? "estimated" : !input.good && was_estimated ? "lost" : "";
     if (state == input_states_[i]) continue;
-    const std::string subject = "input " + columns[i];
+    const Subject subject{SubjectKind::input, columns[i]};
     if (!state.empty()) {
-      if (journal_.fault(subject, state)) spdlog::warn("{}: {}", subject, state);
+      note_fault({.subject = subject, .code = state});
     } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
-      spdlog::info("{}: measured again after {:.1f} s", subject, lasted_s);
+      spdlog::info("input {}: measured again after {:.1f} s", subject.name, lasted_s);
     }
     input_states_[i] = std::move(state);
   }
@@ -57,17 +50,22 @@ void EventLog::note_estimates(const Report& report, const EstimatorConfig& confi
   if (uncertain == uncertain_) return;
   uncertain_ = uncertain;
   for (std::size_t i = 0; i < report.axes.size(); ++i) {
-    const std::string subject = "estimate of axis " + config.axes[i].name;
+    const Subject subject{SubjectKind::estimate, config.axes[i].name};
     const double sd_um_max = config.compensation.offset_sd_um_max;
     if (!uncertain) {
       if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0)
-        spdlog::info("{}: certain enough again after {:.1f} s", subject, lasted_s);
+        spdlog::info("{}: certain enough again after {:.1f} s", subject_text(subject), lasted_s);
     } else if (report.axes[i].offset_sd_um > sd_um_max) {
-      const std::string what = fmt::format("too uncertain, more than {:.2f} um", sd_um_max);
-      if (journal_.fault(subject, what))
-        spdlog::warn("{}: {} ({:.2f} um)", subject, what, report.axes[i].offset_sd_um);
+      note_fault({.subject = subject, .code = "uncertain", .value = sd_um_max});
     }
   }
+}
+
+void EventLog::note_fault(const Event& fault, std::string_view more) {
+  Event noted = fault;
+  noted.kind = EventKind::fault;
+  if (journal_.fault(noted))
+    spdlog::warn("{}: {}{}", subject_text(noted.subject), what_text(noted), more);
 }
 
 void EventLog::note_report(const Report& report, const EstimatorConfig& config, bool dry_run) {
@@ -82,13 +80,14 @@ void EventLog::note_report(const Report& report, const EstimatorConfig& config, 
   note_ended_outages();
   note_sensors(report, config);
   note_mismatches(report, config);
-  note_mode(report, std::string(mode_name(report.mode, dry_run)));  // what comes of them
+  note_mode(report, std::string(code_text(report.mode, dry_run).name));  // what comes of them
   first_ = false;
 }
 
 void EventLog::note_ended_outages() {
   for (const Event& event : journal_.settle())
-    spdlog::info("{}: {}: over, lasted {:.1f} s", event.subject, event.what, event.duration_s);
+    spdlog::info("{}: {}: over, lasted {:.1f} s", subject_text(event.subject), what_text(event),
+                 event.duration_s);
 }
 
 void EventLog::note_mode(const Report& report, const std::string& mode) {
@@ -101,7 +100,7 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
     if (reason == Reason::cutting) continue;
     const bool is_given = has_reason(report.reasons, reason);
     note_reason(reason, is_given);
-    const std::string subject = "reason " + std::string(to_string(reason));
+    const Subject subject{SubjectKind::reason, std::string(to_string(reason))};
     if (is_given || journal_.lasts(subject)) reasons_ |= bit;
     may_return = may_return || (!is_given && journal_.comes_and_goes(subject));
   }
@@ -119,11 +118,11 @@ void EventLog::note_mode(const Report& report, const std::string& mode) {
 void EventLog::note_reason(Reason reason, bool is_given) {
   // What an operator wanted is no fault; the command and the mode tell of it.
   if (reason == Reason::operator_disabled) return;
-  const std::string name(to_string(reason));
+  const Subject subject{SubjectKind::reason, std::string(to_string(reason))};
   if (is_given)
-    journal_.fault("reason " + name, name);
+    journal_.fault({.subject = subject, .code = subject.name});
   else
-    journal_.recovery("reason " + name, hold_of(reason));
+    journal_.recovery(subject, hold_of(reason));
 }
 
 void EventLog::note_sensors(const Report& report, const EstimatorConfig& config) {
@@ -135,12 +134,11 @@ void EventLog::note_sensors(const Report& report, const EstimatorConfig& config)
     // One that settles ends what was told before only once it counts.
     const bool settles = sensor.fault == Fault::unconfirmed && !sensor.jumped;
     if (sensor.fault != faults_[i] && !settles) {
-      const std::string subject = "sensor " + config.sensors[i].name;
+      const Subject subject{SubjectKind::sensor, config.sensors[i].name};
       if (sensor.fault != Fault::none) {
-        if (journal_.fault(subject, std::string(to_string(sensor.fault))))
-          spdlog::warn("{}: {}", subject, to_string(sensor.fault));
+        note_fault({.subject = subject, .code = std::string(to_string(sensor.fault))});
       } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
-        spdlog::info("{}: good again after {:.1f} s", subject, lasted_s);
+        spdlog::info("sensor {}: good again after {:.1f} s", subject.name, lasted_s);
       }
       faults_[i] = sensor.fault;
     }
@@ -157,12 +155,10 @@ void EventLog::note_suspicion(std::size_t index, const SensorReport& sensor,
                               const std::string& name) {
   if (sensor.suspected == suspected_[index]) return;
   suspected_[index] = sensor.suspected;
-  const std::string subject = "suspected sensor " + name;
+  const Subject subject{SubjectKind::suspected_sensor, name};
   if (sensor.suspected) {
-    const std::string what =
-        fmt::format("off by {:+.1f} K against its neighbours", sensor.suspected_size_K);
-    if (journal_.fault(subject, what))
-      spdlog::warn("{}: {}{}", subject, what, sensor.weighed_down ? ", not used" : "");
+    note_fault({.subject = subject, .code = "suspected", .value = sensor.suspected_size_K},
+               sensor.weighed_down ? ", not used" : "");
   } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
     spdlog::info("sensor {}: no longer suspected, after {:.1f} s", name, lasted_s);
   }
@@ -175,9 +171,10 @@ void EventLog::note_mismatches(const Report& report, const EstimatorConfig& conf
     if (axis.latched == latched_[i]) continue;
     latched_[i] = axis.latched;
     const Mismatch& mismatch = axis.latched_mismatch;
-    const std::string subject = "axis " + config.axes[i].name;
+    const Subject subject{SubjectKind::axis, config.axes[i].name};
     if (axis.latched) {
-      journal_.fault(subject, "mismatch latched: " + std::string(likely_text(mismatch)));
+      journal_.fault(
+          {.subject = subject, .code = "mismatch_latched", .detail = likely_text(mismatch)});
       spdlog::error(
           "axis {}: sent {:.3f} um, read back {:.3f} um: {}; not driven until it is mended and "
           "released (thermocomp release {})",
@@ -191,68 +188,66 @@ void EventLog::note_mismatches(const Report& report, const EstimatorConfig& conf
   }
 }
 
-void EventLog::note_link(const std::string& what, bool connected, const std::string& error) {
-  const auto known = connected_.find(what);
+void EventLog::note_link(const Subject& subject, bool connected, const std::string& error) {
+  const auto known = connected_.find(subject);
   if (known != connected_.end() && known->second == connected) return;
-  connected_[what] = connected;
-  const std::string why = error.empty() ? "not connected" : error;
-  if (!connected) {
-    if (journal_.fault(what, why)) spdlog::warn("{}: {}", what, why);
-  } else if (const double lasted_s = journal_.recovery(what); lasted_s >= 0.0) {
-    spdlog::info("{}: connected again after {:.1f} s", what, lasted_s);
-  } else if (!journal_.lasts(what)) {
-    spdlog::info("{}: connected", what);
-  }
+  connected_[subject] = connected;
+  if (!connected)
+    note_fault({.subject = subject,
+                .code = "not_connected",
+                .detail = error.empty() ? "not connected" : error});
+  else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0)
+    spdlog::info("{}: connected again after {:.1f} s", subject_text(subject), lasted_s);
+  else if (!journal_.lasts(subject))
+    spdlog::info("{}: connected", subject_text(subject));
 }
 
-// A bus that is not connected has said so already.
-void EventLog::note_state(const std::string& what, bool connected, const std::string& state) {
+// A bus that is not connected has an event of its own.
+void EventLog::note_state(const Subject& subject, bool connected, const std::string& state) {
   if (state.empty() || !connected) return;
-  std::string& known = states_.try_emplace(what, "active").first->second;
+  std::string& known = states_.try_emplace(subject, "active").first->second;
   if (known == state) return;
   known = state;
-  const std::string subject = what + ", errors";
-  if (state != "active") {
-    if (journal_.fault(subject, "error state " + state))
-      spdlog::warn("{}: error state {}", what, state);
-  } else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0) {
-    spdlog::info("{}: without errors again after {:.1f} s", what, lasted_s);
-  }
+  if (state != "active")
+    note_fault({.subject = subject, .code = state});
+  else if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0)
+    spdlog::info("{}: none again after {:.1f} s", subject_text(subject), lasted_s);
 }
 
 void EventLog::note_bus(const BusHealth& bus) {
-  note_link("bus " + bus.name, bus.connected, bus.last_error);
-  note_state("bus " + bus.name, bus.connected, bus.state);
+  note_link({SubjectKind::bus, bus.name}, bus.connected, bus.last_error);
+  note_state({SubjectKind::bus_errors, bus.name}, bus.connected, bus.state);
   if (!bus.connected) return;
   for (const UnitHealth& unit : bus.units)
     if (unit.answering || !unit.last_error.empty())
-      note_link("device " + unit.name, unit.answering, unit.last_error);
+      note_link({SubjectKind::device, unit.name}, unit.answering, unit.last_error);
 }
 
 void EventLog::note_controller(const ControllerHealth& controller) {
-  note_link("controller " + controller.name, controller.connected, controller.last_error);
-  note_state("controller " + controller.name, controller.connected, controller.state);
+  note_link({SubjectKind::controller, controller.name}, controller.connected,
+            controller.last_error);
+  note_state({SubjectKind::controller_errors, controller.name}, controller.connected,
+             controller.state);
   note_writes(controller);
 }
 
 /// Once an outage, with which write failed and how; a single write that fails is none.
 void EventLog::note_writes(const ControllerHealth& controller) {
-  const std::string subject = "writes to controller " + controller.name;
+  const Subject subject{SubjectKind::controller_writes, controller.name};
   const WriteHealth& write = controller.write;
   const bool none_since = write.confirmed_at == write_.confirmed_at;
   if (!write.error.empty() && none_since && !unwritten_) {
     unwritten_ = true;
-    spdlog::warn("{}: {}", subject, write.error);
-    journal_.fault(subject, write.error);
+    note_fault({.subject = subject, .code = "not_written", .detail = write.error});
   } else if (write.error.empty() && unwritten_) {
     unwritten_ = false;
-    spdlog::info("{}: confirmed again; {} refused, {} not answered since the start", subject,
-                 write.refused, write.unanswered);
+    spdlog::info("{}: confirmed again; {} refused, {} not answered since the start",
+                 subject_text(subject), write.refused, write.unanswered);
     journal_.recovery(subject);
   }
   const std::uint64_t late = write.late - write_.late;
   if (2 * late > controller.reads - reads_ && late > 0 && !late_) {
-    spdlog::warn("{}: late, reading and writing take longer than period_s", subject);
+    spdlog::warn("{}: late, reading and writing take longer than period_s", subject_text(subject));
     late_ = true;
   }
   if (late == 0 && controller.reads != reads_) late_ = false;
@@ -262,18 +257,19 @@ void EventLog::note_writes(const ControllerHealth& controller) {
 
 void EventLog::note_history(const HistoryStatistics& history,
                             const std::vector<std::string>& news) {
-  const std::string subject = "history";
+  const Subject subject{SubjectKind::history, ""};
   for (const std::string& what : news) {
-    spdlog::warn("{}: {}", subject, what);
-    journal_.daemon(subject + ": " + what);
+    spdlog::warn("history: {}", what);
+    journal_.daemon("history", what);
   }
   if (history.working) {
     if (const double lasted_s = journal_.recovery(subject); lasted_s >= 0.0)
-      spdlog::info("{}: written again after {:.1f} s, {} records lost in it", subject, lasted_s,
+      spdlog::info("history: written again after {:.1f} s, {} records lost in it", lasted_s,
                    history.lost - lost_);
     lost_ = history.lost;
-  } else if (!history.last_error.empty() && journal_.fault(subject, history.last_error)) {
-    spdlog::warn("{}: {}; the compensation goes on, tried again", subject, history.last_error);
+  } else if (!history.last_error.empty()) {
+    note_fault({.subject = subject, .code = "not_written", .detail = history.last_error},
+               "; the compensation goes on, tried again");
   }
 }
 

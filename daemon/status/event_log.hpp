@@ -5,6 +5,7 @@
 #include <chrono>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/history/writing/history_writer.hpp"
@@ -47,9 +48,11 @@ class EventLog {
   void note_sensors(const Report& report, const EstimatorConfig& config);
   void note_suspicion(std::size_t index, const SensorReport& sensor, const std::string& name);
   void note_mismatches(const Report& report, const EstimatorConfig& config);
-  void note_link(const std::string& what, bool connected, const std::string& error);
+  void note_link(const Subject& subject, bool connected, const std::string& error);
   void note_writes(const ControllerHealth& controller);
-  void note_state(const std::string& what, bool connected, const std::string& state);
+  void note_state(const Subject& subject, bool connected, const std::string& state);
+  /// Into the journal and, where it becomes an event, the log. @param more  only for the log
+  void note_fault(const Event& fault, std::string_view more = "");
 
   EventJournal& journal_;
   bool first_{true};
@@ -62,13 +65,13 @@ class EventLog {
   std::vector<std::string> input_states_;
   std::vector<bool> latched_;
   bool uncertain_{false};
-  std::map<std::string, bool> connected_;
-  std::map<std::string, std::string> states_;  ///< of CAN interfaces
-  std::uint64_t lost_{0};                      ///< records of the history
-  WriteHealth write_;                          ///< when last looked at
-  std::uint64_t reads_{0};                     ///< then
-  bool unwritten_{false};                      ///< told
-  bool late_{false};                           ///< told
+  std::map<Subject, bool> connected_;
+  std::map<Subject, std::string> states_;  ///< of CAN interfaces
+  std::uint64_t lost_{0};                  ///< records of the history
+  WriteHealth write_;                      ///< when last looked at
+  std::uint64_t reads_{0};                 ///< then
+  bool unwritten_{false};                  ///< noted
+  bool late_{false};                       ///< noted
   std::uint64_t missed_{0};
   std::uint64_t failed_sleeps_{0};
   SocketStatistics socket_;

@@ -14,7 +14,7 @@ void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexce
   out.measured_um = stages.learned.measured_um(axis);
   out.synced = channel.synced();
   out.driven = stages.axes.driven(axis);
-  out.mismatch = channel.mismatch();
+  out.disagrees = channel.mismatch();
   out.latched = channel.latched();
   out.releasing = channel.releasing();
   out.latched_mismatch = channel.latched_mismatch();

@@ -36,8 +36,8 @@ struct AxisReport {
   double applied_um{not_a_number};   ///< read back
   double measured_um{not_a_number};  ///< last `measured` of the operator
   bool synced{false};
-  bool driven{false};  ///< offset marked valid
-  bool mismatch{false};
+  bool driven{false};         ///< offset marked valid
+  bool disagrees{false};      ///< read-back and offset sent differ
   bool latched{false};        ///< the mismatch stays until an operator releases it
   bool releasing{false};      ///< released, the read-backs are looked at
   Mismatch latched_mismatch;  ///< of the newest latch

@@ -2,46 +2,35 @@
 
 #include <set>
 
-#include <nlohmann/json.hpp>
-
-#include "cli/common/json_fields.hpp"
-#include "cli/common/reason_text.hpp"
-#include "cli/observe/troubles.hpp"
+#include "status/codes.hpp"
+#include "status/figures.hpp"
+#include "status/verdict.hpp"
 
 namespace thermocomp::gateway {
 namespace {
 
-using cli::flag_of;
-using cli::list_of;
-using cli::object_of;
-using cli::text_of;
-using nlohmann::json;
-
-void add_compensation(const json& status, std::vector<AlarmCondition>& wrong) {
-  const cli::Verdict verdict = cli::verdict(status);
-  if (verdict.compensating) return;
-  // A dry run that computes is what somebody wants, for days.
-  if (text_of(status, "mode") == "dry_run") return;
-  AlarmCondition condition{"compensation", "compensating: " + verdict.answer + verdict.detail, ""};
-  for (const json& reason : list_of(status, "reasons"))
-    if (reason.is_string() && condition.remedy.empty())
-      condition.remedy = std::string(cli::reason_text(reason.get<std::string>()).remedy);
+void add_compensation(const Status& status, std::vector<AlarmCondition>& wrong) {
+  const Verdict now = verdict(status);
+  if (now.compensating) return;
+  // A dry run that computes is wanted, for days.
+  if (status.dry_run && status.mode == Mode::compensating) return;
+  AlarmCondition condition{"compensation", "compensating: " + verdict_text(now), ""};
+  const std::vector<Reason> reasons = by_severity(status.reasons);
+  if (!reasons.empty()) condition.remedy = std::string(code_text(reasons.front()).remedy);
   wrong.push_back(std::move(condition));
 }
 
-void add_sensors(const json& sensors, std::vector<AlarmCondition>& wrong) {
-  for (const json& sensor : list_of(sensors, "sensors")) {
-    const std::string name = text_of(sensor, "name");
-    const cli::ReasonText fault = cli::fault_text(text_of(sensor, "fault"));
-    if (fault.name != "none")
-      wrong.push_back({"sensor/" + name, "sensor " + name + ": " + std::string(fault.meaning),
+void add_sensors(const SensorsAnswer& answer, std::vector<AlarmCondition>& wrong) {
+  for (const SensorStatus& sensor : answer.sensors) {
+    const CodeText fault = code_text(sensor.fault);
+    if (sensor.fault != Fault::none)
+      wrong.push_back({"sensor/" + sensor.name,
+                       "sensor " + sensor.name + ": " + std::string(fault.meaning),
                        std::string(fault.remedy)});
-    const json& suspected = object_of(sensor, "suspected");
-    if (!suspected.empty())
-      wrong.push_back({"suspected/" + name,
-                       "sensor " + name + " is off by " +
-                           cli::fixed_signed(cli::number_of(suspected, "size_K"), 1) +
-                           " K against its neighbours",
+    if (sensor.suspected)
+      wrong.push_back({"suspected/" + sensor.name,
+                       "sensor " + sensor.name + " is off by " +
+                           fixed_signed(sensor.suspected->size_K, 1) + " K against its neighbours",
                        "check its contact and its place"});
   }
 }
@@ -55,23 +44,21 @@ std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot) {
                      "systemctl status thermocompd; journalctl -u thermocompd"});
     return wrong;
   }
-  const json& status = snapshot.status;
+  const Status& status = snapshot.status;
   add_compensation(status, wrong);
   add_sensors(snapshot.sensors, wrong);
-  for (const json& axis : list_of(status, "axes"))
-    if (flag_of(axis, "at_bound"))
-      wrong.push_back({"bound/" + text_of(axis, "name"),
-                       "axis " + text_of(axis, "name") + " is at its bound",
-                       std::string(cli::reason_text("at_bound").remedy)});
-  const cli::ReasonText domain = cli::reason_text("outside_domain");
-  if (flag_of(object_of(status, "model"), "outside"))
+  for (const AxisStatus& axis : status.axes)
+    if (axis.at_bound)
+      wrong.push_back({"bound/" + axis.name, "axis " + axis.name + " is at its bound",
+                       std::string(code_text(Reason::at_bound).remedy)});
+  const CodeText domain = code_text(Reason::outside_domain);
+  if (status.model.outside.value_or(false))
     wrong.push_back({"domain", std::string(domain.meaning), std::string(domain.remedy)});
-  for (const json& bus : list_of(status, "buses"))
-    if (!flag_of(bus, "connected"))
-      wrong.push_back(
-          {"bus/" + text_of(bus, "name"),
-           "bus " + text_of(bus, "name") + " is not connected (" + text_of(bus, "last_error") + ")",
-           std::string(cli::bus_remedy(text_of(bus, "kind")))});
+  for (const BusStatus& bus : status.buses)
+    if (!bus.connected)
+      wrong.push_back({"bus/" + bus.name,
+                       "bus " + bus.name + " is not connected (" + bus.last_error + ")",
+                       std::string(bus_remedy(bus.kind))});
   return wrong;
 }
 

@@ -12,9 +12,9 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
-#include "cli/common/json_fields.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "gateway/feed/trend_watch.hpp"
+#include "status/status_json.hpp"
 
 namespace thermocomp::gateway {
 namespace {
@@ -38,6 +38,21 @@ double steady_s() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
+/// What of a status changes with an event.
+struct Happened {
+  Mode mode{Mode::starting};
+  std::uint32_t reasons{0};
+  std::vector<std::string> sensors_bad;
+  std::size_t ended{0};
+  std::uint64_t last_ended{0};
+  bool operator==(const Happened&) const = default;
+};
+
+Happened happened_in(const Status& status) {
+  return {status.mode, status.reasons, status.sensors_bad, status.ended.size(),
+          status.ended.empty() ? 0 : status.ended.front().number};
+}
+
 }  // namespace
 
 struct DaemonFeed::Parts {
@@ -45,7 +60,7 @@ struct DaemonFeed::Parts {
 
   void run();
   void follow();
-  void take_sensors(StatusClient& client, json sensors);
+  void take_sensors(StatusClient& client);
   void renew_slow_answers(StatusClient& client);
   void publish();
   void be_away(const std::string& why);
@@ -66,8 +81,10 @@ struct DaemonFeed::Parts {
   // Only of the feed's thread.
   Snapshot next;
   TrendWatch trends;
+  bool has_status{false};
+  std::string model_checksum;  ///< of `next.model`
   Clock::time_point events_at{};
-  nlohmann::json happened;  ///< what of the status hints at events, when they were asked for last
+  Happened happened;  ///< when events were asked for last
 };
 
 void DaemonFeed::Parts::run() {
@@ -90,20 +107,22 @@ void DaemonFeed::Parts::follow() {
   while (!stops) {
     json told = client.next(silence_max);
     const std::string method = told.value("method", std::string());
-    if (method == "status") next.status = std::move(told["params"]);
-    if (method == "sensors") take_sensors(client, std::move(told["params"]));
+    if (method == "status") {
+      next.status = part_from<Status>(told["params"]);
+      has_status = true;
+    }
+    if (method == "sensors" && has_status) {  // else the pair is not whole yet
+      next.sensors = part_from<SensorsAnswer>(told["params"]);
+      take_sensors(client);
+    }
   }
 }
 
-void DaemonFeed::Parts::take_sensors(StatusClient& client, json sensors) {
-  if (!next.status.is_object()) return;  // the pair is not whole yet
-  next.sensors = std::move(sensors);
+void DaemonFeed::Parts::take_sensors(StatusClient& client) {
   renew_slow_answers(client);
-  for (const json& sensor : cli::list_of(next.sensors, "sensors")) {
-    const std::string name = cli::text_of(sensor, "name");
-    trends.add(name, steady_s(), cli::number_of(sensor, "smoothed_degC"));
-    const double rate = trends.per_hour(name);
-    next.trends[name] = std::isfinite(rate) ? json(rate) : json(nullptr);
+  for (const SensorStatus& sensor : next.sensors.sensors) {
+    trends.add(sensor.name, steady_s(), sensor.smoothed_degC);
+    next.trends[sensor.name] = trends.per_hour(sensor.name);
   }
   if (!next.is_here) {
     spdlog::info("the daemon answers at {}", settings.socket.string());
@@ -117,24 +136,23 @@ void DaemonFeed::Parts::take_sensors(StatusClient& client, json sensors) {
 /// The model when it is another one; events when something shows that there are new ones, and every
 /// few seconds: there may be a thousand of them.
 void DaemonFeed::Parts::renew_slow_answers(StatusClient& client) {
-  const std::string checksum = cli::text_of(cli::object_of(next.status, "model"), "checksum");
-  if (!next.is_here || cli::text_of(*next.model, "checksum") != checksum) {
+  const std::string& checksum = next.status.model.checksum;
+  if (!next.is_here || model_checksum != checksum) {
+    model_checksum = checksum;
     next.model = std::make_shared<const json>(client.call("model", json::object(), silence_max));
     trends.forget();
-    next.trends = json::object();
+    next.trends.clear();
     events_at = {};
   }
-  json shown = {cli::text_of(next.status, "mode"), cli::list_of(next.status, "reasons"),
-                cli::list_of(next.status, "sensors_bad"), cli::list_of(next.status, "ended")};
-  if (shown == happened && Clock::now() - events_at < events_every) return;
-  happened = std::move(shown);
+  Happened now = happened_in(next.status);
+  if (now == happened && Clock::now() - events_at < events_every) return;
+  happened = std::move(now);
   events_at = Clock::now();
-  json told = client.call("events", json::object(), silence_max);
-  const json& all = cli::list_of(told, "events");
-  const auto first = all.size() > events_max ? all.size() - events_max : 0;
-  json newest_of_them = json::array();
-  for (std::size_t i = first; i < all.size(); ++i) newest_of_them.push_back(all[i]);
-  next.events = std::make_shared<const json>(std::move(newest_of_them));
+  std::vector<Event> all =
+      part_from<EventsAnswer>(client.call("events", json::object(), silence_max)).events;
+  if (all.size() > events_max)
+    all.erase(all.begin(), all.end() - static_cast<std::ptrdiff_t>(events_max));
+  next.events = std::make_shared<const std::vector<Event>>(std::move(all));
 }
 
 void DaemonFeed::Parts::publish() {
@@ -144,7 +162,7 @@ void DaemonFeed::Parts::publish() {
   {
     const std::lock_guard lock(mutex);
     newest = made;
-    if (made->is_here) displacement.add(made->wall_s, made->status);
+    if (made->is_here) displacement.add(made->wall_s, made->status.axes);
   }
   for (const Listener& listener : listeners) listener(made);
 }
@@ -206,8 +224,7 @@ std::vector<std::pair<std::string, std::vector<double>>> DaemonFeed::displacemen
 
 std::filesystem::path DaemonFeed::history_file() const {
   if (!parts_->settings.history.empty()) return parts_->settings.history;
-  const SnapshotPointer snapshot = newest();
-  return cli::text_of(cli::object_of(snapshot->status, "history"), "file");
+  return newest()->status.history.file;
 }
 
 }  // namespace thermocomp::gateway

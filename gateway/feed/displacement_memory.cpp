@@ -2,18 +2,14 @@
 
 #include <cmath>
 
-#include <nlohmann/json.hpp>
-
-#include "cli/common/json_fields.hpp"
-
 namespace thermocomp::gateway {
 
-void DisplacementMemory::add(double wall_s, const nlohmann::json& status) {
+void DisplacementMemory::add(double wall_s, const std::vector<AxisStatus>& now) {
   std::vector<std::string> axes;
   Sample sample{wall_s, {}};
-  for (const nlohmann::json& axis : cli::list_of(status, "axes")) {
-    axes.push_back(cli::text_of(axis, "name"));
-    sample.values.push_back(static_cast<float>(cli::number_of(axis, "displacement")));
+  for (const AxisStatus& axis : now) {
+    axes.push_back(axis.name);
+    sample.values.push_back(static_cast<float>(axis.displacement));
   }
   // A clock that was set back: what was noted "later" has no place any more.
   const bool went_back = !samples_.empty() && wall_s < samples_.back().wall_s;

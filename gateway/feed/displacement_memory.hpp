@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
+#include "status/status.hpp"
 
 namespace thermocomp::gateway {
 
@@ -16,8 +16,8 @@ class DisplacementMemory {
   static constexpr double sample_every_s = 10.0;
   static constexpr std::size_t samples_max = 4320;  ///< twelve hours
 
-  /// @param status  result of the method `status`. Other axes than before: all is forgotten.
-  void add(double wall_s, const nlohmann::json& status);
+  /// Other axes than before: all is forgotten.
+  void add(double wall_s, const std::vector<AxisStatus>& now);
   [[nodiscard]] const std::vector<std::string>& axes() const noexcept { return axes_; }
   /// Mean of an axis over each span [times[i] - span_s / 2, times[i] + span_s / 2); NaN: unknown.
   [[nodiscard]] std::vector<double> over(std::size_t axis, const std::vector<double>& times_s,

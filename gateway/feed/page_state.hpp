@@ -1,4 +1,4 @@
-/// What the page and MQTT show of a snapshot: the daemon's answers, shortened and put in words.
+/// What the page and MQTT show of a snapshot: the daemon's answers, and their words.
 #pragma once
 
 #include <string>
@@ -9,20 +9,20 @@
 
 namespace thermocomp::gateway {
 
-/// {"time_s", "here", "since_s", "why", "machine", "verdict": {"compensating", "intended",
-/// "answer",
-///  "detail", "level"}, "problems": [{"what", "remedy"}], "axes", "inputs", "sensors", "buses",
-///  "controller", "model", "reference", "cycle", "history", "version", "lately"}. `level` is
-///  "good",
-/// "warning" or "bad". While the daemon is away only the first five keys and the verdict.
+/// The answer of `status` and {"time_s", "here", "since_s", "why", "machine", "verdict":
+/// {"compensating", "intended", "answer", "detail", "level"}, "problems": [{"what", "remedy"}],
+/// "sensors", "lately"}. `level` is "good", "warning" or "bad". While the daemon is away only these
+/// first five keys, verdict and problems.
 [[nodiscard]] nlohmann::json page_state(const Snapshot& snapshot, const std::string& machine);
 
 /// The newest `most` events with their words, newest first:
 /// [{"number", "wall_s", "kind", "text"}].
 [[nodiscard]] nlohmann::json page_events(const Snapshot& snapshot, std::size_t most);
 
+/// Everything that is wrong: [{"what", "remedy"}].
+[[nodiscard]] nlohmann::json problems_json(const Snapshot& snapshot);
+
 /// One sensor with blocks, values, fault in words, trend and suspicion.
-/// @param sensor  of the method `sensors`
-[[nodiscard]] nlohmann::json sensor_state(const nlohmann::json& sensor, const Snapshot& snapshot);
+[[nodiscard]] nlohmann::json sensor_json(const SensorStatus& sensor, const Snapshot& snapshot);
 
 }  // namespace thermocomp::gateway

@@ -2,10 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
+
+#include "status/status.hpp"
 
 namespace thermocomp::gateway {
 
@@ -16,12 +20,13 @@ struct Snapshot {
   bool is_here{false};      ///< the daemon answers
   double since_s{0.0};      ///< wall clock; since when it does, or does not
   std::string why;          ///< why it does not
-  nlohmann::json status;  ///< results of the methods of these names; the last ones while it is away
-  nlohmann::json sensors;
-  std::shared_ptr<const nlohmann::json> model{std::make_shared<nlohmann::json>()};
-  /// The newest of the list of `events`, oldest first.
-  std::shared_ptr<const nlohmann::json> events{std::make_shared<nlohmann::json>()};
-  nlohmann::json trends;  ///< {sensor: K/h}; null where not known yet
+  Status status;  ///< answers of the methods of these names; the last ones while it is away
+  SensorsAnswer sensors;
+  std::shared_ptr<const nlohmann::json> model{
+      std::make_shared<nlohmann::json>()};  ///< null: not known yet
+  /// The newest of the answer of `events`, oldest first.
+  std::shared_ptr<const std::vector<Event>> events{std::make_shared<std::vector<Event>>()};
+  std::map<std::string, double> trends;  ///< [K/h] by sensor; NaN where not known yet
 };
 using SnapshotPointer = std::shared_ptr<const Snapshot>;
 

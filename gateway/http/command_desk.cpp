@@ -9,17 +9,13 @@
 #include <spdlog/spdlog.h>
 #include <sys/random.h>
 
-#include "cli/common/json_fields.hpp"
 #include "config/text/outer_json.hpp"
 #include "daemon/socket/status_client.hpp"
+#include "status/figures.hpp"
 
 namespace thermocomp::gateway {
 namespace {
 
-using cli::fixed;
-using cli::fixed_signed;
-using cli::number_of;
-using cli::text_of;
 using nlohmann::json;
 
 JsonAnswer answer(unsigned status, const json& value) {
@@ -43,28 +39,39 @@ std::string random_token() {
   return text;
 }
 
-const json& axis_named(const json& status, const std::string& name) {
-  for (const json& axis : cli::list_of(status, "axes"))
-    if (text_of(axis, "name") == name) return axis;
+std::string word(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+CommandRequest request_from(const json& object) {
+  const json value = object.value("value_um", json(nullptr));
+  return {word(object, "method"), word(object, "axis"),
+          value.is_number() ? value.get<double>() : not_a_number};
+}
+
+const AxisStatus& axis_named(const Status& status, const std::string& name) {
+  for (const AxisStatus& axis : status.axes)
+    if (axis.name == name) return axis;
   throw std::invalid_argument("there is no axis " + name);
 }
 
 /// "z from +1.2 um to -3.4 um, y ..."
-std::string moves_to(const json& status, bool to_target) {
+std::string moves_to(const Status& status, bool to_target) {
   std::string text;
-  for (const json& axis : cli::list_of(status, "axes")) {
-    std::string unit(" ");
-    unit.append(text_of(axis, "unit"));
-    text.append(text.empty() ? "" : ", ").append(text_of(axis, "name")).append(" from ");
-    text.append(fixed_signed(number_of(axis, "offset"), 1)).append(unit).append(" to ");
-    text.append(to_target ? fixed_signed(number_of(axis, "target"), 1) : "0").append(unit);
+  for (const AxisStatus& axis : status.axes) {
+    const std::string unit = " " + axis.unit;
+    text.append(text.empty() ? "" : ", ").append(axis.name).append(" from ");
+    text.append(fixed_signed(axis.offset, 1)).append(unit).append(" to ");
+    text.append(to_target ? fixed_signed(axis.target, 1) : "0").append(unit);
   }
   return text;
 }
 
 }  // namespace
 
-std::string confirmation_text(const std::string& method, const json& asked, const json& status) {
+std::string confirmation_text(const CommandRequest& asked, const Status& status) {
+  const std::string& method = asked.method;
   if (method == "enable")
     return "Switch the compensation on. The axes will move, no faster than their slew rates: " +
            moves_to(status, true) + ", and go on following the model.";
@@ -75,11 +82,9 @@ std::string confirmation_text(const std::string& method, const json& asked, cons
     return "Take the machine as it is now for straight. Displacement is counted from here on; "
            "right "
            "only with the machine cold and even and the offsets at zero.";
-  const std::string axis = text_of(asked, "axis");
-  const double value_um = number_of(asked, "value_um");
-  if (!std::isfinite(value_um)) throw std::invalid_argument("value_um must be a number");
-  return "Axis " + axis + " will move by " + fixed_signed(value_um, 1) + " " +
-         text_of(axis_named(status, axis), "unit") +
+  if (!std::isfinite(asked.value_um)) throw std::invalid_argument("value_um must be a number");
+  return "Axis " + asked.axis + " will move by " + fixed_signed(asked.value_um, 1) + " " +
+         axis_named(status, asked.axis).unit +
          " and back, to show its sign. Nobody must be in the machine.";
 }
 
@@ -105,8 +110,8 @@ JsonAnswer CommandDesk::take(const std::string& user, const std::string& body,
   try {
     const json asked = parse_outer_json(body);
     if (!asked.is_object()) return error(400, "the body must be a JSON object");
-    if (asked.contains("token")) return carry_out(user, text_of(asked, "token"));
-    return confirm(user, asked, snapshot);
+    if (asked.contains("token")) return carry_out(user, word(asked, "token"));
+    return confirm(user, request_from(asked), snapshot);
   } catch (const JsonError& problem) {
     return error(400, std::string("the body ") + problem.what());
   } catch (const std::invalid_argument& problem) {
@@ -116,15 +121,14 @@ JsonAnswer CommandDesk::take(const std::string& user, const std::string& body,
   }
 }
 
-JsonAnswer CommandDesk::confirm(const std::string& user, const json& asked,
+JsonAnswer CommandDesk::confirm(const std::string& user, const CommandRequest& asked,
                                 const Snapshot& snapshot) {
-  const std::string method = text_of(asked, "method");
+  const std::string& method = asked.method;
   if (!may(user, method)) return error(403, "this command is not for this user");
   if (!snapshot.is_here) return error(503, "the daemon does not answer");
-  const std::string text = confirmation_text(method, asked, snapshot.status);
+  const std::string text = confirmation_text(asked, snapshot.status);
   json params = json::object();
-  if (method == "prove")
-    params = {{"axis", text_of(asked, "axis")}, {"value_um", number_of(asked, "value_um")}};
+  if (method == "prove") params = {{"axis", asked.axis}, {"value_um", asked.value_um}};
   const auto now = std::chrono::steady_clock::now();
   const std::string token = random_token();
   const std::lock_guard lock(mutex_);

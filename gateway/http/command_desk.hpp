@@ -15,6 +15,13 @@
 
 namespace thermocomp::gateway {
 
+/// What a page asks for.
+struct CommandRequest {
+  std::string method{};
+  std::string axis{};
+  double value_um{not_a_number};
+};
+
 class CommandDesk {
  public:
   static constexpr std::chrono::seconds confirmation_max{60};
@@ -42,7 +49,7 @@ class CommandDesk {
   };
 
   [[nodiscard]] bool may(const std::string& user, const std::string& method) const;
-  [[nodiscard]] JsonAnswer confirm(const std::string& user, const nlohmann::json& asked,
+  [[nodiscard]] JsonAnswer confirm(const std::string& user, const CommandRequest& asked,
                                    const Snapshot& snapshot);
   void make_room(const std::string& user);
   [[nodiscard]] JsonAnswer carry_out(const std::string& user, const std::string& token);
@@ -53,7 +60,6 @@ class CommandDesk {
 };
 
 /// What the command will move, in words. @throws std::invalid_argument: no such axis, no number
-[[nodiscard]] std::string confirmation_text(const std::string& method, const nlohmann::json& asked,
-                                            const nlohmann::json& status);
+[[nodiscard]] std::string confirmation_text(const CommandRequest& asked, const Status& status);
 
 }  // namespace thermocomp::gateway

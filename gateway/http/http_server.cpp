@@ -25,6 +25,7 @@
 #include "gateway/http/request_rules.hpp"
 #include "gateway/http/slow_connections.hpp"
 #include "gateway/http/work_desk.hpp"
+#include "status/status_json.hpp"
 
 namespace thermocomp::gateway {
 namespace {
@@ -165,7 +166,7 @@ struct HttpServer::Parts {
                     std::string text);
   MHD_Result queue(MHD_Connection* connection, unsigned status, const char* type,
                    MHD_Response* response);
-  MHD_Result of_daemon(MHD_Connection* connection, json Snapshot::*part);
+  MHD_Result of_daemon(MHD_Connection* connection, json (*part)(const Snapshot&));
   MHD_Result history(MHD_Connection* connection, Request& request);
   MHD_Result later(MHD_Connection* connection, Request& request, WorkDesk& desk,
                    WorkDesk::Work work);
@@ -318,8 +319,10 @@ MHD_Result HttpServer::Parts::route(MHD_Connection* connection, std::string_view
                                     Request& request) {
   if (const PageFile* file = files.find(path))
     return answer(connection, MHD_HTTP_OK, file->type.c_str(), file->bytes);
-  if (path == "/api/status") return of_daemon(connection, &Snapshot::status);
-  if (path == "/api/sensors") return of_daemon(connection, &Snapshot::sensors);
+  if (path == "/api/status")
+    return of_daemon(connection, [](const Snapshot& all) { return json_of(all.status); });
+  if (path == "/api/sensors")
+    return of_daemon(connection, [](const Snapshot& all) { return json_of(all.sensors); });
   if (path == "/api/events") return stream(connection);
   if (path == "/api/history") return history(connection, request);
   if (path == "/api/commands")
@@ -345,12 +348,12 @@ MHD_Result HttpServer::Parts::post(MHD_Connection* connection, std::string_view 
   });
 }
 
-MHD_Result HttpServer::Parts::of_daemon(MHD_Connection* connection, json Snapshot::*part) {
+MHD_Result HttpServer::Parts::of_daemon(MHD_Connection* connection, json (*part)(const Snapshot&)) {
   const SnapshotPointer snapshot = feed.newest();
   if (!snapshot->is_here)
     return answer(connection, MHD_HTTP_SERVICE_UNAVAILABLE, json_type,
                   error_text("the daemon does not answer: " + snapshot->why));
-  return answer(connection, MHD_HTTP_OK, json_type, dumped((*snapshot).*part));
+  return answer(connection, MHD_HTTP_OK, json_type, dumped(part(*snapshot)));
 }
 
 MHD_Result HttpServer::Parts::history(MHD_Connection* connection, Request& request) {

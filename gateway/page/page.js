@@ -76,7 +76,7 @@ function show(now) {
   document.title = now.machine + ': ' + now.verdict.answer;
   setText(place('clock'), clockText(now.time_s));
   document.body.classList.toggle('stale', !now.here);
-  let detail = now.verdict.detail.replace(/^[,:;]? ?/, '').replace(/^\((.*)\)$/, '$1');
+  let detail = now.verdict.detail;
   if (!now.here) detail += ' for ' + duration(now.time_s - now.since_s) + '; the values below are old';
   showVerdict({level: now.verdict.level, answer: now.verdict.answer, detail: detail});
   showProblems(now);

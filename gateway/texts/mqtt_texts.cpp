@@ -8,17 +8,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/common/json_fields.hpp"
-#include "cli/observe/troubles.hpp"
 #include "gateway/feed/page_state.hpp"
+#include "status/codes.hpp"
+#include "status/verdict.hpp"
 
 namespace thermocomp::gateway {
 namespace {
 
-using cli::flag_of;
-using cli::list_of;
-using cli::number_of;
-using cli::text_of;
 using nlohmann::json;
 
 json rounded(double value) {
@@ -33,33 +29,35 @@ json status_state(const Snapshot& snapshot) {
     state.update({{"compensating", false}, {"why", snapshot.why}});
     return state;
   }
-  json problems = json::array();
-  for (const cli::Trouble& trouble : cli::troubles(snapshot.status))
-    problems.push_back({{"what", trouble.what}, {"remedy", trouble.remedy}});
-  state.update({{"compensating", cli::is_compensating(snapshot.status)},
-                {"mode", text_of(snapshot.status, "mode")},
-                {"enabled", flag_of(snapshot.status, "enabled")},
-                {"reasons", list_of(snapshot.status, "reasons")},
-                {"problems", std::move(problems)},
-                {"version", text_of(snapshot.status, "version")}});
+  const Status& status = snapshot.status;
+  json reasons = json::array();
+  for (const Reason reason : members_of(status.reasons)) reasons.push_back(to_string(reason));
+  state.update({{"compensating", is_compensating(status)},
+                {"mode", code_text(status.mode, status.dry_run).name},
+                {"enabled", status.enabled},
+                {"reasons", std::move(reasons)},
+                {"problems", problems_json(snapshot)},
+                {"version", status.version}});
   return state;
 }
 
-json axis_state(const json& axis) {
-  const std::string unit = text_of(axis, "unit");
-  json state = {{"unit", unit}};
-  for (const char* key : {"displacement", "target", "offset", "applied"})
-    state[std::string(key) + "_" + unit] = rounded(number_of(axis, key));
-  for (const char* key : {"driven", "at_bound", "disagrees"}) state[key] = flag_of(axis, key);
-  return state;
+json axis_state(const AxisStatus& axis) {
+  return {{"unit", axis.unit},
+          {"displacement_" + axis.unit, rounded(axis.displacement)},
+          {"target_" + axis.unit, rounded(axis.target)},
+          {"offset_" + axis.unit, rounded(axis.offset)},
+          {"applied_" + axis.unit, rounded(axis.applied)},
+          {"driven", axis.driven},
+          {"at_bound", axis.at_bound},
+          {"disagrees", axis.disagrees}};
 }
 
-json sensor_topic_state(const json& sensor, const Snapshot& snapshot) {
-  json state = sensor_state(sensor, snapshot);
-  // The age changes with every look and says nothing that `fault` does not.
+json sensor_topic_state(const SensorStatus& sensor, const Snapshot& snapshot) {
+  json state = sensor_json(sensor, snapshot);
+  // The age changes with every look; `fault` has what matters of it.
   for (const char* key : {"name", "age_s"}) state.erase(key);
   for (const char* key : {"raw_degC", "smoothed_degC", "trend_K_per_h"})
-    state[key] = rounded(number_of(state, key));
+    if (state[key].is_number()) state[key] = rounded(state[key].get<double>());
   return state;
 }
 
@@ -106,11 +104,11 @@ std::vector<TopicState> topic_states(const Snapshot& snapshot, const std::string
   std::vector<TopicState> list;
   list.push_back({topic_of(machine, "status"), status_state(snapshot)});
   if (!snapshot.is_here) return list;
-  for (const json& sensor : list_of(snapshot.sensors, "sensors"))
-    list.push_back({topic_of(machine, "sensor", text_of(sensor, "name")),
-                    sensor_topic_state(sensor, snapshot)});
-  for (const json& axis : list_of(snapshot.status, "axes"))
-    list.push_back({topic_of(machine, "axis", text_of(axis, "name")), axis_state(axis)});
+  for (const SensorStatus& sensor : snapshot.sensors.sensors)
+    list.push_back(
+        {topic_of(machine, "sensor", sensor.name), sensor_topic_state(sensor, snapshot)});
+  for (const AxisStatus& axis : snapshot.status.axes)
+    list.push_back({topic_of(machine, "axis", axis.name), axis_state(axis)});
   return list;
 }
 

@@ -6,22 +6,12 @@
 #include <numbers>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
-#include "cli/common/json_fields.hpp"
-#include "cli/common/reason_text.hpp"
-#include "cli/observe/troubles.hpp"
 #include "gateway/texts/mqtt_texts.hpp"
+#include "status/codes.hpp"
+#include "status/verdict.hpp"
 
 namespace thermocomp::gateway {
 namespace {
-
-using cli::flag_of;
-using cli::list_of;
-using cli::number_of;
-using cli::object_of;
-using cli::text_of;
-using nlohmann::json;
 
 constexpr const char* unavailable = "UNAVAILABLE";
 constexpr const char* normal = "NORMAL||||";
@@ -55,36 +45,35 @@ bool is_condition(const std::string& item) {
 
 /// FAULT: the machine is not compensated though it should be. WARNING: it is, or it is switched
 /// off, and something is wrong.
-std::vector<std::string> system_condition(const json& status) {
-  const cli::Verdict verdict = cli::verdict(status);
-  const bool is_fault = !verdict.compensating && !verdict.intended;
+std::vector<std::string> system_condition(const Status& status) {
+  const Verdict now = verdict(status);
+  const bool is_fault = !now.compensating && !now.intended;
   const char* level = is_fault ? "FAULT" : "WARNING";
   std::vector<std::string> entries;
-  for (const json& reason : list_of(status, "reasons")) {
-    if (!reason.is_string() || reason == "cutting") continue;
-    const auto name = reason.get<std::string>();
-    entries.push_back(condition(level, name, cli::reason_text(name).meaning));
+  for (const Reason reason : by_severity(status.reasons)) {
+    const CodeText text = code_text(reason);
+    if (text.severity != Severity::normal)
+      entries.push_back(condition(level, text.name, text.meaning));
   }
   if (entries.empty() && is_fault)
-    entries.push_back(condition(level, text_of(status, "mode"), verdict.answer + verdict.detail));
+    entries.push_back(
+        condition(level, code_text(status.mode, status.dry_run).name, verdict_text(now)));
   if (entries.empty()) entries.emplace_back(normal);
   return entries;
 }
 
-void add_sensors(const json& sensors, ShdrStates& states) {
-  for (const json& sensor : list_of(sensors, "sensors")) {
-    const std::string name = text_of(sensor, "name");
-    const std::string fault = text_of(sensor, "fault");
-    const bool is_good = fault == "none";
-    states[item_name("temp", name)] = {is_good ? number(number_of(sensor, "smoothed_degC"))
-                                               : unavailable};
-    std::vector<std::string>& entry = states[item_name("sensor", name)];
-    if (!is_good)
-      entry = {condition("FAULT", fault, cli::fault_text(fault).meaning)};
-    else if (!object_of(sensor, "suspected").empty())
-      entry = {condition("WARNING", "suspected", "off against its neighbours")};
-    else
-      entry = {normal};
+std::string sensor_condition(const SensorStatus& sensor) {
+  const CodeText fault = code_text(sensor.fault);
+  if (sensor.fault != Fault::none) return condition("FAULT", fault.name, fault.meaning);
+  if (sensor.suspected) return condition("WARNING", "suspected", "off against its neighbours");
+  return normal;
+}
+
+void add_sensors(const SensorsAnswer& answer, ShdrStates& states) {
+  for (const SensorStatus& sensor : answer.sensors) {
+    const bool is_good = sensor.fault == Fault::none;
+    states[item_name("temp", sensor.name)] = {is_good ? number(sensor.smoothed_degC) : unavailable};
+    states[item_name("sensor", sensor.name)] = {sensor_condition(sensor)};
   }
 }
 
@@ -116,21 +105,18 @@ std::string item_name(const std::string& kind, const std::string& name) {
 ShdrStates shdr_states(const Snapshot& snapshot) {
   ShdrStates states;
   states["avail"] = {snapshot.is_here ? "AVAILABLE" : unavailable};
-  const json& status = snapshot.status;
-  states["mode"] = {plain(text_of(status, "mode"))};
+  const Status& status = snapshot.status;
+  states["mode"] = {plain(code_text(status.mode, status.dry_run).name)};
   states["system"] = system_condition(status);
   add_sensors(snapshot.sensors, states);
-  for (const json& axis : list_of(status, "axes")) {
-    const double factor = text_of(axis, "unit") == "urad" ? deg_per_urad : mm_per_um;
-    const std::string name = text_of(axis, "name");
-    states[item_name("offset", name)] = {number(factor * number_of(axis, "offset"))};
-    states[item_name("displacement", name)] = {number(factor * number_of(axis, "displacement"))};
+  for (const AxisStatus& axis : status.axes) {
+    const double factor = axis.unit == "urad" ? deg_per_urad : mm_per_um;
+    states[item_name("offset", axis.name)] = {number(factor * axis.offset)};
+    states[item_name("displacement", axis.name)] = {number(factor * axis.displacement)};
   }
-  for (const json& bus : list_of(status, "buses")) {
-    const std::string entry =
-        flag_of(bus, "connected") ? normal : condition("FAULT", "away", text_of(bus, "last_error"));
-    states[item_name("bus", text_of(bus, "name"))] = {entry};
-  }
+  for (const BusStatus& bus : status.buses)
+    states[item_name("bus", bus.name)] = {
+        bus.connected ? normal : condition("FAULT", "away", bus.last_error)};
   if (snapshot.is_here) return states;
   for (auto& [item, entries] : states) entries = {unavailable};
   states["system"] = {condition("FAULT", "daemon", "the daemon does not answer")};
@@ -186,20 +172,18 @@ std::string device_file(const Snapshot& snapshot, const std::string& machine) {
   append_item(xml, {"EVENT", "AVAILABILITY", ""}, "avail");
   append_item(xml, {"EVENT", "VARIABLE", ""}, "mode");
   append_item(xml, condition_item, "system");
-  for (const json& sensor : list_of(snapshot.sensors, "sensors")) {
-    const std::string name = text_of(sensor, "name");
-    append_item(xml, {"SAMPLE", "TEMPERATURE", "CELSIUS"}, item_name("temp", name));
-    append_item(xml, condition_item, item_name("sensor", name));
+  for (const SensorStatus& sensor : snapshot.sensors.sensors) {
+    append_item(xml, {"SAMPLE", "TEMPERATURE", "CELSIUS"}, item_name("temp", sensor.name));
+    append_item(xml, condition_item, item_name("sensor", sensor.name));
   }
-  for (const json& axis : list_of(snapshot.status, "axes")) {
-    const ItemKind kind = text_of(axis, "unit") == "urad"
-                              ? ItemKind{"SAMPLE", "ANGLE", "DEGREE"}
-                              : ItemKind{"SAMPLE", "DISPLACEMENT", "MILLIMETER"};
-    append_item(xml, kind, item_name("offset", text_of(axis, "name")));
-    append_item(xml, kind, item_name("displacement", text_of(axis, "name")));
+  for (const AxisStatus& axis : snapshot.status.axes) {
+    const ItemKind kind = axis.unit == "urad" ? ItemKind{"SAMPLE", "ANGLE", "DEGREE"}
+                                              : ItemKind{"SAMPLE", "DISPLACEMENT", "MILLIMETER"};
+    append_item(xml, kind, item_name("offset", axis.name));
+    append_item(xml, kind, item_name("displacement", axis.name));
   }
-  for (const json& bus : list_of(snapshot.status, "buses"))
-    append_item(xml, {"CONDITION", "COMMUNICATIONS", ""}, item_name("bus", text_of(bus, "name")));
+  for (const BusStatus& bus : snapshot.status.buses)
+    append_item(xml, {"CONDITION", "COMMUNICATIONS", ""}, item_name("bus", bus.name));
   return xml + "      </DataItems>\n    </Device>\n  </Devices>\n</MTConnectDevices>\n";
 }
 

@@ -284,7 +284,7 @@ void Invariants::check_hold(const CycleSeen& seen) {
     const double rate_um = seen.shape->estimator.axes[i].limiter.rate_um_per_s_max;
     const bool from_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
                               rate_um + register_rounding_um;
-    if (change_um == 0.0 || (from_applied && report.axes[i].mismatch)) continue;
+    if (change_um == 0.0 || (from_applied && report.axes[i].disagrees)) continue;
     const double bound_um = seen.shape->estimator.axes[i].limiter.offset_um_max;
     const bool beyond_new_bound =
         std::max(std::abs(offset_um_[i]), std::abs(seen.told->applied_um[i])) > bound_um &&

@@ -1,20 +1,32 @@
 #include "daemon/history/format/recorded_event.hpp"
 
-#include "daemon/history/format/database.hpp"
+#include <string>
+
+#include "status/status_json.hpp"
 
 namespace thermocomp {
 namespace {
 
-RecordedEvent event_from(const Statement& row) {
-  RecordedEvent event;
-  event.run = row.number(0);
-  event.number = row.number(1);
-  event.wall_ns = row.number(2);
-  event.kind = row.text(3);
-  event.subject = row.text(4);
-  event.what = row.text(5);
-  event.duration_ns = row.number(6);
+/// An earlier version kept only texts.
+Event event_of_texts(const Statement& row) {
+  Event event;
+  event.kind = event_kind_named(row.text(3));
+  event.subject.name = row.text(4);
+  (event.kind == EventKind::mode ? event.code : event.detail) = row.text(5);
+  if (row.number(6) >= 0) event.duration_s = 1e-9 * static_cast<double>(row.number(6));
   event.user = row.number(7);
+  return event;
+}
+
+RecordedEvent event_from(const Statement& row) {
+  const std::string record = row.text(8);
+  RecordedEvent event;
+  static_cast<Event&>(event) =
+      record.empty() ? event_of_texts(row)
+                     : part_from<Event>(nlohmann::json::parse(record, nullptr, false));
+  event.run = row.number(0);
+  event.number = static_cast<std::uint64_t>(row.number(1));
+  event.wall_s = 1e-9 * static_cast<double>(row.number(2));
   return event;
 }
 
@@ -24,6 +36,11 @@ bool is_before(std::int64_t wall_ns, std::int64_t first_ns, const HistoryTime& b
 }
 
 }  // namespace
+
+bool has_event_records(Database& database) {
+  return database.number("SELECT count(*) FROM pragma_table_info('event') WHERE name = 'record'") !=
+         0;
+}
 
 RecordedEvents read_events(const std::filesystem::path& history,
                            const std::optional<HistoryTime>& from,
@@ -35,16 +52,18 @@ RecordedEvents read_events(const std::filesystem::path& history,
       database.number(
           "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'event'") != 0;
   if (!found.are_kept) return found;
-  Statement rows(database,
-                 "SELECT run, number, wall_ns, kind, subject, what, duration_ns, user FROM event"
-                 " ORDER BY run, number");
+  const std::string query =
+      "SELECT run, number, wall_ns, kind, subject, what, duration_ns, user, " +
+      std::string(has_event_records(database) ? "record" : "''") +
+      " FROM event ORDER BY run, number";
+  Statement rows(database, query.c_str());
   std::optional<std::int64_t> first_ns;
   while (rows.step()) {
-    RecordedEvent event = event_from(rows);
-    if (!first_ns) first_ns = event.wall_ns;
-    if (from && is_before(event.wall_ns, *first_ns, *from)) continue;
-    if (to && !is_before(event.wall_ns, *first_ns, *to)) continue;
-    found.events.push_back(std::move(event));
+    const std::int64_t wall_ns = rows.number(2);
+    if (!first_ns) first_ns = wall_ns;
+    if (from && is_before(wall_ns, *first_ns, *from)) continue;
+    if (to && !is_before(wall_ns, *first_ns, *to)) continue;
+    found.events.push_back(event_from(rows));
   }
   return found;
 }

@@ -1,32 +1,23 @@
-/// What happened, as the history keeps it, for every run of the daemon that is still in the file.
+/// What happened, for every run of the daemon that a history still has.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "daemon/history/format/database.hpp"
 #include "daemon/history/format/history_time.hpp"
+#include "status/event.hpp"
 
 namespace thermocomp {
-
-/// The fields mean what they do in daemon/status/event_journal.hpp.
-struct RecordedEvent {
-  std::int64_t run{0};  ///< one number for each start of the daemon; set by the history
-  std::int64_t number{0};
-  std::int64_t wall_ns{0};
-  std::string kind;
-  std::string subject;
-  std::string what;
-  std::int64_t duration_ns{-1};  ///< -1: none
-  std::int64_t user{-1};
-};
 
 struct RecordedEvents {
   std::vector<RecordedEvent> events;  ///< oldest first
   bool are_kept{false};  ///< false: an earlier version wrote the history, which kept no events
 };
+
+/// Whether the table `event` keeps whole records, or only their texts as an earlier version did.
+[[nodiscard]] bool has_event_records(Database& database);
 
 /// Times of `from` and `to` are wall times; seconds count from the first event.
 /// @throws HistoryError: no history, or one that cannot be read

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <ctime>
 #include <fmt/format.h>
 #include <utility>
@@ -10,7 +11,9 @@
 #include <system_error>
 
 #include "daemon/history/format/history_time.hpp"
+#include "daemon/history/format/recorded_event.hpp"
 #include "daemon/history/format/row_checksum.hpp"
+#include "status/status_json.hpp"
 
 namespace thermocomp {
 namespace {
@@ -45,12 +48,12 @@ constexpr const char* tables =
 constexpr const char* event_table =
     "CREATE TABLE IF NOT EXISTS event (run INTEGER NOT NULL, number INTEGER NOT NULL,"
     " wall_ns INTEGER NOT NULL, kind TEXT NOT NULL, subject TEXT NOT NULL, what TEXT NOT NULL,"
-    " duration_ns INTEGER NOT NULL, user INTEGER NOT NULL, PRIMARY KEY (run, number))"
-    " WITHOUT ROWID;";
+    " duration_ns INTEGER NOT NULL, user INTEGER NOT NULL, record TEXT NOT NULL DEFAULT '',"
+    " PRIMARY KEY (run, number)) WITHOUT ROWID;";
 
 /// So many events are kept, or as many as take a twentieth of the file.
 constexpr double events_max = 20000.0;
-constexpr double event_bytes = 150.0;
+constexpr double event_bytes = 400.0;
 
 std::string utc_stamp() {
   const std::time_t now = std::time(nullptr);
@@ -98,8 +101,8 @@ void PendingRows::add(ChunkRow row) {
   rows_.emplace_back(std::move(row));
 }
 
-void PendingRows::add(RecordedEvent row) {
-  bytes_ += sizeof(RecordedEvent) + row.what.size();
+void PendingRows::add(Event row) {
+  bytes_ += sizeof(Event) + row.detail.size();
   rows_.emplace_back(std::move(row));
 }
 
@@ -230,6 +233,8 @@ void HistoryStore::prepare() {
       "PRAGMA wal_autocheckpoint = 1");
   if (!has_checksum_columns(*database_)) add_checksum_columns(*database_);
   database_->run(event_table);
+  if (!has_event_records(*database_))
+    database_->run("ALTER TABLE event ADD COLUMN record TEXT NOT NULL DEFAULT ''");
   if (run_ == 0)
     run_ = database_->number(
                "SELECT max((SELECT ifnull(max(run), 0) FROM segment),"
@@ -259,8 +264,8 @@ void HistoryStore::create() {
   database_->run("PRAGMA auto_vacuum = INCREMENTAL");
   Transaction transaction(*database_);
   database_->run(tables);
-  database_->run(("PRAGMA application_id = " + std::to_string(history_application_id) +
-                  "; PRAGMA user_version = " + std::to_string(history_version))
+  database_->run(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}",
+                             history_application_id, history_version)
                      .c_str());
   transaction.commit();
 }
@@ -303,7 +308,7 @@ void HistoryStore::write(const PendingRows& pending, bool prove) {
     } else if (const auto* chunk = std::get_if<ChunkRow>(&row)) {
       insert(*chunk, tokens);
     } else {
-      insert(std::get<RecordedEvent>(row));
+      insert(std::get<Event>(row));
     }
   }
   transaction.commit();
@@ -332,7 +337,7 @@ void HistoryStore::read_back(const PendingRows& pending) {
       require(known.bind(std::span<const std::byte>(chunk->records)));
     } else {
       Statement known(reader, "SELECT 1 FROM event WHERE run = ? AND number = ?");
-      require(known.bind(run_).bind(std::get<RecordedEvent>(row).number));
+      require(known.bind(run_).bind(static_cast<std::int64_t>(std::get<Event>(row).number)));
     }
   }
 }
@@ -416,11 +421,17 @@ void HistoryStore::insert(const ChunkRow& row, const Tokens& tokens) {
 }
 
 /// One that is there already was committed by a commit that was reported as failed.
-void HistoryStore::insert(const RecordedEvent& row) {
-  Statement statement(*database_, "INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
-  statement.bind(run_).bind(row.number).bind(row.wall_ns);
-  statement.bind(std::string_view(row.kind)).bind(std::string_view(row.subject));
-  statement.bind(std::string_view(row.what)).bind(row.duration_ns).bind(row.user).run();
+void HistoryStore::insert(const Event& row) {
+  const std::string record =
+      json_of(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  Statement statement(*database_, "INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  statement.bind(run_).bind(static_cast<std::int64_t>(row.number));
+  statement.bind(static_cast<std::int64_t>(std::llround(1e9 * row.wall_s)));
+  statement.bind(to_string(row.kind)).bind(std::string_view(subject_text(row.subject)));
+  statement.bind(std::string_view(what_text(row)));
+  statement.bind(static_cast<std::int64_t>(
+      std::isfinite(row.duration_s) ? std::llround(1e9 * row.duration_s) : -1));
+  statement.bind(row.user).bind(std::string_view(record)).run();
 }
 
 void HistoryStore::forget_old_events() {

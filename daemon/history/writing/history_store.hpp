@@ -30,11 +30,11 @@
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/format/database.hpp"
-#include "daemon/history/format/recorded_event.hpp"
 #include "daemon/history/writing/writer_inputs.hpp"
 #include "daemon/locks/file_lock.hpp"
 #include "daemon/recording/grid.hpp"
 #include "daemon/recording/record.hpp"
+#include "status/event.hpp"
 
 namespace thermocomp {
 
@@ -62,10 +62,10 @@ struct ChunkRow {
 /// What waits for the next commit.
 class PendingRows {
  public:
-  using Row = std::variant<SegmentRow, ChunkRow, RecordedEvent>;
+  using Row = std::variant<SegmentRow, ChunkRow, Event>;
   void add(SegmentRow row);
   void add(ChunkRow row);
-  void add(RecordedEvent row);
+  void add(Event row);
   void clear();
   [[nodiscard]] const std::vector<Row>& rows() const noexcept { return rows_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
@@ -138,7 +138,7 @@ class HistoryStore {
   void read_back(const PendingRows& pending);
   void insert(const SegmentRow& row, Tokens& tokens);
   void insert(const ChunkRow& row, const Tokens& tokens);
-  void insert(const RecordedEvent& row);
+  void insert(const Event& row);
   void forget_old_events();
   [[nodiscard]] bool is_known(std::int64_t segment, const ChunkRow& row);
   [[nodiscard]] std::int64_t setup_id(const HistorySetup& setup);

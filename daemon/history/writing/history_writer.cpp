@@ -75,7 +75,7 @@ struct HistoryWriter::Parts {
   std::condition_variable wake;
   bool stopping{false};
   std::vector<KnownSession> sessions;
-  std::vector<RecordedEvent> events;  ///< that no commit has taken yet
+  std::vector<Event> events;  ///< that no commit has taken yet
   std::uint16_t next_session{1};
   HistoryStatistics statistics;
   std::vector<std::string> news;
@@ -231,12 +231,12 @@ void HistoryWriter::Parts::cut_chunk() {
 }
 
 void HistoryWriter::Parts::take_events() {
-  std::vector<RecordedEvent> taken;
+  std::vector<Event> taken;
   {
     const std::lock_guard lock(mutex);
     taken.swap(events);
   }
-  for (RecordedEvent& event : taken) pending.add(std::move(event));
+  for (Event& event : taken) pending.add(std::move(event));
 }
 
 void HistoryWriter::Parts::commit() {
@@ -373,7 +373,7 @@ std::unique_ptr<CycleRecorder> HistoryWriter::make_recorder(const HistorySetup& 
                                          as_duration(parts_->config.offsets_period_s), estimator);
 }
 
-void HistoryWriter::note(RecordedEvent event) {
+void HistoryWriter::note(Event event) {
   const std::lock_guard lock(parts_->mutex);
   parts_->events.push_back(std::move(event));
 }

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "config/daemon/daemon_config.hpp"
-#include "daemon/history/format/recorded_event.hpp"
 #include "daemon/history/writing/writer_inputs.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/grid.hpp"
+#include "status/event.hpp"
 
 namespace thermocomp {
 
@@ -56,7 +56,7 @@ class HistoryWriter {
   [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const HistorySetup& setup,
                                                              const Estimator& estimator);
   /// Something has happened; it is on disk with the next commit. Any ordinary thread.
-  void note(RecordedEvent event);
+  void note(Event event);
   /// Opens the file and starts the thread. A damaged file is moved aside, which is among the news;
   /// a disk that does not work is tried again for ever.
   /// @throws HistoryError when the file is of a newer version or of another program, or another

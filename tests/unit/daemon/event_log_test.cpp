@@ -36,7 +36,7 @@ struct Bench {
   [[nodiscard]] std::vector<Event> about(const std::string& subject) const {
     std::vector<Event> found;
     for (const Event& event : journal.events())
-      if (event.subject == subject) found.push_back(event);
+      if (subject_text(event.subject) == subject) found.push_back(event);
     return found;
   }
 };
@@ -56,9 +56,9 @@ TEST_CASE("a suspected sensor is a fault with its size, and recovers", "[daemon]
   bench.pass(1s);
   const auto told = bench.about("suspected sensor head");
   REQUIRE(told.size() == 2);
-  CHECK(told[0].kind == "fault");
-  CHECK(told[0].what == "off by -2.0 K against its neighbours");
-  CHECK(told[1].kind == "recovery");
+  CHECK(told[0].kind == EventKind::fault);
+  CHECK(what_text(told[0]) == "off by -2.0 K against its neighbours");
+  CHECK(told[1].kind == EventKind::recovery);
   CHECK(told[1].duration_s == Approx(60.0));
   CHECK(bench.about("suspected sensor bed").empty());
   const auto reason = bench.about("reason sensor_suspected");
@@ -78,7 +78,7 @@ TEST_CASE("a target that flickers about its bound is one outage", "[daemon][even
   bench.pass(20s);
   const auto told = bench.about("reason at_bound");
   REQUIRE(told.size() == 2);
-  CHECK(told[1].kind == "recovery");
+  CHECK(told[1].kind == EventKind::recovery);
   CHECK(told[1].duration_s == Approx(99 * 20.0));  // to where it went away
 }
 
@@ -116,7 +116,7 @@ TEST_CASE("a block that is lost and back four times a second makes a few lines a
   CHECK(std::count(said.begin(), said.end(), '\n') < 30);
   CHECK(said.find("sensor bed: no_answer: over, lasted 600.0 s") != std::string::npos);
   CHECK(bench.journal.events().size() < 30);
-  CHECK(bench.journal.events().back().what == "compensating");
+  CHECK(bench.journal.events().back().code == "compensating");
 }
 
 TEST_CASE("what has no limit is over at once", "[daemon][events]") {

@@ -151,13 +151,13 @@ TEST_CASE("events are in the history with the next commit, run by run, the newes
     HistoryWriter writer(config, {std::chrono::hours(7), std::chrono::milliseconds(10)}, "test");
     writer.start();
     for (int i = 1; i <= 300; ++i) {
-      RecordedEvent event;
-      event.number = i;
-      event.wall_ns = (1000 * run + i) * 1'000'000'000LL;
-      event.kind = "fault";
-      event.subject = "sensor bed";
-      event.what = "stale";
-      event.duration_ns = i == 7 ? 28'100'000'000 : -1;
+      Event event{.kind = EventKind::command,
+                  .subject = {SubjectKind::axis, "z"},
+                  .code = "measured",
+                  .value = 0.1 * static_cast<double>(i)};
+      event.number = static_cast<std::uint64_t>(i);
+      event.wall_s = static_cast<double>(1000 * run + i);
+      if (i == 7) event.duration_s = 28.1;
       writer.note(event);
     }
     writer.stop();
@@ -167,7 +167,11 @@ TEST_CASE("events are in the history with the next commit, run by run, the newes
     CHECK(read.events.size() >= 300);
     CHECK(read.events.back().run == run + 1);
     CHECK(read.events.back().number == 300);
-    if (run == 0) CHECK(read.events[6].duration_ns == 28'100'000'000);
+    if (run == 0) {
+      CHECK(read.events[6].duration_s == 28.1);
+      CHECK(read.events[6].subject == Subject{SubjectKind::axis, "z"});
+      CHECK(read.events[6].value == 0.1 * 7.0);
+    }
   }
   const RecordedEvents part = read_events(config.file, HistoryTime{{}, 1'290'000'000'000});
   CHECK(part.events.size() == 11);

@@ -1,13 +1,12 @@
 #include "gateway/alarms/alarm_watch.hpp"
 
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 
 #include "gateway/alarms/hook_limit.hpp"
 #include "gateway/mqtt/message_buffer.hpp"
 
+using namespace thermocomp;
 using namespace thermocomp::gateway;
-using nlohmann::json;
 
 namespace {
 
@@ -17,13 +16,11 @@ const std::vector<AlarmCondition> nothing;
 Snapshot good_snapshot() {
   Snapshot snapshot;
   snapshot.is_here = true;
-  snapshot.status = {{"mode", "compensating"},
-                     {"mode_since_s", 5.0},
-                     {"reasons", json::array()},
-                     {"axes", {{{"name", "z"}, {"driven", true}, {"at_bound", false}}}},
-                     {"buses", {{{"name", "cabinet"}, {"connected", true}}}},
-                     {"model", {{"outside", false}}}};
-  snapshot.sensors = {{"sensors", {{{"name", "a"}, {"fault", "none"}, {"suspected", nullptr}}}}};
+  snapshot.status = {.mode = Mode::compensating, .mode_since_s = 5.0};
+  snapshot.status.axes = {{.name = "z", .driven = true}};
+  snapshot.status.buses = {{.name = "cabinet", .connected = true}};
+  snapshot.status.model.outside = false;
+  snapshot.sensors.sensors = {{.name = "a", .fault = Fault::none}};
   return snapshot;
 }
 
@@ -82,13 +79,13 @@ TEST_CASE("while the daemon is away, what was wrong is neither cleared nor forgo
 TEST_CASE("each thing that is wrong has its alarm", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
   CHECK(wrong_now(snapshot).empty());
-  snapshot.status["axes"][0]["at_bound"] = true;
-  snapshot.status["buses"][0]["connected"] = false;
-  snapshot.status["model"]["outside"] = true;
-  snapshot.status["mode"] = "holding";
-  snapshot.status["reasons"] = {"block_lost"};
-  snapshot.sensors["sensors"][0]["fault"] = "open_circuit";
-  snapshot.sensors["sensors"][0]["suspected"] = {{"size_K", 2.0}, {"since", 1.0}};
+  snapshot.status.axes[0].at_bound = true;
+  snapshot.status.buses[0].connected = false;
+  snapshot.status.model.outside = true;
+  snapshot.status.mode = Mode::holding;
+  snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
+  snapshot.sensors.sensors[0].fault = Fault::open_circuit;
+  snapshot.sensors.sensors[0].suspected = {.size_K = 2.0, .since = 1.0};
   const auto wrong = wrong_now(snapshot);
   CHECK(names(wrong) == std::vector<std::string>{"compensation", "sensor/a", "suspected/a",
                                                  "bound/z", "domain", "bus/cabinet"});
@@ -124,9 +121,8 @@ TEST_CASE("a full buffer keeps the newest messages, and the last of each topic",
 
 TEST_CASE("a dry run is no alarm, one that lacks a sensor is", "[gateway][alarm]") {
   Snapshot snapshot = good_snapshot();
-  snapshot.status["dry_run"] = true;
-  snapshot.status["mode"] = "dry_run";
+  snapshot.status.dry_run = true;
   CHECK(wrong_now(snapshot).empty());
-  snapshot.status["mode"] = "holding";
+  snapshot.status.mode = Mode::holding;
   CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"compensation"});
 }

@@ -15,6 +15,7 @@
 #include "gateway/texts/mqtt_texts.hpp"
 #include "gateway/texts/shdr_text.hpp"
 
+using namespace thermocomp;
 using namespace thermocomp::gateway;
 using Catch::Contains;
 using nlohmann::json;
@@ -25,25 +26,16 @@ Snapshot snapshot_of_two_axes() {
   Snapshot snapshot;
   snapshot.is_here = true;
   snapshot.wall_s = 1772353800.125;
-  snapshot.status = {
-      {"mode", "compensating"},
-      {"mode_since_s", 60.0},
-      {"reasons", json::array()},
-      {"version", "0.1\"x"},
-      {"axes",
-       {{{"name", "z"}, {"unit", "um"}, {"offset", -3.5}, {"displacement", 3.5}, {"driven", true}},
-        {{"name", "b"},
-         {"unit", "urad"},
-         {"offset", 4.0},
-         {"displacement", nullptr},
-         {"driven", true}}}},
-      {"buses", {{{"name", "cabinet"}, {"kind", "can"}, {"connected", true}}}}};
-  snapshot.sensors = {{"sensors",
-                       {{{"name", "bed front"},
-                         {"blocks", {"bed"}},
-                         {"fault", "none"},
-                         {"raw_degC", 21.25},
-                         {"smoothed_degC", 21.5}}}}};
+  snapshot.status = {.mode = Mode::compensating, .mode_since_s = 60.0, .version = "0.1\"x"};
+  snapshot.status.axes = {
+      {.name = "z", .unit = "um", .displacement = 3.5, .offset = -3.5, .driven = true},
+      {.name = "b", .unit = "urad", .offset = 4.0, .driven = true}};
+  snapshot.status.buses = {{.name = "cabinet", .kind = "can", .connected = true}};
+  snapshot.sensors.sensors = {{.name = "bed front",
+                               .blocks = {"bed"},
+                               .raw_degC = 21.25,
+                               .smoothed_degC = 21.5,
+                               .fault = Fault::none}};
   return snapshot;
 }
 
@@ -73,8 +65,9 @@ TEST_CASE("metrics of a daemon that is away end, and do not stand still", "[gate
 TEST_CASE("metrics of any answer are lines of the format", "[gateway][metrics]") {
   Snapshot odd;
   odd.is_here = true;
-  odd.status = {{"axes", {1, nullptr, {{"name", 5}}}}, {"buses", "none"}, {"reasons", {1, "x\ny"}}};
-  odd.sensors = {{"sensors", {{{"name", "a\\\"\nb"}, {"smoothed_degC", 1.0}}}}};
+  odd.status.axes = {{}, {.name = "a\\\"\nb", .unit = "x\ny", .offset = 1.0}};
+  odd.status.version = "\n";
+  odd.sensors.sensors = {{.name = "a\\\"\nb", .blocks = {"\"", "\n"}, .smoothed_degC = 1.0}};
   const std::regex line(
       R"re((# (HELP|TYPE) [^\n]*|[a-z_]+(\{([a-z_]+="([^"\\\n]|\\["\\n])*",?)*\})? [-+0-9.e]+))re");
   std::istringstream lines(metrics_text(odd, {}));
@@ -122,11 +115,10 @@ TEST_CASE("different names stay different and a name stays what it was", "[gatew
 
 TEST_CASE("every sensor has an item of its own in lines and device file", "[gateway][names]") {
   Snapshot snapshot = snapshot_of_two_axes();
-  json sensors = json::array();
+  snapshot.sensors.sensors.clear();
   for (const char* name : {"床前", "床后", "主轴", "立柱", "a b", "a_b"})
-    sensors.push_back({{"name", name}, {"fault", "none"}, {"smoothed_degC", 20.0}});
-  sensors[1]["fault"] = "open_circuit";
-  snapshot.sensors = {{"sensors", sensors}};
+    snapshot.sensors.sensors.push_back({.name = name, .smoothed_degC = 20.0, .fault = Fault::none});
+  snapshot.sensors.sensors[1].fault = Fault::open_circuit;
   const ShdrStates states = shdr_states(snapshot);
   const std::string file = device_file(snapshot, "mill");
   std::size_t faulty = 0;
@@ -150,8 +142,9 @@ TEST_CASE("adapter lines tell everything once, then what changes", "[gateway][sh
   CHECK_THAT(all, Contains("|displacement_b|UNAVAILABLE"));
   CHECK_THAT(all, Contains("Z|system|NORMAL||||\n"));
   CHECK(shdr_lines(first, first, snapshot.wall_s).empty());
-  snapshot.status["mode"] = "holding";
-  snapshot.status["reasons"] = {"block_lost", "signal_lost"};
+  snapshot.status.mode = Mode::holding;
+  snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost) |
+                            static_cast<std::uint32_t>(Reason::signal_lost);
   const ShdrStates second = shdr_states(snapshot);
   const std::string changed = shdr_lines(first, second, snapshot.wall_s);
   CHECK(changed ==
@@ -185,17 +178,17 @@ TEST_CASE("a trend is the slope of the last minutes, once there are some", "[gat
 
 TEST_CASE("displacement is remembered by time, and not for other axes", "[gateway][memory]") {
   DisplacementMemory memory;
-  const auto status = [](const char* name, double um) {
-    return json{{"axes", {{{"name", name}, {"displacement", um}}}}};
+  const auto axes = [](const char* name, double um) {
+    return std::vector<AxisStatus>{{.name = name, .displacement = um}};
   };
-  for (int s = 0; s < 100; ++s) memory.add(1000.0 + s, status("z", s));
+  for (int s = 0; s < 100; ++s) memory.add(1000.0 + s, axes("z", s));
   REQUIRE(memory.axes() == std::vector<std::string>{"z"});
   const auto values = memory.over(0, {985.0, 995.0, 1005.0, 1015.0}, 10.0);
   CHECK(std::isnan(values[0]));
   CHECK(std::isnan(values[1]));
   CHECK(values[2] == Approx(0.0));
   CHECK(values[3] == Approx(10.0));
-  memory.add(1100.0, status("y", 1.0));
+  memory.add(1100.0, axes("y", 1.0));
   CHECK(memory.axes() == std::vector<std::string>{"y"});
 }
 
@@ -203,9 +196,10 @@ TEST_CASE("the page is told in the words of thermocomp status", "[gateway][page]
   Snapshot snapshot = snapshot_of_two_axes();
   json state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["answer"] == "yes");
+  CHECK(state["verdict"]["detail"] == "for -");
   CHECK(state["verdict"]["level"] == "good");
-  snapshot.status["mode"] = "holding";
-  snapshot.status["reasons"] = {"block_lost"};
+  snapshot.status.mode = Mode::holding;
+  snapshot.status.reasons = static_cast<std::uint32_t>(Reason::block_lost);
   state = page_state(snapshot, "mill");
   CHECK(state["verdict"]["level"] == "bad");
   CHECK(state["problems"][0]["what"] == "an input of the model has no good sensor left");

@@ -1,7 +1,6 @@
 #include "cli/observe/axis_trends.hpp"
 
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 
 #include "cli/observe/watch_text.hpp"
 
@@ -9,10 +8,11 @@ namespace {
 
 using namespace thermocomp::cli;
 using Catch::Matchers::Contains;
-using nlohmann::json;
 
-json status_at(double uptime_s, double offset) {
-  return {{"uptime_s", uptime_s}, {"axes", {{{"name", "z"}, {"offset", offset}}}}};
+thermocomp::Status status_at(double uptime_s, double offset) {
+  thermocomp::Status status{.uptime_s = uptime_s};
+  status.axes = {{.name = "z", .offset = offset}};
+  return status;
 }
 
 }  // namespace

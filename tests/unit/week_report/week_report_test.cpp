@@ -22,16 +22,40 @@ using Catch::Matchers::Contains;
 constexpr double day_s = 86400.0;
 constexpr double begin_s = 1.8e9;
 
-RecordedEvent event_at(double since_begin_s, const std::string& kind, const std::string& subject,
-                       const std::string& what, std::int64_t run = 1) {
+RecordedEvent event_at(double since_begin_s, EventKind kind, const Subject& subject,
+                       const std::string& code, std::int64_t run = 1) {
   RecordedEvent event;
   event.run = run;
-  event.wall_ns = std::llround((begin_s + since_begin_s) * 1e9);
+  event.wall_s = begin_s + since_begin_s;
   event.kind = kind;
   event.subject = subject;
-  event.what = what;
+  event.code = code;
   return event;
 }
+
+RecordedEvent mode_at(double since_begin_s, const std::string& code, std::int64_t run = 1) {
+  return event_at(since_begin_s, EventKind::mode, {}, code, run);
+}
+
+RecordedEvent fault_at(double since_begin_s, const Subject& subject, const std::string& code) {
+  return event_at(since_begin_s, EventKind::fault, subject, code);
+}
+
+RecordedEvent recovery_at(double since_begin_s, const Subject& subject, const std::string& code) {
+  return event_at(since_begin_s, EventKind::recovery, subject, code);
+}
+
+Event measured_z(double wall_s, double value_um) {
+  return {.number = 1,
+          .wall_s = wall_s,
+          .kind = EventKind::command,
+          .subject = {SubjectKind::axis, "z"},
+          .code = "measured",
+          .value = value_um};
+}
+
+const Subject bed{SubjectKind::sensor, "bed"};
+const Subject cabinet{SubjectKind::bus, "cabinet"};
 
 double spell_s(const std::vector<ModeSpell>& spells, const std::string& mode) {
   double sum = 0.0;
@@ -63,10 +87,8 @@ ThinnedHistory week_of_sensors(double drift_K, std::uint64_t seed) {
 TEST_CASE("hours of each mode are those between its events, cut at the span and at a run's end",
           "[week]") {
   const WeekEvents events{
-      {event_at(-3600, "mode", "", "starting"), event_at(0, "mode", "starting", "compensating"),
-       event_at(7200, "mode", "compensating", "holding"),
-       event_at(7800, "mode", "holding", "compensating"),
-       event_at(20000, "mode", "", "disabled", 2)},
+      {mode_at(-3600, "starting"), mode_at(0, "compensating"), mode_at(7200, "holding"),
+       mode_at(7800, "compensating"), mode_at(20000, "disabled", 2)},
       {{1, begin_s + 10800}, {2, begin_s + 50000}}};
   const auto spells = mode_spells(events, {begin_s - 600, begin_s + 30000});
   CHECK(spell_s(spells, "starting") == Approx(600.0).margin(1e-3));
@@ -77,14 +99,12 @@ TEST_CASE("hours of each mode are those between its events, cut at the span and 
 
 TEST_CASE("outages count and last until their recovery, or the run's end", "[week]") {
   const WeekEvents events{
-      {event_at(0, "fault", "sensor bed", "stale"), event_at(30, "fault", "bus cabinet", "timeout"),
-       event_at(60, "recovery", "sensor bed", "stale"),
-       event_at(500, "fault", "sensor bed", "open_circuit"),
-       event_at(600, "recovery", "sensor bed", "open_circuit")},
+      {fault_at(0, bed, "stale"), fault_at(30, cabinet, "timeout"), recovery_at(60, bed, "stale"),
+       fault_at(500, bed, "open_circuit"), recovery_at(600, bed, "open_circuit")},
       {{1, begin_s + 1000}}};
   const auto outages = outages_of(events, {begin_s, begin_s + 1000});
   REQUIRE(outages.size() == 2);
-  CHECK(outages[0].subject == "bus cabinet");
+  CHECK(outages[0].subject == cabinet);
   CHECK(outages[0].lasted_s == Approx(970.0).margin(1e-3));
   CHECK(outages[0].lasts);
   CHECK(outages[1].count == 2);
@@ -123,12 +143,13 @@ TEST_CASE("a sensor that was suspected is named with what to do, in its own line
   week.span = {begin_s, begin_s + 7 * day_s};
   week.course = week_of_sensors(2.0, 3);  // column drifts, too
   week.sensors = sensors_of(week.course);
+  RecordedEvent suspected = fault_at(1000, {SubjectKind::suspected_sensor, "column"}, "suspected");
+  suspected.value = 2.0;
   const WeekEvents events{
-      {event_at(0, "mode", "", "compensating"),
-       event_at(1000, "fault", "reason sensor_suspected", "sensor_suspected"),
-       event_at(1000, "fault", "suspected sensor column", "off by +2.0 K against its neighbours"),
-       event_at(8200, "recovery", "suspected sensor column", ""),
-       event_at(8200, "recovery", "reason sensor_suspected", "")},
+      {mode_at(0, "compensating"),
+       fault_at(1000, {SubjectKind::reason, "sensor_suspected"}, "sensor_suspected"), suspected,
+       recovery_at(8200, {SubjectKind::suspected_sensor, "column"}, ""),
+       recovery_at(8200, {SubjectKind::reason, "sensor_suspected"}, "")},
       {{1, begin_s + 7 * day_s}}};
   week.modes = mode_spells(events, week.span);
   week.outages = outages_of(events, week.span);
@@ -147,19 +168,19 @@ TEST_CASE("a sensor that was suspected is named with what to do, in its own line
 
 TEST_CASE("a bus takes its sensors with it in one line, and a broken one has its own", "[week]") {
   WeekEvents events{{}, {{1, begin_s + day_s}}};
-  events.events.push_back(event_at(1000, "fault", "bus cabinet", "no answer"));
+  events.events.push_back(fault_at(1000, cabinet, "no answer"));
   for (const char* name : {"bed", "column", "oil"})
-    events.events.push_back(event_at(1001, "fault", std::string("sensor ") + name, "no_answer"));
+    events.events.push_back(fault_at(1001, {SubjectKind::sensor, name}, "no_answer"));
   for (const char* name : {"bed", "column", "oil"})
-    events.events.push_back(event_at(1700, "recovery", std::string("sensor ") + name, "no_answer"));
-  events.events.push_back(event_at(1700, "recovery", "bus cabinet", "no answer"));
-  events.events.push_back(event_at(5000, "fault", "sensor oil", "open_circuit"));
-  events.events.push_back(event_at(9000, "recovery", "sensor oil", "open_circuit"));
+    events.events.push_back(recovery_at(1700, {SubjectKind::sensor, name}, "no_answer"));
+  events.events.push_back(recovery_at(1700, cabinet, "no answer"));
+  events.events.push_back(fault_at(5000, {SubjectKind::sensor, "oil"}, "open_circuit"));
+  events.events.push_back(recovery_at(9000, {SubjectKind::sensor, "oil"}, "open_circuit"));
   MachineWeek week;
   week.span = {begin_s, begin_s + day_s};
   week.outages = outages_of(events, week.span);
   REQUIRE(week.outages.size() == 4);
-  CHECK(week.outages[0].subject == "sensor oil");
+  CHECK(week.outages[0].subject.name == "oil");
   CHECK(week.outages[0].count == 2);
   CHECK(week.outages[0].kinds.at("open_circuit").count == 1);
   CHECK(week.outages[0].kinds.at("open_circuit").lasted_s == Approx(4000.0).margin(1e-3));
@@ -214,10 +235,7 @@ TEST_CASE("what a dry run computed is not said to have been taken out", "[week]"
   RecordedMachine machine(config, 11, 65536, clocks);
   machine.start();
   machine.run(12000);
-  RecordedEvent probed = event_at(0, "command", "", "measured z 2.5 um");
-  probed.number = 1;
-  probed.wall_ns = std::llround((zero_s + 60.0) * 1e9);
-  machine.writer().note(probed);
+  machine.writer().note(measured_z(zero_s + 60.0, 2.5));
   machine.reload(0.5);
   machine.run(12000);
   machine.stop();
@@ -273,16 +291,13 @@ TEST_CASE("a recorded machine: offsets and probings as replay has them", "[week]
   RecordedMachine machine(config, 11, 65536, clocks);
   machine.start();
   machine.run(12000);  // two minutes
-  std::int64_t number = 0;
-  const auto at = [&](double since_s, const char* kind, const char* subject, const char* what) {
-    RecordedEvent event = event_at(0, kind, subject, what);
-    event.number = ++number;
-    event.wall_ns = std::llround((zero_s + since_s) * 1e9);
-    machine.writer().note(event);
-  };
-  at(0.0, "mode", "", "compensating");
-  at(60.0, "command", "", "measured z 2.5 um");
-  at(90.0, "mode", "compensating", "disabled");
+  Event compensating = mode_at(zero_s - begin_s, "compensating");
+  compensating.number = 1;
+  Event probed = measured_z(zero_s + 60.0, 2.5);
+  probed.number = 2;
+  Event disabled = mode_at(zero_s - begin_s + 90.0, "disabled");
+  disabled.number = 3;
+  for (const Event& event : {compensating, probed, disabled}) machine.writer().note(event);
   machine.stop();
 
   std::vector<double> z_um;

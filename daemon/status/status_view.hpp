@@ -1,10 +1,8 @@
-/// The answers of the status socket, made from reports and health.
+/// Fills the answers of the status socket (status/status.hpp) from reports and health.
 #pragma once
 
 #include <chrono>
-#include <deque>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -19,6 +17,7 @@
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "estimator/pipeline/estimator.hpp"
+#include "status/status.hpp"
 
 namespace thermocomp {
 
@@ -44,17 +43,12 @@ struct StatusView {
   double compensating_s{not_a_number};
 };
 
-/// What a status calls the mode. A dry run does not compensate: its "compensating" is "dry_run".
-[[nodiscard]] std::string_view mode_name(Mode mode, bool dry_run) noexcept;
-
-/// NaN becomes null. Units are the ends of the keys; axes and outputs name theirs.
-[[nodiscard]] nlohmann::json status_json(const StatusView& view);
-[[nodiscard]] nlohmann::json sensors_json(const StatusView& view);
-[[nodiscard]] nlohmann::json offsets_json(const StatusView& view);
-[[nodiscard]] nlohmann::json timing_json(const StatusView& view);
-/// Oldest first.
-[[nodiscard]] nlohmann::json events_json(const std::deque<Event>& events);
-[[nodiscard]] nlohmann::json model_json(const StatusView& view);
+[[nodiscard]] Status status_of(const StatusView& view);
+[[nodiscard]] SensorsAnswer sensors_of(const StatusView& view);
+[[nodiscard]] OffsetsAnswer offsets_of(const StatusView& view);
+[[nodiscard]] CycleStatus timing_of(const StatusView& view);
+/// The answer of `model`: the file that runs.
+[[nodiscard]] nlohmann::json model_json(const DaemonConfig& config);
 /// One line for systemctl status.
 [[nodiscard]] std::string status_line(const StatusView& view);
 

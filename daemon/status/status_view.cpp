@@ -1,0 +1,408 @@
+#include "daemon/status/status_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "status/codes.hpp"
+
+namespace thermocomp {
+namespace {
+
+using nlohmann::json;
+
+double seconds(nanoseconds time) {
+  return 1e-9 * static_cast<double>(time.count());
+}
+double microseconds(nanoseconds time) {
+  return 1e-3 * static_cast<double>(time.count());
+}
+
+json number(double value) {
+  return std::isfinite(value) ? json(value) : json(nullptr);
+}
+
+std::string unit_of(const std::string& output) {
+  return output.size() > 5 && output.ends_with("_urad") ? "urad" : "um";
+}
+
+double age_s(const StatusView& view, nanoseconds since) {
+  return std::max(0.0, seconds(view.report.now - since));
+}
+
+CorrectionStatus correction_of(const CorrectionConfig& config, const CorrectionReport& report) {
+  CorrectionStatus status{
+      .form = config.form == CorrectionForm::two_phase ? "two_phase" : "recursive",
+      .bias_um = report.bias_um,
+      .sd_um = report.sd_um,
+      .probing_wanted = report.probing_wanted,
+      .phase = report.phase,
+      .taken = report.taken,
+      .refused = report.refused};
+  for (std::size_t g = 0; g < config.groups.size(); ++g) {
+    GainStatus gain{config.groups[g], report.gain[g], report.gain_sd[g]};
+    if (report.has_record) {
+      gain.used = report.gain_used[g];
+      gain.recorded = report.recorded[g];
+      gain.recorded_sd = report.recorded_sd[g];
+    }
+    status.gains.push_back(std::move(gain));
+  }
+  return status;
+}
+
+AxisStatus axis_of(const StatusView& view, const AxisConfig& config, const AxisReport& report) {
+  AxisStatus axis{.name = config.name,
+                  .unit = unit_of(config.output),
+                  .displacement = report.displacement_um,
+                  .target = report.target_um,
+                  .offset = report.offset_um,
+                  .applied = report.applied_um,
+                  .measured = report.measured_um,
+                  .synced = report.synced,
+                  .driven = report.driven,
+                  .disagrees = report.disagrees,
+                  .at_bound = report.at_bound,
+                  .proving = report.proving,
+                  .offset_sd = report.offset_sd_um,
+                  .offset_sd_max = view.config.estimator.compensation.offset_sd_um_max};
+  if (report.latched) {
+    const Mismatch& latched = report.latched_mismatch;
+    axis.latched = {latched.sent_um, latched.read_um, likely_text(latched), report.releasing};
+  }
+  if (config.node) {
+    axis.axis = config.node->axis;
+    axis.at_mm = config.node->position_mm;
+  }
+  if (std::isfinite(report.held_um)) axis.held = report.held_um;
+  if (view.config.estimator.correction.form != CorrectionForm::off)
+    axis.correction = correction_of(view.config.estimator.correction, report.correction);
+  return axis;
+}
+
+std::vector<AxisStatus> axes_of(const StatusView& view) {
+  std::vector<AxisStatus> list;
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i)
+    list.push_back(axis_of(view, view.config.estimator.axes[i], view.report.axes[i]));
+  return list;
+}
+
+/// The block that the model's temperature column is bound to.
+std::string block_of(const StatusView& view, const std::string& column) {
+  for (const BlockConfig& block : view.config.estimator.blocks)
+    if (block.input == column) return block.name;
+  return column;
+}
+
+double rate_K_per_h(const StatusView& view, std::size_t input) {
+  if (view.trend == nullptr) return not_a_number;
+  return view.trend->change(input, view.report.now, view.report.inputs[input].temp_degC)
+      .rate_K_per_h;
+}
+
+std::vector<InputStatus> inputs_of(const StatusView& view) {
+  std::vector<InputStatus> list;
+  const auto columns = view.config.model.temperature_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const InputReport& input = view.report.inputs[i];
+    list.push_back({.name = columns[i],
+                    .temp_degC = input.temp_degC,
+                    .reference_degC = input.reference_degC,
+                    .good = input.good,
+                    .block = block_of(view, columns[i]),
+                    .estimated = input.estimated,
+                    .sd_K = input.sd_K,
+                    .rate_K_per_h = rate_K_per_h(view, i)});
+  }
+  return list;
+}
+
+/// nullopt: the neighbours do not contradict the sensor.
+std::optional<Suspicion> suspicion_of(const StatusView& view, const SensorReport& sensor) {
+  if (!sensor.suspected) return std::nullopt;
+  return Suspicion{sensor.suspected_size_K,
+                   view.wall_s - seconds(view.report.now - sensor.suspected_since),
+                   sensor.weighed_down};
+}
+
+/// nullopt: no change waits to be confirmed.
+std::optional<Jump> jump_of(const StatusView& view, const SensorReport& sensor) {
+  if (!sensor.jumped) return std::nullopt;
+  return Jump{sensor.jump_K, view.wall_s - seconds(view.report.now - sensor.jumped_at)};
+}
+
+/// The blocks that a sensor belongs to.
+std::vector<std::string> blocks_of(const StatusView& view, std::size_t sensor) {
+  std::vector<std::string> list;
+  for (const BlockConfig& block : view.config.estimator.blocks)
+    if (std::find(block.sensors.begin(), block.sensors.end(), sensor) != block.sensors.end())
+      list.push_back(block.name);
+  return list;
+}
+
+SensorStatus sensor_of(const StatusView& view, std::size_t index) {
+  const SensorReport& sensor = view.report.sensors[index];
+  const bool ever = sensor.taken_at != nanoseconds{};
+  return {.name = view.config.estimator.sensors[index].name,
+          .blocks = blocks_of(view, index),
+          .raw_degC = sensor.raw_degC,
+          .smoothed_degC = sensor.smoothed_degC,
+          .fault = sensor.fault,
+          .age_s = ever ? age_s(view, sensor.taken_at) : not_a_number,
+          .clipped_in_a_row = sensor.clipped_in_a_row,
+          .clipped = sensor.clipped,
+          .rejected = sensor.rejected,
+          .suspected = suspicion_of(view, sensor),
+          .jump = jump_of(view, sensor)};
+}
+
+UnitStatus unit_of(const UnitHealth& unit) {
+  return {unit.name,       unit.answering,  unit.requests,      unit.answers,   unit.timeouts,
+          unit.exceptions, unit.bad_frames, unit.round_trip_ms, unit.last_error};
+}
+
+BusStatus bus_of(const StatusView& view, const BusHealth& bus) {
+  BusStatus status{.name = bus.name,
+                   .kind = bus.kind,
+                   .connected = bus.connected,
+                   .connects = bus.connects,
+                   .last_error = bus.last_error};
+  for (const UnitHealth& unit : bus.units) status.units.push_back(unit_of(unit));
+  if (bus.state.empty()) return status;
+  status.state = bus.state;
+  status.state_s = age_s(view, bus.state_since);
+  status.error_frames = bus.error_frames;
+  status.bus_offs = bus.bus_offs;
+  status.restarts = bus.restarts;
+  status.dropped = bus.dropped;
+  return status;
+}
+
+WriteStatus write_of(const StatusView& view) {
+  const WriteHealth& write = view.controller_health.write;
+  WriteStatus status{.refused = write.refused, .unanswered = write.unanswered, .late = write.late};
+  if (write.function != 0) {
+    status.function = static_cast<std::uint64_t>(write.function);
+    status.address = static_cast<std::uint64_t>(write.address);
+  }
+  if (write.exception != 0) status.exception = static_cast<std::uint64_t>(write.exception);
+  if (write.confirmed_at != nanoseconds{})
+    status.last_confirmed_s = age_s(view, write.confirmed_at);
+  return status;
+}
+
+ControllerStatus controller_of(const StatusView& view) {
+  const ControllerHealth& health = view.controller_health;
+  ControllerStatus status{.name = health.name,
+                          .kind = health.kind,
+                          .connected = health.connected,
+                          .online = !has_reason(view.report.reasons, Reason::controller_offline),
+                          .connects = health.connects,
+                          .writes = health.writes,
+                          .write_errors = health.write_errors,
+                          .reads = health.reads,
+                          .read_errors = health.read_errors,
+                          .last_error = health.last_error,
+                          .write = write_of(view)};
+  for (std::size_t i = 0; i < view.config.estimator.signals.size(); ++i)
+    status.signals[view.config.estimator.signals[i]] = view.controller.signals[i];
+  if (health.shown_um) {
+    status.shown.emplace();
+    for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i)
+      (*status.shown)[view.config.estimator.axes[i].name] = (*health.shown_um)[i];
+  }
+  if (health.state.empty()) return status;
+  status.state = health.state;
+  status.state_s = age_s(view, health.state_since);
+  status.bus_offs = health.bus_offs;
+  return status;
+}
+
+HistoryStatus history_of(const StatusView& view) {
+  const HistoryStatistics& statistics = view.history;
+  return {.enabled = view.config.history.enabled,
+          .file = view.config.history.file.string(),
+          .working = statistics.working,
+          .size_MB = static_cast<double>(statistics.bytes) * 1e-6,
+          .last_commit_age_s = statistics.last_commit_age_s,
+          .lost_records = statistics.lost,
+          .errors = statistics.errors,
+          .deleted_segments = statistics.deleted,
+          .files_replaced = statistics.replaced,
+          .last_error = statistics.last_error};
+}
+
+SocketStatus socket_of(const SocketStatistics& statistics) {
+  return {.clients = statistics.clients,
+          .accepted = statistics.accepted,
+          .refused = statistics.refused,
+          .requests = statistics.requests,
+          .errors = statistics.errors,
+          .cut_off = statistics.cut_off,
+          .delayed = statistics.delayed,
+          .missed_notifications = statistics.missed,
+          .buffered_bytes = statistics.buffered_bytes};
+}
+
+/// Whether the reference is that of the model file, number for number.
+bool is_of_model_file(const StatusView& view) {
+  const std::vector<double>& given = view.config.model.reference_degC;
+  if (given.empty() || given.size() > view.report.inputs.size()) return false;
+  for (std::size_t i = 0; i < given.size(); ++i)
+    if (view.report.inputs[i].reference_degC != given[i]) return false;
+  return true;
+}
+
+ReferenceStatus reference_of(const StatusView& view) {
+  ReferenceStatus status;
+  status.lost = view.reference_lost;
+  const auto columns = view.config.model.temperature_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    status.temps_degC[columns[i]] = view.report.inputs[i].reference_degC;
+  if (is_of_model_file(view)) {
+    status.by = "model_file";
+  } else if (view.reference.is_known()) {
+    status.by = to_string(view.reference.origin);
+    status.wall_s = view.reference.wall_s;
+  }
+  return status;
+}
+
+/// A figure of each axis by its name.
+std::map<std::string, double> by_axis(const StatusView& view, double AxisReport::*figure) {
+  std::map<std::string, double> figures;
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i)
+    figures[view.config.estimator.axes[i].name] = view.report.axes[i].*figure;
+  return figures;
+}
+
+ModelStatus model_of(const StatusView& view) {
+  const DomainReport& domain = view.report.domain;
+  ModelStatus status{.file = view.config.model_file.string(),
+                     .checksum = view.config.model_checksum,
+                     .inputs = view.config.model.inputs.size(),
+                     .outputs = view.config.model.outputs.size(),
+                     .compared = is_compared(view.config.model),
+                     .claimed_sd_um = by_axis(view, &AxisReport::claimed_sd_um),
+                     .probed_rms_um = by_axis(view, &AxisReport::probed_rms_um)};
+  if (!domain.known) return status;
+  status.outside = domain.outside;
+  status.outside_share_24h = domain.outside_share_24h;
+  return status;
+}
+
+/// What the model file says it was made from; null: nothing.
+json made_from(const ThermalModel& model) {
+  if (!model.made_from) return nullptr;
+  json outputs = json::object();
+  for (const auto& [name, output] : model.made_from->outputs)
+    outputs[name] = {{"left_out_rms_um", number(output.left_out_rms_um)},
+                     {"no_model_rms_um", number(output.no_model_rms_um)}};
+  return {{"runs", model.made_from->runs},
+          {"hours", number(model.made_from->hours)},
+          {"rows", number(model.made_from->rows)},
+          {"outputs", std::move(outputs)}};
+}
+
+}  // namespace
+
+Status status_of(const StatusView& view) {
+  Status status{
+      .mode = view.report.mode,
+      .dry_run = view.config.dry_run,
+      .mode_since_s = std::min(seconds(view.report.now - view.report.mode_since), view.uptime_s),
+      .compensating_s = view.compensating_s,
+      .enabled = view.report.enabled,
+      .reasons = view.report.reasons,
+      .cycle_ends = view.report.cycle_ends,
+      .version = THERMOCOMP_VERSION,
+      .uptime_s = view.uptime_s,
+      .cycle = timing_of(view),
+      .model = model_of(view),
+      .axes = axes_of(view),
+      .inputs = inputs_of(view),
+      .reference = reference_of(view),
+      .controller = controller_of(view),
+      .history = history_of(view),
+      .socket = socket_of(view.socket),
+      .ended = view.ended,
+      .warnings = view.warnings};
+  for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
+    const std::string& name = view.config.estimator.sensors[i].name;
+    if (view.report.sensors[i].fault != Fault::none) status.sensors_bad.push_back(name);
+    if (const auto suspicion = suspicion_of(view, view.report.sensors[i]))
+      status.sensors_suspected.push_back({name, *suspicion});
+  }
+  for (const BusHealth& bus : view.buses) status.buses.push_back(bus_of(view, bus));
+  return status;
+}
+
+SensorsAnswer sensors_of(const StatusView& view) {
+  SensorsAnswer answer{.inputs = inputs_of(view), .axes = axes_of(view)};
+  for (std::size_t i = 0; i < view.report.sensors.size(); ++i)
+    answer.sensors.push_back(sensor_of(view, i));
+  return answer;
+}
+
+OffsetsAnswer offsets_of(const StatusView& view) {
+  return {view.report.mode, view.config.dry_run, axes_of(view)};
+}
+
+CycleStatus timing_of(const StatusView& view) {
+  const DurationHistogram& lateness = view.timing.lateness;
+  const DurationHistogram& work = view.timing.work;
+  return {.count = view.timing.cycles.load(),
+          .missed = view.timing.missed.load(),
+          .rate_hz = view.config.loop.rate_hz,
+          .lateness_us_p50 = microseconds(lateness.percentile(0.5)),
+          .lateness_us_p99 = microseconds(lateness.percentile(0.99)),
+          .lateness_us_p999 = microseconds(lateness.percentile(0.999)),
+          .lateness_us_max = microseconds(lateness.max()),
+          .work_us_p50 = microseconds(work.percentile(0.5)),
+          .work_us_p999 = microseconds(work.percentile(0.999)),
+          .work_us_max = microseconds(work.max()),
+          .real_time = view.real_time};
+}
+
+json model_json(const DaemonConfig& config) {
+  json terms = json::array();
+  for (const TermSpec& term : config.model.terms) {
+    if (term.is_bank()) {
+      terms.push_back({{"kind", term.kind},
+                       {"subjects", term.bank.subjects},
+                       {"powers", term.bank.powers},
+                       {"tau_s", term.bank.taus_s},
+                       {"gain_um_per_unit", term.bank.gain_um_per_unit}});
+      continue;
+    }
+    terms.push_back({{"kind", term.kind},
+                     {"subject", term.subject},
+                     {"shared", term.shared},
+                     {"per_output", term.per_output}});
+  }
+  return {{"file", config.model_file.string()},
+          {"checksum", config.model_checksum},
+          {"inputs", config.model.inputs},
+          {"outputs", config.model.outputs},
+          {"matrix_um_per_K", config.model.matrix_um_per_K},
+          {"terms", terms},
+          {"made_from", made_from(config.model)}};
+}
+
+std::string status_line(const StatusView& view) {
+  std::string line(view.config.dry_run ? "DRY RUN, nothing is written; " : "");
+  line += code_text(view.report.mode, view.config.dry_run).name;
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
+    char text[64];
+    const AxisConfig& axis = view.config.estimator.axes[i];
+    std::snprintf(text, sizeof text, "%s %s %+.1f %s", i == 0 ? ":" : ",", axis.name.c_str(),
+                  view.report.axes[i].offset_um, unit_of(axis.output).c_str());
+    line += text;
+  }
+  return line;
+}
+
+}  // namespace thermocomp
