@@ -289,12 +289,20 @@ SimulatedPiezoConfig read_piezo(const TomlTable& table) {
   return piezo;
 }
 
+/// The simulated controller has the bound of its file and no slew limit of its own.
+LimiterConfig bound_of(double offset_um_max) {
+  LimiterConfig limiter;
+  limiter.offset_um_max = offset_um_max;
+  limiter.rate_um_per_s_max = 1e6;
+  return limiter;
+}
+
 /// What the daemon sends and the controller shows in frames of its own; a bit that a set takes
 /// twice is a problem of the section already.
 CanTravel read_travel_frames(Draft& state, const TomlTable& axis, double offset_um_max,
                              std::size_t bus) {
   sections::TakenBits sent;
-  sections::CanTravelSection section(axis, offset_um_max, sent);
+  sections::CanTravelSection section(axis, bound_of(offset_um_max), sent);
   section.read_applied(sent);
   const CanTravel& travel = section.travel();
   const TomlTable table = sections::travel_table(axis);
@@ -322,7 +330,7 @@ SimulatedTravel read_travel(Draft& state, const TomlTable& axis, double offset_u
     return travel;
   }
   sections::WrittenRegisters written;
-  travel.registers = sections::read_modbus_travel(axis, offset_um_max, written);
+  travel.registers = sections::read_modbus_travel(axis, bound_of(offset_um_max), written);
   const auto take_all = [&](const std::vector<ModbusValue>& values) {
     for (const ModbusValue& value : values) take(state, bus, controller.unit, value, table);
   };
