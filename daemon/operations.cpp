@@ -17,6 +17,9 @@ namespace {
 
 using nlohmann::json;
 
+/// A client is answered within 2 s, whatever the disk does.
+constexpr auto disk_patience = std::chrono::milliseconds(1500);
+
 constexpr auto patience_s =
     std::chrono::duration_cast<std::chrono::seconds>(CycleHandle::patience).count();
 
@@ -77,15 +80,27 @@ RpcPending Operations::command(const Command& asked) {
   const CycleHandle::Tracked outcome = cycle_.send(asked, Clock::now());
   if (!outcome) throw RpcError(rpc::refused, "too many commands wait for the cycle");
   note_asked(asked, outcome);
-  return [this, outcome, kind = asked.kind]() -> std::optional<json> {
+  return [this, outcome, kind = asked.kind,
+          save = std::optional<Save>()]() mutable -> std::optional<json> {
     poll();
     if (!is_done(*outcome, "command")) return std::nullopt;
-    if (is_kept(kind) && !parts_.keeper.error().empty())
-      throw RpcError(
-          rpc::internal_error,
-          "carried out, but not saved, so that a restart would undo it: " + parts_.keeper.error());
+    // carried_out() has handed over what it changed.
+    if (!save) save = {parts_.keeper.serial(), Clock::now() + disk_patience};
+    if (!is_settled(*save, kind)) return std::nullopt;
     return json{{"done", true}};
   };
+}
+
+/// Whether the disk has what a command changed, or need not have it. @throws RpcError: it has not
+bool Operations::is_settled(const Save& save, CommandKind kind) const {
+  const StateKeeper::Saving saving = parts_.keeper.saving(save.serial);
+  if (saving == StateKeeper::Saving::under_way && Clock::now() < save.deadline) return false;
+  if (saving == StateKeeper::Saving::on_disk || !is_kept(kind)) return true;
+  throw RpcError(rpc::internal_error,
+                 "carried out, but not saved, so that a restart would undo it: " +
+                     (saving == StateKeeper::Saving::under_way
+                          ? std::string("the disk does not answer; it is saved as soon as it does")
+                          : parts_.keeper.error()));
 }
 
 RpcPending Operations::reload() {
@@ -132,6 +147,7 @@ CycleHandle::Tracked Operations::begin_reload() {
 
 void Operations::poll() {
   cycle_.poll(Clock::now());
+  parts_.keeper.poll(Clock::now());
   finish_reload();
 }
 
@@ -184,7 +200,7 @@ void Operations::carried_out(const Command& done) {
     parts_.reference_before_degC.clear();
     note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::command);
   }
-  // Called done only when it would survive a power cut.
+  // Called done only when it would survive a power cut: is_settled().
   save_state(true);
 }
 

@@ -20,7 +20,8 @@
 namespace thermocomp {
 
 /// Main's thread only; nothing waits. What an operator was told survives a restart: a command is
-/// called done only when it is on disk, and one that the cycle did not take in time never happens.
+/// called done only when it is on disk (where that takes longer than a client waits, the answer
+/// says so), and one that the cycle did not take in time never happens.
 /// Configuration, reports and state change together, in poll(), when the cycle has gone over to a
 /// new brain.
 class Operations {
@@ -69,6 +70,13 @@ class Operations {
     std::int64_t user{-1};
   };
 
+  /// What a command has changed, on its way to the disk.
+  struct Save {
+    std::uint64_t serial{0};
+    Clock::time_point deadline;
+  };
+
+  [[nodiscard]] bool is_settled(const Save& save, CommandKind kind) const;
   CycleHandle::Tracked begin_reload();
   void finish_reload();
   void carried_out(const Command& done);
