@@ -193,7 +193,7 @@ void Daemon::Parts::stop() noexcept {
     // Nothing of it can be trusted, and it may stand in the midst of anything: what a kill would
     // leave is what is left, and the service manager need not wait for a time-out.
     spdlog::critical("the cycle hangs; ending without it");
-    spdlog::shutdown();
+    static_cast<void>(flush_log(std::chrono::seconds(1)));
     std::_Exit(EXIT_FAILURE);
   }
   link->stop();

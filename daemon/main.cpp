@@ -1,5 +1,6 @@
 // thermocompd: reads thermocouples, predicts how the machine bends, sends offsets to its
 // controller.
+#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -11,6 +12,15 @@
 #include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/system/log_setup.hpp"
+
+namespace {
+
+/// After the log; where nobody takes that, standard error would be waited for as well.
+void complain(const std::string& what) {
+  if (thermocomp::flush_log(std::chrono::seconds(1))) std::fprintf(stderr, "%s\n", what.c_str());
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   thermocomp::clean_standard_output();
@@ -27,10 +37,10 @@ int main(int argc, char** argv) {
     thermocomp::Daemon daemon(config_file);
     daemon.run();
   } catch (const thermocomp::ConfigurationError& error) {
-    std::fprintf(stderr, "%s\n", error.what());
+    complain(error.what());
     return 2;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "thermocompd: %s\n", error.what());
+    complain(std::string("thermocompd: ") + error.what());
     return 1;
   }
   return 0;

@@ -290,6 +290,13 @@ void EventLog::note_failed_sleeps(std::uint64_t failed) {
   failed_sleeps_ = failed;
 }
 
+void EventLog::note_log(bool stands) {
+  if (stands)
+    journal_.fault("log", "nobody takes it, lines are lost");
+  else
+    journal_.recovery("log");
+}
+
 void EventLog::note_socket(const SocketStatistics& statistics) {
   const auto now = std::chrono::steady_clock::now();
   if (now < socket_next_) return;

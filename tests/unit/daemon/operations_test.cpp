@@ -104,7 +104,7 @@ TEST_CASE("while the reference is lost nothing is switched on before one is take
 
 TEST_CASE("a reload that cannot be read leaves everything as it is", "[daemon]") {
   Desk desk;
-  CHECK_THROWS(desk.operations.reload());
+  CHECK_THROWS_AS(Desk::answer(desk.operations.reload()), ConfigurationError);
   desk.operations.hang_up();  // the same, for the log
   CHECK_FALSE(desk.operations.is_busy());
   CHECK(desk.give(CommandKind::disable) == nlohmann::json{{"done", true}});
