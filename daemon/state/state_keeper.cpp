@@ -28,6 +28,7 @@ void StateKeeper::save(const PersistentState& state, Clock::time_point now) {
 }
 
 void StateKeeper::poll(Clock::time_point now) {
+  now_ = now;
   if (writing_ == nullptr) return;
   if (thread_.is_busy()) {
     if (now - begun_ > disk_answers_within)
@@ -45,11 +46,13 @@ void StateKeeper::poll(Clock::time_point now) {
 }
 
 bool StateKeeper::wait(Clock::duration at_most) {
-  const Clock::time_point end = Clock::now() + at_most;
-  poll(Clock::now());
+  const Clock::time_point begun = Clock::now();
+  const Clock::time_point given = now_;
+  const auto waited = [begun] { return Clock::now() - begun; };
+  poll(given);
   while (is_busy()) {
-    const bool ended = thread_.wait(end - Clock::now());
-    poll(Clock::now());
+    const bool ended = thread_.wait(at_most - waited());
+    poll(given + waited());
     if (!ended) return false;
   }
   return true;

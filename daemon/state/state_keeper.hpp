@@ -92,6 +92,7 @@ class StateKeeper {
   ReferenceRecord reference_;
   std::uint64_t references_{0};
   std::string error_;
+  Clock::time_point now_{};  ///< as it was given last
   Clock::time_point next_offsets_{};
   std::uint64_t serial_{0};
   std::uint64_t attempted_{0};         ///< of the last attempt that has ended

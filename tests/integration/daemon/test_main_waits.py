@@ -92,8 +92,9 @@ def test_a_disk_that_takes_seconds_to_save_the_state(lab, manager):
     said = watched.ask("disable")
     assert "carried out, but not saved" in said and "does not answer" in said, said
     assert watched.ask()["mode"] == "disabled"
-    watched.ask_for(7.0)
-    assert any("does not answer" in warning for warning in watched.ask()["warnings"])
+    eventually(lambda: any("does not answer" in warning for warning in watched.ask()["warnings"]),
+               "the status says so")
+    watched.ask_for(2.0)
     watched.judge()
     watched.stands.unlink()
     eventually(lambda: json.loads(watched.daemon.state.read_text())["enabled"] is False,
@@ -222,8 +223,8 @@ def test_a_log_pipe_that_nobody_reads(lab, manager):
         return b"lines of the log were lost" in text
     eventually(read_on, "the log says that lines were lost")
     eventually(lambda: read_on() and not warns_of_log(watched), "the warning ends")
-    events = watched.daemon.call("events")["events"]
-    assert [event["kind"] for event in events if event["subject"] == "log"] == ["fault", "recovery"]
+    eventually(lambda: [event["kind"] for event in watched.daemon.call("events")["events"]
+                        if event["subject"] == "log"] == ["fault", "recovery"], "and its events")
     # And not again.
     fill_log(watched)
     end_without_log(watched)
