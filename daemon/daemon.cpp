@@ -142,6 +142,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
   if (history) journal.tell([this](const Event& event) { history->note(event); });
   // A kill right now must not make this a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
+  static_cast<void>(keeper.wait(StateKeeper::disk_answers_within));
   if (!locks.warning.empty()) supervisor.add_warning(locks.warning);
   for (const std::string& warning : start_state.warnings) supervisor.add_warning(warning);
   add_operator_methods(server, actions());
@@ -197,7 +198,7 @@ void Daemon::Parts::stop() noexcept {
     // Nothing of it can be trusted, and it may stand in the midst of anything: what a kill would
     // leave is what is left, and the service manager need not wait for a time-out.
     spdlog::critical("the cycle hangs; ending without it");
-    spdlog::shutdown();
+    static_cast<void>(flush_log(std::chrono::seconds(1)));
     std::_Exit(EXIT_FAILURE);
   }
   link->stop();
@@ -205,6 +206,9 @@ void Daemon::Parts::stop() noexcept {
   try {
     operations.settle();
     operations.save_state(true);
+    // What is still under way then may end or not: the file is the old one or the new one.
+    if (!keeper.wait(StateKeeper::disk_answers_within) || !keeper.error().empty())
+      spdlog::error("state not saved: {}", keeper.error());
   } catch (const std::exception& error) {
     spdlog::error("state not saved: {}", error.what());
   }

@@ -1,6 +1,8 @@
 // thermocompd: reads thermocouples, predicts how the machine bends, sends offsets to its
 // controller.
+#include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string>
 
@@ -11,6 +13,31 @@
 #include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/system/log_setup.hpp"
+
+namespace {
+
+constexpr std::chrono::seconds log_patience{1};
+
+/// After the log; where nobody takes that, standard error would be waited for as well.
+void complain(const std::string& what) {
+  if (thermocomp::flush_log(log_patience)) std::fprintf(stderr, "%s\n", what.c_str());
+}
+
+int run(const std::string& config_file) {
+  try {
+    thermocomp::Daemon daemon(config_file);
+    daemon.run();
+  } catch (const thermocomp::ConfigurationError& error) {
+    complain(error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    complain(std::string("thermocompd: ") + error.what());
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   thermocomp::clean_standard_output();
@@ -23,15 +50,8 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   thermocomp::set_up_log();
-  try {
-    thermocomp::Daemon daemon(config_file);
-    daemon.run();
-  } catch (const thermocomp::ConfigurationError& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "thermocompd: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  const int status = run(config_file);
+  // What exit() flushes and ends would wait for whoever does not take the log.
+  if (!thermocomp::flush_log(log_patience)) std::_Exit(status);
+  return status;
 }

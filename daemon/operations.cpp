@@ -17,6 +17,9 @@ namespace {
 
 using nlohmann::json;
 
+/// A client is answered within 2 s, whatever the disk does.
+constexpr auto disk_patience = std::chrono::milliseconds(1500);
+
 constexpr auto patience_s =
     std::chrono::duration_cast<std::chrono::seconds>(CycleHandle::patience).count();
 
@@ -55,6 +58,12 @@ Event command_event(std::string_view code, std::int64_t user) {
   return event;
 }
 
+void add_recorder(CycleBrain& brain, const DaemonConfig& config, HistoryWriter* history) {
+  if (history != nullptr)
+    brain.recorder = history->make_recorder({config.text, config.model_text, config.model_checksum},
+                                            brain.estimator);
+}
+
 bool is_reference_whole(const Report& report) {
   return std::all_of(report.inputs.begin(), report.inputs.end(), [](const InputReport& input) {
     return input.good && std::isfinite(input.reference_degC);
@@ -65,15 +74,32 @@ bool is_reference_whole(const Report& report) {
 
 std::unique_ptr<CycleBrain> make_brain(const DaemonConfig& config, HistoryWriter* history) {
   auto brain = std::make_unique<CycleBrain>(Estimator(config.estimator, config.model));
-  if (history != nullptr)
-    brain->recorder = history->make_recorder(
-        {config.text, config.model_text, config.model_checksum}, brain->estimator);
+  add_recorder(*brain, config, history);
   return brain;
 }
+
+/// What the files give, made beside main: a file may be on a disk that does not answer, and an
+/// estimator takes its time.
+struct Operations::Loaded {
+  DaemonConfig config;
+  std::unique_ptr<CycleBrain> brain;
+  std::exception_ptr error;  ///< instead of the others
+
+  void load(const std::filesystem::path& file) noexcept {
+    try {
+      config = load_daemon_config(file);
+      brain = std::make_unique<CycleBrain>(Estimator(config.estimator, config.model));
+    } catch (...) {
+      error = std::current_exception();
+    }
+  }
+};
 
 Operations::Operations(Parts parts)
     : parts_(std::move(parts)),
       cycle_(parts_.cycle, [this](const Command& done) { carried_out(done); }) {}
+
+Operations::~Operations() = default;
 
 RpcPending Operations::command(const Command& asked) {
   if (has_index(asked.kind) && cycle_.replacing())
@@ -85,24 +111,46 @@ RpcPending Operations::command(const Command& asked) {
   const CycleHandle::Tracked outcome = cycle_.send(asked, Clock::now());
   if (!outcome) throw RpcError(rpc::refused, "too many commands wait for the cycle");
   note_asked(asked, outcome);
-  return [this, outcome, kind = asked.kind]() -> std::optional<json> {
+  return [this, outcome, kind = asked.kind,
+          save = std::optional<Save>()]() mutable -> std::optional<json> {
     poll();
     if (!is_done(*outcome, "command")) return std::nullopt;
-    if (is_kept(kind) && !parts_.keeper.error().empty())
-      throw RpcError(
-          rpc::internal_error,
-          "carried out, but not saved, so that a restart would undo it: " + parts_.keeper.error());
+    // carried_out() has handed over what it changed.
+    if (!save) save = {parts_.keeper.serial(), Clock::now() + disk_patience};
+    if (!is_settled(*save, kind)) return std::nullopt;
     return json{{"done", true}};
   };
 }
 
+/// Whether the disk has what a command changed, or need not have it. @throws RpcError: it has not
+bool Operations::is_settled(const Save& save, CommandKind kind) const {
+  const StateKeeper::Saving saving = parts_.keeper.saving(save.serial);
+  if (saving == StateKeeper::Saving::under_way && Clock::now() < save.deadline) return false;
+  if (saving == StateKeeper::Saving::on_disk || !is_kept(kind)) return true;
+  throw RpcError(rpc::internal_error,
+                 "carried out, but not saved, so that a restart would undo it: " +
+                     (saving == StateKeeper::Saving::under_way
+                          ? std::string("the disk does not answer; it is saved as soon as it does")
+                          : parts_.keeper.error()));
+}
+
 RpcPending Operations::reload() {
-  const CycleHandle::Tracked outcome = begin_reload();
+  begin_reload();
   reload_->user = asking_user();
-  return [this, outcome]() -> std::optional<json> {
+  reload_->is_asked = true;
+  return [this, answer = reload_->answer,
+          late = Clock::now() + CycleHandle::patience]() -> std::optional<json> {
     poll();
-    if (!is_done(*outcome, "new configuration")) return std::nullopt;
-    return json{{"done", true}};
+    if (answer->error) std::rethrow_exception(answer->error);
+    if (answer->outcome) {
+      if (!is_done(*answer->outcome, "new configuration")) return std::nullopt;
+      return json{{"done", true}};
+    }
+    if (Clock::now() < late) return std::nullopt;
+    throw RpcError(rpc::internal_error,
+                   fmt::format("the files are not read after {} s: the disk does not answer; the "
+                               "reload goes on when it does",
+                               patience_s));
   };
 }
 
@@ -112,34 +160,58 @@ void Operations::hang_up() {
   try {
     begin_reload();
   } catch (const std::exception& error) {
-    spdlog::error("reload refused, the running configuration stays:\n{}", error.what());
+    spdlog::error("reload: {}", error.what());
   }
 }
 
-CycleHandle::Tracked Operations::begin_reload() {
+void Operations::begin_reload() {
   if (reload_) throw RpcError(rpc::refused, "a reload is under way: ask again when it is done");
+  Reload reload;
+  reload.answer = std::make_shared<ReloadAnswer>();
+  reload.loaded = std::make_shared<Loaded>();
+  reload.thread = std::make_unique<SideThread>("reload");
+  reload.thread->start([loaded = reload.loaded, file = parts_.config.file] { loaded->load(file); });
+  reload_ = std::move(reload);
   parts_.service.reloading();
+}
+
+/// Once the files are read: hands the new brain to the cycle.
+void Operations::finish_loading() {
+  if (!reload_ || reload_->answer->outcome || reload_->thread->is_busy()) return;
+  const std::shared_ptr<Loaded> loaded = std::exchange(reload_->loaded, nullptr);
+  reload_->thread.reset();
   try {
-    DaemonConfig next = load_daemon_config(parts_.config.file);
-    const std::vector<std::string> fixed = restart_needed(parts_.config, next);
+    if (loaded->error) std::rethrow_exception(loaded->error);
+    const std::vector<std::string> fixed = restart_needed(parts_.config, loaded->config);
     if (!fixed.empty())
       throw RpcError(rpc::refused,
                      fmt::format("nothing was taken, the running configuration stays: a "
                                  "restart is needed for a change of {}",
                                  fmt::join(fixed, ", ")));
-    auto brain = make_brain(next, parts_.history);
-    brain->estimator.plan_adoption(cycle_.estimator());
-    reload_ = {std::move(next), cycle_.replace(std::move(brain), Clock::now()), false, -1};
-  } catch (...) {
+    add_recorder(*loaded->brain, loaded->config, parts_.history);
+    loaded->brain->estimator.plan_adoption(cycle_.estimator());
+    reload_->next = std::move(loaded->config);
+    reload_->answer->outcome = cycle_.replace(std::move(loaded->brain), Clock::now());
+  } catch (const std::exception& error) {
+    if (!reload_->is_asked)
+      spdlog::error("reload refused, the running configuration stays:\n{}", error.what());
+    reload_->answer->error = std::current_exception();
+    loaded->config = {};
     malloc_trim(0);  // what the refused files took; locked memory is never given back by itself
-    parts_.service.ready(parts_.status_line());
-    throw;
+    end_reload();
   }
-  return reload_->outcome;
+}
+
+void Operations::end_reload() {
+  reload_.reset();
+  parts_.service.ready(parts_.status_line());
+  if (std::exchange(reload_again_, false)) hang_up();
 }
 
 void Operations::poll() {
   cycle_.poll(Clock::now());
+  parts_.keeper.poll(Clock::now());
+  finish_loading();
   finish_reload();
 }
 
@@ -150,13 +222,15 @@ void Operations::settle() {
 }
 
 void Operations::finish_reload() {
-  if (!reload_ || *reload_->outcome == Outcome::waiting) return;
-  if (*reload_->outcome == Outcome::overdue) {
+  if (!reload_ || !reload_->answer->outcome) return;
+  const Outcome outcome = *reload_->answer->outcome;
+  if (outcome == Outcome::waiting) return;
+  if (outcome == Outcome::overdue) {
     if (!std::exchange(reload_->is_overdue_told, true))
       spdlog::error("reload: the cycle has the new configuration in hand and does not finish");
     return;
   }
-  if (*reload_->outcome == Outcome::done) {
+  if (outcome == Outcome::done) {
     parts_.config = std::move(reload_->next);
     set_log_level(parts_.config.log_level);
     note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::reload);
@@ -169,9 +243,7 @@ void Operations::finish_reload() {
         "one stays",
         patience_s);
   }
-  reload_.reset();
-  parts_.service.ready(parts_.status_line());
-  if (std::exchange(reload_again_, false)) hang_up();
+  end_reload();
 }
 
 void Operations::carried_out(const Command& done) {
@@ -191,7 +263,7 @@ void Operations::carried_out(const Command& done) {
     parts_.reference_before_degC.clear();
     note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::command);
   }
-  // Called done only when it would survive a power cut.
+  // Called done only when it would survive a power cut: is_settled().
   save_state(true);
 }
 

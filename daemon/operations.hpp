@@ -2,6 +2,7 @@
 /// disk.
 #pragma once
 
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -16,11 +17,13 @@
 #include "daemon/state/state_keeper.hpp"
 #include "daemon/status/event_journal.hpp"
 #include "daemon/system/service_manager.hpp"
+#include "daemon/threads/side_thread.hpp"
 
 namespace thermocomp {
 
 /// Main's thread only; nothing waits. What an operator was told survives a restart: a command is
-/// called done only when it is on disk, and one that the cycle did not take in time never happens.
+/// called done only when it is on disk (where that takes longer than a client waits, the answer
+/// says so), and one that the cycle did not take in time never happens.
 /// Configuration, reports and state change together, in poll(), when the cycle has gone over to a
 /// new brain.
 class Operations {
@@ -41,10 +44,14 @@ class Operations {
     std::map<std::string, double> reference_before_degC{};
   };
   explicit Operations(Parts parts);
+  ~Operations();
+  Operations(const Operations&) = delete;
+  Operations& operator=(const Operations&) = delete;
 
   /// @throws RpcError when it cannot even be begun
   [[nodiscard]] RpcPending command(const Command& asked);
-  /// @throws ConfigurationError, or RpcError: a restart is needed, a reload is under way
+  /// Its result throws ConfigurationError, or RpcError: a restart is needed.
+  /// @throws RpcError: a reload is under way
   [[nodiscard]] RpcPending reload();
   /// The same for SIGHUP. However many arrive while one is under way, one more follows it.
   void hang_up();
@@ -62,15 +69,33 @@ class Operations {
 
  private:
   using Clock = CycleHandle::Clock;
+  struct Loaded;
+  /// What has become of a reload, for the client that asked.
+  struct ReloadAnswer {
+    CycleHandle::Tracked outcome;  ///< none: the files are being read
+    std::exception_ptr error;
+  };
   struct Reload {
+    std::shared_ptr<ReloadAnswer> answer;
+    std::shared_ptr<Loaded> loaded;      ///< the thread's until it has ended
+    std::unique_ptr<SideThread> thread;  ///< none: the files are read
     DaemonConfig next;
-    CycleHandle::Tracked outcome;
     bool is_overdue_told{false};
+    bool is_asked{false};  ///< by a client, who is told what comes of it
     std::int64_t user{-1};
   };
 
-  CycleHandle::Tracked begin_reload();
+  /// What a command has changed, on its way to the disk.
+  struct Save {
+    std::uint64_t serial{0};
+    Clock::time_point deadline;
+  };
+
+  [[nodiscard]] bool is_settled(const Save& save, CommandKind kind) const;
+  void begin_reload();
+  void finish_loading();
   void finish_reload();
+  void end_reload();
   void carried_out(const Command& done);
   void note_reference(const PersistentState& state, ReferenceOrigin origin);
   void note_asked(const Command& asked, const CycleHandle::Tracked& outcome);

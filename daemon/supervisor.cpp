@@ -5,6 +5,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
+#include <fmt/format.h>
 #include <poll.h>
 #include <stdexcept>
 #include <thread>
@@ -12,6 +13,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/cycle/real_time_thread.hpp"
+#include "daemon/system/log_setup.hpp"
 
 namespace thermocomp {
 namespace {
@@ -127,6 +129,7 @@ void Supervisor::look_at_health() {
   events_.note_missed(cycle().timing().missed.load());
   events_.note_failed_sleeps(cycle().timing().failed_sleeps.load());
   events_.note_socket(parts_.server.statistics());
+  events_.note_log(log_statistics().stands);
   note_history();
   for (NameLock& lock : parts_.locks) lock.drain();
   parts_.service.status(status_line(view()));
@@ -181,6 +184,8 @@ StatusView Supervisor::view() {
         "the machine's reference is lost, compensation stays off: when the machine is cold and "
         "even, give `thermocomp reference`, then `thermocomp enable`");
   if (!parts_.keeper.error().empty()) all.push_back(parts_.keeper.error());
+  if (const LogStatistics log = log_statistics(); log.stands)
+    all.push_back(fmt::format("nobody takes the log: {} lines are lost", log.dropped));
   const HistoryStatistics statistics =
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);

@@ -20,7 +20,7 @@ struct SubjectName {
   std::string_view after;
 };
 constexpr std::array<std::string_view, 5> kinds{"fault", "recovery", "mode", "command", "daemon"};
-constexpr std::array<SubjectName, 14> subjects{{
+constexpr std::array<SubjectName, 15> subjects{{
     {"nothing", "", ""},
     {"reason", "reason ", ""},
     {"sensor", "sensor ", ""},
@@ -35,6 +35,7 @@ constexpr std::array<SubjectName, 14> subjects{{
     {"controller_errors", "controller ", ", errors"},
     {"controller_writes", "writes to controller ", ""},
     {"history", "history", ""},
+    {"log", "log", ""},
 }};
 
 std::string command_text(const Event& event) {

@@ -27,7 +27,8 @@ enum class SubjectKind : std::uint8_t {
   controller,
   controller_errors,
   controller_writes,
-  history
+  history,
+  log  ///< of the daemon itself
 };
 
 struct Subject {
@@ -47,7 +48,7 @@ struct Event {
   Subject subject{};
   /// Name of the reason, fault, mode, command or CAN state; else one word that programs compare:
   /// "suspected", "mismatch_latched", "not_connected", "not_written", "estimated", "lost",
-  /// "uncertain"; of the daemon "started", "stopping", "history".
+  /// "uncertain", "not_taken"; of the daemon "started", "stopping", "history".
   std::string code{};
   std::string detail{};  ///< in the words of a device, driver or signal; may be empty
   /// suspected: error of the sensor [K]; commands `measured` and `prove`: [um]; NaN: none

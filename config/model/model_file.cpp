@@ -19,6 +19,10 @@ using Rows = std::vector<std::vector<double>>;
 
 constexpr std::size_t inputs_max = 512;
 constexpr std::size_t outputs_max = 64;
+/// What a model may cost the daemon: memory, the time in which it is built, and every step of the
+/// cycle (model_operations()).
+constexpr std::size_t terms_max = 2000;
+constexpr double operations_max = 1e6;
 /// What rounding may do to a covariance that was computed and written down.
 constexpr double covariance_tolerance = 1e-9;
 
@@ -346,6 +350,18 @@ void read_covariance(const TomlTable& root, ThermalModel& model) {
   growth.scatter_factor = read_factors(table, "scatter_factor", model.inputs.size());
 }
 
+void check_cost(const TomlTable& root, const ThermalModel& model) {
+  if (model.terms.size() > terms_max)
+    root.problem("term", std::to_string(model.terms.size()) + " terms",
+                 "must be at most " + std::to_string(terms_max));
+  const double operations = model_operations(model);
+  if (!(operations <= operations_max))
+    root.problem("term", std::to_string(std::llround(operations)) + " multiplications a step",
+                 "matrix, guideways and terms together must take at most " +
+                     std::to_string(std::llround(operations_max)) +
+                     " (lag_bank: subjects x time constants x outputs)");
+}
+
 /// @return whether the names could be read
 bool read_model(const TomlDocument& document, ThermalModel& model) {
   const TomlTable root = document.root();
@@ -368,6 +384,7 @@ bool read_model(const TomlDocument& document, ThermalModel& model) {
   for (const TomlTable& term : root.tables("term")) {
     model.terms.push_back(read_term(term, model));
   }
+  check_cost(root, model);
   read_covariance(root, model);
   if (root.has("made_from")) model.made_from = read_made_from(root.table("made_from"), model);
   if (root.has("course")) model.course = read_course(root.table("course"), model);
@@ -375,6 +392,19 @@ bool read_model(const TomlDocument& document, ThermalModel& model) {
 }
 
 }  // namespace
+
+double model_operations(const ThermalModel& model) {
+  const auto count = [](const auto& list) { return static_cast<double>(list.size()); };
+  constexpr double operations_a_term = 20.0;
+  double operations = count(model.inputs) * count(model.outputs);
+  for (const GuidewaySpec& guideway : model.guideways)
+    operations += 2.0 * count(model.inputs) * count(guideway.rows_um_per_K);
+  for (const TermSpec& term : model.terms)
+    operations += operations_a_term + count(model.outputs) +
+                  count(term.bank.subjects) * count(term.bank.taus_s) *
+                      (1.0 + count(term.bank.gain_um_per_unit));
+  return operations;
+}
 
 ModelReading read_model_text(const std::string& text, const std::string& name) {
   ModelReading reading;

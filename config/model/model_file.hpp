@@ -26,6 +26,9 @@ struct ModelReading {
 };
 [[nodiscard]] ModelReading read_model_text(const std::string& text, const std::string& name);
 
+/// Multiplications of one evaluation of the model, roughly: what it costs in each step of a cycle.
+[[nodiscard]] double model_operations(const ThermalModel& model);
+
 /// The model as a file: parse_model(write_model(m)) is m, every number bit for bit.
 /// @pre the model keeps the rules of the file
 [[nodiscard]] std::string write_model(const ThermalModel& model);

@@ -1,9 +1,8 @@
 // What toml_reader.hpp offers beside the reader itself and that needs no TOML.
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <stdexcept>
 
+#include "config/text/regular_file.hpp"
 #include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
 
@@ -28,26 +27,11 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string read_text_file(const std::filesystem::path& path, std::uintmax_t bytes_max) {
-  const auto refuse = [&](const std::string& rule) {
-    throw ConfigurationError({{path.string(), 0, "", "", rule}});
-  };
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (error && error != std::errc::no_such_file_or_directory) {
-    refuse("cannot be read: " + error.message());
+  try {
+    return read_regular_file(path, bytes_max);
+  } catch (const std::runtime_error& error) {
+    throw ConfigurationError({{path.string(), 0, "", "", error.what()}});
   }
-  if (!std::filesystem::exists(status)) refuse("no such file");
-  if (!std::filesystem::is_regular_file(status)) refuse("must be a regular file");
-  const auto size = std::filesystem::file_size(path, error);
-  if (error) refuse("cannot be read: " + error.message());
-  if (size > bytes_max)
-    refuse("must have at most " + std::to_string(bytes_max / bytes_per_MB) + " MB");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) refuse(std::string("cannot be opened: ") + std::strerror(errno));
-  std::string text(static_cast<std::size_t>(size), '\0');
-  file.read(text.data(), static_cast<std::streamsize>(size));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  return text;
 }
 
 std::string read_text_file(const std::filesystem::path& path) {

@@ -220,15 +220,16 @@ RpcPending accept(const DeskActions& actions, const json& params) {
 }
 
 RpcPending reload(const DeskActions& actions) {
-  try {
-    return then(actions.reload(), [actions] {
-      return json{{"done", true}, {"checksum", actions.view().config.model_checksum}};
-    });
-  } catch (const ConfigurationError& error) {
-    throw RpcError(
-        rpc::refused,
-        std::string("nothing was taken, the running configuration stays:\n") + error.what());
-  }
+  return [actions, pending = actions.reload()]() -> std::optional<json> {
+    try {
+      if (!pending()) return std::nullopt;
+    } catch (const ConfigurationError& error) {
+      throw RpcError(
+          rpc::refused,
+          std::string("nothing was taken, the running configuration stays:\n") + error.what());
+    }
+    return json{{"done", true}, {"checksum", actions.view().config.model_checksum}};
+  };
 }
 
 }  // namespace

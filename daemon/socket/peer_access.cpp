@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <grp.h>
-#include <pwd.h>
 
 #include <sys/socket.h>
 
@@ -20,20 +19,6 @@ std::optional<gid_t> group_called(const std::string& name) {
   }
   if (found == nullptr) return std::nullopt;
   return entry.gr_gid;
-}
-
-/// For kernels before 4.13, which do not tell the peer's own list: that of its user.
-std::vector<gid_t> groups_of_user(uid_t user, gid_t group) {
-  const passwd* entry = getpwuid(user);
-  if (entry == nullptr) return {};
-  int count = 64;
-  std::vector<gid_t> groups(static_cast<std::size_t>(count));
-  if (getgrouplist(entry->pw_name, group, groups.data(), &count) < 0 && count > 0) {
-    groups.resize(static_cast<std::size_t>(count));
-    if (getgrouplist(entry->pw_name, group, groups.data(), &count) < 0) return {};
-  }
-  groups.resize(static_cast<std::size_t>(std::max(count, 0)));
-  return groups;
 }
 
 bool is_member(const Peer& peer, gid_t group) {
@@ -62,7 +47,7 @@ std::optional<Peer> peer_of(int socket_fd) {
     if (errno != ERANGE) break;
     peer.groups.resize(count);  // the kernel says how many there are
   }
-  peer.groups = groups_of_user(peer.user, peer.group);
+  peer.groups.clear();
   return peer;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <unistd.h>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "daemon/socket/peer_access.hpp"
 #include "daemon/socket/request_desk.hpp"
 #include "daemon/socket/served_client.hpp"
+#include "daemon/threads/side_thread.hpp"
 
 namespace thermocomp {
 namespace {
@@ -34,6 +36,10 @@ constexpr int accepted_a_turn = 64;
 constexpr auto time_outs_checked_every = std::chrono::milliseconds(250);
 constexpr auto answers_asked_every = std::chrono::milliseconds(1);
 constexpr auto groups_known_for = std::chrono::seconds(5);
+/// The name service is asked beside main and waited for so long: a group of the system's own files
+/// is known at once, one of a server that does not answer holds nobody up.
+constexpr auto groups_first_within = std::chrono::seconds(2);
+constexpr auto groups_within = std::chrono::milliseconds(50);
 
 std::string seconds_text(Clock::duration duration) {
   return std::to_string(std::chrono::ceil<std::chrono::seconds>(duration).count()) + " s";
@@ -59,7 +65,9 @@ struct StatusServer::Parts {
   Alarms subscribers;             ///< when they are to be told next
   std::vector<ClientId> broken;
   AccessGroups groups;
-  std::optional<Clock::time_point> groups_asked;
+  std::shared_ptr<AccessGroups> groups_found;  ///< the thread's while it is busy
+  Clock::time_point groups_asked{};
+  SideThread groups_thread{"groups"};
   Clock::time_point time_outs_checked_next{};
   SocketStatistics statistics;
 
@@ -79,6 +87,7 @@ struct StatusServer::Parts {
   void take(int fd, Clock::time_point now);
   void refuse(int fd, const std::string& why);
   [[nodiscard]] PeerAccess access(const Peer& peer, Clock::time_point now);
+  void ask_groups(Clock::duration at_most);
   [[nodiscard]] bool make_room(Clock::time_point now);
   void on_client(ClientId id, std::uint32_t events);
   void arrange(ClientId id, ServedClient& client);
@@ -112,6 +121,7 @@ StatusServer::Parts::Parts(const SocketConfig& config_in, const SocketLimits& li
     close_own();
     throw SocketError("status socket: epoll is not available");
   }
+  ask_groups(groups_first_within);
 }
 
 bool StatusServer::Parts::watch(int fd, ClientId id, std::uint32_t events,
@@ -173,11 +183,20 @@ void StatusServer::Parts::refuse(int fd, const std::string& why) {
 /// A group made later counts without a restart, within seconds.
 PeerAccess StatusServer::Parts::access(const Peer& peer, Clock::time_point now) {
   if (peer.user == 0) return {true, true, true};
-  if (!groups_asked || now - *groups_asked > groups_known_for) {
-    groups = look_up_groups(config);
-    groups_asked = Clock::now();
-  }
+  if (now - groups_asked > groups_known_for) ask_groups(groups_within);
   return access_of(peer, geteuid(), groups);
+}
+
+void StatusServer::Parts::ask_groups(Clock::duration at_most) {
+  if (groups_found) {
+    at_most = {};  // once is enough
+  } else {
+    groups_found = std::make_shared<AccessGroups>();
+    groups_thread.start([found = groups_found, asked = config] { *found = look_up_groups(asked); });
+  }
+  if (!groups_thread.wait(at_most)) return;  // taken when it is asked for again
+  groups = *std::exchange(groups_found, nullptr);
+  groups_asked = Clock::now();
 }
 
 /// Ends the client that has been idle longest, if that is long.

@@ -4,14 +4,14 @@
 #include <cmath>
 #include <cstring>
 #include <fcntl.h>
-#include <fstream>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <system_error>
+
+#include "config/text/regular_file.hpp"
 
 namespace thermocomp {
 namespace {
@@ -111,16 +111,6 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   return state;
 }
 
-std::string read_all(const std::filesystem::path& path) {
-  if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("is no ordinary file");
-  if (std::filesystem::file_size(path) > size_bytes_max) throw std::runtime_error("is too large");
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) throw std::runtime_error("cannot be read");
-  return text.str();
-}
-
 /// What stands there, a folder too, must not keep the next state from being written.
 std::string move_aside(const std::filesystem::path& file) {
   constexpr int names_max = 9;
@@ -135,27 +125,14 @@ std::string move_aside(const std::filesystem::path& file) {
   return "it could not be moved aside (" + error.message() + ")";
 }
 
-/// Closes itself; -1 is none.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) noexcept : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const noexcept { return fd_; }
-
- private:
-  int fd_;
-};
-
 [[noreturn]] void fail(const std::string& what) {
   throw std::runtime_error(what + ": " + std::strerror(errno));
 }
 
 void write_flushed(const std::string& path, const std::string& text) {
-  const Descriptor file(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
+  // A new one: what stands there may be left over, or a pipe.
+  unlink(path.c_str());
+  const FileDescriptor file(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
   if (file.get() < 0) fail(path);
   std::size_t done = 0;
   while (done < text.size()) {
@@ -178,7 +155,8 @@ LoadedState load_state_file(const std::filesystem::path& file,
     const auto status = std::filesystem::status(file, error);
     if (status.type() == std::filesystem::file_type::not_found) return loaded;
     if (error) throw std::runtime_error(error.message());
-    loaded.state = from_text(read_all(file), loaded.reference_lost, loaded.reference);
+    loaded.state =
+        from_text(read_regular_file(file, size_bytes_max), loaded.reference_lost, loaded.reference);
     loaded.found = true;
   } catch (const std::exception& error) {
     loaded.damaged = true;
@@ -203,7 +181,7 @@ std::string save_state_file(const std::filesystem::path& file, const PersistentS
     if (rename(beside.c_str(), file.c_str()) != 0) fail(file.string());
     const std::filesystem::path folder =
         file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-    const Descriptor directory(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    const FileDescriptor directory(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (directory.get() < 0 || fsync(directory.get()) != 0) fail(folder.string());
     return {};
   } catch (const std::exception& error) {

@@ -286,6 +286,15 @@ void EventLog::note_failed_sleeps(std::uint64_t failed) {
   failed_sleeps_ = failed;
 }
 
+void EventLog::note_log(bool stands) {
+  const Subject subject{SubjectKind::log, ""};
+  if (stands)
+    journal_.fault(
+        {.subject = subject, .code = "not_taken", .detail = "nobody takes it, lines are lost"});
+  else
+    journal_.recovery(subject);
+}
+
 void EventLog::note_socket(const SocketStatistics& statistics) {
   const auto now = std::chrono::steady_clock::now();
   if (now < socket_next_) return;

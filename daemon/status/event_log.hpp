@@ -40,6 +40,8 @@ class EventLog {
   /// Clients that were refused, cut off or missed notifications: at most one line a minute, since
   /// whoever can connect could otherwise fill the log.
   void note_socket(const SocketStatistics& statistics);
+  /// @param stands  nobody takes the log, lines are lost
+  void note_log(bool stands);
 
  private:
   void note_mode(const Report& report, const std::string& mode);

@@ -1,44 +1,83 @@
 #include "daemon/system/service_manager.hpp"
 
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <cstring>
 #include <time.h>
+#include <unistd.h>
 
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <systemd/sd-daemon.h>
 
 namespace thermocomp {
 
+namespace {
+
+constexpr auto alive_period_max = std::chrono::milliseconds(500);
+
+}  // namespace
+
 ServiceManager::ServiceManager() {
   std::uint64_t watchdog_us = 0;
   if (sd_watchdog_enabled(0, &watchdog_us) > 0)
-    // Three times in its period: one late tick of main is no reason to be killed.
-    watchdog_period_ = std::chrono::microseconds(watchdog_us / 3);
+    // At least three times in its period: one late tick of main is no reason to be killed.
+    watchdog_period_ = std::min<std::chrono::steady_clock::duration>(
+        std::chrono::microseconds(watchdog_us / 3), alive_period_max);
+  const char* path = std::getenv("NOTIFY_SOCKET");
+  if (path == nullptr || (path[0] != '/' && path[0] != '@')) return;
+  if (std::strlen(path) >= sizeof address_.sun_path) return;
+  address_.sun_family = AF_UNIX;
+  std::strcpy(address_.sun_path, path);
+  address_bytes_ = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + std::strlen(path));
+  if (path[0] == '@') address_.sun_path[0] = '\0';
+  fd_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+}
+
+ServiceManager::~ServiceManager() {
+  if (fd_ >= 0) close(fd_);
+}
+
+void ServiceManager::send(const std::string& news, bool is_kept) noexcept {
+  if (fd_ < 0) return;
+  const std::string all = unsent_ + news;
+  const auto sent = sendto(fd_, all.data(), all.size(), MSG_NOSIGNAL,
+                           reinterpret_cast<const sockaddr*>(&address_), address_bytes_);
+  const bool is_full = sent < 0 && (errno == EAGAIN || errno == ENOBUFS);
+  if (!is_full)
+    unsent_.clear();
+  else if (is_kept)
+    unsent_ = all.size() <= unsent_bytes_max ? all : news;
 }
 
 void ServiceManager::ready(const std::string& status) noexcept {
   last_status_ = status;
-  sd_notifyf(0, "READY=1\nSTATUS=%s", status.c_str());
+  send("READY=1\nSTATUS=" + status + "\n");
 }
 
 void ServiceManager::reloading() noexcept {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
-  sd_notifyf(0, "RELOADING=1\nMONOTONIC_USEC=%lld",
-             static_cast<long long>(now.tv_sec) * 1000000 + now.tv_nsec / 1000);
+  const std::int64_t us = std::int64_t{now.tv_sec} * 1000000 + now.tv_nsec / 1000;
+  send("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(us) + "\n");
 }
 
 void ServiceManager::stopping(const std::string& status) noexcept {
   last_status_ = status;
-  sd_notifyf(0, "STOPPING=1\nSTATUS=%s", status.c_str());
+  send("STOPPING=1\nSTATUS=" + status + "\n");
 }
 
 void ServiceManager::extend_stop(std::chrono::microseconds time) noexcept {
-  sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%lld", static_cast<long long>(time.count()));
+  send("EXTEND_TIMEOUT_USEC=" + std::to_string(time.count()) + "\n");
 }
 
 void ServiceManager::status(const std::string& status) noexcept {
   if (status == last_status_) return;
   last_status_ = status;
-  sd_notifyf(0, "STATUS=%s", status.c_str());
+  send("STATUS=" + status + "\n");
 }
 
 void ServiceManager::alive() noexcept {
@@ -46,7 +85,7 @@ void ServiceManager::alive() noexcept {
   const auto now = std::chrono::steady_clock::now();
   if (now - last_alive_ < watchdog_period_) return;
   last_alive_ = now;
-  sd_notify(0, "WATCHDOG=1");
+  send("WATCHDOG=1\n", false);
 }
 
 }  // namespace thermocomp

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <tuple>
 
 #include <Eigen/Core>
 
@@ -49,9 +51,10 @@ struct Guideway {
   }
 };
 
-Guideway guideway_from(const GuidewaySpec& spec, const ThermalModel& model) {
+Guideway guideway_from(const GuidewaySpec& spec, const ThermalModel& model,
+                       const ModelColumns& columns) {
   Guideway guideway;
-  guideway.signal = index_of(model.signal_columns(), spec.axis, "guideway.axis", "is not a signal");
+  guideway.signal = index_of(columns.signals, spec.axis, "guideway.axis", "is not a signal");
   guideway.positions_mm = spec.positions_mm;
   require(spec.positions_mm.size() >= 2, "guideway.positions_mm",
           static_cast<double>(spec.positions_mm.size()), "needs at least two positions");
@@ -67,9 +70,17 @@ Guideway guideway_from(const GuidewaySpec& spec, const ThermalModel& model) {
   return guideway;
 }
 
-bool same_states(const LagBankSpec& a, const LagBankSpec& b) {
-  return a.subjects == b.subjects && a.powers == b.powers && a.taus_s == b.taus_s;
-}
+/// By all that a term's state depends on. Gains do not live in the state, so a term with new gains
+/// keeps its past.
+struct ByState {
+  bool operator()(const TermSpec* a, const TermSpec* b) const {
+    const auto key = [](const TermSpec& term) {
+      return std::tie(term.kind, term.subject, term.shared, term.bank.subjects, term.bank.powers,
+                      term.bank.taus_s);
+    };
+    return key(*a) < key(*b);
+  }
+};
 
 }  // namespace
 
@@ -114,16 +125,18 @@ struct DisplacementModel::Equation {
 
 DisplacementModel::DisplacementModel(const ThermalModel& model)
     : equation_(std::make_unique<Equation>()) {
-  equation_->columns = model.temperature_columns().size();
-  equation_->signals = model.signal_columns().size();
+  const ModelColumns columns(model);
+  equation_->columns = columns.temperatures.size();
+  equation_->signals = columns.signals.size();
   equation_->outputs = model.outputs.size();
   equation_->inputs = static_cast<Eigen::Index>(model.inputs.size());
   equation_->matrix_um_per_K = matrix_from(model.matrix_um_per_K, model.outputs.size(),
                                            model.inputs.size(), "matrix_um_per_K");
   for (const GuidewaySpec& spec : model.guideways)
-    equation_->guideways.push_back(guideway_from(spec, model));
+    equation_->guideways.push_back(guideway_from(spec, model, columns));
   equation_->term_specs = model.terms;
-  for (const TermSpec& spec : model.terms) equation_->terms.push_back(make_term(spec, model));
+  for (const TermSpec& spec : model.terms)
+    equation_->terms.push_back(make_term(spec, model, columns));
   equation_->rise_K = Vector::Zero(static_cast<Eigen::Index>(equation_->columns));
   StateArchive counting;
   visit_state(counting);
@@ -188,15 +201,14 @@ void DisplacementModel::copy_states(const DisplacementModel& same) noexcept {
 }
 
 std::vector<int> DisplacementModel::plan_terms(const DisplacementModel& other) const {
+  const std::vector<TermSpec>& theirs = other.equation_->term_specs;
+  std::map<const TermSpec*, int, ByState> known;  // of two that are the same the first
+  for (std::size_t i = 0; i < theirs.size(); ++i)
+    known.try_emplace(&theirs[i], static_cast<int>(i));
   std::vector<int> plan;
   for (const TermSpec& ours : equation_->term_specs) {
-    const auto& theirs = other.equation_->term_specs;
-    const auto same = std::find_if(theirs.begin(), theirs.end(), [&](const TermSpec& each) {
-      // Gains do not live in the state, so a term with new gains keeps its past.
-      return each.kind == ours.kind && each.subject == ours.subject && each.shared == ours.shared &&
-             same_states(each.bank, ours.bank);
-    });
-    plan.push_back(same == theirs.end() ? -1 : static_cast<int>(same - theirs.begin()));
+    const auto same = known.find(&ours);
+    plan.push_back(same == known.end() ? -1 : same->second);
   }
   return plan;
 }

@@ -1,8 +1,11 @@
 #include "daemon/history/format/database.hpp"
 
 #include <cstring>
+#include <stdexcept>
 
 #include <system_error>
+
+#include "config/text/regular_file.hpp"
 
 namespace thermocomp {
 namespace {
@@ -43,6 +46,19 @@ std::filesystem::path followed(const std::filesystem::path& file) {
   return real;
 }
 
+/// SQLite opens what stands there, and opening a pipe waits for its other end.
+/// @throws DatabaseError
+void refuse_what_waits(const std::filesystem::path& real) {
+  for (const char* part : {"", "-journal", "-wal", "-shm"}) {
+    const std::string file = real.string() + part;
+    try {
+      require_regular_or_missing(file);
+    } catch (const std::runtime_error& error) {
+      throw DatabaseError(SQLITE_CANTOPEN, file + ": " + error.what());
+    }
+  }
+}
+
 bool can_read(sqlite3* handle) {
   return sqlite3_exec(handle, "SELECT count(*) FROM sqlite_master", nullptr, nullptr, nullptr) ==
          SQLITE_OK;
@@ -53,6 +69,7 @@ bool can_read(sqlite3* handle) {
 Database::Database(const std::filesystem::path& file, DatabaseMode mode) : file_(file) {
   const bool read_only = mode == DatabaseMode::read_only;
   const std::filesystem::path real = followed(file);
+  refuse_what_waits(real);
   const int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI |
                     (read_only ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   int code = sqlite3_open_v2(real.c_str(), &handle_, flags, nullptr);

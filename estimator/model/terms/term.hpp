@@ -74,8 +74,17 @@ struct TermRegistration {
 
 [[nodiscard]] const std::vector<TermRegistration>& term_registrations();
 
+/// The columns of a model. Made once for all of its terms, since each has a share in them.
+struct ModelColumns {
+  explicit ModelColumns(const ThermalModel& model)
+      : temperatures(model.temperature_columns()), signals(model.signal_columns()) {}
+  std::vector<std::string> temperatures;
+  std::vector<std::string> signals;
+};
+
 /// @throws InvalidValue when the specification does not fit the model
-[[nodiscard]] std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model);
+[[nodiscard]] std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model,
+                                              const ModelColumns& columns);
 
 /// Every kind: a file of this folder that defines NAME_registration(), and its line here.
 #define THERMOCOMP_TERMS(KIND) \

@@ -15,10 +15,10 @@ struct SubjectIndices {
 };
 
 /// @throws InvalidValue when the model has no such subject
-SubjectIndices subject_indices(const TermSpec& spec, TermSubject subject,
-                               const ThermalModel& model) {
-  const auto temperatures = model.temperature_columns();
-  const auto signals = model.signal_columns();
+SubjectIndices subject_indices(const TermSpec& spec, TermSubject subject, const ThermalModel& model,
+                               const ModelColumns& of_model) {
+  const std::vector<std::string>& temperatures = of_model.temperatures;
+  const std::vector<std::string>& signals = of_model.signals;
   const SubjectColumns columns = subject_columns(spec.subject);
   switch (subject) {
     case TermSubject::signal:
@@ -55,13 +55,12 @@ SubjectIndices subject_indices(const TermSpec& spec, TermSubject subject,
   return {index_of(temperatures, columns.first, subject_key, "must be a temperature")};
 }
 
-std::vector<std::size_t> bank_columns(const LagBankSpec& bank, const ThermalModel& model) {
-  const auto temperatures = model.temperature_columns();
-  const auto signals = model.signal_columns();
+std::vector<std::size_t> bank_columns(const LagBankSpec& bank, const ModelColumns& of_model) {
   std::vector<std::size_t> columns;
   for (const std::string& subject : bank.subjects)
-    columns.push_back(index_of(is_temperature_name(subject) ? temperatures : signals, subject,
-                               "term.subjects", "must be a temperature or an operating signal"));
+    columns.push_back(
+        index_of(is_temperature_name(subject) ? of_model.temperatures : of_model.signals, subject,
+                 "term.subjects", "must be a temperature or an operating signal"));
   return columns;
 }
 
@@ -119,7 +118,8 @@ const TermKind* find_term_kind(std::string_view name, std::string_view subject) 
   return best;
 }
 
-std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model) {
+std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model,
+                                const ModelColumns& columns) {
   const TermKind* kind = find_term_kind(spec.kind, spec.subject);
   if (kind == nullptr) throw InvalidValue("term.kind", spec.kind, "is not a known kind of term");
   const TermRegistration& registration =
@@ -143,9 +143,9 @@ std::unique_ptr<Term> make_term(const TermSpec& spec, const ThermalModel& model)
     }
     return values;
   };
-  const SubjectIndices subject = subject_indices(spec, kind->subject, model);
+  const SubjectIndices subject = subject_indices(spec, kind->subject, model, columns);
   return registration.make({spec, subject.first, subject.second, per_output, shared,
-                            bank_columns(spec.bank, model), bank_gains(spec.bank, model)});
+                            bank_columns(spec.bank, columns), bank_gains(spec.bank, model)});
 }
 
 }  // namespace thermocomp

@@ -39,6 +39,30 @@ class ServiceManager:
         self.socket.close()
 
 
+class Metronome:
+    """How late this computer is: a thread that wants to wake every 20 ms."""
+
+    PERIOD_S = 0.02
+
+    def __init__(self):
+        self.beats = [time.monotonic()]
+        self.running = True
+        threading.Thread(target=self.beat, daemon=True).start()
+
+    def beat(self):
+        while self.running:
+            time.sleep(self.PERIOD_S)
+            self.beats.append(time.monotonic())
+
+    def latest_s(self, begin, end):
+        beats = [at for at in list(self.beats) if begin - 1.0 < at < end]
+        return max((later - earlier - self.PERIOD_S for earlier, later in zip(beats, beats[1:])),
+                   default=0.0)
+
+    def close(self):
+        self.running = False
+
+
 def largest_gap_s(times, begin, end):
     times = [begin] + [at for at in times if begin < at < end] + [end]
     return max(later - earlier for earlier, later in zip(times, times[1:]))

@@ -1,6 +1,9 @@
 // What an operator is told, beside what is on disk at that moment.
 #include "daemon/operations.hpp"
 
+#include <optional>
+#include <thread>
+
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
@@ -52,7 +55,13 @@ struct Desk {
     const RpcPending pending = operations.command({kind, 0, 0.0});
     CHECK_FALSE(pending());
     step();
-    return pending().value();
+    return answer(pending);
+  }
+  /// Once what it changed is on disk.
+  static nlohmann::json answer(const RpcPending& pending) {
+    std::optional<nlohmann::json> found;
+    while (!(found = pending())) std::this_thread::sleep_for(1ms);
+    return *found;
   }
 
   TempFolder folder;
@@ -95,7 +104,7 @@ TEST_CASE("while the reference is lost nothing is switched on before one is take
 
 TEST_CASE("a reload that cannot be read leaves everything as it is", "[daemon]") {
   Desk desk;
-  CHECK_THROWS(desk.operations.reload());
+  CHECK_THROWS_AS(Desk::answer(desk.operations.reload()), ConfigurationError);
   desk.operations.hang_up();  // the same, for the log
   CHECK_FALSE(desk.operations.is_busy());
   CHECK(desk.give(CommandKind::disable) == nlohmann::json{{"done", true}});
@@ -106,12 +115,14 @@ TEST_CASE("nobody has to ask for what was commanded to be saved", "[daemon]") {
   static_cast<void>(desk.operations.command({CommandKind::disable, 0, 0.0}));
   desk.step();
   desk.operations.poll();
+  REQUIRE(desk.keeper.wait(20s));
   CHECK_FALSE(desk.on_disk().state.enabled);
 }
 
 TEST_CASE("when and by whom the reference was taken is on disk with it", "[daemon]") {
   Desk desk;
   desk.operations.save_state(false);
+  REQUIRE(desk.keeper.wait(20s));
   const ReferenceRecord first = desk.on_disk().reference;
   CHECK(first.origin == ReferenceOrigin::first_values);
   CHECK(first.is_known());
@@ -121,5 +132,6 @@ TEST_CASE("when and by whom the reference was taken is on disk with it", "[daemo
   CHECK(second.origin == ReferenceOrigin::command);
   CHECK(second.wall_s >= first.wall_s);
   desk.operations.save_state(true);
+  REQUIRE(desk.keeper.wait(20s));
   CHECK(desk.on_disk().reference.wall_s == second.wall_s);
 }
