@@ -64,6 +64,12 @@ std::vector<std::string> controller_names(const ControllerConfig& config, bool d
   return std::visit(Names{}, config);
 }
 
+std::string controller_identity(const ControllerConfig& config) {
+  if (const auto* bridge = std::get_if<BridgeControllerConfig>(&config))
+    return "bridge " + bridge->name;
+  return fmt::format("{}", fmt::join(controller_names(config), ", "));
+}
+
 std::vector<NameLock> lock_controller(const ControllerConfig& config, bool dry_run) {
   std::vector<NameLock> locks;
   for (const std::string& name : controller_names(config, dry_run)) locks.emplace_back(name);

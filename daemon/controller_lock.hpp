@@ -18,6 +18,9 @@ namespace thermocomp {
 [[nodiscard]] std::vector<std::string> controller_names(const ControllerConfig& config,
                                                         bool dry_run = false);
 
+/// The controller as the state file and the last-sent record name it.
+[[nodiscard]] std::string controller_identity(const ControllerConfig& config);
+
 /// @throws LockHeld, LockImpossible
 [[nodiscard]] std::vector<NameLock> lock_controller(const ControllerConfig& config,
                                                     bool dry_run = false);

@@ -82,14 +82,27 @@ struct Locks {
     try {
       state.emplace(config.state_file);
     } catch (const LockImpossible& problem) {
-      warning = "state file: " + std::string(problem.what());
+      warnings.push_back("state file: " + std::string(problem.what()));
     }
   }
   std::vector<NameLock> controller;
   std::optional<FileLock> state;
-  std::string
-      warning;  ///< not empty: the state file's folder takes no file, so nobody else's either
+  std::vector<std::string> warnings;  ///< the state file's folder takes no file, nobody else's either
 };
+
+/// Beside the status socket. A dry run sends nothing, and leaves the record of who did.
+std::unique_ptr<LastSent> open_last_sent(const DaemonConfig& config,
+                                         std::vector<std::string>& warnings) {
+  if (config.dry_run) return nullptr;
+  try {
+    return std::make_unique<LastSent>(config.socket.path.string() + ".sent",
+                                      controller_identity(config.controller),
+                                      config.estimator.axes);
+  } catch (const std::runtime_error& problem) {
+    warnings.emplace_back(problem.what());
+    return nullptr;
+  }
+}
 
 }  // namespace
 
@@ -103,6 +116,7 @@ struct Daemon::Parts {
   DaemonConfig config;
   StatusServer server;
   Locks locks;
+  std::unique_ptr<LastSent> last_sent;
   StartState start_state;
   StateKeeper keeper;
   std::vector<std::unique_ptr<SensorSource>> sources;
@@ -126,16 +140,18 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
     : config(load(config_file)),
       server(config.socket),
       locks(config),
-      start_state(find_start_state(config)),
+      last_sent(open_last_sent(config, locks.warnings)),
+      start_state(find_start_state(config, last_sent ? last_sent->before() : Offsets{})),
       keeper(config.state_file, start_state.state, start_state.is_on_disk,
              start_state.reference_lost, start_state.reference),
       sources(make_sources(config)),
       link(make_controller(config.controller, config.dry_run)),
       grid(make_grid(config.loop)),
       history(make_history(config.history, grid)),
-      cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain()),
+      cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain(),
+            last_sent.get()),
       operations({config, cycle, keeper, service, history.get(),
-                  [this] { return status_line(supervisor.view()); }, start_state.state.offset_um,
+                  [this] { return status_line(supervisor.view()); },
                   &journal, [this] { return server.caller(); }, start_state.state.reference_degC}),
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal, locks.controller}) {
@@ -143,7 +159,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
   // A kill right now must not make this a first start.
   keeper.save(start_state.state, std::chrono::steady_clock::now());
   static_cast<void>(keeper.wait(StateKeeper::disk_answers_within));
-  if (!locks.warning.empty()) supervisor.add_warning(locks.warning);
+  for (const std::string& warning : locks.warnings) supervisor.add_warning(warning);
   for (const std::string& warning : start_state.warnings) supervisor.add_warning(warning);
   add_operator_methods(server, actions());
 }

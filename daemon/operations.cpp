@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
+#include "daemon/controller_lock.hpp"
 #include "daemon/system/log_setup.hpp"
 
 namespace thermocomp {
@@ -211,6 +212,7 @@ void Operations::end_reload() {
 void Operations::poll() {
   cycle_.poll(Clock::now());
   parts_.keeper.poll(Clock::now());
+  tell_saved(false);
   finish_loading();
   finish_reload();
 }
@@ -247,7 +249,8 @@ void Operations::finish_reload() {
 }
 
 void Operations::carried_out(const Command& done) {
-  if (done.kind == CommandKind::stop) return;  // not an operator's
+  if (done.kind == CommandKind::stop || done.kind == CommandKind::saved)
+    return;  // not an operator's
   Event event = command_event(to_string(done.kind), take_asking(done));
   if (names_axis(done.kind))
     event.subject = {SubjectKind::axis, parts_.config.estimator.axes[done.axis].name};
@@ -295,14 +298,40 @@ std::int64_t Operations::take_asking(const Command& done) {
 void Operations::save_state(bool at_once) {
   PersistentState state = cycle_.estimator().persistent_state(cycle_.report());
   note_reference(state, ReferenceOrigin::first_values);
-  if (parts_.config.dry_run) state.offset_um = parts_.sent_before_um;
+  state.controller = controller_identity(parts_.config.controller);
+  if (parts_.config.dry_run) {
+    // It sends nothing: what was sent before stays.
+    const PersistentState& before = parts_.keeper.on_disk().state;
+    state.offset_um = before.offset_um;
+    state.corridor_um = before.corridor_um;
+    state.sign = before.sign;
+    state.controller = before.controller;
+  }
   if (at_once)
     parts_.keeper.save(state, Clock::now());
   else
     parts_.keeper.note(state, Clock::now());
+  tell_saved(!at_once);
   const std::string& error = parts_.keeper.error();
   if (!error.empty() && error != save_error_told_) spdlog::error("{}", error);
   save_error_told_ = error;
+}
+
+/// What is on disk, where that is new.
+/// @param again  also where an axis waits and nothing is on its way to the disk: then no other state
+///               than this can be there
+void Operations::tell_saved(bool again) {
+  const std::vector<AxisReport>& axes = cycle_.report().axes;
+  const bool is_waited_for =
+      again && !parts_.keeper.is_busy() && parts_.keeper.error().empty() &&
+      std::any_of(axes.begin(), axes.end(), [](const AxisReport& axis) { return axis.waits_for_disk; });
+  const SavedState& on_disk = parts_.keeper.on_disk();
+  if (on_disk.serial == told_serial_ && !is_waited_for) return;
+  if (cycle_.replacing() || (saved_told_ && *saved_told_ == Outcome::waiting)) return;
+  told_serial_ = on_disk.serial;
+  if (parts_.config.dry_run) return;
+  for (const Command& saved : saved_commands(parts_.config.estimator, on_disk.state))
+    saved_told_ = cycle_.send(saved, Clock::now());
 }
 
 }  // namespace thermocomp

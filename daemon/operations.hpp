@@ -36,8 +36,6 @@ class Operations {
     ServiceManager& service;
     HistoryWriter* history;                    ///< none: no history
     std::function<std::string()> status_line;  ///< for the service manager
-    /// By axis, when the daemon started: what a dry run keeps, since it sends nothing.
-    std::map<std::string, double> sent_before_um{};
     EventJournal* journal{nullptr};               ///< none: nothing is noted
     std::function<std::int64_t()> asking_user{};  ///< of the request in hand; -1: nobody known
     /// By column, when the daemon started: what differs from it was taken since.
@@ -97,6 +95,7 @@ class Operations {
   void finish_reload();
   void end_reload();
   void carried_out(const Command& done);
+  void tell_saved(bool again);
   void note_reference(const PersistentState& state, ReferenceOrigin origin);
   void note_asked(const Command& asked, const CycleHandle::Tracked& outcome);
   [[nodiscard]] std::int64_t take_asking(const Command& done);
@@ -114,6 +113,8 @@ class Operations {
   std::optional<Reload> reload_;
   bool reload_again_{false};
   std::string save_error_told_;
+  std::uint64_t told_serial_{0};  ///< of the state that the estimator knows to be on disk
+  CycleHandle::Tracked saved_told_;
   std::vector<Asked> asked_;  ///< commands on their way, in order
 };
 

@@ -1,5 +1,9 @@
 #include "daemon/start_state.hpp"
 
+#include <cmath>
+#include <fmt/format.h>
+
+#include "daemon/controller_lock.hpp"
 #include "daemon/history/replay/last_state.hpp"
 #include "daemon/state/state_file.hpp"
 #include "estimator/temperature_range.hpp"
@@ -41,6 +45,37 @@ void refuse_impossible(const DaemonConfig& config, StartState& start) {
   start.is_on_disk = false;
 }
 
+/// Takes out what cannot have been sent with this configuration.
+void refuse_beyond_bound(const DaemonConfig& config, const std::string& source, Offsets& offset_um,
+                         std::vector<std::string>& warnings) {
+  for (const AxisConfig& axis : config.estimator.axes) {
+    const auto found = offset_um.find(axis.name);
+    const double bound_um = axis.limiter.offset_um_max;
+    // Negated, so that NaN is out too.
+    if (found == offset_um.end() || std::abs(found->second) <= bound_um) continue;
+    warnings.push_back(fmt::format("{}: offset_um.{} = {:g} is beyond this configuration's "
+                                   "offset_um_max = {:g} and is not taken",
+                                   source, axis.name, found->second, bound_um));
+    offset_um.erase(found);
+  }
+}
+
+void refuse_impossible_offsets(const DaemonConfig& config, StartState& start) {
+  PersistentState& state = start.state;
+  const std::string file = "state file " + config.state_file.string();
+  refuse_beyond_bound(config, file, state.offset_um, start.warnings);
+  refuse_beyond_bound(config, "last-sent record", state.recorded_um, start.warnings);
+  for (const AxisConfig& axis : config.estimator.axes) {
+    const auto sign = state.sign.find(axis.name);
+    const bool same = state.controller == controller_identity(config.controller) &&
+                      sign != state.sign.end() && sign->second == axis.sign;
+    if (same || state.corridor_um.erase(axis.name) == 0) continue;
+    start.warnings.push_back(file + ": the offset of axis " + axis.name +
+                             " was sent to another controller or with another sign, and is not "
+                             "taken for what was sent last");
+  }
+}
+
 StartState find(const DaemonConfig& config) {
   StartState start;
   PersistentState first;
@@ -70,9 +105,11 @@ StartState find(const DaemonConfig& config) {
 
 }  // namespace
 
-StartState find_start_state(const DaemonConfig& config) {
+StartState find_start_state(const DaemonConfig& config, Offsets recorded) {
   StartState start = find(config);
   refuse_impossible(config, start);
+  start.state.recorded_um = std::move(recorded);
+  refuse_impossible_offsets(config, start);
   return start;
 }
 

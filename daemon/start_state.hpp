@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "config/daemon/daemon_config.hpp"
+#include "daemon/state/last_sent.hpp"
 #include "daemon/state/reference_record.hpp"
 #include "estimator/pipeline/persistent_state.hpp"
 
@@ -25,6 +26,10 @@ struct StartState {
 ///                                 since is not known
 ///   none sound                    disabled, reference lost
 /// A state file that is unusable is moved aside. May take some seconds (last_state.hpp).
-[[nodiscard]] StartState find_start_state(const DaemonConfig& config);
+///
+/// Offsets beyond this configuration's bounds are left out, with a warning; so are those that were
+/// sent to another controller or with another sign, where an axis would have to start from them.
+/// @param recorded  of the last-sent record
+[[nodiscard]] StartState find_start_state(const DaemonConfig& config, Offsets recorded = {});
 
 }  // namespace thermocomp

@@ -184,6 +184,11 @@ StatusView Supervisor::view() {
         "the machine's reference is lost, compensation stays off: when the machine is cold and "
         "even, give `thermocomp reference`, then `thermocomp enable`");
   if (!parts_.keeper.error().empty()) all.push_back(parts_.keeper.error());
+  const std::vector<AxisReport>& axes = cycle().report().axes;
+  for (std::size_t i = 0; i < axes.size() && !parts_.keeper.error().empty(); ++i)
+    if (axes[i].waits_for_disk)
+      all.push_back("axis " + parts_.config.estimator.axes[i].name +
+                    " waits for the state file, by which alone a restart would know its offset");
   if (const LogStatistics log = log_statistics(); log.stands)
     all.push_back(fmt::format("nobody takes the log: {} lines are lost", log.dropped));
   const HistoryStatistics statistics =

@@ -50,6 +50,8 @@ void CompensationConfig::validate() const {
   require(mismatch_um > 0 && mismatch_um <= 500, "mismatch_um", mismatch_um, "must be in (0, 500]");
   require(mismatch_after_s > 0 && mismatch_after_s <= 3600, "mismatch_after_s", mismatch_after_s,
           "must be in (0, 3600]");
+  require(restart_leap_um_max > 0 && restart_leap_um_max <= 500, "restart_leap_um_max",
+          restart_leap_um_max, "must be in (0, 500]");
   require(offset_sd_um_max > 0 && offset_sd_um_max <= 500, "offset_sd_um_max", offset_sd_um_max,
           "must be in (0, 500]");
   require(suspected_sensors != SuspectedPolicy::weigh_down || estimate_lost_blocks,

@@ -130,6 +130,9 @@ struct CompensationConfig {
   double controller_stale_after_s{2.0};
   double mismatch_um{2.0};       ///< applied and sent may differ by this much
   double mismatch_after_s{3.0};  ///< ... by more, for no longer than this
+  /// Without read-back and readable registers: how far the first offset after a power cut may lie
+  /// from the one sent last [um], and so how far the offset goes from the one that is saved.
+  double restart_leap_um_max{1.0};
   /// A block without a good sensor is estimated where the model has a covariance.
   bool estimate_lost_blocks{true};
   double offset_sd_um_max{5.0};  ///< of any axis; beyond, an estimate does not serve: hold

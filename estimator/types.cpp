@@ -60,6 +60,26 @@ std::string_view to_string(CommandKind kind) noexcept {
       return "release";
     case CommandKind::accept:
       return "accept";
+    case CommandKind::saved:
+      return "saved";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(StartEvidence evidence) noexcept {
+  switch (evidence) {
+    case StartEvidence::unknown:
+      return "unknown";
+    case StartEvidence::read_back:
+      return "read_back";
+    case StartEvidence::registers:
+      return "registers";
+    case StartEvidence::record:
+      return "record";
+    case StartEvidence::corridor:
+      return "corridor";
+    case StartEvidence::released:
+      return "released";
   }
   return "unknown";
 }

@@ -90,7 +90,8 @@ struct OffsetCommand {
 
 /// What an operator (or the CNC program) asks of the estimator, or the daemon that is about to end
 /// (`stop`: offsets to zero and nowhere else; the operator's switch stays as it is). `release` ends
-/// a latched mismatch of an axis; `accept` confirms the unconfirmed reading of a sensor.
+/// a latched mismatch of an axis, or an unknown start; `accept` confirms the unconfirmed reading of
+/// a sensor; `saved`: a state with this offset of the axis is on disk.
 enum class CommandKind : std::uint8_t {
   enable,
   disable,
@@ -100,16 +101,29 @@ enum class CommandKind : std::uint8_t {
   prove,
   stop,
   release,
-  accept
+  accept,
+  saved
 };
-inline constexpr std::size_t command_kinds_count = 9;
+inline constexpr std::size_t command_kinds_count = 10;
 [[nodiscard]] std::string_view to_string(CommandKind kind) noexcept;
 
 struct Command {
   CommandKind kind{CommandKind::enable};
   std::uint32_t axis{
-      0};  ///< `measured`, `prove`, `release`: index of the axis; `accept`: of the sensor
-  double value_um{0.0};  ///< for `measured` and `prove` [um]
+      0};  ///< `measured`, `prove`, `release`, `saved`: index of the axis; `accept`: of the sensor
+  double value_um{0.0};  ///< for `measured`, `prove` and `saved` [um]
 };
+
+/// What an axis' first offset on a link was known by, the best evidence first.
+enum class StartEvidence : std::uint8_t {
+  unknown,    ///< nothing; the axis is not driven
+  read_back,  ///< the controller shows what it applies
+  registers,  ///< the registers that are written were read when the link began
+  record,     ///< the last-sent record of the process before
+  corridor,   ///< the state file, which the offset sent stays beside
+  released    ///< an operator has set the offset to zero at the controller
+};
+/// As it stands in JSON.
+[[nodiscard]] std::string_view to_string(StartEvidence evidence) noexcept;
 
 }  // namespace thermocomp

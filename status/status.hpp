@@ -93,7 +93,7 @@ struct AxisStatus {
   double offset_sd{not_a_number};  ///< standard deviation from estimated blocks
   double offset_sd_max{not_a_number};
   /// Where the offset sent last is known from: "read_back", "registers", "record", "corridor",
-  /// "unknown".
+  /// "released" (an operator has set it to zero), "unknown".
   std::string start{"unknown"};
   std::optional<std::string> axis{};  ///< of a node of a travel: the axis' own name
   std::optional<double> at_mm{};      ///< ... and the node's position

@@ -38,6 +38,7 @@ class MeasuredMachine {
     controller_.online = true;
     controller_.written = controller_.online;
     controller_.link_epoch = 1;
+    controller_.applied_um.fill(0.0);
   }
   /// @param temps_degC  one an input; NaN: no answer  @param lost  inputs whose circuit is open
   void step(double time_s, const std::vector<double>& temps_degC,

@@ -39,10 +39,11 @@ bool sleep_until(nanoseconds wake) noexcept {
 }  // namespace
 
 Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
-             std::size_t sensors, std::unique_ptr<CycleBrain> brain)
+             std::size_t sensors, std::unique_ptr<CycleBrain> brain, LastSent* last_sent)
     : grid_(grid),
       sources_(std::move(sources)),
       link_(link),
+      last_sent_(last_sent),
       brain_(std::move(brain)),
       observed_(brain_.get()),
       readings_(sensors) {
@@ -90,6 +91,8 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   link_.newest(controller_);
   // The grid's time, not the clock's: the same steps can be taken again from the history.
   brain.estimator.step(grid_.time_of(cycle), readings_, controller_, offsets_);
+  // Before it can be sent, so that what was sent is never farther than what is recorded.
+  if (last_sent_ != nullptr) last_sent_->note(offsets_, brain.estimator.forgotten_axes());
   link_.offer(offsets_);
   if (brain.recorder)
     brain.recorder->record(cycle, readings_, controller_, offsets_, brain.estimator);

@@ -12,6 +12,7 @@
 #include "daemon/cycle/duration_histogram.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/grid.hpp"
+#include "daemon/state/last_sent.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "drivers/wait_free_slot.hpp"
@@ -41,10 +42,11 @@ struct CycleTiming {
 /// call but the sleep and the clock.
 class Cycle {
  public:
-  /// @param sources, link  outlive the cycle
-  /// @param sensors        number of configured sensors
+  /// @param sources, link, last_sent  outlive the cycle
+  /// @param sensors    number of configured sensors
+  /// @param last_sent  none: what is sent is not recorded
   Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
-        std::size_t sensors, std::unique_ptr<CycleBrain> brain);
+        std::size_t sensors, std::unique_ptr<CycleBrain> brain, LastSent* last_sent = nullptr);
 
   /// Until stop(); the first cycle is the grid's newest.
   void run() noexcept;
@@ -99,6 +101,7 @@ class Cycle {
   Grid grid_;
   std::vector<SensorSource*> sources_;
   ControllerLink& link_;
+  LastSent* last_sent_;
   std::unique_ptr<CycleBrain> brain_;  ///< the cycle's
   CycleBrain* retiring_{nullptr};      ///< the cycle's: to be given back after this step
   CycleBrain* observed_;               ///< main's: whose reports it reads

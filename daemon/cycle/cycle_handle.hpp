@@ -87,7 +87,7 @@ class CycleHandle {
 /// Whether Command::axis is the index of an axis.
 [[nodiscard]] constexpr bool names_axis(CommandKind kind) noexcept {
   return kind == CommandKind::measured || kind == CommandKind::prove ||
-         kind == CommandKind::release;
+         kind == CommandKind::release || kind == CommandKind::saved;
 }
 /// Whether it is an index of the running configuration, and means another thing in the next one.
 [[nodiscard]] constexpr bool has_index(CommandKind kind) noexcept {

@@ -192,8 +192,9 @@ RpcPending prove(const DeskActions& actions, const json& params) {
 RpcPending release(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::release, axis_index(view, params), 0.0};
-  refuse_unless(any_node(view, command.axis, &AxisReport::latched),
-                "the axis has no latched mismatch");
+  refuse_unless(any_node(view, command.axis, &AxisReport::latched) ||
+                    any_node(view, command.axis, &AxisReport::start_unknown),
+                "the axis has no latched mismatch and no unknown start");
   return actions.command(command);
 }
 

@@ -73,6 +73,9 @@ std::string to_text(const PersistentState& state, bool reference_lost,
   file["model_reference_degC"] = numbers(state.model_reference_degC);
   file["reference_signals"] = numbers(state.reference_signals);
   file["offset_um"] = numbers(state.offset_um);
+  file["sign"] = numbers(state.sign);
+  file["controller"] = state.controller;
+  file["corridor_um"] = numbers(state.corridor_um);
   file["temp_degC"] = numbers(state.temp_degC);
   if (!state.jumped_from_degC.empty()) file["jumped_from_degC"] = numbers(state.jumped_from_degC);
   file["held_degC"] = numbers(state.held_degC);
@@ -103,6 +106,9 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   state.reference_signals = numbers(file, "reference_signals");
   state.offset_um = numbers(file, "offset_um");
   // Files of earlier versions have none.
+  if (file.contains("sign")) state.sign = numbers(file, "sign");
+  state.controller = file.value("controller", "");
+  if (file.contains("corridor_um")) state.corridor_um = numbers(file, "corridor_um");
   if (file.contains("temp_degC")) state.temp_degC = numbers(file, "temp_degC");
   if (file.contains("jumped_from_degC")) state.jumped_from_degC = numbers(file, "jumped_from_degC");
   if (file.contains("held_degC")) state.held_degC = numbers(file, "held_degC");

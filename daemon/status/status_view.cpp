@@ -68,7 +68,8 @@ AxisStatus axis_of(const StatusView& view, const AxisConfig& config, const AxisR
                   .at_bound = report.at_bound,
                   .proving = report.proving,
                   .offset_sd = report.offset_sd_um,
-                  .offset_sd_max = view.config.estimator.compensation.offset_sd_um_max};
+                  .offset_sd_max = view.config.estimator.compensation.offset_sd_um_max,
+                  .start = std::string(to_string(report.start))};
   if (report.latched) {
     const Mismatch& latched = report.latched_mismatch;
     axis.latched = {latched.sent_um, latched.read_um, likely_text(latched), report.releasing};

@@ -61,6 +61,8 @@ class WriteGate {
   /// The same of a link that is still the same one: what was sent still counts.
   void paused() noexcept { in_sync_ = false; }
   [[nodiscard]] bool in_sync() const noexcept { return in_sync_; }
+  /// Whether synchronised() will begin another link.
+  [[nodiscard]] bool link_is_new() const noexcept { return link_is_new_; }
   /// The newest epoch; 0: never synchronised.
   [[nodiscard]] std::uint32_t epoch() const noexcept { return epoch_; }
   /// Counts synchronised() and explains(): the number of what was read back last.

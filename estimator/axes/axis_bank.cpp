@@ -27,6 +27,7 @@ void AxisBank::step(const StepTime& time, const Targets& targets, const Signals&
   input.may_change = targets.may_change;
   input.link_epoch = controller.link_epoch;
   input.online = signals.online;
+  input.written = controller.written;
   input.taken_at = controller.taken_at;
   command.link_epoch = controller.link_epoch;
   command.look = controller.look;
@@ -54,8 +55,19 @@ bool AxisBank::driven(const AxisSpan& span) const noexcept {
 }
 
 bool AxisBank::synced() const noexcept {
-  return std::all_of(axes_.begin(), axes_.end(),
-                     [](const AxisChannel& axis) { return axis.synced(); });
+  bool any_known = axes_.empty();
+  for (const AxisChannel& axis : axes_) {
+    if (!axis.synced()) return false;
+    any_known = any_known || !axis.start_unknown();
+  }
+  return any_known;
+}
+
+std::uint32_t AxisBank::forgotten() const noexcept {
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; i < axes_.size(); ++i)
+    if (axes_[i].forgotten()) bits |= 1u << i;
+  return bits;
 }
 
 double AxisBank::compensated_um(std::size_t axis) const noexcept {

@@ -1,6 +1,7 @@
 /// All axes from their targets to the command.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -29,7 +30,10 @@ class AxisBank {
   [[nodiscard]] const AxisChannel& operator[](std::size_t axis) const noexcept {
     return axes_[axis];
   }
-  [[nodiscard]] bool synced() const noexcept;  ///< every axis is
+  /// Every axis is, and of at least one it is known what was sent last.
+  [[nodiscard]] bool synced() const noexcept;
+  /// By bits, one an axis: what was sent last is forgotten.
+  [[nodiscard]] std::uint32_t forgotten() const noexcept;
   /// Whether the offset may be sent: the axis is driven, with all nodes of its travel.
   [[nodiscard]] bool driven(std::size_t axis) const noexcept { return driven(span_of_[axis]); }
   /// The entries that are one axis with this one.
@@ -44,8 +48,12 @@ class AxisBank {
   void release(std::size_t axis) noexcept;
   void end_proves() noexcept;
 
+  void saved(std::size_t axis, double offset_um) noexcept { axes_[axis].saved(offset_um); }
+
   /// Before the first step: what was sent last before the restart.
-  void restore(std::size_t axis, double offset_um) noexcept { axes_[axis].restore(offset_um); }
+  void restore(std::size_t axis, const SentBefore& before) noexcept {
+    axes_[axis].restore(before);
+  }
   /// @param axes  from plan_names()
   void adopt(const AxisBank& previous, const std::vector<int>& axes) noexcept;
   void visit_state(StateArchive& archive);

@@ -39,15 +39,17 @@ AxisChannel::AxisChannel(const AxisConfig& config, const CompensationConfig& com
       reads_back_(reads_back),
       mismatch_after_(from_seconds(compensation.mismatch_after_s)),
       prove_um_max_(compensation.prove_um_max),
-      prove_hold_(from_seconds(compensation.prove_hold_s)) {
+      prove_hold_(from_seconds(compensation.prove_hold_s)),
+      corridor_um_(compensation.restart_leap_um_max) {
   state_.trusted_um = config.limiter.offset_um_max;
 }
 
 void AxisChannel::observe(const AxisInput& input) noexcept {
   if (input.link_epoch != state_.epoch) take_epoch(input.link_epoch);
+  const nanoseconds seen_before = state_.seen_at;
   if (input.online) note_read_back(input);
   if (!state_.synced)
-    synchronise(input);
+    synchronise(input, input.taken_at - seen_before);
   else if (input.online && reads_back_)
     compare(input);
 }
@@ -62,8 +64,33 @@ void AxisChannel::move(const AxisInput& input) noexcept {
   state_.driven_at = input.now;
   state_.target_um = input.target_um;
   if (proving()) state_.target_um = prove_target_um(input.now);
-  if (input.may_change && state_.stands_for == 0) limiter_.step(state_.target_um, input.dt_s);
+  // Without a read-back to start from again, nothing moves that is not known to reach the controller:
+  // what is sent first on a link is what was sent last.
+  const bool reaches = (input.online && input.written) || reads_back_;
+  if (input.may_change && state_.stands_for == 0 && reaches)
+    limiter_.step(in_corridor() ? within_corridor(state_.target_um) : state_.target_um, input.dt_s);
+  if (in_corridor()) widen_corridor();
   check_.sent(input.now, limiter_.offset_um());
+}
+
+double AxisChannel::within_corridor(double target_um) noexcept {
+  const double low_um = std::min({start_.saved_um, start_.low_um[0], start_.low_um[1]});
+  const double high_um = std::max({start_.saved_um, start_.high_um[0], start_.high_um[1]});
+  start_.held = target_um < high_um - corridor_um_ || target_um > low_um + corridor_um_;
+  // NaN, to stay, stays so.
+  return std::clamp(target_um, high_um - corridor_um_, low_um + corridor_um_);
+}
+
+void AxisChannel::widen_corridor() noexcept {
+  start_.low_um[0] = std::min(start_.low_um[0], limiter_.offset_um());
+  start_.high_um[0] = std::max(start_.high_um[0], limiter_.offset_um());
+}
+
+/// No state with this offset has been on its way to the disk yet.
+void AxisChannel::begin_corridor(StartEvidence by) noexcept {
+  start_ = {by, false, true, not_a_number};
+  start_.low_um.fill(limiter_.offset_um());
+  start_.high_um.fill(limiter_.offset_um());
 }
 
 /// A pause of the same link changes nothing by itself: what is read back is compared as ever. But
@@ -78,23 +105,40 @@ void AxisChannel::take_epoch(std::uint32_t epoch) noexcept {
 }
 
 void AxisChannel::note_read_back(const AxisInput& input) noexcept {
-  state_.applied_um = input.applied_um;
+  if (reads_back_) state_.applied_um = input.applied_um;
   if (state_.stands_for > 0 && input.taken_at != state_.seen_at) --state_.stands_for;
   state_.seen_at = input.taken_at;
 }
 
-void AxisChannel::synchronise(const AxisInput& input) noexcept {
+void AxisChannel::synchronise(const AxisInput& input, nanoseconds away) noexcept {
   if (!input.online || state_.epoch == 0) return;
-  if (!reads_back_) {
-    // Nothing better is known than what was sent last.
-    start_from(input.now, limiter_.offset_um());
-    state_.synced = true;
-    return;
-  }
+  if (!reads_back_) return start_without_read_back(input, away);
   if (!std::isfinite(input.applied_um)) return;
   state_.synced = true;
   state_.starting = true;
+  start_.by = StartEvidence::read_back;
   compare(input);
+}
+
+void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds away) noexcept {
+  state_.synced = true;
+  const double register_um = input.applied_um;
+  if (!std::isfinite(register_um)) {
+    if (!start_.no_registers) begin_corridor(start_.by);
+    // Whether it restarted, and what it applies since, cannot be told any more.
+    if (state_.driven_once && away > lag_max) start_.by = StartEvidence::unknown;
+    start_.unknown = start_.by == StartEvidence::unknown;
+    return start_from(input.now, limiter_.offset_um());
+  }
+  start_.no_registers = false;
+  const bool agrees = start_.by == StartEvidence::unknown ||
+                      (state_.driven_once ? check_.agrees_after_absence(register_um)
+                                          : check_.agrees(register_um));
+  state_.out_of_bound = is_out_of_bound(register_um);
+  start_.unknown = !agrees || state_.out_of_bound;
+  if (start_.unknown) return;
+  start_.by = StartEvidence::registers;
+  start_from(input.now, std::clamp(register_um, -state_.trusted_um, state_.trusted_um));
 }
 
 void AxisChannel::compare(const AxisInput& input) noexcept {
@@ -172,11 +216,26 @@ void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept 
 }
 
 void AxisChannel::release() noexcept {
+  if (start_unknown()) {
+    const bool no_registers = start_.no_registers;
+    start_from(state_.seen_at, 0.0);
+    begin_corridor(StartEvidence::released);
+    start_.no_registers = no_registers;
+    state_.out_of_bound = false;
+    return;
+  }
   // Said again while read-backs are awaited it must not make them begin anew: with a slow link and
   // an impatient operator they would never be enough.
   if (!state_.latched || state_.releasing) return;
   state_.releasing = true;
   state_.released_um = not_a_number;
+}
+
+void AxisChannel::saved(double offset_um) noexcept {
+  if (!(std::abs(offset_um - limiter_.offset_um()) <= corridor_um_)) return;
+  start_.saved_um = offset_um;
+  start_.low_um = {limiter_.offset_um(), start_.low_um[0]};
+  start_.high_um = {limiter_.offset_um(), start_.high_um[0]};
 }
 
 void AxisChannel::check_release(const AxisInput& input) noexcept {
@@ -241,11 +300,21 @@ double AxisChannel::prove_target_um(nanoseconds now) noexcept {
   return state_.prove.from_um;
 }
 
-void AxisChannel::restore(double offset_um) noexcept {
-  // Beyond what any configuration allows it cannot be ours.
-  if (!(std::abs(offset_um) <= offset_um_max_of_any_axis)) return;
-  limiter_.start_from(offset_um);
-  state_.trusted_um = std::max(state_.trusted_um, std::abs(offset_um));
+void AxisChannel::restore(const SentBefore& before) noexcept {
+  const auto is_possible = [this](double um) { return std::abs(um) <= limiter_.bound_um(); };
+  const bool is_corridor = before.is_corridor && is_possible(before.saved_um);
+  StartEvidence by = StartEvidence::unknown;
+  if (is_possible(before.recorded_um)) {
+    by = StartEvidence::record;
+    start_from({}, before.recorded_um);
+  } else if (is_possible(before.saved_um)) {
+    if (is_corridor) by = StartEvidence::corridor;
+    start_from({}, before.saved_um);
+  }
+  if (reads_back_) return;
+  if (is_corridor) begin_corridor(by);
+  start_.by = by;
+  if (is_corridor) start_.saved_um = before.saved_um;
 }
 
 void AxisChannel::adopt(const AxisChannel& previous) noexcept {
@@ -253,6 +322,7 @@ void AxisChannel::adopt(const AxisChannel& previous) noexcept {
   check_.adopt(previous.check_);
   state_ = previous.state_;
   state_.trusted_um = std::max(limiter_.bound_um(), previous.state_.trusted_um);
+  start_ = previous.start_;
   state_.prove = {};  // an indicator waits for nothing that another configuration allowed
 }
 

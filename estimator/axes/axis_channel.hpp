@@ -1,6 +1,9 @@
 /// One axis from target to offset: limiter, agreement with the controller, proving move.
 #pragma once
 
+#include <array>
+#include <cmath>
+
 #include "estimator/axes/applied_check.hpp"
 #include "estimator/axes/limiter.hpp"
 #include "estimator/axes/mismatch.hpp"
@@ -18,8 +21,16 @@ struct AxisInput {
   bool may_change{true};  ///< false: surface-aware hold
   std::uint32_t link_epoch{0};
   bool online{false};  ///< the controller's values below are fresh
+  bool written{false};  ///< ControllerState::written
   double applied_um{not_a_number};
   nanoseconds taken_at{};  ///< when applied_um was read back
+};
+
+/// What is known of the offset that was sent before the first step; NaN: nothing.
+struct SentBefore {
+  double saved_um{not_a_number};     ///< by the state file
+  bool is_corridor{false};           ///< the offset sent had to stay beside it
+  double recorded_um{not_a_number};  ///< by the last-sent record
 };
 
 /// A read-back is evidence, not a command. The offset starts from it in three cases only: at the
@@ -29,6 +40,14 @@ struct AxisInput {
 ///
 /// A read-back that nothing sent lately explains pauses the axis; a second one, before sixteen good
 /// ones have followed, latches the mismatch: the axis is not driven until release().
+///
+/// Without read-back the offset goes on, on each new link, from the one sent last. It is known, in
+/// this order, by the registers as they stood when the link began (they come in place of the
+/// read-back), by what was sent until then, by the record, by the state file. Registers that
+/// contradict what else is known, and a link that was away for longer than a controller needs to
+/// restart and has no registers to read, make it unknown: the axis is not driven until release(),
+/// which starts from 0. While no registers can be read, the offset stays within restart_leap_um_max
+/// of every one that may be on disk, so that it waits where the disk does not follow.
 class AxisChannel {
  public:
   AxisChannel(const AxisConfig& config, const CompensationConfig& compensation, bool reads_back);
@@ -46,8 +65,10 @@ class AxisChannel {
   /// An operator says that what caused a latched mismatch is mended. The next read-backs decide:
   /// explained by the same factor, sign or constant that was latched, or no two of them alike, it
   /// stays latched; else the axis starts from what is read back, once it could have got there at
-  /// its slew rate from what was sent last.
+  /// its slew rate from what was sent last. Of an unknown start: the offset at the controller is 0.
   void release() noexcept;
+  /// A state with this offset is on disk. One from before a release means nothing any more.
+  void saved(double offset_um) noexcept;
 
   [[nodiscard]] double offset_um() const noexcept { return limiter_.offset_um(); }
   [[nodiscard]] double target_um() const noexcept { return state_.target_um; }
@@ -56,7 +77,25 @@ class AxisChannel {
   [[nodiscard]] bool synced() const noexcept { return state_.synced; }
   /// Whether the offset may be sent: synced, started, and nothing read back is unexplained.
   [[nodiscard]] bool driven() const noexcept {
-    return state_.synced && !state_.starting && !state_.in_doubt && !state_.latched;
+    return state_.synced && !state_.starting && !state_.in_doubt && !state_.latched &&
+           !start_.unknown && !(in_corridor() && std::isnan(start_.saved_um));
+  }
+  /// What the offset goes on from is not known.
+  [[nodiscard]] bool start_unknown() const noexcept { return state_.synced && start_.unknown; }
+  [[nodiscard]] StartEvidence start() const noexcept {
+    return start_.unknown ? StartEvidence::unknown : start_.by;
+  }
+  /// Nothing is known of what was sent last, whether or not a link is there.
+  [[nodiscard]] bool forgotten() const noexcept {
+    return !reads_back_ && start_.by == StartEvidence::unknown;
+  }
+  /// How far the offset goes from the one that is on disk; NaN: as far as it likes.
+  [[nodiscard]] double corridor_um() const noexcept {
+    return in_corridor() ? corridor_um_ : not_a_number;
+  }
+  /// It would go on if a newer state were on disk.
+  [[nodiscard]] bool waits_for_disk() const noexcept {
+    return in_corridor() && (start_.held || !std::isfinite(start_.saved_um));
   }
   [[nodiscard]] bool mismatch() const noexcept { return state_.mismatch; }
   [[nodiscard]] bool latched() const noexcept { return state_.latched; }
@@ -69,12 +108,12 @@ class AxisChannel {
   [[nodiscard]] bool at_bound() const noexcept { return limiter_.at_bound(); }
   [[nodiscard]] bool proving() const noexcept { return state_.prove.phase != ProvePhase::none; }
 
-  /// Before the first step: what was sent last before the restart.
-  void restore(double offset_um) noexcept;
+  /// Before the first step. What lies beyond the bound is not taken.
+  void restore(const SentBefore& before) noexcept;
   /// After a reload: goes on from the other's offset and agreement.
   void adopt(const AxisChannel& previous) noexcept;
 
-  void visit_state(StateArchive& archive) { archive(limiter_, check_, state_); }
+  void visit_state(StateArchive& archive) { archive(limiter_, check_, state_, start_); }
 
  private:
   enum class ProvePhase : std::uint8_t { none, out, wait, back };
@@ -121,10 +160,33 @@ class AxisChannel {
     }
   };
 
+  struct Start {
+    StartEvidence by{StartEvidence::unknown};  ///< what is known of the offset sent last
+    bool unknown{false};                       ///< on this link
+    bool no_registers{false};                  ///< on this link, so that only the disk remembers
+    double saved_um{not_a_number};             ///< in the newest state that is on disk
+    bool held{false};                          ///< by the corridor, in the last step
+    /// Where the offset has been since the last saved(), and between the two before: a state that
+    /// is on its way to the disk was taken then.
+    std::array<double, 2> low_um{};
+    std::array<double, 2> high_um{};
+    void visit_state(StateArchive& archive) {
+      auto& [a, b, c, d, e, f, g] = *this;
+      archive(a, b, c, d, e, f, g);
+    }
+  };
+
+  [[nodiscard]] bool in_corridor() const noexcept {
+    return start_.no_registers && !start_.unknown;
+  }
   void take_epoch(std::uint32_t epoch) noexcept;
   void note_read_back(const AxisInput& input) noexcept;
-  void synchronise(const AxisInput& input) noexcept;
+  void synchronise(const AxisInput& input, nanoseconds away) noexcept;
   void compare(const AxisInput& input) noexcept;
+  void start_without_read_back(const AxisInput& input, nanoseconds away) noexcept;
+  [[nodiscard]] double within_corridor(double target_um) noexcept;
+  void widen_corridor() noexcept;
+  void begin_corridor(StartEvidence by) noexcept;
   void start_on_link(const AxisInput& input, bool fresh) noexcept;
   void note_explained(const AxisInput& input, bool fresh) noexcept;
   void note_unexplained(const AxisInput& input, bool fresh) noexcept;
@@ -141,8 +203,10 @@ class AxisChannel {
   const nanoseconds mismatch_after_;
   const double prove_um_max_;
   const nanoseconds prove_hold_;
+  const double corridor_um_;
 
   State state_;
+  Start start_;
 };
 
 }  // namespace thermocomp

@@ -101,6 +101,9 @@ void Estimator::apply(const Command& command) noexcept {
     case CommandKind::release:
       if (has_axis) stages.axes.release(command.axis);
       return;
+    case CommandKind::saved:
+      if (has_axis) stages.axes.saved(command.axis, command.value_um);
+      return;
     case CommandKind::accept:
       if (command.axis < stages.config.sensors.size()) stages.sensing.accept(command.axis);
       return;
@@ -146,9 +149,12 @@ std::vector<std::string> Estimator::restore(const PersistentState& state) {
   stages.sensing.restore(state.temp_degC, state.jumped_from_degC);
   restore_held(stages, state);
   for (std::size_t i = 0; i < stages.axes.size(); ++i) {
-    double offset_um = 0.0;
-    take_if_finite(state.offset_um, stages.config.axes[i].name, offset_um);
-    stages.axes.restore(i, offset_um);
+    const std::string& name = stages.config.axes[i].name;
+    SentBefore before;
+    take_if_finite(state.offset_um, name, before.saved_um);
+    take_if_finite(state.recorded_um, name, before.recorded_um);
+    before.is_corridor = state.corridor_um.contains(name);
+    stages.axes.restore(i, before);
   }
   stages.learned.restore(state.correction);
   return refused;
@@ -160,6 +166,10 @@ void Estimator::plan_adoption(const Estimator& previous) {
 
 void Estimator::adopt(const Estimator& previous) noexcept {
   stages_->adopt(*previous.stages_);
+}
+
+std::uint32_t Estimator::forgotten_axes() const noexcept {
+  return stages_->axes.forgotten();
 }
 
 const EstimatorConfig& Estimator::config() const noexcept {

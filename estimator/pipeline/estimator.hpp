@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -32,6 +33,9 @@ class Estimator {
             OffsetCommand& command) noexcept;
   /// An operator's command, taken between two steps. Never throws, never allocates.
   void apply(const Command& command) noexcept;
+
+  /// By bits, one an axis: nothing is known of what was sent last. No allocation.
+  [[nodiscard]] std::uint32_t forgotten_axes() const noexcept;
 
   [[nodiscard]] Report make_report() const;  ///< allocates; sizes are then fixed
   void report(Report& out) const noexcept;   ///< no allocation

@@ -1,5 +1,6 @@
 #include "estimator/pipeline/persistent_state.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/checks.hpp"
@@ -24,8 +25,19 @@ void add_inputs(const std::vector<std::string>& columns, const Report& report,
 
 void add_axis(const std::string& name, const AxisReport& axis, PersistentState& state) {
   add(state.offset_um, name, axis.offset_um);
+  add(state.corridor_um, name, axis.corridor_um);
   for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
     state.correction[std::string(name).append(".").append(key)] = value;
+}
+
+bool nears_an_edge(const PersistentState& now, const PersistentState& saved) {
+  return std::any_of(now.corridor_um.begin(), now.corridor_um.end(), [&](const auto& corridor) {
+    const auto& [name, width_um] = corridor;
+    const auto before = saved.offset_um.find(name);
+    const auto offset = now.offset_um.find(name);
+    return before == saved.offset_um.end() || offset == now.offset_um.end() ||
+           std::abs(offset->second - before->second) >= 0.25 * width_um;
+  });
 }
 
 }  // namespace
@@ -53,8 +65,10 @@ PersistentState make_persistent_state(const EstimatorConfig& config, const Therm
   for (std::size_t i = 0; i < report.sensors.size(); ++i)
     add(state.jumped_from_degC, config.sensors[i].name, report.sensors[i].jumped_from_degC);
   THERMOCOMP_ENSURE(config.axes.size() == report.axes.size());
-  for (std::size_t i = 0; i < report.axes.size(); ++i)
+  for (std::size_t i = 0; i < report.axes.size(); ++i) {
+    state.sign[config.axes[i].name] = config.axes[i].sign;
     add_axis(config.axes[i].name, report.axes[i], state);
+  }
   return state;
 }
 
@@ -63,7 +77,19 @@ bool must_be_saved(const PersistentState& now, const PersistentState& saved) {
          now.model_reference_degC != saved.model_reference_degC ||
          now.jumped_from_degC != saved.jumped_from_degC ||
          now.reference_signals != saved.reference_signals || now.held_degC != saved.held_degC ||
-         now.held_signals != saved.held_signals || now.correction != saved.correction;
+         now.held_signals != saved.held_signals || now.correction != saved.correction ||
+         now.corridor_um != saved.corridor_um || nears_an_edge(now, saved);
+}
+
+std::vector<Command> saved_commands(const EstimatorConfig& config, const PersistentState& saved) {
+  std::vector<Command> commands;
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    const std::string& name = config.axes[i].name;
+    const auto offset = saved.offset_um.find(name);
+    if (saved.corridor_um.contains(name) && offset != saved.offset_um.end())
+      commands.push_back({CommandKind::saved, static_cast<std::uint32_t>(i), offset->second});
+  }
+  return commands;
 }
 
 }  // namespace thermocomp

@@ -37,6 +37,7 @@ std::uint32_t reasons_of(const Signals& signals, bool written, const Temperature
     // Of an axis that is not driven nothing is sent.
     reasons.add(signals.online && axis.driven() && !written, Reason::not_written);
     reasons.add(!axis.synced(), Reason::not_synced);
+    reasons.add(axis.start_unknown(), Reason::start_unknown);
     reasons.add(axis.mismatch(), Reason::mismatch);
     reasons.add(axis.latched(), Reason::mismatch_latched);
     reasons.add(axis.at_bound(), Reason::at_bound);

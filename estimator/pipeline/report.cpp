@@ -15,6 +15,10 @@ void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexce
   out.synced = channel.synced();
   out.driven = stages.axes.driven(axis);
   out.disagrees = channel.mismatch();
+  out.start = channel.start();
+  out.start_unknown = channel.start_unknown();
+  out.waits_for_disk = channel.waits_for_disk();
+  out.corridor_um = channel.corridor_um();
   out.latched = channel.latched();
   out.releasing = channel.releasing();
   out.latched_mismatch = channel.latched_mismatch();

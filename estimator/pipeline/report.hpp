@@ -36,7 +36,12 @@ struct AxisReport {
   double applied_um{not_a_number};   ///< read back
   double measured_um{not_a_number};  ///< last `measured` of the operator
   bool synced{false};
-  bool driven{false};         ///< offset marked valid
+  bool driven{false};  ///< offset marked valid
+  StartEvidence start{StartEvidence::unknown};
+  bool start_unknown{false};  ///< a link is there, and nothing tells what was sent last
+  bool waits_for_disk{false};
+  /// How far the offset goes from the one in the state file that is on disk; NaN: no matter.
+  double corridor_um{not_a_number};
   bool disagrees{false};      ///< read-back and offset sent differ
   bool latched{false};        ///< the mismatch stays until an operator releases it
   bool releasing{false};      ///< released, the read-backs are looked at

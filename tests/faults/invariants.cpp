@@ -52,14 +52,16 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
   patience_s_ = std::max({5.0 * link_period_s_, 1.0, 2.0 * turn_s_});
   smoothing_off_ = shape.estimator.sensors[0].smoothing.form == SmoothingForm::off;
   resolution_um_ = shape.offsets_are_float ? 1e-4 : 0.1;
+  reads_back_ = shape.estimator.controller_reads_back;
   for (std::size_t i = 0; i < axes_count; ++i) {
-    largest_bound_um_[i] = shape.estimator.axes[i].limiter.offset_um_max;
+    largest_bound_um_[i] = bound_um_[i] = shape.estimator.axes[i].limiter.offset_um_max;
     rate_um_per_s_[i] = shape.estimator.axes[i].limiter.rate_um_per_s_max;
   }
 }
 
-void Invariants::booted(nanoseconds now) {
+void Invariants::booted(nanoseconds now, double leap_um) {
   boot_ = now;
+  leap_um_.fill(leap_um);
   sent_ = {};
   last_ = now;
   last_compensating_ = now;
@@ -84,6 +86,7 @@ void Invariants::booted(nanoseconds now) {
 void Invariants::reloaded(const MachineShape& shape) {
   for (std::size_t i = 0; i < axes_count; ++i) {
     const LimiterConfig& limiter = shape.estimator.axes[i].limiter;
+    bound_um_[i] = limiter.offset_um_max;
     largest_bound_um_[i] = std::max(largest_bound_um_[i], limiter.offset_um_max);
     // What was computed before may still be under way.
     rate_um_per_s_[i] = std::max(rate_um_per_s_[i], limiter.rate_um_per_s_max);
@@ -119,7 +122,9 @@ void Invariants::restored(const PersistentState& saved, const Report& report, na
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     offset_um_[axis] = report.axes[axis].offset_um;
     const auto found = saved.offset_um.find(std::string(1, static_cast<char>('x' + axis)));
-    demand(found == saved.offset_um.end() || found->second == offset_um_[axis],
+    // Of an earlier, larger bound it is not taken; of a record there is a later one.
+    demand(found == saved.offset_um.end() || found->second == offset_um_[axis] || !reads_back_ ||
+               std::abs(found->second) > bound_um_[axis],
            "state_survives_restart", now, "offset of an axis");
   }
 }
@@ -491,7 +496,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   // Offsets move on the cycle's grid, writes come when the link has its turn: one cycle besides.
   const double since_seen_um = rate_um * to_s(move.at - move.seen_at);
   double allowed_um = (move.disturbed ? std::min(budget.um, since_seen_um) : budget.um) +
-                      rate_um * period_s_ + 2.0 * resolution_um_;
+                      rate_um * period_s_ + 2.0 * resolution_um_ + leap_um_[move.axis];
+  leap_um_[move.axis] = 0.0;
   // An operator may have released an axis on the word of a controller that has stopped lying since.
   const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
   if (move.disturbed || lies) budget.disturbed_at = move.at;
@@ -577,7 +583,7 @@ void Invariants::check_unexplained(const CycleSeen& seen, std::size_t axis) {
          [&] { return fmt::format("axis {}: nobody released it", axis); });
   if (!latched) sent.released = false;
   sent.latched = latched;
-  if (!seen.told->online || sent.lately.empty() || !std::isfinite(told_um)) return;
+  if (!reads_back_ || !seen.told->online || sent.lately.empty() || !std::isfinite(told_um)) return;
   // What the cycle wants explains a read-back as well as what reached the controller: after a
   // release or on a new link it starts from what is read back, and the write may be refused.
   const double wanted_um = seen.command->offset_um[axis];

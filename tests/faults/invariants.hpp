@@ -57,7 +57,8 @@ class Invariants {
   Invariants(const MachineShape& shape, const FaultSchedule& schedule,
              const Thermocouples& thermocouples);
 
-  void booted(nanoseconds now);
+  /// @param leap_um  by so much the first offset may differ from the last one
+  void booted(nanoseconds now, double leap_um);
   void reloaded(const MachineShape& shape);
   /// A probing of this axis reaches the estimator in the cycle to come.
   void probed(std::size_t axis) { ++probings_[axis]; }
@@ -119,6 +120,8 @@ class Invariants {
   double patience_s_{1.0};  ///< so long it may go without a write
   bool smoothing_off_{false};
   double resolution_um_{0.0};
+  bool reads_back_{true};
+  std::array<double, axes_count> leap_um_{};  ///< of the first offset since the boot
 
   nanoseconds boot_{};
   nanoseconds last_{};
@@ -127,6 +130,7 @@ class Invariants {
   bool first_{true};
   bool lost_before_{false};
   std::array<double, axes_count> offset_um_{};  ///< sent in the cycle before
+  std::array<double, axes_count> bound_um_{};
   std::array<double, axes_count> largest_bound_um_{};
   std::array<double, axes_count> rate_um_per_s_{};  ///< the larger one across a reload
 

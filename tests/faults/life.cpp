@@ -1,5 +1,6 @@
 #include "life.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +11,7 @@
 #include "estimator/checks.hpp"
 #include "estimator/pipeline/persistent_state.hpp"
 #include "history_disk.hpp"
+#include "kept_state.hpp"
 #include "recorded_twin.hpp"
 #include "simulated_daemon.hpp"
 
@@ -42,6 +44,8 @@ class Life {
     saved_.enabled = true;
     if (!options.history_folder.empty())
       disk_ = std::make_unique<HistoryDisk>(options.history_folder, options.seed, schedule_);
+    if (!reads_back(options.seed))
+      kept_ = std::make_unique<KeptState>(options.state_folder, options.seed, schedule_);
   }
 
   LifeResult live() {
@@ -66,14 +70,24 @@ class Life {
     twin_ = disk_ ? nullptr : std::make_unique<RecordedTwin>(grid_);
     if (disk_) disk_->boot(grid_, world_.now);
     auto brain = make_brain();
+    world_.controller.daemon_starts(world_.now);
+    double leap_um = 0.0;
+    if (kept_ && restarted_) {
+      saved_ = kept_->boot(shape_).state;
+      if (power_was_cut_ && !shows_registers(options_.seed))
+        leap_um = shape_.estimator.compensation.restart_leap_um_max;
+    } else if (kept_) {
+      static_cast<void>(kept_->boot(shape_));
+    }
     const auto refused = brain->estimator.restore(saved_);
     judge_.demand(refused.empty(), "state_survives_restart", world_.now, "a reference was refused");
     report_ = brain->estimator.make_report();
-    judge_.booted(world_.now);
+    judge_.booted(world_.now, leap_um);
     // The very first value becomes the reference; a later start has one already.
     if (!restarted_) world_.thermocouples.no_spikes_before(world_.now + std::chrono::seconds(15));
     if (restarted_) judge_.restored(saved_, report_, world_.now);
-    SimulatedDaemon daemon(shape_, world_, grid_, std::move(brain));
+    SimulatedDaemon daemon(shape_, world_, grid_, std::move(brain),
+                           kept_ ? kept_->record() : nullptr);
     daemon_ = &daemon;
     std::uint64_t cycle = daemon.cycle().begin(world_.now);
     while (!judge_.broken()) {
@@ -157,6 +171,18 @@ class Life {
     }
     if (twin_) result_.replayed += twin_->replayed();
     twin_.reset();
+    if (kept_) end_kept(ended.has_value());
+  }
+
+  /// Of those that are no order to end, every other one is a power cut.
+  void end_kept(bool in_order) {
+    power_was_cut_ = !in_order && last_kill_ % 4 == 1;
+    if (in_order)
+      kept_->end(daemon_->cycle().brain().estimator.persistent_state(report_));
+    else if (power_was_cut_)
+      kept_->cut_power();
+    else
+      kept_->kill();
   }
 
   [[nodiscard]] nanoseconds done_at() const {
@@ -182,6 +208,7 @@ class Life {
     const Episode* episode = schedule_.episode_at(world_.now);
     const bool well = episode == nullptr || world_.now < episode->begin;
     for (std::size_t axis = 0; axis < axes_count; ++axis) {
+      set_to_zero(axis, well);
       if (!report_.axes[axis].latched || report_.axes[axis].releasing) continue;
       if (!releases_.one_in(static_cast<std::uint64_t>((well ? 5.0 : 60.0) * options_.cycle_hz)))
         continue;
@@ -205,6 +232,21 @@ class Life {
       static_cast<void>(
           daemon_->cycle().send({CommandKind::accept, static_cast<std::uint32_t>(i), 0.0}));
     }
+  }
+
+  /// Where nothing tells what was sent last, or more than the bound is applied: the operator sets
+  /// the offset at the controller to zero and says so.
+  void set_to_zero(std::size_t axis, bool well) {
+    const bool unknown = report_.axes[axis].start_unknown;
+    const bool beyond = has_reason(report_.reasons, Reason::applied_out_of_bound) &&
+                        std::abs(world_.controller.applied_um(axis)) >
+                            shape_.estimator.axes[axis].limiter.offset_um_max;
+    if (!well || !(unknown || beyond)) return;
+    if (!releases_.one_in(static_cast<std::uint64_t>(8.0 * options_.cycle_hz))) return;
+    const AxisSpan span = span_of(shape_.estimator.axes, axis);
+    for (std::size_t i = span.first; i < span.end(); ++i) world_.controller.set_to_zero(i);
+    const Command command{CommandKind::release, static_cast<std::uint32_t>(axis), 0.0};
+    if (unknown) static_cast<void>(daemon_->cycle().send(command));
   }
 
   [[nodiscard]] bool once_in(double period_s) {
@@ -299,6 +341,13 @@ class Life {
   /// As the daemon does: switches and references at once, offsets every 10 s.
   void save_state() {
     const PersistentState state = daemon_->cycle().brain().estimator.persistent_state(report_);
+    if (kept_) {
+      const bool waits = std::any_of(report_.axes.begin(), report_.axes.end(),
+                                     [](const AxisReport& axis) { return axis.waits_for_disk; });
+      for (const Command& saved : kept_->note(state, shape_, world_.now, waits))
+        static_cast<void>(daemon_->cycle().send(saved));
+      return;
+    }
     if (world_.now < next_save_ && !must_be_saved(state, saved_)) return;
     next_save_ = world_.now + saved_every;
     saved_ = state;
@@ -364,6 +413,8 @@ class Life {
   Grid grid_;
   std::unique_ptr<RecordedTwin> twin_;
   std::unique_ptr<HistoryDisk> disk_;
+  std::unique_ptr<KeptState> kept_;  ///< none: the controller shows what it applies
+  bool power_was_cut_{false};
   SimulatedDaemon* daemon_{nullptr};
   Report report_;
   PersistentState saved_;

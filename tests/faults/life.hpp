@@ -19,6 +19,8 @@ struct LifeOptions {
   /// Where the history is really written, with a disk that fills up and writes cut off by a kill;
   /// empty: it goes through the codec in memory, into a second estimator.
   std::filesystem::path history_folder;
+  /// Where a life writes a state file, of which nothing is left at its end.
+  std::filesystem::path state_folder;
   std::optional<FaultKind> only{};  ///< no other fault happens
   bool verbose{false};              ///< the faults and what becomes of them, on standard output
 };

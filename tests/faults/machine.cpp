@@ -233,7 +233,24 @@ double SimulatedController::shown_um(std::size_t axis, nanoseconds time) {
   return shown;
 }
 
+void SimulatedController::restart(nanoseconds time) {
+  restarted_ = time;
+  if (!reads_back(seed_)) written_ = {};
+  for (std::size_t axis = 0; axis < axes_count; ++axis) {
+    applied_um_[axis] = 0.0;
+    disturbed_[axis] = true;
+    seen_[axis] = false;
+  }
+}
+
+void SimulatedController::set_to_zero(std::size_t axis) {
+  if (reads_back(seed_)) return disturb(axis, 0.0);
+  applied_um_[axis] = 0.0;
+  for (std::size_t word = 0; word < words_an_offset(); ++word) written_[offset_at(axis) + word] = 0;
+}
+
 void SimulatedController::disturb(std::size_t axis, double applied_um) {
+  if (!reads_back(seed_)) return;
   applied_um_[axis] = applied_um;
   disturbed_[axis] = true;
   seen_[axis] = false;
@@ -241,9 +258,8 @@ void SimulatedController::disturb(std::size_t axis, double applied_um) {
 
 void SimulatedController::advance(nanoseconds time) {
   const bool on = powered(time);
-  if (on && !on_ && scramble(seed_ + static_cast<std::uint64_t>(time.count() / 1000000000)) % 2) {
-    for (std::size_t axis = 0; axis < axes_count; ++axis) disturb(axis, 0.0);
-  }
+  if (on && !on_ && scramble(seed_ + static_cast<std::uint64_t>(time.count() / 1000000000)) % 2)
+    restart(time);
   on_ = on;
   const FaultEvent* rehoming = schedule_.find(FaultKind::controller_rehomed, time);
   if (rehoming == nullptr || rehoming->number == last_rehoming_) return;
@@ -256,9 +272,11 @@ void SimulatedController::advance(nanoseconds time) {
   }
 }
 
-void SimulatedController::read(std::size_t address, std::span<std::uint16_t> words,
+bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> words,
                                nanoseconds time) {
   advance(time);
+  const bool of_written = address >= 200;
+  if (of_written && !shows_registers(seed_)) return false;
   std::array<std::uint16_t, 9> image{};
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     if (const FaultEvent* other = lie(FaultKind::second_writer, axis, time))
@@ -282,11 +300,15 @@ void SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
     if (at >= 100 && at < 100 + image.size()) words[i] = image[at - 100];
     if (at >= 200 && at < 200 + written_.size()) words[i] = written_[at - 200];
   }
-  for (std::size_t axis = 0; axis < axes_count; ++axis)
+  // A restart is told by registers, or by having been away for long.
+  const bool tells = reads_back(seed_) || of_written ||
+                     (!shows_registers(seed_) && restarted_ >= daemon_started_);
+  for (std::size_t axis = 0; tells && axis < axes_count; ++axis)
     if (!seen_[axis]) seen_at_[axis] = time;
-  seen_.fill(true);
+  if (tells) seen_.fill(true);
   ++reads_since_break_;
   looked_at_ = time;
+  return true;
 }
 
 /// By its valid bit; the nodes of a travel by that of their axis, and only as a whole set.

@@ -45,6 +45,16 @@ inline constexpr std::size_t axes_count = 3;
   return seed % 8 == 5;
 }
 
+/// Whether the controller of this life shows what it applies. Where it does not, nothing but its
+/// restart changes that by itself.
+[[nodiscard]] constexpr bool reads_back(std::uint64_t seed) noexcept {
+  return seed % 8 != 6 && seed % 32 != 10;
+}
+/// Whether the registers that are written can be read. Of a set they must.
+[[nodiscard]] constexpr bool shows_registers(std::uint64_t seed) noexcept {
+  return seed % 16 != 6;
+}
+
 /// The configuration of a life, drawn from its seed.
 struct MachineShape {
   MachineShape(std::uint64_t seed, double cycle_hz);
@@ -148,8 +158,12 @@ class SimulatedController {
  public:
   SimulatedController(std::uint64_t seed, const FaultSchedule& schedule, bool floats);
 
-  /// Registers as they stand at `time`.
-  void read(std::size_t address, std::span<std::uint16_t> words, nanoseconds time);
+  /// Registers as they stand at `time`. @return false: refused
+  bool read(std::size_t address, std::span<std::uint16_t> words, nanoseconds time);
+  /// A daemon starts, which knows nothing of restarts before.
+  void daemon_starts(nanoseconds time) noexcept { daemon_started_ = time; }
+  /// An operator sets the offset to zero.
+  void set_to_zero(std::size_t axis);
   /// @return false: refused
   bool write(std::size_t address, std::span<const std::uint16_t> words, nanoseconds time);
 
@@ -175,6 +189,7 @@ class SimulatedController {
 
  private:
   void disturb(std::size_t axis, double applied_um);
+  void restart(nanoseconds time);
   [[nodiscard]] const FaultEvent* lie(FaultKind kind, std::size_t axis, nanoseconds time) const;
   [[nodiscard]] double shown_um(std::size_t axis, nanoseconds time);
   [[nodiscard]] std::size_t words_an_offset() const noexcept { return floats_ ? 2 : 1; }
@@ -194,6 +209,8 @@ class SimulatedController {
   std::uint64_t last_rehoming_{0};
   std::uint64_t breaks_{0};
   std::uint64_t reads_since_break_{0};
+  nanoseconds daemon_started_{};
+  nanoseconds restarted_{-1};
   nanoseconds looked_at_{};
   nanoseconds written_at_{};
   std::array<std::uint64_t, axes_count> frozen_by_{};  ///< the fault that froze the read-back

@@ -236,6 +236,15 @@ MachineShape::MachineShape(std::uint64_t seed, double cycle_hz) {
     Chance own(seed, 12);
     lay_out_travel(*this, own);
   }
+  if (!reads_back(seed)) {
+    Chance own(seed, 13);
+    estimator.controller_reads_back = false;
+    compensation.restart_leap_um_max = own.between(0.3, 2.0);
+    for (ModbusAxis& axis : controller.axes) {
+      axis.applied.reset();
+      if (axis.travel) axis.travel->applied.clear();
+    }
+  }
   if (!corrects_itself(seed)) return;
   Chance own(seed, 9);
   draw_correction(own, estimator);

@@ -113,6 +113,7 @@ class Campaign {
       life.cycle_hz = options_.cycle_hz;
       life.verbose = options_.verbose;
       life.only = kind_of(options_.only);
+      life.state_folder = history_folder_ / ("state" + std::to_string(seed));
       if (options_.history_every != 0 && seed % options_.history_every == 0)
         life.history_folder = history_folder_;
       add(seed, live(life));

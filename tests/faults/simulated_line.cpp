@@ -75,8 +75,10 @@ void ControllerUnit::ask(int /*unit*/, std::span<const std::uint8_t> request, na
   const std::size_t count = word_of(request, 3);
   std::array<std::uint16_t, 125> words{};
   if (request[0] == 3 && count <= words.size()) {
-    controller_.read(address, std::span(words).first(count), time);
-    push_registers(answer, 3, std::span(words).first(count));
+    if (controller_.read(address, std::span(words).first(count), time))
+      push_registers(answer, 3, std::span(words).first(count));
+    else
+      refuse(answer, request[0], 2);
   } else if (request[0] == 16 && schedule_.find(FaultKind::writes_unanswered, time) != nullptr) {
     return;
   } else if (request[0] == 16 && request.size() == 6 + 2 * count) {

@@ -41,6 +41,7 @@ class LiedTo {
     controller_.online = true;
     controller_.written = controller_.online;
     controller_.link_epoch = 1;
+    controller_.applied_um.fill(0.0);
   }
   void step(std::uint64_t cycle) noexcept {
     const nanoseconds now = std::chrono::seconds(12) * static_cast<std::int64_t>(cycle);
@@ -231,7 +232,10 @@ int main(int argc, char** argv) {
     brain->recorder = history.make_recorder({"", "", ""}, brain->estimator);
     return brain;
   };
-  Cycle cycle(grid, {&probe, &line}, controller, sensors, make_brain(2.0));
+  // In memory, as /run is.
+  const std::string record = "/dev/shm/cycle_purity_" + std::to_string(getpid());
+  LastSent last_sent(record, "none", make_config().axes);
+  Cycle cycle(grid, {&probe, &line}, controller, sensors, make_brain(2.0), &last_sent);
   history.start();
   line.start();
   controller.start();
@@ -260,6 +264,7 @@ int main(int argc, char** argv) {
   line.stop();
   history.stop();
   std::filesystem::remove_all(folder);
+  std::filesystem::remove(record);
 
   const test::ThreadCounts& counts = probe.counts;
   std::printf("%llu cycles: %llu allocations, %llu locks, %llu system calls, %lld page faults\n",

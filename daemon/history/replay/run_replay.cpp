@@ -147,9 +147,7 @@ class RunReplay {
     controller_.online = true;
     controller_.written = true;
     controller_.link_epoch = 1;
-    if (config.estimator.controller_reads_back) {
-      for (std::size_t i = 0; i < config.estimator.axes.size(); ++i) controller_.applied_um[i] = 0;
-    }
+    for (std::size_t i = 0; i < config.estimator.axes.size(); ++i) controller_.applied_um[i] = 0;
     assume_zero(config.estimator.compensation.cutting_signal);
     assume_zero(config.estimator.compensation.disable_signal);
   }
@@ -170,9 +168,7 @@ class RunReplay {
     controller_.taken_at = now;
     estimator_.step(now, readings_, controller_, command_);
     for (std::size_t i = 0; i < estimator_.config().axes.size(); ++i) {
-      if (command_.valid[i] && estimator_.config().controller_reads_back) {
-        controller_.applied_um[i] = command_.offset_um[i];
-      }
+      if (command_.valid[i]) controller_.applied_um[i] = command_.offset_um[i];
     }
     ++summary_.steps;
   }

@@ -218,6 +218,7 @@ void SegmentExport::take_offsets() {
 void SegmentExport::take_command() {
   if (record_.detail >= command_kinds_count) throw HistoryError("damaged: unknown command");
   const auto kind = static_cast<CommandKind>(record_.detail);
+  if (kind == CommandKind::saved) return;  // not an operator's
   const bool names_axis =
       kind == CommandKind::measured || kind == CommandKind::prove || kind == CommandKind::release;
   if (names_axis && record_.index >= config_.axes.size()) return;

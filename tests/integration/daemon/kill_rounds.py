@@ -1,6 +1,11 @@
 """kill -9 at random moments, again and again, on one history and one machine that keeps moving.
 
   kill_rounds.py --rounds 200 --seed 1     prints, last, "NAME VALUE UNIT" lines; 1: something lost
+    --controller registers                 nothing is read back but the registers that are written
+    --controller silent                    nor can these be read
+    --power-cuts                           of a silent one: the record of the runtime folder goes,
+                                           and the state file is the one that was flushed last
+    --no-history                           quicker: only the offsets are judged
 
 What is checked in every round, against notes taken from outside just before the kill:
   * every row of the history that a reader could see is there afterwards, byte for byte;
@@ -9,7 +14,8 @@ What is checked in every round, against notes taken from outside just before the
   * the first order to the controller is no farther from the last one than the slew rate allows for
     the time since the daemon was first told what the controller applies, and one cycle more. No
     slack: both times are taken at the controller, the earlier one before it answers, the later one
-    after it was written.
+    after it was written. Of a silent controller the time from its last order to the kill counts
+    too, and after a power cut restart_leap_um_max.
 """
 
 import argparse
@@ -17,9 +23,12 @@ import contextlib
 import math
 import pathlib
 import random
+import re
+import shutil
 import socket
 import sqlite3
 import statistics
+import subprocess
 import sys
 import tempfile
 import threading
@@ -33,29 +42,78 @@ from plain_devices import RATE_UM_PER_S, Machine, PlainController  # noqa: E402
 RESOLUTION_UM = 0.001
 PERIOD_S = 0.02  # of the controller's link
 CYCLE_S = 0.01  # the offset moves at its ticks, the first of which may come at once
+LEAP_UM = 1.0  # restart_leap_um_max
 MOMENTS = ("running", "start", "commit", "reload", "command")
+
+# When a folder has been flushed, so has the file that was renamed in it before.
+DURABLE = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+int fsync(int fd) {
+  static int (*real)(int);
+  if (!real) real = (int (*)(int))dlsym(RTLD_NEXT, "fsync");
+  const int result = real(fd);
+  struct stat status;
+  if (result != 0 || fstat(fd, &status) != 0 || !S_ISDIR(status.st_mode)) return result;
+  char bytes[65536];
+  FILE* from = fopen(getenv("STATE_FILE"), "r");
+  FILE* to = fopen(getenv("DURABLE_FILE"), "w");
+  if (from && to) fwrite(bytes, 1, fread(bytes, 1, sizeof bytes, from), to);
+  if (from) fclose(from);
+  if (to) fclose(to);
+  return result;
+}
+"""
 
 
 class WatchedController(PlainController):
-    """Notes also when the applied offset was asked for."""
+    """Notes also when the applied offset was asked for, or what it was told."""
+
+    silent = False
+    asked_by = (4,)
 
     def start(self):
         self.read_log = []
         super().start()
 
     def answer(self, pdu):
-        if pdu[0] == 4:
+        if pdu[0] in self.asked_by:
             self.read_log.append(time.monotonic())
+        if self.silent and pdu[0] == 3:
+            return bytes([0x83, 2])
         return super().answer(pdu)
 
 
 class KillRounds:
-    def __init__(self, lab, seed):
+    def __init__(self, lab, seed, controller="read_back", power_cuts=False, history=True):
         self.random = random.Random(seed)
         self.machine = Machine(lab)
         self.controller = self.machine.controller
         self.controller.__class__ = WatchedController
         self.controller.stop()
+        self.reads_back = controller == "read_back"
+        self.power_cuts = power_cuts
+        self.history = history
+        self.controller.silent = controller == "silent"
+        self.controller.asked_by = (4,) if self.reads_back else (2, 3)
+        self.killed_at = 0.0
+        config = self.machine.config
+        if not self.reads_back:
+            config = re.sub(r"(?m)^applied = .*\n", "", config)
+        if not self.history:
+            config = config.replace("@HISTORY@\n", "enabled = false\n@HISTORY@\n")
+        self.machine.daemon.write_config(config)
+        if self.power_cuts:
+            self.durable = lab.folder / "durable.json"
+            shim = lab.folder / "durable.so"
+            subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-xc", "-", "-o", shim, "-ldl"],
+                           input=DURABLE.encode(), check=True)
+            self.machine.daemon.environment = {"LD_PRELOAD": str(shim),
+                                               "STATE_FILE": str(self.machine.daemon.state),
+                                               "DURABLE_FILE": str(self.durable)}
         self.controller.start()
         self.lab = lab
         self.daemon = self.machine.daemon
@@ -63,6 +121,7 @@ class KillRounds:
         self.lost = 0
         self.steps_um = []
         self.shares = []
+        self.away = []
         self.restarts_wrong = []
         self.counts = dict.fromkeys(MOMENTS, 0)
         self.moving = True
@@ -78,7 +137,7 @@ class KillRounds:
 
     def note_rows(self):
         """What a reader sees committed now; also finds what is gone."""
-        if not self.daemon.history.exists():
+        if not self.history or not self.daemon.history.exists():
             return
         with contextlib.closing(sqlite3.connect(f"file:{self.daemon.history}?mode=ro",
                                                 uri=True)) as base:
@@ -103,9 +162,12 @@ class KillRounds:
 
     def start_ready(self):
         """Restart and what the controller saw of it."""
+        time.sleep(0.05)  # what the daemon has left in the line is taken
         with self.controller.lock:
             reads, orders = len(self.controller.read_log), len(self.controller.order_log)
-            before = self.controller.order_log[-1][1] if orders else None
+            before_at, before = self.controller.order_log[-1] if orders else (0.0, None)
+        if self.power_cuts and before is not None:
+            self.cut_power()
         self.daemon.start()
         eventually(lambda: len(self.controller.orders()) > orders + 1, "orders after the restart")
         if before is None:
@@ -116,9 +178,35 @@ class KillRounds:
         step = abs(first - before)
         self.steps_um.append(step)
         allowed = RATE_UM_PER_S * (ordered_at - told_at + CYCLE_S) + RESOLUTION_UM
+        if self.power_cuts:
+            allowed = max(allowed, LEAP_UM + RATE_UM_PER_S * CYCLE_S)
+        elif self.controller.silent:
+            # What was recorded need not have been sent yet.
+            allowed += RATE_UM_PER_S * (max(0.0, self.killed_at - before_at) + CYCLE_S)
+        self.away.append(step / (RATE_UM_PER_S * (ordered_at - before_at)))
         self.shares.append(step / allowed)
         if step > allowed:
             self.restarts_wrong.append(f"a step of {step} um, {allowed} um allowed")
+
+    def cut_power(self):
+        """Of what was not flushed nothing need be left, but may."""
+        self.daemon.socket.with_name(self.daemon.socket.name + ".sent").unlink(missing_ok=True)
+        if self.random.random() < 0.8:
+            shutil.copyfile(self.durable, self.daemon.state)
+
+    def kill(self):
+        self.killed_at = time.monotonic()
+        self.daemon.kill()
+
+    def release_where_unknown(self):
+        """A first start, of which nothing is known: the operator has looked, the offset is 0."""
+        def started():
+            axis = self.daemon.axis()
+            if axis.get("start") == "unknown":
+                self.daemon.call("release", axis="z")
+            return axis["driven"]
+
+        eventually(started, "the axis is driven")
 
     def send_command(self, method):
         """Sends without waiting; the socket, on which the answer may come."""
@@ -153,7 +241,7 @@ class KillRounds:
             method = self.random.choice(("enable", "disable", "reference"))
             with contextlib.closing(self.send_command(method)) as link:
                 time.sleep(0.06 * pause)
-                self.daemon.kill()
+                self.kill()
                 link.settimeout(1.0)
                 try:
                     answered = b'"result"' in link.recv(4096)
@@ -163,7 +251,7 @@ class KillRounds:
             after = (method != "disable" if method != "reference" else enabled,
                      None if method == "reference" else reference)
             return [after] if answered else [expected, after]
-        self.daemon.kill()
+        self.kill()
         return [expected]
 
     def check_state(self, allowed):
@@ -173,10 +261,14 @@ class KillRounds:
 
     def run_round(self):
         moment = self.random.choice(MOMENTS)
+        if moment == "commit" and not self.history:
+            moment = "running"
         self.counts[moment] += 1
         if not self.daemon.status()["enabled"]:
             self.daemon.call("enable")
-        time.sleep(0.2 * self.random.random())
+        # Now and then for long, so that what is saved now and then is old.
+        longest_s = 4.0 if self.random.random() < 0.1 else 0.2
+        time.sleep(longest_s * self.random.random())
         expected = self.expectation()
         if moment == "start":
             # Killed once running, then again somewhere in its start.
@@ -184,7 +276,7 @@ class KillRounds:
             self.note_rows()
             self.daemon.start(wait=False)
             time.sleep(0.4 * self.random.random())
-            self.daemon.kill()
+            self.kill()
         else:
             allowed = self.kill_at(moment, expected)
         self.note_rows()
@@ -192,7 +284,8 @@ class KillRounds:
         self.check_state(allowed)
 
     def run(self, rounds):
-        self.start_ready()
+        self.daemon.start()
+        self.release_where_unknown()
         self.daemon.wait_for_mode("compensating")
         for number in range(rounds):
             self.run_round()
@@ -203,7 +296,8 @@ class KillRounds:
         self.note_rows()
         self.moving = False
         self.mover.join()
-        assert_replays_exactly(self.daemon.history, self.lab.folder / "out.csv")
+        if self.history:
+            assert_replays_exactly(self.daemon.history, self.lab.folder / "out.csv")
 
     def print_figures(self, rounds, took_s):
         print("moments of the kills: " +
@@ -221,18 +315,23 @@ class KillRounds:
         print(f"restart_step_median {statistics.median(self.steps_um):.3f} um")
         print(f"restart_step_largest {max(self.steps_um):.3f} um")
         print(f"step_over_allowed_largest {max(self.shares):.3f} ratio")
+        print(f"step_over_slew_times_away_largest {max(self.away):.3f} ratio")
 
 
 def main():
     options = argparse.ArgumentParser()
     options.add_argument("--rounds", type=int, default=200)
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--controller", choices=("read_back", "registers", "silent"),
+                         default="read_back")
+    options.add_argument("--power-cuts", action="store_true")
+    options.add_argument("--no-history", dest="history", action="store_false")
     given = options.parse_args()
     print(f"seed {given.seed}")
     with tempfile.TemporaryDirectory() as folder:
         lab = Lab(pathlib.Path(folder))
         try:
-            kills = KillRounds(lab, given.seed)
+            kills = KillRounds(lab, given.seed, given.controller, given.power_cuts, given.history)
             begun = time.monotonic()
             kills.run(given.rounds)
             kills.print_figures(given.rounds, time.monotonic() - begun)

@@ -51,8 +51,11 @@ def test_the_watchdog_ends_a_hang_and_the_offset_stays(running, what, hang):
 
 def test_a_restart_is_bumpless(running):
     pid, orders = service.main_pid(), running.count()
+    record = service.SOCKET.with_name("status.sock.sent")
+    written = record.stat().st_ino
     run("systemctl", "restart", UNIT)
     assert service.main_pid() != pid
+    assert record.stat().st_ino == written  # what was sent last outlives the service
     service.wait_for_mode("compensating")
     eventually(lambda: len(running.orders_since(orders)) > 20, "orders")
     assert stayed_at(running.orders_since(orders), 9.0)

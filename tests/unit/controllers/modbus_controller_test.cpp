@@ -146,6 +146,55 @@ TEST_CASE("what the controller applies and measures is read back", "[controllers
   CHECK(link.health().kind == "modbus_tcp");
 }
 
+TEST_CASE("without read-back the registers that are written tell what stands in them",
+          "[controllers]") {
+  ModbusMachine machine;
+  machine.set_holding(2, 0xFFFF);  // -1500 counts
+  machine.set_holding(3, 0xFA24);
+  machine.shows = GENERATE(ModbusMachine::Shows::all, ModbusMachine::Shows::exception);
+  ModbusControllerConfig config = three_axes(machine.port());
+  config.axes[1].applied.reset();
+  ModbusController link(config);
+  link.start();
+  Cycle cycle(link);
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  if (machine.shows == ModbusMachine::Shows::all)
+    CHECK(cycle.state().applied_um[1] == Approx(-15.0));
+  else
+    CHECK(std::isnan(cycle.state().applied_um[1]));
+  CHECK(cycle.state().applied_um[0] == 0.0);
+  // What is sent then is no reason to begin anew: it is not read back.
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.want(1, -14.0);
+  REQUIRE(eventually([&] { return int32_of(machine, 2) == -1400; }));
+  cycle.want(1, 20.0);
+  REQUIRE(eventually([&] { return int32_of(machine, 2) == 2000; }));
+  CHECK(cycle.state().link_epoch == epoch);
+  link.stop();
+}
+
+TEST_CASE("registers that do not hold what is written tell nothing", "[controllers]") {
+  ModbusMachine machine;
+  machine.shows = ModbusMachine::Shows::zeros;
+  ModbusControllerConfig config = three_axes(machine.port());
+  for (ModbusAxis& axis : config.axes) axis.applied.reset();
+  ModbusController link(config);
+  link.start();
+  Cycle cycle(link);
+  REQUIRE(eventually([&] { return cycle.state().online; }));
+  CHECK(cycle.state().applied_um[0] == 0.0);
+  const std::uint32_t epoch = cycle.state().link_epoch;
+  cycle.want(0, 3.0);
+  // Another link, of which nothing is known.
+  REQUIRE(eventually([&] {
+    const ControllerState state = cycle.state();
+    return state.online && !is_same_link(state.link_epoch, epoch);
+  }));
+  CHECK(std::isnan(cycle.state().applied_um[0]));
+  CHECK(eventually([&] { return int32_of(machine, 0) == 300; }));
+  link.stop();
+}
+
 TEST_CASE("a controller that applies something else is seen", "[controllers]") {
   ModbusMachine machine;
   machine.mirrored = 6;

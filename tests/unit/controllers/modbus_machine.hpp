@@ -84,6 +84,9 @@ class ModbusMachine {
   std::atomic<bool> restart_on_write{false};
   /// Reads are answered with "slave device failure".
   std::atomic<bool> refuse_reads{false};
+  /// What holding registers below 100 answer to a read: what they hold, an exception, or zeros.
+  enum class Shows { all, exception, zeros };
+  std::atomic<Shows> shows{Shows::all};
   /// Requests are taken and never answered.
   std::atomic<bool> mute{false};
   std::atomic<int> writes{0};
@@ -141,7 +144,20 @@ class ModbusMachine {
       return modbus_reply_exception(context_.get(), query,
                                     MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE) >= 0;
     }
+    const int head = modbus_get_header_length(context_.get());
+    const bool of_written =
+        function == MODBUS_FC_READ_HOLDING_REGISTERS && query[head + 1] == 0 && query[head + 2] < 100;
+    if (of_written && shows == Shows::exception)
+      return modbus_reply_exception(context_.get(), query,
+                                    MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS) >= 0;
     const std::scoped_lock lock(mutex_);
+    if (of_written && shows == Shows::zeros) {
+      std::vector<std::uint16_t> kept(mapping_->tab_registers, mapping_->tab_registers + 100);
+      std::fill_n(mapping_->tab_registers, 100, std::uint16_t{0});
+      const bool shown = modbus_reply(context_.get(), query, size, mapping_.get()) >= 0;
+      std::copy(kept.begin(), kept.end(), mapping_->tab_registers);
+      return shown;
+    }
     const bool answered = modbus_reply(context_.get(), query, size, mapping_.get()) >= 0;
     for (int i = 0; i < mirrored; ++i) {
       mapping_->tab_input_registers[i] = mapping_->tab_registers[i];

@@ -10,6 +10,7 @@
 
 #include "cycle_stub.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
+#include "drivers/controllers/kinds/modbus/written_offsets.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"
@@ -291,4 +292,28 @@ TEST_CASE("sets that cannot be are refused", "[controllers][travel]") {
   bad = table();
   bad.begin.encoding = Encoding::float32;
   refused(bad);
+}
+
+TEST_CASE("a set that stands in its registers tells the offsets at the nodes", "[controllers]") {
+  ModbusAxis axis;
+  axis.travel = ModbusTravel{};
+  ModbusTravel& travel = *axis.travel;
+  travel.nodes_mm = {100.0, 300.0};
+  travel.p0_mm = 200.0;
+  const auto holding = [](std::uint16_t address, Encoding encoding, double scale) {
+    return ModbusValue{ModbusTable::holding, address, encoding, WordOrder::abcd, scale};
+  };
+  travel.begin = holding(20, Encoding::uint16, 1.0);
+  travel.values = {holding(21, Encoding::int32, 0.01), holding(23, Encoding::int32, 0.01)};
+  travel.end = holding(25, Encoding::uint16, 1.0);
+  WrittenOffsets written(axis);
+  CHECK(written.request().address == 20);
+  REQUIRE(written.request().count == 6);
+  const std::vector<double> offset_um{-7.5, 12.5};
+  WriteField field = travel_field(travel, 9, offset_um);
+  CHECK(written.decode(field.words)[0] == Approx(-7.5));
+  CHECK(written.decode(field.words)[1] == Approx(12.5));
+  field.words.back() = 8;  // broken off
+  CHECK(std::isnan(written.decode(field.words)[0]));
+  CHECK(std::isnan(written.decode({})[1]));
 }

@@ -123,3 +123,45 @@ TEST_CASE("an unusable state file without a history keeps the machine off", "[st
   CHECK(start.reference_lost);
   CHECK_FALSE(start.state.enabled);
 }
+
+TEST_CASE("offsets of a file are judged by this configuration", "[state]") {
+  const TempFolder folder;
+  DaemonConfig config = in_folder(folder);
+  BridgeControllerConfig bridge;
+  bridge.name = "cnc";
+  config.controller = bridge;
+  config.estimator.axes = {{"z", "z_um", -1.0, {50.0, 1.0}, {}}};
+  PersistentState kept;
+  kept.offset_um = {{"z", 12.0}};
+  kept.corridor_um = {{"z", 1.0}};
+  kept.sign = {{"z", -1.0}};
+  kept.controller = "bridge cnc";
+  SECTION("the same axis, controller and sign") {
+    REQUIRE(save_state_file(config.state_file, kept).empty());
+    const StartState start = find_start_state(config, {{"z", 12.5}});
+    CHECK(start.warnings.empty());
+    CHECK(start.state.corridor_um.size() == 1);
+    CHECK(start.state.offset_um.at("z") == 12.0);
+    CHECK(start.state.recorded_um.at("z") == 12.5);
+  }
+  SECTION("beyond the bound") {
+    kept.offset_um["z"] = GENERATE(300.0, -499.0, 50.001);
+    REQUIRE(save_state_file(config.state_file, kept).empty());
+    const StartState start = find_start_state(config, {{"z", -51.0}});
+    REQUIRE(start.warnings.size() == 2);
+    CHECK(start.warnings[0].find("offset_um_max = 50") != std::string::npos);
+    CHECK(start.warnings[1].find("last-sent record") == 0);
+    CHECK(start.state.offset_um.empty());
+    CHECK(start.state.recorded_um.empty());
+  }
+  SECTION("another sign, another controller, or a file of an earlier version") {
+    const int other = GENERATE(0, 1, 2);
+    if (other == 0) kept.sign["z"] = 1.0;
+    if (other == 1) kept.controller = "bridge lathe";
+    if (other == 2) kept.sign.clear();
+    REQUIRE(save_state_file(config.state_file, kept).empty());
+    const StartState start = find_start_state(config);
+    REQUIRE(start.warnings.size() == 1);
+    CHECK(start.state.corridor_um.empty());
+  }
+}

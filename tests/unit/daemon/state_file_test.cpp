@@ -18,6 +18,9 @@ PersistentState sample_state() {
   state.model_reference_degC = {{"bed_degC", 20.0}};
   state.reference_signals = {{"spindle_rpm", 1.0 / 3.0}};
   state.offset_um = {{"z", -12.345678901234567}};
+  state.corridor_um = {{"z", 1.0}};
+  state.sign = {{"z", -1.0}};
+  state.controller = "controller at \"CAN\"";
   state.temp_degC = {{"bed_degC", 21.7}};
   state.jumped_from_degC = {{"bed_front", 21.0}};
   state.held_degC = {{"t1_degC", 24.5}};
@@ -40,6 +43,9 @@ TEST_CASE("a state comes back bit for bit", "[state]") {
   CHECK(loaded.state.model_reference_degC == state.model_reference_degC);
   CHECK(loaded.state.reference_signals == state.reference_signals);
   CHECK(loaded.state.offset_um == state.offset_um);
+  CHECK(loaded.state.corridor_um == state.corridor_um);
+  CHECK(loaded.state.sign == state.sign);
+  CHECK(loaded.state.controller == state.controller);
   CHECK(loaded.state.temp_degC == state.temp_degC);
   CHECK(loaded.state.jumped_from_degC == state.jumped_from_degC);
   CHECK(loaded.state.held_degC == state.held_degC);

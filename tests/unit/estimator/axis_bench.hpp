@@ -17,6 +17,7 @@ struct Bench {
     input.dt_s = 0.1;
     input.link_epoch = 1;
     input.online = true;
+    input.written = true;
     input.applied_um = 0.0;
   }
   /// The controller applies what it was sent in the step before.
@@ -39,6 +40,7 @@ struct Bench {
     signals.online = input.online;
     ControllerState controller;
     controller.link_epoch = input.link_epoch;
+    controller.written = input.written;
     controller.applied_um[0] = input.applied_um;
     controller.taken_at = input.taken_at;
     OffsetCommand command;

@@ -37,19 +37,6 @@ TEST_CASE("an axis of a link that was never connected is not driven", "[axis]") 
   }
 }
 
-TEST_CASE("a controller that does not read back is driven from what was sent last", "[axis]") {
-  Bench bench(false);
-  bench.bank.restore(0, 8.0);
-  bench.input.applied_um = not_a_number;
-  bench.step(8.0);
-  CHECK(bench.axis().driven());
-  CHECK(bench.axis().offset_um() == 8.0);
-  CHECK(std::isnan(bench.axis().applied_um()));
-  bench.input.link_epoch = 2;
-  bench.steps(3, 8.0);
-  CHECK(bench.axis().offset_um() == 8.0);
-}
-
 TEST_CASE("a new link starts from the read-back, not from what was sent", "[axis]") {
   Bench bench;
   bench.steps(100, 10.0);
@@ -70,19 +57,12 @@ TEST_CASE("a new link starts from the read-back, not from what was sent", "[axis
 
 TEST_CASE("a restored offset that is out of date gives way to the read-back", "[axis]") {
   Bench bench;
-  bench.bank.restore(0, 40.0);
+  bench.bank.restore(0, {.saved_um = 40.0, .is_corridor = true, .recorded_um = 41.0});
   bench.input.applied_um = -5.0;
   bench.obeys = false;
   bench.step(40.0);
   CHECK(bench.axis().offset_um() == Approx(-4.8));
-}
-
-TEST_CASE("a restored offset that no configuration allows is not taken", "[axis]") {
-  for (const double offset_um : {501.0, -1e9, not_a_number}) {
-    Bench bench(false);
-    bench.bank.restore(0, offset_um);
-    CHECK(bench.axis().offset_um() == 0.0);
-  }
+  CHECK(bench.axis().start() == StartEvidence::read_back);
 }
 
 TEST_CASE("a read-back that is old when the link is new does not take the offset back", "[axis]") {

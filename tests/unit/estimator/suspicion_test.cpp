@@ -110,6 +110,7 @@ struct Shop {
     controller.online = true;
     controller.written = controller.online;
     controller.link_epoch = 1;
+    controller.applied_um.fill(0.0);
   }
   void step(const Lie& lie) {
     time_s += 12.0;

@@ -112,6 +112,11 @@ bool drivable(const OffsetCommand& command, std::size_t axis) noexcept {
   return command.valid[axis] && std::isfinite(command.offset_um[axis]);
 }
 
+/// The offset of a piezo whose amplifier was given a voltage; its rest is the offset 0.
+double resting_um(const PiezoConfig& config, double volt) {
+  return std::abs(volt) <= config.tolerance_V ? 0.0 : displacement_at(config, volt);
+}
+
 WriteField field_of(const ModbusValue& place, WriteStage stage, double value,
                     const NumberFormat& format) {
   const Encoded encoded = encode(value, format);
@@ -127,8 +132,10 @@ ModbusDialogue::ModbusDialogue(ModbusControllerConfig config, ModbusConnection& 
       next_exchange_at_(connection.now()),
       retry_at_(connection.now()) {
   plan_values();
-  for (const ModbusAxis& axis : config_.axes)
+  for (const ModbusAxis& axis : config_.axes) {
     piezos_.push_back(axis.piezo ? std::optional<PiezoDrive>(*axis.piezo) : std::nullopt);
+    written_.push_back(axis.reads_back() ? std::nullopt : std::optional<WrittenOffsets>(axis));
+  }
   health_.name = config_.name;
   health_.kind = std::holds_alternative<ModbusTcp>(config_.line.link) ? "modbus_tcp" : "modbus_rtu";
 }
@@ -216,13 +223,13 @@ bool ModbusDialogue::synchronise() {
     const std::scoped_lock lock(health_mutex_);
     ++health_.connects;
   }
-  if (!read_set_numbers() || !read_all()) {
+  if (!read_set_numbers() || (gate_.link_is_new() && !read_written()) || !read_all()) {
     lose(refused_);
     return false;
   }
   restart_piezos();
   show_piezos();
-  gate_.synchronised(without_leaps_um());
+  gate_.synchronised(judged_um());
   publish(true);
   const std::scoped_lock lock(health_mutex_);
   health_.connected = true;
@@ -250,6 +257,53 @@ bool ModbusDialogue::read_set_numbers() {
   return true;
 }
 
+bool ModbusDialogue::read_written() {
+  constexpr int asked_max = 3;
+  for (std::size_t axis = 0; axis < written_.size(); ++axis) {
+    if (!written_[axis]) continue;
+    std::vector<std::uint16_t> words;
+    if (written_[axis]->count()) {
+      const ReadRequest& request = written_[axis]->request();
+      words.resize(request.count);
+      const Exchange exchange = with_retries([&] {
+        return connection_.read(config_.unit, request.table, request.address, words);
+      });
+      // A device may do without these registers, with an exception or in silence.
+      const bool is_refused = refused_ && exchange.fault() == Fault::device_error;
+      if (!exchange.ok() && !is_refused && ++written_asked_ < asked_max) {
+        const std::scoped_lock lock(health_mutex_);
+        ++health_.read_errors;
+        health_.last_error =
+            "reading from " + std::to_string(request.address) + ": " + describe(exchange);
+        return false;
+      }
+      if (!exchange.ok()) words.clear();
+    }
+    std::vector<double> stands = written_[axis]->decode(words);
+    if (piezos_[axis]) stands = {resting_um(*config_.axes[axis].piezo, stands.front())};
+    std::copy(stands.begin(), stands.end(),
+              state_.applied_um.begin() + static_cast<std::ptrdiff_t>(first_[axis]));
+  }
+  written_asked_ = 0;
+  return true;
+}
+
+void ModbusDialogue::compare_written() {
+  bool held = true;
+  for (std::optional<WrittenOffsets>& written : written_) {
+    if (!written || !written->is_to_be_compared()) continue;
+    const ReadRequest& request = written->request();
+    std::vector<std::uint16_t> words(request.count);
+    const Exchange exchange =
+        connection_.read(config_.unit, request.table, request.address, words);
+    if (!exchange.ok()) continue;
+    written->compare(words);
+    held = held && written->count();
+  }
+  // What the registers showed when the link began was nothing that was written.
+  if (!held) lose(false);
+}
+
 /// One period: read, and write only while what was read can be explained by what was written. In
 /// this order nothing computed before a re-homing was seen is written after it was (a command tells
 /// which look it knew of), and a controller that is slowly read gets the newest command all the
@@ -267,7 +321,8 @@ void ModbusDialogue::exchange() {
     look_for_command();
     const SendVerdict verdict = gate_.verdict(connection_.now());
     if (verdict == SendVerdict::resynchronise) lose(true);
-    if (verdict != SendVerdict::send || write_command()) return;
+    if (verdict != SendVerdict::send) return;
+    if (write_command()) return compare_written();
     if (refused_ || retries == 0 || !connection_.connected() || ending_.load())
       return lose_by_write();
   }
@@ -276,8 +331,8 @@ void ModbusDialogue::exchange() {
 bool ModbusDialogue::look() {
   if (!read_all()) return false;
   show_piezos();
-  if (!gate_.explains(without_leaps_um())) {
-    gate_.synchronised(without_leaps_um());
+  if (!gate_.explains(judged_um())) {
+    gate_.synchronised(judged_um());
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = "the controller applies what it was not sent";
   }
@@ -325,6 +380,7 @@ void ModbusDialogue::add_axis(std::size_t axis, const OffsetCommand& command,
     fields.push_back(field_of(offset, WriteStage::offset, value,
                               {offset.encoding, offset.word_order, offset.scale, 0.0}));
   }
+  if (written_[axis]) written_[axis]->wrote(fields.back());
   valid_bits += std::ldexp(1.0, static_cast<int>(axis));
 }
 
@@ -469,10 +525,12 @@ void ModbusDialogue::show_piezos() {
   }
 }
 
-std::array<double, axes_max> ModbusDialogue::without_leaps_um() const noexcept {
+std::array<double, axes_max> ModbusDialogue::judged_um() const noexcept {
   std::array<double, axes_max> applied_um = state_.applied_um;
-  for (std::size_t axis = 0; axis < piezos_.size(); ++axis)
-    if (piezos_[axis]) applied_um[first_[axis]] = not_a_number;
+  for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
+    if (piezos_[axis] || written_[axis])
+      for (std::size_t i = 0; i < config_.axes[axis].offsets(); ++i)
+        applied_um[first_[axis] + i] = not_a_number;
   return applied_um;
 }
 

@@ -13,6 +13,7 @@
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/kinds/modbus/piezo_drive.hpp"
+#include "drivers/controllers/kinds/modbus/written_offsets.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/wait_free_slot.hpp"
@@ -33,6 +34,9 @@ namespace thermocomp {
 /// with a number of its own (ModbusTravel), while all of them are valid. The numbers go on from the
 /// one that stands in `end` whenever everything is read anew: a set that was broken off, by whoever
 /// wrote before, is never taken for one that is whole.
+///
+/// Of an axis that is not read back, a new link reads the registers that are written instead, once
+/// (WrittenOffsets): applied_um is what stood in them then, NaN where that cannot be read.
 ///
 /// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
 /// heartbeat counts up with every command written and starts anew when its register is full. Valid
@@ -62,6 +66,11 @@ class ModbusDialogue {
   bool synchronise();
   /// The numbers of the sets that stand in the registers. False: they could not be read.
   bool read_set_numbers();
+  /// What stands in the registers of axes that are not read back. False: asked in vain, to be tried
+  /// again.
+  bool read_written();
+  /// Whether registers that are not read back hold what was just written.
+  void compare_written();
   void exchange();
   /// Reads all and begins a new epoch where that is not explained. False: it could not be read.
   bool look();
@@ -79,7 +88,7 @@ class ModbusDialogue {
   void take(std::span<const std::vector<std::uint16_t>> answers);
   void restart_piezos();
   void show_piezos();
-  [[nodiscard]] std::array<double, axes_max> without_leaps_um() const noexcept;
+  [[nodiscard]] std::array<double, axes_max> judged_um() const noexcept;
   void publish(bool online);
   void lose(bool same_link);
   void lose_by_write();
@@ -96,7 +105,9 @@ class ModbusDialogue {
   ReadPlan read_plan_;
   ModbusConnection& connection_;
   WriteGate gate_;
-  std::vector<std::optional<PiezoDrive>> piezos_;  ///< one an axis
+  std::vector<std::optional<PiezoDrive>> piezos_;       ///< one an axis
+  std::vector<std::optional<WrittenOffsets>> written_;  ///< one an axis; none: it is read back
+  int written_asked_{0};                                ///< in vain, one after the other
   std::array<double, axes_max> shown_V_{};         ///< by the amplifiers of piezos, one an axis
   std::vector<std::vector<double>> shown_sets_;    ///< one an axis: ModbusTravel::applied
   std::vector<std::uint64_t> set_numbers_;         ///< one an axis: of the set written last

@@ -1,0 +1,59 @@
+/// The offsets sent last, where they outlive the process: a small file that is mapped into memory.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/estimator_config.hpp"
+#include "estimator/types.hpp"
+
+namespace thermocomp {
+
+/// By axis [um].
+using Offsets = std::map<std::string, double>;
+
+/// Two places, written in turn, each with a number and a checksum: a process that ends while it
+/// writes one leaves the other. The checksum holds the boot of the system, the controller, names
+/// and signs of the axes, so that nobody else's offsets are taken for these. The file belongs into
+/// a folder in memory (/run): on a disk the system may keep a store waiting.
+class LastSent {
+ public:
+  /// @param file        made where there is none
+  /// @param controller  to which the offsets are sent
+  /// @throws std::runtime_error
+  LastSent(const std::filesystem::path& file, const std::string& controller,
+           const std::vector<AxisConfig>& axes);
+  ~LastSent();
+  LastSent(const LastSent&) = delete;
+  LastSent& operator=(const LastSent&) = delete;
+
+  /// As the process before left them, of this boot, controller and axes.
+  [[nodiscard]] const Offsets& before() const noexcept { return before_; }
+
+  /// Before a command is offered to the controller: plain stores, no system call. An axis that is
+  /// not driven keeps what it was sent last.
+  /// @param forgotten  by bits, one an axis: what it was sent last is worth nothing any more
+  void note(const OffsetCommand& command, std::uint32_t forgotten) noexcept;
+
+ private:
+  struct Place {
+    std::uint64_t number{0};  ///< 0: never written
+    std::array<double, axes_max> offset_um{};
+    std::uint64_t known{0};  ///< by bits, one an axis
+    std::uint64_t checksum{0};
+  };
+  [[nodiscard]] std::uint64_t checksum_of(const Place& place) const noexcept;
+
+  const std::uint64_t key_;
+  std::size_t axes_;
+  Place* places_{nullptr};  ///< the file
+  Place now_;
+  Offsets before_;
+};
+
+}  // namespace thermocomp

@@ -1,0 +1,113 @@
+// What of the offsets sent last outlives a process, whenever that ends.
+#include "daemon/state/last_sent.hpp"
+
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "history_fixture.hpp"
+
+using namespace thermocomp;
+using namespace thermocomp::testing;
+
+namespace {
+
+std::vector<AxisConfig> two_axes(double sign_of_x = 1.0) {
+  return {{"z", "z_um", 1.0, {}, {}}, {"x", "x_um", sign_of_x, {}, {}}};
+}
+
+OffsetCommand command(double z_um, double x_um, bool x_is_driven = true) {
+  OffsetCommand made;
+  made.offset_um = {z_um, x_um};
+  made.valid = {true, x_is_driven};
+  return made;
+}
+
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+void write(const std::filesystem::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+Offsets left_in(const std::filesystem::path& file, const std::vector<AxisConfig>& axes = two_axes(),
+                const std::string& controller = "cnc") {
+  return LastSent(file, controller, axes).before();
+}
+
+}  // namespace
+
+TEST_CASE("the next process finds what was sent last", "[last_sent]") {
+  const TempFolder folder;
+  CHECK(left_in(folder / "sent").empty());
+  {
+    LastSent sent(folder / "sent", "cnc", two_axes());
+    sent.note(command(-3.25, 7.0), 0);
+    sent.note(command(-3.5, 99.0, false), 0);
+  }
+  CHECK(left_in(folder / "sent") == Offsets{{"z", -3.5}, {"x", 7.0}});
+  // Not driven yet, it goes on knowing what the one before knew.
+  CHECK(left_in(folder / "sent") == Offsets{{"z", -3.5}, {"x", 7.0}});
+  {
+    LastSent sent(folder / "sent", "cnc", two_axes());
+    sent.note(command(-3.75, 0.0, false), 0b10);
+  }
+  CHECK(left_in(folder / "sent") == Offsets{{"z", -3.75}});
+}
+
+TEST_CASE("what was sent to another controller, axis or sign is not taken", "[last_sent]") {
+  const TempFolder folder;
+  { LastSent(folder / "sent", "cnc", two_axes()).note(command(1.0, 2.0), 0); }
+  CHECK(left_in(folder / "sent", two_axes(), "other").empty());
+  CHECK(left_in(folder / "sent", two_axes(-1.0)).empty());
+  std::vector<AxisConfig> swapped = two_axes();
+  std::swap(swapped[0], swapped[1]);
+  CHECK(left_in(folder / "sent", swapped).empty());
+  CHECK(left_in(folder / "sent").size() == 2);
+}
+
+TEST_CASE("a process that ends while it records leaves what was before, or after", "[last_sent]") {
+  const TempFolder folder;
+  const auto file = folder / "sent";
+  std::string before;
+  std::string after;
+  {
+    LastSent sent(file, "cnc", two_axes());
+    sent.note(command(1.0, 2.0), 0);
+    sent.note(command(1.5, 2.5), 0);
+    before = bytes_of(file);
+    sent.note(command(-40.0, 40.0), 0);
+    after = bytes_of(file);
+  }
+  REQUIRE(before.size() == after.size());
+  std::mt19937 random(3);
+  for (int i = 0; i < 400; ++i) {
+    // Any part of what differs may have been stored.
+    std::string torn = before;
+    for (std::size_t k = 0; k < torn.size(); ++k)
+      if (random() % 2 == 0) torn[k] = after[k];
+    write(file, torn);
+    const Offsets left = left_in(file);
+    CHECK((left == Offsets{{"z", 1.5}, {"x", 2.5}} || left == Offsets{{"z", -40.0}, {"x", 40.0}}));
+  }
+  for (std::size_t k = 0; k < after.size(); ++k) {
+    write(file, after.substr(0, k) + std::string(after.size() - k, '\xa5'));
+    for (const auto& [axis, um] : left_in(file)) CHECK(std::abs(um) <= 40.0);
+  }
+}
+
+TEST_CASE("a record that is no ordinary file is refused", "[last_sent]") {
+  const TempFolder folder;
+  std::filesystem::create_directory(folder / "sent");
+  CHECK_THROWS(left_in(folder / "sent"));
+  std::filesystem::create_symlink(folder / "elsewhere", folder / "link");
+  CHECK_THROWS(left_in(folder / "link"));
+  CHECK_THROWS(left_in("/nowhere/sent"));
+  write(folder / "short", "x");
+  CHECK(left_in(folder / "short").empty());
+}
