@@ -17,6 +17,10 @@ constexpr double expectation_share = 0.5;
 /// ... and contradicts one that is off by more than so many, and by more than the allowance.
 constexpr double unexpected_sd = 2.5;
 
+/// A module shows a change late, and as a step: it renews its values once a second or more slowly,
+/// and filters them.
+constexpr nanoseconds shown_late_max = std::chrono::seconds{2};
+
 /// Half, so that a difference to it is one.
 constexpr nanoseconds long_ago = nanoseconds::min() / 2;
 
@@ -161,7 +165,12 @@ double Screening::change_K(nanoseconds unread) const noexcept {
 /// Whether the structure can have come from the last value that counted to the newest one.
 bool Screening::possible() const noexcept {
   const double off_K = std::abs(state_.newest.temp_degC - state_.good.temp_degC);
-  const double allowed_K = allowance_K_ + change_K(state_.unread);
+  const nanoseconds since_good = state_.newest.at - state_.good.at;
+  const nanoseconds late =
+      since_good <= stale_after_ ? std::min(since_good, shown_late_max) : nanoseconds{0};
+  const double allowed_K =
+      allowance_K_ +
+      std::max(change_K(state_.unread), rate_K_per_ns_ * static_cast<double>(late.count()));
   if (off_K <= allowed_K) return true;
   if (!state_.jumped) return false;
   const auto jumped_ns = static_cast<double>((state_.newest.at - state_.jumped_at).count());

@@ -12,12 +12,13 @@ namespace thermocomp {
 ///
 /// A value T follows the last one that counted, T0, when
 ///
-///     |T - T0| <= rate_allowance_K + min(rate u, outage_K_max + 10 K/h u),
+///     |T - T0| <= rate_allowance_K + max(rate min(t, 2 s), min(rate u, outage_K_max + 10 K/h u)),
 ///
-/// where u is how long *nothing* was read. A value that is there and does not follow (a jump) adds
-/// nothing to u, however long it lasts: it counts when its neighbours expect it, when an operator
-/// accepts it, or when it returns to where T0 allows. After a jump J a return may miss by 10 K/h
-/// since its begin, up to J / 4.
+/// where t is the time since T0 while T0 serves, and u how long *nothing* was read. Modules show a
+/// change late and as a step, hence the 2 s. A value that is there and does not follow (a jump)
+/// adds nothing to u, however long it lasts: it counts when its neighbours expect it, when an
+/// operator accepts it, or when it returns to where T0 allows. After a jump J a return may miss by
+/// 10 K/h since its begin, up to J / 4.
 ///
 /// After an outage, and at the start, a value counts once readings have followed each other for
 /// settle_s, at least settle_readings of them. An exact 0 does not settle: devices give it while

@@ -153,7 +153,7 @@ TEST_CASE("writes that fail are one outage with what failed, a single one is non
   bench.log.note_controller(controller);
   const auto told = bench.about("writes to controller plc");
   REQUIRE(told.size() == 2);
-  CHECK(told[0].what == "the controller refuses writes (function 16, register 100)");
-  CHECK(told[1].kind == "recovery");
+  CHECK(what_text(told[0]) == "the controller refuses writes (function 16, register 100)");
+  CHECK(told[1].kind == EventKind::recovery);
   CHECK(told[1].duration_s == Approx(10.0));
 }

@@ -23,6 +23,7 @@ ModeInput working(int second) {
   ModeInput input;
   input.time = {std::chrono::seconds(second), 1.0, second == 0};
   input.displacement_known = input.controller_online = input.axes_synced = true;
+  input.controller_written = true;
   return input;
 }
 
@@ -34,12 +35,13 @@ ModeInput lost(int second) {
 
 }  // namespace
 
-TEST_CASE("it compensates as soon as displacement, controller and what it applies are known",
+TEST_CASE("it compensates once displacement and controller are known and the offsets are written",
           "[mode]") {
   ModeDecision decision(config());
   ModeInput input = working(0);
-  bool ModeInput::*const missing = GENERATE(&ModeInput::displacement_known,
-                                            &ModeInput::controller_online, &ModeInput::axes_synced);
+  bool ModeInput::*const missing =
+      GENERATE(&ModeInput::displacement_known, &ModeInput::controller_online,
+               &ModeInput::axes_synced, &ModeInput::controller_written);
   input.*missing = false;
   CHECK(decision.step(input) == Mode::starting);
   CHECK(decision.step(working(1)) == Mode::compensating);

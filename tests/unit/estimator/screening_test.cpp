@@ -165,6 +165,12 @@ TEST_CASE("a step that is there stays refused, however long it lasts", "[screeni
   CHECK(screening.jumped_at() == 20s);
 }
 
+TEST_CASE("a step that a module shows late is followed within two seconds", "[screening]") {
+  Screening screening(settling());
+  look_each_second(screening, 0s, 20s, 20.0);
+  CHECK(look_each_second(screening, 20s, 30s, 22.0) > 0);
+}
+
 TEST_CASE("a step is too_fast while the value before it serves, and then unconfirmed",
           "[screening]") {
   Screening screening(settling());

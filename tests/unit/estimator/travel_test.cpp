@@ -55,6 +55,7 @@ struct TravelMachine : Machine {
       readings[i] = {temps_degC[i], now,
                      std::isnan(temps_degC[i]) ? Fault::open_circuit : Fault::none};
     controller.taken_at = now;
+    controller.written = controller.online;
     estimator.step(now, readings, controller, command);
     for (std::size_t i = 0; i < count && controller.online; ++i)
       if (command.valid[i] && !stuck) controller.applied_um[i] = command.offset_um[i];
