@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/check/check_command.hpp"
-#include "cli/common/command_slip.hpp"
 #include "cli/history/history_commands.hpp"
 #include "cli/import/import_command.hpp"
 #include "cli/init/init_command.hpp"
@@ -13,6 +12,7 @@
 #include "cli/operate/operate_commands.hpp"
 #include "cli/report/report_command.hpp"
 #include "cli/scan/scan_command.hpp"
+#include "report/command_slip.hpp"
 
 namespace thermocomp::cli {
 

@@ -2,7 +2,7 @@
 /// all made from what is declared here.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -8,10 +8,10 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/common/command.hpp"
 #include "cli/common/daemon_client.hpp"
 #include "config/text/clean_output.hpp"
 #include "config/text/problems.hpp"
+#include "report/command.hpp"
 
 namespace {
 

@@ -4,13 +4,13 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/command_slip.hpp"
 #include "modelling/diagnosis/command/diagnose_command.hpp"
 #include "modelling/experiments/plan_command.hpp"
 #include "modelling/identification/equation/group_command.hpp"
 #include "modelling/identification/families/fit_command.hpp"
 #include "modelling/identification/gate/tiebar_command.hpp"
 #include "modelling/inspection/inspect_command.hpp"
+#include "report/command_slip.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/placement/place_command.hpp"
 #include "modelling/structure/structure_command.hpp"

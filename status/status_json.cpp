@@ -29,7 +29,7 @@ json value_of(Fault fault) {
 }
 json value_of(const Event& event) {
   return {{"number", event.number},
-          {"wall_s", event.wall_s},
+          {"wall_s", value_of(event.wall_s)},
           {"kind", to_string(event.kind)},
           {"about", to_string(event.subject.kind)},
           {"name", event.subject.name},

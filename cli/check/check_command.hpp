@@ -1,7 +1,7 @@
 /// check: a daemon's configuration with its model, every problem at once.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/common/command.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/socket/status_client.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -9,14 +9,14 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
-#include "cli/common/terminal.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/runs/run_file.hpp"
 #include "daemon/history/replay/history_check.hpp"
 #include "daemon/history/replay/replay.hpp"
 #include "daemon/history/replay/run_replay.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::cli {
 

@@ -1,7 +1,7 @@
 /// export, replay: what the daemon's history holds, and whether it can be reproduced.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

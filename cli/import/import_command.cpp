@@ -10,11 +10,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
 #include "cli/import/import_log.hpp"
 #include "cli/import/joined_runs.hpp"
 #include "config/runs/run_file.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -1,7 +1,7 @@
 /// `thermocomp import LOG -o RUN.csv`
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

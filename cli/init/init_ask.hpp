@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/common/command.hpp"
 #include "cli/init/init_draft.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -15,8 +15,6 @@
 #include <CLI/CLI.hpp>
 #include <system_error>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/terminal.hpp"
 #include "cli/init/init_ask.hpp"
 #include "cli/init/init_probe.hpp"
 #include "cli/init/init_specs.hpp"
@@ -24,6 +22,8 @@
 #include "config/daemon/daemon_config.hpp"
 #include "config/model/model_file.hpp"
 #include "config/toml/toml_text.hpp"
+#include "report/output_file.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -1,7 +1,7 @@
 /// `thermocomp init`: from a bare machine to a configuration that passes `check`.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

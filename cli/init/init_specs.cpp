@@ -9,7 +9,7 @@
 
 #include <system_error>
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 namespace {

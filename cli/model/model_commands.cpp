@@ -7,17 +7,17 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
 #include "cli/model/course_fit.hpp"
 #include "cli/model/covariance_fit.hpp"
 #include "cli/model/prediction.hpp"
-#include "cli/records/record_loader.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
+#include "daemon/history/replay/record_loader.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 #include "simulator/files/machine_file.hpp"
 #include "simulator/plant/simulate.hpp"
 

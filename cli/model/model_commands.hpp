@@ -1,7 +1,7 @@
 /// predict, simulate: what a model says about a run, and runs of a machine that does not exist.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -1,7 +1,7 @@
 /// The modelling subcommands, which a program of another package carries out.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

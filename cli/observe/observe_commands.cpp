@@ -15,7 +15,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common/daemon_client.hpp"
-#include "cli/common/terminal.hpp"
 #include "cli/observe/axis_trends.hpp"
 #include "cli/observe/status_text.hpp"
 #include "cli/observe/truth_file.hpp"
@@ -23,6 +22,7 @@
 #include "config/text/clean_output.hpp"
 #include "daemon/history/format/recorded_event.hpp"
 #include "daemon/socket/status_client.hpp"
+#include "report/terminal.hpp"
 #include "status/status_json.hpp"
 #include "status/verdict.hpp"
 

@@ -1,7 +1,7 @@
 /// status, sensors, watch: what the running daemon does.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

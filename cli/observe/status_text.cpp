@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cli/common/terminal.hpp"
+#include "report/terminal.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"
 #include "status/verdict.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/common/terminal.hpp"
+#include "report/terminal.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"
 #include "status/verdict.hpp"

@@ -2,7 +2,7 @@
 /// program) asks of the running daemon.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "cli/common/terminal.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::cli {
 namespace {

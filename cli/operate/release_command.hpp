@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -8,10 +8,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
 #include "cli/report/machine_week.hpp"
 #include "cli/report/week_page.hpp"
 #include "daemon/history/format/history_time.hpp"
+#include "report/output_file.hpp"
 
 namespace thermocomp::cli {
 namespace {

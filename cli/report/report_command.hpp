@@ -1,7 +1,7 @@
 /// `thermocomp report HISTORY.db -o REPORT.html`
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

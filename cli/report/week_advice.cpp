@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/report/week_page.hpp"
-#include "modelling/markup/html_page.hpp"
+#include "report/html_page.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"
 

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
-#include "modelling/markup/html_page.hpp"
-#include "modelling/markup/svg_plot.hpp"
+#include "report/html_page.hpp"
+#include "report/svg_plot.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"
 

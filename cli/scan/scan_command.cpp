@@ -8,11 +8,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/common/terminal.hpp"
 #include "cli/scan/scan_bus.hpp"
 #include "cli/scan/scan_controller.hpp"
 #include "cli/scan/scan_report.hpp"
 #include "config/daemon/daemon_config.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::cli {
 namespace {

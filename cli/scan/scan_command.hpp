@@ -1,7 +1,7 @@
 /// `thermocomp scan`: every channel of a configuration, live and without the daemon.
 #pragma once
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/common/terminal.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
 #include "modelling/experiments/test_plan.hpp"
+#include "report/output_file.hpp"
 
 namespace thermocomp::experiments {
 namespace {

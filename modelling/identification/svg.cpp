@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "modelling/identification/printed.hpp"
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -6,10 +6,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
-#include "cli/common/terminal.hpp"
 #include "modelling/inspection/inspection.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::inspection {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "config/text/units.hpp"
 #include "modelling/inspection/inspection.hpp"
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp::inspection {
 namespace {

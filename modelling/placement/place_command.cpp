@@ -6,8 +6,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
 #include "modelling/placement/comparison.hpp"
+#include "report/output_file.hpp"
 
 namespace thermocomp::placement {
 namespace {

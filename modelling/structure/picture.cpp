@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <numeric>
 
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp::structure {
 namespace {

@@ -11,12 +11,12 @@
 #include <CLI/CLI.hpp>
 #include <sys/resource.h>
 
-#include "cli/common/output_file.hpp"
 #include "config/model/model_file.hpp"
 #include "modelling/structure/body_reduction.hpp"
 #include "modelling/structure/picture.hpp"
 #include "modelling/structure/structure_model.hpp"
 #include "modelling/structure/vtu_file.hpp"
+#include "report/output_file.hpp"
 
 namespace thermocomp::structure {
 namespace {

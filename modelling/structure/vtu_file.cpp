@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp::structure {
 namespace {

@@ -5,9 +5,9 @@
 #include <memory>
 #include <span>
 
-#include "modelling/markup/html_page.hpp"
-#include "modelling/markup/svg_plot.hpp"
 #include "modelling/thermal_test/test_report.hpp"
+#include "report/html_page.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp::thermal_test {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "config/text/problems.hpp"
-#include "modelling/markup/html_page.hpp"
+#include "report/html_page.hpp"
 
 namespace thermocomp::thermal_test {
 namespace {

@@ -8,13 +8,13 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/command.hpp"
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
-#include "cli/records/record_loader.hpp"
+#include "daemon/history/replay/record_loader.hpp"
 #include "modelling/thermal_test/test_data.hpp"
 #include "modelling/thermal_test/test_report.hpp"
 #include "modelling/thermal_test/test_sheet.hpp"
+#include "report/command.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::thermal_test {
 namespace {

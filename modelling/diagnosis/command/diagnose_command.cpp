@@ -11,8 +11,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/runs/run_overlap.hpp"
@@ -22,6 +20,8 @@
 #include "modelling/diagnosis/report/report_html.hpp"
 #include "modelling/diagnosis/thermal/corrected_machine.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -9,7 +9,7 @@
 #include "modelling/diagnosis/report/report_pictures.hpp"
 #include "modelling/diagnosis/report/report_texts.hpp"
 #include "modelling/diagnosis/report/report_words.hpp"
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -7,7 +7,7 @@
 #include <span>
 
 #include "modelling/diagnosis/report/report_words.hpp"
-#include "modelling/markup/svg_plot.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

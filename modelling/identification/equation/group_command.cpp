@@ -7,10 +7,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
 #include "modelling/identification/equation/similarity.hpp"
 #include "modelling/identification/svg.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::identification {
 namespace {

@@ -9,13 +9,13 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
-#include "cli/common/terminal.hpp"
 #include "config/model/model_file.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
 #include "modelling/identification/families/model_frame.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::identification {
 namespace {

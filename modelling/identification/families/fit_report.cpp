@@ -8,7 +8,7 @@
 #include "modelling/identification/families/families.hpp"
 #include "modelling/identification/printed.hpp"
 #include "modelling/identification/svg.hpp"
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp::identification {
 namespace {

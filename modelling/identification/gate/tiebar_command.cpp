@@ -10,14 +10,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/common/output_file.hpp"
-#include "cli/common/run_loader.hpp"
 #include "modelling/identification/gate/gate_file.hpp"
 #include "modelling/identification/gate/gate_machine.hpp"
 #include "modelling/identification/gate/one_tie.hpp"
 #include "modelling/identification/gate/tie_course.hpp"
 #include "modelling/identification/gate/tied_columns.hpp"
 #include "modelling/identification/printed.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::identification {
 namespace {

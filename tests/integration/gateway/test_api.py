@@ -14,7 +14,7 @@ def without_times(value):
     """Numbers that differ from one moment to the next taken out, so that two answers compare."""
     changing = {"age_s", "uptime_s", "mode_since_s", "compensating_s", "cycle", "socket", "last_commit_age_s",
                 "size_MB", "round_trip_ms", "requests", "answers", "writes", "reads", "state_s",
-                "rate_K_per_h", "ended", "outside_share_24h"}
+                "rate_K_per_h", "ended", "outside_share_24h", "last_confirmed_s"}
     if isinstance(value, dict):
         return {k: without_times(v) for k, v in value.items() if k not in changing}
     if isinstance(value, list):

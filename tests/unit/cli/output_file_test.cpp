@@ -1,4 +1,4 @@
-#include "cli/common/output_file.hpp"
+#include "report/output_file.hpp"
 
 #include <cstdlib>
 #include <fcntl.h>
@@ -11,8 +11,8 @@
 #include <catch2/catch.hpp>
 #include <sys/stat.h>
 
-#include "cli/common/command.hpp"
 #include "cli/observe/truth_file.hpp"
+#include "report/command.hpp"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include "modelling/diagnosis/report/report_html.hpp"
 #include "modelling/diagnosis/report/report_texts.hpp"
 #include "modelling/diagnosis/report/report_words.hpp"
-#include "modelling/markup/svg_plot.hpp"
-#include "modelling/markup/xml_text.hpp"
+#include "report/svg_plot.hpp"
+#include "report/xml_text.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

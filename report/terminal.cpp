@@ -1,4 +1,4 @@
-#include "cli/common/terminal.hpp"
+#include "report/terminal.hpp"
 
 #include <cmath>
 #include <cstdio>

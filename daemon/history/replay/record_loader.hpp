@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "cli/common/run_loader.hpp"
 #include "config/runs/run_file.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::cli {
 

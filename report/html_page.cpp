@@ -1,9 +1,9 @@
-#include "modelling/markup/html_page.hpp"
+#include "report/html_page.hpp"
 
 #include <cmath>
 #include <cstdio>
 
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp {
 namespace {

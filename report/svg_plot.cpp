@@ -1,10 +1,10 @@
-#include "modelling/markup/svg_plot.hpp"
+#include "report/svg_plot.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp {
 namespace {

@@ -1,4 +1,4 @@
-#include "cli/common/run_loader.hpp"
+#include "report/run_loader.hpp"
 
 #include <algorithm>
 #include <cstdio>

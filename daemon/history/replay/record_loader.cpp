@@ -1,4 +1,4 @@
-#include "cli/records/record_loader.hpp"
+#include "daemon/history/replay/record_loader.hpp"
 
 #include <cstdio>
 #include <filesystem>
@@ -7,8 +7,8 @@
 #include <sstream>
 #include <string_view>
 
-#include "cli/common/terminal.hpp"
 #include "daemon/history/replay/replay.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::cli {
 

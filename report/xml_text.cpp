@@ -1,4 +1,4 @@
-#include "modelling/markup/xml_text.hpp"
+#include "report/xml_text.hpp"
 
 namespace thermocomp {
 

@@ -1,4 +1,4 @@
-#include "cli/common/command_slip.hpp"
+#include "report/command_slip.hpp"
 
 #include <algorithm>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "cli/common/output_file.hpp"
+#include "report/output_file.hpp"
 
 #include <cerrno>
 #include <csignal>
@@ -12,7 +12,7 @@
 #include <sys/sysmacros.h>
 #include <system_error>
 
-#include "cli/common/command.hpp"
+#include "report/command.hpp"
 
 namespace thermocomp::cli {
 
