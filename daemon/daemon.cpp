@@ -32,6 +32,8 @@ namespace {
 /// At 1 Hz it ends within a second.
 constexpr auto cycle_ends_within = std::chrono::seconds(3);
 
+constexpr auto history_ends_within = std::chrono::seconds(4);
+
 Grid make_grid(const LoopConfig& loop) {
   return {std::chrono::steady_clock::now().time_since_epoch(),
           nanoseconds(std::llround(1e9 / loop.rate_hz))};
@@ -87,7 +89,8 @@ struct Locks {
   }
   std::vector<NameLock> controller;
   std::optional<FileLock> state;
-  std::vector<std::string> warnings;  ///< the state file's folder takes no file, nobody else's either
+  std::vector<std::string>
+      warnings;  ///< the state file's folder takes no file, nobody else's either
 };
 
 /// Beside the status socket. A dry run sends nothing, and leaves the record of who did.
@@ -151,8 +154,8 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain(),
             last_sent.get()),
       operations({config, cycle, keeper, service, history.get(),
-                  [this] { return status_line(supervisor.view()); },
-                  &journal, [this] { return server.caller(); }, start_state.state.reference_degC}),
+                  [this] { return status_line(supervisor.view()); }, &journal,
+                  [this] { return server.caller(); }, start_state.state.reference_degC}),
       supervisor({config, sources, *link, history.get(), keeper, server, signals, service,
                   operations, journal, locks.controller}) {
   if (history) journal.tell([this](const Event& event) { history->note(event); });
@@ -229,7 +232,12 @@ void Daemon::Parts::stop() noexcept {
     spdlog::error("state not saved: {}", error.what());
   }
   cycle.finish_recording();
-  if (history) history->stop();
+  if (history && !history->stop_within(history_ends_within)) {
+    spdlog::error("the history's disk does not answer: what it has not committed is lost");
+    spdlog::info("stopped; {}", what_stays(config));
+    static_cast<void>(flush_log(std::chrono::seconds(1)));
+    std::_Exit(EXIT_SUCCESS);
+  }
   supervisor.note_history();
 }
 

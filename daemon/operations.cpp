@@ -149,8 +149,8 @@ RpcPending Operations::reload() {
     }
     if (Clock::now() < late) return std::nullopt;
     throw RpcError(rpc::internal_error,
-                   fmt::format("the files are not read after {} s: the disk does not answer; the "
-                               "reload goes on when it does",
+                   fmt::format("the files are not read and the model is not built after {} s; "
+                               "the reload goes on",
                                patience_s));
   };
 }
@@ -318,13 +318,15 @@ void Operations::save_state(bool at_once) {
 }
 
 /// What is on disk, where that is new.
-/// @param again  also where an axis waits and nothing is on its way to the disk: then no other state
+/// @param again  also where an axis waits and nothing is on its way to the disk: then no other
+/// state
 ///               than this can be there
 void Operations::tell_saved(bool again) {
   const std::vector<AxisReport>& axes = cycle_.report().axes;
-  const bool is_waited_for =
-      again && !parts_.keeper.is_busy() && parts_.keeper.error().empty() &&
-      std::any_of(axes.begin(), axes.end(), [](const AxisReport& axis) { return axis.waits_for_disk; });
+  const bool is_waited_for = again && !parts_.keeper.is_busy() && parts_.keeper.error().empty() &&
+                             std::any_of(axes.begin(), axes.end(), [](const AxisReport& axis) {
+                               return axis.waits_for_disk;
+                             });
   const SavedState& on_disk = parts_.keeper.on_disk();
   if (on_disk.serial == told_serial_ && !is_waited_for) return;
   if (cycle_.replacing() || (saved_told_ && *saved_told_ == Outcome::waiting)) return;

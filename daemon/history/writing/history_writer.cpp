@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <pthread.h>
+#include <time.h>
 #include <vector>
 
 #include <sys/statvfs.h>
@@ -420,13 +421,28 @@ void HistoryWriter::start() {
 
 void HistoryWriter::stop() noexcept {
   if (!parts_->running) return;
+  ask_to_stop();
+  pthread_join(parts_->thread, nullptr);
+  parts_->running = false;
+}
+
+bool HistoryWriter::stop_within(std::chrono::seconds at_most) noexcept {
+  if (!parts_->running) return true;
+  ask_to_stop();
+  timespec until{};
+  clock_gettime(CLOCK_MONOTONIC, &until);
+  until.tv_sec += at_most.count();
+  if (pthread_clockjoin_np(parts_->thread, nullptr, CLOCK_MONOTONIC, &until) != 0) return false;
+  parts_->running = false;
+  return true;
+}
+
+void HistoryWriter::ask_to_stop() noexcept {
   {
     const std::lock_guard lock(parts_->mutex);
     parts_->stopping = true;
   }
   parts_->wake.notify_all();
-  pthread_join(parts_->thread, nullptr);
-  parts_->running = false;
 }
 
 std::vector<std::string> HistoryWriter::take_news() {

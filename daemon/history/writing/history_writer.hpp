@@ -1,6 +1,7 @@
 /// Puts what the cycle recorded on disk.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -68,11 +69,16 @@ class HistoryWriter {
   void work();
   /// Writes what is left and closes the file. Gives up on a disk that does not work after one try.
   void stop() noexcept;
+  /// The same for a caller that waits for no disk.
+  /// @return false: it has not ended, and only the end of the process will end it
+  [[nodiscard]] bool stop_within(std::chrono::seconds at_most) noexcept;
   [[nodiscard]] HistoryStatistics statistics() const;
   /// What happened to rows or files since the last call, one sentence each. Any ordinary thread.
   [[nodiscard]] std::vector<std::string> take_news();
 
  private:
+  void ask_to_stop() noexcept;
+
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };

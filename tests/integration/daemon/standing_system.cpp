@@ -45,13 +45,23 @@ void stand(const char* call, const char* path) {
   for (int i = 0; i < 1200 && ::access(file, F_OK) == 0; ++i) ::nanosleep(&pause, nullptr);
 }
 
-}  // namespace
-
-extern "C" int fsync(int file) {
+void stand_at_disk(int file) {
   std::array<char, 4096> path{};
   const std::string link = "/proc/self/fd/" + std::to_string(file);
   if (::readlink(link.c_str(), path.data(), path.size() - 1) > 0) stand("fsync", path.data());
+}
+
+}  // namespace
+
+extern "C" int fsync(int file) {
+  stand_at_disk(file);
   static const auto next = real(&fsync, "fsync");
+  return next(file);
+}
+
+extern "C" int fdatasync(int file) {
+  stand_at_disk(file);
+  static const auto next = real(&fdatasync, "fdatasync");
   return next(file);
 }
 

@@ -108,6 +108,18 @@ def test_a_disk_that_takes_seconds_to_save_the_state(lab, manager):
     watched.end(within_s=12.0)
 
 
+def test_a_disk_that_takes_seconds_to_commit_the_history(lab, manager):
+    watched = Watched(lab, manager, "fsync:history.db")
+    watched.start()
+    watched.daemon.committed()
+    watched.stands.touch()
+    watched.ask_for(3.0)
+    assert watched.ask("disable") == {"done": True}
+    watched.judge()
+    watched.end(within_s=10.0)
+    assert "has not committed is lost" in watched.daemon.log_text()
+
+
 def test_files_on_a_disk_that_does_not_answer_hold_a_reload_and_nothing_else(lab, manager):
     watched = Watched(lab, manager, "open:model.toml")
     watched.start()

@@ -308,6 +308,38 @@ const char* const with_course =
 
 }  // namespace
 
+TEST_CASE("a model that costs the daemon too much is refused", "[config][model]") {
+  std::string text = good;
+  for (int i = 0; i < 2000; ++i)
+    text +=
+        "[[term]]\nkind = \"thermal_lag\"\nsubject = \"a_degC\"\ntau_s = " + std::to_string(i + 1) +
+        "\ngain_um_per_K = { z_um = 0.001 }\n";
+  const std::vector<Problem> many = read_model_text(text, "m.toml").problems;
+  REQUIRE(many.size() == 1);
+  CHECK(many.front().key == "term");
+  CHECK(many.front().value == "2003 terms");
+  CHECK(many.front().rule == "must be at most 2000");
+
+  // Of 16 time constants and 256 columns each, with gains for both outputs.
+  text = good;
+  std::string columns;
+  std::string rows;
+  for (int i = 0; i < 256; ++i) {
+    columns += (i > 0 ? ", \"s" : "\"s") + std::to_string(i) + "_rpm\"";
+    rows += (i > 0 ? ", [" : "[") + std::string("0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0]");
+  }
+  for (int i = 0; i < 82; ++i)
+    text += "[[term]]\nkind = \"lag_bank\"\nsubjects = [" + columns +
+            "]\ntau_s = [1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]\n"
+            "gain_um_per_unit = { z_um = [" +
+            rows + "], c_urad = [" + rows + "] }\n";
+  const ModelReading reading = read_model_text(text, "m.toml");
+  const double operations = model_operations(reading.model);
+  CHECK(operations > 82 * 256 * 16 * 3);
+  REQUIRE(reading.problems.size() == 1);
+  CHECK_THAT(reading.problems.front().rule, Catch::Contains("must take at most 1000000"));
+}
+
 TEST_CASE("a recorded course is read and written bit for bit", "[config][model]") {
   const ThermalModel model = parse_model(with_course, "model.toml");
   REQUIRE(model.course);
