@@ -34,8 +34,8 @@ class Operations {
     Cycle& cycle;
     StateKeeper& keeper;
     ServiceManager& service;
-    HistoryWriter* history;                    ///< none: no history
-    std::function<std::string()> status_line;  ///< for the service manager
+    HistoryWriter* history;                       ///< none: no history
+    std::function<std::string()> status_line;     ///< for the service manager
     EventJournal* journal{nullptr};               ///< none: nothing is noted
     std::function<std::int64_t()> asking_user{};  ///< of the request in hand; -1: nobody known
     /// By column, when the daemon started: what differs from it was taken since.

@@ -53,9 +53,10 @@ void refuse_beyond_bound(const DaemonConfig& config, const std::string& source, 
     const double bound_um = axis.limiter.offset_um_max;
     // Negated, so that NaN is out too.
     if (found == offset_um.end() || std::abs(found->second) <= bound_um) continue;
-    warnings.push_back(fmt::format("{}: offset_um.{} = {:g} is beyond this configuration's "
-                                   "offset_um_max = {:g} and is not taken",
-                                   source, axis.name, found->second, bound_um));
+    warnings.push_back(
+        fmt::format("{}: offset_um.{} = {:g} is beyond this configuration's "
+                    "offset_um_max = {:g} and is not taken",
+                    source, axis.name, found->second, bound_um));
     offset_um.erase(found);
   }
 }

@@ -51,9 +51,7 @@ class AxisBank {
   void saved(std::size_t axis, double offset_um) noexcept { axes_[axis].saved(offset_um); }
 
   /// Before the first step: what was sent last before the restart.
-  void restore(std::size_t axis, const SentBefore& before) noexcept {
-    axes_[axis].restore(before);
-  }
+  void restore(std::size_t axis, const SentBefore& before) noexcept { axes_[axis].restore(before); }
   /// @param axes  from plan_names()
   void adopt(const AxisBank& previous, const std::vector<int>& axes) noexcept;
   void visit_state(StateArchive& archive);

@@ -64,8 +64,8 @@ void AxisChannel::move(const AxisInput& input) noexcept {
   state_.driven_at = input.now;
   state_.target_um = input.target_um;
   if (proving()) state_.target_um = prove_target_um(input.now);
-  // Without a read-back to start from again, nothing moves that is not known to reach the controller:
-  // what is sent first on a link is what was sent last.
+  // Without a read-back to start from again, nothing moves that is not known to reach the
+  // controller: what is sent first on a link is what was sent last.
   const bool reaches = (input.online && input.written) || reads_back_;
   if (input.may_change && state_.stands_for == 0 && reaches)
     limiter_.step(in_corridor() ? within_corridor(state_.target_um) : state_.target_um, input.dt_s);
@@ -131,9 +131,9 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
     return start_from(input.now, limiter_.offset_um());
   }
   start_.no_registers = false;
-  const bool agrees = start_.by == StartEvidence::unknown ||
-                      (state_.driven_once ? check_.agrees_after_absence(register_um)
-                                          : check_.agrees(register_um));
+  const bool agrees =
+      start_.by == StartEvidence::unknown ||
+      (state_.driven_once ? check_.agrees_after_absence(register_um) : check_.agrees(register_um));
   state_.out_of_bound = is_out_of_bound(register_um);
   start_.unknown = !agrees || state_.out_of_bound;
   if (start_.unknown) return;

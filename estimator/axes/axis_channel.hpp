@@ -20,7 +20,7 @@ struct AxisInput {
   double target_um{0.0};  ///< NaN: stay
   bool may_change{true};  ///< false: surface-aware hold
   std::uint32_t link_epoch{0};
-  bool online{false};  ///< the controller's values below are fresh
+  bool online{false};   ///< the controller's values below are fresh
   bool written{false};  ///< ControllerState::written
   double applied_um{not_a_number};
   nanoseconds taken_at{};  ///< when applied_um was read back
@@ -176,9 +176,7 @@ class AxisChannel {
     }
   };
 
-  [[nodiscard]] bool in_corridor() const noexcept {
-    return start_.no_registers && !start_.unknown;
-  }
+  [[nodiscard]] bool in_corridor() const noexcept { return start_.no_registers && !start_.unknown; }
   void take_epoch(std::uint32_t epoch) noexcept;
   void note_read_back(const AxisInput& input) noexcept;
   void synchronise(const AxisInput& input, nanoseconds away) noexcept;

@@ -26,7 +26,7 @@ struct PersistentState {
   std::map<std::string, double> sign;         ///< by axis: what an offset meant
   std::string controller;                     ///< to which the offsets were sent; empty: not known
   std::map<std::string, double> recorded_um;  ///< by axis, of the last-sent record; in no file
-  std::map<std::string, double> temp_degC;          ///< in use then, by temperature column
+  std::map<std::string, double> temp_degC;    ///< in use then, by temperature column
   /// By sensor that had jumped: what it showed before, so that a restart does not confirm the jump.
   std::map<std::string, double> jumped_from_degC;
   std::map<std::string, double> held_degC;     ///< InputReport::held_degC, by column

@@ -301,8 +301,8 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
     if (at >= 200 && at < 200 + written_.size()) words[i] = written_[at - 200];
   }
   // A restart is told by registers, or by having been away for long.
-  const bool tells = reads_back(seed_) || of_written ||
-                     (!shows_registers(seed_) && restarted_ >= daemon_started_);
+  const bool tells =
+      reads_back(seed_) || of_written || (!shows_registers(seed_) && restarted_ >= daemon_started_);
   for (std::size_t axis = 0; tells && axis < axes_count; ++axis)
     if (!seen_[axis]) seen_at_[axis] = time;
   if (tells) seen_.fill(true);

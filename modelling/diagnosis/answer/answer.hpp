@@ -53,7 +53,7 @@ struct RemainderBank {
   TermSpec term;
   std::vector<TermSpec> hinges;
   std::map<std::string, LeftOutRms> left_out;  ///< of the outputs that it serves
-  bool changes_coefficients{false};             ///< that had been fitted to the training rows
+  bool changes_coefficients{false};            ///< that had been fitted to the training rows
   /// Beside the findings; an output that does not gain goes without it.
   std::map<std::string, TestGain> test;
 };

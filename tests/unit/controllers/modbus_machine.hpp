@@ -145,11 +145,11 @@ class ModbusMachine {
                                     MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE) >= 0;
     }
     const int head = modbus_get_header_length(context_.get());
-    const bool of_written =
-        function == MODBUS_FC_READ_HOLDING_REGISTERS && query[head + 1] == 0 && query[head + 2] < 100;
+    const bool of_written = function == MODBUS_FC_READ_HOLDING_REGISTERS && query[head + 1] == 0 &&
+                            query[head + 2] < 100;
     if (of_written && shows == Shows::exception)
-      return modbus_reply_exception(context_.get(), query,
-                                    MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS) >= 0;
+      return modbus_reply_exception(context_.get(), query, MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS) >=
+             0;
     const std::scoped_lock lock(mutex_);
     if (of_written && shows == Shows::zeros) {
       std::vector<std::uint16_t> kept(mapping_->tab_registers, mapping_->tab_registers + 100);

@@ -80,11 +80,12 @@ TEST_CASE("without registers an axis starts from the record, else from the state
   CHECK(by_file.axis().start() == StartEvidence::corridor);
 }
 
-TEST_CASE("where nothing tells what was sent last, an axis is not driven until released", "[start]") {
+TEST_CASE("where nothing tells what was sent last, an axis is not driven until released",
+          "[start]") {
   // Any file may hold an offset; only a corridor was kept.
-  const SentBefore before = GENERATE(SentBefore{}, SentBefore{8.0, false, none},
-                                     SentBefore{none, true, none}, SentBefore{300.0, true, -499.0},
-                                     SentBefore{50.1, true, none});
+  const SentBefore before =
+      GENERATE(SentBefore{}, SentBefore{8.0, false, none}, SentBefore{none, true, none},
+               SentBefore{300.0, true, -499.0}, SentBefore{50.1, true, none});
   Unread bench(none, before);
   bench.steps(20, 30.0);
   CHECK_FALSE(bench.axis().driven());
@@ -114,7 +115,8 @@ TEST_CASE("a register beyond the bound is nothing to start from", "[start]") {
   CHECK(bench.axis().offset_um() == 0.0);
 }
 
-TEST_CASE("without registers an offset stays beside each that may be on disk", "[start][property]") {
+TEST_CASE("without registers an offset stays beside each that may be on disk",
+          "[start][property]") {
   std::mt19937 random(GENERATE(range(0u, 50u)));
   const auto between = [&](double low, double high) {
     return std::uniform_real_distribution(low, high)(random);
@@ -171,7 +173,8 @@ TEST_CASE("a controller that was away goes on from its registers", "[start]") {
   }
 }
 
-TEST_CASE("a controller that nothing is known of must not have had the time to restart", "[start]") {
+TEST_CASE("a controller that nothing is known of must not have had the time to restart",
+          "[start]") {
   Unread bench(none, {0.0, true, none});
   bench.step(0.4);
   REQUIRE(bench.axis().offset_um() == Approx(0.2));

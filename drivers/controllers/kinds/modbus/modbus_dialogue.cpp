@@ -265,9 +265,8 @@ bool ModbusDialogue::read_written() {
     if (written_[axis]->count()) {
       const ReadRequest& request = written_[axis]->request();
       words.resize(request.count);
-      const Exchange exchange = with_retries([&] {
-        return connection_.read(config_.unit, request.table, request.address, words);
-      });
+      const Exchange exchange = with_retries(
+          [&] { return connection_.read(config_.unit, request.table, request.address, words); });
       // A device may do without these registers, with an exception or in silence.
       const bool is_refused = refused_ && exchange.fault() == Fault::device_error;
       if (!exchange.ok() && !is_refused && ++written_asked_ < asked_max) {
@@ -294,8 +293,7 @@ void ModbusDialogue::compare_written() {
     if (!written || !written->is_to_be_compared()) continue;
     const ReadRequest& request = written->request();
     std::vector<std::uint16_t> words(request.count);
-    const Exchange exchange =
-        connection_.read(config_.unit, request.table, request.address, words);
+    const Exchange exchange = connection_.read(config_.unit, request.table, request.address, words);
     if (!exchange.ok()) continue;
     written->compare(words);
     held = held && written->count();

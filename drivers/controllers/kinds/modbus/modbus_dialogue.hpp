@@ -108,9 +108,9 @@ class ModbusDialogue {
   std::vector<std::optional<PiezoDrive>> piezos_;       ///< one an axis
   std::vector<std::optional<WrittenOffsets>> written_;  ///< one an axis; none: it is read back
   int written_asked_{0};                                ///< in vain, one after the other
-  std::array<double, axes_max> shown_V_{};         ///< by the amplifiers of piezos, one an axis
-  std::vector<std::vector<double>> shown_sets_;    ///< one an axis: ModbusTravel::applied
-  std::vector<std::uint64_t> set_numbers_;         ///< one an axis: of the set written last
+  std::array<double, axes_max> shown_V_{};       ///< by the amplifiers of piezos, one an axis
+  std::vector<std::vector<double>> shown_sets_;  ///< one an axis: ModbusTravel::applied
+  std::vector<std::uint64_t> set_numbers_;       ///< one an axis: of the set written last
   std::uint64_t heartbeat_{0};
   ControllerState state_;  ///< the thread's own
   WaitFreeSlot<ControllerState> states_;

@@ -50,8 +50,8 @@ bool WrittenOffsets::is_to_be_compared() const noexcept {
 }
 
 void WrittenOffsets::compare(std::span<const std::uint16_t> words) noexcept {
-  held_ = std::equal(words.begin(), words.end(), words_.begin(), words_.end()) ? Held::yes
-                                                                               : Held::no;
+  held_ =
+      std::equal(words.begin(), words.end(), words_.begin(), words_.end()) ? Held::yes : Held::no;
 }
 
 }  // namespace thermocomp
