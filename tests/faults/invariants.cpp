@@ -145,7 +145,10 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
   check_recovery(seen, controller);
   check_written(seen, controller);
   check_correction(seen);
-  for (std::size_t i = 0; i < axes_count; ++i) offset_um_[i] = seen.command->offset_um[i];
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    offset_um_[i] = seen.command->offset_um[i];
+    offset_was_driven_[i] = seen.command->valid[i];
+  }
   last_ = seen.now;
   first_ = false;
 }
@@ -259,8 +262,10 @@ void Invariants::check_command(const CycleSeen& seen) {
     if (from_applied) bound_um = std::max(bound_um, std::abs(told_um));
     demand(std::abs(offset_um) <= bound_um + tiny_um, "offset_within_bound", seen.now,
            [&] { return fmt::format("axis {}: {:.4f} um beside {:.4f}", i, offset_um, bound_um); });
-    demand(std::abs(offset_um - offset_um_[i]) <= step_um || from_applied, "slew_kept_by_command",
-           seen.now, [&] {
+    // An operator has set it to zero, and nothing is sent yet.
+    const bool released = !reads_back_ && offset_um == 0.0 && !offset_was_driven_[i];
+    demand(std::abs(offset_um - offset_um_[i]) <= step_um || from_applied || released,
+           "slew_kept_by_command", seen.now, [&] {
              return fmt::format("axis {}: from {:.4f} to {:.4f} um in {:.3f} s, applied {:.4f}", i,
                                 offset_um_[i], offset_um, dt_s, told_um);
            });

@@ -130,6 +130,7 @@ class Invariants {
   bool first_{true};
   bool lost_before_{false};
   std::array<double, axes_count> offset_um_{};  ///< sent in the cycle before
+  std::array<bool, axes_count> offset_was_driven_{};
   std::array<double, axes_count> bound_um_{};
   std::array<double, axes_count> largest_bound_um_{};
   std::array<double, axes_count> rate_um_per_s_{};  ///< the larger one across a reload

@@ -59,11 +59,13 @@ int fsync(int fd) {
   struct stat status;
   if (result != 0 || fstat(fd, &status) != 0 || !S_ISDIR(status.st_mode)) return result;
   char bytes[65536];
+  char beside[4096];
+  snprintf(beside, sizeof beside, "%s.new", getenv("DURABLE_FILE"));
   FILE* from = fopen(getenv("STATE_FILE"), "r");
-  FILE* to = fopen(getenv("DURABLE_FILE"), "w");
+  FILE* to = fopen(beside, "w");
   if (from && to) fwrite(bytes, 1, fread(bytes, 1, sizeof bytes, from), to);
   if (from) fclose(from);
-  if (to) fclose(to);
+  if (to && fclose(to) == 0) rename(beside, getenv("DURABLE_FILE"));
   return result;
 }
 """
@@ -201,10 +203,10 @@ class KillRounds:
     def release_where_unknown(self):
         """A first start, of which nothing is known: the operator has looked, the offset is 0."""
         def started():
-            axis = self.daemon.axis()
-            if axis.get("start") == "unknown":
+            status = self.daemon.status()
+            if "start_unknown" in status["reasons"]:
                 self.daemon.call("release", axis="z")
-            return axis["driven"]
+            return status["axes"][0]["driven"]
 
         eventually(started, "the axis is driven")
 
