@@ -24,7 +24,7 @@ class SteadySource final : public SensorSource {
 
 EstimatorConfig machine(const std::vector<std::string>& axes) {
   EstimatorConfig config;
-  config.sensors.emplace_back().name = "s";
+  config.sensors.push_back({"s", {}, std::nullopt, {}, {}});
   config.sensors.back().screening.settle_s = 0.0;
   config.blocks.push_back({"b", "b_degC", {0}});
   for (const std::string& name : axes) config.axes.push_back({name, name + "_um", 1.0, {}});

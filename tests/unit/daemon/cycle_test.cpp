@@ -53,7 +53,7 @@ class SlowSource final : public SensorSource {
 
 EstimatorConfig one_sensor() {
   EstimatorConfig config;
-  config.sensors.emplace_back().name = "s";
+  config.sensors.push_back({"s", {}, std::nullopt, {}, {}});
   config.sensors.back().screening.settle_s = 0.0;
   config.blocks.push_back({"b", "b_degC", {0}});
   config.axes.push_back({"z", "z_um", 1.0, {}});

@@ -110,8 +110,9 @@ TEST_CASE("an answer that must not be acted on is refused", "[linuxcnc]") {
 
 TEST_CASE("brackets in a string hide no depth, and words of the daemon command no terminal",
           "[linuxcnc]") {
-  const std::string hidden = R"({"a":")" + std::string(400000, ']') + R"(","id":3,"result":)" +
-                             std::string(400000, '[') + std::string(400000, ']') + "}";
+  std::string hidden = R"({"a":")";
+  hidden.append(400000, ']').append(R"(","id":3,"result":)");
+  hidden.append(400000, '[').append(400000, ']').append("}");
   CHECK_THROWS_WITH(read_answer(hidden, 3, "x", 0.2), Catch::Contains("no JSON object"));
   const std::string words = std::string(100, '[') + "\\\"";
   CHECK_NOTHROW(read_answer(
