@@ -142,6 +142,7 @@ class RecordedMachine {
       if (one_in(400)) ++controller_.link_epoch;
       controller_.link_epoch = std::max(controller_.link_epoch, 1u);
       controller_.online = !one_in(200);
+      controller_.written = controller_.online;
       controller_.taken_at = now;
       for (std::size_t i = 0; i < 2; ++i) controller_.applied_um[i] = command_.offset_um[i];
       controller_.signals[0] = static_cast<double>(random_() % 3) * 1000.0;

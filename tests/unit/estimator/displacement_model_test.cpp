@@ -1,7 +1,5 @@
 #include "estimator/model/displacement_model.hpp"
 
-#include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <vector>
 
@@ -426,33 +424,17 @@ TEST_CASE("the certainty of an offset counts the largest that a bank may still d
   CHECK(slope == Vector{8.0, 3.0});
 }
 
-namespace {
-
-/// The shortest of some, since a busy computer only adds.
-double seconds_to_build(std::size_t terms) {
+TEST_CASE("a model of 2000 terms finds each of them again", "[displacement]") {
+  constexpr std::size_t terms = 2000;
   ThermalModel model = without_matrix();
   for (std::size_t i = 0; i < terms; ++i)
     model.terms.push_back({"thermal_lag",
                            "t1_degC",
                            {{"tau_s", 1.0 + static_cast<double>(i)}},
                            {{"gain_um_per_K", {{"z_um", 0.001}}}}});
-  double shortest_s = 1e9;
-  for (int i = 0; i < 5; ++i) {
-    const auto begun = std::chrono::steady_clock::now();
-    const DisplacementModel built(model);
-    const DisplacementModel next(model);
-    CHECK(next.plan_terms(built).size() == terms);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
-    shortest_s = std::min(shortest_s, took.count());
-  }
-  return shortest_s;
-}
-
-}  // namespace
-
-TEST_CASE("a model is built in a time that grows as its terms", "[displacement]") {
-  const double few_s = seconds_to_build(250);
-  const double many_s = seconds_to_build(2000);
-  INFO("250 terms: " << few_s << " s, 2000 terms: " << many_s << " s");
-  CHECK(many_s < 24.0 * few_s);  // 8 times as many; as their square it were 64 times
+  const DisplacementModel built(model);
+  const DisplacementModel next(model);
+  const std::vector<int> plan = next.plan_terms(built);
+  REQUIRE(plan.size() == terms);
+  for (std::size_t i = 0; i < terms; ++i) CHECK(plan[i] == static_cast<int>(i));
 }

@@ -234,6 +234,7 @@ TEST_CASE("what a cycle end holds is held along the whole travel", "[estimator][
   machine.run(5, cold);
   machine.run(5, warm);
   machine.estimator.apply({CommandKind::cycle_end, 0, 0.0});
+  machine.run(1, warm);
   machine.run(20, {30.0, 30.0});
   CHECK(machine.command.offset_um[0] == Approx(-13.0));
   CHECK(machine.command.offset_um[1] == Approx(27.0));

@@ -51,7 +51,7 @@ TEST_CASE("metrics are in base units; what is not known has no sample", "[gatewa
       text,
       Contains("thermocomp_sensor_temperature_celsius{sensor=\"bed front\",block=\"bed\"} 21.5\n"));
   CHECK_THAT(text, Contains("thermocomp_build_info{version=\"0.1\\\"x\"} 1\n"));
-  CHECK_THAT(text, !Contains("nan"));
+  CHECK_THAT(text, !Contains(" nan"));
 }
 
 TEST_CASE("metrics of a daemon that is away end, and do not stand still", "[gateway][metrics]") {
