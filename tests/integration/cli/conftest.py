@@ -69,7 +69,8 @@ class FakeDaemon:
 
 def status_answer(**changes):
     status = {
-        "mode": "compensating", "mode_since_s": 65.0, "enabled": True, "reasons": [],
+        "mode": "compensating", "mode_since_s": 65.0, "compensating_s": 65.0, "enabled": True,
+        "reasons": [],
         "version": "0", "uptime_s": 70.0, "cycle": {"count": 7000, "rate_hz": 100.0, "missed": 0},
         "model": {"file": "m.toml", "checksum": "ab" * 32},
         "axes": [{"name": "z", "unit": "um", "displacement": -3.0, "target": 3.0, "offset": 3.0,
