@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "config/daemon/daemon_config.hpp"
-#include "daemon/state/last_sent.hpp"
+#include "daemon/recording/last_sent.hpp"
 #include "daemon/state/reference_record.hpp"
 #include "estimator/pipeline/persistent_state.hpp"
 

@@ -12,7 +12,7 @@
 #include "daemon/cycle/duration_histogram.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/grid.hpp"
-#include "daemon/state/last_sent.hpp"
+#include "daemon/recording/last_sent.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "drivers/wait_free_slot.hpp"

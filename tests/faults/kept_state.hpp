@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "chance.hpp"
+#include "daemon/recording/last_sent.hpp"
 #include "daemon/start_state.hpp"
-#include "daemon/state/last_sent.hpp"
 #include "estimator/pipeline/persistent_state.hpp"
 #include "fault_schedule.hpp"
 #include "machine.hpp"

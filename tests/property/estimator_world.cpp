@@ -367,6 +367,8 @@ class World {
     // believed so far on a new link only, or when somebody has looked into it.
     if (!(std::abs(offset_um - before_um) <= step_um) ||
         !(std::abs(offset_um) <= std::max(bound_um, std::abs(before_um)))) {
+      // What a state file holds beyond this bound is no evidence: 0, and nothing is sent yet.
+      if (offset_um == 0.0 && !command_.valid[axis] && std::abs(before_um) > bound_um) return;
       ++outcome_.resyncs;
       const double from_applied_um = std::abs(offset_um - state_.applied_um[axis]);
       demand("offset changes at the slew rate, or starts from the read-back",

@@ -1,5 +1,5 @@
 // What of the offsets sent last outlives a process, whenever that ends.
-#include "daemon/state/last_sent.hpp"
+#include "daemon/recording/last_sent.hpp"
 
 #include <fstream>
 #include <iterator>

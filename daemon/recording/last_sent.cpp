@@ -1,4 +1,4 @@
-#include "daemon/state/last_sent.hpp"
+#include "daemon/recording/last_sent.hpp"
 
 #include <algorithm>
 #include <bit>
