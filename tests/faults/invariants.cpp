@@ -262,14 +262,17 @@ void Invariants::check_command(const CycleSeen& seen) {
     if (from_applied) bound_um = std::max(bound_um, std::abs(told_um));
     demand(std::abs(offset_um) <= bound_um + tiny_um, "offset_within_bound", seen.now,
            [&] { return fmt::format("axis {}: {:.4f} um beside {:.4f}", i, offset_um, bound_um); });
-    // An operator has set it to zero, and nothing is sent yet.
-    const bool released = !reads_back_ && offset_um == 0.0 && !offset_was_driven_[i];
-    demand(std::abs(offset_um - offset_um_[i]) <= step_um || from_applied || released,
+    demand(std::abs(offset_um - offset_um_[i]) <= step_um || from_applied || is_released(seen, i),
            "slew_kept_by_command", seen.now, [&] {
              return fmt::format("axis {}: from {:.4f} to {:.4f} um in {:.3f} s, applied {:.4f}", i,
                                 offset_um_[i], offset_um, dt_s, told_um);
            });
   }
+}
+
+/// An operator has set the offset to zero, and nothing has been sent since.
+bool Invariants::is_released(const CycleSeen& seen, std::size_t axis) const {
+  return !reads_back_ && seen.command->offset_um[axis] == 0.0 && !offset_was_driven_[axis];
 }
 
 void Invariants::check_hold(const CycleSeen& seen) {
@@ -294,6 +297,7 @@ void Invariants::check_hold(const CycleSeen& seen) {
     const double rate_um = seen.shape->estimator.axes[i].limiter.rate_um_per_s_max;
     const bool from_applied = std::abs(seen.command->offset_um[i] - seen.told->applied_um[i]) <=
                               rate_um + register_rounding_um;
+    if (is_released(seen, i)) continue;
     if (change_um == 0.0 || (from_applied && report.axes[i].disagrees)) continue;
     const double bound_um = seen.shape->estimator.axes[i].limiter.offset_um_max;
     const bool beyond_new_bound =

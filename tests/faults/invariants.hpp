@@ -85,6 +85,7 @@ class Invariants {
   void check_truth(const CycleSeen& seen);
   void check_command(const CycleSeen& seen);
   void check_hold(const CycleSeen& seen);
+  [[nodiscard]] bool is_released(const CycleSeen& seen, std::size_t axis) const;
   void check_correction(const CycleSeen& seen);
   void check_node(const CycleSeen& seen, std::size_t axis);
   void check_learning(const CycleSeen& seen, std::size_t axis);
