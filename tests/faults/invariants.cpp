@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace thermocomp::faults {
 namespace {
@@ -53,6 +54,7 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
   smoothing_off_ = shape.estimator.sensors[0].smoothing.form == SmoothingForm::off;
   resolution_um_ = shape.offsets_are_float ? 1e-4 : 0.1;
   reads_back_ = shape.estimator.controller_reads_back;
+  wanted_um_.fill(not_a_number);
   for (std::size_t i = 0; i < axes_count; ++i) {
     largest_bound_um_[i] = bound_um_[i] = shape.estimator.axes[i].limiter.offset_um_max;
     rate_um_per_s_[i] = shape.estimator.axes[i].limiter.rate_um_per_s_max;
@@ -61,7 +63,9 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
 
 void Invariants::booted(nanoseconds now, double leap_um) {
   boot_ = now;
-  leap_um_.fill(leap_um);
+  leap_um_ = leap_um;
+  wanted_before_um_ = wanted_um_;
+  has_moved_.fill(false);
   sent_ = {};
   last_ = now;
   last_compensating_ = now;
@@ -137,6 +141,7 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
   for (const Move& move : moves) {
     check_move(seen, move, controller);
     check_sent(seen, move);
+    if (!reads_back_ && !std::exchange(has_moved_[move.axis], true)) check_first(seen, move);
   }
   moves.clear();
   for (std::size_t axis = 0; axis < axes_count; ++axis) check_unexplained(seen, axis);
@@ -148,6 +153,7 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
   for (std::size_t i = 0; i < axes_count; ++i) {
     offset_um_[i] = seen.command->offset_um[i];
     offset_was_driven_[i] = seen.command->valid[i];
+    if (seen.command->valid[i]) wanted_um_[i] = seen.command->offset_um[i];
   }
   last_ = seen.now;
   first_ = false;
@@ -505,8 +511,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   // Offsets move on the cycle's grid, writes come when the link has its turn: one cycle besides.
   const double since_seen_um = rate_um * to_s(move.at - move.seen_at);
   double allowed_um = (move.disturbed ? std::min(budget.um, since_seen_um) : budget.um) +
-                      rate_um * period_s_ + 2.0 * resolution_um_ + leap_um_[move.axis];
-  leap_um_[move.axis] = 0.0;
+                      rate_um * period_s_ + 2.0 * resolution_um_ +
+                      (has_moved_[move.axis] ? 0.0 : leap_um_);
   // An operator may have released an axis on the word of a controller that has stopped lying since.
   const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
   if (move.disturbed || lies) budget.disturbed_at = move.at;
@@ -530,6 +536,25 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
          "offset_within_bound", seen.now, [&] {
            return fmt::format("axis {}: the controller is told {:.4f} um", move.axis, move.to_um);
          });
+}
+
+/// Without read-back nothing moves before a write is confirmed: what is sent first is what the
+/// registers held or, where they cannot be read, what was wanted last. An axis that is released
+/// goes on from 0 while others are written.
+void Invariants::check_first(const CycleSeen& seen, const Move& move) {
+  const double rounding_um = 2.0 * resolution_um_ + tiny_um;
+  const double slack_um =
+      rounding_um + rate_um_per_s_[move.axis] * (2.0 * period_s_ + link_period_s_);
+  const bool is_read = std::isfinite(seen.told->applied_um[move.axis]);
+  const bool held = is_read && std::abs(move.to_um - move.from_um) <= slack_um;
+  const double before_um = wanted_before_um_[move.axis];
+  const bool wanted = std::abs(move.to_um - before_um) <= leap_um_ + rounding_um;
+  const bool released = std::abs(move.to_um) <= slack_um &&
+                        seen.report->axes[move.axis].start == StartEvidence::released;
+  demand(held || wanted || released, "first_offset_is_known", seen.now, [&] {
+    return fmt::format("axis {}: {:.4f} um first, {:.4f} um last, {:.4f} allowed", move.axis,
+                       move.to_um, before_um, leap_um_);
+  });
 }
 
 /// Two values sent one after the other differ by no more than the slew allows, whatever was read

@@ -21,7 +21,7 @@ struct Broken {
   std::string detail;
 };
 
-inline constexpr std::array<const char*, 24> invariant_names{
+inline constexpr std::array<const char*, 25> invariant_names{
     "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
     "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
     "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
@@ -29,7 +29,8 @@ inline constexpr std::array<const char*, 24> invariant_names{
     "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
     "nothing_learned_mid_cut",   "held_between_cycle_ends",      "slew_kept_by_what_is_sent",
     "unexplained_is_latched",    "looked_before_written",        "suspicion_never_holds",
-    "compensating_is_written",   "slow_controller_is_written",   "no_false_reading_used"};
+    "compensating_is_written",   "slow_controller_is_written",   "no_false_reading_used",
+    "first_offset_is_known"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -96,6 +97,7 @@ class Invariants {
   void check_written(const CycleSeen& seen, const SimulatedController& controller);
   void check_move(const CycleSeen& seen, const Move& move, const SimulatedController& controller);
   void check_sent(const CycleSeen& seen, const Move& move);
+  void check_first(const CycleSeen& seen, const Move& move);
   void check_unexplained(const CycleSeen& seen, std::size_t axis);
   [[nodiscard]] bool fresh(std::size_t sensor, nanoseconds now) const;
   void check_suspicion(const Report& report, nanoseconds now);
@@ -122,7 +124,10 @@ class Invariants {
   bool smoothing_off_{false};
   double resolution_um_{0.0};
   bool reads_back_{true};
-  std::array<double, axes_count> leap_um_{};  ///< of the first offset since the boot
+  double leap_um_{0.0};                                ///< of the first offsets since the boot
+  std::array<double, axes_count> wanted_um_{};         ///< by the newest valid command
+  std::array<double, axes_count> wanted_before_um_{};  ///< ... before the boot
+  std::array<bool, axes_count> has_moved_{};           ///< since the boot
 
   nanoseconds boot_{};
   nanoseconds last_{};

@@ -70,7 +70,7 @@ std::vector<Command> KeptState::note(const PersistentState& now_is, const Machin
 }
 
 void KeptState::begin(PersistentState state, nanoseconds now) {
-  const double takes_s = chance_.one_in(20) ? chance_.between(1.0, 8.0) : chance_.between(0.0, 0.3);
+  const double takes_s = chance_.one_in(4) ? chance_.between(1.0, 60.0) : chance_.between(0.0, 0.3);
   writing_ = {std::move(state), now + nanoseconds{static_cast<nanoseconds::rep>(1e9 * takes_s)}};
 }
 

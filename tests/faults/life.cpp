@@ -37,6 +37,7 @@ class Life {
         chance_(options.seed, 5),
         probings_(options.seed, 6),
         releases_(options.seed, 8),
+        power_cuts_(options.seed, 15),
         gains_{probings_.between(0.4, 2.0), probings_.between(0.4, 2.0)},
         judge_(shape_, schedule_, world_.thermocouples),
         end_(life_begin + nanoseconds{static_cast<nanoseconds::rep>(options.hours * 3600e9)}) {
@@ -142,6 +143,10 @@ class Life {
   }
 
   [[nodiscard]] bool killed() {
+    // Where only the state file knows the offset, kills are too rare to show much of it.
+    power_was_cut_ =
+        kept_ && power_cuts_.one_in(static_cast<std::uint64_t>(900 * options_.cycle_hz));
+    if (power_was_cut_) return true;
     const FaultEvent* kill = schedule_.find(FaultKind::daemon_killed, world_.now);
     if (kill == nullptr || kill->number == last_kill_) return false;
     last_kill_ = kill->number;
@@ -152,13 +157,16 @@ class Life {
     if (world_.now >= end_) return;
     const FaultEvent* kill = schedule_.find(FaultKind::daemon_killed, world_.now);
     if (kill != nullptr) world_.now = kill->end;
-    if (options_.verbose) fmt::print("{:>10.1f} s  the daemon starts again\n", life_s());
+    if (power_was_cut_) world_.now += std::chrono::seconds(20);
+    if (options_.verbose)
+      fmt::print("{:>10.1f} s  the daemon starts again{}\n", life_s(),
+                 power_was_cut_ ? " after a power cut" : "");
   }
 
   /// Every other kill is a service manager's, which the daemon takes as an order to end.
   void finish() {
     const std::optional<std::uint64_t> ended =
-        last_kill_ % 2 == 0 ? daemon_->cycle().finish_recording() : std::nullopt;
+        last_kill_ % 2 == 0 && !power_was_cut_ ? daemon_->cycle().finish_recording() : std::nullopt;
     if (disk_ && ended) {
       disk_->end(*ended, world_.now);
     } else if (disk_) {
@@ -174,9 +182,7 @@ class Life {
     if (kept_) end_kept(ended.has_value());
   }
 
-  /// Of those that are no order to end, every other one is a power cut.
   void end_kept(bool in_order) {
-    power_was_cut_ = !in_order && last_kill_ % 4 == 1;
     if (in_order)
       kept_->end(daemon_->cycle().brain().estimator.persistent_state(report_));
     else if (power_was_cut_)
@@ -405,6 +411,7 @@ class Life {
   Chance chance_;
   Chance probings_;
   Chance releases_;
+  Chance power_cuts_;
   std::array<double, 2> gains_;                 ///< of the machine, where the model's are 1
   std::array<double, axes_count> probed_um_{};  ///< measured last
   std::array<nanoseconds, sensors_count> unconfirmed_since_{};
