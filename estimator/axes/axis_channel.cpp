@@ -20,6 +20,9 @@ constexpr std::uint8_t read_backs_until_written = 3;
 /// last; set from the slowest read-backs that were tried (0.5 s) and the pauses of a reconnection.
 constexpr nanoseconds lag_max = std::chrono::milliseconds(1500);
 
+/// WriteGate::patience() of links with periods up to 0.6 s.
+constexpr nanoseconds unwritten_max = std::chrono::seconds(3);
+
 /// Two read-backs after a release that are no further apart say the same.
 constexpr double same_read_back_um = 0.3;
 
@@ -132,13 +135,21 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   }
   start_.no_registers = false;
   const bool agrees =
-      start_.by == StartEvidence::unknown ||
+      start_.by == StartEvidence::unknown || can_be_ours(register_um) ||
       (state_.driven_once ? check_.agrees_after_absence(register_um) : check_.agrees(register_um));
   state_.out_of_bound = is_out_of_bound(register_um);
   start_.unknown = !agrees || state_.out_of_bound;
   if (start_.unknown) return;
   start_.by = StartEvidence::registers;
   start_from(input.now, std::clamp(register_um, -state_.trusted_um, state_.trusted_um));
+}
+
+/// The offset may have gone on for as long as a write may stay out before it counts as none. That
+/// does not hold for 0, which is also what registers show that hold nothing.
+bool AxisChannel::can_be_ours(double register_um) const noexcept {
+  return std::abs(register_um) > same_read_back_um &&
+         std::abs(register_um - limiter_.offset_um()) <=
+             limiter_.rate_um_per_s() * to_seconds(unwritten_max);
 }
 
 void AxisChannel::compare(const AxisInput& input) noexcept {

@@ -278,7 +278,9 @@ void Invariants::check_command(const CycleSeen& seen) {
 
 /// An operator has set the offset to zero, and nothing has been sent since.
 bool Invariants::is_released(const CycleSeen& seen, std::size_t axis) const {
-  return !reads_back_ && seen.command->offset_um[axis] == 0.0 && !offset_was_driven_[axis];
+  const double step_um = rate_um_per_s_[axis] * period_s_ + tiny_um;
+  return !reads_back_ && std::abs(seen.command->offset_um[axis]) <= step_um &&
+         !offset_was_driven_[axis];
 }
 
 void Invariants::check_hold(const CycleSeen& seen) {
@@ -551,10 +553,11 @@ void Invariants::check_first(const CycleSeen& seen, const Move& move) {
   const bool wanted = std::abs(move.to_um - before_um) <= leap_um_ + rounding_um;
   const bool released = std::abs(move.to_um) <= slack_um &&
                         seen.report->axes[move.axis].start == StartEvidence::released;
-  demand(held || wanted || released, "first_offset_is_known", seen.now, [&] {
-    return fmt::format("axis {}: {:.4f} um first, {:.4f} um last, {:.4f} allowed", move.axis,
-                       move.to_um, before_um, leap_um_);
-  });
+  demand(held || wanted || released || std::isnan(before_um), "first_offset_is_known", seen.now,
+         [&] {
+           return fmt::format("axis {}: {:.4f} um first, {:.4f} um last, {:.4f} allowed", move.axis,
+                              move.to_um, before_um, leap_um_);
+         });
 }
 
 /// Two values sent one after the other differ by no more than the slew allows, whatever was read

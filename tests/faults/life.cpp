@@ -71,7 +71,7 @@ class Life {
     twin_ = disk_ ? nullptr : std::make_unique<RecordedTwin>(grid_);
     if (disk_) disk_->boot(grid_, world_.now);
     auto brain = make_brain();
-    world_.controller.daemon_starts(world_.now);
+    world_.controller.daemon_starts();
     double leap_um = 0.0;
     if (kept_ && restarted_) {
       saved_ = kept_->boot(shape_).state;

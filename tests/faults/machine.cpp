@@ -233,8 +233,8 @@ double SimulatedController::shown_um(std::size_t axis, nanoseconds time) {
   return shown;
 }
 
-void SimulatedController::restart(nanoseconds time) {
-  restarted_ = time;
+void SimulatedController::restart() {
+  restart_is_noticed_ = is_in_contact_;
   if (!reads_back(seed_)) written_ = {};
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     applied_um_[axis] = 0.0;
@@ -259,7 +259,7 @@ void SimulatedController::disturb(std::size_t axis, double applied_um) {
 void SimulatedController::advance(nanoseconds time) {
   const bool on = powered(time);
   if (on && !on_ && scramble(seed_ + static_cast<std::uint64_t>(time.count() / 1000000000)) % 2)
-    restart(time);
+    restart();
   on_ = on;
   const FaultEvent* rehoming = schedule_.find(FaultKind::controller_rehomed, time);
   if (rehoming == nullptr || rehoming->number == last_rehoming_) return;
@@ -300,9 +300,10 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
     if (at >= 100 && at < 100 + image.size()) words[i] = image[at - 100];
     if (at >= 200 && at < 200 + written_.size()) words[i] = written_[at - 200];
   }
-  // A restart is told by registers, or by having been away for long.
+  // A restart is told by registers, or by having been away for long since the daemon was there.
   const bool tells =
-      reads_back(seed_) || of_written || (!shows_registers(seed_) && restarted_ >= daemon_started_);
+      reads_back(seed_) || of_written || (!shows_registers(seed_) && restart_is_noticed_);
+  is_in_contact_ = true;
   for (std::size_t axis = 0; tells && axis < axes_count; ++axis)
     if (!seen_[axis]) seen_at_[axis] = time;
   if (tells) seen_.fill(true);
@@ -338,7 +339,7 @@ bool SimulatedController::write(std::size_t address, std::span<const std::uint16
           std::bit_cast<float>(static_cast<std::uint32_t>(written_[at]) << 16 | written_[at + 1]));
     moves_.push_back({axis, time, applied_um_[axis], told_um, disturbed_[axis], seen_[axis],
                       breaks_, looked_at_, seen_at_[axis]});
-    if (lie(FaultKind::controller_ignoring, axis, time) != nullptr) {
+    if (reads_back(seed_) && lie(FaultKind::controller_ignoring, axis, time) != nullptr) {
       disturb(axis, applied_um_[axis]);
       continue;
     }

@@ -161,7 +161,7 @@ class SimulatedController {
   /// Registers as they stand at `time`. @return false: refused
   bool read(std::size_t address, std::span<std::uint16_t> words, nanoseconds time);
   /// A daemon starts, which knows nothing of restarts before.
-  void daemon_starts(nanoseconds time) noexcept { daemon_started_ = time; }
+  void daemon_starts() noexcept { is_in_contact_ = restart_is_noticed_ = false; }
   /// An operator sets the offset to zero.
   void set_to_zero(std::size_t axis);
   /// @return false: refused
@@ -189,7 +189,7 @@ class SimulatedController {
 
  private:
   void disturb(std::size_t axis, double applied_um);
-  void restart(nanoseconds time);
+  void restart();
   [[nodiscard]] const FaultEvent* lie(FaultKind kind, std::size_t axis, nanoseconds time) const;
   [[nodiscard]] double shown_um(std::size_t axis, nanoseconds time);
   [[nodiscard]] std::size_t words_an_offset() const noexcept { return floats_ ? 2 : 1; }
@@ -209,8 +209,8 @@ class SimulatedController {
   std::uint64_t last_rehoming_{0};
   std::uint64_t breaks_{0};
   std::uint64_t reads_since_break_{0};
-  nanoseconds daemon_started_{};
-  nanoseconds restarted_{-1};
+  bool is_in_contact_{false};  ///< with this daemon
+  bool restart_is_noticed_{false};
   nanoseconds looked_at_{};
   nanoseconds written_at_{};
   std::array<std::uint64_t, axes_count> frozen_by_{};  ///< the fault that froze the read-back

@@ -67,6 +67,13 @@ TEST_CASE("registers that contradict what was sent are not followed", "[start]")
   CHECK(bench.axis().offset_um() == -15.0);
 }
 
+TEST_CASE("a write that stayed out until the end is no contradiction", "[start]") {
+  Unread bench(10.0, {none, false, 15.0});  // 2.5 s of its slew behind
+  bench.step(10.0);
+  CHECK(bench.axis().driven());
+  CHECK(bench.axis().offset_um() == 10.0);
+}
+
 TEST_CASE("without registers an axis starts from the record, else from the state file", "[start]") {
   Unread by_record(none, {7.6, true, 8.0});
   by_record.step(8.0);
