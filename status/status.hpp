@@ -150,7 +150,7 @@ struct InputStatus {
 };
 
 /// The error of a sensor, by its neighbours.
-struct Suspicion {
+struct SensorError {
   double size_K{not_a_number};
   double since{not_a_number};  ///< wall clock, s since 1970
   bool weighed_down{false};    ///< its blocks do without it
@@ -165,12 +165,12 @@ struct Suspicion {
 
 struct SuspectedSensor {
   std::string name{};
-  Suspicion suspicion{};
+  SensorError suspicion{};
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
     visit("name", self.name);
-    Suspicion::fields(self.suspicion, visit);
+    SensorError::fields(self.suspicion, visit);
   }
 };
 
@@ -196,7 +196,7 @@ struct SensorStatus {
   std::uint64_t clipped_in_a_row{0};
   std::uint64_t clipped{0};
   std::uint64_t rejected{0};
-  std::optional<Suspicion> suspected{};
+  std::optional<SensorError> suspected{};
   std::optional<Jump> jump{};
 
   template <class Self, class Visitor>

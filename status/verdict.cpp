@@ -168,7 +168,7 @@ std::vector<std::string> estimate_lines(const std::vector<InputStatus>& inputs,
   return lines;
 }
 
-std::string suspicion_text(const Suspicion& suspected) {
+std::string suspicion_text(const SensorError& suspected) {
   return "off by " + fixed_signed(suspected.size_K, 1) + " K against its neighbours since " +
          local_time(suspected.since) +
          (suspected.weighed_down ? ", not used" : ", used all the same");

@@ -39,7 +39,7 @@ struct Trouble {
 [[nodiscard]] std::vector<std::string> estimate_lines(const std::vector<InputStatus>& inputs,
                                                       const std::vector<AxisStatus>& axes);
 /// "off by +2.0 K against its neighbours since 2026-03-01 08:30:11.1, used all the same"
-[[nodiscard]] std::string suspicion_text(const Suspicion& suspected);
+[[nodiscard]] std::string suspicion_text(const SensorError& suspected);
 /// The newest write that failed: "refused (function 16, address 100, exception 1), last confirmed
 /// 12 s ago"; empty where every write was confirmed.
 [[nodiscard]] std::string write_text(const WriteStatus& write);

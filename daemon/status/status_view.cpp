@@ -122,9 +122,9 @@ std::vector<InputStatus> inputs_of(const StatusView& view) {
 }
 
 /// nullopt: the neighbours do not contradict the sensor.
-std::optional<Suspicion> suspicion_of(const StatusView& view, const SensorReport& sensor) {
+std::optional<SensorError> suspicion_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.suspected) return std::nullopt;
-  return Suspicion{sensor.suspected_size_K,
+  return SensorError{sensor.suspected_size_K,
                    view.wall_s - seconds(view.report.now - sensor.suspected_since),
                    sensor.weighed_down};
 }

@@ -455,28 +455,28 @@ void read_target(const Draft& state, const TomlTable& table, EventConfig& event)
 }
 
 /// Which sorts of target an event may have.
-bool fits(EventKind kind, TargetKind target, bool can) {
+bool fits(NodeEventKind kind, TargetKind target, bool can) {
   switch (kind) {
-    case EventKind::open_circuit:
-    case EventKind::short_circuit:
-    case EventKind::over_range:
-    case EventKind::under_range:
-    case EventKind::channel_error:
-    case EventKind::spike:
-    case EventKind::drift:
+    case NodeEventKind::open_circuit:
+    case NodeEventKind::short_circuit:
+    case NodeEventKind::over_range:
+    case NodeEventKind::under_range:
+    case NodeEventKind::channel_error:
+    case NodeEventKind::spike:
+    case NodeEventKind::drift:
       return target == TargetKind::channel;
-    case EventKind::freeze:
+    case NodeEventKind::freeze:
       return target == TargetKind::channel || target == TargetKind::device;
-    case EventKind::drop:
-    case EventKind::reboot:
+    case NodeEventKind::drop:
+    case NodeEventKind::reboot:
       return target != TargetKind::channel;
-    case EventKind::delay:
-    case EventKind::garbage:
-    case EventKind::exception:
+    case NodeEventKind::delay:
+    case NodeEventKind::garbage:
+    case NodeEventKind::exception:
       return target != TargetKind::channel && !can;
-    case EventKind::reject:
-    case EventKind::misapply:
-    case EventKind::rehome:
+    case NodeEventKind::reject:
+    case NodeEventKind::misapply:
+    case NodeEventKind::rehome:
       return target == TargetKind::controller;
   }
   return false;
@@ -521,41 +521,41 @@ void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& 
 
 EventConfig read_event(const Draft& state, const TomlTable& table) {
   EventConfig event;
-  event.kind = table.choice<EventKind>("kind", {{"open_circuit", EventKind::open_circuit},
-                                                {"short_circuit", EventKind::short_circuit},
-                                                {"over_range", EventKind::over_range},
-                                                {"under_range", EventKind::under_range},
-                                                {"channel_error", EventKind::channel_error},
-                                                {"freeze", EventKind::freeze},
-                                                {"spike", EventKind::spike},
-                                                {"drift", EventKind::drift},
-                                                {"drop", EventKind::drop},
-                                                {"delay", EventKind::delay},
-                                                {"garbage", EventKind::garbage},
-                                                {"exception", EventKind::exception},
-                                                {"reboot", EventKind::reboot},
-                                                {"reject", EventKind::reject},
-                                                {"misapply", EventKind::misapply},
-                                                {"rehome", EventKind::rehome}});
+  event.kind = table.choice<NodeEventKind>("kind", {{"open_circuit", NodeEventKind::open_circuit},
+                                                    {"short_circuit", NodeEventKind::short_circuit},
+                                                    {"over_range", NodeEventKind::over_range},
+                                                    {"under_range", NodeEventKind::under_range},
+                                                    {"channel_error", NodeEventKind::channel_error},
+                                                    {"freeze", NodeEventKind::freeze},
+                                                    {"spike", NodeEventKind::spike},
+                                                    {"drift", NodeEventKind::drift},
+                                                    {"drop", NodeEventKind::drop},
+                                                    {"delay", NodeEventKind::delay},
+                                                    {"garbage", NodeEventKind::garbage},
+                                                    {"exception", NodeEventKind::exception},
+                                                    {"reboot", NodeEventKind::reboot},
+                                                    {"reject", NodeEventKind::reject},
+                                                    {"misapply", NodeEventKind::misapply},
+                                                    {"rehome", NodeEventKind::rehome}});
   event.at_s = table.number("at_s", Range::between(0.0, large));
   read_target(state, table, event);
-  if (event.kind != EventKind::rehome) {
+  if (event.kind != NodeEventKind::rehome) {
     event.duration_s = table.number("duration_s", Range::above(0.0, large));
   }
-  if (event.kind == EventKind::spike) {
+  if (event.kind == NodeEventKind::spike) {
     event.change_K = table.number("change_K", Range::between(-1e4, 1e4));
   }
-  if (event.kind == EventKind::misapply) {
+  if (event.kind == NodeEventKind::misapply) {
     event.change_um = table.number("change_um", Range::between(-1e4, 1e4));
   }
-  if (event.kind == EventKind::drift) {
+  if (event.kind == NodeEventKind::drift) {
     event.rate_K_per_h = table.number("rate_K_per_h", Range::between(-1e6, 1e6));
   }
-  if (event.kind == EventKind::delay) {
+  if (event.kind == NodeEventKind::delay) {
     event.delay_ms = table.number("delay_ms", Range::above(0.0, 1e6));
   }
   read_channel_code(state, table, event);
-  if (event.kind == EventKind::exception) event.code = table.integer("code", 1, 255, 6);
+  if (event.kind == NodeEventKind::exception) event.code = table.integer("code", 1, 255, 6);
   if (!fits(event.kind, event.target, on_can(state, event))) {
     table.problem("kind", "cannot happen to such a target");
   }

@@ -5,22 +5,22 @@ namespace {
 
 void befall(UnitEffect& unit, const EventConfig& event) {
   switch (event.kind) {
-    case EventKind::drop:
+    case NodeEventKind::drop:
       unit.silent = true;
       break;
-    case EventKind::reboot:
+    case NodeEventKind::reboot:
       unit.down = true;
       break;
-    case EventKind::garbage:
+    case NodeEventKind::garbage:
       unit.garbage = true;
       break;
-    case EventKind::freeze:
+    case NodeEventKind::freeze:
       unit.frozen = true;
       break;
-    case EventKind::delay:
+    case NodeEventKind::delay:
       unit.delay_ms = event.delay_ms;
       break;
-    case EventKind::exception:
+    case NodeEventKind::exception:
       unit.exception = event.code;
       break;
     default:
@@ -35,13 +35,13 @@ void befall(ChannelEffect& channel, const EventConfig& event, double since_s) {
     return;
   }
   switch (event.kind) {
-    case EventKind::freeze:
+    case NodeEventKind::freeze:
       channel.frozen = true;
       break;
-    case EventKind::spike:
+    case NodeEventKind::spike:
       channel.added_K += event.change_K;
       break;
-    case EventKind::drift:
+    case NodeEventKind::drift:
       channel.added_K += event.rate_K_per_h * since_s / 3600.0;
       break;
     default:
@@ -51,10 +51,10 @@ void befall(ChannelEffect& channel, const EventConfig& event, double since_s) {
 
 void befall_controller(Effects& effects, const EventConfig& event) {
   switch (event.kind) {
-    case EventKind::reject:
+    case NodeEventKind::reject:
       effects.controller.rejects = true;
       break;
-    case EventKind::misapply:
+    case NodeEventKind::misapply:
       effects.controller.misapplied_um = event.change_um;
       break;
     default:
@@ -65,17 +65,17 @@ void befall_controller(Effects& effects, const EventConfig& event) {
 
 }  // namespace
 
-std::optional<ChannelFault> channel_fault(EventKind kind) {
+std::optional<ChannelFault> channel_fault(NodeEventKind kind) {
   switch (kind) {
-    case EventKind::open_circuit:
+    case NodeEventKind::open_circuit:
       return ChannelFault::open_circuit;
-    case EventKind::short_circuit:
+    case NodeEventKind::short_circuit:
       return ChannelFault::short_circuit;
-    case EventKind::over_range:
+    case NodeEventKind::over_range:
       return ChannelFault::over_range;
-    case EventKind::under_range:
+    case NodeEventKind::under_range:
       return ChannelFault::under_range;
-    case EventKind::channel_error:
+    case NodeEventKind::channel_error:
       return ChannelFault::error;
     default:
       return std::nullopt;
@@ -92,7 +92,7 @@ Effects effects_at(const MachineConfig& machine, double plant_time_s) {
   for (const EventConfig& event : machine.events) {
     const double since_s = plant_time_s - event.at_s;
     if (!(since_s >= 0.0)) continue;
-    if (event.kind == EventKind::rehome) ++effects.controller.rehomings;
+    if (event.kind == NodeEventKind::rehome) ++effects.controller.rehomings;
     if (!(since_s < event.duration_s)) continue;
     switch (event.target) {
       case TargetKind::channel:

@@ -171,18 +171,23 @@ void HistoryStore::rescue(const std::string& changed) {
   const bool is_cut = is_wal_ours && now[wal_file].bytes < files_[wal_file].bytes;
   int in_log = 0;
   int moved = -1;
+  int code = SQLITE_ERROR;
   try {
     if (has_database) chunks_before_ = database_->number("SELECT count(*) FROM chunk");
+    // A checkpoint that fails sets both numbers to -1: alike, and nothing has been moved.
     if (!is_cut)
-      sqlite3_wal_checkpoint_v2(database_->handle(), nullptr, SQLITE_CHECKPOINT_FULL, &in_log,
-                                &moved);
+      code = sqlite3_wal_checkpoint_v2(database_->handle(), nullptr, SQLITE_CHECKPOINT_FULL,
+                                       &in_log, &moved);
   } catch (const DatabaseError&) {
     // The log cannot be read any more: what is in the database is what is left.
   }
+  // Of a log that was removed this connection has the only copy: it stays open until there is room.
+  if (code == SQLITE_FULL && has_database)
+    throw DatabaseError(code, changed + ": the disk is full, tried again");
+  const bool is_moved = code == SQLITE_OK && in_log == moved;
   // Closing would read the log once more, and remove whatever bears its name.
   sqlite3_db_config(database_->handle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   close();
-  const bool is_moved = in_log == moved;
   if (has_database ? is_moved || is_cut || !is_wal_ours : is_wal_ours) {
     std::error_code ignored;
     for (const char* end : {"-wal", "-shm"})

@@ -206,7 +206,7 @@ TEST_CASE("the error state of a CAN interface is told with its age and a remedy"
 
 TEST_CASE("a suspected sensor is shown with its error and whether it is used", "[cli][status]") {
   Status status = good_status();
-  const Suspicion error{.size_K = -2.04, .since = 1'700'000'000.0};
+  const SensorError error{.size_K = -2.04, .since = 1'700'000'000.0};
   status.sensors_suspected = {{"head", error}};
   status.reasons = only(Reason::sensor_suspected);
   const std::string used = status_text(status, false);

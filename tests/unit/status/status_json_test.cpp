@@ -162,7 +162,7 @@ TEST_CASE("every member of a structure has its key, and no key is given twice", 
   CHECK(members<CorrectionStatus>() == keys_of<CorrectionStatus>());
   CHECK(members<AxisStatus>() == keys_of<AxisStatus>());
   CHECK(members<InputStatus>() == keys_of<InputStatus>());
-  CHECK(members<Suspicion>() == keys_of<Suspicion>());
+  CHECK(members<SensorError>() == keys_of<SensorError>());
   CHECK(members<Jump>() == keys_of<Jump>());
   CHECK(members<SensorStatus>() == keys_of<SensorStatus>());
   CHECK(members<UnitStatus>() == keys_of<UnitStatus>());
