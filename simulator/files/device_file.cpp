@@ -455,28 +455,28 @@ void read_target(const Draft& state, const TomlTable& table, EventConfig& event)
 }
 
 /// Which sorts of target an event may have.
-bool fits(NodeEventKind kind, TargetKind target, bool can) {
+bool fits(MachineEventKind kind, TargetKind target, bool can) {
   switch (kind) {
-    case NodeEventKind::open_circuit:
-    case NodeEventKind::short_circuit:
-    case NodeEventKind::over_range:
-    case NodeEventKind::under_range:
-    case NodeEventKind::channel_error:
-    case NodeEventKind::spike:
-    case NodeEventKind::drift:
+    case MachineEventKind::open_circuit:
+    case MachineEventKind::short_circuit:
+    case MachineEventKind::over_range:
+    case MachineEventKind::under_range:
+    case MachineEventKind::channel_error:
+    case MachineEventKind::spike:
+    case MachineEventKind::drift:
       return target == TargetKind::channel;
-    case NodeEventKind::freeze:
+    case MachineEventKind::freeze:
       return target == TargetKind::channel || target == TargetKind::device;
-    case NodeEventKind::drop:
-    case NodeEventKind::reboot:
+    case MachineEventKind::drop:
+    case MachineEventKind::reboot:
       return target != TargetKind::channel;
-    case NodeEventKind::delay:
-    case NodeEventKind::garbage:
-    case NodeEventKind::exception:
+    case MachineEventKind::delay:
+    case MachineEventKind::garbage:
+    case MachineEventKind::exception:
       return target != TargetKind::channel && !can;
-    case NodeEventKind::reject:
-    case NodeEventKind::misapply:
-    case NodeEventKind::rehome:
+    case MachineEventKind::reject:
+    case MachineEventKind::misapply:
+    case MachineEventKind::rehome:
       return target == TargetKind::controller;
   }
   return false;
@@ -521,41 +521,42 @@ void read_channel_code(const Draft& state, const TomlTable& table, EventConfig& 
 
 EventConfig read_event(const Draft& state, const TomlTable& table) {
   EventConfig event;
-  event.kind = table.choice<NodeEventKind>("kind", {{"open_circuit", NodeEventKind::open_circuit},
-                                                    {"short_circuit", NodeEventKind::short_circuit},
-                                                    {"over_range", NodeEventKind::over_range},
-                                                    {"under_range", NodeEventKind::under_range},
-                                                    {"channel_error", NodeEventKind::channel_error},
-                                                    {"freeze", NodeEventKind::freeze},
-                                                    {"spike", NodeEventKind::spike},
-                                                    {"drift", NodeEventKind::drift},
-                                                    {"drop", NodeEventKind::drop},
-                                                    {"delay", NodeEventKind::delay},
-                                                    {"garbage", NodeEventKind::garbage},
-                                                    {"exception", NodeEventKind::exception},
-                                                    {"reboot", NodeEventKind::reboot},
-                                                    {"reject", NodeEventKind::reject},
-                                                    {"misapply", NodeEventKind::misapply},
-                                                    {"rehome", NodeEventKind::rehome}});
+  event.kind =
+      table.choice<MachineEventKind>("kind", {{"open_circuit", MachineEventKind::open_circuit},
+                                              {"short_circuit", MachineEventKind::short_circuit},
+                                              {"over_range", MachineEventKind::over_range},
+                                              {"under_range", MachineEventKind::under_range},
+                                              {"channel_error", MachineEventKind::channel_error},
+                                              {"freeze", MachineEventKind::freeze},
+                                              {"spike", MachineEventKind::spike},
+                                              {"drift", MachineEventKind::drift},
+                                              {"drop", MachineEventKind::drop},
+                                              {"delay", MachineEventKind::delay},
+                                              {"garbage", MachineEventKind::garbage},
+                                              {"exception", MachineEventKind::exception},
+                                              {"reboot", MachineEventKind::reboot},
+                                              {"reject", MachineEventKind::reject},
+                                              {"misapply", MachineEventKind::misapply},
+                                              {"rehome", MachineEventKind::rehome}});
   event.at_s = table.number("at_s", Range::between(0.0, large));
   read_target(state, table, event);
-  if (event.kind != NodeEventKind::rehome) {
+  if (event.kind != MachineEventKind::rehome) {
     event.duration_s = table.number("duration_s", Range::above(0.0, large));
   }
-  if (event.kind == NodeEventKind::spike) {
+  if (event.kind == MachineEventKind::spike) {
     event.change_K = table.number("change_K", Range::between(-1e4, 1e4));
   }
-  if (event.kind == NodeEventKind::misapply) {
+  if (event.kind == MachineEventKind::misapply) {
     event.change_um = table.number("change_um", Range::between(-1e4, 1e4));
   }
-  if (event.kind == NodeEventKind::drift) {
+  if (event.kind == MachineEventKind::drift) {
     event.rate_K_per_h = table.number("rate_K_per_h", Range::between(-1e6, 1e6));
   }
-  if (event.kind == NodeEventKind::delay) {
+  if (event.kind == MachineEventKind::delay) {
     event.delay_ms = table.number("delay_ms", Range::above(0.0, 1e6));
   }
   read_channel_code(state, table, event);
-  if (event.kind == NodeEventKind::exception) event.code = table.integer("code", 1, 255, 6);
+  if (event.kind == MachineEventKind::exception) event.code = table.integer("code", 1, 255, 6);
   if (!fits(event.kind, event.target, on_can(state, event))) {
     table.problem("kind", "cannot happen to such a target");
   }

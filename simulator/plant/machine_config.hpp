@@ -125,7 +125,7 @@ struct SimulatedController {
   std::vector<SimulatedControllerSignal> signals;
 };
 
-enum class NodeEventKind {
+enum class MachineEventKind {
   open_circuit,  ///< a channel's thermocouple is broken
   short_circuit,
   over_range,
@@ -147,7 +147,7 @@ enum class NodeEventKind {
 enum class TargetKind { channel, device, bus, controller };
 
 struct EventConfig {
-  NodeEventKind kind{NodeEventKind::drop};
+  MachineEventKind kind{MachineEventKind::drop};
   TargetKind target{TargetKind::device};
   std::size_t device{0};  ///< of a channel or device
   std::size_t channel{0};

@@ -5,22 +5,22 @@ namespace {
 
 void befall(UnitEffect& unit, const EventConfig& event) {
   switch (event.kind) {
-    case NodeEventKind::drop:
+    case MachineEventKind::drop:
       unit.silent = true;
       break;
-    case NodeEventKind::reboot:
+    case MachineEventKind::reboot:
       unit.down = true;
       break;
-    case NodeEventKind::garbage:
+    case MachineEventKind::garbage:
       unit.garbage = true;
       break;
-    case NodeEventKind::freeze:
+    case MachineEventKind::freeze:
       unit.frozen = true;
       break;
-    case NodeEventKind::delay:
+    case MachineEventKind::delay:
       unit.delay_ms = event.delay_ms;
       break;
-    case NodeEventKind::exception:
+    case MachineEventKind::exception:
       unit.exception = event.code;
       break;
     default:
@@ -35,13 +35,13 @@ void befall(ChannelEffect& channel, const EventConfig& event, double since_s) {
     return;
   }
   switch (event.kind) {
-    case NodeEventKind::freeze:
+    case MachineEventKind::freeze:
       channel.frozen = true;
       break;
-    case NodeEventKind::spike:
+    case MachineEventKind::spike:
       channel.added_K += event.change_K;
       break;
-    case NodeEventKind::drift:
+    case MachineEventKind::drift:
       channel.added_K += event.rate_K_per_h * since_s / 3600.0;
       break;
     default:
@@ -51,10 +51,10 @@ void befall(ChannelEffect& channel, const EventConfig& event, double since_s) {
 
 void befall_controller(Effects& effects, const EventConfig& event) {
   switch (event.kind) {
-    case NodeEventKind::reject:
+    case MachineEventKind::reject:
       effects.controller.rejects = true;
       break;
-    case NodeEventKind::misapply:
+    case MachineEventKind::misapply:
       effects.controller.misapplied_um = event.change_um;
       break;
     default:
@@ -65,17 +65,17 @@ void befall_controller(Effects& effects, const EventConfig& event) {
 
 }  // namespace
 
-std::optional<ChannelFault> channel_fault(NodeEventKind kind) {
+std::optional<ChannelFault> channel_fault(MachineEventKind kind) {
   switch (kind) {
-    case NodeEventKind::open_circuit:
+    case MachineEventKind::open_circuit:
       return ChannelFault::open_circuit;
-    case NodeEventKind::short_circuit:
+    case MachineEventKind::short_circuit:
       return ChannelFault::short_circuit;
-    case NodeEventKind::over_range:
+    case MachineEventKind::over_range:
       return ChannelFault::over_range;
-    case NodeEventKind::under_range:
+    case MachineEventKind::under_range:
       return ChannelFault::under_range;
-    case NodeEventKind::channel_error:
+    case MachineEventKind::channel_error:
       return ChannelFault::error;
     default:
       return std::nullopt;
@@ -92,7 +92,7 @@ Effects effects_at(const MachineConfig& machine, double plant_time_s) {
   for (const EventConfig& event : machine.events) {
     const double since_s = plant_time_s - event.at_s;
     if (!(since_s >= 0.0)) continue;
-    if (event.kind == NodeEventKind::rehome) ++effects.controller.rehomings;
+    if (event.kind == MachineEventKind::rehome) ++effects.controller.rehomings;
     if (!(since_s < event.duration_s)) continue;
     switch (event.target) {
       case TargetKind::channel:

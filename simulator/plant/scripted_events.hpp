@@ -40,7 +40,7 @@ struct Effects {
 };
 
 /// The fault of a channel that an event of this kind is; none for all other kinds.
-[[nodiscard]] std::optional<ChannelFault> channel_fault(NodeEventKind kind);
+[[nodiscard]] std::optional<ChannelFault> channel_fault(MachineEventKind kind);
 
 /// An event is in force from at_s until before at_s + duration_s.
 [[nodiscard]] Effects effects_at(const MachineConfig& machine, double plant_time_s);

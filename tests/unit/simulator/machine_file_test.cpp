@@ -150,10 +150,10 @@ address = 0
 
 TEST_CASE("the commented example is right and every event kind is in it") {
   const MachineConfig machine = load_machine(folder + "/examples/machine.toml");
-  for (int kind = 0; kind <= static_cast<int>(NodeEventKind::rehome); ++kind) {
+  for (int kind = 0; kind <= static_cast<int>(MachineEventKind::rehome); ++kind) {
     bool there = false;
     for (const EventConfig& event : machine.events) {
-      there = there || event.kind == static_cast<NodeEventKind>(kind);
+      there = there || event.kind == static_cast<MachineEventKind>(kind);
     }
     CHECK(there);
   }

@@ -20,7 +20,7 @@ MachineConfig one_device() {
   return machine;
 }
 
-EventConfig event(NodeEventKind kind, TargetKind target, double at_s, double duration_s) {
+EventConfig event(MachineEventKind kind, TargetKind target, double at_s, double duration_s) {
   EventConfig made;
   made.kind = kind;
   made.target = target;
@@ -43,7 +43,7 @@ SimulatedController two_axes() {
 
 TEST_CASE("an event is in force from its time until its duration is over, and only on its target") {
   MachineConfig machine = one_device();
-  machine.events = {event(NodeEventKind::open_circuit, TargetKind::channel, 100.0, 50.0)};
+  machine.events = {event(MachineEventKind::open_circuit, TargetKind::channel, 100.0, 50.0)};
   CHECK_FALSE(effects_at(machine, 99.9).channels[0][1].fault.has_value());
   CHECK(effects_at(machine, 100.0).channels[0][1].fault.has_value());
   CHECK_FALSE(effects_at(machine, 100.0).channels[0][0].fault.has_value());
@@ -53,27 +53,27 @@ TEST_CASE("an event is in force from its time until its duration is over, and on
 
 TEST_CASE("each kind of event does what its name says") {
   MachineConfig machine = one_device();
-  EventConfig made =
-      event(GENERATE(NodeEventKind::freeze, NodeEventKind::drop, NodeEventKind::delay,
-                     NodeEventKind::garbage, NodeEventKind::exception, NodeEventKind::reboot),
-            TargetKind::device, 10.0, 10.0);
+  EventConfig made = event(
+      GENERATE(MachineEventKind::freeze, MachineEventKind::drop, MachineEventKind::delay,
+               MachineEventKind::garbage, MachineEventKind::exception, MachineEventKind::reboot),
+      TargetKind::device, 10.0, 10.0);
   made.delay_ms = 300.0;
   made.code = 6;
   machine.events = {made};
   const UnitEffect effect = effects_at(machine, 15.0).devices[0];
-  CHECK(effect.frozen == (made.kind == NodeEventKind::freeze));
-  CHECK(effect.silent == (made.kind == NodeEventKind::drop));
-  CHECK(effect.garbage == (made.kind == NodeEventKind::garbage));
-  CHECK(effect.down == (made.kind == NodeEventKind::reboot));
-  CHECK(effect.delay_ms == (made.kind == NodeEventKind::delay ? 300.0 : 0.0));
-  CHECK(effect.exception.has_value() == (made.kind == NodeEventKind::exception));
+  CHECK(effect.frozen == (made.kind == MachineEventKind::freeze));
+  CHECK(effect.silent == (made.kind == MachineEventKind::drop));
+  CHECK(effect.garbage == (made.kind == MachineEventKind::garbage));
+  CHECK(effect.down == (made.kind == MachineEventKind::reboot));
+  CHECK(effect.delay_ms == (made.kind == MachineEventKind::delay ? 300.0 : 0.0));
+  CHECK(effect.exception.has_value() == (made.kind == MachineEventKind::exception));
 }
 
 TEST_CASE("spikes and drifts add up and end") {
   MachineConfig machine = one_device();
-  EventConfig spike = event(NodeEventKind::spike, TargetKind::channel, 1000.0, 10.0);
+  EventConfig spike = event(MachineEventKind::spike, TargetKind::channel, 1000.0, 10.0);
   spike.change_K = 8.0;
-  EventConfig drift = event(NodeEventKind::drift, TargetKind::channel, 0.0, 3600.0);
+  EventConfig drift = event(MachineEventKind::drift, TargetKind::channel, 0.0, 3600.0);
   drift.rate_K_per_h = 3.6;
   machine.events = {spike, drift};
   CHECK(effects_at(machine, 500.0).channels[0][1].added_K == Approx(0.5));
