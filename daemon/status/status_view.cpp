@@ -125,8 +125,8 @@ std::vector<InputStatus> inputs_of(const StatusView& view) {
 std::optional<SensorError> suspicion_of(const StatusView& view, const SensorReport& sensor) {
   if (!sensor.suspected) return std::nullopt;
   return SensorError{sensor.suspected_size_K,
-                   view.wall_s - seconds(view.report.now - sensor.suspected_since),
-                   sensor.weighed_down};
+                     view.wall_s - seconds(view.report.now - sensor.suspected_since),
+                     sensor.weighed_down};
 }
 
 /// nullopt: no change waits to be confirmed.

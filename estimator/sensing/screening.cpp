@@ -64,14 +64,15 @@ bool Screening::take(nanoseconds now, const Reading& reading) noexcept {
   return false;
 }
 
-/// Nearly every reading: beside the one before, which counted.
+/// Nearly every reading: beside the one before, which counted. The reading's time may be any: a
+/// difference to it could overflow.
 bool Screening::goes_on(nanoseconds now, const Reading& reading) const noexcept {
-  const nanoseconds gap = reading.taken_at - state_.good.at;
   return reading.fault == Fault::none && !state_.waiting && state_.good.known &&
          std::abs(reading.temp_degC - state_.good.temp_degC) <= allowance_K_ &&
-         reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_ && gap > nanoseconds{0} &&
-         gap <= stale_after_ && reading.taken_at >= now - stale_after_ &&
-         reading.taken_at <= now + stale_after_ && stuck_after_ <= nanoseconds{0};
+         reading.temp_degC >= min_degC_ && reading.temp_degC <= max_degC_ &&
+         reading.taken_at > state_.good.at && reading.taken_at <= state_.good.at + stale_after_ &&
+         reading.taken_at >= now - stale_after_ && reading.taken_at <= now + stale_after_ &&
+         stuck_after_ <= nanoseconds{0};
 }
 
 Fault Screening::check(nanoseconds now, const Reading& reading) const noexcept {

@@ -136,7 +136,7 @@ HistoryReader::HistoryReader(HistoryReader&&) noexcept = default;
 const std::filesystem::path& HistoryReader::file() const noexcept {
   return parts_->file;
 }
-const std::vector<SegmentInfo>& HistoryReader::segments() const noexcept {
+const std::vector<SegmentInfo>& HistoryReader::segments() const& noexcept {
   return parts_->segments;
 }
 const std::vector<HistoryDamage>& HistoryReader::damage() const noexcept {

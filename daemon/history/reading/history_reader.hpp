@@ -67,7 +67,8 @@ class HistoryReader {
   HistoryReader(HistoryReader&&) noexcept;
 
   [[nodiscard]] const std::filesystem::path& file() const noexcept;
-  [[nodiscard]] const std::vector<SegmentInfo>& segments() const noexcept;  ///< oldest first
+  [[nodiscard]] const std::vector<SegmentInfo>& segments() const& noexcept;  ///< oldest first
+  const std::vector<SegmentInfo>& segments() const&& = delete;
   [[nodiscard]] const std::vector<HistoryDamage>& damage() const noexcept;
   [[nodiscard]] SegmentSetup setup(const SegmentInfo& segment) const;
   [[nodiscard]] SegmentStart start(const SegmentInfo& segment) const;

@@ -31,6 +31,13 @@ ReplaySummary replay_quietly(const std::filesystem::path& file) {
   return replay(file, {}, {}, parse_test_setup);
 }
 
+std::uint64_t records_in(const std::filesystem::path& file) {
+  const HistoryReader reader(file);
+  std::uint64_t records = 0;
+  for (const SegmentInfo& segment : reader.segments()) records += segment.records;
+  return records;
+}
+
 std::string told(const std::vector<HistoryDamage>& damage) {
   std::string text;
   for (const HistoryDamage& part : damage) text += to_string(part) + "\n";
@@ -301,7 +308,8 @@ TEST_CASE("what was committed before kill -9 is read and replayed whole", "[hist
   std::this_thread::sleep_for(std::chrono::milliseconds(400 + 37 * seed));
   const bool was_started = eventually([&] {
     try {
-      return !HistoryReader(config.file).segments().empty();
+      const HistoryReader reader(config.file);
+      return !reader.segments().empty();
     } catch (const HistoryError&) {
       return false;  // not there, or not begun
     }
@@ -450,10 +458,7 @@ TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, 
   const std::uint64_t written = machine.writer().statistics().records;
   // As kill -9 would leave it at this moment: committed rows are in the database already.
   std::filesystem::copy_file(config.file, folder / "killed.db");
-  std::uint64_t held = 0;
-  for (const SegmentInfo& segment : HistoryReader(folder / "killed.db").segments())
-    held += segment.records;
-  CHECK(held == written);
+  CHECK(records_in(folder / "killed.db") == written);
   commit();
   CHECK(machine.writer().statistics().replaced == 1);
   CHECK(machine.writer().statistics().working);
@@ -461,9 +466,7 @@ TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, 
   CHECK_THAT(told(machine.writer().take_news()),
              Catch::Contains("opened anew") && !Catch::Contains("lost"));
   commit();
-  held = 0;
-  for (const SegmentInfo& segment : HistoryReader(config.file).segments()) held += segment.records;
-  CHECK(held == machine.writer().statistics().records);
+  CHECK(records_in(config.file) == machine.writer().statistics().records);
   CHECK(machine.writer().statistics().replaced == 1);
   machine.stop();
   const ReplaySummary summary = replay_quietly(config.file);
@@ -499,9 +502,7 @@ TEST_CASE("a history that is moved away, or its folder, is told and begun anew",
   for (int i = 0; i < 4; ++i) commit();
   CHECK(machine.writer().statistics().replaced == 1);
   CHECK_THAT(told(machine.writer().take_news()), Catch::Contains("a new history begins"));
-  std::uint64_t held = 0;
-  for (const SegmentInfo& segment : HistoryReader(moved).segments()) held += segment.records;
-  CHECK(held == written);
+  CHECK(records_in(moved) == written);
   machine.stop();
   CHECK(replay_quietly(config.file).different == 0);
   CHECK(replay_quietly(config.file).segments >= 1);
