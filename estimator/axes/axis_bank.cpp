@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "estimator/checks.hpp"
 
@@ -83,7 +84,17 @@ void AxisBank::prove(std::size_t axis, double move_um) noexcept {
 
 void AxisBank::release(std::size_t axis) noexcept {
   const AxisSpan span = span_of_[axis];
-  for (std::size_t i = span.first; i < span.end(); ++i) axes_[i].release();
+  const std::span nodes = std::span(axes_).subspan(span.first, span.end() - span.first);
+  // Where nothing tells what was sent last, the operator has set the whole axis to zero: of a
+  // travel also the nodes whose offset is known.
+  const bool at_zero = std::any_of(nodes.begin(), nodes.end(),
+                                   [](const AxisChannel& node) { return node.start_unknown(); });
+  for (AxisChannel& node : nodes) {
+    if (at_zero)
+      node.begin_at_zero();
+    else
+      node.release();
+  }
 }
 
 void AxisBank::end_proves() noexcept {

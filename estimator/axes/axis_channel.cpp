@@ -226,15 +226,15 @@ void AxisChannel::note_unexplained(const AxisInput& input, bool fresh) noexcept 
   state_.pairs.note(limiter_.offset_um(), input.applied_um);
 }
 
+void AxisChannel::begin_at_zero() noexcept {
+  const bool no_registers = start_.no_registers;
+  start_from(state_.seen_at, 0.0);
+  begin_corridor(StartEvidence::released);
+  start_.no_registers = no_registers;
+  state_.out_of_bound = false;
+}
+
 void AxisChannel::release() noexcept {
-  if (start_unknown()) {
-    const bool no_registers = start_.no_registers;
-    start_from(state_.seen_at, 0.0);
-    begin_corridor(StartEvidence::released);
-    start_.no_registers = no_registers;
-    state_.out_of_bound = false;
-    return;
-  }
   // Said again while read-backs are awaited it must not make them begin anew: with a slow link and
   // an impatient operator they would never be enough.
   if (!state_.latched || state_.releasing) return;

@@ -63,7 +63,10 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
 
 void Invariants::booted(nanoseconds now, double leap_um) {
   boot_ = now;
-  leap_um_ = leap_um;
+  for (std::size_t i = 0; i < axes_count; ++i) {
+    // What a start before this one went by still holds where it has sent nothing.
+    leap_um_[i] = has_moved_[i] ? leap_um : std::max(leap_um_[i], leap_um);
+  }
   wanted_before_um_ = wanted_um_;
   has_moved_.fill(false);
   sent_ = {};
@@ -142,6 +145,7 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
     check_move(seen, move, controller);
     check_sent(seen, move);
     if (!reads_back_ && !std::exchange(has_moved_[move.axis], true)) check_first(seen, move);
+    is_lost_[move.axis] = false;
   }
   moves.clear();
   for (std::size_t axis = 0; axis < axes_count; ++axis) check_unexplained(seen, axis);
@@ -153,7 +157,8 @@ void Invariants::check(const CycleSeen& seen, std::vector<Move>& moves,
   for (std::size_t i = 0; i < axes_count; ++i) {
     offset_um_[i] = seen.command->offset_um[i];
     offset_was_driven_[i] = seen.command->valid[i];
-    if (seen.command->valid[i]) wanted_um_[i] = seen.command->offset_um[i];
+    if (seen.command->valid[i] || seen.report->axes[i].start == StartEvidence::released)
+      wanted_um_[i] = seen.command->offset_um[i];
   }
   last_ = seen.now;
   first_ = false;
@@ -280,7 +285,7 @@ void Invariants::check_command(const CycleSeen& seen) {
 bool Invariants::is_released(const CycleSeen& seen, std::size_t axis) const {
   const double step_um = rate_um_per_s_[axis] * period_s_ + tiny_um;
   return !reads_back_ && std::abs(seen.command->offset_um[axis]) <= step_um &&
-         !offset_was_driven_[axis];
+         !offset_was_driven_[axis] && seen.report->axes[axis].start == StartEvidence::released;
 }
 
 void Invariants::check_hold(const CycleSeen& seen) {
@@ -514,7 +519,7 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   const double since_seen_um = rate_um * to_s(move.at - move.seen_at);
   double allowed_um = (move.disturbed ? std::min(budget.um, since_seen_um) : budget.um) +
                       rate_um * period_s_ + 2.0 * resolution_um_ +
-                      (has_moved_[move.axis] ? 0.0 : leap_um_);
+                      (has_moved_[move.axis] ? 0.0 : leap_um_[move.axis]);
   // An operator may have released an axis on the word of a controller that has stopped lying since.
   const bool lies = controller.lies(move.at) || controller.lies(move.at - from_s(4.0));
   if (move.disturbed || lies) budget.disturbed_at = move.at;
@@ -525,7 +530,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
     const auto [low, high] = std::minmax_element(budget.told_um.begin(), end);
     allowed_um += 3.0 + 2.0 * resolution_um_ + (budget.count == 0 ? 0.0 : *high - *low);
   }
-  const bool knowable = !move.disturbed || move.seen;
+  const bool knowable =
+      (!move.disturbed || move.seen) && (has_moved_[move.axis] || !is_lost_[move.axis]);
   if (knowable && !lies)
     demand(change_um <= allowed_um, "slew_kept_at_controller", seen.now, [&] {
       return fmt::format("axis {}: told {:.4f} um where {:.4f} is applied, {:.4f} allowed",
@@ -550,13 +556,13 @@ void Invariants::check_first(const CycleSeen& seen, const Move& move) {
   const bool is_read = std::isfinite(seen.told->applied_um[move.axis]);
   const bool held = is_read && std::abs(move.to_um - move.from_um) <= slack_um;
   const double before_um = wanted_before_um_[move.axis];
-  const bool wanted = std::abs(move.to_um - before_um) <= leap_um_ + rounding_um;
+  const bool wanted = std::abs(move.to_um - before_um) <= leap_um_[move.axis] + slack_um;
   const bool released = std::abs(move.to_um) <= slack_um &&
                         seen.report->axes[move.axis].start == StartEvidence::released;
-  demand(held || wanted || released || std::isnan(before_um), "first_offset_is_known", seen.now,
-         [&] {
+  demand(held || wanted || released || std::isnan(before_um) || is_lost_[move.axis],
+         "first_offset_is_known", seen.now, [&] {
            return fmt::format("axis {}: {:.4f} um first, {:.4f} um last, {:.4f} allowed", move.axis,
-                              move.to_um, before_um, leap_um_);
+                              move.to_um, before_um, leap_um_[move.axis]);
          });
 }
 

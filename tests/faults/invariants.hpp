@@ -60,6 +60,9 @@ class Invariants {
 
   /// @param leap_um  by so much the first offset may differ from the last one
   void booted(nanoseconds now, double leap_um);
+  /// At a power cut the disk did not have yet that the controller had lost this axis's offset, or
+  /// that an operator had set it to zero: no start can know.
+  void lost(std::size_t axis) { is_lost_[axis] = true; }
   void reloaded(const MachineShape& shape);
   /// A probing of this axis reaches the estimator in the cycle to come.
   void probed(std::size_t axis) { ++probings_[axis]; }
@@ -124,7 +127,8 @@ class Invariants {
   bool smoothing_off_{false};
   double resolution_um_{0.0};
   bool reads_back_{true};
-  double leap_um_{0.0};                                ///< of the first offsets since the boot
+  std::array<double, axes_count> leap_um_{};           ///< of the first offset since the boot
+  std::array<bool, axes_count> is_lost_{};             ///< until it moves: see lost()
   std::array<double, axes_count> wanted_um_{};         ///< by the newest valid command
   std::array<double, axes_count> wanted_before_um_{};  ///< ... before the boot
   std::array<bool, axes_count> has_moved_{};           ///< since the boot

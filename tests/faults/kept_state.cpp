@@ -1,5 +1,6 @@
 #include "kept_state.hpp"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "config/daemon/daemon_config.hpp"
@@ -90,6 +91,14 @@ void KeptState::kill() {
 void KeptState::cut_power() {
   kill();
   std::filesystem::remove(folder_ / "sent");
+}
+
+bool KeptState::is_behind(const PersistentState& then, const std::string& axis) const {
+  const auto width = then.corridor_um.find(axis);
+  if (width == then.corridor_um.end()) return on_disk_.corridor_um.contains(axis);
+  const auto on_disk = on_disk_.offset_um.find(axis);
+  return on_disk != on_disk_.offset_um.end() &&
+         std::abs(on_disk->second - then.offset_um.at(axis)) > width->second;
 }
 
 void KeptState::end(const PersistentState& state) {

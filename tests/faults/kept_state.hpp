@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "chance.hpp"
@@ -36,6 +37,9 @@ class KeptState {
   /// nothing of the record.
   void kill();
   void cut_power();
+  /// Whether the file says something else of an axis than the state then: another offset than its
+  /// corridor allows, or an offset that is not known any more.
+  [[nodiscard]] bool is_behind(const PersistentState& then, const std::string& axis) const;
   /// In order: what the state is at the end is saved.
   void end(const PersistentState& state);
 

@@ -183,12 +183,12 @@ class Life {
   }
 
   void end_kept(bool in_order) {
-    if (in_order)
-      kept_->end(daemon_->cycle().brain().estimator.persistent_state(report_));
-    else if (power_was_cut_)
-      kept_->cut_power();
-    else
-      kept_->kill();
+    const PersistentState then = daemon_->cycle().brain().estimator.persistent_state(report_);
+    if (in_order) return kept_->end(then);
+    if (!power_was_cut_) return kept_->kill();
+    kept_->cut_power();
+    for (std::size_t i = 0; i < axes_count; ++i)
+      if (kept_->is_behind(then, shape_.estimator.axes[i].name)) judge_.lost(i);
   }
 
   [[nodiscard]] nanoseconds done_at() const {
