@@ -235,6 +235,7 @@ void AxisChannel::begin_at_zero() noexcept {
 }
 
 void AxisChannel::release() noexcept {
+  if (start_unknown()) return begin_at_zero();
   // Said again while read-backs are awaited it must not make them begin anew: with a slow link and
   // an impatient operator they would never be enough.
   if (!state_.latched || state_.releasing) return;

@@ -65,9 +65,9 @@ class AxisChannel {
   /// An operator says that what caused a latched mismatch is mended. The next read-backs decide:
   /// explained by the same factor, sign or constant that was latched, or no two of them alike, it
   /// stays latched; else the axis starts from what is read back, once it could have got there at
-  /// its slew rate from what was sent last.
+  /// its slew rate from what was sent last. Of an unknown start: begin_at_zero().
   void release() noexcept;
-  /// An operator says that the offset at the controller is 0, where nothing else tells.
+  /// An operator has set the offset at the controller to 0.
   void begin_at_zero() noexcept;
   /// A state with this offset is on disk. One from before a release means nothing any more.
   void saved(double offset_um) noexcept;
