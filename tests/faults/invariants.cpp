@@ -281,11 +281,13 @@ void Invariants::check_command(const CycleSeen& seen) {
   }
 }
 
-/// An operator has set the offset to zero, and nothing has been sent since.
+/// Not driven: what would be sent first is zero. A driven axis goes there only where an operator
+/// has set it to zero, and nothing has been sent since.
 bool Invariants::is_released(const CycleSeen& seen, std::size_t axis) const {
   const double step_um = rate_um_per_s_[axis] * period_s_ + tiny_um;
   return !reads_back_ && std::abs(seen.command->offset_um[axis]) <= step_um &&
-         !offset_was_driven_[axis] && seen.report->axes[axis].start == StartEvidence::released;
+         !offset_was_driven_[axis] &&
+         (!seen.command->valid[axis] || seen.report->axes[axis].start == StartEvidence::released);
 }
 
 void Invariants::check_hold(const CycleSeen& seen) {
