@@ -14,6 +14,7 @@
 #include "daemon/cycle/real_time_thread.hpp"
 #include "daemon/desks/bridge_desk.hpp"
 #include "daemon/desks/operator_desk.hpp"
+#include "daemon/history/format/database.hpp"
 #include "daemon/locks/file_lock.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/start_state.hpp"
@@ -58,8 +59,22 @@ std::unique_ptr<HistoryWriter> make_history(const HistoryConfig& config, const G
   return std::make_unique<HistoryWriter>(config, grid, THERMOCOMP_VERSION);
 }
 
+/// A start that is refused later would have moved the state file.
+void require_own_history(const DaemonConfig& config) {
+  if (!config.history.enabled) return;
+  try {
+    refuse_foreign_history(config.history.file);
+  } catch (const HistoryError& error) {
+    const std::string remedy =
+        "; move it away, name another file, or install the program that wrote it";
+    throw ConfigurationError(
+        {{config.file.string(), 0, "history.file", "", error.what() + remedy}});
+  }
+}
+
 DaemonConfig load(const std::filesystem::path& file) {
   DaemonConfig config = load_daemon_config(file);
+  require_own_history(config);
   set_log_level(config.log_level);
   spdlog::info("thermocompd {}: configuration {}, model {} (SHA-256 {})", THERMOCOMP_VERSION,
                config.file.string(), config.model_file.string(), config.model_checksum);
@@ -98,9 +113,11 @@ std::unique_ptr<LastSent> open_last_sent(const DaemonConfig& config,
                                          std::vector<std::string>& warnings) {
   if (config.dry_run) return nullptr;
   try {
-    return std::make_unique<LastSent>(config.socket.path.string() + ".sent",
-                                      controller_identity(config.controller),
-                                      config.estimator.axes);
+    auto record =
+        std::make_unique<LastSent>(config.socket.path.string() + ".sent",
+                                   controller_identity(config.controller), config.estimator.axes);
+    if (!record->problem().empty()) warnings.push_back(record->problem());
+    return record;
   } catch (const std::runtime_error& problem) {
     warnings.emplace_back(problem.what());
     return nullptr;

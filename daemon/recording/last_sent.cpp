@@ -17,7 +17,9 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t places = 2;
+constexpr std::uint64_t magic = 0x746E6573636D6874u;  ///< "thmcsent"
+/// Raised with a change of what stands where.
+constexpr std::uint64_t format = 1;
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& what) {
   throw std::runtime_error("last-sent record " + file.string() + ": " + what);
@@ -46,8 +48,7 @@ std::string boot_of(const std::filesystem::path& file) {
 
 std::uint64_t key_of(const std::filesystem::path& file, const std::string& controller,
                      const std::vector<AxisConfig>& axes) {
-  // "thermoc1": of this layout.
-  std::uint64_t key = mixed(mixed(0x31636F6D72656874u, boot_of(file)), controller);
+  std::uint64_t key = mixed(mixed(format, boot_of(file)), controller);
   for (const AxisConfig& axis : axes)
     key = mixed(mixed(key, axis.name), std::bit_cast<std::uint64_t>(axis.sign));
   return key;
@@ -76,17 +77,24 @@ LastSent::LastSent(const std::filesystem::path& file, const std::string& control
                    const std::vector<AxisConfig>& axes)
     : key_(key_of(file, controller, axes)),
       axes_(axes.size()),
-      places_(static_cast<Place*>(map(file, places * sizeof(Place)))) {
-  for (std::size_t i = 0; i < places; ++i) {
-    const Place& place = places_[i];
-    if (place.number > now_.number && place.checksum == checksum_of(place)) now_ = place;
+      file_(static_cast<File*>(map(file, sizeof(File)))) {
+  if (file_->magic == 0 && file_->format == 0) return;  // new
+  if (file_->magic != magic || file_->format != format) {
+    problem_ = "last-sent record " + file.string() + ": " +
+               (file_->magic == magic ? "is of format " + std::to_string(file_->format) +
+                                            ", this program reads format " + std::to_string(format)
+                                      : "is none of this program") +
+               "; it is not read, and replaced with the first offset that is sent";
+    return;
   }
+  for (const Place& place : file_->places)
+    if (place.number > now_.number && place.checksum == checksum_of(place)) now_ = place;
   for (std::size_t i = 0; i < axes_; ++i)
     if ((now_.known >> i & 1u) != 0) before_[axes[i].name] = now_.offset_um[i];
 }
 
 LastSent::~LastSent() {
-  munmap(places_, places * sizeof(Place));
+  munmap(file_, sizeof(File));
 }
 
 void LastSent::note(const OffsetCommand& command, std::uint32_t forgotten) noexcept {
@@ -98,10 +106,12 @@ void LastSent::note(const OffsetCommand& command, std::uint32_t forgotten) noexc
     if ((forgotten >> i & 1u) != 0) next.known &= ~bit;
   }
   if (next.known == now_.known && next.offset_um == now_.offset_um) return;
+  // What others left would be found again by them, and be wrong by then.
+  if (next.number == 0) *file_ = File{magic, format, {}};
   ++next.number;
   next.checksum = checksum_of(next);
   now_ = next;
-  std::memcpy(&places_[next.number % places], &next, sizeof next);
+  std::memcpy(&file_->places[next.number % file_->places.size()], &next, sizeof next);
 }
 
 std::uint64_t LastSent::checksum_of(const Place& place) const noexcept {

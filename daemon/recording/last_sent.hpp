@@ -21,6 +21,9 @@ using Offsets = std::map<std::string, double>;
 /// writes one leaves the other. The checksum holds the boot of the system, the controller, names
 /// and signs of the axes, so that nobody else's offsets are taken for these. The file belongs into
 /// a folder in memory (/run): on a disk the system may keep a store waiting.
+///
+/// A record of another format, which another version of the program wrote, is not read. It stays
+/// until the first offset is sent: from then on what it says is wrong, and it is replaced.
 class LastSent {
  public:
   /// @param file        made where there is none
@@ -35,6 +38,9 @@ class LastSent {
   /// As the process before left them, of this boot, controller and axes.
   [[nodiscard]] const Offsets& before() const noexcept { return before_; }
 
+  /// Why what is there is not read; empty: it is, or nothing is there.
+  [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
+
   /// Before a command is offered to the controller: plain stores, no system call. An axis that is
   /// not driven keeps what it was sent last.
   /// @param forgotten  by bits, one an axis: what it was sent last is worth nothing any more
@@ -47,13 +53,19 @@ class LastSent {
     std::uint64_t known{0};  ///< by bits, one an axis
     std::uint64_t checksum{0};
   };
+  struct File {
+    std::uint64_t magic;
+    std::uint64_t format;
+    std::array<Place, 2> places;
+  };
   [[nodiscard]] std::uint64_t checksum_of(const Place& place) const noexcept;
 
   const std::uint64_t key_;
   std::size_t axes_;
-  Place* places_{nullptr};  ///< the file
+  File* file_;  ///< in memory
   Place now_;
   Offsets before_;
+  std::string problem_;
 };
 
 }  // namespace thermocomp

@@ -18,8 +18,19 @@ namespace {
 
 using nlohmann::json;
 
+/// Raised with a change by which an earlier program would read something else than was written.
 constexpr int format = 1;
 constexpr std::uintmax_t size_bytes_max = 1u << 20;
+
+/// What a later program wrote: kept under a name of its own, so that nothing takes its place.
+class NewerFormat : public std::runtime_error {
+ public:
+  explicit NewerFormat(std::int64_t newer)
+      : std::runtime_error("a newer thermocompd wrote it (format " + std::to_string(newer) +
+                           ", this one reads format " + std::to_string(format) + ")"),
+        ending(".format-" + std::to_string(newer)) {}
+  const std::string ending;
+};
 
 json numbers(const std::map<std::string, double>& values) {
   json object = json::object();
@@ -92,6 +103,8 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   }
   // Compared and shown as JSON: any number may stand there, or lists as deep as the file is long.
   const json& its_format = file.at("format");
+  if (its_format.is_number_integer() && its_format > format)
+    throw NewerFormat(its_format.get<std::int64_t>());
   if (its_format != format) {
     throw std::runtime_error("is of format " +
                              (its_format.is_number() ? its_format.dump() : "(no number)") +
@@ -118,11 +131,11 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
 }
 
 /// What stands there, a folder too, must not keep the next state from being written.
-std::string move_aside(const std::filesystem::path& file) {
+std::string move_aside(const std::filesystem::path& file, const std::string& ending) {
   constexpr int names_max = 9;
   std::error_code error;
   for (int name = 1; name <= names_max; ++name) {
-    std::string aside = file.string() + ".unusable";
+    std::string aside = file.string() + ending;
     if (name > 1) aside += "." + std::to_string(name);
     // A file takes the place of an older one; what cannot gets the next name.
     std::filesystem::rename(file, aside, error);
@@ -170,8 +183,9 @@ LoadedState load_state_file(const std::filesystem::path& file,
     loaded.reference = {};
     try {
       loaded.state = fallback;
+      const auto* newer = dynamic_cast<const NewerFormat*>(&error);
       loaded.warning = "state file " + file.string() + " cannot be used: " + error.what() + "; " +
-                       move_aside(file);
+                       move_aside(file, newer != nullptr ? newer->ending : ".unusable");
     } catch (const std::exception&) {
       loaded.found = false;  // out of memory for a message
     }

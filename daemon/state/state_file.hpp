@@ -20,8 +20,8 @@ struct LoadedState {
   ReferenceRecord reference;  ///< unknown where the file does not say
 };
 
-/// Never throws: a damaged or foreign file is moved aside (`<file>.unusable`) and reported in
-/// `warning`.
+/// Never throws: a damaged or foreign file is moved aside (`<file>.unusable`), one of a newer
+/// format too (`<file>.format-N`), and reported in `warning`.
 /// @param fallback  returned where there is no usable file
 [[nodiscard]] LoadedState load_state_file(const std::filesystem::path& file,
                                           const PersistentState& fallback) noexcept;

@@ -107,6 +107,21 @@ std::int64_t Database::number(const char* sql) {
   return statement.step() ? statement.number(0) : 0;
 }
 
+bool is_without_tables(Database& database) {
+  return database.number("SELECT count(*) FROM sqlite_master") == 0;
+}
+
+void refuse_foreign_history(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return;
+  try {
+    Database database(file, DatabaseMode::read_only);
+    if (!is_without_tables(database)) require_history(database);
+  } catch (const DatabaseError&) {
+    // The writer moves aside what is damaged, and waits for the disk.
+  }
+}
+
 void require_history(Database& database) {
   const std::string name = database.file().string();
   if (database.number("PRAGMA application_id") != history_application_id) {
@@ -114,12 +129,13 @@ void require_history(Database& database) {
   }
   const std::int64_t version = database.number("PRAGMA user_version");
   if (version < 1) {
-    throw HistoryError(name + ": is of version " + std::to_string(version) +
+    throw HistoryError(name + ": is a history of version " + std::to_string(version) +
                        ", which no thermocomp wrote (damaged)");
   }
   if (version > history_version) {
-    throw HistoryError(name + ": is of version " + std::to_string(version) +
-                       ", this program reads up to version " + std::to_string(history_version));
+    throw HistoryError(name + ": is a history of version " + std::to_string(version) +
+                       ", which a newer thermocompd wrote; this program knows up to version " +
+                       std::to_string(history_version));
   }
 }
 

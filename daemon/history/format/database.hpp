@@ -18,6 +18,7 @@ namespace thermocomp {
 
 /// "thco": marks a SQLite file as a history of ours.
 inline constexpr std::int64_t history_application_id = 0x7468636F;
+/// Raised with a change by which an earlier program would read something else than was written.
 inline constexpr std::int64_t history_version = 1;
 
 class DatabaseError : public HistoryError {
@@ -55,8 +56,14 @@ class Database {
   sqlite3* handle_{nullptr};
 };
 
+[[nodiscard]] bool is_without_tables(Database& database);
+
 /// @throws HistoryError: the file is another program's, or of an unknown version
 void require_history(Database& database);
+
+/// The same before a daemon reads, moves or makes anything. A file that is missing, empty or
+/// damaged is none of another program.
+void refuse_foreign_history(const std::filesystem::path& file);
 
 class Statement {
  public:

@@ -214,22 +214,8 @@ void HistoryStore::lock() {
 void HistoryStore::prepare() {
   lock();
   database_ = std::make_unique<Database>(config_.file, DatabaseMode::read_write_create);
-  const std::string name = config_.file.string();
-  const std::int64_t application = database_->number("PRAGMA application_id");
-  const std::int64_t version = database_->number("PRAGMA user_version");
-  const bool is_empty = database_->number("SELECT count(*) FROM sqlite_master") == 0;
-  if (!is_empty && application != history_application_id) {
-    throw HistoryError(name + ": is a database of another program; history.file must name another");
-  }
-  if (!is_empty && version < 1) {
-    throw HistoryError(name + ": is a history of version " + std::to_string(version) +
-                       ", which no thermocomp wrote; move it away or name another file");
-  }
-  if (version > history_version) {
-    throw HistoryError(name + ": is a history of version " + std::to_string(version) +
-                       ", this program writes version " + std::to_string(history_version) +
-                       "; move it away or name another file");
-  }
+  const bool is_empty = is_without_tables(*database_);
+  if (!is_empty) require_history(*database_);
   database_->run("PRAGMA cache_size = -512; PRAGMA synchronous = FULL; PRAGMA temp_store = MEMORY");
   if (is_empty) create();
   database_->run(

@@ -12,6 +12,7 @@ class PlainDevice:
 
     def __init__(self, port):
         self.port = port
+        self.refused = set()  # functions that are answered with exception 1
         self.lock = threading.Lock()
         self.server = None
         self.start()
@@ -65,6 +66,8 @@ class PlainDevice:
     def answer(self, pdu):
         function, address, count = struct.unpack(">BHH", pdu[:5])
         with self.lock:
+            if function in self.refused:
+                return bytes([function | 0x80, 1])
             if function in (3, 4):
                 words = [self.tables[function].get(address + i, 0) for i in range(count)]
                 return struct.pack(f">BB{count}H", function, 2 * count, *words)

@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import socket
+import sqlite3
 import subprocess
 import time
 
@@ -259,13 +260,27 @@ def start(mode="compensating"):
 
 
 def committed_rows():
-    import sqlite3
     base = sqlite3.connect(HISTORY)
     try:
         assert base.execute("PRAGMA integrity_check").fetchone() == ("ok",)
         return base.execute("SELECT sum(count) FROM chunk").fetchone()[0] or 0
     finally:
         base.close()
+
+
+def committed_chunks():
+    """Each part of the history that is on disk, whole."""
+    with contextlib.closing(sqlite3.connect(HISTORY)) as base:
+        return set(base.execute("SELECT segment, number, through_cycle, count, records FROM chunk"))
+
+
+def recorded_spans():
+    """[from, through] of each segment on CLOCK_MONOTONIC [s], oldest first."""
+    with contextlib.closing(sqlite3.connect(HISTORY)) as base:
+        return [(1e-9 * (start + period * first), 1e-9 * (start + period * last))
+                for start, period, first, last in base.execute(
+                    "SELECT grid_start_ns, period_ns, first_cycle, last_cycle FROM segment "
+                    "ORDER BY id")]
 
 
 def tree(*tops):

@@ -24,7 +24,7 @@ Status good_status() {
                 .mode_since_s = 3725.0,
                 .compensating_s = 3725.0,
                 .enabled = true,
-                .version = "0.1.0",
+                .version = "0.2.0",
                 .uptime_s = 4000.0};
   status.cycle = {.count = 400000,
                   .missed = 3,

@@ -588,7 +588,7 @@ TEST_CASE("a newer version and another program's database are refused", "[histor
   SECTION("foreign") {
     run_sql(config.file, "CREATE TABLE mine (x)");
     CHECK_THROWS_WITH(HistoryWriter(config, Grid{}, "test").start(),
-                      Catch::Contains("another program"));
+                      Catch::Contains("not a history of thermocomp"));
     CHECK_THROWS_AS(HistoryReader(config.file), HistoryError);
   }
   SECTION("missing") {

@@ -71,6 +71,43 @@ TEST_CASE("what was sent to another controller, axis or sign is not taken", "[la
   CHECK(left_in(folder / "sent").size() == 2);
 }
 
+TEST_CASE("what is another's comes never back once an offset was sent", "[last_sent]") {
+  const TempFolder folder;
+  const auto file = folder / "sent";
+  { LastSent(file, "cnc", two_axes()).note(command(1.0, 2.0), 0); }
+  { LastSent(file, "cnc", two_axes(-1.0)).note(command(9.0, -9.0), 0); }
+  // The controller has 9.0 by now, whatever was sent before with the other sign.
+  CHECK(left_in(file).empty());
+}
+
+TEST_CASE("a record of another format is said, left until an offset is sent, and then replaced",
+          "[last_sent]") {
+  const TempFolder folder;
+  const auto file = folder / "sent";
+  {
+    LastSent sent(file, "cnc", two_axes());
+    CHECK(sent.problem().empty());
+    sent.note(command(1.0, 2.0), 0);
+    sent.note(command(1.5, 2.5), 0);
+  }
+  std::string newer = bytes_of(file);
+  newer[8] = 2;
+  write(file, newer);
+  {
+    LastSent sent(file, "cnc", two_axes());
+    CHECK_THAT(sent.problem(), Catch::Contains("is of format 2, this program reads format 1"));
+    CHECK(sent.before().empty());
+    CHECK(bytes_of(file) == newer);
+    sent.note(command(7.0, 8.0), 0);
+  }
+  CHECK(left_in(file) == Offsets{{"z", 7.0}, {"x", 8.0}});
+  // Nothing of it is left for the newer program.
+  std::string back = bytes_of(file);
+  CHECK(back[8] == 1);
+  write(file, "something else that is long enough to have a format");
+  CHECK_THAT(LastSent(file, "cnc", two_axes()).problem(), Catch::Contains("none of this program"));
+}
+
 TEST_CASE("a process that ends while it records leaves what was before, or after", "[last_sent]") {
   const TempFolder folder;
   const auto file = folder / "sent";

@@ -68,7 +68,7 @@ TEST_CASE("an unusable state file is moved aside and said", "[state]") {
   const std::string text = GENERATE_COPY(
       std::string(), std::string("{"), std::string("[]"), std::string("null"),
       std::string(R"({"enabled": true})"), std::string(R"({"program":"other","format":1})"),
-      head + R"("format":2,"enabled":true,)" + good, head + R"("format":1,"enabled":1,)" + good,
+      head + R"("format":0,"enabled":true,)" + good, head + R"("format":1,"enabled":1,)" + good,
       head + R"("format":1e300,"enabled":true,)" + good,
       head + R"("format":)" + std::string(400000, '[') + std::string(400000, ']') +
           R"(,"enabled":true,)" + good,
@@ -83,6 +83,22 @@ TEST_CASE("an unusable state file is moved aside and said", "[state]") {
   CHECK(loaded.state.offset_um == sample_state().offset_um);
   CHECK_FALSE(std::filesystem::exists(file));
   CHECK(std::filesystem::exists(file.string() + ".unusable"));
+}
+
+TEST_CASE("the state of a newer version is kept under a name that nothing else gets", "[state]") {
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "state.json";
+  const std::string newer = R"({"program":"thermocomp","format":2,"moved":"elsewhere"})";
+  std::ofstream(file) << newer;
+  const LoadedState loaded = load_state_file(file, sample_state());
+  CHECK_FALSE(loaded.found);
+  CHECK(loaded.damaged);
+  CHECK_THAT(loaded.warning, Catch::Contains("newer thermocompd wrote it (format 2") &&
+                                 Catch::Contains("state.json.format-2"));
+  std::ofstream(file) << "damaged";
+  CHECK(load_state_file(file, sample_state()).damaged);
+  std::ifstream in(folder / "state.json.format-2");
+  CHECK(std::string{std::istreambuf_iterator<char>(in), {}} == newer);
 }
 
 TEST_CASE("a state that cannot be written is an error and leaves the old file", "[state]") {

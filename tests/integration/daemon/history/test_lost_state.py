@@ -1,12 +1,13 @@
 """A state file that is gone or cannot be read is no first start where there was an earlier one: the
 warm machine is not taken for straight, and an operator's "off" stays."""
 
+import contextlib
 import json
 import sqlite3
 
 import pytest
 
-from lab import Refused, eventually
+from lab import PATIENCE_S, Refused, eventually
 from plain_devices import Machine
 
 DAMAGE = {
@@ -65,6 +66,29 @@ def test_reference_and_switch_come_from_the_history(machine, damage):
     daemon.start()
     daemon.wait_for_mode("disabled")
     assert references(daemon) == [20.0, 20.0]
+
+
+def test_a_newer_history_is_refused_once_and_everything_stays_as_it_is(machine):
+    """The way back to an older program: the state file is of a newer format too."""
+    daemon = machine.start()
+    machine.warm_by(9.0)
+    daemon.wait_for_offset(9.0, 0.05)
+    daemon.end()
+    with contextlib.closing(sqlite3.connect(daemon.history)) as base:
+        base.execute("PRAGMA user_version = 2")
+    DAMAGE["newer_format"](daemon.state)
+    before = {file.name: file.read_bytes() for file in (daemon.state, daemon.history)}
+    daemon.start(wait=False)
+    assert daemon.process.wait(PATIENCE_S) == 2
+    assert "history of version 2, which a newer thermocompd wrote" in daemon.log_text()
+    assert {name: (daemon.folder / name).read_bytes() for name in before} == before
+    assert machine.controller.applied_um() == pytest.approx(9.0, abs=0.01)
+    with contextlib.closing(sqlite3.connect(daemon.history)) as base:
+        base.execute("PRAGMA user_version = 1")
+    daemon.start()
+    daemon.wait_for_offset(9.0, 0.05)
+    assert "newer thermocompd wrote it (format 9" in warnings(daemon)
+    assert '"format": 9' in daemon.state.with_name("state.json.format-9").read_text()
 
 
 def test_a_commanded_reference_comes_from_the_history_too(machine):
