@@ -1,5 +1,6 @@
 #include "cli/import/import_command.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -10,7 +11,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/import/import_log.hpp"
 #include "cli/import/joined_runs.hpp"
 #include "config/runs/run_file.hpp"
 #include "report/output_file.hpp"
@@ -25,7 +25,8 @@ struct ImportOptions {
   std::optional<double> shift_s;
   std::string columns;
   std::string output;
-  LogOptions of_log;
+  std::vector<std::string> names;
+  std::optional<double> period_s;
 };
 
 void tell(const std::string& name, const std::vector<std::string>& lines) {
@@ -39,25 +40,49 @@ void refuse_onto(const std::string& input, const std::string& output) {
     throw Failure(output + ": is what is read; the output must be another file");
 }
 
+/// A file of our own form whose time_s counts from 1970 is not left so: selections would need ten
+/// digits.
+void count_from_first_row(RunFile& run) {
+  constexpr double since_1970_s_min = 1e9;
+  std::vector<double>& time_s = run.values[*run.find("time_s")];
+  const double first_s = time_s.front();
+  if (!(first_s >= since_1970_s_min)) return;
+  for (double& value : time_s) value = std::round((value - first_s) * 1e6) / 1e6;
+  run.wall_zero = WallZero{first_s, true};
+  run.understood.push_back("time_s: seconds since 1970, now after the first row");
+}
+
+RunFile read_log(const std::string& file, const ColumnMap& map) {
+  RunFile run = load_run({file}, &map);
+  if (run.understood.empty()) {
+    run.understood.emplace_back("a run file already");
+    if (run.wall_zero) run.understood.emplace_back("a comment says when its time_s was 0");
+    count_from_first_row(run);
+  }
+  tell(run.name, run.understood);
+  return run;
+}
+
 int run_import(const ImportOptions& options) {
-  std::optional<ColumnMap> map;
+  ColumnMap map;
   if (!options.columns.empty()) map = load_column_map(options.columns);
+  map.takes_signals = true;
+  if (!options.names.empty()) map.names = options.names;
+  if (options.period_s) map.period_s = options.period_s;
   for (const std::string& input : {options.log, options.join})
     if (!input.empty()) refuse_onto(input, options.output);
   if (options.shift_s && options.join.empty())
     throw Failure("--shift-s is the shift of the file of --join, which is missing");
-  ImportedLog log = import_log(options.log, map ? &*map : nullptr, options.of_log);
-  tell(log.run.name, log.run.understood);
-  RunFile run;
-  if (options.join.empty()) {
-    run = std::move(log.run);
-  } else {
-    const ImportedLog second = import_log(options.join, map ? &*map : nullptr, {});
-    tell(second.run.name, second.run.understood);
-    run = joined_runs(log, second, options.shift_s);
+  RunFile run = read_log(options.log, map);
+  if (!options.join.empty()) {
+    ColumnMap of_second = map;
+    of_second.names.clear();
+    of_second.period_s.reset();
+    run = joined_runs(run, read_log(options.join, of_second), options.shift_s);
     tell(options.output, run.understood);
   }
   OutputFile file(options.output);
+  if (run.wall_zero) file.stream() << wall_zero_comment(*run.wall_zero);
   file.stream() << write_run(run);
   file.commit();
   std::fprintf(stderr, "%zu rows, %zu columns\n", run.rows(), run.columns.size());
@@ -70,15 +95,14 @@ void add_import_command(CLI::App& app, Action& action) {
   const auto options = std::make_shared<ImportOptions>();
   CLI::App* sub = app.add_subcommand(
       "import",
-      "any log as a run file: tables of PLCs and data loggers, LinuxCNC's halsampler, Moonraker's "
-      "temperature store; what was understood is told line by line");
+      "any log as a run file: tables of PLCs, loggers and databases, JSON, workbooks, LinuxCNC's "
+      "halsampler and halscope; what was understood is told line by line");
   sub->add_option("LOG", options->log, "the log")->type_name("FILE")->required();
-  sub->add_option("--names", options->of_log.names,
+  sub->add_option("--names", options->names,
                   "columns of a log without a header, as a run file calls them: z_mm,t1_degC")
       ->delimiter(',')
       ->type_name("NAME,NAME");
-  sub->add_option("--period-s", options->of_log.period_s,
-                  "seconds between two rows of a log without time")
+  sub->add_option("--period-s", options->period_s, "seconds between two rows of a log without time")
       ->check(CLI::PositiveNumber)
       ->type_name("S");
   sub->add_option("--columns", options->columns, columns_help)->type_name("FILE");
@@ -88,7 +112,9 @@ void add_import_command(CLI::App& app, Action& action) {
          "here")
       ->type_name("FILE");
   sub->add_option("--shift-s", options->shift_s,
-                  "what makes the second's time_s that of the first, where dates do not say it")
+                  "what makes the second's time_s that of the first, where neither dates nor "
+                  "columns that change "
+                  "alike say it")
       ->type_name("S");
   sub->add_option("-o,--output", options->output, "run file; - is standard output")
       ->type_name("FILE")

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 
+#include "cli/import/clock_shift.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
@@ -22,19 +24,46 @@ constexpr double gap_steps = 3.0;
   throw ConfigurationError({Problem{run.name, 0, key, value, std::move(rule)}});
 }
 
-double shift_of(const ImportedLog& first, const ImportedLog& second,
-                std::optional<double> shift_s) {
-  if (shift_s) return *shift_s;
-  for (const ImportedLog* log : {&first, &second})
-    if (!log->wall_zero)
-      refuse(log->run, "--shift-s", "(missing)",
-             "has no dates, so nothing says how the two clocks belong together: write --shift-s S, "
-             "where the second file's time_s plus S is the first one's");
-  if (first.wall_zero->is_utc != second.wall_zero->is_utc)
-    refuse(second.run, "--shift-s", "(missing)",
-           "one of the two says its time zone and the other does not: write --shift-s S, where the "
-           "second file's time_s plus S is the first one's");
-  return second.wall_zero->seconds - first.wall_zero->seconds;
+std::string two_digits(double value) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+/// The two recordings may have seen the same events.
+std::optional<ClockShift> seen_shift(const RunFile& first, const RunFile& second,
+                                     const std::string& why) {
+  const auto shift = clock_shift(first, second);
+  if (shift && shift->is_sure()) return shift;
+  std::string rule = why +
+                     ": write --shift-s S, where the second file's time_s plus S is the first "
+                     "one's";
+  if (shift)
+    rule += "; the best that their values show is " + number_text(shift->shift_s) + ", where " +
+            shift->columns + " change alike (correlation " + two_digits(shift->correlation) +
+            ", at another shift " + two_digits(shift->next) + "), which is not sure";
+  refuse(second, "--shift-s", "(missing)", rule);
+}
+
+struct Shift {
+  double shift_s{0.0};
+  std::string why;
+};
+
+Shift shift_of(const RunFile& first, const RunFile& second, std::optional<double> shift_s) {
+  if (shift_s) return {*shift_s, "as --shift-s says"};
+  std::string why;
+  for (const RunFile* run : {&second, &first})
+    if (!run->wall_zero)
+      why = run->name + " has no dates, so nothing says how the two clocks belong together";
+  if (why.empty() && first.wall_zero->is_utc != second.wall_zero->is_utc)
+    why = "one of the two says its time zone and the other does not";
+  if (why.empty()) return {second.wall_zero->seconds - first.wall_zero->seconds, "by their dates"};
+  const auto seen = seen_shift(first, second, why);
+  return {seen->shift_s, "since " + seen->columns + " change alike there (correlation " +
+                             two_digits(seen->correlation) + ", at most " + two_digits(seen->next) +
+                             " at other shifts), to about " +
+                             number_text(std::round(seen->step_s * 10) / 10) + " s"};
 }
 
 double usual_step_s(const std::vector<double>& time_s) {
@@ -65,10 +94,11 @@ double value_between(const RunFile& run, std::size_t column, std::size_t after, 
 
 class Join {
  public:
-  Join(const RunFile& first, const RunFile& second, double shift_s)
-      : first_(first), second_(second), shift_s_(shift_s) {
+  Join(const RunFile& first, const RunFile& second, const Shift& shift)
+      : first_(first), second_(second), shift_s_(shift.shift_s), why_(shift.why) {
     gap_s_ = std::max(gap_s_min, gap_steps * usual_step_s(first.time_s()));
     run_.name = first.name;
+    run_.wall_zero = first.wall_zero;
     for (std::size_t i = 0; i < first.columns.size(); ++i)
       if (first.columns[i] != "time_s") from_first_.push_back(i);
     for (std::size_t i = 0; i < second.columns.size(); ++i)
@@ -133,7 +163,7 @@ class Join {
   void say() {
     const std::size_t rows = second_.rows();
     run_.understood.push_back(second_.name + ": its time_s plus " + number_text(shift_s_) +
-                              " s is that of " + first_.name);
+                              " s is that of " + first_.name + ", " + why_);
     run_.understood.push_back(
         std::to_string(inside_) + " of its " + std::to_string(rows) +
         " rows lie within; temperatures and positions between two rows are on the line between "
@@ -144,6 +174,7 @@ class Join {
   const RunFile& first_;
   const RunFile& second_;
   double shift_s_;
+  std::string why_;
   double gap_s_{0.0};
   std::vector<std::size_t> from_first_;
   std::vector<std::size_t> from_second_;
@@ -153,9 +184,8 @@ class Join {
 
 }  // namespace
 
-RunFile joined_runs(const ImportedLog& first, const ImportedLog& second,
-                    std::optional<double> shift_s) {
-  return Join(first.run, second.run, shift_of(first, second, shift_s)).run();
+RunFile joined_runs(const RunFile& first, const RunFile& second, std::optional<double> shift_s) {
+  return Join(first, second, shift_of(first, second, shift_s)).run();
 }
 
 }  // namespace thermocomp::cli

@@ -32,7 +32,8 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   ColumnMap map;
   map.file = name;
   if (root.has("separator"))
-    map.separator = root.choice<char>("separator", {{",", ','}, {";", ';'}, {"tab", '\t'}});
+    map.separator = root.choice<char>(
+        "separator", {{",", ','}, {";", ';'}, {"|", '|'}, {"tab", '\t'}, {"blank", ' '}});
   if (root.has("decimal")) map.decimal = root.choice<char>("decimal", {{".", '.'}, {",", ','}});
   if (root.has("thousands"))
     map.thousands = root.choice<char>("thousands", {{".", '.'}, {",", ','}, {"'", '\''}});
@@ -41,17 +42,25 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
   map.header_line = root.integer("header_line", 1, 100000, 0);
   map.date_order = root.choice<DateOrder>("date_order",
                                           {{"day.month.year", DateOrder::day_month_year},
-                                           {"month.day.year", DateOrder::month_day_year}},
+                                           {"month.day.year", DateOrder::month_day_year},
+                                           {"year.month.day", DateOrder::year_month_day}},
                                           DateOrder::unknown);
-  if (root.is_text("time"))
-    map.time = {root.text("time")};
-  else
-    map.time = root.texts("time", {});
+  const auto one_or_more = [&](const char* key) {
+    return root.is_text(key) ? std::vector{root.text(key)} : root.texts(key, {});
+  };
+  map.time = one_or_more("time");
   if (map.time.size() > 2) root.problem("time", "must be one column, or date and clock time");
-  const Names<std::string> units{{"ms", "ms"},   {"s", "s"},         {"min", "min"},    {"h", "h"},
+  map.pivot = one_or_more("pivot");
+  if (map.pivot.size() > 2)
+    root.problem("pivot", "must be the column of the names, or it and the column of the values");
+  map.names = root.texts("names", {});
+  if (root.has("period_s")) map.period_s = root.number("period_s", Range::above(0));
+  map.missing = root.texts("missing", {});
+  const Names<std::string> units{{"ns", "ns"},   {"us", "us"},       {"ms", "ms"},
+                                 {"s", "s"},     {"min", "min"},     {"h", "h"},
                                  {"day", "day"}, {"hh:mm", "hh:mm"}, {"mm:ss", "mm:ss"}};
   map.time_unit = root.choice<std::string>("time_unit", units, "");
-  map.ignored = root.texts("ignore", {});
+  map.ignored = root.texts("ignore", {}, true);  // "": without a name
   const TomlTable columns = root.table_or_empty("columns");
   if (columns) {
     for (const std::string& key : columns.keys()) read_column(columns, key, map);

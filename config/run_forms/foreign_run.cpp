@@ -3,13 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <set>
 
+#include "config/run_forms/log_form.hpp"
+#include "config/run_forms/long_table.hpp"
 #include "config/run_forms/number_form.hpp"
+#include "config/run_forms/run_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_table.hpp"
 #include "config/run_forms/time_column.hpp"
+#include "config/run_forms/time_stamp.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
@@ -17,8 +22,14 @@
 namespace thermocomp {
 namespace {
 
+/// What programs write for a missing value, in small letters.
 constexpr auto missing_words = std::to_array<std::string_view>(
-    {"NA", "N/A", "n/a", "#N/A", "#NV", "null", "NULL", "-", "--", "---"});
+    {"na",       "n/a",         "#n/a",    "#nv",   "null",         "none",     "-",
+     "--",       "---",         "----",    "-.-",   "--.-",         "*",        "***",
+     "inf",      "+inf",        "-inf",    "ol",    "open",         "overflow", "overload",
+     "burnout",  "unavailable", "unknown", "error", "no data",      "bad",      "invalid",
+     "#div/0!",  "#value!",     "undef",   "n.a.",  "disconnected", "over",     "under",
+     "no value", "nodata",      "logged",  "nan"});
 
 /// What a column of the file becomes.
 struct Meaning {
@@ -52,35 +63,52 @@ std::optional<double> switch_word(std::string_view field) {
 class ForeignReader {
  public:
   ForeignReader(std::string_view text, const std::string& name, const ColumnMap* map)
-      : problems_(name), map_(map), table_(read_text_table(text, map, problems_)) {
+      : problems_(name), map_(map) {
     run_.name = name;
-  }
-
-  std::optional<WallZero> read_wall_zero() {
-    problems_.throw_any();
-    read_units();
-    form_ = number_form(table_, map_, problems_);
-    const auto time = find_time(table_, map_, units_, problems_);
-    problems_.throw_any();
-    const RunTime run_time = read_time(table_, *time, map_, units_, form_, problems_);
-    problems_.throw_any();
-    return run_time.wall_zero;
+    RunText read = run_text(text, name);
+    from_latin1_ = read.from_latin1;
+    run_.wall_zero = said_wall_zero(read.text);
+    auto plain = plain_table(read.text, name, map);
+    if (plain && !run_.wall_zero) run_.wall_zero = said_wall_zero(plain->text);
+    has_own_names_ = plain && plain->has_own_names;
+    ColumnMap without_names;
+    if (has_own_names_ && map != nullptr) {
+      without_names = *map;  // the form has used them
+      without_names.names.clear();
+    }
+    table_ = read_text_table(std::move(plain ? plain->text : read.text),
+                             has_own_names_ && map != nullptr ? &without_names : map,
+                             plain ? plain->lines_above : 0, problems_);
+    if (plain) run_.understood = std::move(plain->said);
   }
 
   RunFile read() {
     problems_.throw_any();
+    leave_empty_columns_out();
     read_units();
     form_ = number_form(table_, map_, problems_);
+    problems_.throw_any();
     say_layout();
-    const auto time = find_time(table_, map_, units_, problems_);
-    if (time) find_meanings(*time);
+    const auto found = find_time(table_, map_, units_, form_, problems_);
     problems_.throw_any();
-    RunTime run_time = read_time(table_, *time, map_, units_, form_, problems_);
+    TimeColumns time = *found;
+    if (map_ != nullptr && map_->period_s && !time.columns.empty() && !has_own_names_)
+      problems_.add({map_->file, 0, "period_s", number_text(*map_->period_s),
+                     "is for a table without time; in " + run_.name + " '" +
+                         table_.header[time.columns[0]] + "' is the time"});
     problems_.throw_any();
-    run_.understood.insert(run_.understood.begin() + 1, run_time.said);
-    run_.columns.insert(run_.columns.begin(), "time_s");
-    run_.values.insert(run_.values.begin(), std::move(run_time.time_s));
+    RunTime run_time = read_time(table_, time, map_, units_, form_, problems_);
+    problems_.throw_any();
+    run_.understood.push_back(run_time.said);
+    if (run_time.wall_zero) run_.wall_zero = run_time.wall_zero;
+    order_rows(time, run_time.time_s);
+    problems_.throw_any();
+    run_.columns.emplace_back("time_s");
+    run_.values.push_back(std::move(run_time.time_s));
+    find_meanings(time);
+    problems_.throw_any();
     for (const Meaning& meaning : meanings_) read_values(meaning);
+    ask_for_words();
     problems_.throw_any();
     if (missing_ > 0)
       run_.understood.push_back("missing: " + std::to_string(missing_) + " fields like '" +
@@ -89,41 +117,130 @@ class ForeignReader {
   }
 
  private:
-  /// From the header, or from a row of nothing but units under it.
-  void read_units() {
-    for (const std::string& header : table_.header) units_.push_back(spelled_name(header).unit);
-    if (table_.rows() < 2) return;
-    std::vector<std::string> below;
-    std::size_t known = 0;
+  /// A separator at the end of every line makes no column.
+  void leave_empty_columns_out() {
+    std::vector<bool> leaves(table_.columns());
     for (std::size_t i = 0; i < table_.columns(); ++i) {
-      std::string_view field = table_.field(0, i);
-      if (finite_number(field)) return;
-      if (field.size() > 2 && (field.front() == '[' || field.front() == '('))
-        field = trimmed(field.substr(1, field.size() - 2));
-      if (spelled_unit(field) != nullptr && field != "-") ++known;
-      below.emplace_back(field);
+      leaves[i] = is_unnamed(table_.header[i]);
+      for (std::size_t row = 0; row < table_.rows() && leaves[i]; ++row)
+        leaves[i] = table_.field(row, i).empty();
     }
-    if (2 * known <= table_.columns()) return;
-    for (std::size_t i = 0; i < below.size(); ++i)
-      if (units_[i].empty()) units_[i] = below[i];
-    units_below_ = true;
-    table_.lines.erase(table_.lines.begin());
-    table_.fields.erase(table_.fields.begin(),
-                        table_.fields.begin() + static_cast<std::ptrdiff_t>(table_.columns()));
+    table_.leave_out(leaves);
+  }
+
+  /// From the header, the row of units, or the cells.
+  void read_units() {
+    units_.clear();
+    for (std::size_t i = 0; i < table_.columns(); ++i) {
+      units_.push_back(spelled_name(table_.header[i]).unit);
+      if (units_[i].empty() && !table_.units.empty()) units_[i] = table_.units[i];
+      for (std::size_t row = 0; row < table_.rows() && units_[i].empty(); ++row) {
+        const SpelledUnit* unit = number_text_of(table_.field(row, i)).unit;
+        if (unit != nullptr) units_[i] = unit->spelling;
+      }
+    }
+  }
+
+  /// Rows of a long table become rows of a time; what is written backwards is turned.
+  void order_rows(TimeColumns& time, std::vector<double>& time_s) {
+    if (const auto form = long_form(table_, time, time_s, map_, problems_)) {
+      run_.understood.push_back(pivot(table_, time_s, *form, problems_));
+      if (!problems_.empty()) return;
+      const double first = time_s.front();  // the earliest, which is 0
+      if (first < 0)
+        for (double& at : time_s) at -= first;
+      if (run_.wall_zero && first < 0) run_.wall_zero->seconds += first;
+      time = {};
+      read_units();
+    }
+    const auto is_not_later = [](double a, double b) { return !(b > a); };
+    if (std::adjacent_find(time_s.begin(), time_s.end(), is_not_later) == time_s.end()) return;
+    const auto is_not_earlier = [](double a, double b) { return !(b < a); };
+    if (std::adjacent_find(time_s.begin(), time_s.end(), is_not_earlier) == time_s.end()) {
+      turn_rows(time_s);
+      return;
+    }
+    const auto at = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
+    const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
+    const std::size_t column = time.columns.empty() ? 0 : time.columns.back();
+    problems_.add(table_.lines[row], table_.header[column], table_.field(row, column),
+                  "must be later than in the row before (" +
+                      shortened(table_.field(row - 1, column)) +
+                      "); of a row per value write pivot = \"the column that names the series\" in "
+                      "the file of --columns");
+  }
+
+  void turn_rows(std::vector<double>& time_s) {
+    const double earliest = time_s.back();
+    std::reverse(time_s.begin(), time_s.end());
+    for (double& at : time_s) at -= earliest;
+    if (run_.wall_zero) run_.wall_zero->seconds += earliest;
+    std::reverse(table_.lines.begin(), table_.lines.end());
+    std::vector<std::string_view> fields;
+    fields.reserve(table_.fields.size());
+    for (std::size_t row = table_.rows(); row-- > 0;)
+      for (std::size_t i = 0; i < table_.columns(); ++i) fields.push_back(table_.field(row, i));
+    table_.fields = std::move(fields);
+    run_.understood.emplace_back("the newest row stands first: turned");
   }
 
   void say_layout() {
     std::string said = "separator '" + separator_name(table_.separator) + "', decimal " +
                        (form_.decimal == ',' ? "comma" : "point");
     if (form_.thousands != '\0') said += std::string(", thousands '") + form_.thousands + "'";
-    if (table_.from_latin1) said += ", letters Latin-1";
-    if (units_below_) said += ", units in the row under the header";
+    if (from_latin1_) said += ", letters Latin-1";
+    if (!table_.units.empty()) said += ", units in the row under the header";
+    if (!table_.has_header) said += ", no header";
     run_.understood.push_back(said);
+    run_.understood.insert(run_.understood.end(), table_.said.begin(), table_.said.end());
   }
 
   [[nodiscard]] bool is_ignored(const std::string& header) const {
-    return map_ != nullptr &&
-           std::find(map_->ignored.begin(), map_->ignored.end(), header) != map_->ignored.end();
+    if (map_ == nullptr) return false;
+    const auto has = [&](std::string_view name) {
+      return std::find(map_->ignored.begin(), map_->ignored.end(), name) != map_->ignored.end();
+    };
+    return has(header) || (is_unnamed(header) && has(""));
+  }
+
+  /// Whether no field of a column is a number: what cannot be a value is left out.
+  [[nodiscard]] bool is_text(std::size_t column) const {
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const std::string_view field = table_.field(row, column);
+      if (looks_like_number(field) || switch_word(field)) return false;
+    }
+    return true;
+  }
+
+  /// Whether a column counts the rows, 0 1 2 or 1 2 3.
+  [[nodiscard]] bool counts_rows(std::size_t column) const {
+    const auto first = finite_number(table_.field(0, column));
+    if (!first || (*first != 0.0 && *first != 1.0)) return false;
+    for (std::size_t row = 1; row < table_.rows(); ++row)
+      if (finite_number(table_.field(row, column)) != *first + static_cast<double>(row))
+        return false;
+    return table_.rows() > 1;
+  }
+
+  /// Why a column that nothing is said of is no value; empty: it is one.
+  [[nodiscard]] std::string no_value(std::size_t i) const {
+    const std::string& header = table_.header[i];
+    if (is_mapped(header)) return {};
+    const bool is_count = is_unnamed(header) || header == "#" || header == "RECORD" ||
+                          header == "No." || header == "Nr." || header == "index";
+    if (is_count && (counts_rows(i) || header == "RECORD")) return "it counts the rows";
+    const SpelledUnit* unit = spelled_unit(units_[i]);
+    if (unit != nullptr && unit->dimension == "time") return "another time";
+    return unit == nullptr && is_text(i) && !has_own_unit(header) ? "no field of it is a number"
+                                                                  : "";
+  }
+
+  static bool has_own_unit(const std::string& header) {
+    return is_column_name(header) && !unit_of(header).suffix.empty();
+  }
+
+  [[nodiscard]] bool is_mapped(const std::string& header) const {
+    return map_ != nullptr && map_->columns.contains(header);
   }
 
   void find_meanings(const TimeColumns& time) {
@@ -136,8 +253,13 @@ class ForeignReader {
         run_.understood.push_back("'" + header + "' left out");
         continue;
       }
-      const auto meaning = meaning_of(i);
+      if (const std::string why = no_value(i); !why.empty()) {
+        run_.understood.push_back("'" + header + "' left out: " + why);
+        continue;
+      }
+      auto meaning = meaning_of(i);
       if (!meaning) continue;
+      if (!is_mapped(header)) number_name(*meaning, seen);
       if (!seen.insert(meaning->name).second) {
         refuse(i, "becomes " + meaning->name + ", which is there twice: write " +
                       toml_text(header) +
@@ -148,6 +270,16 @@ class ForeignReader {
       run_.columns.push_back(meaning->name);
       meanings_.push_back(*meaning);
     }
+    if (meanings_.empty() && problems_.empty())
+      problems_.add(0, "", "", "has no column of numbers beside the time");
+  }
+
+  /// Several columns of one name: Temp_degC, Temp_2_degC.
+  static void number_name(Meaning& meaning, const std::set<std::string>& seen) {
+    const std::string suffix(unit_of(meaning.name).suffix);
+    const std::string base = meaning.name.substr(0, meaning.name.size() - suffix.size());
+    for (int i = 2; seen.contains(meaning.name); ++i)
+      meaning.name = base + "_" + std::to_string(i) + suffix;
   }
 
   void check_map() {
@@ -164,15 +296,12 @@ class ForeignReader {
       problems_.add({map_->file, 0, key, header, rule});
     };
     for (const auto& [header, column] : map_->columns) check("columns", header);
-    for (const std::string& header : map_->ignored) check("ignore", header);
+    for (const std::string& header : map_->ignored)
+      if (!header.empty()) check("ignore", header);
   }
 
   std::optional<Meaning> meaning_of(std::size_t i) {
     const std::string& header = table_.header[i];
-    if (header.empty()) {
-      refuse(i, "has no name");
-      return std::nullopt;
-    }
     SpelledName spelled = spelled_name(header);
     if (spelled.unit.empty() && !units_[i].empty()) {
       spelled.unit = units_[i];
@@ -184,6 +313,12 @@ class ForeignReader {
     }
     if (spelled.unit.empty() && !unit_of(header).suffix.empty() && is_column_name(header))
       return Meaning{i, header, {}};
+    const bool is_told = map_ != nullptr && std::find(map_->names.begin(), map_->names.end(),
+                                                      header) != map_->names.end();
+    const bool takes_signal = spelled.unit.empty() && (has_own_names_ || is_told ||
+                                                       (map_ != nullptr && map_->takes_signals));
+    if (takes_signal && is_column_name(plain_name(header)))
+      return Meaning{i, plain_name(header), {}};
     if (spelled.known == nullptr || spelled.known->dimension == "time") {
       const std::string example = spelled.unit.empty()
                                       ? example_name(spelled.base)
@@ -234,7 +369,13 @@ class ForeignReader {
 
   void say(std::size_t i, const Meaning& meaning) {
     std::string said = "'" + table_.header[i] + "' is " + meaning.name;
-    if (unit_of(meaning.name).suffix.empty()) said += ", a signal without unit";
+    const bool has_unit = !unit_of(meaning.name).suffix.empty();
+    if (!has_unit) said += ", a signal without unit";
+    if (!has_unit && !is_mapped(table_.header[i]) && !has_own_names_ && map_ != nullptr &&
+        map_->takes_signals && map_->names.empty())
+      said += " (if it has one, write " + toml_text(table_.header[i]) + " = " +
+              toml_text(example_name(spelled_name(table_.header[i]).base)) +
+              ", or what it is, under [columns] in the file of --columns)";
     if (meaning.conversion.factor != 1.0)
       said += ", times " + number_text(meaning.conversion.factor);
     if (meaning.conversion.offset != 0.0)
@@ -253,15 +394,15 @@ class ForeignReader {
     values.reserve(table_.rows());
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const std::string_view field = table_.field(row, meaning.source);
-      std::optional<double> number = number_of(field, form_);
+      const NumberText parts = number_text_of(field);
+      std::optional<double> number = number_of(parts.digits, form_);
+      if (number && parts.unit != nullptr)
+        number = in_unit_of_column(meaning, *number, *parts.unit);
       if (!number && is_switch) number = switch_word(field);
       if (!number && !takes_as_missing(field)) {
         const std::string& header = table_.header[meaning.source];
-        problems_.add(table_.lines[row], header, field,
-                      "must be a number with a decimal " +
-                          std::string(form_.decimal == ',' ? "comma" : "point") +
-                          ", or empty; a column of text is left out by ignore = [" +
-                          toml_text(header) + "] in the file of --columns");
+        if (words_.empty()) word_at_ = {table_.lines[row], header};
+        words_.insert(std::string(field));
       }
       double value = number.value_or(std::numeric_limits<double>::quiet_NaN());
       if (!meaning.conversion.is_identity())
@@ -272,10 +413,40 @@ class ForeignReader {
     run_.values.push_back(std::move(values));
   }
 
+  /// A cell may be in another unit than its column: 850 mA among A.
+  std::optional<double> in_unit_of_column(const Meaning& meaning, double number,
+                                          const SpelledUnit& unit) const {
+    const SpelledUnit* of_column = spelled_unit(units_[meaning.source]);
+    if (of_column == nullptr || of_column->dimension != unit.dimension) return std::nullopt;
+    if (of_column->factor == unit.factor && of_column->offset == unit.offset) return number;
+    return (unit.factor * number + unit.offset - of_column->offset) / of_column->factor;
+  }
+
+  /// One line for all words that are no numbers.
+  void ask_for_words() {
+    if (words_.empty()) return;
+    constexpr std::size_t words_max = 5;
+    std::string list;
+    std::size_t count = 0;
+    for (const std::string& word : words_)
+      if (count++ < words_max) list += (list.empty() ? "" : ", ") + toml_text(shortened(word));
+    problems_.add(word_at_.first, word_at_.second, *words_.begin(),
+                  "must be a number with a decimal " +
+                      std::string(form_.decimal == ',' ? "comma" : "point") +
+                      ", or empty: where it stands for a missing value write missing = [" + list +
+                      (count > words_max ? ", ..." : "") + "], to leave the column out ignore = [" +
+                      toml_text(word_at_.second) + "] in the file of --columns");
+  }
+
   bool takes_as_missing(std::string_view field) {
     if (is_missing(field)) return true;
-    if (std::find(missing_words.begin(), missing_words.end(), field) == missing_words.end())
-      return false;
+    std::string small(field.substr(0, 20));
+    for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    const bool is_word =
+        std::find(missing_words.begin(), missing_words.end(), small) != missing_words.end();
+    const bool is_told = map_ != nullptr && std::find(map_->missing.begin(), map_->missing.end(),
+                                                      field) != map_->missing.end();
+    if (!is_word && !is_told) return false;
     if (missing_++ == 0) missing_as_ = field;
     return true;
   }
@@ -291,7 +462,10 @@ class ForeignReader {
   TextTable table_;
   RunFile run_;
   std::vector<std::string> units_;  ///< as written, by column
-  bool units_below_{false};
+  bool from_latin1_{false};
+  bool has_own_names_{false};
+  std::set<std::string> words_;  ///< that are neither numbers nor known to be missing values
+  std::pair<int, std::string> word_at_;
   NumberForm form_;
   std::vector<Meaning> meanings_;
   std::size_t missing_{0};
@@ -315,9 +489,25 @@ RunFile read_foreign_run(std::string_view text, const std::string& name, const C
   return ForeignReader(text, name, map).read();
 }
 
-std::optional<WallZero> wall_zero(std::string_view text, const std::string& name,
-                                  const ColumnMap* map) {
-  return ForeignReader(text, name, map).read_wall_zero();
+std::optional<WallZero> said_wall_zero(std::string_view text) {
+  const std::size_t at = text.find(wall_zero_mark);
+  if (at == std::string_view::npos || (at > 0 && text[at - 1] != '\n')) return std::nullopt;
+  std::string_view said = text.substr(at + wall_zero_mark.size());
+  said = said.substr(0, said.find_first_of("\r\n"));
+  const auto stamp = parse_time_stamp(said);
+  const auto seconds = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
+  if (!seconds) return std::nullopt;
+  return WallZero{*seconds, stamp->zone_s.has_value()};
+}
+
+std::string wall_zero_comment(const WallZero& zero) {
+  const double whole = std::floor(zero.seconds);
+  char thousandths[8];
+  std::snprintf(thousandths, sizeof thousandths, "%.3f", std::min(zero.seconds - whole, 0.999));
+  std::string stamp = date_text(whole);
+  stamp[10] = 'T';
+  return std::string(wall_zero_mark) + stamp + std::string(thousandths + 1) +
+         (zero.is_utc ? "Z\n" : "\n");
 }
 
 }  // namespace thermocomp

@@ -3,13 +3,11 @@
 /// `--columns`. docs/run_files.md has the rules.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <string_view>
 
 #include "config/run_forms/column_map.hpp"
 #include "config/run_forms/run_data.hpp"
-#include "config/run_forms/time_column.hpp"
 
 namespace thermocomp {
 
@@ -22,10 +20,5 @@ namespace thermocomp {
 /// @throws ConfigurationError with every problem (the first 100)
 [[nodiscard]] RunFile read_foreign_run(std::string_view text, const std::string& name,
                                        const ColumnMap* map);
-
-/// The wall time at which time_s of the same file was 0; nullopt where its times have no date.
-/// @throws ConfigurationError as above
-[[nodiscard]] std::optional<WallZero> wall_zero(std::string_view text, const std::string& name,
-                                                const ColumnMap* map);
 
 }  // namespace thermocomp

@@ -9,6 +9,12 @@
 
 namespace thermocomp {
 
+/// When time_s was 0, by the clock that wrote the file.
+struct WallZero {
+  double seconds{0.0};  ///< since 1970, in UTC or the writer's zone
+  bool is_utc{false};
+};
+
 /// A whole run, column by column. References and the states of lags start at row 0, whatever is
 /// selected; results are for the rows [selected_begin, selected_end).
 struct RunFile {
@@ -19,6 +25,7 @@ struct RunFile {
   std::size_t selected_end{0};
   /// How a file of another form was read, line by line; empty: it has our own form.
   std::vector<std::string> understood;
+  std::optional<WallZero> wall_zero;  ///< where the file has dates, or a comment that says it
 
   [[nodiscard]] std::size_t rows() const noexcept { return values.empty() ? 0 : values[0].size(); }
   [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
@@ -26,5 +33,12 @@ struct RunFile {
   [[nodiscard]] const std::vector<double>& column(std::string_view name) const;
   [[nodiscard]] const std::vector<double>& time_s() const { return column("time_s"); }
 };
+
+/// The comment of a run file that says when its time_s was 0; `export` and `import` write it:
+/// "# 0.000 s: wall time 2026-03-02T07:00:00.000Z".
+inline constexpr std::string_view wall_zero_mark = "# 0.000 s: wall time ";
+/// @return nullopt when no comment of the text says it
+[[nodiscard]] std::optional<WallZero> said_wall_zero(std::string_view text);
+[[nodiscard]] std::string wall_zero_comment(const WallZero& zero);
 
 }  // namespace thermocomp

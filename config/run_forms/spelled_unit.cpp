@@ -21,6 +21,13 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"deg C", "temperature", 1, 0, "_degC", true},
     {"Grad C", "temperature", 1, 0, "_degC", true},
     {"C", "temperature", 1, 0, "_degC", true},
+    {"Deg C", "temperature", 1, 0, "_degC", true},
+    {"DegC", "temperature", 1, 0, "_degC"},
+    {"Deg_C", "temperature", 1, 0, "_degC"},
+    {"deg_C", "temperature", 1, 0, "_degC"},
+    {"degc", "temperature", 1, 0, "_degC"},
+    {"° C", "temperature", 1, 0, "_degC", true},
+    {"Cel", "temperature", 1, 0, "_degC", true},
     {"Celsius", "temperature", 1, 0, "_degC"},
     {"celsius", "temperature", 1, 0, "_degC"},
     {"K", "temperature", 1, -kelvin_of_0_degC, "_K", true},
@@ -29,6 +36,7 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"degF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
     {"°F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
     {"ºF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
+    {"Deg F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC", true},
     {"F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC", true},
     {"um", "length", 1, 0, "_um"},
     {"µm", "length", 1, 0, "_um"},
@@ -66,6 +74,7 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"W", "power", 1, 0, "_W", true},
     {"kW", "power", 1e3, 0, "_W"},
     {"V", "voltage", 1, 0, "_V", true},
+    {"VDC", "voltage", 1, 0, "_V"},
     {"mV", "voltage", 1e-3, 0, "_V", true},
     {"%", "share", 1, 0, "_percent"},
     {"percent", "share", 1, 0, "_percent"},
@@ -74,11 +83,13 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"on/off", "switch", 1, 0, "_on"},
     {"-", "none", 1, 0, "", true},
     {"1", "none", 1, 0, "", true},
+    {"ns", "time", 1e-9, 0, "_s", true},
     {"us", "time", 1e-6, 0, "_s", true},
     {"µs", "time", 1e-6, 0, "_s", true},
     {"ms", "time", 1e-3, 0, "_s", true},
     {"s", "time", 1, 0, "_s", true},
     {"sec", "time", 1, 0, "_s", true},
+    {"sec.", "time", 1, 0, "_s", true},
     {"seconds", "time", 1, 0, "_s", true},
     {"min", "time", 60, 0, "_s", true},
     {"minutes", "time", 60, 0, "_s", true},
@@ -94,6 +105,8 @@ bool is_index(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789, ") == std::string_view::npos;
 }
 
+bool split_blank(std::string_view header, SpelledName& name);
+
 /// "T1 [°C]": the part in the brackets at the end.
 bool split_brackets(std::string_view header, SpelledName& name) {
   for (const auto& [open, close] : {std::pair('[', ']'), {'(', ')'}, {'{', '}'}}) {
@@ -101,22 +114,26 @@ bool split_brackets(std::string_view header, SpelledName& name) {
     const auto begin = header.rfind(open);
     if (begin == std::string_view::npos) continue;
     if (open == '(' && is_index(header.substr(begin + 1, header.size() - begin - 2))) continue;
-    name.base = trimmed(header.substr(0, begin));
+    const std::string_view base = trimmed(header.substr(0, begin));
+    name.base = base;
     name.unit = trimmed(header.substr(begin + 1, header.size() - begin - 2));
     name.known = spelled_unit(name.unit);
+    // "Temp, °C (LGR S/N: 1)": the unit stands in front of what else is said.
+    SpelledName before;
+    if (name.known == nullptr && split_blank(base, before)) name = before;
     return true;
   }
   return false;
 }
 
-/// "Temp °C", "I / A", "t in s": the unit after the last blank.
+/// "Temp °C", "Temp, °C", "I / A", "t in s": the unit after the last blank.
 bool split_blank(std::string_view header, SpelledName& name) {
   const auto blank = header.rfind(' ');
   if (blank == std::string_view::npos) return false;
   const SpelledUnit* unit = spelled_unit(header.substr(blank + 1));
   std::string_view base = trimmed(header.substr(0, blank));
   bool told = false;
-  for (const std::string_view before : {" /", " in"}) {
+  for (const std::string_view before : {" /", " in", ","}) {
     if (!base.ends_with(before)) continue;
     base = trimmed(base.substr(0, base.size() - before.size()));
     told = true;

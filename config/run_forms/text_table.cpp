@@ -1,55 +1,34 @@
 #include "config/run_forms/text_table.hpp"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
+#include "config/run_forms/number_form.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
 
 namespace thermocomp {
 namespace {
 
-constexpr std::string_view separators = ";\t,";
-constexpr std::size_t rows_judged = 100;
+constexpr std::string_view separators = ";\t,|";
+constexpr std::size_t rows_judged = 200;
+constexpr std::size_t header_rows_max = 10;
 constexpr std::size_t columns_max = 1024;  // as of our own form
+constexpr double values_share_min = 0.2;
 
-bool is_utf8(std::string_view text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    std::size_t more = 0;
-    if (lead >= 0xf0)
-      more = lead < 0xf8 ? 3 : 4;
-    else if (lead >= 0xe0)
-      more = 2;
-    else if (lead >= 0xc2)
-      more = 1;
-    else if (lead >= 0x80)
-      return false;
-    if (more > 3 || i + more >= text.size() + (more == 0 ? 1 : 0)) return false;
-    for (std::size_t k = 1; k <= more; ++k)
-      if ((static_cast<unsigned char>(text[i + k]) & 0xc0) != 0x80) return false;
-    i += more + 1;
-  }
-  return true;
-}
-
-std::string utf8_of_latin1(std::string_view text) {
-  std::string converted;
-  converted.reserve(text.size() + text.size() / 8);
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x80) {
-      converted += c;
-    } else {
-      converted += static_cast<char>(0xc0 | (byte >> 6));
-      converted += static_cast<char>(0x80 | (byte & 0x3f));
-    }
-  }
-  return converted;
-}
-
-/// Fields of a line; a quoted one may hold the separator.
+/// Fields of a line; a quoted one may hold the separator and doubled quotes.
 /// @return false when a quote is not closed, or something stands behind it
 bool split(std::string_view line, char separator, std::vector<std::string_view>& fields) {
   fields.clear();
+  if (separator == ' ') {
+    for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
+      const auto end = std::min(line.find_first_of(" \t"), line.size());
+      fields.push_back(line.substr(0, end));
+      line.remove_prefix(end);
+    }
+    return true;
+  }
   for (bool more = true; more;) {
     std::string_view start = line;
     while (!start.empty() && start.front() == ' ') start.remove_prefix(1);
@@ -60,11 +39,16 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
       fields.push_back(trimmed(field));
       continue;
     }
-    const auto end = start.find('"', 1);
-    if (end == std::string_view::npos) return false;
+    auto end = start.find('"', 1);
+    while (end != std::string_view::npos && start.substr(end).starts_with("\"\""))
+      end = start.find('"', end + 2);
+    if (end == std::string_view::npos) {
+      fields.push_back(start);
+      return false;
+    }
     fields.push_back(trimmed(start.substr(1, end - 1)));
     line = start.substr(end + 1);
-    while (!line.empty() && line.front() == ' ' && separator != ' ') line.remove_prefix(1);
+    while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
     if (!line.empty() && line.front() != separator) return false;
     more = !line.empty();
     if (more) line.remove_prefix(1);
@@ -72,19 +56,28 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
   return true;
 }
 
+enum class Shows { text, nothing, number, time };
+
+Shows shown_by(std::string_view field) {
+  if (is_missing(field)) return Shows::nothing;
+  if (looks_like_number(field)) return Shows::number;
+  return parse_time_stamp(field) ? Shows::time : Shows::text;
+}
+
 class TableReader {
  public:
-  TableReader(const ColumnMap* map, ProblemList& problems) : map_(map), problems_(problems) {}
+  TableReader(const ColumnMap* map, int lines_above, ProblemList& problems)
+      : map_(map), lines_above_(lines_above), problems_(problems) {}
 
-  TextTable read(std::string_view text) {
-    table_.from_latin1 = !is_utf8(text);
-    table_.text = table_.from_latin1 ? utf8_of_latin1(text) : std::string(text);
+  TextTable read(std::string text) {
+    table_.text = std::move(text);
+    table_.text.reserve(64);  // on the heap, where it stays when the table is moved
     find_lines();
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
       return std::move(table_);
     }
-    if (choose_separator() && read_header()) read_rows();
+    if (choose_separator() && find_header()) read_rows();
     return std::move(table_);
   }
 
@@ -93,106 +86,286 @@ class TableReader {
     int number;
     std::string_view text;
   };
+  using Fields = std::vector<std::string_view>;
 
-  /// The header's line and those behind it. Excel's first line `sep=;` is taken at its word.
+  /// How the lines are cut by one separator.
+  struct Cut {
+    char separator{','};
+    std::size_t fields{1};
+    std::size_t begin{0};  ///< the first line with so many
+    double score{0.0};
+    double values{0.0};  ///< share of fields that are numbers or times
+  };
+
   void find_lines() {
     std::string_view rest = table_.text;
     std::string_view line;
-    for (int number = 1; !rest.empty(); ++number) {
+    for (int number = 1 + lines_above_; !rest.empty(); ++number) {
       static_cast<void>(take(rest, '\n', line));
       if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
       if (map_ != nullptr && number < map_->header_line) continue;
-      if (line.starts_with('#')) continue;
-      if (lines_.empty() && line.size() == 5 && line.starts_with("sep=") &&
-          separators.find(line[4]) != std::string_view::npos) {
+      const bool is_comment = line.starts_with('#');
+      if (is_comment && lines_.empty()) last_comment_ = {number, line};
+      if (is_comment || line.find_first_not_of(" \t;,|") == std::string_view::npos) continue;
+      // Excel's first line is taken at its word.
+      if (lines_.empty() && line.size() == 5 && line.starts_with("sep=")) {
         told_separator_ = line[4];
         continue;
       }
-      if (trimmed(line).empty() && (lines_.empty() || trimmed(rest).empty())) continue;
       lines_.push_back({number, line});
     }
-    const auto blank = [](const Line& each) {
-      return each.text.find_first_not_of(" \t;,") == std::string_view::npos;
-    };
-    while (lines_.size() > 1 && blank(lines_.back())) lines_.pop_back();
+    if (lines_.size() > 2 && lines_.back().text == "EOF") lines_.pop_back();
+  }
+
+  [[nodiscard]] std::size_t judged() const { return std::min(lines_.size(), rows_judged); }
+
+  [[nodiscard]] Cut cut_by(char separator) const {
+    std::map<std::size_t, std::size_t> lines_of;
+    std::vector<Fields> cut(judged());
+    for (std::size_t i = 0; i < cut.size(); ++i) {
+      static_cast<void>(split(lines_[i].text, separator, cut[i]));
+      ++lines_of[cut[i].size()];
+    }
+    Cut best;
+    best.separator = separator;
+    std::size_t most = 0;
+    for (const auto& [fields, lines] : lines_of) {
+      if (fields < 2 || lines < most) continue;
+      most = lines;
+      best.fields = fields;
+    }
+    if (best.fields < 2) return best;
+    while (cut[best.begin].size() != best.fields) ++best.begin;
+    std::size_t values = 0;
+    std::size_t texts = 0;
+    for (std::size_t i = (best.begin + cut.size()) / 2; i < cut.size(); ++i) {
+      if (cut[i].size() != best.fields) continue;
+      for (const std::string_view field : cut[i]) {
+        const Shows shown = shown_by(field);
+        if (shown != Shows::nothing) ++(shown == Shows::text ? texts : values);
+      }
+    }
+    best.values = static_cast<double>(values) / std::max<double>(1.0, double(values + texts));
+    best.score = static_cast<double>(most) / static_cast<double>(cut.size() - best.begin) *
+                 (0.1 + best.values);
+    return best;
   }
 
   bool choose_separator() {
     if (map_ != nullptr && map_->separator) told_separator_ = map_->separator;
     if (told_separator_) {
-      table_.separator = *told_separator_;
-      return true;
+      cut_ = cut_by(*told_separator_);
+    } else {
+      for (const char separator : separators) {
+        const Cut cut = cut_by(separator);
+        if (cut.fields > 1 && cut.score > cut_.score) cut_ = cut;
+      }
+      if (cut_.fields < 2) cut_ = cut_by(' ');
     }
-    std::vector<char> in_header;
-    std::vector<char> in_all;
-    std::vector<std::string_view> fields;
-    for (const char separator : separators) {
-      static_cast<void>(split(lines_[0].text, separator, fields));
-      const std::size_t count = fields.size();
-      if (count < 2) continue;
-      in_header.push_back(separator);
-      const auto end =
-          lines_.begin() + static_cast<std::ptrdiff_t>(std::min(lines_.size(), rows_judged + 1));
-      if (std::all_of(lines_.begin() + 1, end, [&](const Line& line) {
-            return split(line.text, separator, fields) && fields.size() == count;
-          }))
-        in_all.push_back(separator);
-    }
-    const std::vector<char>& possible = in_all.empty() ? in_header : in_all;
-    if (possible.size() > 1) {
-      std::string rule = "may be separated by";
-      for (const char each : possible) rule += " '" + separator_name(each) + "'";
+    table_.separator = cut_.separator;
+    const bool is_table = cut_.fields > 1 && (cut_.values >= values_share_min || judged() == 1);
+    if (!is_table)
       problems_.add(lines_[0].number, "", lines_[0].text,
-                    rule + ": write separator = \"" + separator_name(possible[0]) +
-                        "\" (or the other) in the file of --columns");
-      return false;
-    }
-    if (!possible.empty()) table_.separator = possible[0];
-    return true;
+                    "is no table that is known here: rows of numbers and times between ; , tab | "
+                    "or blanks; docs/run_files.md lists the forms that are read");
+    return is_table;
   }
 
-  bool read_header() {
-    std::vector<std::string_view> fields;
-    const Line& line = lines_.front();
-    table_.header_line = line.number;
-    if (!split(line.text, table_.separator, fields)) {
-      problems_.add(line.number, "", line.text, "has a quote that is not closed");
+  Fields fields_of(std::size_t line) {
+    Fields fields;
+    if (!split(lines_[line].text, table_.separator, fields)) fields.clear();
+    return fields;
+  }
+
+  /// What the columns show in the lower half of the lines judged.
+  std::vector<Shows> kinds() {
+    std::vector<std::array<std::size_t, 4>> counts(cut_.fields);
+    for (std::size_t i = (cut_.begin + judged()) / 2; i < judged(); ++i) {
+      const Fields fields = fields_of(i);
+      if (fields.size() != cut_.fields) continue;
+      for (std::size_t k = 0; k < fields.size(); ++k)
+        ++counts[k][static_cast<std::size_t>(shown_by(fields[k]))];
+    }
+    std::vector<Shows> kinds;
+    for (const auto& [texts, nothing, numbers, times] : counts)
+      kinds.push_back(times > texts + numbers                   ? Shows::time
+                      : numbers >= texts + times && numbers > 0 ? Shows::number
+                                                                : Shows::text);
+    return kinds;
+  }
+
+  /// The first line that is a row: its column of time, or else its first of numbers and half of
+  /// these, hold what they hold below.
+  std::size_t first_row() {
+    const std::vector<Shows> kind = kinds();
+    const auto time = std::find(kind.begin(), kind.end(), Shows::time);
+    const auto numbers = std::count(kind.begin(), kind.end(), Shows::number);
+    const auto first = std::find(kind.begin(), kind.end(), Shows::number);
+    for (std::size_t i = cut_.begin; i < judged(); ++i) {
+      const Fields fields = fields_of(i);
+      if (fields.size() != cut_.fields) continue;
+      if (time != kind.end()) {
+        if (shown_by(fields[static_cast<std::size_t>(time - kind.begin())]) == Shows::time)
+          return i;
+        continue;
+      }
+      std::ptrdiff_t alike = 0;
+      for (std::size_t k = 0; k < fields.size(); ++k)
+        if (kind[k] == Shows::number && looks_like_number(fields[k])) ++alike;
+      const bool first_is_alike =
+          numbers > 0 && looks_like_number(fields[static_cast<std::size_t>(first - kind.begin())]);
+      if (first_is_alike && 2 * alike >= numbers) return i;
+    }
+    return std::min(cut_.begin + 1, lines_.size());
+  }
+
+  /// A row of units has more of them than of anything else.
+  static bool is_row_of_units(const Fields& fields) {
+    std::size_t known = 0;
+    std::size_t other = 0;
+    for (const std::string_view field : fields) {
+      if (field.empty() || field == "-") continue;
+      const bool of_logger = field == "TS" || field == "RN";
+      ++(of_logger || spelled_unit(without_brackets(field)) != nullptr ? known : other);
+    }
+    return known > other;
+  }
+
+  static std::string_view without_brackets(std::string_view field) {
+    const bool has = field.size() > 2 && (field.front() == '[' || field.front() == '(');
+    return has ? trimmed(field.substr(1, field.size() - 2)) : field;
+  }
+
+  /// Of the lines above the first row the one with the most names; the lowest of several.
+  bool find_header() {
+    const bool told = map_ != nullptr && map_->header_line > 0;
+    row_begin_ = told ? std::max<std::size_t>(first_row(), 1) : first_row();
+    std::optional<std::size_t> names;
+    std::size_t most = 0;
+    for (std::size_t up = 1; up <= std::min(row_begin_, header_rows_max); ++up) {
+      const std::size_t i = row_begin_ - up;
+      const Fields fields = fields_of(i);
+      if (told ? i == 0 : fields.size() == cut_.fields) {
+        if (fields.size() == cut_.fields && is_row_of_units(fields) && i > 0) {
+          for (const std::string_view field : fields)
+            table_.units.emplace_back(without_brackets(field));
+          continue;
+        }
+        std::set<std::string_view> distinct(fields.begin(), fields.end());
+        distinct.erase("");
+        if (distinct.size() > most) {
+          most = distinct.size();
+          names = i;
+        }
+      } else if (told && fields.size() == cut_.fields && is_row_of_units(fields)) {
+        for (const std::string_view field : fields)
+          table_.units.emplace_back(without_brackets(field));
+      } else if (!told) {
+        break;
+      }
+    }
+    if (!names && row_begin_ > 0 && fits_another_count(row_begin_ - 1)) names = row_begin_ - 1;
+    if (cut_.fields > columns_max) {
+      problems_.add(lines_[row_begin_ < lines_.size() ? row_begin_ : 0].number, "columns",
+                    std::to_string(cut_.fields), "must be at most " + std::to_string(columns_max));
       return false;
     }
-    // A separator at the end of every line makes no column.
-    while (fields.size() > 1 && fields.back().empty()) {
-      fields.pop_back();
-      ++empty_at_end_;
-    }
-    const auto is_value = [](std::string_view field) {
-      return field.empty() || finite_number(field) || parse_time_stamp(field);
-    };
-    if (std::all_of(fields.begin(), fields.end(), is_value)) {
-      problems_.add(line.number, "", line.text, "must be the header row, names of columns");
+    if (names) {
+      take_names(*names);
+    } else if (!take_commented_names() && !take_told_names()) {
       return false;
     }
-    if (fields.size() > columns_max) {
-      problems_.add(line.number, "columns", std::to_string(fields.size()),
-                    "must be at most " + std::to_string(columns_max));
-      return false;
+    return names_are_clear();
+  }
+
+  /// Names of columns that the rows do not have at their end, or names for all but the first.
+  bool fits_another_count(std::size_t line) {
+    const Fields fields = fields_of(line);
+    if (fields.size() < 2 || fields.size() + 1 < cut_.fields) return false;
+    return std::none_of(fields.begin(), fields.end(), [](std::string_view field) {
+      const Shows shown = shown_by(field);
+      return shown == Shows::number || shown == Shows::time;
+    });
+  }
+
+  void take_names(std::size_t line) {
+    Fields fields = fields_of(line);
+    table_.has_header = true;
+    table_.header_line = lines_[line].number;
+    if (fields.size() + 1 == cut_.fields) {
+      const Fields row = fields_of(row_begin_);
+      if (row.size() == cut_.fields && row.back().empty())
+        fields.emplace_back();  // a separator at the end of each row
+      else
+        fields.insert(fields.begin(), std::string_view());
     }
+    fields.resize(cut_.fields);
+    for (const std::string_view field : fields) table_.header.emplace_back(field);
+    header_text_ = lines_[line].text;
+    if (line > 0)
+      table_.said.push_back("above the header in line " + std::to_string(table_.header_line) +
+                            " left out: '" + shortened(lines_[0].text) + "'" +
+                            (line > 1 ? " and " + std::to_string(line - 1) + " more lines" : ""));
+  }
+
+  /// "# time t1 z": names in the last comment above rows without a header.
+  bool take_commented_names() {
+    std::string_view text = last_comment_.text;
+    if (row_begin_ > 0 || text.empty()) return false;
+    Fields fields;
+    static_cast<void>(split(text, table_.separator, fields));
+    if (fields.size() != cut_.fields) {
+      static_cast<void>(split(trimmed(text.substr(1)), table_.separator, fields));
+    } else {
+      fields[0] = trimmed(fields[0].substr(1));
+    }
+    if (fields.size() != cut_.fields || !std::all_of(fields.begin(), fields.end(), [](auto field) {
+          return shown_by(field) == Shows::text || field.empty();
+        }))
+      return false;
+    table_.has_header = true;
+    table_.header_line = last_comment_.number;
     for (const std::string_view field : fields) table_.header.emplace_back(field);
     return true;
   }
 
+  bool take_told_names() {
+    row_begin_ = row_begin_ < lines_.size() ? row_begin_ : 0;
+    table_.header.assign(cut_.fields, "");
+    const bool has_names = map_ != nullptr && !map_->names.empty();
+    if (!has_names) return true;
+    if (map_->names.size() != cut_.fields) {
+      problems_.add(
+          lines_[row_begin_].number, "names", std::to_string(map_->names.size()) + " names",
+          "must be one for each of the " + std::to_string(cut_.fields) + " fields of a row");
+      return false;
+    }
+    table_.header = map_->names;
+    return true;
+  }
+
+  bool names_are_clear() {
+    if (table_.has_header && map_ != nullptr && !map_->names.empty())
+      problems_.add(table_.header_line, "names", map_->names.front(),
+                    "are for a table without a header; this one has names in this line");
+    for (std::size_t i = 0; i < table_.header.size(); ++i)
+      if (table_.header[i].empty()) table_.header[i] = unnamed(i);
+    return problems_.empty();
+  }
+
   void read_rows() {
-    std::vector<std::string_view> fields;
-    table_.fields.reserve((lines_.size() - 1) * table_.columns());
-    table_.lines.reserve(lines_.size() - 1);
-    for (std::size_t i = 1; i < lines_.size() && !problems_.full(); ++i) {
+    Fields fields;
+    const std::size_t rows = lines_.size() - std::min(row_begin_, lines_.size());
+    table_.fields.reserve(rows * table_.columns());
+    table_.lines.reserve(rows);
+    for (std::size_t i = row_begin_; i < lines_.size() && !problems_.full(); ++i) {
       const Line& line = lines_[i];
+      if (!header_text_.empty() && line.text == header_text_) continue;
       if (!split(line.text, table_.separator, fields)) {
         problems_.add(line.number, "", line.text, "has a quote that is not closed");
         continue;
       }
-      for (std::size_t k = 0;
-           k < empty_at_end_ && fields.size() > table_.columns() && fields.back().empty(); ++k)
-        fields.pop_back();
+      while (fields.size() > table_.columns() && fields.back().empty()) fields.pop_back();
       if (fields.size() != table_.columns()) {
         problems_.add(line.number, "", std::to_string(fields.size()) + " fields",
                       "must have " + std::to_string(table_.columns()) + ", as the header");
@@ -205,21 +378,49 @@ class TableReader {
   }
 
   const ColumnMap* map_;
+  int lines_above_;
   ProblemList& problems_;
   TextTable table_;
   std::vector<Line> lines_;
+  Line last_comment_{0, {}};
   std::optional<char> told_separator_;
-  std::size_t empty_at_end_{0};
+  Cut cut_;
+  std::size_t row_begin_{0};
+  std::string_view header_text_;
 };
 
 }  // namespace
 
-TextTable read_text_table(std::string_view text, const ColumnMap* map, ProblemList& problems) {
-  return TableReader(map, problems).read(text);
+void TextTable::leave_out(const std::vector<bool>& leaves) {
+  TextTable kept;
+  for (std::size_t i = 0; i < columns(); ++i) {
+    if (leaves[i]) continue;
+    kept.header.push_back(header[i]);
+    if (!units.empty()) kept.units.push_back(units[i]);
+  }
+  for (std::size_t k = 0; k < fields.size(); ++k)
+    if (!leaves[k % columns()]) kept.fields.push_back(fields[k]);
+  header = std::move(kept.header);
+  units = std::move(kept.units);
+  fields = std::move(kept.fields);
+}
+
+TextTable read_text_table(std::string text, const ColumnMap* map, int lines_above,
+                          ProblemList& problems) {
+  return TableReader(map, lines_above, problems).read(std::move(text));
 }
 
 std::string separator_name(char separator) {
-  return separator == '\t' ? "tab" : std::string(1, separator);
+  return separator == '\t' ? "tab" : separator == ' ' ? "blank" : std::string(1, separator);
+}
+
+std::string unnamed(std::size_t column) {
+  return "column " + std::to_string(column + 1);
+}
+
+bool is_unnamed(std::string_view header) {
+  return header.starts_with("column ") &&
+         header.find_first_not_of("0123456789", 7) == std::string_view::npos;
 }
 
 }  // namespace thermocomp

@@ -13,15 +13,37 @@ namespace {
 
 constexpr double day_s = 86400.0;
 constexpr std::size_t rows_judged = 100;
-// A number that is a date counts days since 1899-12-30, as spreadsheets do: 1954 to 2119.
-constexpr double serial_days_min = 20000.0;
-constexpr double serial_days_max = 80000.0;
 
 constexpr auto time_names = std::to_array<std::string_view>(
-    {"time", "zeit", "timestamp", "zeitstempel", "datetime", "date", "datum", "uhrzeit", "elapsed",
-     "elapsed time", "date time", "date/time", "datum/uhrzeit", "t_s", "laufzeit"});
-constexpr auto date_names = std::to_array<std::string_view>(
-    {"date", "datum", "datetime", "date time", "date/time", "datum/uhrzeit"});
+    {"time",          "zeit",      "timestamp", "zeitstempel",  "datetime",     "date",
+     "datum",         "uhrzeit",   "elapsed",   "elapsed time", "date time",    "date/time",
+     "datum/uhrzeit", "t_s",       "laufzeit",  "ts",           "_time",        "x_value",
+     "unixtime",      "unix_time", "epoch",     "seconds",      "last_changed", "elapsed_time",
+     "time stamp",    "scan time", "date_time", "sample time"});
+constexpr auto date_names =
+    std::to_array<std::string_view>({"date", "datum", "datetime", "date time", "date/time",
+                                     "datum/uhrzeit", "time", "zeit", "timestamp", "zeitstempel"});
+
+/// Numbers whose size shows from when they count; the ranges are of the years 2001 to 2050 or so.
+struct Epoch {
+  const char* said;
+  double low;
+  double high;
+  double per_second;
+  double zero_s;    ///< since 1970
+  bool only_named;  ///< small numbers may be anything: the column must be called date or time
+  bool is_utc;
+};
+constexpr std::array<Epoch, 8> epochs{{
+    {"s since 1970", 1e9, 2.5e9, 1, 0, false, true},
+    {"ms since 1970", 1e12, 2.5e12, 1e3, 0, false, true},
+    {"us since 1970", 1e15, 2.5e15, 1e6, 0, false, true},
+    {"ns since 1970", 1e18, 2.5e18, 1e9, 0, false, true},
+    {"s since 1904", 3.1e9, 4.6e9, 1, -2082844800.0, true, true},
+    {"100 ns since 1601", 1.25e17, 1.42e17, 1e7, -11644473600.0, false, true},
+    {"day", 20000, 80000, 1 / day_s, -25569 * day_s, true, false},
+    {"days since the year 0", 7.2e5, 7.6e5, 1 / day_s, -719529 * day_s, true, false},
+}};
 
 std::string small_letters(std::string_view text) {
   std::string small(text);
@@ -31,8 +53,18 @@ std::string small_letters(std::string_view text) {
 
 template <std::size_t N>
 bool is_one_of(const std::array<std::string_view, N>& names, std::string_view header) {
-  const std::string base = small_letters(spelled_name(header).base);
+  std::string base = small_letters(spelled_name(header).base);
+  base = base.substr(0, base.find(','));  // "Date Time, GMT+01:00"
   return std::find(names.begin(), names.end(), base) != names.end();
+}
+
+/// The unit of a time that its column's name ends with, "time_ms"; empty: none.
+std::string unit_of_name(std::string_view header) {
+  const auto bar = header.rfind('_');
+  if (bar == std::string_view::npos || bar == 0 || !is_one_of(time_names, header.substr(0, bar)))
+    return {};
+  const SpelledUnit* unit = spelled_unit(header.substr(bar + 1));
+  return unit != nullptr && unit->dimension == "time" ? std::string(unit->spelling) : "";
 }
 
 enum class Holds { other, date, clock, both };
@@ -52,6 +84,60 @@ Holds content(const TextTable& table, std::size_t column) {
   return holds;
 }
 
+/// The numbers of a column's first rows; empty when one is none.
+std::vector<double> first_numbers(const TextTable& table, std::size_t column,
+                                  const NumberForm& form) {
+  std::vector<double> numbers;
+  for (std::size_t row = 0; row < std::min(table.rows(), rows_judged); ++row) {
+    const auto number = number_of(table.field(row, column), form);
+    if (!number) return {};
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+const Epoch* epoch_of(const std::vector<double>& numbers, std::string_view header) {
+  for (const Epoch& epoch : epochs) {
+    if (epoch.only_named && !is_one_of(date_names, header)) continue;
+    if (!numbers.empty() && std::all_of(numbers.begin(), numbers.end(), [&](double number) {
+          return number >= epoch.low && number < epoch.high;
+        }))
+      return &epoch;
+  }
+  return nullptr;
+}
+
+/// "Date Time, GMT+01:00": the zone of all its times.
+std::optional<double> zone_of_header(std::string_view header) {
+  for (const std::string_view name : {"GMT", "UTC"}) {
+    const auto at = header.find(name);
+    if (at == std::string_view::npos) continue;
+    std::string_view zone = header.substr(at);
+    zone = zone.substr(0, zone.find_first_of(" )]"));
+    return parse_zone(zone);
+  }
+  return std::nullopt;
+}
+
+bool within(const std::vector<double>& numbers, double low, double high) {
+  return !numbers.empty() && std::all_of(numbers.begin(), numbers.end(), [&](double number) {
+    return number >= low && number <= high && number == std::floor(number);
+  });
+}
+
+/// Year, day of the year and hhmm side by side, as arrays of Campbell's loggers have them.
+std::optional<TimeColumns> day_of_year(const TextTable& table, const NumberForm& form) {
+  for (std::size_t i = 0; i + 2 < std::min<std::size_t>(table.columns(), 6); ++i) {
+    const std::vector<double> clock = first_numbers(table, i + 2, form);
+    if (within(first_numbers(table, i, form), 1980, 2099) &&
+        within(first_numbers(table, i + 1, form), 1, 366) && within(clock, 0, 2400) &&
+        std::all_of(clock.begin(), clock.end(),
+                    [](double hhmm) { return std::fmod(hhmm, 100.0) < 60.0; }))
+      return TimeColumns{{i, i + 1, i + 2}, {}};
+  }
+  return std::nullopt;
+}
+
 class TimeReader {
  public:
   TimeReader(const TextTable& table, const TimeColumns& time, const ColumnMap* map,
@@ -59,12 +145,22 @@ class TimeReader {
       : table_(table), time_(time), map_(map), units_(units), form_(form), problems_(problems) {}
 
   RunTime read() {
-    const std::size_t column = time_.columns[0];
-    if (time_.columns.size() == 2 || content(table_, column) != Holds::other)
+    if (time_.columns.empty())
+      read_period();
+    else if (time_.columns.size() == 3)
+      read_day_of_year();
+    else if (time_.columns.size() == 2 || parse_time_stamp(table_.field(0, time_.columns[0])))
       read_stamps();
     else
-      read_numbers(column);
-    check_increasing();
+      read_numbers(time_.columns[0]);
+    for (const double value : run_.time_s)
+      if (!std::isfinite(value) && problems_.empty())
+        problems_.add(0, "time_s", "(too large)", "must be finite numbers of seconds");
+    if (time_.dates && problems_.empty()) {
+      const auto stamp = parse_time_stamp(table_.field(0, *time_.dates));
+      const auto seconds = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
+      if (seconds) run_.wall_zero = {*seconds - run_.time_s.front(), stamp->zone_s.has_value()};
+    }
     return std::move(run_);
   }
 
@@ -74,26 +170,67 @@ class TimeReader {
   }
 
   // ---- numbers
-  void read_numbers(std::size_t column) {
-    const std::string& header = table_.header[column];
-    std::vector<double>& time = run_.time_s;
+  void read_period() {
+    for (std::size_t row = 0; row < table_.rows(); ++row)
+      run_.time_s.push_back(static_cast<double>(row) * *map_->period_s);
+    run_.said = "time_s: a row each " + number_text(*map_->period_s) + " s, from the first";
+  }
+
+  bool take_numbers(std::size_t column) {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const auto number = number_of(table_.field(row, column), form_);
       if (!number)
-        problems_.add(table_.lines[row], header,
-                      table_.field(row, column).empty() ? "(missing)" : table_.field(row, column),
-                      "must be a time, as in the rows before");
-      time.push_back(number.value_or(NAN));
+        refuse(row, row == 0 ? "must be a number or a time of a form that is read; "
+                               "docs/run_files.md lists them"
+                             : "must be a number, as in the rows before");
+      run_.time_s.push_back(number.value_or(NAN));
     }
-    if (!problems_.empty() || time.empty()) return;
+    return problems_.empty() && !run_.time_s.empty();
+  }
+
+  void read_day_of_year() {
+    const auto number = [&](std::size_t row, std::size_t column) {
+      const auto value = number_of(table_.field(row, time_.columns[column]), form_);
+      if (!value) refuse(row, "must be year, day of the year and hhmm, as in the rows before");
+      return value.value_or(0.0);
+    };
+    double first = 0.0;
+    for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
+      TimeStamp new_year;
+      new_year.has_date = true;
+      new_year.date = {static_cast<int>(number(row, 0)), 1, 1};
+      new_year.allows[static_cast<std::size_t>(DateOrder::year_month_day)] = true;
+      const double hhmm = number(row, 2);
+      const double at = seconds_of(new_year, DateOrder::unknown, false).value_or(0.0) +
+                        day_s * (number(row, 1) - 1) + 3600 * std::floor(hhmm / 100) +
+                        60 * std::fmod(hhmm, 100.0);
+      if (row == 0) first = at;
+      run_.time_s.push_back(at - first);
+    }
+    run_.wall_zero = WallZero{first, false};
+    run_.said = "time_s: year, day of the year and hhmm from '" + table_.header[time_.columns[0]] +
+                "' on, seconds after the first row (" + date_text(first) + ")";
+  }
+
+  void read_numbers(std::size_t column) {
+    const std::string& header = table_.header[column];
+    if (!take_numbers(column)) return;
     std::string unit(asked_unit());
     if (unit.empty()) unit = header == "time_s" ? "s" : units_[column];
+    if (unit.empty()) unit = unit_of_name(header);
     const SpelledUnit* known = spelled_unit(unit);
-    if (known != nullptr && known->dimension == "time") {
-      scale(header, unit, known->factor);
-    } else if (is_one_of(date_names, header) && time.front() >= serial_days_min &&
-               time.back() < serial_days_max) {
-      scale(header, "day", day_s);
+    const bool is_time = known != nullptr && known->dimension == "time";
+    const Epoch* epoch = epoch_of(run_.time_s, header);
+    if (epoch == nullptr && is_time) epoch = epoch_of(run_.time_s, "date");
+    if (epoch != nullptr && is_time && std::abs(known->factor * epoch->per_second - 1) > 1e-9)
+      epoch = nullptr;  // the unit says another scale
+    if (epoch != nullptr) {
+      count_from_first(header, *epoch);
+    } else if (is_time) {
+      run_.said = "time_s: '" + header + "', numbers [" + unit + "]";
+      if (known->factor == 1.0) return;
+      for (double& value : run_.time_s) value *= known->factor;
+      run_.said += ", times " + number_text(known->factor);
     } else {
       problems_.add(table_.header_line, header, unit.empty() ? "(no unit)" : unit,
                     "has no unit of time: write time_unit = \"s\" (or \"ms\", \"min\", \"h\", "
@@ -101,55 +238,66 @@ class TimeReader {
     }
   }
 
-  void scale(const std::string& header, const std::string& unit, double factor) {
-    std::vector<double>& time = run_.time_s;
-    run_.said = "time_s: '" + header + "', numbers [" + unit + "]";
-    const bool serial = factor == day_s && time.front() >= serial_days_min;
-    const double first = time.front();
-    if (serial) {
-      // Fractions of days are rounded where they were written: to a microsecond here.
-      for (double& value : time) value = std::round((value - first) * day_s * 1e6) / 1e6;
-      run_.said += ", seconds after the first row (" + number_text(first) + ")";
-    } else if (factor != 1.0) {
-      for (double& value : time) value *= factor;
-      run_.said += ", times " + number_text(factor);
-    }
+  /// Fractions are rounded where they were written: to a microsecond here.
+  void count_from_first(const std::string& header, const Epoch& epoch) {
+    const double first = run_.time_s.front();
+    for (double& value : run_.time_s)
+      value = std::round((value - first) / epoch.per_second * 1e6) / 1e6;
+    const double zero_s = first / epoch.per_second + epoch.zero_s;
+    run_.wall_zero = WallZero{zero_s, epoch.is_utc};
+    run_.said = "time_s: '" + header + "', numbers [" + epoch.said +
+                "], seconds after the first row (" +
+                (epoch.is_utc ? date_text(zero_s) + " UTC)" : number_text(first) + ")");
   }
 
   // ---- dates and times of the clock
   void read_stamps() {
     std::vector<TimeStamp> stamps;
+    const auto zone = zone_of_header(table_.header[time_.columns[0]]);
     for (std::size_t row = 0; row < table_.rows() && !problems_.full(); ++row) {
       std::optional<TimeStamp> stamp = parse_time_stamp(table_.field(row, time_.columns[0]));
       if (stamp && time_.columns.size() == 2) stamp = joined(row, *stamp);
+      if (stamp && stamp->has_date && !stamp->zone_s) stamp->zone_s = zone;
       if (stamp && !stamps.empty() && !alike(*stamp, stamps.front())) stamp.reset();
-      if (!stamp) refuse(row, "must be a time in the form of the rows before");
+      if (!stamp)
+        refuse(row, row == 0 ? "must be a time of a form that is read; docs/run_files.md lists them"
+                             : "must be a time in the form of the rows before");
       stamps.push_back(stamp.value_or(TimeStamp{}));
     }
-    if (!problems_.empty() || stamps.empty()) return;
-    const DateOrder order = date_order(stamps);
+    if (!problems_.empty() || stamps.empty() || !clock_is_clear(stamps)) return;
+    const std::optional<DateOrder> order = date_order(stamps);
+    if (!problems_.empty()) return;
+    const DateOrder taken = order.value_or(DateOrder::unknown);
+    run_.time_s = seconds_by(stamps, taken);
+    const double first = run_.time_s.front();
+    for (std::size_t row = 0; row < stamps.size(); ++row) {
+      if (std::isnan(run_.time_s[row]))
+        refuse(row, "must be a day of the calendar and a time of it");
+      run_.time_s[row] = std::round((run_.time_s[row] - first) * 1e6) / 1e6;
+    }
+    if (!problems_.empty()) return;
+    say_stamps(stamps.front(), order, first);
+    if (stamps.front().has_date && order)
+      run_.wall_zero = WallZero{first, stamps.front().zone_s.has_value()};
+  }
+
+  /// NaN where the calendar has no such day.
+  [[nodiscard]] std::vector<double> seconds_by(const std::vector<TimeStamp>& stamps,
+                                               DateOrder order) const {
     const bool minutes_first = asked_unit() == "mm:ss";
-    if (!problems_.empty() || !clock_is_clear(stamps)) return;
-    const bool clock_only = !stamps.front().has_date;
     const bool wraps =
-        clock_only &&
-        std::all_of(stamps.begin(), stamps.end(), [](const auto& s) { return s.clock_a < 24; }) &&
-        !minutes_first;
-    double first = 0.0;
+        !stamps.front().has_date && !minutes_first &&
+        std::all_of(stamps.begin(), stamps.end(), [](const auto& s) { return s.clock_a < 24; });
+    std::vector<double> seconds;
     double days = 0.0;
     double last = 0.0;
-    for (std::size_t row = 0; row < stamps.size(); ++row) {
-      const auto seconds = seconds_of(stamps[row], order, minutes_first);
-      if (!seconds) refuse(row, "must be a day of the calendar and a time of it");
-      const double at = seconds.value_or(0.0);
-      if (row == 0) first = at;
-      if (wraps && row > 0 && at < last - day_s / 2) days += day_s;
+    for (const TimeStamp& stamp : stamps) {
+      const double at = seconds_of(stamp, order, minutes_first).value_or(NAN);
+      if (wraps && !seconds.empty() && at < last - day_s / 2) days += day_s;
       last = at;
-      run_.time_s.push_back(std::round((at - first + days) * 1e6) / 1e6);
+      seconds.push_back(at + days);
     }
-    if (problems_.empty()) say_stamps(stamps.front(), order, first);
-    if (stamps.front().has_date)
-      run_.wall_zero = WallZero{first, stamps.front().zone_s.has_value()};
+    return seconds;
   }
 
   std::optional<TimeStamp> joined(std::size_t row, TimeStamp date) const {
@@ -157,10 +305,8 @@ class TimeReader {
     if (!clock || clock->has_date || date.has_clock) return std::nullopt;
     TimeStamp both = *clock;
     both.has_date = true;
-    both.year = date.year;
-    both.first = date.first;
-    both.second = date.second;
-    both.order = date.order;
+    both.date = date.date;
+    both.allows = date.allows;
     return both;
   }
 
@@ -169,28 +315,50 @@ class TimeReader {
            a.zone_s.has_value() == b.zone_s.has_value() && a.clock_parts == b.clock_parts;
   }
 
-  DateOrder date_order(const std::vector<TimeStamp>& stamps) {
-    DateOrder order = DateOrder::unknown;
-    std::optional<std::size_t> unclear;
-    for (std::size_t row = 0; row < stamps.size(); ++row) {
-      const DateOrder here = stamps[row].order;
-      if (!stamps[row].has_date) continue;
-      if (here == DateOrder::unknown) {
-        if (!unclear) unclear = row;
-      } else if (order != DateOrder::unknown && here != order) {
-        refuse(row, "has day and month the other way round than a row before");
-        return order;
-      } else {
-        order = here;
-      }
-    }
+  /// The order that all rows allow. Of several the one by which they lie within a far shorter
+  /// time; where all rows are of one day, any does for the seconds, and none for the date.
+  /// @return nullopt: the date is not known
+  std::optional<DateOrder> date_order(const std::vector<TimeStamp>& stamps) {
+    if (!stamps.front().has_date) return DateOrder::unknown;
+    std::vector<DateOrder> possible;
     const DateOrder asked = map_ == nullptr ? DateOrder::unknown : map_->date_order;
-    if (order == DateOrder::unknown) order = asked;
-    if (order == DateOrder::unknown && unclear)
-      refuse(*unclear,
+    for (const DateOrder order :
+         {DateOrder::year_month_day, DateOrder::day_month_year, DateOrder::month_day_year}) {
+      const bool by_all = std::all_of(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
+        return stamp.allows_order(order);
+      });
+      if (by_all && order == asked) return order;
+      if (by_all) possible.push_back(order);
+    }
+    if (possible.empty()) {
+      const auto other = std::find_if(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
+        return stamp.allows != stamps.front().allows;
+      });
+      refuse(static_cast<std::size_t>(other - stamps.begin()) % stamps.size(),
+             "has day and month the other way round than a row before");
+      return std::nullopt;
+    }
+    if (possible.size() == 1) return possible[0];
+    std::vector<std::pair<double, DateOrder>> spans;
+    for (const DateOrder order : possible) {
+      const std::vector<double> seconds = seconds_by(stamps, order);
+      const auto [low, high] = std::minmax_element(seconds.begin(), seconds.end());
+      const bool is_good =
+          std::none_of(seconds.begin(), seconds.end(), [](double s) { return std::isnan(s); });
+      if (is_good) spans.emplace_back(*high - *low, order);
+    }
+    std::sort(spans.begin(), spans.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    if (spans.size() == 1) return spans[0].second;
+    if (spans.size() > 1 && spans[1].first > 5 * spans[0].first) return spans[0].second;
+    const bool one_day = std::all_of(stamps.begin(), stamps.end(), [&](const TimeStamp& stamp) {
+      return stamp.date == stamps.front().date;
+    });
+    if (!one_day)
+      refuse(0,
              "may begin with the day or the month: write date_order = \"day.month.year\" or "
              "\"month.day.year\" in the file of --columns");
-    return order;
+    return std::nullopt;
   }
 
   bool clock_is_clear(const std::vector<TimeStamp>& stamps) {
@@ -202,15 +370,18 @@ class TimeReader {
     return false;
   }
 
-  void say_stamps(const TimeStamp& first, DateOrder order, double first_s) {
+  void say_stamps(const TimeStamp& first, std::optional<DateOrder> order, double first_s) {
     run_.said = "time_s: '" + table_.header[time_.columns[0]] + "'";
     if (time_.columns.size() == 2) run_.said += " and '" + table_.header[time_.columns[1]] + "'";
-    if (first.has_date) {
-      const bool stands_year_first =
-          table_.field(0, time_.columns[0]).find_first_not_of("0123456789") == 4;
-      run_.said += stands_year_first                    ? ", year-month-day"
-                   : order == DateOrder::month_day_year ? ", month/day/year"
-                                                        : ", day.month.year";
+    if (first.has_date && !order) {
+      run_.said +=
+          ", seconds after the first row; the date may begin with the day or the month, which only "
+          "--join asks for (date_order = \"day.month.year\" or \"month.day.year\" in the file of "
+          "--columns)";
+    } else if (first.has_date) {
+      run_.said += *order == DateOrder::year_month_day   ? ", year-month-day"
+                   : *order == DateOrder::month_day_year ? ", month/day/year"
+                                                         : ", day.month.year";
       run_.said += ", seconds after the first row (" + date_text(first_s);
       run_.said += first.zone_s ? " UTC)" : ")";
     } else {
@@ -221,23 +392,11 @@ class TimeReader {
     }
   }
 
-  // ---- both
   void refuse(std::size_t row, std::string rule) {
     const std::size_t column = time_.columns[0];
     const std::string_view field = table_.field(row, column);
     problems_.add(table_.lines[row], table_.header[column], field.empty() ? "(missing)" : field,
                   std::move(rule));
-  }
-
-  void check_increasing() {
-    for (std::size_t row = 1; row < run_.time_s.size() && problems_.empty(); ++row) {
-      if (run_.time_s[row] > run_.time_s[row - 1]) continue;
-      refuse(row, "must be later than in the row before (" +
-                      shortened(table_.field(row - 1, time_.columns.back())) + ")");
-    }
-    for (const double value : run_.time_s)
-      if (!std::isfinite(value) && problems_.empty())
-        problems_.add(0, "time_s", "(too large)", "must be finite numbers of seconds");
   }
 
   const TextTable& table_;
@@ -249,6 +408,68 @@ class TimeReader {
   RunTime run_;
 };
 
+/// What may be the time, by kinds.
+struct Candidates {
+  std::vector<std::size_t> dates;   ///< with or without the clock time
+  std::vector<std::size_t> clocks;  ///< alone
+  std::vector<std::size_t> epochs;
+  std::vector<std::size_t> counting;  ///< numbers with a unit of time, or called so
+};
+
+/// Dates that never change, as the start of a query, are no time; of several the first that the
+/// others do not differ from.
+void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) {
+  if (dates.size() < 2) return;
+  const auto is_constant = [&](std::size_t column) {
+    for (std::size_t row = 1; row < table.rows(); ++row)
+      if (table.field(row, column) != table.field(0, column)) return false;
+    return true;
+  };
+  if (!std::all_of(dates.begin(), dates.end(), is_constant)) std::erase_if(dates, is_constant);
+  const auto named = std::find_if(dates.begin(), dates.end(), [&](std::size_t column) {
+    return is_one_of(time_names, table.header[column]);
+  });
+  const auto named_count = std::count_if(dates.begin(), dates.end(), [&](std::size_t column) {
+    return is_one_of(time_names, table.header[column]);
+  });
+  if (named_count == 1) dates = {*named};
+}
+
+bool increases(const TextTable& table, std::size_t column) {
+  double last = -INFINITY;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto stamp = parse_time_stamp(table.field(row, column));
+    const auto at = stamp ? seconds_of(*stamp, DateOrder::unknown, false) : std::nullopt;
+    if (!at || !(*at > last)) return false;
+    last = *at;
+  }
+  return true;
+}
+
+Candidates candidates(const TextTable& table, const ColumnMap* map,
+                      const std::vector<std::string>& units, const NumberForm& form) {
+  Candidates found;
+  for (std::size_t i = 0; i < table.columns(); ++i) {
+    const std::string& header = table.header[i];
+    if (map != nullptr &&
+        (map->columns.contains(header) ||
+         std::find(map->ignored.begin(), map->ignored.end(), header) != map->ignored.end()))
+      continue;
+    const Holds here = content(table, i);
+    const SpelledUnit* unit = spelled_unit(units[i]);
+    if (here == Holds::date || here == Holds::both)
+      found.dates.push_back(i);
+    else if (here == Holds::clock)
+      found.clocks.push_back(i);
+    else if (epoch_of(first_numbers(table, i, form), header) != nullptr)
+      found.epochs.push_back(i);
+    else if (is_one_of(time_names, header) || !unit_of_name(header).empty() ||
+             (unit != nullptr && unit->dimension == "time"))
+      found.counting.push_back(i);
+  }
+  return found;
+}
+
 }  // namespace
 
 bool TimeColumns::has(std::size_t column) const {
@@ -256,7 +477,8 @@ bool TimeColumns::has(std::size_t column) const {
 }
 
 std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* map,
-                                     const std::vector<std::string>& units, ProblemList& problems) {
+                                     const std::vector<std::string>& units, const NumberForm& form,
+                                     ProblemList& problems) {
   const auto column_of = [&](std::string_view name) {
     return static_cast<std::size_t>(std::find(table.header.begin(), table.header.end(), name) -
                                     table.header.begin());
@@ -272,38 +494,38 @@ std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* ma
     }
     return time;
   }
-  if (column_of("time_s") < table.columns()) return TimeColumns{{column_of("time_s")}};
-  TimeColumns found;
-  std::vector<Holds> holds;
-  for (std::size_t i = 0; i < table.columns(); ++i) {
-    if (map != nullptr && (map->columns.contains(table.header[i]) ||
-                           std::find(map->ignored.begin(), map->ignored.end(), table.header[i]) !=
-                               map->ignored.end()))
-      continue;
-    const Holds here = content(table, i);
-    const SpelledUnit* unit = spelled_unit(units[i]);
-    if (here == Holds::other && !is_one_of(time_names, table.header[i]) &&
-        !(unit != nullptr && unit->dimension == "time"))
-      continue;
-    found.columns.push_back(i);
-    holds.push_back(here);
-  }
-  if (found.columns.size() == 1) return found;
-  if (holds.size() == 2 && holds[0] == Holds::date && holds[1] == Holds::clock) return found;
-  if (holds.size() == 2 && holds[0] == Holds::clock && holds[1] == Holds::date)
-    return TimeColumns{{found.columns[1], found.columns[0]}};
-  if (found.columns.empty()) {
-    problems.add(table.header_line, "time_s", "(missing)",
-                 "must be one of the columns; if another is the time, write time = \"its name\" in "
-                 "the file of --columns");
+  if (column_of("time_s") < table.columns()) return TimeColumns{{column_of("time_s")}, {}};
+  Candidates found = candidates(table, map, units, form);
+  keep_moving_dates(table, found.dates);
+  const std::size_t dates = found.dates.size();
+  if (dates == 1 && found.clocks.size() == 1 && content(table, found.dates[0]) == Holds::date)
+    return TimeColumns{{found.dates[0], found.clocks[0]}, {}};
+  if (dates == 1 && found.counting.size() == 1 && !increases(table, found.dates[0]))
+    return TimeColumns{{found.counting[0]}, found.dates[0]};
+  for (const auto* kind : {&found.dates, &found.epochs, &found.clocks, &found.counting}) {
+    if (kind->size() == 1) return TimeColumns{{kind->front()}, {}};
+    if (kind->empty()) continue;
+    const std::string first = toml_text(table.header[(*kind)[0]]);
+    const std::string second = toml_text(table.header[(*kind)[1]]);
+    problems.add(
+        table.header_line, "column " + std::to_string((*kind)[0] + 1), table.header[(*kind)[0]],
+        "may be the time, and so may " + second + ": write time = " + first + " and ignore = [" +
+            second + "], or the other way round, in the file of --columns");
     return std::nullopt;
   }
-  std::string rule = "may be the time, and so may " + toml_text(table.header[found.columns[1]]) +
-                     ": write time = " + toml_text(table.header[found.columns[0]]) +
-                     " and ignore = [" + toml_text(table.header[found.columns[1]]) +
-                     "], or the other way round, in the file of --columns";
-  problems.add(table.header_line, "column " + std::to_string(found.columns[0] + 1),
-               table.header[found.columns[0]], std::move(rule));
+  if (const auto time = day_of_year(table, form)) return time;
+  if (map != nullptr && map->period_s) return TimeColumns{};
+  if (!table.has_header)
+    problems.add(table.lines.empty() ? 1 : table.lines[0], "names", "(missing)",
+                 "has no header that says which column is the time: write names = [\"time_s\", "
+                 "\"t1_degC\", ...], one for each of the " +
+                     std::to_string(table.columns()) +
+                     " fields of a row, in the file of --columns (of import: --names "
+                     "time_s,t1_degC,...), and period_s where no field is the time");
+  else
+    problems.add(table.header_line, "time_s", "(missing)",
+                 "must be one of the columns; if another is the time, write time = \"its name\" in "
+                 "the file of --columns; if none is, period_s = the seconds between two rows");
   return std::nullopt;
 }
 

@@ -12,8 +12,9 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::array<std::string_view, 12> month_names{"jan", "feb", "mar", "apr", "may", "jun",
-                                                       "jul", "aug", "sep", "oct", "nov", "dec"};
+constexpr std::array<std::string_view, 24> month_names{
+    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+    "jan", "feb", "mrz", "apr", "mai", "jun", "jul", "aug", "sep", "okt", "nov", "dez"};
 
 bool is_digit(char c) {
   return c >= '0' && c <= '9';
@@ -43,56 +44,114 @@ std::optional<int> take_month_name(std::string_view& text) {
   const auto* const found = std::find(month_names.begin(), month_names.end(), name);
   if (found == month_names.end()) return std::nullopt;
   text.remove_prefix(3);
-  return static_cast<int>(found - month_names.begin()) + 1;
+  return static_cast<int>((found - month_names.begin()) % 12) + 1;
 }
 
-/// 2026-03-01, 01.03.2026, 3/1/2026, 01-Mar-2026.
+bool take_day_name(std::string_view& text) {
+  constexpr std::array<std::string_view, 7> days{"Mon", "Tue", "Wed", "Thu", "Fri", "Sat", "Sun"};
+  if (std::none_of(days.begin(), days.end(), [&](auto day) { return text.starts_with(day); }))
+    return false;
+  text = trimmed(text.substr(3));
+  take_char(text, ",");
+  text = trimmed(text);
+  return true;
+}
+
+/// A number of a date and how many digits it has; a month's name has none.
+struct DatePart {
+  int value{0};
+  std::size_t digits{0};
+};
+
+std::optional<DatePart> take_date_part(std::string_view& text) {
+  const std::size_t before = text.size();
+  if (const auto number = take_digits(text, 4)) return DatePart{*number, before - text.size()};
+  if (const auto month = take_month_name(text)) return DatePart{*month, 0};
+  return std::nullopt;
+}
+
+/// Which orders of day, month and year three parts allow.
+void find_orders(const std::array<DatePart, 3>& parts, char separator, TimeStamp& stamp) {
+  const auto allow = [&](DateOrder order, std::size_t day, std::size_t month, std::size_t year) {
+    const bool is_year = parts[year].digits == 4 || parts[year].digits == 2;
+    const bool others_short = parts[day].digits <= 2 && parts[month].digits <= 2;
+    const bool named = parts[0].digits == 0 || parts[1].digits == 0;
+    if (!is_year || !others_short || parts[day].digits == 0) return;
+    if (named && parts[month].digits != 0) return;
+    const bool in_range = parts[month].value <= 12 && parts[day].value <= 31;
+    if (parts[year].digits == 4 || in_range) stamp.allows[static_cast<std::size_t>(order)] = true;
+  };
+  const bool is_long =
+      std::any_of(parts.begin(), parts.end(), [](auto p) { return p.digits == 4; });
+  const auto year_is = [&](std::size_t i) { return !is_long || parts[i].digits == 4; };
+  if (year_is(2)) {
+    const bool by_points = separator == '.';
+    if (by_points || parts[0].digits == 0 || parts[1].value <= 12 || parts[0].value > 12)
+      allow(DateOrder::day_month_year, 0, 1, 2);
+    if (!by_points && (parts[0].digits == 0 || parts[0].value <= 12))
+      allow(DateOrder::month_day_year, 1, 0, 2);
+  }
+  if (year_is(0) && (is_long || separator != '.')) allow(DateOrder::year_month_day, 2, 1, 0);
+}
+
+/// 2026-03-01, 01.03.2026, 3/1/26, 01-Mar-2026, Mar 1, 2026, 20260301.
 bool take_date(std::string_view& text, TimeStamp& stamp) {
   std::string_view rest = text;
-  const auto a = take_digits(rest, 4);
-  const std::size_t a_digits = text.size() - rest.size();
-  if (!a || rest.empty()) return false;
-  const char separator = rest.front();
-  if (!take_char(rest, "-./ ")) return false;
-  std::optional<int> b = take_digits(rest, 2);
-  const bool named = !b;
-  if (named) b = take_month_name(rest);
-  if (!b || rest.empty() || rest.front() != separator) return false;
-  rest.remove_prefix(1);
-  const std::size_t before = rest.size();
-  const auto c = take_digits(rest, 4);
-  const std::size_t c_digits = before - rest.size();
-  if (!c || (!rest.empty() && is_digit(rest.front()))) return false;
-  if (separator == ' ' && !named) return false;
-  stamp.has_date = true;
-  if (a_digits == 4 && c_digits <= 2) {
-    stamp.year = *a;
-    stamp.first = *c;
-    stamp.second = *b;
-    stamp.order = DateOrder::day_month_year;
-  } else if (a_digits <= 2 && c_digits == 4) {
-    stamp.year = *c;
-    stamp.first = *a;
-    stamp.second = *b;
-    if (separator == '.' || named || *a > 12)
-      stamp.order = DateOrder::day_month_year;
-    else if (*b > 12)
-      stamp.order = DateOrder::month_day_year;
+  take_day_name(rest);
+  std::array<DatePart, 3> parts{};
+  char separator = ' ';
+  const auto compact = rest.substr(0, 8);
+  if (compact.size() == 8 && std::all_of(compact.begin(), compact.end(), is_digit) &&
+      (rest.size() == 8 || std::string_view("T_ -").find(rest[8]) != std::string_view::npos)) {
+    parts[0] = {*take_digits(rest, 4), 4};
+    parts[1] = {*take_digits(rest, 2), 2};
+    parts[2] = {*take_digits(rest, 2), 2};
+    if (!(parts[0].value >= 1900 && parts[0].value < 2100 && parts[1].value <= 12)) return false;
+    separator = '-';
   } else {
-    return false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto part = take_date_part(rest);
+      if (!part) return false;
+      parts[i] = *part;
+      if (i == 2) break;
+      if (rest.empty() || std::string_view("-./ ,").find(rest.front()) == std::string_view::npos)
+        return false;
+      const char here = rest.front();
+      const bool named = parts[0].digits == 0 || (i == 1 && parts[1].digits == 0);
+      if (i == 1 && here != separator && !(named && here == ',')) return false;
+      separator = i == 0 ? here : separator;
+      rest.remove_prefix(1);
+      if (here == ',' || here == ' ') rest = trimmed(rest);
+    }
   }
+  const bool named = parts[0].digits == 0 || parts[1].digits == 0;
+  if ((separator == ' ' && !named) || separator == ',' || parts[2].digits == 0 ||
+      (!rest.empty() && is_digit(rest.front())))
+    return false;
+  find_orders(parts, separator, stamp);
+  if (std::none_of(stamp.allows.begin(), stamp.allows.end(), [](bool each) { return each; }))
+    return false;
+  for (std::size_t i = 0; i < 3; ++i) stamp.date[i] = parts[i].value;
+  stamp.has_date = true;
   text = rest;
   return true;
 }
 
 std::optional<double> take_zone(std::string_view& text) {
-  if (take_char(text, "Zz")) return 0.0;
+  text = trimmed(text);
+  bool is_utc = false;
+  for (const std::string_view name : {"UTC", "GMT", "Z", "z"}) {
+    if (is_utc || !text.starts_with(name)) continue;
+    text.remove_prefix(name.size());
+    is_utc = true;
+  }
   const bool west = !text.empty() && text.front() == '-';
-  if (!take_char(text, "+-")) return std::nullopt;
+  if (!take_char(text, "+-")) return is_utc ? std::optional(0.0) : std::nullopt;
   const auto hours = take_digits(text, 2);
   take_char(text, ":");
   const int minutes = take_digits(text, 2).value_or(0);
   if (!hours) return std::nullopt;
+  if (trimmed(text) == "UTC") text = {};
   return (west ? -60.0 : 60.0) * (60 * *hours + minutes);
 }
 
@@ -108,9 +167,18 @@ bool take_half_of_day(std::string_view& text, TimeStamp& stamp) {
   return true;
 }
 
-/// 8:30, 08:30:15, 08:30:15.250, 26:15:00; then a zone or AM, PM.
+/// 8:30, 08:30:15, 08:30:15.250, 08:30:15:250, 26:15:00, 083015; then a zone or AM, PM.
 bool take_clock(std::string_view& text, TimeStamp& stamp) {
   std::string_view rest = text;
+  const std::string_view compact = rest.substr(0, 6);
+  std::string spelled;
+  if (stamp.has_date && compact.size() == 6 &&
+      std::all_of(compact.begin(), compact.end(), is_digit)) {
+    for (const std::size_t at : {0U, 2U, 4U})
+      spelled.append(at > 0 ? ":" : "").append(compact.substr(at, 2));
+    spelled.append(rest.substr(6));
+    rest = spelled;
+  }
   const auto a = take_digits(rest, 5);
   if (!a || !take_char(rest, ":")) return false;
   const auto b = take_digits(rest, 2);
@@ -124,7 +192,7 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
     stamp.clock_parts = 3;
     stamp.clock_c = *c;
   }
-  if (take_char(rest, ".,")) {
+  if (take_char(rest, stamp.clock_parts == 3 ? ".,:" : ".,")) {
     double unit = 0.1;
     double fraction = 0.0;
     if (rest.empty() || !is_digit(rest.front())) return false;
@@ -133,14 +201,28 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
     (stamp.clock_parts == 3 ? stamp.clock_c : stamp.clock_b) += fraction;
   }
   stamp.has_clock = true;
-  if (!rest.empty() && std::string_view("Zz+-").find(rest.front()) != std::string_view::npos) {
+  rest = trimmed(rest);
+  if (!rest.empty() && std::string_view("ZzUG+-").find(rest.front()) != std::string_view::npos) {
     stamp.zone_s = take_zone(rest);
     if (!stamp.zone_s) return false;
   } else if (!take_half_of_day(rest, stamp)) {
     return false;
   }
-  text = rest;
-  return text.empty();
+  return rest.empty();
+}
+
+/// ctime: "Wed Jun 11 11:50:00 2026" with the year at its end.
+std::string year_in_front(std::string_view text) {
+  take_day_name(text);
+  if (text.size() < 18 || text[text.size() - 5] != ' ') return {};
+  const std::string_view year = text.substr(text.size() - 4);
+  const auto clock = text.find(':');
+  if (clock == std::string_view::npos || clock < 6 ||
+      !std::all_of(year.begin(), year.end(), is_digit))
+    return {};
+  const std::string_view day = trimmed(text.substr(0, clock - 2));
+  return std::string(day) + " " + std::string(year) + " " +
+         std::string(text.substr(clock - 2, text.size() - 5 - (clock - 2)));
 }
 
 }  // namespace
@@ -148,24 +230,43 @@ bool take_clock(std::string_view& text, TimeStamp& stamp) {
 std::optional<TimeStamp> parse_time_stamp(std::string_view text) {
   text = trimmed(text);
   TimeStamp stamp;
+  // No letter of a plain field is the first of a date.
+  if (text.size() < 4 || text.size() > 64) return std::nullopt;
+  std::string turned;
+  if (!is_digit(text.front())) {
+    turned = year_in_front(text);
+    if (!turned.empty()) text = turned;
+  }
   if (take_date(text, stamp)) {
-    if (text.empty()) return stamp;
-    if (!take_char(text, "T _")) return std::nullopt;
+    if (trimmed(text).empty()) return stamp;
+    if (!take_char(text, "T _-,")) return std::nullopt;
     text = trimmed(text);
   }
   if (!take_clock(text, stamp)) return std::nullopt;
   return stamp;
 }
 
+std::optional<double> parse_zone(std::string_view text) {
+  const auto zone = take_zone(text);
+  return trimmed(text).empty() ? zone : std::nullopt;
+}
+
 std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order, bool minutes_first) {
   double seconds = 0.0;
   if (stamp.has_date) {
-    const DateOrder known = stamp.order == DateOrder::unknown ? order : stamp.order;
-    const bool day_first = known != DateOrder::month_day_year;
-    const auto day = static_cast<unsigned>(day_first ? stamp.first : stamp.second);
-    const auto month = static_cast<unsigned>(day_first ? stamp.second : stamp.first);
-    const std::chrono::year_month_day date{std::chrono::year{stamp.year}, std::chrono::month{month},
-                                           std::chrono::day{day}};
+    for (const DateOrder each :
+         {DateOrder::year_month_day, DateOrder::day_month_year, DateOrder::month_day_year})
+      if (order == DateOrder::unknown && stamp.allows_order(each)) order = each;
+    if (!stamp.allows_order(order)) return std::nullopt;
+    const std::array<std::size_t, 3> at =
+        order == DateOrder::day_month_year   ? std::array<std::size_t, 3>{0, 1, 2}
+        : order == DateOrder::month_day_year ? std::array<std::size_t, 3>{1, 0, 2}
+                                             : std::array<std::size_t, 3>{2, 1, 0};
+    int year = stamp.date[at[2]];
+    if (year < 100) year += year < 70 ? 2000 : 1900;
+    const std::chrono::year_month_day date{
+        std::chrono::year{year}, std::chrono::month{static_cast<unsigned>(stamp.date[at[1]])},
+        std::chrono::day{static_cast<unsigned>(stamp.date[at[0]])}};
     if (!date.ok() || (stamp.has_clock && stamp.clock_a > 24)) return std::nullopt;
     const auto days = std::chrono::sys_days(date).time_since_epoch().count();
     seconds = 86400.0 * static_cast<double>(days);

@@ -1,7 +1,8 @@
-/// Times as people write them: 2026-03-01T08:30:00+01:00, 01.03.2026 08:30, 3/1/2026 8:30:00 PM,
-/// 01-Mar-2026, 08:30:15,250.
+/// Times as people write them: 2026-03-01T08:30:00+01:00, 01.03.2026 08:30, 3/1/26 8:30:00 PM,
+/// 01-Mar-2026, Mar 1, 2026, 2026/03/01-08:30:15, 20260301T083015Z, 08:30:15,250.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string_view>
 
@@ -9,14 +10,15 @@
 
 namespace thermocomp {
 
-/// The parts of one time, before it is known which of day and month stands first.
+/// The parts of one time, before it is known which number is the day, the month and the year.
 struct TimeStamp {
   bool has_date{false};
-  int year{0};
-  int first{0};   ///< day or month; with `order` known see there
-  int second{0};  ///< the other
-  /// What the spelling itself says: a year or a month's name in front, points, a number above 12.
-  DateOrder order{DateOrder::unknown};
+  std::array<int, 3> date{};  ///< as they stand; a month's name is its number
+  /// The orders that the spelling allows; of two-digit years and slashes there may be three.
+  std::array<bool, 4> allows{};  ///< by DateOrder
+  [[nodiscard]] bool allows_order(DateOrder order) const noexcept {
+    return allows[static_cast<std::size_t>(order)];
+  }
 
   bool has_clock{false};
   int clock_parts{0};   ///< 2: hh:mm or mm:ss; 3: hh:mm:ss
@@ -30,10 +32,13 @@ struct TimeStamp {
 ///         found by seconds_of(), not here.
 [[nodiscard]] std::optional<TimeStamp> parse_time_stamp(std::string_view text);
 
+/// "GMT+01:00", "+0200", "Z", "UTC": seconds east of Greenwich; nullopt: none.
+[[nodiscard]] std::optional<double> parse_zone(std::string_view text);
+
 /// Seconds since 1970 in the stamp's own zone or, where it has one, in UTC; without a date since
-/// midnight. `order` decides where the stamp does not. A clock of two parts is hours and minutes
-/// unless `minutes_first`.
-/// @return nullopt when the calendar has no such day
+/// midnight. A clock of two parts is hours and minutes unless `minutes_first`.
+/// @param order  unknown: the first that the stamp allows
+/// @return nullopt when the calendar has no such day, or the stamp does not allow the order
 [[nodiscard]] std::optional<double> seconds_of(const TimeStamp& stamp, DateOrder order,
                                                bool minutes_first);
 

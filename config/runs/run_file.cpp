@@ -5,10 +5,16 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <fcntl.h>
 #include <set>
+#include <spawn.h>
+#include <unistd.h>
+
+#include <sys/wait.h>
 
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/foreign_run.hpp"
+#include "config/run_forms/run_text.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/file_limits.hpp"
@@ -126,11 +132,6 @@ class RunParser {
         add(line_number_, where, name, "is there twice");
       }
       run_.columns.push_back(name);
-    }
-    if (finite_number(run_.columns.front())) {
-      problems_.clear();
-      add(line_number_, "", line, "must be the header row, names of columns");
-      return;
     }
     time_ = run_.find("time_s");
     if (!time_) add(line_number_, "time_s", "(missing)", "must be one of the columns");
@@ -294,14 +295,40 @@ bool names_a_column(const ColumnMap& map, std::string_view header) {
   return false;
 }
 
-std::string_view without_mark(std::string_view text, const std::string& name) {
-  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
-    throw ConfigurationError(
-        {{name, 0, "", "",
-          "is UTF-16: make it UTF-8 by  iconv -f UTF-16 -t UTF-8 FILE > NEW.csv"}});
+/// The sheet of a workbook as CSV, by the program that Debian has for it.
+std::string sheet_of(const std::filesystem::path& path) {
+  const auto refuse = [&](const std::string& rule) {
+    throw ConfigurationError({{path.string(), 0, "", "(Excel workbook)", rule}});
+  };
+  std::array<int, 2> ends{};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) refuse("cannot be read: no pipe");
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  std::string program = "xlsx2csv";
+  std::string format = "--dateformat=%Y-%m-%d %H:%M:%S";
+  std::string file = std::filesystem::absolute(path).string();
+  std::array<char*, 4> arguments{program.data(), format.data(), file.data(), nullptr};
+  pid_t child = 0;
+  const int failed =
+      ::posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  ::close(ends[1]);
+  std::string text;
+  std::array<char, 65536> part{};
+  for (ssize_t size = 1; failed == 0 && size > 0 && text.size() <= run_bytes_max;) {
+    size = ::read(ends[0], part.data(), part.size());
+    if (size > 0) text.append(part.data(), static_cast<std::size_t>(size));
   }
-  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  ::close(ends[0]);
+  int status = 0;
+  if (failed == 0) ::waitpid(child, &status, 0);
+  if (failed != 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 127))
+    refuse(
+        "is read by xlsx2csv, which is not installed: apt install xlsx2csv, or save the sheet "
+        "as CSV");
+  if (status != 0 || text.empty()) refuse("xlsx2csv cannot read it: save the sheet as CSV");
   return text;
 }
 
@@ -309,18 +336,24 @@ std::string_view without_mark(std::string_view text, const std::string& name) {
 
 RunFile parse_run(std::string_view text, const std::string& name, const RunSelection& selection,
                   const ColumnMap* map) {
-  text = without_mark(text, name);
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   const std::string_view header = header_of(text);
-  const bool own = (is_own_form(header) && (map == nullptr || !names_a_column(*map, header))) ||
-                   header.empty() || finite_number(trimmed(header.substr(0, header.find(','))));
+  const bool own =
+      (is_own_form(header) && (map == nullptr || !names_a_column(*map, header))) || header.empty();
   RunFile run = own ? RunParser(text, name).parse() : read_foreign_run(text, name, map);
+  if (own) run.wall_zero = said_wall_zero(text.substr(0, text.find(header)));
   select(run, selection);
   return run;
 }
 
 RunFile load_run(const RunSelection& selection, const ColumnMap* map) {
-  return parse_run(read_text_file(selection.file, run_bytes_max), selection.file.string(),
-                   selection, map);
+  std::string text = read_text_file(selection.file, run_bytes_max);
+  const bool is_sheet = is_workbook(text);
+  if (is_sheet) text = sheet_of(selection.file);
+  RunFile run = parse_run(text, selection.file.string(), selection, map);
+  if (is_sheet) run.understood.emplace_back("an Excel workbook, by xlsx2csv");
+  return run;
 }
 
 std::string write_run(const RunFile& run) {

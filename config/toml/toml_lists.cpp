@@ -73,14 +73,14 @@ std::vector<std::string> TomlTable::texts(std::string_view key) const {
   return texts(key, {});
 }
 
-std::vector<std::string> TomlTable::texts(std::string_view key,
-                                          std::vector<std::string> otherwise) const {
+std::vector<std::string> TomlTable::texts(std::string_view key, std::vector<std::string> otherwise,
+                                          bool takes_empty) const {
   if (!has(key)) return otherwise;
   std::vector<std::string> values;
   for_each_element(key, false, "strings", [&](const void* element, std::size_t position) {
     const auto* value = as_node(element)->as_string();
     const bool is_good = value != nullptr && is_printable(value->get());
-    if (value == nullptr || value->get().empty()) {
+    if (value == nullptr || (value->get().empty() && !takes_empty)) {
       problem(key, shown(*as_node(element)),
               at_position(position, "must be a string that is not empty"));
     } else if (!is_good) {

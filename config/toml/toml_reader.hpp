@@ -103,8 +103,10 @@ class TomlTable {
                                                    std::int64_t high,
                                                    std::vector<std::int64_t> otherwise) const;
   [[nodiscard]] std::vector<std::string> texts(std::string_view key) const;
+  /// @param takes_empty  whether an element may be ""
   [[nodiscard]] std::vector<std::string> texts(std::string_view key,
-                                               std::vector<std::string> otherwise) const;
+                                               std::vector<std::string> otherwise,
+                                               bool takes_empty = false) const;
   /// Rows of finite numbers, shape (rows, columns); empty after a problem. Required.
   [[nodiscard]] std::vector<std::vector<double>> matrix(std::string_view key, std::size_t rows,
                                                         std::size_t columns) const;

@@ -260,6 +260,32 @@ class ChangeSearch {
         [&](const auto& other) { return other.size / steps[at].size < -0.5; });
   }
 
+  /// Whether the column itself leaps there: by half of the size within two rows, by far more than
+  /// in the rows around, and not on and on: a heater's ramp is as steep three rows away.
+  [[nodiscard]] bool is_sudden(const Judged& judged, const Target& target, std::size_t run,
+                               Index row, double size) const {
+    constexpr Index beside = 15;
+    constexpr double times_usual = 3.0;
+    const Index rows = judged.begins[run + 1] - judged.begins[run];
+    const auto value = [&](Index i) {
+      const Index at = judged.rows[static_cast<std::size_t>(judged.begins[run] + i)];
+      return target.output ? recording_.outputs_um(at, target.column)
+                           : recording_.temps_K(at, target.column);
+    };
+    const auto change = [&](Index i) {
+      return i < 1 || i > rows - 2 ? 0.0 : value(i + 1) - value(i - 1);
+    };
+    double leap = 0.0;
+    for (Index i = row - 1; i <= row + 1; ++i)
+      if (std::abs(change(i)) > std::abs(leap)) leap = change(i);
+    std::vector<double> others;
+    for (Index i = std::max<Index>(1, row - beside); i <= std::min(rows - 2, row + beside); ++i)
+      if (std::abs(i - row) > 2) others.push_back(std::abs(change(i)));
+    const double on_and_on = std::max(change(row - 3) / leap, change(row + 3) / leap);
+    return std::abs(leap) >= 0.5 * std::abs(size) && on_and_on < 1.0 / times_usual &&
+           (others.empty() || std::abs(leap) >= times_usual * median(std::move(others)));
+  }
+
   void look_for_step(const Judged& judged, const Target& target, std::size_t run) {
     const auto steps = judged.expectation.steps(run);
     const double wild = wildness(steps);
@@ -274,7 +300,9 @@ class ChangeSearch {
     for (const std::size_t i : order) {
       const auto row = static_cast<Index>(i);
       const Index at = judged.rows[static_cast<std::size_t>(judged.begins[run] + row)];
-      if (is_operated(at, run) || !stays(steps, i)) continue;
+      if (is_operated(at, run) || !stays(steps, i) ||
+          !is_sudden(judged, target, run, row, steps[i].size))
+        continue;
       offer(target, target.output ? "displacement_step" : "sensor_step", run,
             time_at(judged, run, row), steps[i].size, std::abs(steps[i].z) / wild);
       return;

@@ -185,7 +185,7 @@ TEST_CASE("what may mean two things is asked for, with the line to write", "[con
       {"thousands", "time_s;z [um]\n0;1.234,5\n", 2, "thousands ="},
       {"both signs", "time_s;z [um]\n0;1,25\n1;1.5\n", 2, "one decimal sign"},
       {"a group among commas", "time_s;z [um]\n0;1,25\n1;1.500\n", 3, "thousands = \".\""},
-      {"day or month", "Time;z [um]\n03/04/2026 08:00:00;1\n", 2,
+      {"day or month", "Time;z [um]\n03/04/2026 08:00:00;1\n04/05/2026 08:00:00;2\n", 2,
        "date_order = \"day.month.year\" or \"month.day.year\""},
       {"time without unit", "Time;z [um]\n0;1\n15;2\n", 1, "time_unit = \"s\""},
       {"hours or minutes", "Time;z [um]\n08:30;1\n08:31;2\n", 2,
@@ -193,10 +193,12 @@ TEST_CASE("what may mean two things is asked for, with the line to write", "[con
       {"two times", "Time [s];t [h];z [um]\n0;0;1\n", 1,
        "time = \"Time [s]\" and ignore = [\"t [h]\"]"},
       {"no time", "n [rpm];z [um]\n0;1\n", 1, "time = \"its name\""},
-      {"separator", "time_s;a,b [um]\n0;1,5\n", 1, "separator ="},
       {"a column of words", "time_s;z [um];note [-]\n0;1;cold\n", 2, "ignore = [\"note [-]\"]"},
-      {"the same name twice", "time_s;T [°C];T (C)\n0;1;2\n", 1, "[columns]"},
-      {"UTF-16", std::string("\xFF\xFEt\0i\0", 6), 0, "iconv -f UTF-16"},
+      {"no header", "0;20.5\n1;20.6\n", 1, "names = [\"time_s\", "},
+      {"words", "time_s;z [um]\n0;1\n1;cold\n2;warm\n", 3, "missing = [\"cold\", \"warm\"]"},
+      {"no table", "one line\nand another\n", 1, "no table that is known"},
+      {"XML", "<?xml version=\"1.0\"?>\n<a/>\n", 1, "is XML"},
+      {"an archive", "\x1F\x8B rest", 0, "gunzip"},
   };
   for (const Unclear& unclear : table) {
     INFO(unclear.what);
@@ -217,7 +219,8 @@ TEST_CASE("faults in a file of another form are told with their line", "[config]
       {"a day there is not", "Time;z [um]\n2026-02-28 08:00;1\n2026-02-30 08:00;2\n", 3,
        "calendar"},
       {"another form of time", "Time;z [um]\n2026-02-28 08:00;1\n8:15;2\n", 2, "must be a time"},
-      {"no header", "2026-02-28 08:00;1\n2026-02-28 08:01;2\n", 1, "header row"},
+      {"no header and no unit", "2026-02-28 08:00;4\n2026-02-28 08:01;5\n", 0, "has no unit"},
+      {"nothing but a time", "Zeit;Note\n2026-02-28 08:00;cold\n", 0, "no column of numbers"},
       {"no row", "Time [s];z [um]\n", 0, "no row"},
   };
   for (const Unclear& fault : table) {

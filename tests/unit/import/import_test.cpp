@@ -10,13 +10,21 @@
 //   probings.csv: what a spreadsheet of a German shop gives
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <random>
 #include <string>
+#include <unistd.h>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
-#include "cli/import/import_log.hpp"
+#include "cli/import/clock_shift.hpp"
 #include "cli/import/joined_runs.hpp"
+#include "config/run_forms/column_map.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/text/problems.hpp"
 
@@ -30,17 +38,28 @@ std::string log_file(const std::string& name) {
   return std::string(THERMOCOMP_LOGS) + "/" + name;
 }
 
-ImportedLog log_of(const std::string& name, const LogOptions& options = {}) {
-  return import_log(log_file(name), nullptr, options);
+struct LogOptions {
+  std::vector<std::string> names;
+  std::optional<double> period_s;
+};
+
+RunFile import_text(const std::string& text, const LogOptions& options = {}) {
+  ColumnMap map;
+  map.names = options.names;
+  map.period_s = options.period_s;
+  return parse_run(text, "log", {}, &map);
 }
 
 RunFile imported(const std::string& name, const LogOptions& options = {}) {
-  return log_of(name, options).run;
+  ColumnMap map;
+  map.names = options.names;
+  map.period_s = options.period_s;
+  return load_run({log_file(name)}, &map);
 }
 
 RunFile imported_with(const std::string& name, const std::string& map_text) {
   const ColumnMap map = parse_column_map(map_text, "map.toml");
-  return import_log(log_file(name), &map, {}).run;
+  return load_run({log_file(name)}, &map);
 }
 
 bool says(const RunFile& run, const std::string& part) {
@@ -83,13 +102,11 @@ TEST_CASE("halsampler says neither names nor period: the line to write is told",
 
 TEST_CASE("lost samples are a gap where they are numbered, else an error", "[import]") {
   const LogOptions one{{"z_mm"}, 0.5};
-  const RunFile run = import_text("7 1.5 \n8 1.6 \noverrun\n20 1.9 \n", "log", nullptr, one).run;
+  const RunFile run = import_text("7 1.5 \n8 1.6 \noverrun\n20 1.9 \n", one);
   CHECK(run.time_s() == std::vector<double>{0.0, 0.5, 6.5});
   CHECK(says(run, "lost: 1 times"));
-  CHECK_THROWS_WITH(import_text("1.5 \noverrun\n1.9 \n", "log", nullptr, one),
-                    Contains("halsampler -t"));
-  CHECK_THROWS_WITH(import_text("1 2 \n3 \n4 5 \n", "log", nullptr, one),
-                    Contains("log:2: 1 numbers"));
+  CHECK_THROWS_WITH(import_text("1.5 \noverrun\n1.9 \n", one), Contains("halsampler -t"));
+  CHECK_THROWS_WITH(import_text("1 2 \n3 \n4 5 \n", one), Contains("log:2: 1 numbers"));
 }
 
 TEST_CASE("Moonraker's temperature store: temperatures, targets, powers", "[import]") {
@@ -102,11 +119,9 @@ TEST_CASE("Moonraker's temperature store: temperatures, targets, powers", "[impo
   CHECK(run.column("extruder_power_percent")[2] == 100.0);
   CHECK(std::isnan(run.column("frame_degC")[2]));
   CHECK(says(run, "'temperature_sensor frame' temperatures is frame_degC"));
-  CHECK_THROWS_WITH(import_text(R"({"result": {"a": 1}})", "x", nullptr, {}),
-                    Contains("server/temperature_store"));
-  CHECK_THROWS_WITH(import_text(R"({"result": )", "x", nullptr, {}), Contains("must be JSON"));
-  CHECK_THROWS_WITH(import_text(R"({"a": {"temperatures": [1, 2]}, "b": {"temperatures": [1]}})",
-                                "x", nullptr, {}),
+  CHECK_THROWS_WITH(import_text(R"({"result": {"a": 1}})"), Contains("server/temperature_store"));
+  CHECK_THROWS_WITH(import_text(R"({"result": )"), Contains("must be JSON"));
+  CHECK_THROWS_WITH(import_text(R"({"a": {"temperatures": [1, 2]}, "b": {"temperatures": [1]}})"),
                     Contains("b.temperatures = 1 values: must be as many"));
 }
 
@@ -116,7 +131,7 @@ TEST_CASE("TOA5: names and units from their lines, record numbers left out", "[i
   CHECK(run.time_s() == std::vector<double>{0, 60, 120});
   CHECK(run.column("Head_Avg_degC")[1] == 22.4);
   CHECK(std::isnan(run.column("Bed_Avg_degC")[2]));
-  CHECK(says(run, "station 'mill_3'"));
+  CHECK(says(run, "mill_3"));
   CHECK(says(run, "'RECORD' left out"));
 }
 
@@ -133,15 +148,14 @@ TEST_CASE("TOA5: elements of an array keep their units, what has no value is mis
            "\"2012-06-07 12:45:00.05\",11,20.5,21.5,0\r\n"
            "\"2012-06-07 12:45:00.1\",12,\"INF\",\"NAN\",1\r\n";
   };
-  const RunFile run = import_text(written("-"), "x", nullptr, {}).run;
+  const RunFile run = import_text(written("-"));
   CHECK(run.columns == Columns{"time_s", "TC(1)_degC", "TC(2)_degC", "Flag(1)"});
   CHECK(run.time_s()[1] == Approx(0.05));
   CHECK(run.column("TC(2)_degC")[0] == 21.5);
   CHECK(std::isnan(run.column("TC(1)_degC")[1]));
   CHECK(std::isnan(run.column("TC(2)_degC")[1]));
-  CHECK(says(run, "INF, taken as missing: 1"));
-  CHECK_THROWS_WITH(import_text(written(""), "x", nullptr, {}),
-                    Contains("column 4 = Flag(1): has no unit"));
+  CHECK(says(run, "missing: 1 fields like 'INF'"));
+  CHECK_THROWS_WITH(import_text(written("")), Contains("column 5 = Flag(1): has no unit"));
 }
 
 TEST_CASE("KW Watcher: seven lines above the rows", "[import]") {
@@ -162,7 +176,7 @@ TEST_CASE("a log whose columns have no unit asks for the map's lines, and takes 
 }
 
 TEST_CASE("two files with dates are joined by them", "[import]") {
-  const RunFile run = joined_runs(log_of("kw_watcher.csv"), log_of("probings.csv"), {});
+  const RunFile run = joined_runs(imported("kw_watcher.csv"), imported("probings.csv"), {});
   CHECK(run.columns == Columns{"time_s", "bed_degC", "head_degC", "spindle_rpm", "z_um"});
   CHECK(run.time_s() == std::vector<double>{0, 20, 30, 45, 60, 1800});
   // Between two rows: temperatures on the line, the speed as it was before.
@@ -179,8 +193,8 @@ TEST_CASE("two files with dates are joined by them", "[import]") {
 }
 
 TEST_CASE("files without a common clock ask for the shift", "[import]") {
-  const ImportedLog store = log_of("temperature_store.json");
-  const ImportedLog probings = log_of("probings.csv");
+  const RunFile store = imported("temperature_store.json");
+  const RunFile probings = imported("probings.csv");
   CHECK_THROWS_WITH(joined_runs(store, probings, {}), Contains("write --shift-s S"));
   const RunFile run = joined_runs(store, probings, 1.5);
   CHECK(run.time_s()[2] == 1.5);
@@ -189,16 +203,97 @@ TEST_CASE("files without a common clock ask for the shift", "[import]") {
   CHECK_THROWS_WITH(joined_runs(probings, probings, 0.0), Contains("is a column of"));
 }
 
+namespace {
+
+/// A spindle warms up and cools, from `start_s` of the machine's time on, each `step_s`.
+RunFile seen_from(double start_s, double step_s, const std::string& column, double factor,
+                  bool with_event, unsigned seed) {
+  RunFile run;
+  run.name = column;
+  run.columns = {"time_s", column};
+  run.values.resize(2);
+  double temp_K = 0.0;
+  std::mt19937 chance(seed);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  for (double at_s = 0.0; at_s < 9000.0; at_s += 1.0) {
+    const bool runs = with_event && ((at_s > 3000 && at_s < 4500) || (at_s > 5000 && at_s < 5600));
+    temp_K += ((runs ? 8.0 : 0.0) - temp_K) / 400.0;
+    if (at_s < start_s || std::fmod(at_s - start_s, step_s) != 0.0) continue;
+    run.values[0].push_back(at_s - start_s);
+    run.values[1].push_back(20.0 + factor * (temp_K + noise(chance)));
+  }
+  run.selected_end = run.rows();
+  return run;
+}
+
+}  // namespace
+
+TEST_CASE("clocks without dates are joined by the event that both saw, or not at all", "[import]") {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const RunFile first = seen_from(0.0, 10.0, "bed_degC", 1.0, true, seed);
+    const RunFile second = seen_from(1500.0, 7.0, "z_um", -3.0, true, 100 + seed);
+    const auto shift = clock_shift(first, second);
+    REQUIRE(shift);
+    INFO(shift->correlation << " next " << shift->next << " at " << shift->shift_s);
+    CHECK(shift->is_sure());
+    CHECK(shift->shift_s == Approx(1500.0).margin(15.0));
+    CHECK(says(joined_runs(first, second, {}), "'bed_degC' and 'z_um' change alike"));
+    // Noise alone, and an event that only one saw, say nothing.
+    const RunFile calm = seen_from(1500.0, 7.0, "z_um", 1.0, false, 200 + seed);
+    CHECK(!clock_shift(first, calm)->is_sure());
+    CHECK_THROWS_WITH(joined_runs(first, calm, {}), Contains("which is not sure"));
+  }
+}
+
 TEST_CASE("an export's comment says its clock", "[import]") {
-  const ImportedLog log =
-      import_text("# 0.000 s: wall time 2026-03-02T07:00:00.000Z\ntime_s,t1_degC\n0,20\n60,21\n",
-                  "run.csv", nullptr, {});
+  const RunFile log = import_text(
+      "# 0.000 s: wall time 2026-03-02T07:00:00.000Z\ntime_s,t1_degC\n0,20\n60,21\n", {});
   REQUIRE(log.wall_zero);
   CHECK(log.wall_zero->is_utc);
-  CHECK_THROWS_WITH(joined_runs(log, log_of("probings.csv"), {}), Contains("time zone"));
+  CHECK_THROWS_WITH(joined_runs(log, imported("probings.csv"), {}), Contains("time zone"));
+}
+
+TEST_CASE("a folder a form: what a program writes becomes the run that is expected", "[import]") {
+  namespace fs = std::filesystem;
+  std::size_t folders = 0;
+  for (const auto& folder : fs::directory_iterator(THERMOCOMP_FORMS)) {
+    INFO(folder.path().string());
+    ++folders;
+    ColumnMap map;
+    if (fs::exists(folder.path() / "columns.toml"))
+      map = load_column_map(folder.path() / "columns.toml");
+    map.takes_signals = true;
+    fs::path input;
+    for (const auto& file : fs::directory_iterator(folder.path()))
+      if (file.path().stem() == "in") input = file.path();
+    std::string text;
+    try {
+      const RunFile run = load_run({input}, &map);
+      text = (run.wall_zero ? wall_zero_comment(*run.wall_zero) : "") + write_run(run);
+    } catch (const ConfigurationError& error) {
+      text = error.what();
+    }
+    std::ifstream expected(folder.path() / "expected.csv");
+    const std::string wanted((std::istreambuf_iterator<char>(expected)), {});
+    CHECK(text == wanted);
+  }
+  CHECK(folders >= 25);
+}
+
+TEST_CASE("a workbook is read by xlsx2csv, or the error says how", "[import]") {
+  const std::string file =
+      (std::filesystem::temp_directory_path() / ("book" + std::to_string(getpid()) + ".xlsx"))
+          .string();
+  std::ofstream(file) << "PK\x03\x04 and no sheet";
+  const std::string path = std::getenv("PATH");
+  CHECK_THROWS_WITH(load_run({file}), Contains("save the sheet as CSV"));
+  setenv("PATH", "/nowhere", 1);
+  CHECK_THROWS_WITH(load_run({file}), Contains("apt install xlsx2csv"));
+  setenv("PATH", path.c_str(), 1);
+  std::filesystem::remove(file);
 }
 
 TEST_CASE("options that a log has no use for are refused", "[import]") {
-  CHECK_THROWS_WITH(imported("kw_watcher.csv", {{"a"}, {}}), Contains("--names"));
-  CHECK_THROWS_WITH(imported("kw_watcher.csv", {{}, 2.0}), Contains("--period-s"));
+  CHECK_THROWS_WITH(imported("kw_watcher.csv", {{"a"}, {}}), Contains("names"));
+  CHECK_THROWS_WITH(imported("kw_watcher.csv", {{}, 2.0}), Contains("period_s"));
 }

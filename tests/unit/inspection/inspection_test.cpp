@@ -97,6 +97,24 @@ TEST_CASE("a reading that jumps is named with its time and size, and its neighbo
         Approx(run.column("t3_degC")[500] - 2.0).margin(0.1));
 }
 
+TEST_CASE("a heater that is switched on and off is a ramp, no step of a sensor", "[inspection]") {
+  // No signal says when: the bed warms by 4 K in a row for six rows, holds, and cools.
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    RunFile run = recording(seed);
+    std::vector<double>& bed = column(run, "t3_degC");
+    double warm = 0.0;
+    for (std::size_t row = 0; row < rows; ++row) {
+      if (row >= 200 && row < 206) warm += 4.0;
+      if (row >= 420) warm *= 0.97;
+      bed[row] += warm;
+      column(run, "t4_degC")[row] += 0.05 * warm;
+    }
+    const Inspection inspection = inspect({run});
+    INFO(inspection_text(inspection));
+    CHECK(find(inspection, "sensor_step") == nullptr);
+  }
+}
+
 TEST_CASE("the likeliest creep is that of the reading that creeps", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 0; row < rows; ++row)

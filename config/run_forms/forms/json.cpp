@@ -1,0 +1,242 @@
+#include <algorithm>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "config/run_forms/field_text.hpp"
+#include "config/run_forms/log_form.hpp"
+#include "config/run_forms/spelled_unit.hpp"
+#include "config/run_forms/time_stamp.hpp"
+#include "config/text/number_text.hpp"
+#include "config/text/outer_json.hpp"
+
+namespace thermocomp::forms {
+namespace {
+
+using nlohmann::json;
+
+// A list of values as `import` takes it: as long as a run file of text.
+constexpr JsonLimits limits{16, 8'000'000, std::size_t{64} << 20};
+
+json parsed(const Log& log, std::string_view text, int line) {
+  try {
+    return parse_outer_json(text, limits);
+  } catch (const JsonError& error) {
+    log.refuse(line, "", "(no JSON)", error.what());
+  }
+}
+
+// ---- Moonraker's temperature store
+
+/// "temperature_sensor chamber" is called chamber, unless two would be called so.
+std::map<std::string, std::string> short_names(const json& store) {
+  std::map<std::string, std::string> names;
+  const auto last_word = [](const std::string& full) {
+    const std::size_t blank = full.rfind(' ');
+    return blank == std::string::npos ? full : full.substr(blank + 1);
+  };
+  for (const auto& [full, object] : store.items()) {
+    int same = 0;
+    for (const auto& [other, ignored] : store.items())
+      if (last_word(other) == last_word(full)) ++same;
+    names[full] = plain_name(same == 1 ? last_word(full) : full);
+  }
+  return names;
+}
+
+struct Series {
+  const char* key;
+  const char* end;
+  double factor;
+  const char* said;
+};
+constexpr Series series[] = {{"temperatures", "_degC", 1.0, ""},
+                             {"targets", "_target", 1.0, ", a signal: what the heater was set to"},
+                             {"powers", "_power_percent", 100.0, ", times 100"},
+                             {"speeds", "_speed_percent", 100.0, ", times 100"}};
+
+struct NamedValues {
+  std::string name;
+  std::vector<std::string> values;
+};
+
+void add_series(const Log& log, const std::string& full, const std::string& plain,
+                const json& object, std::vector<NamedValues>& columns, PlainTable& table) {
+  for (const Series& one : series) {
+    const auto found = object.find(one.key);
+    if (found == object.end()) continue;
+    const std::string key = full + "." + one.key;
+    if (!found->is_array()) log.refuse(0, key, found->type_name(), "must be a list of numbers");
+    NamedValues column{plain + one.end, {}};
+    for (const json& value : *found) {
+      if (!value.is_number() && !value.is_null())
+        log.refuse(0, key, value.dump(), "must be a number or null");
+      column.values.push_back(value.is_null() ? "" : number_text(one.factor * value.get<double>()));
+    }
+    if (!columns.empty() && column.values.size() != columns.front().values.size())
+      log.refuse(
+          0, key, std::to_string(column.values.size()) + " values",
+          "must be as many as the others have, " + std::to_string(columns.front().values.size()));
+    table.said.push_back("'" + full + "' " + one.key + " is " + column.name + one.said);
+    columns.push_back(std::move(column));
+  }
+}
+
+bool is_store(const json& store) {
+  return store.is_object() && std::any_of(store.begin(), store.end(), [](const json& object) {
+           return object.is_object() && object.contains("temperatures");
+         });
+}
+
+PlainTable plain_store(const Log& log, const json& store) {
+  PlainTable table;
+  table.has_own_names = true;
+  const double period_s = log.map.period_s.value_or(1.0);
+  table.said.push_back("temperature store of Moonraker, a row each " + number_text(period_s) +
+                       " s" + (log.map.period_s ? "" : " (its own period)") +
+                       "; it has no time of day");
+  std::vector<NamedValues> columns;
+  const auto names = short_names(store);
+  for (const auto& [full, object] : store.items())
+    if (object.is_object()) add_series(log, full, names.at(full), object, columns, table);
+  table.text = "time_s";
+  for (const NamedValues& column : columns) table.text.append(",").append(column.name);
+  for (std::size_t row = 0; row < columns.front().values.size(); ++row) {
+    table.text.append("\n").append(number_text(static_cast<double>(row) * period_s));
+    for (const NamedValues& column : columns) table.text.append(",").append(column.values[row]);
+  }
+  table.text += '\n';
+  return table;
+}
+
+// ---- records
+
+class Records {
+ public:
+  /// @param time  beside the record; empty: it is one of its values
+  void add(const json& record, const std::string& time = {}) {
+    std::map<std::size_t, std::string> row;
+    if (!time.empty()) row[column("time")] = time;
+    add_values(record, "", row);
+    if (!row.empty()) rows_.push_back(std::move(row));
+  }
+
+  [[nodiscard]] bool empty() const { return rows_.empty(); }
+
+  [[nodiscard]] std::string text() const {
+    std::string text;
+    for (std::size_t i = 0; i < names_.size(); ++i)
+      text.append(i > 0 ? "," : "").append(in_quotes(names_[i]));
+    for (const auto& row : rows_) {
+      text += '\n';
+      for (std::size_t i = 0; i < names_.size(); ++i) {
+        const auto found = row.find(i);
+        if (i > 0) text += ',';
+        if (found != row.end()) text += found->second;
+      }
+    }
+    return text + '\n';
+  }
+
+ private:
+  std::size_t column(const std::string& name) {
+    const auto [found, is_new] = index_.emplace(name, names_.size());
+    if (is_new) names_.push_back(name);
+    return found->second;
+  }
+
+  void add_values(const json& record, const std::string& before,
+                  std::map<std::size_t, std::string>& row) {
+    for (const auto& [key, value] : record.items()) {
+      const std::string name = before + key;
+      if (value.is_object()) {
+        add_values(value, name + ".", row);
+      } else if (value.is_number() || value.is_boolean()) {
+        row[column(name)] = value.is_number_float() ? number_text(value.get<double>())
+                            : value.is_boolean()    ? (value.get<bool>() ? "1" : "0")
+                                                    : value.dump();
+      } else if (value.is_string()) {
+        row[column(name)] = in_quotes(value.get<std::string>());
+      }
+    }
+  }
+
+  std::vector<std::string> names_;
+  std::map<std::string, std::size_t> index_;
+  std::vector<std::map<std::size_t, std::string>> rows_;
+};
+
+/// Records in lists, or under their times.
+void collect(const json& value, int depth, Records& records) {
+  constexpr int depth_max = 5;
+  if (depth > depth_max) return;
+  if (value.is_array()) {
+    for (const json& each : value) {
+      if (each.is_object())
+        records.add(each);
+      else
+        collect(each, depth + 1, records);
+    }
+  } else if (value.is_object()) {
+    for (const auto& [key, each] : value.items()) {
+      if (each.is_object() && parse_time_stamp(key))
+        records.add(each, in_quotes(key));
+      else
+        collect(each, depth + 1, records);
+    }
+  }
+}
+
+PlainTable plain_lines(const Log& log) {
+  Records records;
+  std::string_view rest = log.text;
+  for (int line = 1; !rest.empty(); ++line) {
+    const std::string_view text = trimmed(take_line(rest));
+    if (text.empty()) continue;
+    const json record = parsed(log, text, line);
+    if (!record.is_object()) log.refuse(line, "", "(other JSON)", "must be an object, {...}");
+    records.add(record);
+  }
+  PlainTable table;
+  table.text = records.text();
+  table.lines_above = -1;
+  table.said.emplace_back("JSON, a record a line; what a record does not have is missing");
+  return table;
+}
+
+}  // namespace
+
+bool is_json(std::string_view text) {
+  const std::string_view first = trimmed(text.substr(0, text.find('\n')));
+  if (first.starts_with('{')) return true;
+  // "[INFO]" begins a line of another log.
+  const auto next = text.find_first_not_of(" \t\r\n[");
+  return first.starts_with('[') && next != std::string_view::npos && text[next] == '{';
+}
+
+PlainTable plain_json(const Log& log) {
+  std::string_view rest = log.text;
+  const std::string_view first = trimmed(take_line(rest));
+  const bool is_lines = first.starts_with('{') && first.ends_with('}') &&
+                        rest.find_first_not_of(" \t\r\n") != std::string_view::npos;
+  if (is_lines) return plain_lines(log);
+  json document = parsed(log, log.text, 0);
+  if (document.is_object() && document.contains("result")) {
+    json result = document["result"];
+    document = std::move(result);
+  }
+  if (is_store(document)) return plain_store(log, document);
+  Records records;
+  collect(document, 0, records);
+  if (records.empty())
+    log.refuse(0, "", "(other JSON)",
+               "must be records (a line each, a list, or each under its time) or the answer of "
+               "Moonraker's server/temperature_store, a list \"temperatures\" for each heater and "
+               "sensor");
+  PlainTable table;
+  table.text = records.text();
+  table.said.emplace_back("JSON, a row a record; what a record does not have is missing");
+  return table;
+}
+
+}  // namespace thermocomp::forms

@@ -1,0 +1,90 @@
+#include <algorithm>
+
+#include "config/run_forms/field_text.hpp"
+#include "config/run_forms/log_form.hpp"
+#include "config/run_forms/number_form.hpp"
+#include "config/text/number_text.hpp"
+
+namespace thermocomp::forms {
+namespace {
+
+char separator_of(std::string_view text) {
+  const auto at = text.find("SampleTime[ms]");
+  const std::string_view behind = text.substr(std::min(at + 14, text.size()));
+  return behind.empty() || behind.front() == '"' ? '\t' : behind.front();
+}
+
+/// 100 ns since 1601 as ms since 1970.
+std::string start_ms(const std::string& filetime) {
+  const auto ticks = finite_number(filetime);
+  if (!ticks || !(*ticks > 1.2e17 && *ticks < 1.5e17)) return {};
+  return number_text(*ticks * 1e-4 - 11644473600000.0);
+}
+
+}  // namespace
+
+bool is_twincat(std::string_view text) {
+  return text.substr(0, 20000).find("SampleTime[ms]") != std::string_view::npos;
+}
+
+PlainTable plain_twincat(const Log& log) {
+  const char separator = separator_of(log.text);
+  std::string_view rest = log.text;
+  std::vector<std::string> names;
+  std::vector<std::string> units;
+  std::string start;
+  std::string_view rows;
+  int line = 0;
+  for (std::string_view before = rest; !rest.empty(); before = rest) {
+    ++line;
+    const std::vector<std::string> fields = fields_of(take_line(rest), separator);
+    std::string key = fields[0];
+    if (key.starts_with("Start") && fields.size() > 1 && start.empty()) start = start_ms(fields[1]);
+    if (key == "Name" && fields.size() >= names.size()) names = fields;
+    if (key == "Unit") units = fields;
+    if (!looks_like_number(key) || fields.size() < 2) continue;
+    rows = before;
+    break;
+  }
+  if (rows.empty() || names.size() < 2)
+    log.refuse(line, "Name", "(missing)", "must name the channels of TwinCAT's scope");
+  // A column called Name is one of times; the channels behind it count by these.
+  std::vector<std::string> series;
+  PlainTable table;
+  const bool many_times = std::count(names.begin(), names.end(), "Name") > 1;
+  units.resize(names.size());
+  if (!many_times) {
+    table.text = "\"time [ms]\"";
+    for (std::size_t i = 1; i < names.size(); ++i)
+      table.text.append(";").append(with_unit(names[i], units[i].starts_with('(') ? "" : units[i]));
+  } else {
+    table.text = "time [ms];series;value";
+  }
+  const double zero_ms = finite_number(start).value_or(0.0);
+  table.lines_above = line - 2;
+  while (!rows.empty()) {
+    const std::vector<std::string> fields = fields_of(take_line(rows), separator);
+    if (fields.size() < 2) continue;  // "EOF"
+    std::string time;
+    for (std::size_t i = 0; i < std::min(fields.size(), names.size()); ++i) {
+      std::string field = fields[i];
+      std::replace(field.begin(), field.end(), ',', '.');
+      if (names[i] == "Name") {
+        const auto at = finite_number(field);
+        time = at ? number_text(*at < 1e15 ? *at + zero_ms : *at * 1e-4 - 11644473600000.0) : "";
+        if (!many_times) table.text.append("\n").append(time);
+      } else if (!many_times) {
+        table.text.append(";").append(field);
+      } else if (!field.empty() && !time.empty()) {
+        table.text.append("\n").append(time).append(";");
+        table.text.append(with_unit(names[i], units[i].starts_with('(') ? "" : units[i]));
+        table.text.append(";").append(field);
+      }
+    }
+  }
+  table.text += '\n';
+  table.said.emplace_back("scope of TwinCAT: the channels' names in the line \"Name\"");
+  return table;
+}
+
+}  // namespace thermocomp::forms

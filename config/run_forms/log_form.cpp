@@ -1,0 +1,82 @@
+#include "config/run_forms/log_form.hpp"
+
+#include "config/run_forms/field_text.hpp"
+#include "config/run_forms/spelled_unit.hpp"
+#include "config/text/problems.hpp"
+
+namespace thermocomp {
+namespace {
+
+struct Form {
+  bool (*is)(std::string_view text);
+  PlainTable (*plain)(const forms::Log& log);
+};
+/// The first that knows the text takes it.
+constexpr Form known_forms[] = {
+    {forms::is_json, forms::plain_json},        {forms::is_halscope, forms::plain_halscope},
+    {forms::is_lvm, forms::plain_lvm},          {forms::is_kw_watcher, forms::plain_kw_watcher},
+    {forms::is_twincat, forms::plain_twincat},  {forms::is_halsampler, forms::plain_halsampler},
+    {forms::is_labelled, forms::plain_labelled}};
+
+}  // namespace
+
+std::optional<PlainTable> plain_table(std::string_view text, const std::string& name,
+                                      const ColumnMap* map) {
+  const ColumnMap none;
+  const forms::Log log{text, name, map == nullptr ? none : *map};
+  if (trimmed(text.substr(0, 100)).starts_with('<'))
+    log.refuse(1, "", shortened(text.substr(0, text.find('\n'))),
+               "is XML, no table that is known here; write its values as CSV or JSON lines");
+  for (const Form& form : known_forms)
+    if (form.is(text)) return form.plain(log);
+  return std::nullopt;
+}
+
+namespace forms {
+
+void Log::refuse(int line, const std::string& key, const std::string& value,
+                 std::string rule) const {
+  throw ConfigurationError({Problem{name, line, key, value, std::move(rule)}});
+}
+
+std::string_view take_line(std::string_view& text) {
+  std::string_view line;
+  static_cast<void>(take(text, '\n', line));
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return line;
+}
+
+std::vector<std::string> fields_of(std::string_view line, char separator) {
+  std::vector<std::string> fields;
+  std::string field;
+  bool is_quoted = false;
+  for (const char c : line) {
+    if (c == '"') {
+      is_quoted = !is_quoted;
+    } else if (c == separator && !is_quoted) {
+      fields.emplace_back(trimmed(field));
+      field.clear();
+    } else {
+      field += c;
+    }
+  }
+  fields.emplace_back(trimmed(field));
+  return fields;
+}
+
+std::string in_quotes(std::string_view field) {
+  std::string text = "\"";
+  for (const char c : field) text += c == '"' || c == '\n' || c == '\r' ? '\'' : c;
+  return text + '"';
+}
+
+std::string with_unit(std::string_view name, std::string_view unit) {
+  std::string header(name);
+  if (!unit.empty() && spelled_name(header).known == nullptr)
+    header.append(" [").append(unit).append("]");
+  return in_quotes(header);
+}
+
+}  // namespace forms
+
+}  // namespace thermocomp

@@ -1,0 +1,202 @@
+#include "config/run_forms/long_table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+namespace thermocomp {
+namespace {
+
+constexpr auto value_names = std::to_array<std::string_view>(
+    {"value", "_value", "state", "val", "wert", "reading", "mean", "messwert"});
+constexpr auto unit_names =
+    std::to_array<std::string_view>({"unit", "units", "einheit", "unit_of_measurement", "uom"});
+constexpr std::size_t series_max = 1024;
+
+template <std::size_t N>
+bool is_one_of(const std::array<std::string_view, N>& names, std::string_view header) {
+  std::string small(header);
+  for (char& c : small) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return std::find(names.begin(), names.end(), small) != names.end();
+}
+
+struct ColumnContent {
+  bool numbers{false};  ///< most are
+  bool complete{true};  ///< no field is empty
+  std::size_t distinct{0};
+};
+
+ColumnContent content(const TextTable& table, std::size_t column) {
+  ColumnContent content;
+  std::set<std::string_view> distinct;
+  std::size_t numbers = 0;
+  std::size_t filled = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string_view field = table.field(row, column);
+    content.complete = content.complete && !field.empty();
+    if (!field.empty()) ++filled;
+    if (looks_like_number(field)) ++numbers;
+    if (distinct.size() <= series_max) distinct.insert(field);
+  }
+  content.numbers = 2 * numbers > filled;
+  content.distinct = distinct.size();
+  return content;
+}
+
+std::string series_of(const TextTable& table, std::size_t row, const LongForm& form) {
+  std::string name;
+  for (const std::size_t column : form.names) {
+    if (!name.empty()) name += ' ';
+    name += table.field(row, column);
+  }
+  return name;
+}
+
+bool increases(const std::vector<double>& time_s) {
+  return std::adjacent_find(time_s.begin(), time_s.end(), std::greater_equal<>()) == time_s.end();
+}
+
+bool decreases(const std::vector<double>& time_s) {
+  return std::adjacent_find(time_s.begin(), time_s.end(), std::less_equal<>()) == time_s.end();
+}
+
+std::optional<LongForm> told_form(const TextTable& table, const ColumnMap& map,
+                                  const std::vector<std::size_t>& numbers, ProblemList& problems) {
+  LongForm form;
+  std::vector<std::size_t> columns;
+  for (const std::string& name : map.pivot) {
+    const auto found = std::find(table.header.begin(), table.header.end(), name);
+    if (found == table.header.end()) {
+      problems.add({map.file, 0, "pivot", name, "must be a column of the run file"});
+      return std::nullopt;
+    }
+    columns.push_back(static_cast<std::size_t>(found - table.header.begin()));
+  }
+  form.names.assign(1, columns[0]);
+  if (columns.size() == 1 && numbers.size() != 1) {
+    problems.add({map.file, 0, "pivot", map.pivot[0],
+                  "must name the column of the values too: pivot = [" + toml_text(map.pivot[0]) +
+                      ", \"its name\"]"});
+    return std::nullopt;
+  }
+  form.value = columns.size() == 2 ? columns[1] : numbers[0];
+  return form;
+}
+
+/// Of several columns of words the fewest that leave no time twice in a series.
+void keep_needed_names(const TextTable& table, const std::vector<double>& time_s, LongForm& form) {
+  const auto is_clear = [&](const LongForm& tried) {
+    std::set<std::pair<std::string, double>> seen;
+    for (std::size_t row = 0; row < table.rows(); ++row)
+      if (!seen.emplace(series_of(table, row, tried), time_s[row]).second) return false;
+    return true;
+  };
+  for (const std::size_t column : form.names) {
+    LongForm tried = form;
+    tried.names.assign(1, column);
+    if (!is_clear(tried)) continue;
+    form = tried;
+    return;
+  }
+}
+
+}  // namespace
+
+std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& time,
+                                  const std::vector<double>& time_s, const ColumnMap* map,
+                                  ProblemList& problems) {
+  LongForm form;
+  std::vector<std::size_t> numbers;
+  std::vector<std::size_t> values;
+  for (std::size_t i = 0; i < table.columns(); ++i) {
+    if (time.has(i)) continue;
+    const ColumnContent here = content(table, i);
+    const bool named_value = is_one_of(value_names, table.header[i]);
+    if (named_value) values.push_back(i);
+    if (is_one_of(unit_names, table.header[i])) {
+      form.unit = i;
+    } else if (here.numbers || named_value) {
+      // A number for each series, as InfluxDB's "table", is no value.
+      if (here.distinct > 1 || named_value) numbers.push_back(i);
+    } else if (here.complete && here.distinct > 1 && 2 * here.distinct <= table.rows() &&
+               here.distinct <= series_max) {
+      form.names.push_back(i);
+    }
+  }
+  if (map != nullptr && !map->pivot.empty()) {
+    auto told = told_form(table, *map, values.size() == 1 ? values : numbers, problems);
+    if (told) told->unit = form.unit;
+    return told;
+  }
+  // One series alone has one name throughout.
+  if (form.names.empty() && values.size() == 1) {
+    for (std::size_t i = 0; i < table.columns(); ++i) {
+      if (time.has(i) || i == values[0] || i == form.unit) continue;
+      const ColumnContent here = content(table, i);
+      if (!here.numbers && here.complete && here.distinct == 1) form.names.push_back(i);
+    }
+    while (form.names.size() > 1) form.names.pop_back();
+  }
+  if (form.names.empty()) return std::nullopt;
+  if (values.size() == 1)
+    form.value = values[0];
+  else if (numbers.size() == 1 && !increases(time_s) && !decreases(time_s))
+    form.value = numbers[0];
+  else
+    return std::nullopt;
+  keep_needed_names(table, time_s, form);
+  return form;
+}
+
+std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm& form,
+                  ProblemList& problems) {
+  std::map<double, std::size_t> row_of;
+  for (const double at : time_s) row_of.emplace(at, 0);
+  std::vector<double> times;
+  for (auto& [at, row] : row_of) {
+    row = times.size();
+    times.push_back(at);
+  }
+  std::map<std::string, std::size_t> column_of;
+  TextTable wide;
+  std::vector<std::vector<std::string_view>> columns;
+  wide.lines.assign(times.size(), 0);
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string series = series_of(table, row, form);
+    const auto [found, is_new] = column_of.emplace(series, columns.size());
+    if (is_new && columns.size() < series_max) {
+      columns.emplace_back(times.size());
+      wide.header.push_back(series);
+      wide.units.emplace_back(form.unit ? table.field(row, *form.unit) : std::string_view());
+    } else if (is_new) {
+      problems.add(table.lines[row], table.header[form.names[0]], series,
+                   "must be one of at most " + std::to_string(series_max) + " series");
+      return {};
+    }
+    const std::size_t at = row_of.at(time_s[row]);
+    std::string_view& cell = columns[found->second][at];
+    const std::string_view value = table.field(row, form.value);
+    if (!cell.empty() && cell != value)
+      problems.add(
+          table.lines[row], series, value,
+          "must be there once at a time; an earlier row of that time has " + shortened(cell));
+    cell = value;
+    if (wide.lines[at] == 0) wide.lines[at] = table.lines[row];
+  }
+  std::string said = "a row per value: '" + table.header[form.names[0]] + "'";
+  for (std::size_t i = 1; i < form.names.size(); ++i)
+    said += " and '" + table.header[form.names[i]] + "'";
+  said += " names the series, '" + table.header[form.value] + "' is the value; " +
+          std::to_string(columns.size()) + " columns";
+  table.header = std::move(wide.header);
+  table.units = std::move(wide.units);
+  table.lines = std::move(wide.lines);
+  table.fields.clear();
+  for (std::size_t row = 0; row < times.size(); ++row)
+    for (const auto& column : columns) table.fields.push_back(column[row]);
+  time_s = std::move(times);
+  return said;
+}
+
+}  // namespace thermocomp

@@ -1,0 +1,32 @@
+/// Tables of one row per value, with the name of the series beside it: Grafana, Home Assistant,
+/// InfluxDB, historians.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/run_forms/time_column.hpp"
+
+namespace thermocomp {
+
+struct LongForm {
+  std::vector<std::size_t> names;  ///< columns whose words together name the series
+  std::size_t value{0};
+  std::optional<std::size_t> unit;
+};
+
+/// What `pivot` of the map says; else a column of numbers called value, or one whose times repeat
+/// or go back, beside columns of words that recur.
+/// @param time_s  of each row
+/// @return nullopt when the table is a wide one
+[[nodiscard]] std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& time,
+                                                const std::vector<double>& time_s,
+                                                const ColumnMap* map, ProblemList& problems);
+
+/// A column a series, a row a time; what a series does not have at that time is empty.
+/// @return what was done
+std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm& form,
+                  ProblemList& problems);
+
+}  // namespace thermocomp

@@ -1,0 +1,21 @@
+/// The text in the bytes of a log.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace thermocomp {
+
+struct RunText {
+  std::string text;  ///< UTF-8, without a byte order mark
+  bool from_latin1{false};
+};
+
+/// UTF-8, UTF-16 with a byte order mark, else Latin-1.
+/// @throws ConfigurationError when the bytes are no text (a workbook, an archive, a database)
+[[nodiscard]] RunText run_text(std::string_view bytes, const std::string& name);
+
+/// Whether bytes are an Excel workbook, or another archive of that kind.
+[[nodiscard]] bool is_workbook(std::string_view bytes);
+
+}  // namespace thermocomp
