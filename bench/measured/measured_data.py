@@ -107,8 +107,30 @@ def mirror(folder):
     return [Split("mirror_nights", [first], [second], ["m2_focus_um"])]
 
 
+def probes(folder):
+    """Inductive probes on one machine: another kind, the same covered, and the end of each run."""
+    runs = {path.stem: Run(path.stem, read(path))
+            for path in sorted((folder / "probe_drift").glob("*.csv"))}
+    pairs = (("superpinda", "superpinda_covered"), ("superpinda_fysetc", "superpinda_fysetc_covered"),
+             ("GX_H8A", "N3F_H4NB"), ("superpinda", "superpinda_fysetc"))
+    splits = [Split(f"probe_{a}_{b}", [runs[a]], [runs[b]], ["z_um"]) for a, b in pairs]
+    for name, run in runs.items():
+        time_s = run.columns["time_s"]
+        at_s = time_s[0] + 0.6 * (time_s[-1] - time_s[0])
+        splits.append(Split(f"probe_{name}_60_40", [run.selected(-np.inf, at_s)],
+                            [run.selected(at_s, np.inf)], ["z_um"]))
+    return splits
+
+
+def printer_other(folder):
+    run = Run("printer_other", read(folder / "printer_other" / "run_2021-06-12.csv"))
+    return [Split("printer_other_13000", [run.selected(-np.inf, 13000.0)],
+                  [run.selected(13000.0, np.inf)], ["z_um"])]
+
+
 def all_splits(folder):
-    splits = spindle(folder) + printer(folder) + telescope(folder) + cell(folder) + mirror(folder)
+    splits = (spindle(folder) + printer(folder) + telescope(folder) + cell(folder) +
+              mirror(folder) + probes(folder) + printer_other(folder))
     return [split.of_common_columns() for split in splits]
 
 

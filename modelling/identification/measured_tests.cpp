@@ -9,6 +9,7 @@
 #include "config/runs/run_overlap.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
+#include "modelling/blunders/blunders.hpp"
 #include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {
@@ -271,7 +272,11 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
   MeasuredTests tests;
   refuse_overlap(given);
   std::vector<RunFile> runs = given;
-  for (RunFile& run : runs) leave_out_spikes(run, tests.notes);
+  for (RunFile& run : runs) {
+    leave_out_spikes(run, tests.notes);
+    for (const Blunders& each : leave_out_blunders(run, options.outputs))
+      tests.notes.push_back(run.name + ": " + each.text());
+  }
   for (const std::string& name : options.places)
     if (!is_temperature(name)) refuse("", name, "must be a temperature (*_degC, *_K)");
   for (const std::string& name : options.outputs)

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
+#include "modelling/blunders/blunders.hpp"
 #include "modelling/thermal_test/axis_binding.hpp"
 
 namespace thermocomp::thermal_test {
@@ -225,8 +227,13 @@ std::string to_string(TestKind kind) {
   return kind == TestKind::spindle ? "spindle" : "axis";
 }
 
-TestData test_data(const RunFile& run, const TestOptions& options) {
+TestData test_data(const RunFile& given, const TestOptions& options) {
   TestData data;
+  RunFile run = given;
+  std::vector<std::string> outputs;
+  std::copy_if(run.columns.begin(), run.columns.end(), std::back_inserter(outputs),
+               [](const std::string& column) { return is_output(column); });
+  for (const Blunders& each : leave_out_blunders(run, outputs)) data.said.push_back(each.text());
   data.kind = options.kind;
   data.file = run.name;
   data.phases.from_s = run.time_s()[run.selected_begin];

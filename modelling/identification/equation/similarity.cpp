@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include <Eigen/Cholesky>
+
 namespace thermocomp::identification {
 namespace {
 
@@ -56,6 +58,27 @@ Eigen::VectorXd mean_squares(const MeasuredTests& tests) {
   return sum / static_cast<double>(tests.rows());
 }
 
+/// Of each place's second differences the part that the other places do not have: rows ten minutes
+/// apart hold motion, which neighbours share, and noise, which they do not. A place that moves as
+/// no other keeps motion in its part; sensors are alike, so it gets at most twice the usual one.
+/// @param products  of the places' second differences, summed over `count` rows
+Eigen::VectorXd own_parts(const Eigen::MatrixXd& products, double count) {
+  const Eigen::VectorXd whole = products.diagonal();
+  const auto places = static_cast<double>(whole.size());
+  if (count < 3.0 * places || !(whole.minCoeff() > 0)) return whole;
+  const Eigen::VectorXd size = whole.cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd correlation = size.asDiagonal() * products * size.asDiagonal();
+  correlation.diagonal().array() += 1e-9;
+  // 1 / (R^-1)_ii is the share of column i that the other columns do not explain.
+  const Eigen::MatrixXd inverse =
+      correlation.ldlt().solve(Eigen::MatrixXd::Identity(correlation.rows(), correlation.cols()));
+  Eigen::VectorXd own = whole.cwiseQuotient(inverse.diagonal()) * (count / (count - places + 1.0));
+  std::vector<double> sorted(own.begin(), own.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return own.cwiseMin(4.0 * *middle);
+}
+
 }  // namespace
 
 Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative, LargestOver over) {
@@ -96,21 +119,21 @@ Eigen::MatrixXd similarity(const MeasuredTests& tests, bool relative, LargestOve
 
 Eigen::MatrixXd noise_floor(const MeasuredTests& tests) {
   const auto places = static_cast<Eigen::Index>(tests.places.size());
-  Eigen::VectorXd noise = Eigen::VectorXd::Zero(places);
+  Eigen::MatrixXd second = Eigen::MatrixXd::Zero(places, places);  // products of second differences
   double count = 0.0;
   for (const TestRun& run : tests.runs) {
     const Eigen::Index rows = run.places_K.rows();
     if (rows < 3) continue;
-    const Eigen::MatrixXd second = run.places_K.topRows(rows - 2) -
-                                   2.0 * run.places_K.middleRows(1, rows - 2) +
-                                   run.places_K.bottomRows(rows - 2);
-    noise += second.colwise().squaredNorm();
+    const Eigen::MatrixXd each = run.places_K.topRows(rows - 2) -
+                                 2.0 * run.places_K.middleRows(1, rows - 2) +
+                                 run.places_K.bottomRows(rows - 2);
+    second.noalias() += each.transpose() * each;
     count += static_cast<double>(rows - 2);
   }
   // A second difference of white noise has six times its variance. The rise has the noise of its
   // own row and that of the reference row.
-  const Eigen::VectorXd share =
-      (2.0 * noise / (6.0 * std::max(count, 1.0))).cwiseQuotient(mean_squares(tests));
+  const Eigen::VectorXd noise = own_parts(second, count) / (6.0 * std::max(count, 1.0));
+  const Eigen::VectorXd share = (2.0 * noise).cwiseQuotient(mean_squares(tests));
   Eigen::MatrixXd floor(places, places);
   for (Eigen::Index a = 0; a < places; ++a)
     for (Eigen::Index b = 0; b < places; ++b) floor(a, b) = share[a] + share[b];

@@ -23,7 +23,8 @@ enum class LargestOver { all_tests, each_test };
                                          LargestOver over = LargestOver::all_tests);
 
 /// The relative similarity that noise alone would leave between each two places: noise is what
-/// second differences of neighbouring rows show, and the reference row has it too.
+/// second differences of neighbouring rows show beyond those of the other places, and the reference
+/// row has it too.
 [[nodiscard]] Eigen::MatrixXd noise_floor(const MeasuredTests& tests);
 
 /// One merging of two groups, in ascending order of S.

@@ -324,3 +324,19 @@ TEST_CASE("a signal that lacks a few values costs those rows, not the signal", "
   CHECK(tests.runs[1].time_s.size() == 60 * hours - 1);
   for (const TestRun& run : tests.runs) CHECK(run.signals.allFinite());
 }
+
+TEST_CASE("blunders of a probe are left out with a word, the first row's too", "[families]") {
+  const auto moved = [](double quick, double, double, double) { return 5.0 * quick; };
+  RunFile run = machine_run("probe", 3, moved);
+  for (const std::size_t row : {0u, 40u, 41u, 200u, 359u}) run.values[4][row] += 4300.0;
+  TestOptions options;
+  options.outputs = {"z_um"};
+  const MeasuredTests tests = measured_tests({run}, options);
+  REQUIRE(tests.notes.size() == 1);
+  CHECK(tests.notes[0].find("z_um: 5 values are left out") != std::string::npos);
+  CHECK(tests.runs[0].time_s[0] == 60.0);
+  CHECK(tests.runs[0].outputs_um.cwiseAbs().maxCoeff() < 100.0);
+  RunFile steps = machine_run("steps", 3, moved);  // a step of the machine is no blunder
+  for (std::size_t row = 100; row < steps.rows(); ++row) steps.values[4][row] += 60.0;
+  CHECK(measured_tests({steps}, options).notes.empty());
+}

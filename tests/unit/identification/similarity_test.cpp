@@ -75,7 +75,8 @@ TEST_CASE("a threshold merges pairs in ascending order, and says what others wou
   CHECK(group_places(s, 1.0).groups.size() == 1);
 }
 
-TEST_CASE("22 places in 9 groups are found again at three levels of noise", "[group]") {
+TEST_CASE("22 places in 9 groups are found again at three levels of noise and three samplings",
+          "[group]") {
   const std::vector<std::size_t> sizes{10, 5, 1, 1, 1, 1, 1, 1, 1};
   std::vector<std::vector<std::size_t>> truth;
   std::size_t next = 0;
@@ -85,9 +86,15 @@ TEST_CASE("22 places in 9 groups are found again at three levels of noise", "[gr
   }
   const double noise_K = GENERATE(0.01, 0.05, 0.1);
   const auto seed = GENERATE(1u, 2u, 3u);
-  const MeasuredTests tests = grouped_places(sizes, noise_K, seed);
+  const int minutes = GENERATE(1, 10, 25);  // 25: a row a machining cycle
+  MeasuredTests tests = grouped_places(sizes, noise_K, seed);
+  for (TestRun& run : tests.runs) {
+    const auto rows = Eigen::seq(0, Eigen::last, minutes);
+    run.places_K = run.places_K(rows, Eigen::all).eval();
+    run.time_s = run.time_s(rows).eval();
+  }
   const Grouping grouping = group_places(similarity(tests, true), noise_floor(tests));
-  CAPTURE(noise_K, grouping.threshold);
+  CAPTURE(noise_K, minutes, grouping.threshold);
   CHECK(grouping.groups == truth);
 }
 

@@ -1,0 +1,145 @@
+#include "modelling/blunders/blunders.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "config/text/number_text.hpp"
+#include "config/text/units.hpp"
+
+namespace thermocomp {
+namespace {
+
+constexpr std::size_t side = 4;
+constexpr std::size_t rows_min = 2 * side + 1;
+constexpr double usual_deviations = 12.0;
+constexpr double share_of_way = 0.25;
+/// At an end nothing tells a blunder from a first step of the machine but its size.
+constexpr double share_of_way_at_end = 0.5;
+constexpr double share_max = 0.1;  ///< of the values; more are no blunders but the course itself
+constexpr std::size_t times_named_max = 6;
+constexpr double as_sd = 1.4826;  ///< of the median of |x|, for Gaussian x
+
+using Values = std::vector<double>;
+
+double median(Values values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The straight line through those beside an end, at the end; slopes are a median of pairs.
+double line_at_end(const Values& values, bool front) {
+  const std::size_t count = 2 * side;
+  const auto at = [&](std::size_t i) { return front ? values[i] : values[values.size() - 1 - i]; };
+  Values slopes;
+  for (std::size_t i = 1; i <= side; ++i)
+    slopes.push_back((at(i + side) - at(i)) / static_cast<double>(side));
+  const double slope = median(slopes);
+  Values levels;
+  for (std::size_t i = 1; i <= count; ++i) levels.push_back(at(i) - slope * static_cast<double>(i));
+  return median(levels);
+}
+
+/// Of each value how far it stands off what its neighbours have there.
+Values leaps_of(const Values& values) {
+  Values leaps(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t half = std::min({side, i, values.size() - 1 - i});
+    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(i - half);
+    const auto end = values.begin() + static_cast<std::ptrdiff_t>(i + half + 1);
+    leaps[i] = values[i] - (half == 0 ? line_at_end(values, i == 0) : median(Values(begin, end)));
+  }
+  return leaps;
+}
+
+double size_of_most(const Values& values) {
+  Values sizes;
+  for (const double each : values) sizes.push_back(std::abs(each));
+  return as_sd * median(std::move(sizes));
+}
+
+/// The way from the least to the most of the running medians, without their outermost hundredths.
+double way_of(const Values& values, const Values& leaps) {
+  Values expected;
+  for (std::size_t i = 0; i < values.size(); ++i) expected.push_back(values[i] - leaps[i]);
+  std::sort(expected.begin(), expected.end());
+  const std::size_t rim = expected.size() / 50;
+  return expected[expected.size() - 1 - rim] - expected[rim];
+}
+
+Blunders blunders_of(const RunFile& run, const std::string& column) {
+  Blunders found;
+  found.column = column;
+  Values values;
+  Values times_s;
+  const Values& all = run.column(column);
+  for (std::size_t row = 0; row < all.size(); ++row) {
+    if (!std::isfinite(all[row])) continue;
+    values.push_back(all[row]);
+    times_s.push_back(run.time_s()[row]);
+  }
+  // Once more without those found: one beside an end bends the line there.
+  while (values.size() >= rows_min) {
+    const Values leaps = leaps_of(values);
+    const double usual_um = usual_deviations * size_of_most(leaps);
+    const double way_um = way_of(values, leaps);
+    const double limit_um = std::max(usual_um, share_of_way * way_um);
+    const double limit_at_end_um = std::max(usual_um, share_of_way_at_end * way_um);
+    if (found.times_s.empty()) found.limit_um = limit_um;
+    std::vector<std::size_t> off;
+    for (std::size_t i = 0; i < leaps.size(); ++i) {
+      const bool at_end = i == 0 || i + 1 == leaps.size();
+      if (std::abs(leaps[i]) > (at_end ? limit_at_end_um : limit_um)) off.push_back(i);
+    }
+    if (off.empty()) break;
+    for (auto i = off.rbegin(); i != off.rend(); ++i) {
+      if (std::abs(leaps[*i]) > std::abs(found.size_um)) found.size_um = leaps[*i];
+      found.times_s.push_back(times_s[*i]);
+      values.erase(values.begin() + static_cast<std::ptrdiff_t>(*i));
+      times_s.erase(times_s.begin() + static_cast<std::ptrdiff_t>(*i));
+    }
+  }
+  const auto count = static_cast<double>(found.times_s.size());
+  if (count > share_max * (count + static_cast<double>(values.size()))) return Blunders{};
+  std::sort(found.times_s.begin(), found.times_s.end());
+  return found;
+}
+
+}  // namespace
+
+std::string Blunders::text() const {
+  const std::string unit(unit_of(column).symbol);
+  std::string text = column + ": " + std::to_string(times_s.size()) +
+                     (times_s.size() == 1 ? " value is" : " values are") +
+                     " left out, off the neighbours by up to ";
+  char size[32];
+  std::snprintf(size, sizeof size, "%+.4g ", size_um);
+  text += size + unit + " (limit " + number_text(std::round(10.0 * limit_um) / 10.0) + "), at ";
+  for (std::size_t i = 0; i < std::min(times_s.size(), times_named_max); ++i)
+    text += (i == 0 ? "" : ", ") + number_text(times_s[i]);
+  return text + (times_s.size() > times_named_max ? ", ... s" : " s");
+}
+
+std::vector<Blunders> find_blunders(const RunFile& run, const std::vector<std::string>& columns) {
+  std::vector<Blunders> all;
+  for (const std::string& column : columns) {
+    if (!run.find(column)) continue;
+    Blunders found = blunders_of(run, column);
+    if (!found.times_s.empty()) all.push_back(std::move(found));
+  }
+  return all;
+}
+
+std::vector<Blunders> leave_out_blunders(RunFile& run, const std::vector<std::string>& columns) {
+  std::vector<Blunders> all = find_blunders(run, columns);
+  for (const Blunders& each : all) {
+    std::vector<double>& values = run.values[*run.find(each.column)];
+    for (std::size_t row = 0; row < values.size(); ++row)
+      if (std::binary_search(each.times_s.begin(), each.times_s.end(), run.time_s()[row]))
+        values[row] = std::nan("");
+  }
+  return all;
+}
+
+}  // namespace thermocomp

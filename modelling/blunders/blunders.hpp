@@ -1,0 +1,33 @@
+/// Measured displacements that no structure can show: a probe that missed, a row read wrong.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/runs/run_file.hpp"
+
+namespace thermocomp {
+
+/// Those of one column of a run.
+struct Blunders {
+  std::string column;
+  std::vector<double> times_s;
+  double size_um{0.0};   ///< the largest, with its sign
+  double limit_um{0.0};  ///< beyond which a value is one
+
+  /// One line: how many, of what, when and how far off.
+  [[nodiscard]] std::string text() const;
+};
+
+/// A value is a blunder that stands off the median of its neighbours (four on each side; at an end
+/// off the straight line through those of its one side) by more than twelve usual deviations from
+/// that median and a quarter (at an end half) of the way that the column goes. A step is none: the
+/// values after it agree with each other.
+/// @param columns  of displacement or tilt
+[[nodiscard]] std::vector<Blunders> find_blunders(const RunFile& run,
+                                                  const std::vector<std::string>& columns);
+
+/// The same, and each becomes a missing value.
+std::vector<Blunders> leave_out_blunders(RunFile& run, const std::vector<std::string>& columns);
+
+}  // namespace thermocomp
