@@ -1,9 +1,7 @@
 #include "config/run_forms/number_form.hpp"
 
-#include <algorithm>
 #include <array>
 
-#include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/text_table.hpp"
 
 namespace thermocomp {
@@ -17,22 +15,6 @@ enum class Shows {
   point_or_group,  ///< 1.234
   groups           ///< 1,234.5 or 1.234.567
 };
-
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-/// Digits in front and, where there is none behind, three digits after each `sign`.
-bool is_grouped(std::string_view text, char sign) {
-  std::string_view part;
-  bool first = true;
-  while (take(text, sign, part)) {
-    const bool digits = std::all_of(part.begin(), part.end(), is_digit);
-    if (!digits || part.empty() || part.size() > 3 || (!first && part.size() != 3)) return false;
-    first = false;
-  }
-  return true;
-}
 
 Shows shown_by(std::string_view field) {
   if (!field.empty() && (field.front() == '-' || field.front() == '+')) field.remove_prefix(1);
@@ -115,36 +97,6 @@ NumberForm number_form(const TextTable& table, const ColumnMap* map, ProblemList
     form.decimal = ',';
   }
   return form;
-}
-
-NumberText number_text_of(std::string_view field) {
-  const bool may_end_so = field.find(' ') != std::string_view::npos;  // "1500 min-1"
-  if (field.empty() || (is_digit(field.back()) && !may_end_so)) return {field};
-  const auto end = field.find_last_of("0123456789");
-  const auto begin = field.find_first_not_of("+-.,");
-  if (end == std::string_view::npos || begin == std::string_view::npos || !is_digit(field[begin]))
-    return {field};
-  // Digits may belong to the unit, as in "1500 min-1".
-  const auto blank = field.find(' ');
-  const auto cut = std::min(blank, end + 1);
-  const SpelledUnit* unit = spelled_unit(trimmed(field.substr(cut)));
-  if (unit == nullptr) return {field};
-  return {trimmed(field.substr(0, cut)), unit};
-}
-
-bool looks_like_number(std::string_view field) {
-  field = number_text_of(field).digits;
-  if (field.empty() || field.size() > 40) return false;
-  if (field.front() == '-' || field.front() == '+') field.remove_prefix(1);
-  if (field.empty() || field.find_first_not_of("0123456789.,'eE+-") != std::string_view::npos)
-    return false;
-  const auto exponent = field.find_first_of("eE");
-  const std::string_view digits = field.substr(0, exponent);
-  return !digits.empty() && digits.find_first_of("+-") == std::string_view::npos &&
-         digits.find_first_of("0123456789") != std::string_view::npos &&
-         (std::count(digits.begin(), digits.end(), '.') <= 1 ||
-          std::count(digits.begin(), digits.end(), ',') <= 1) &&
-         !(std::count(digits.begin(), digits.end(), '.') > 1 && !is_grouped(digits, '.'));
 }
 
 std::optional<double> number_of(std::string_view field, const NumberForm& form) {

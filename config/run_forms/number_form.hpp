@@ -5,12 +5,12 @@
 #include <string_view>
 
 #include "config/run_forms/column_map.hpp"
+#include "config/run_forms/number_text.hpp"
 #include "config/run_forms/problem_list.hpp"
 
 namespace thermocomp {
 
 struct TextTable;
-struct SpelledUnit;
 
 struct NumberForm {
   char decimal{'.'};
@@ -22,16 +22,6 @@ struct NumberForm {
 /// @param map  may be nullptr
 [[nodiscard]] NumberForm number_form(const TextTable& table, const ColumnMap* map,
                                      ProblemList& problems);
-
-/// A number with its unit behind it, "22.1 °C"; without one, `unit` is nullptr.
-struct NumberText {
-  std::string_view digits;  ///< the number
-  const SpelledUnit* unit{nullptr};
-};
-[[nodiscard]] NumberText number_text_of(std::string_view field);
-
-/// Whether it may be a number of one form or the other, with or without a unit.
-[[nodiscard]] bool looks_like_number(std::string_view field);
 
 /// @return nullopt unless all of `field` is one finite number of that form
 [[nodiscard]] std::optional<double> number_of(std::string_view field, const NumberForm& form);

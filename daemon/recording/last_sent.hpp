@@ -54,9 +54,9 @@ class LastSent {
     std::uint64_t checksum{0};
   };
   struct File {
-    std::uint64_t magic;
-    std::uint64_t format;
-    std::array<Place, 2> places;
+    std::uint64_t magic{0};
+    std::uint64_t format{0};
+    std::array<Place, 2> places{};
   };
   [[nodiscard]] std::uint64_t checksum_of(const Place& place) const noexcept;
 
