@@ -109,6 +109,10 @@ StartState find(const DaemonConfig& config) {
 StartState find_start_state(const DaemonConfig& config, Offsets recorded) {
   StartState start = find(config);
   refuse_impossible(config, start);
+  // The record is newer than what is saved of an offset.
+  for (const auto& [axis, offset_um] : recorded)
+    if (std::isnan(offset_um)) start.state.corridor_um.erase(axis);
+  std::erase_if(recorded, [](const auto& each) { return std::isnan(each.second); });
   start.state.recorded_um = std::move(recorded);
   refuse_impossible_offsets(config, start);
   return start;

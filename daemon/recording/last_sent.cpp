@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
+#include <limits>
 #include <stdexcept>
 #include <unistd.h>
 
@@ -90,7 +91,10 @@ LastSent::LastSent(const std::filesystem::path& file, const std::string& control
   for (const Place& place : file_->places)
     if (place.number > now_.number && place.checksum == checksum_of(place)) now_ = place;
   for (std::size_t i = 0; i < axes_; ++i)
-    if ((now_.known >> i & 1u) != 0) before_[axes[i].name] = now_.offset_um[i];
+    if ((now_.forgotten >> i & 1u) != 0)
+      before_[axes[i].name] = std::numeric_limits<double>::quiet_NaN();
+    else if ((now_.known >> i & 1u) != 0)
+      before_[axes[i].name] = now_.offset_um[i];
 }
 
 LastSent::~LastSent() {
@@ -99,13 +103,16 @@ LastSent::~LastSent() {
 
 void LastSent::note(const OffsetCommand& command, std::uint32_t forgotten) noexcept {
   Place next = now_;
+  next.forgotten = forgotten;
   for (std::size_t i = 0; i < axes_; ++i) {
     if (command.valid[i]) next.offset_um[i] = command.offset_um[i];
     const std::uint64_t bit = std::uint64_t{1} << i;
     if (command.valid[i]) next.known |= bit;
     if ((forgotten >> i & 1u) != 0) next.known &= ~bit;
   }
-  if (next.known == now_.known && next.offset_um == now_.offset_um) return;
+  if (next.known == now_.known && next.forgotten == now_.forgotten &&
+      next.offset_um == now_.offset_um)
+    return;
   // What others left would be found again by them, and be wrong by then.
   if (next.number == 0) *file_ = File{magic, format, {}};
   ++next.number;
@@ -115,7 +122,7 @@ void LastSent::note(const OffsetCommand& command, std::uint32_t forgotten) noexc
 }
 
 std::uint64_t LastSent::checksum_of(const Place& place) const noexcept {
-  std::uint64_t hash = mixed(mixed(key_, place.number), place.known);
+  std::uint64_t hash = mixed(mixed(mixed(key_, place.number), place.known), place.forgotten);
   for (std::size_t i = 0; i < axes_; ++i)
     hash = mixed(hash, std::bit_cast<std::uint64_t>(place.offset_um[i]));
   return hash;

@@ -35,7 +35,8 @@ class LastSent {
   LastSent(const LastSent&) = delete;
   LastSent& operator=(const LastSent&) = delete;
 
-  /// As the process before left them, of this boot, controller and axes.
+  /// As the process before left them, of this boot, controller and axes. NaN: that process knew
+  /// that what it had sent last was worth nothing any more.
   [[nodiscard]] const Offsets& before() const noexcept { return before_; }
 
   /// Why what is there is not read; empty: it is, or nothing is there.
@@ -50,7 +51,8 @@ class LastSent {
   struct Place {
     std::uint64_t number{0};  ///< 0: never written
     std::array<double, axes_max> offset_um{};
-    std::uint64_t known{0};  ///< by bits, one an axis
+    std::uint64_t known{0};      ///< by bits, one an axis
+    std::uint64_t forgotten{0};  ///< by bits: the controller has lost it
     std::uint64_t checksum{0};
   };
   struct File {

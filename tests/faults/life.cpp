@@ -246,7 +246,7 @@ class Life {
     const bool unknown = report_.axes[axis].start_unknown;
     const bool beyond = has_reason(report_.reasons, Reason::applied_out_of_bound) &&
                         std::abs(world_.controller.applied_um(axis)) >
-                            shape_.estimator.axes[axis].limiter.offset_um_max;
+                            shape_.estimator.axes[axis].limiter.offset_um_max + 0.1;
     if (!well || !(unknown || beyond)) return;
     if (!releases_.one_in(static_cast<std::uint64_t>(8.0 * options_.cycle_hz))) return;
     const AxisSpan span = span_of(shape_.estimator.axes, axis);

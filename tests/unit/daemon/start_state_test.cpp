@@ -1,6 +1,7 @@
 // With which state the daemon starts where its state file is gone or damaged.
 #include "daemon/start_state.hpp"
 
+#include <cmath>
 #include <fstream>
 
 #include <catch2/catch.hpp>
@@ -143,6 +144,13 @@ TEST_CASE("offsets of a file are judged by this configuration", "[state]") {
     CHECK(start.state.corridor_um.size() == 1);
     CHECK(start.state.offset_um.at("z") == 12.0);
     CHECK(start.state.recorded_um.at("z") == 12.5);
+  }
+  SECTION("the controller had lost it, and the file did not say so yet") {
+    REQUIRE(save_state_file(config.state_file, kept).empty());
+    const StartState start = find_start_state(config, {{"z", std::nan("")}});
+    CHECK(start.warnings.empty());
+    CHECK(start.state.corridor_um.empty());
+    CHECK(start.state.recorded_um.empty());
   }
   SECTION("beyond the bound") {
     kept.offset_um["z"] = GENERATE(300.0, -499.0, 50.001);
