@@ -13,7 +13,6 @@ const std::array<std::vector<std::size_t>, 3> blocks{{{0, 4}, {1, 2}, {3, 5, 6}}
 constexpr double tiny_um = 1e-9;
 /// What was sent so long ago does not explain a read-back any more [s].
 constexpr double window_s = 10.0;
-constexpr double register_rounding_um = 0.1;
 /// The window of comparison, and the read-back and the command that are under way at its end.
 constexpr nanoseconds settling = std::chrono::seconds(8);
 

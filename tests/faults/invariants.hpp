@@ -15,6 +15,9 @@
 
 namespace thermocomp::faults {
 
+/// So far may a register of 0.1 um be off the offset that it holds [um].
+inline constexpr double register_rounding_um = 0.1;
+
 struct Broken {
   std::string invariant;
   nanoseconds at{};

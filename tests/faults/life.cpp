@@ -244,9 +244,10 @@ class Life {
   /// the offset at the controller to zero and says so.
   void set_to_zero(std::size_t axis, bool well) {
     const bool unknown = report_.axes[axis].start_unknown;
-    const bool beyond = has_reason(report_.reasons, Reason::applied_out_of_bound) &&
-                        std::abs(world_.controller.applied_um(axis)) >
-                            shape_.estimator.axes[axis].limiter.offset_um_max + 0.1;
+    const bool beyond =
+        has_reason(report_.reasons, Reason::applied_out_of_bound) &&
+        std::abs(world_.controller.applied_um(axis)) >
+            shape_.estimator.axes[axis].limiter.offset_um_max + register_rounding_um;
     if (!well || !(unknown || beyond)) return;
     if (!releases_.one_in(static_cast<std::uint64_t>(8.0 * options_.cycle_hz))) return;
     const AxisSpan span = span_of(shape_.estimator.axes, axis);

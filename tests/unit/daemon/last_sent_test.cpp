@@ -102,6 +102,8 @@ TEST_CASE("a record of another format is said, left until an offset is sent, and
     CHECK_THAT(sent.problem(), Catch::Contains("is of format 2, this program reads format 1"));
     CHECK(sent.before().empty());
     CHECK(bytes_of(file) == newer);
+    sent.note(OffsetCommand{}, 0b11);  // the start of both axes is not known
+    CHECK(bytes_of(file) == newer);
     sent.note(command(7.0, 8.0), 0);
   }
   CHECK(left_in(file) == Offsets{{"z", 7.0}, {"x", 8.0}});
