@@ -57,7 +57,7 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b,
     of_a += x * x;
     of_b += y * y;
   }
-  // What lies outside of the common part was not seen by the other: it counts half.
+  // The parts that only one recording covers count half.
   double all_a = 0.0;
   double all_b = 0.0;
   for (const double x : a) all_a += x * x;
@@ -84,7 +84,7 @@ void try_pair(const std::vector<double>& a, const std::vector<double>& b, double
   best.correlation = by_shift[static_cast<std::size_t>(strongest)];
   best.shift_s = offset_s + best.step_s * static_cast<double>(strongest + common - size_b);
   best.columns = columns;
-  // Beside a peak r falls; another peak is one after r has been below half of it or risen again.
+  // Beside its peak r falls; where it rises again by more than 0.05, another peak begins.
   best.next = 0.0;
   for (const std::ptrdiff_t way : {-1, 1}) {
     double lowest = best.correlation;

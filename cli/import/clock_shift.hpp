@@ -18,9 +18,11 @@ struct ClockShift {
   [[nodiscard]] bool is_sure() const noexcept;
 };
 
-/// Changes over a step of each column of one are laid beside those of each of the other,
-/// r(k) = sum a_i b_(i-k) / sqrt(sum a_i^2 sum b_(i-k)^2), at every shift k that leaves a third of
-/// the shorter recording in common; the pair and shift of the greatest |r|.
+/// The pair of columns and the shift k of the greatest |r|, among all shifts that leave a third of
+/// the shorter recording in common. a and b are the changes of a column of each over a fortieth of
+/// the shorter recording,
+/// r(k) = sum a_i b_(i-k) / sqrt(A B), A = (sum of a_i^2 in common + sum of all a_i^2) / 2, B
+/// alike.
 /// @return nullopt where no column of either moves
 [[nodiscard]] std::optional<ClockShift> clock_shift(const RunFile& first, const RunFile& second);
 

@@ -10,9 +10,8 @@ namespace thermocomp::cli {
 /// Every row of both by the time of the first. In rows that the second brings along, temperatures
 /// and positions of the first are on the line between its rows beside them, its other columns are
 /// those of the row before; a gap of more than a minute, or three usual steps, stays empty.
-/// @param shift_s  the second's time_s plus this is the first's; nullopt: by the dates of both
-/// files, or
-///                 where they have none, by columns that clearly change alike
+/// @param shift_s  the second's time_s plus this is the first's; nullopt: the dates of both files
+///                 tell it or, where they have none, columns that clearly change alike
 /// @throws ConfigurationError when the clocks cannot be compared, columns are there twice, or the
 ///         two do not overlap
 [[nodiscard]] RunFile joined_runs(const RunFile& first, const RunFile& second,

@@ -22,7 +22,7 @@
 namespace thermocomp {
 namespace {
 
-/// What programs write for a missing value, in small letters.
+/// Words that programs write for a missing value, in small letters.
 constexpr auto missing_words = std::to_array<std::string_view>(
     {"na",       "n/a",         "#n/a",    "#nv",   "null",         "none",     "-",
      "--",       "---",         "----",    "-.-",   "--.-",         "*",        "***",

@@ -28,7 +28,7 @@ struct PlainTable {
 
 namespace forms {
 
-/// What a form is given.
+/// A file, as its form reads it.
 struct Log {
   std::string_view text;
   const std::string& name;
@@ -68,7 +68,7 @@ PlainTable plain_twincat(const Log& log);
 bool is_labelled(std::string_view text);
 PlainTable plain_labelled(const Log& log);
 
-/// Taken off the front; without the end of the line.
+/// Takes the first line off `text`; it comes without its end.
 std::string_view take_line(std::string_view& text);
 
 /// Fields between separators, without quotes and blanks.

@@ -84,7 +84,7 @@ std::optional<LongForm> told_form(const TextTable& table, const ColumnMap& map,
   return form;
 }
 
-/// Of several columns of words the fewest that leave no time twice in a series.
+/// Keeps the fewest columns of words with which no series has a time twice.
 void keep_needed_names(const TextTable& table, const std::vector<double>& time_s, LongForm& form) {
   const auto is_clear = [&](const LongForm& tried) {
     std::set<std::pair<std::string, double>> seen;

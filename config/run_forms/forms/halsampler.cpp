@@ -24,7 +24,7 @@ Samples samples_of(const Log& log) {
     rest = trimmed(rest);
     if (rest.empty()) continue;
     if (rest == "overrun") {
-      overrun = !samples.rows.empty();  // what was lost before the first row is in no file
+      overrun = !samples.rows.empty();  // no row of the file is missing before its first one
       continue;
     }
     std::vector<double> row;
