@@ -80,6 +80,7 @@ void ControllerUnit::ask(int /*unit*/, std::span<const std::uint8_t> request, na
     else
       refuse(answer, request[0], 2);
   } else if (request[0] == 16 && schedule_.find(FaultKind::writes_unanswered, time) != nullptr) {
+    controller_.link_broke();
     return;
   } else if (request[0] == 16 && request.size() == 6 + 2 * count) {
     for (std::size_t i = 0; i < count; ++i) words[i] = word_of(request, 6 + 2 * i);
