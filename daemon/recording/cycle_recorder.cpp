@@ -200,6 +200,8 @@ bool CycleRecorder::snapshot(std::uint64_t first_cycle, const Estimator& estimat
     record.session = session_->id;
     if (ring_.try_push(record)) {
       broken_ = false;
+      // The offsets of the cycle before are no part of the new segment.
+      noted_cycle_ = static_cast<std::int64_t>(first_cycle) - 1;
       return true;
     }
     snapshot.taken.store(false, std::memory_order_relaxed);

@@ -42,6 +42,7 @@ constexpr std::array<std::string_view, fault_kinds> names{"sensor_open",
                                                           "cycle_overrun",
                                                           "model_reload",
                                                           "daemon_killed",
+                                                          "main_stands_still",
                                                           "history_disk_full",
                                                           "history_files_removed"};
 
@@ -60,6 +61,9 @@ std::pair<double, double> duration_s(FaultKind kind) {
       return {3.0, 40.0};
     case FaultKind::daemon_killed:
       return {2.0, 60.0};
+    // Longer than the watchdog allows it is a kill.
+    case FaultKind::main_stands_still:
+      return {0.5, 10.0};
     // They last longer than any band that widens with time can stay below them.
     case FaultKind::unit_in_fahrenheit:
     case FaultKind::unit_tenfold_too_low:

@@ -54,10 +54,11 @@ enum class FaultKind : std::uint8_t {
   cycle_overrun,
   model_reload,
   daemon_killed,
+  main_stands_still,
   history_disk_full,
   history_files_removed
 };
-inline constexpr std::size_t fault_kinds = 39;
+inline constexpr std::size_t fault_kinds = 40;
 /// Unordered, a kind with itself (another subject or time) among them.
 inline constexpr std::size_t fault_pairs = fault_kinds * (fault_kinds + 1) / 2;
 

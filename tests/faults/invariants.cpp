@@ -42,7 +42,9 @@ Invariants::Invariants(const MachineShape& shape, const FaultSchedule& schedule,
     for (const std::size_t sensor : place.sensors) {
       // A serial answer carries no number: one to the same question may be up to 3 s old.
       slack_[sensor] = from_s(timeout_s + (place.bus == 0 ? 0.05 : 3.1));
-      stale_after_[sensor] = from_s(shape.estimator.sensors[sensor].screening.stale_after_s);
+      const ScreeningConfig& screening = shape.estimator.sensors[sensor].screening;
+      stale_after_[sensor] = from_s(screening.stale_after_s);
+      settled_after_[sensor] = from_s(screening.settle_s);
       stamped_earlier_[sensor] = place.has_counter || place.has_status;
     }
   }
@@ -242,13 +244,15 @@ void Invariants::check_sensors_used(const CycleSeen& seen) {
   }
 }
 
-/// A daemon that starts beside a false reading has no past to tell it by.
+/// A daemon that starts beside a false reading has no past to tell it by; what it read while the
+/// sensor settled is none.
 void Invariants::check_truth(const CycleSeen& seen) {
   for (std::size_t i = 0; i < sensors_count; ++i) {
     const SensorReport& sensor = seen.report->sensors[i];
     const double off_K =
         std::abs(sensor.smoothed_degC - thermocouples_.plausible_degC(i, seen.now));
-    if (sensor.fault == Fault::none && off_K <= false_K_max) had_truth_[i] = true;
+    const bool is_settled = seen.now - boot_ > settled_after_[i];
+    if (sensor.fault == Fault::none && off_K <= false_K_max && is_settled) had_truth_[i] = true;
     if (sensor.fault != Fault::none || !(off_K > false_K_max) || !had_truth_[i])
       true_at_[i] = seen.now;
     demand(to_s(seen.now - true_at_[i]) <= false_s_max, "no_false_reading_used", seen.now, [&] {

@@ -115,6 +115,7 @@ class Invariants {
   std::optional<Broken> broken_;
   std::array<nanoseconds, sensors_count> slack_{};  ///< from the unit to the time of the reading
   std::array<nanoseconds, sensors_count> stale_after_{};
+  std::array<nanoseconds, sensors_count> settled_after_{};
   /// By a counter that has not moved, or a status asked for before.
   std::array<bool, sensors_count> stamped_earlier_{};
   std::array<Reading, sensors_count> last_readings_{};

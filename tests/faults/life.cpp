@@ -20,6 +20,9 @@ namespace {
 
 constexpr nanoseconds life_begin = std::chrono::hours(1);
 constexpr nanoseconds saved_every = std::chrono::seconds(10);
+/// Of the service: WatchdogSec and RestartSec.
+constexpr nanoseconds watchdog = std::chrono::seconds(5);
+constexpr nanoseconds restarted_after = std::chrono::seconds(2);
 
 double to_s(nanoseconds time) {
   return 1e-9 * static_cast<double>(time.count());
@@ -113,13 +116,10 @@ class Life {
 
   void step(std::uint64_t cycle) {
     say_faults();
-    operate();
-    release();
-    accept();
-    probe();
-    reload();
+    const bool main_works = stall() == nullptr;
+    if (main_works) serve();
     daemon_->cycle().step(cycle);
-    static_cast<void>(daemon_->cycle().take_retired());
+    if (main_works) static_cast<void>(daemon_->cycle().take_retired());
     daemon_->cycle().brain().estimator.report(report_);
     world_.controller.advance(world_.now);
     const CycleSeen seen{world_.now,
@@ -131,7 +131,7 @@ class Life {
     if (options_.verbose) remember(seen);
     judge_.check(seen, world_.controller.moves(), world_.controller);
     if (options_.verbose && judge_.broken()) say_last_cycles();
-    save_state();
+    if (main_works) save_state();
     if (report_.mode == Mode::compensating) ++result_.compensating;
     ++result_.cycles;
     if (disk_) {
@@ -142,11 +142,30 @@ class Life {
     }
   }
 
+  /// What main does between two cycles.
+  void serve() {
+    operate();
+    release();
+    accept();
+    probe();
+    reload();
+  }
+
+  /// Main stands still; the service manager has ended what came before its last kill.
+  [[nodiscard]] const FaultEvent* stall() const {
+    const FaultEvent* found = schedule_.find(FaultKind::main_stands_still, world_.now);
+    return found != nullptr && found->number != last_stall_ ? found : nullptr;
+  }
+
   [[nodiscard]] bool killed() {
     // Where only the state file knows the offset, kills are too rare to show much of it.
     power_was_cut_ =
         kept_ && power_cuts_.one_in(static_cast<std::uint64_t>(900 * options_.cycle_hz));
     if (power_was_cut_) return true;
+    const FaultEvent* long_stall = stall();
+    watchdog_bit_ = long_stall != nullptr && world_.now - long_stall->begin > watchdog;
+    if (watchdog_bit_) last_stall_ = long_stall->number;
+    if (watchdog_bit_) return true;
     const FaultEvent* kill = schedule_.find(FaultKind::daemon_killed, world_.now);
     if (kill == nullptr || kill->number == last_kill_) return false;
     last_kill_ = kill->number;
@@ -158,6 +177,7 @@ class Life {
     const FaultEvent* kill = schedule_.find(FaultKind::daemon_killed, world_.now);
     if (kill != nullptr) world_.now = kill->end;
     if (power_was_cut_) world_.now += std::chrono::seconds(20);
+    if (watchdog_bit_) world_.now += restarted_after;
     if (options_.verbose)
       fmt::print("{:>10.1f} s  the daemon starts again{}\n", life_s(),
                  power_was_cut_ ? " after a power cut" : "");
@@ -166,7 +186,9 @@ class Life {
   /// Every other kill is a service manager's, which the daemon takes as an order to end.
   void finish() {
     const std::optional<std::uint64_t> ended =
-        last_kill_ % 2 == 0 && !power_was_cut_ ? daemon_->cycle().finish_recording() : std::nullopt;
+        last_kill_ % 2 == 0 && !power_was_cut_ && !watchdog_bit_
+            ? daemon_->cycle().finish_recording()
+            : std::nullopt;
     if (disk_ && ended) {
       disk_->end(*ended, world_.now);
     } else if (disk_) {
@@ -423,12 +445,14 @@ class Life {
   std::unique_ptr<HistoryDisk> disk_;
   std::unique_ptr<KeptState> kept_;  ///< none: the controller shows what it applies
   bool power_was_cut_{false};
+  bool watchdog_bit_{false};  ///< main has stood still for too long
   SimulatedDaemon* daemon_{nullptr};
   Report report_;
   PersistentState saved_;
   bool restarted_{false};
   nanoseconds next_save_{};
   std::uint64_t last_kill_{0};
+  std::uint64_t last_stall_{0};  ///< that the service manager has ended
   std::uint64_t last_reload_{0};
   std::uint64_t said_{0};
   Mode said_mode_{Mode::starting};

@@ -29,8 +29,11 @@ class DatabaseError : public HistoryError {
   [[nodiscard]] bool is_damage() const noexcept {
     return (code_ & 0xFF) == SQLITE_CORRUPT || (code_ & 0xFF) == SQLITE_NOTADB;
   }
-  /// No room for more; the connection is as good as before.
-  [[nodiscard]] bool is_full() const noexcept { return (code_ & 0xFF) == SQLITE_FULL; }
+  /// No room, or the disk takes nothing now; the connection is as good as before.
+  [[nodiscard]] bool is_for_now() const noexcept {
+    return (code_ & 0xFF) == SQLITE_FULL || code_ == SQLITE_IOERR_WRITE ||
+           code_ == SQLITE_IOERR_FSYNC;
+  }
 
  private:
   int code_;

@@ -181,9 +181,11 @@ void HistoryStore::rescue(const std::string& changed) {
   } catch (const DatabaseError&) {
     // The log cannot be read any more: what is in the database is what is left.
   }
-  // Of a log that was removed this connection has the only copy: it stays open until there is room.
-  if (code == SQLITE_FULL && has_database)
-    throw DatabaseError(code, changed + ": the disk is full, tried again");
+  // Of a log that was removed this connection has the only copy: it stays open until all of it can
+  // be written. Half of it would leave a database that is damaged.
+  const DatabaseError failed(code, changed + " was removed, and the disk takes nothing (" +
+                                       sqlite3_errstr(code) + "): tried again");
+  if (failed.is_for_now() && has_database) throw failed;
   const bool is_moved = code == SQLITE_OK && in_log == moved;
   // Closing would read the log once more, and remove whatever bears its name.
   sqlite3_db_config(database_->handle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);

@@ -266,7 +266,7 @@ bool HistoryWriter::Parts::write() {
   } catch (const DatabaseError& error) {
     if (error.is_damage()) store.move_aside(error.what());
     // On a full disk it stays open: opening anew would need room, for this thread as for a reader.
-    if (error.is_full())
+    if (error.is_for_now())
       store.note_files();
     else
       store.close();

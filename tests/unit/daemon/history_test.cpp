@@ -87,6 +87,28 @@ TEST_CASE("replay gives the daemon's offsets bit for bit", "[history][replay]") 
   CHECK(summary.segments >= 2);
 }
 
+TEST_CASE("a stop in the cycle in which a segment begins leaves a segment that is read",
+          "[history][replay]") {
+  const TempFolder folder;
+  HistoryConfig config = history_config(folder / "h.db");
+  config.segment_h = 3.0 / 3600.0;
+  nanoseconds now = std::chrono::hours(7);
+  RecordedMachine machine(config, 4, 65536, {[&] { return now; }, [&] { return now; }});
+  machine.open();
+  machine.run(401);
+  now += std::chrono::seconds(4);
+  machine.writer().work();
+  machine.run(1);
+  machine.stop();
+  now += std::chrono::seconds(1);
+  machine.writer().work();
+  const ReplaySummary summary = replay_quietly(config.file);
+  CHECK(summary.segments == 2);
+  CHECK(told(summary.damage).empty());
+  CHECK(summary.different == 0);
+  CHECK(summary.compared > 0);
+}
+
 TEST_CASE("replay notices a history that was changed", "[history][replay]") {
   const TempFolder folder;
   const HistoryConfig config = history_config(folder / "h.db");
@@ -471,6 +493,54 @@ TEST_CASE("-wal or -shm removed, replaced or cut while running: no row is lost, 
   machine.stop();
   const ReplaySummary summary = replay_quietly(config.file);
   CHECK(summary.damage.empty());
+  CHECK(summary.different == 0);
+  CHECK(summary.segments == 1);
+}
+
+TEST_CASE("rows of which a removed -wal was the only copy wait until they can be written",
+          "[history][files]") {
+  const TempFolder folder;
+  const HistoryConfig config = history_config(folder / "h.db");
+  nanoseconds now = std::chrono::hours(7);
+  RecordedMachine machine(config, 12, 65536, {[&] { return now; }, [&] { return now; }});
+  machine.open();
+  const auto commit = [&] {
+    machine.run(3000);
+    now += std::chrono::seconds(1);
+    machine.writer().work();
+  };
+  commit();
+  // What is committed while somebody reads stays in the log.
+  sqlite3* reader = nullptr;
+  REQUIRE(sqlite3_open(config.file.c_str(), &reader) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(reader, "BEGIN; SELECT count(*) FROM chunk", nullptr, nullptr, nullptr) ==
+          SQLITE_OK);
+  commit();
+  commit();
+  const std::uint64_t written = machine.writer().statistics().records;
+  std::filesystem::remove(config.file.string() + "-wal");
+  sqlite3_close(reader);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  signal(SIGXFSZ, SIG_IGN);
+  rlimit tight = before;
+  tight.rlim_cur = std::filesystem::file_size(config.file);
+  REQUIRE(setrlimit(RLIMIT_FSIZE, &tight) == 0);
+  commit();
+  const HistoryStatistics failed = machine.writer().statistics();
+  setrlimit(RLIMIT_FSIZE, &before);
+  CHECK(failed.errors > 0);
+  CHECK(failed.lost == 0);
+  CHECK(told(machine.writer().take_news()).empty());
+  now += std::chrono::minutes(1);
+  commit();
+  CHECK_THAT(told(machine.writer().take_news()), Catch::Contains("opened anew"));
+  CHECK(machine.writer().statistics().replaced == 1);
+  CHECK(machine.writer().statistics().lost == 0);
+  machine.stop();
+  CHECK(records_in(config.file) > written);
+  const ReplaySummary summary = replay_quietly(config.file);
+  CHECK(told(summary.damage).empty());
   CHECK(summary.different == 0);
   CHECK(summary.segments == 1);
 }
