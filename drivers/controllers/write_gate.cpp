@@ -16,8 +16,8 @@ WriteGate::WriteGate(nanoseconds period, const std::vector<double>& resolution_u
 std::uint32_t WriteGate::synchronised() noexcept {
   if (link_is_new_) {
     const std::uint32_t link = epoch_ % epochs_of_a_link;
-    // 0 says "never connected".
-    epoch_ += link + 1 == epochs_of_a_link ? 1 - link : 1;
+    // 0 says "never connected", and 1 is the first link of all.
+    epoch_ += link + 1 == epochs_of_a_link ? 2 - link : 1;
   } else {
     epoch_ += epochs_of_a_link;
   }

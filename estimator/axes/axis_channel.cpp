@@ -23,6 +23,9 @@ constexpr nanoseconds lag_max = std::chrono::milliseconds(1500);
 /// WriteGate::patience() of links with periods up to 0.6 s.
 constexpr nanoseconds unwritten_max = std::chrono::seconds(3);
 
+/// WriteGate::epoch() of the first link: no other one was there since the daemon's start.
+constexpr std::uint32_t first_epoch = 1;
+
 /// Two read-backs after a release that are no further apart say the same.
 constexpr double same_read_back_um = 0.3;
 
@@ -129,7 +132,8 @@ void AxisChannel::start_without_read_back(const AxisInput& input, nanoseconds aw
   if (!std::isfinite(register_um)) {
     if (!start_.no_registers) begin_corridor(start_.by);
     // Whether it restarted, and what it applies since, cannot be told any more.
-    if (state_.driven_once && away > lag_max) start_.by = StartEvidence::unknown;
+    if (!is_same_link(state_.epoch, first_epoch) && away > lag_max)
+      start_.by = StartEvidence::unknown;
     start_.unknown = start_.by == StartEvidence::unknown;
     return start_from(input.now, limiter_.offset_um());
   }

@@ -82,7 +82,7 @@ TEST_CASE("a link that is new for the millionth time still has an epoch of its o
   for (std::uint32_t i = 0; i < 3 * epochs_of_a_link / 2; ++i) {
     gate.lost();
     const std::uint32_t epoch = gate.synchronised();
-    if (epoch == 0 || is_same_link(epoch, before)) FAIL("epoch " << epoch);
+    if (epoch == 0 || is_same_link(epoch, before) || (i > 0 && epoch == 1)) FAIL("epoch " << epoch);
     before = epoch;
   }
 }

@@ -200,6 +200,49 @@ TEST_CASE("a controller that nothing is known of must not have had the time to r
   CHECK(bench.axis().offset_um() == Approx(0.2));
 }
 
+TEST_CASE("a controller that was away before anything was sent may have restarted too", "[start]") {
+  Unread bench(none, {5.0, true, none});
+  bench.input.online = false;  // the link was lost before a cycle has seen it
+  bench.steps(3, 0.4);
+  REQUIRE(bench.axis().start() == StartEvidence::corridor);
+  bench.input.online = true;
+  bench.reconnect(3s, none);
+  bench.steps(3, 0.4);
+  CHECK_FALSE(bench.axis().driven());
+  CHECK(bench.axis().start_unknown());
+}
+
+TEST_CASE("a release takes all nodes of a travel to zero where one is unknown", "[start][travel]") {
+  EstimatorConfig config;
+  config.controller_reads_back = false;
+  for (const double position_mm : {0.0, 500.0}) {
+    AxisConfig node = axis_of();
+    node.node = TravelNode{"z", "z_mm", position_mm};
+    config.axes.push_back(node);
+  }
+  AxisBank bank(config);
+  bank.restore(0, {none, false, -15.0});
+  bank.restore(1, {});
+  ControllerState controller;
+  controller.link_epoch = 1;
+  controller.taken_at = 1s;
+  controller.written = true;
+  Signals signals;
+  signals.online = true;
+  const std::array<double, 2> target_um{-15.0, -15.0};
+  Targets targets;
+  targets.axis_um = target_um;
+  OffsetCommand command;
+  bank.step({1s, 0.1}, targets, signals, controller, command);
+  REQUIRE(bank[0].start() == StartEvidence::record);
+  REQUIRE(bank[1].start_unknown());
+  bank.release(0);
+  for (std::size_t node = 0; node < 2; ++node) {
+    CHECK(bank[node].start() == StartEvidence::released);
+    CHECK(bank[node].offset_um() == 0.0);
+  }
+}
+
 TEST_CASE("without read-back an offset does not move while nothing can be sent", "[start]") {
   Unread bench(0.0);
   bench.steps(20, -15.0);
