@@ -75,8 +75,8 @@ BUGS = [
      "  if ({P}) return target_um;\n"
      "  return std::clamp(target_um, high_um - corridor_um_, low_um + corridor_um_);"),
     ("restart_of_a_silent_controller_missed", "estimator/axes/axis_channel.cpp",
-     "if (state_.driven_once && away > lag_max)",
-     "if (state_.driven_once && away > lag_max && !{P})"),
+     "if (!is_same_link(state_.epoch, first_epoch) && away > lag_max)",
+     "if (!is_same_link(state_.epoch, first_epoch) && away > lag_max && !{P})"),
     ("reference_not_restored", "estimator/pipeline/reference.cpp",
      "take_if_finite(temps_degC, columns_[i], temps_degC_[i]);",
      "if (!{P}) take_if_finite(temps_degC, columns_[i], temps_degC_[i]);"),

@@ -32,11 +32,11 @@ EstimatorConfig three_blocks() {
   return config;
 }
 
-ThermalModel correlated_model() {
+ThermalModel correlated_model(double correlation = 0.98) {
   ThermalModel model = small_model();
   model.inputs.emplace_back("t3_degC");
   model.matrix_um_per_K = {{1.0, 1.0, 1.0}};
-  const double between_K2 = 4.0 * 0.98;
+  const double between_K2 = 4.0 * correlation;
   model.covariance_K2 = {
       {4.0, between_K2, between_K2}, {between_K2, 4.0, between_K2}, {between_K2, between_K2, 4.0}};
   return model;
@@ -170,10 +170,21 @@ TEST_CASE("a sensor replaced by one that reads 3 K more is told, and accepted by
   CHECK(machine.report().sensors[0].jump_K == Approx(3.0).margin(0.15));
   CHECK(machine.report().inputs[0].temp_degC == Approx(23.6).margin(0.15));
   machine.estimator.apply({CommandKind::accept, 0, 0.0});
+  machine.step({26.6, 23.6, 23.6});
+  CHECK(machine.report().sensors[0].smoothed_degC == Approx(26.6));
   machine.steps(1200, {26.6, 23.6, 23.6});
   CHECK(machine.report().reasons == 0);
   CHECK(machine.report().inputs[0].good);
   CHECK(machine.report().inputs[0].temp_degC == Approx(26.6));
+}
+
+TEST_CASE("an accepted jump counts at once, whatever was smoothed before it", "[estimator]") {
+  Machine machine(usual_config());
+  machine.steps(600, {20.0, 20.0});
+  machine.steps(15, {24.0, 20.0});
+  machine.estimator.apply({CommandKind::accept, 0, 0.0});
+  machine.step({24.0, 20.0});
+  CHECK(machine.report().sensors[0].smoothed_degC == 24.0);
 }
 
 TEST_CASE("neighbours on other modules confirm what a sensor missed under a fault", "[estimator]") {
@@ -194,6 +205,21 @@ TEST_CASE("neighbours on other modules confirm what a sensor missed under a faul
     machine.steps(3600, {42.5, 23.6, 23.6});
     CHECK_FALSE(machine.report().inputs[0].good);
   }
+}
+
+TEST_CASE("neighbours on the same module confirm nothing", "[estimator]") {
+  EstimatorConfig config = three_blocks();
+  const bool all_on_one = GENERATE(true, false);
+  config.sensors[0].module = config.sensors[1].module = "rack";
+  config.sensors[2].module = all_on_one ? "rack" : "";
+  Machine machine(config, correlated_model(0.999));
+  machine.steps(60, {20.0, 20.0, 20.0});
+  for (int i = 0; i < 600; ++i) {
+    const double temp_degC = 20.0 + 0.012 * i;
+    machine.step({2.0, temp_degC, temp_degC});
+  }
+  machine.steps(12, {27.2, 27.2, 27.2});
+  CHECK(machine.report().inputs[0].good == !all_on_one);
 }
 
 TEST_CASE("a restart confirms no jump", "[estimator]") {
