@@ -18,6 +18,8 @@ namespace {
 constexpr std::size_t rows_min = 3;  // of a test; fewer say nothing of a course
 /// A place that has fewer of its values than this would take the other places' rows with it.
 constexpr double share_present_min = 0.5;
+/// A signal that stays so close to a level within each run, as a share of it, has not moved.
+constexpr double still_share = 0.03;
 
 [[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& rule) {
   throw ConfigurationError({Problem{file, 0, key, "", rule}});
@@ -221,6 +223,19 @@ void leave_out_still_places(MeasuredTests& tests) {
   tests.places = names;
 }
 
+bool stands_still(const MeasuredTests& tests, std::size_t signal) {
+  double within = 0.0;
+  double size = 0.0;
+  for (const TestRun& run : tests.runs) {
+    const auto column = run.signals.col(static_cast<Eigen::Index>(signal))
+                            .tail(run.time_s.size() - run.begin)
+                            .array();
+    within += (column - column.mean()).square().sum();
+    size += column.square().sum();
+  }
+  return !(within > still_share * still_share * size);
+}
+
 std::vector<Fold> make_folds(const std::vector<TestRun>& runs, std::size_t stretches) {
   std::vector<Fold> folds;
   if (runs.size() > 1) {
@@ -268,6 +283,10 @@ std::string MeasuredTests::fold_name(std::size_t fold) const {
   return text;
 }
 
+bool MeasuredTests::moved(const std::string& signal) const {
+  return std::find(unmoved.begin(), unmoved.end(), signal) == unmoved.end();
+}
+
 MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOptions& options) {
   MeasuredTests tests;
   refuse_overlap(given);
@@ -286,6 +305,8 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
   if (options.signals) tests.signals = usable_signals(runs, tests.notes);
   for (const RunFile& run : runs)
     tests.runs.push_back(make_run(run, tests.places, tests.outputs, tests.signals));
+  for (std::size_t i = 0; i < tests.signals.size(); ++i)
+    if (stands_still(tests, i)) tests.unmoved.push_back(tests.signals[i]);
   leave_out_still_places(tests);
   if (tests.places.empty()) refuse(runs.front().name, "", "has no temperature that can be used");
   tests.folds = make_folds(tests.runs, options.folds_of_one_run);

@@ -41,6 +41,9 @@ struct MeasuredTests {
   std::vector<std::string> places;
   std::vector<std::string> outputs;
   std::vector<std::string> signals;  ///< that all runs have and that vary
+  /// Those that stay at a level within each run: they get no gain, and what they do elsewhere is
+  /// another state of the machine.
+  std::vector<std::string> unmoved;
   std::vector<TestRun> runs;
   std::vector<Fold> folds;
   HotHalf hot;
@@ -48,6 +51,7 @@ struct MeasuredTests {
 
   [[nodiscard]] Eigen::Index rows() const;  ///< selected ones of all runs
   [[nodiscard]] std::string fold_name(std::size_t fold) const;
+  [[nodiscard]] bool moved(const std::string& signal) const;  ///< not among the unmoved
 };
 
 struct TestOptions {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
@@ -59,8 +60,11 @@ Stacked stack(const MeasuredTests& tests, const std::vector<FitColumn>& columns)
   return stacked;
 }
 
-Eigen::MatrixXd solve(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
-  return x.colPivHouseholderQr().solve(y);
+Eigen::MatrixXd solve(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, double penalty) {
+  if (!(penalty > 0)) return x.colPivHouseholderQr().solve(y);
+  Eigen::MatrixXd a = x.transpose() * x;
+  a.diagonal() *= 1.0 + penalty;
+  return a.ldlt().solve(x.transpose() * y);
 }
 
 Eigen::MatrixXd without_rows(const Eigen::MatrixXd& all, Eigen::Index begin, Eigen::Index end) {
@@ -93,7 +97,7 @@ Eigen::VectorXd confidence(const Stacked& data, const Eigen::VectorXd& residual)
   return student_95(folds - 1) * covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
 }
 
-void judge_hot_half(const MeasuredTests& tests, const Stacked& data, Fit& fit) {
+void judge_hot_half(const MeasuredTests& tests, const Stacked& data, double penalty, Fit& fit) {
   for (OutputFit& output : fit.outputs)
     output.hot_rms_um = std::numeric_limits<double>::quiet_NaN();
   if (tests.hot.rows.empty()) return;
@@ -104,22 +108,22 @@ void judge_hot_half(const MeasuredTests& tests, const Stacked& data, Fit& fit) {
   std::vector<Eigen::Index> cool;
   for (Eigen::Index row = 0; row < data.x.rows(); ++row)
     (is_hot[static_cast<std::size_t>(row)] ? hot : cool).push_back(row);
-  const Eigen::MatrixXd b = solve(data.x(cool, Eigen::all), data.y(cool, Eigen::all));
+  const Eigen::MatrixXd b = solve(data.x(cool, Eigen::all), data.y(cool, Eigen::all), penalty);
   const Eigen::MatrixXd left = data.y(hot, Eigen::all) - data.x(hot, Eigen::all) * b;
   for (std::size_t o = 0; o < fit.outputs.size(); ++o)
     fit.outputs[o].hot_rms_um = rms(left.col(static_cast<Eigen::Index>(o)));
 }
 
-void judge_outputs(const MeasuredTests& tests, const Stacked& data, Fit& fit) {
+void judge_outputs(const MeasuredTests& tests, const Stacked& data, double penalty, Fit& fit) {
   const std::size_t folds = data.begin.size() - 1;
-  const Eigen::MatrixXd coefficients = solve(data.x, data.y);
+  const Eigen::MatrixXd coefficients = solve(data.x, data.y, penalty);
   fit.left_out_um.resize(data.y.rows(), data.y.cols());
   for (std::size_t f = 0; f < folds; ++f) {
     const Eigen::Index begin = data.begin[f];
     const Eigen::Index end = data.begin[f + 1];
-    const Eigen::MatrixXd b =
-        folds == 1 ? coefficients
-                   : solve(without_rows(data.x, begin, end), without_rows(data.y, begin, end));
+    const Eigen::MatrixXd b = folds == 1 ? coefficients
+                                         : solve(without_rows(data.x, begin, end),
+                                                 without_rows(data.y, begin, end), penalty);
     fit.left_out_um.middleRows(begin, end - begin) = data.x.middleRows(begin, end - begin) * b;
   }
   for (Eigen::Index o = 0; o < data.y.cols(); ++o) {
@@ -138,7 +142,7 @@ void judge_outputs(const MeasuredTests& tests, const Stacked& data, Fit& fit) {
       output.fold_no_model_rms_um.push_back(rms(data.y.col(o).segment(data.begin[f], rows)));
     }
   }
-  judge_hot_half(tests, data, fit);
+  judge_hot_half(tests, data, penalty, fit);
   Eigen::MatrixXd scaled = data.x;
   scaled.colwise().normalize();
   const auto values = scaled.jacobiSvd().singularValues();
@@ -301,13 +305,13 @@ Equation chosen_equation(const MeasuredTests& tests, const FitOptions& options) 
   Fit fit;
   static_cast<void>(choose(tests, options, fit));
   const Stacked data = stack(tests, fit.columns);
-  return {fit.columns, solve(data.x, data.y)};
+  return {fit.columns, solve(data.x, data.y, options.penalty)};
 }
 
 Fit fit_equation(const MeasuredTests& tests, const FitOptions& options) {
   Fit fit;
   const Chosen chosen = choose(tests, options, fit);
-  judge_outputs(tests, stack(tests, fit.columns), fit);
+  judge_outputs(tests, stack(tests, fit.columns), options.penalty, fit);
   judge_losses(tests, chosen.pool, chosen.columns, fit);
   warn(tests, fit);
   return fit;

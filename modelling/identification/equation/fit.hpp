@@ -31,6 +31,9 @@ struct FitOptions {
   double lag_gain_min{0.05};  ///< share of the left-out sum of squares that a lag must take away
   /// Where groups allow nothing: fewer terms, then any places, each with a warning.
   bool relaxes{false};
+  /// Share of its own mean square that each column counts for as error: columns that nearly say the
+  /// same then share what is theirs, instead of gains that balance each other. 0: least squares.
+  double penalty{0.0};
   std::size_t kept_for_lags{3000};  ///< combinations of each number of terms that get lags
 };
 

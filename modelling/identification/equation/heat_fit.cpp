@@ -22,10 +22,12 @@ std::vector<HeatColumn> candidates(const MeasuredTests& tests) {
   for (const TestRun& run : tests.runs)
     longest_s = std::max(longest_s, run.time_s[run.time_s.size() - 1] - run.time_s[0]);
   std::vector<HeatColumn> all;
-  for (std::size_t signal = 0; signal < tests.signals.size(); ++signal)
+  for (std::size_t signal = 0; signal < tests.signals.size(); ++signal) {
+    if (!tests.moved(tests.signals[signal])) continue;
     for (const double power : {1.0, 2.0})
       for (const double tau_s : taus_s)
         if (tau_s <= longest_s / 3.0) all.push_back({signal, power, tau_s});
+  }
   return all;
 }
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <set>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 
 #include "estimator/model/terms/low_pass.hpp"
 #include "estimator/thermal_model.hpp"
@@ -15,10 +15,6 @@ namespace thermocomp::identification {
 namespace {
 
 constexpr std::size_t columns_max = 600;
-constexpr std::size_t parts_inside_max = 8;
-constexpr std::size_t parts_inside_of_many_columns = 4;
-constexpr std::size_t many_columns = 200;
-constexpr std::size_t folds_enough_inside = 4;
 constexpr double shortest_s = 300.0;
 constexpr double ratio = 3.0;
 constexpr std::size_t lags_max = 6;
@@ -26,31 +22,20 @@ constexpr int hinges_a_signal = 8;
 constexpr std::size_t values_of_a_switch_max = 6;
 /// A hinge counts as half of what it moves: nothing but the recording says that it is there.
 constexpr double weight_of_hinge = 0.5;
-// Of columns as scales() leaves them: added to a mean square, and of the correlation with the
-// output.
-constexpr std::array<double, 7> ridge_penalties{1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0};
-constexpr std::array<double, 6> l1_prices{0.3, 0.1, 0.03, 0.01, 0.003, 0.001};
-// Where nothing chooses: a column says what it stands for to 3, 5 and 10 % of the motion that
-// scales() divides by, errors of that size being what a ridge of 0.001, 0.003 and 0.01 stands for;
-// L1 prices alike.
-constexpr std::array<double, 3> unchosen_penalties{1e-3, 3e-3, 1e-2};
-constexpr std::array<double, 3> unchosen_prices{1e-2, 3e-3, 1e-3};
-constexpr int l1_rounds_max = 300;
-constexpr double l1_tolerance = 1e-4;
-constexpr std::size_t nothing = std::numeric_limits<std::size_t>::max();
+/// Of columns of standard deviation 1: added to a mean square; and of the correlation with the
+/// output.
+constexpr std::array<double, 3> ridge_penalties{1e-3, 3e-3, 1e-2};
+constexpr std::array<double, 3> l1_prices{1e-2, 3e-3, 1e-3};
+/// A place that moved by less than this share of the usual one is not believed more for it.
+constexpr double usual_share = 0.1;
+constexpr int l1_rounds_max = 100;
+constexpr double l1_tolerance = 1e-3;
 
 bool is_switch(const MeasuredTests& tests, Eigen::Index signal) {
   return std::all_of(tests.runs.begin(), tests.runs.end(), [&](const TestRun& run) {
     const auto column = run.signals.col(signal).array();
     return (column == 0.0 || column == 1.0).all();
   });
-}
-
-Eigen::MatrixXd ridge(const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& solver,
-                      const Eigen::MatrixXd& xy, double penalty) {
-  const Eigen::VectorXd values = solver.eigenvalues().cwiseMax(0.0).array() + penalty;
-  return solver.eigenvectors() *
-         (values.cwiseInverse().asDiagonal() * (solver.eigenvectors().transpose() * xy));
 }
 
 /// Coordinate descent, min 1/2 w'Aw - c'w + price |w|_1, begun at `w`.
@@ -72,33 +57,28 @@ void descend(const Eigen::MatrixXd& a, const Eigen::VectorXd& c, double price, E
   }
 }
 
-/// What the columns are multiplied by before they are fitted; 0 for what never moves.
-///
-/// Scaled by its own standard deviation, a place that hardly warmed in the runs is trusted with as
-/// much displacement as one that did, and carries it far where it warms another day; scaled alike
-/// per kelvin, a place is believed as little as it moved. Divided by the geometric mean of both,
-/// measured machines are predicted best (docs/measurements.md). A signal's unit says nothing: its
-/// own standard deviation stands for that of the temperatures.
+/// What the columns are multiplied by before they are fitted; 0: no gain, for what never moves, and
+/// for all that is made of a signal that stood still.
 /// @param deviation  standard deviation of each column
 /// @param size       its RMS
 Eigen::VectorXd scales(const Eigen::VectorXd& deviation, const Eigen::VectorXd& size,
-                       std::size_t places, const BankColumns& columns) {
-  const auto of_places = static_cast<Eigen::Index>(places);
-  const auto of_all = static_cast<Eigen::Index>(columns.subjects.size());
+                       const MeasuredTests& tests, const BankColumns& columns) {
+  const auto places = static_cast<Eigen::Index>(tests.places.size());
+  const double usual_K = std::sqrt(deviation.head(places).squaredNorm() /
+                                   static_cast<double>(std::max<Eigen::Index>(places, 1)));
   const auto late = static_cast<Eigen::Index>(columns.late());
-  const double usual_K = std::sqrt(deviation.head(of_places).squaredNorm() /
-                                   static_cast<double>(std::max<std::size_t>(places, 1)));
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(deviation.size());
   for (Eigen::Index i = 0; i < deviation.size(); ++i) {
     if (!(deviation[i] > 1e-12 * size[i])) continue;
+    const auto at = static_cast<std::size_t>(i >= late ? i - late : i);
+    const Eigen::Index subject = i % static_cast<Eigen::Index>(columns.subjects.size());
     if (i >= late) {
-      scale[i] = weight_of_hinge / deviation[i];
-      continue;
+      if (tests.moved(columns.hinges[at].signal)) scale[i] = weight_of_hinge / deviation[i];
+    } else if (subject < places) {
+      scale[i] = 1.0 / std::hypot(deviation[i], usual_share * usual_K);
+    } else if (tests.moved(columns.subjects[static_cast<std::size_t>(subject)])) {
+      scale[i] = 1.0 / deviation[i];
     }
-    const Eigen::Index subject = i % of_all;
-    const double kind = subject < of_places ? usual_K : deviation[subject];
-    const double product = deviation[i] * kind;
-    if (product > 0) scale[i] = 1.0 / std::sqrt(product);
   }
   return scale;
 }
@@ -114,19 +94,6 @@ Rows complete_rows(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
   for (Eigen::Index row = 0; row < y.rows(); ++row)
     if (y.row(row).allFinite()) complete.push_back(row);
   return {x(complete, Eigen::all), y(complete, Eigen::all)};
-}
-
-/// Weights of penalties by what they leave: e^-8 each.
-std::vector<double> weights(const std::vector<double>& left_um2) {
-  const double least = *std::min_element(left_um2.begin(), left_um2.end());
-  std::vector<double> result;
-  double sum = 0.0;
-  for (const double each : left_um2) {
-    result.push_back(each > 0 ? std::pow(least / each, 4.0) : 1.0);
-    sum += result.back();
-  }
-  for (double& each : result) each /= sum;
-  return result;
 }
 
 }  // namespace
@@ -258,158 +225,55 @@ BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& colu
   for (const TestRun& run : tests.runs) rows_.push_back(bank_of(run, tests, columns));
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(count);
   Eigen::VectorXd squares = sum;
-  const std::size_t folds = tests.folds.size();
-  // With few runs, stretches of them are left out inside, else whole runs.
-  const std::size_t cuts = folds < folds_enough_inside ? (parts_inside_max + folds - 1) / folds : 1;
-  for (std::size_t f = 0; f < folds; ++f)
-    for (std::size_t cut = 0; cut < cuts; ++cut) {
-      const Fold& fold = tests.folds[f];
-      const Eigen::Index length = fold.end - fold.begin;
-      const auto at = [&](std::size_t i) {
-        return length * static_cast<Eigen::Index>(i) / static_cast<Eigen::Index>(cuts);
-      };
-      const Eigen::Index begin = fold.begin + at(cut);
-      const Rows part =
-          complete_rows(rows_[fold.run].middleRows(begin, at(cut + 1) - at(cut)),
-                        tests.runs[fold.run].outputs_um.middleRows(begin, at(cut + 1) - at(cut)));
-      const Eigen::MatrixXd& x = part.x;
-      const Eigen::MatrixXd& y = part.y;
-      Sums& sums = pieces_.emplace_back();
-      sums.xx = x.transpose() * x;
-      sums.xy = x.transpose() * y;
-      sums.yy = y.colwise().squaredNorm().transpose();
-      sums.rows = static_cast<double>(x.rows());
-      sum += x.colwise().sum().transpose();
-      squares += sums.xx.diagonal();
-      fold_.push_back(f);
-    }
+  for (const Fold& fold : tests.folds) {
+    const Eigen::Index length = fold.end - fold.begin;
+    const Rows part = complete_rows(rows_[fold.run].middleRows(fold.begin, length),
+                                    tests.runs[fold.run].outputs_um.middleRows(fold.begin, length));
+    Sums& sums = folds_.emplace_back();
+    sums.xx = part.x.transpose() * part.x;
+    sums.xy = part.x.transpose() * part.y;
+    sums.yy = part.y.colwise().squaredNorm().transpose();
+    sums.rows = static_cast<double>(part.x.rows());
+    sum += part.x.colwise().sum().transpose();
+    squares += sums.xx.diagonal();
+  }
   const auto rows = static_cast<double>(tests.rows());
   const Eigen::VectorXd variance = squares / rows - (sum / rows).cwiseAbs2();
-  scale_ = scales(variance.cwiseMax(0.0).cwiseSqrt(), (squares / rows).cwiseSqrt(),
-                  tests.places.size(), columns);
-  for (Sums& sums : pieces_) {
+  scale_ = scales(variance.cwiseMax(0.0).cwiseSqrt(), (squares / rows).cwiseSqrt(), tests, columns);
+  for (Sums& sums : folds_) {
     sums.xx = scale_.asDiagonal() * sums.xx * scale_.asDiagonal();
     sums.xy = scale_.asDiagonal() * sums.xy;
   }
-  runs_choose_ = tests.runs.size() >= folds_enough_inside;
-  parts_ = std::min(columns.size() > many_columns ? parts_inside_of_many_columns : parts_inside_max,
-                    pieces_.size());
-  for (std::size_t i = 0; i < pieces_.size(); ++i) part_.push_back(i * parts_ / pieces_.size());
-}
-
-BankEquations::Sums BankEquations::sums_without(std::size_t left_out, std::size_t part) const {
-  Sums sums;
-  sums.xx = Eigen::MatrixXd::Zero(pieces_[0].xx.rows(), pieces_[0].xx.cols());
-  sums.xy = Eigen::MatrixXd::Zero(pieces_[0].xy.rows(), pieces_[0].xy.cols());
-  sums.yy = Eigen::VectorXd::Zero(pieces_[0].yy.size());
-  for (std::size_t f = 0; f < pieces_.size(); ++f) {
-    if (fold_[f] == left_out || part_[f] == part) continue;
-    sums.xx += pieces_[f].xx;
-    sums.xy += pieces_[f].xy;
-    sums.yy += pieces_[f].yy;
-    sums.rows += pieces_[f].rows;
-  }
-  return sums;
-}
-
-std::vector<Eigen::MatrixXd> BankEquations::ridge_path(const Sums& sums,
-                                                       std::span<const double> penalties) {
-  std::vector<Eigen::MatrixXd> all;
-  const double rows = std::max(1.0, sums.rows);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(sums.xx / rows);
-  for (const double penalty : penalties) all.push_back(ridge(solver, sums.xy / rows, penalty));
-  return all;
-}
-
-std::vector<Eigen::MatrixXd> BankEquations::l1_path(const Sums& sums,
-                                                    std::span<const double> prices) {
-  std::vector<Eigen::MatrixXd> all;
-  const double rows = std::max(1.0, sums.rows);
-  const Eigen::MatrixXd xx = sums.xx / rows;
-  const Eigen::MatrixXd xy = sums.xy / rows;
-  Eigen::MatrixXd w = Eigen::MatrixXd::Zero(xy.rows(), xy.cols());
-  for (const double price : prices) {
-    for (Eigen::Index o = 0; o < w.cols(); ++o) {
-      const double size_um = std::sqrt(sums.yy[o] / rows);
-      if (!(size_um > 0)) continue;
-      Eigen::VectorXd column = w.col(o) / size_um;
-      descend(xx, xy.col(o) / size_um, price, column);
-      w.col(o) = column * size_um;
-    }
-    all.push_back(w);
-  }
-  return all;
-}
-
-std::vector<Eigen::MatrixXd> BankEquations::paths(const Sums& sums) {
-  std::vector<Eigen::MatrixXd> all = ridge_path(sums, ridge_penalties);
-  const std::vector<Eigen::MatrixXd> sparse = l1_path(sums, l1_prices);
-  all.insert(all.end(), sparse.begin(), sparse.end());
-  return all;
 }
 
 Eigen::MatrixXd BankEquations::fit(std::size_t left_out) const {
-  return runs_choose_ ? chosen(left_out) : unchosen(left_out);
-}
-
-bool BankEquations::lacks_more(std::size_t left_out, std::size_t part) const {
-  bool lacks = false;
-  bool rest = false;
-  for (std::size_t f = 0; f < pieces_.size(); ++f) {
-    if (fold_[f] == left_out) continue;
-    (part_[f] == part ? lacks : rest) = true;
+  Eigen::MatrixXd xx = Eigen::MatrixXd::Zero(scale_.size(), scale_.size());
+  Eigen::MatrixXd xy = Eigen::MatrixXd::Zero(scale_.size(), folds_[0].xy.cols());
+  Eigen::VectorXd yy = Eigen::VectorXd::Zero(xy.cols());
+  double rows = 0.0;
+  for (std::size_t f = 0; f < folds_.size(); ++f) {
+    if (f == left_out) continue;
+    xx += folds_[f].xx;
+    xy += folds_[f].xy;
+    yy += folds_[f].yy;
+    rows += folds_[f].rows;
   }
-  return lacks && rest;
-}
-
-Eigen::MatrixXd BankEquations::unchosen(std::size_t left_out) const {
-  Eigen::MatrixXd gains = Eigen::MatrixXd::Zero(pieces_[0].xy.rows(), pieces_[0].xy.cols());
-  for (const Eigen::MatrixXd& each :
-       ridge_path(sums_without(left_out, nothing), unchosen_penalties))
-    gains += 0.5 / static_cast<double>(unchosen_penalties.size()) * each;
-  // Which of columns that go together L1 takes is chance: a mean over records tells less of it.
-  Eigen::MatrixXd sparse = Eigen::MatrixXd::Zero(gains.rows(), gains.cols());
-  double records = 0.0;
-  for (std::size_t part = 0; part < parts_; ++part) {
-    if (!lacks_more(left_out, part)) continue;
-    for (const Eigen::MatrixXd& each : l1_path(sums_without(left_out, part), unchosen_prices))
-      sparse += each;
-    records += static_cast<double>(unchosen_prices.size());
-  }
-  gains += 0.5 / std::max(1.0, records) * sparse;
-  return scale_.asDiagonal() * gains;
-}
-
-Eigen::MatrixXd BankEquations::chosen(std::size_t left_out) const {
-  const Eigen::Index outputs = pieces_[0].xy.cols();
-  std::vector<std::vector<double>> left_um2(ridge_penalties.size() + l1_prices.size());
-  for (auto& each : left_um2) each.assign(static_cast<std::size_t>(outputs), 0.0);
-  for (std::size_t part = 0; part < parts_; ++part) {
-    const std::vector<Eigen::MatrixXd> all = paths(sums_without(left_out, part));
-    for (std::size_t f = 0; f < pieces_.size(); ++f) {
-      if (part_[f] != part || fold_[f] == left_out) continue;
-      const Sums& own = pieces_[f];
-      for (std::size_t p = 0; p < all.size(); ++p)
-        for (Eigen::Index o = 0; o < outputs; ++o) {
-          const auto w = all[p].col(o);
-          const double error = own.yy[o] - 2.0 * w.dot(own.xy.col(o)) + w.dot(own.xx * w);
-          left_um2[p][static_cast<std::size_t>(o)] += std::max(0.0, error);
-        }
+  xx /= std::max(rows, 1.0);
+  xy /= std::max(rows, 1.0);
+  Eigen::MatrixXd gains = Eigen::MatrixXd::Zero(xy.rows(), xy.cols());
+  for (Eigen::Index o = 0; o < xy.cols(); ++o) {
+    const double size_um = std::sqrt(yy[o] / std::max(rows, 1.0));
+    if (!(size_um > 0)) continue;
+    Eigen::VectorXd sparse = Eigen::VectorXd::Zero(xy.rows());
+    for (const double price : l1_prices) {
+      descend(xx, xy.col(o) / size_um, price, sparse);
+      gains.col(o) += 0.5 * size_um / static_cast<double>(l1_prices.size()) * sparse;
     }
   }
-  const std::vector<Eigen::MatrixXd> all = paths(sums_without(left_out, nothing));
-  Eigen::MatrixXd gains = Eigen::MatrixXd::Zero(all[0].rows(), outputs);
-  for (Eigen::Index o = 0; o < outputs; ++o) {
-    const auto take = [&](std::size_t begin, std::size_t end) {
-      std::vector<double> left;
-      for (std::size_t p = begin; p < end; ++p)
-        left.push_back(left_um2[p][static_cast<std::size_t>(o)]);
-      const std::vector<double> shares = weights(left);
-      for (std::size_t p = begin; p < end; ++p)
-        gains.col(o) += 0.5 * shares[p - begin] * all[p].col(o);
-    };
-    take(0, ridge_penalties.size());
-    take(ridge_penalties.size(), all.size());
+  for (const double penalty : ridge_penalties) {
+    Eigen::MatrixXd a = xx;
+    a.diagonal().array() += penalty;
+    gains += 0.5 / static_cast<double>(ridge_penalties.size()) * a.llt().solve(xy);
   }
   return scale_.asDiagonal() * gains;
 }

@@ -2,7 +2,6 @@
 /// knows which few sensors matter.
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 
@@ -53,21 +52,16 @@ void add_hinges(const MeasuredTests& tests, BankColumns& columns);
                                                 const std::vector<std::string>& outputs,
                                                 const Eigen::MatrixXd& gains);
 
-/// X'X and X'Y of every fold, columns scaled between a standard deviation of 1 and 1 per kelvin.
-/// Rows in which an output is missing (NaN) do not count.
+/// X'X and X'Y of every fold, columns scaled to a standard deviation of 1. Rows in which an output
+/// is missing (NaN) do not count.
 class BankEquations {
  public:
   BankEquations(const MeasuredTests& tests, const BankColumns& columns);
 
   /// Gains [um per unit], shape (columns, outputs), from all folds but `left_out` (none: past the
-  /// last). Half of them from ridge regression, half from L1 regression, in each an average over
-  /// penalties. On measured machines neither kind is better than the other, and their mean is
-  /// seldom worse than the better one.
-  ///
-  /// With four runs or more the runs choose: a penalty that leaves e^2 on runs left out inside
-  /// counts as e^-8. Stretches of fewer runs share their loads, and predict penalties alike that
-  /// part by several times on another day: a decade of them counts alike then, and L1 regression is
-  /// a mean over records that lack a stretch each.
+  /// last): the mean of a ridge and an L1 regression at fixed penalties. Neither kind is better
+  /// than the other on measured machines, and stretches of a record do not predict which penalty is
+  /// best on another day (docs/measurements.md).
   [[nodiscard]] Eigen::MatrixXd fit(std::size_t left_out) const;
 
   [[nodiscard]] const std::vector<Eigen::MatrixXd>& rows() const noexcept { return rows_; }
@@ -79,23 +73,7 @@ class BankEquations {
     Eigen::VectorXd yy;
     double rows{0.0};
   };
-  [[nodiscard]] Sums sums_without(std::size_t left_out, std::size_t also) const;
-  /// Whether leaving the part out too takes something away, and not everything.
-  [[nodiscard]] bool lacks_more(std::size_t left_out, std::size_t part) const;
-  [[nodiscard]] static std::vector<Eigen::MatrixXd> ridge_path(const Sums& sums,
-                                                               std::span<const double> penalties);
-  /// @param prices  descending
-  [[nodiscard]] static std::vector<Eigen::MatrixXd> l1_path(const Sums& sums,
-                                                            std::span<const double> prices);
-  [[nodiscard]] static std::vector<Eigen::MatrixXd> paths(const Sums& sums);
-  [[nodiscard]] Eigen::MatrixXd chosen(std::size_t left_out) const;
-  [[nodiscard]] Eigen::MatrixXd unchosen(std::size_t left_out) const;
-
-  std::vector<Sums> pieces_;       ///< of the folds
-  std::vector<std::size_t> fold_;  ///< of each piece
-  std::vector<std::size_t> part_;  ///< of each piece: which are left out together inside
-  std::size_t parts_{0};
-  bool runs_choose_{false};
+  std::vector<Sums> folds_;
   Eigen::VectorXd scale_;
   std::vector<Eigen::MatrixXd> rows_;  ///< one a run
 };

@@ -5,10 +5,12 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "modelling/identification/equation/heat_fit.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
 #include "modelling/identification/families/made_from_tests.hpp"
+#include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -19,13 +21,16 @@ constexpr Eigen::Index stretches_of_only_run = 6;
 /// mostly what a single run has not shown.
 constexpr std::size_t runs_that_choose = 4;
 constexpr std::size_t stretches_that_choose = 8;
-/// Squares, over those of no model, that a family may leave of a whole run: beyond, it is out.
-constexpr double runaway_score = 10.0;
+constexpr double correlation_of_one = 0.98;
 /// Shares of the RMS left out that a family must leave less. By the first no model was made of
 /// noise alone in 60 sets of four to seven simulated runs, three in 30 sets whose noise wanders for
 /// hours.
 constexpr double less_than_none = 0.1;
 constexpr double less_than_simpler = 0.01;
+/// What is left of a fold counts as at least so much of what no model leaves of all: below, a
+/// family is as good as another.
+constexpr double least_share = 0.01;
+constexpr double penalty_of_few = 0.003;  ///< in the middle of the bank's
 
 std::size_t index_of_family(Family family) {
   return static_cast<std::size_t>(family);
@@ -74,6 +79,7 @@ FitOptions options_of(Family family, const MeasuredTests& tests, FitOptions opti
   options.lags = family != Family::static_few;
   options.relaxes = true;
   options.kept_for_lags = kept_for_lags;
+  options.penalty = penalty_of_few;
   // Every combination of five of so many is more than a minute's work.
   if (tests.places.size() > 24) options.terms_max = std::min<std::size_t>(options.terms_max, 4);
   if (tests.places.size() > 40) options.terms_max = std::min<std::size_t>(options.terms_max, 3);
@@ -173,48 +179,128 @@ FamilyResult judge_bank(const MeasuredTests& tests, const BankEquations& bank,
   return result;
 }
 
+/// Lags and heats of few sensors only where they were asked for: their gains balance each other,
+/// and on no measured machine were they clearly better than the bank (docs/measurements.md).
+bool offered(Family family, std::optional<Family> forced) {
+  return (family != Family::lagged_few && family != Family::physical) || family == forced;
+}
+
 /// Every family on the folds left out, order of all_families.
 std::vector<FamilyResult> judged(const MeasuredTests& tests, const FitOptions& options,
-                                 const BankEquations& bank, const std::function<void()>& done) {
+                                 std::optional<Family> forced, const BankEquations& bank,
+                                 const std::function<void()>& done) {
   std::vector<FamilyResult> results(1);
   results[0].left_out_um =
       Eigen::MatrixXd::Zero(rows_of(tests), static_cast<Eigen::Index>(tests.outputs.size()));
   judge(tests, results[0]);
-  for (const Family family : {Family::static_few, Family::lagged_few, Family::physical})
-    results.push_back(judge_few(family, tests, options, done));
+  for (const Family family : {Family::static_few, Family::lagged_few, Family::physical}) {
+    if (offered(family, forced)) {
+      results.push_back(judge_few(family, tests, options, done));
+      continue;
+    }
+    FamilyResult& result = results.emplace_back();
+    result.family = family;
+    result.why_not = "only where asked for: --family " + std::string(to_string(family));
+  }
   results.push_back(judge_bank(tests, bank, done));
   return results;
 }
 
-double total(const FamilyResult& result) {
-  return std::accumulate(result.scores.begin(), result.scores.end(), 0.0);
+/// The first and the second half of the only run, each left out as a whole: what a model meets when
+/// it is used after the record.
+MeasuredTests in_halves(const MeasuredTests& tests) {
+  MeasuredTests halves = tests;
+  const Fold& first = tests.folds[tests.folds.size() / 2];
+  const Eigen::Index middle = first.begin;
+  halves.folds = {{0, tests.folds.front().begin, middle}, {0, middle, tests.folds.back().end}};
+  return halves;
 }
 
-/// The family whose left-out RMS, as geometric mean of the outputs, is least: a factor counts alike
-/// in an output that moves little. Of those that leave the same to 1 % the simplest, and no model
-/// at all unless one leaves a tenth less. Nothing more is given away for simplicity: one standard
-/// error of a handful of runs that differ much from each other is so large that on measured
-/// machines no model at all was often within it (docs/measurements.md).
-Family least_left(const std::vector<FamilyResult>& results) {
-  const auto left = [](const FamilyResult& result) {
-    double sum = 0.0;
-    for (const double rms_um : result.left_out_rms_um) sum += std::log(std::max(rms_um, 1e-30));
-    return sum / static_cast<double>(result.left_out_rms_um.size());
-  };
-  const FamilyResult* best = &results[0];
-  for (const FamilyResult& result : results) {
-    const double less = best == &results[0] ? less_than_none : less_than_simpler;
-    if (result.answers && left(result) < left(*best) + std::log(1.0 - less)) best = &result;
+using Judgement = std::pair<MeasuredTests, std::vector<FamilyResult>>;
+
+/// What a family leaves, geometric mean of judgements, outputs and folds: a factor counts alike in
+/// an output that moves little, and one stretch does not decide.
+double left_by(const std::vector<Judgement>& judgements, std::size_t family) {
+  double sum = 0.0;
+  for (const auto& [tests, results] : judgements) {
+    double of_judgement = 0.0;
+    for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+      const double least_um = std::max(least_share * results[0].left_out_rms_um[o], 1e-30);
+      for (const double rms_um : results[family].fold_um[o])
+        of_judgement += std::log(std::max(rms_um, least_um));
+    }
+    sum += of_judgement / static_cast<double>(tests.outputs.size() * tests.folds.size());
   }
-  return best->family;
+  return std::exp(sum / static_cast<double>(judgements.size()));
 }
 
-/// @param by_runs  the same families on whole runs
-std::vector<FamilyResult> without_runaways(std::vector<FamilyResult> results,
-                                           const std::vector<FamilyResult>& by_runs) {
-  for (std::size_t i = 0; i < results.size(); ++i)
-    if (total(by_runs[i]) > runaway_score) results[i].answers = false;
-  return results;
+/// Names where the family does worse than no model, over all that a judgement left out.
+std::string worse_than_none(const std::vector<Judgement>& judgements, std::size_t family) {
+  const auto sum = [](const std::vector<double>& scores) {
+    return std::accumulate(scores.begin(), scores.end(), 0.0);
+  };
+  for (const auto& [tests, results] : judgements)
+    if (!(sum(results[family].scores) < sum(results[0].scores)))
+      return tests.runs.size() > 1 && tests.folds.size() == tests.runs.size() ? "whole runs"
+             : tests.folds.size() == 2                                        ? "halves"
+                                                                              : "stretches";
+  return "";
+}
+
+/// One rule for all families: the one that leaves least, of those alike to 1 % the simplest; no
+/// model unless it leaves a tenth less. Out is what does worse than no model anywhere it was
+/// judged.
+void choose(const std::vector<Judgement>& judgements, FamiliesFit& fit) {
+  std::size_t chosen = 0;
+  std::vector<double> left_um{left_by(judgements, 0)};
+  std::string worse;
+  for (std::size_t i = 1; i < fit.results.size(); ++i) {
+    left_um.push_back(std::numeric_limits<double>::infinity());
+    if (!std::all_of(judgements.begin(), judgements.end(),
+                     [&](const Judgement& each) { return each.second[i].answers; }))
+      continue;
+    left_um[i] = left_by(judgements, i);
+    const std::string where = worse_than_none(judgements, i);
+    if (!where.empty()) {
+      worse.append("; ").append(to_string(all_families[i])).append(" is worse than no model on ");
+      worse += where;
+    } else if (left_um[i] <
+               (1.0 - (chosen == 0 ? less_than_none : less_than_simpler)) * left_um[chosen]) {
+      chosen = i;
+    }
+  }
+  fit.chosen = all_families[chosen];
+  fit.chosen_because = printed(
+                           "leaves %.3g um of what was left out (geometric mean), no "
+                           "model %.3g",
+                           left_um[chosen], left_um[0]) +
+                       worse;
+}
+
+/// Groups of places whose rises correlate so far that nothing recorded tells them apart.
+std::vector<std::vector<std::string>> moved_together(const MeasuredTests& tests) {
+  const auto places = static_cast<Eigen::Index>(tests.places.size());
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(places, places);
+  for (const TestRun& run : tests.runs) {
+    const Eigen::MatrixXd rows = run.places_K.bottomRows(run.places_K.rows() - run.begin);
+    const Eigen::MatrixXd centred = rows.rowwise() - rows.colwise().mean();
+    squares.noalias() += centred.transpose() * centred;
+  }
+  std::vector<std::vector<std::string>> groups;
+  std::vector<bool> taken(tests.places.size(), false);
+  for (Eigen::Index a = 0; a < places; ++a) {
+    if (taken[static_cast<std::size_t>(a)]) continue;
+    std::vector<std::string> group{tests.places[static_cast<std::size_t>(a)]};
+    for (Eigen::Index b = a + 1; b < places; ++b) {
+      const double correlation = squares(a, b) / std::sqrt(squares(a, a) * squares(b, b));
+      if (taken[static_cast<std::size_t>(b)] || !(std::abs(correlation) > correlation_of_one))
+        continue;
+      taken[static_cast<std::size_t>(b)] = true;
+      group.push_back(tests.places[static_cast<std::size_t>(b)]);
+    }
+    if (group.size() > 1) groups.push_back(std::move(group));
+  }
+  return groups;
 }
 
 ThermalModel no_model(const MeasuredTests& tests) {
@@ -273,9 +359,20 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
         "course of speeds or loads; fit both, and each judges the other");
   const FamilyResult& chosen = fit.chosen_result();
   const FamilyResult& none = fit.results[index_of_family(Family::none)];
+  for (const std::string& signal : tests.unmoved)
+    fit.warnings.push_back(signal +
+                           " stayed at a level within each run: what it does when it moves is not "
+                           "known, it gets no gain");
   if (fit.chosen == Family::none) {
     fit.warnings.emplace_back("no model is better than none on what was left out: its matrix is 0");
     return;
+  }
+  for (const auto& group : fit.together) {
+    std::string names;
+    for (const std::string& name : group) names += (names.empty() ? "" : ", ") + name;
+    fit.warnings.push_back(names +
+                           " always moved together: their gains are shared out. Where they can "
+                           "move apart, record that once");
   }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     for (std::size_t f = 0; f < tests.folds.size(); ++f)
@@ -316,24 +413,28 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
                          std::optional<Family> forced,
                          const std::function<void(double)>& progress) {
   FamiliesFit fit;
-  const bool few_runs = tests.runs.size() > 1 && tests.runs.size() < runs_that_choose;
-  const MeasuredTests choosing = few_runs && !forced ? in_stretches(tests) : MeasuredTests{};
-  const double steps = 4.0 * static_cast<double>(tests.folds.size() + choosing.folds.size());
+  const bool one_run = tests.runs.size() < 2;
+  const bool few_runs = !one_run && tests.runs.size() < runs_that_choose;
+  const MeasuredTests further = few_runs                            ? in_stretches(tests)
+                                : one_run && tests.folds.size() > 1 ? in_halves(tests)
+                                                                    : MeasuredTests{};
+  const double steps = 3.0 * static_cast<double>(tests.folds.size() + further.folds.size());
   double step = 0.0;
-  const auto done = [&] { progress(++step / steps); };
+  const auto done = [&] { progress(std::min(1.0, ++step / steps)); };
   BankColumns columns = bank_columns(tests);
   add_hinges(tests, columns);
   const BankEquations bank(tests, columns);
-  fit.results = judged(tests, options, bank, done);
-  if (forced)
+  fit.results = judged(tests, options, forced, bank, done);
+  std::vector<Judgement> judgements{{tests, fit.results}};
+  if (!further.folds.empty() && !forced)
+    judgements.emplace_back(
+        further, judged(further, options, forced, BankEquations(further, columns), done));
+  choose(judgements, fit);
+  if (forced) {
     fit.chosen = *forced;
-  else if (choosing.folds.empty())
-    fit.chosen = least_left(fit.results);
-  else
-    fit.chosen = least_left(without_runaways(
-        judged(choosing, options, BankEquations(choosing, columns), done), fit.results));
-  fit.chosen_as_asked = forced.has_value();
-  fit.chosen_by_stretches = !choosing.folds.empty();
+    fit.chosen_because = "as asked for";
+  }
+  fit.together = moved_together(tests);
   if (!fit.chosen_result().answers)
     throw std::runtime_error(std::string(to_string(fit.chosen)) + ": " +
                              fit.chosen_result().why_not);
@@ -341,12 +442,11 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
     fit.model = no_model(tests);
   else if (fit.chosen == Family::lag_bank)
     fit.model = bank_model(tests, columns, bank.fit(tests.folds.size()));
-  else
+  else if (fit.chosen == Family::physical)
     fit.model = few_model(tests, few_of(fit.chosen, tests, options));
-  if (fit.chosen == Family::static_few || fit.chosen == Family::lagged_few) {
-    fit.few = fit_equation(tests, options_of(fit.chosen, tests, options));
-    fit.model = model_of(tests, *fit.few);
-  }
+  else
+    fit.model = model_of(
+        tests, fit.few.emplace(fit_equation(tests, options_of(fit.chosen, tests, options))));
   fit.model.made_from = made_from_tests(tests, fit);
   add_warnings(tests, fit);
   return fit;

@@ -9,9 +9,11 @@
 
 namespace thermocomp::identification {
 
-/// The family that leaves least of what is left out, the simplest of those alike to 1 %, and no
-/// model unless one leaves a tenth less. Left out are runs; of one run, and to choose among
-/// families with two or three, stretches.
+/// One rule for none, static_few and lag_bank, on what is left out: whole runs; of one run
+/// stretches and halves; of two or three runs stretches too. Out is what does worse than no model
+/// anywhere it was judged; of the others the one that leaves least, of those alike to 1 % the
+/// simplest; and no model unless one leaves a tenth less. lagged_few and physical are judged where
+/// they are forced.
 /// @param forced    instead of it
 /// @param progress  is told the share of the work done
 /// @throws std::runtime_error when the forced family has no answer

@@ -36,10 +36,11 @@ struct FamilyResult {
 struct FamiliesFit {
   std::vector<FamilyResult> results;  ///< order of all_families
   Family chosen{Family::none};
-  bool chosen_as_asked{false};
   bool chosen_by_stretches{false};  ///< of two or three runs; `results` are of whole runs
-  ThermalModel model;               ///< of the chosen family, on all rows, with [made_from]
-  std::optional<Fit> few;           ///< the equation, where it is one of few sensors
+  std::string chosen_because;       ///< one line, with the figures that decided
+  std::vector<std::vector<std::string>> together;  ///< places that always moved alike
+  ThermalModel model;      ///< of the chosen family, on all rows, with [made_from]
+  std::optional<Fit> few;  ///< the equation, where it is one of few sensors
   std::vector<std::string> warnings;
 
   [[nodiscard]] const FamilyResult& chosen_result() const;

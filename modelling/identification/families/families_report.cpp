@@ -72,11 +72,9 @@ std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom
                  output.left_out_rms_um, output.remainder_rms_um, output.no_model_rms_um);
 }
 
-const char* why(const MeasuredTests& tests, const FamiliesFit& fit) {
-  if (fit.chosen_as_asked) return "as asked for";
-  if (tests.runs.size() < 2) return "which leaves least";
-  if (fit.chosen_by_stretches) return "which leaves least of stretches of the few runs";
-  return "which leaves least of runs left out";
+/// The largest RMS of a fold.
+double worst_um(const FamilyResult& result, std::size_t output) {
+  return *std::max_element(result.fold_um[output].begin(), result.fold_um[output].end());
 }
 
 }  // namespace
@@ -93,7 +91,8 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   text += "   of none's squares\n";
   for (const FamilyResult& result : fit.results)
     text += line_of(result, result.family == fit.chosen);
-  text += printed("chosen: %s, %s\n", std::string(to_string(fit.chosen)).c_str(), why(tests, fit));
+  text += printed("chosen: %s, %s\n", std::string(to_string(fit.chosen)).c_str(),
+                  fit.chosen_because.c_str());
   if (one_run) text += "judged within one run: not valid for other days\n";
   if (fit.chosen != Family::none) {
     const MadeFrom& made_from = *fit.model.made_from;
@@ -115,6 +114,9 @@ std::string families_json(const MeasuredTests& tests, const FamiliesFit& fit) {
   if (fit.few) json = Json::parse(fit_json(tests, *fit.few));
   json["inputs"] = fit.chosen == Family::none ? std::vector<std::string>{} : fit.model.inputs;
   json["family"] = to_string(fit.chosen);
+  json["chosen_because"] = fit.chosen_because;
+  json["together"] = fit.together;
+  json["unmoved"] = tests.unmoved;
   json["judged_within_one_run"] = tests.runs.size() < 2;
   const FamilyResult& chosen = fit.chosen_result();
   for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
@@ -128,8 +130,13 @@ std::string families_json(const MeasuredTests& tests, const FamiliesFit& fit) {
       each["left_out_rms_um"] = nullptr;
       each["why_not"] = result.why_not;
     }
-    for (std::size_t o = 0; o < tests.outputs.size() && result.answers; ++o)
-      each["left_out_rms_um"][tests.outputs[o]] = result.left_out_rms_um[o];
+    for (std::size_t o = 0; o < tests.outputs.size() && result.answers; ++o) {
+      const std::string& name = tests.outputs[o];
+      each["left_out_rms_um"][name] = result.left_out_rms_um[o];
+      each["worst_block_rms_um"][name] = worst_um(result, o);
+      each["over_none"][name] =
+          result.left_out_rms_um[o] / std::max(fit.results.front().left_out_rms_um[o], 1e-30);
+    }
     json["families"].push_back(each);
   }
   if (!json.contains("warnings")) json["warnings"] = Json::array();
