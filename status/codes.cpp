@@ -38,7 +38,7 @@ constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
      "look at what the controller reports; check its [[controller.signal]] entries"},
     {Reason::no_reference, fault, "there is no reference state yet",
      "wait until every sensor has had a value, or: thermocomp reference"},
-    {Reason::controller_offline, fault, "the controller does not answer",
+    {Reason::controller_offline, fault, "the controller cannot be read",
      "check its power, cable and address; the offset it applied last may stay in effect"},
     {Reason::not_synced, fault, "what the controller applies is not known yet",
      "wait a moment; if it stays, check the read-back (`applied`) of every axis"},

@@ -38,9 +38,12 @@ void add_bus_troubles(const Status& status, const AddTrouble& add) {
   for (const BusStatus& bus : status.buses) {
     const std::string name = "bus " + bus.name;
     for (const UnitStatus& unit : bus.units)
-      if (!unit.answering && bus.connected)
-        add(name + ": " + unit.name + " does not answer (" + unit.last_error + ")",
-            code_text(Fault::no_answer).remedy);
+      if (!unit.answering && bus.connected) {
+        const bool is_silent = unit.timeouts >= unit.bad_frames;
+        add(name + ": " + unit.name + (is_silent ? " does not answer (" : " answers wrongly (") +
+                unit.last_error + ")",
+            code_text(is_silent ? Fault::no_answer : Fault::bad_frame).remedy);
+      }
     add_can_trouble(name, bus.state, bus.state_s, add);
     if (!bus.connected && bus.state != "bus_off")
       add(name + " is not connected (" + bus.last_error + ")", bus_remedy(bus.kind));
@@ -54,7 +57,8 @@ void add_reasons(const Status& status, const AddTrouble& add) {
       continue;
     const CodeText text = code_text(reason);
     const std::string& error = status.controller.last_error;
-    const bool has_error = reason == Reason::not_written && !error.empty();
+    const bool is_of_link = reason == Reason::not_written || reason == Reason::controller_offline;
+    const bool has_error = is_of_link && !error.empty();
     const bool switched_off = reason == Reason::operator_disabled && status.dry_run;
     add(std::string(text.meaning) + (has_error ? ": " + error : ""),
         switched_off ? dry_run_remedy : text.remedy);
@@ -187,7 +191,8 @@ std::string write_text(const WriteStatus& write) {
 }
 
 std::string_view bus_remedy(std::string_view kind) {
-  if (kind == "modbus_tcp") return "check the module's power, cable, address and port";
+  if (kind.starts_with("modbus") && kind != "modbus_rtu")
+    return "check the module's power, cable, address and port";
   if (kind == "modbus_rtu") return "check that the adapter is plugged in and is the `device` named";
   return "check the interface (ip -details link show) and its cable";
 }

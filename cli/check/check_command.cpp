@@ -26,13 +26,9 @@ std::string counted(std::size_t count, const char* what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
-std::string line_kind(const ModbusLine& line) {
-  return std::holds_alternative<ModbusRtu>(line.link) ? "modbus_rtu" : "modbus_tcp";
-}
-
 std::string own_kind(const ControllerConfig& controller) {
   if (const auto* modbus = std::get_if<ModbusControllerConfig>(&controller)) {
-    return modbus->name + " (" + line_kind(modbus->line) + ")";
+    return modbus->name + " (" + std::string(kind_of(modbus->line)) + ")";
   }
   if (const auto* can = std::get_if<CanControllerConfig>(&controller)) {
     return can->name + " (can)";

@@ -140,7 +140,7 @@ class ControllerScan {
     std::vector<ModbusValue> values;
     values.reserve(places.size());
     for (const Place& place : places) values.push_back(place.value);
-    const ReadPlan plan = plan_reads(values);
+    const ReadPlan plan = plan_reads(values, config_);
     for (std::size_t r = 0; r < plan.requests.size(); ++r) {
       const ReadRequest& request = plan.requests[r];
       std::vector<std::uint16_t> words(request.count);
@@ -173,7 +173,7 @@ class ControllerScan {
                      std::to_string(request.address) + ".." +
                      std::to_string(request.address + request.count - 1) +
                      " in one request, which the controller refuses (" + why_not(exchange) +
-                     "): provide the registers between, or move the values together";
+                     "): gap_registers_max = 0 in [controller] reads none between";
   }
 
   void ask_alone(Place& place) {
@@ -202,8 +202,7 @@ class ControllerScan {
     if (exchange.outcome == ExchangeOutcome::exception)
       return "the controller answers with " + exception_name(exchange.exception_code);
     if (exchange.outcome == ExchangeOutcome::timeout)
-      return "unit " + std::to_string(config_.unit) + " does not answer within " +
-             number_text(config_.line.timeout_ms) + " ms, asked twice";
+      return "unit " + std::to_string(config_.unit) + ": " + exchange.detail;
     if (exchange.outcome == ExchangeOutcome::disconnected && !connection_.last_error().empty())
       return connection_.last_error();
     return exchange.detail;
@@ -219,7 +218,7 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
   ScanController result;
   result.name = modbus.name;
   const auto* rtu = std::get_if<ModbusRtu>(&modbus.line.link);
-  result.kind = rtu != nullptr ? "modbus_rtu" : "modbus_tcp";
+  result.kind = kind_of(modbus.line);
   result.where = line_name(modbus.line);
   result.address = "unit " + std::to_string(modbus.unit);
   std::vector<Place> read = read_places(config, modbus);

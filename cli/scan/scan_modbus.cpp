@@ -1,10 +1,10 @@
-// Every channel is read once, with the requests that the daemon would send; a unit without answer
-// is asked twice and then left alone. Where a value is not plausible or an address is refused, the
-// registers beside it are read too. Nothing is ever written.
+// Every channel is read once, by the daemon's own poller. Where a value is not plausible or an
+// address is refused, the registers beside it are read too. Nothing is ever written.
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -14,7 +14,7 @@
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
-#include "drivers/sensors/modbus_plan.hpp"
+#include "drivers/sensors/modbus_poller.hpp"
 #include "status/codes.hpp"
 
 namespace thermocomp::cli {
@@ -56,7 +56,11 @@ class ModbusScan {
  public:
   ModbusScan(const ModbusBusConfig& config, const ScanSensors& sensors,
              const std::function<void(const std::string&)>& progress)
-      : config_(config), sensors_(sensors), progress_(progress), connection_(config.line) {}
+      : config_(config),
+        sensors_(sensors),
+        progress_(progress),
+        connection_(config.line),
+        poller_(config, connection_) {}
 
   void run(ScanBus& bus) {
     if (!connection_.connect()) {
@@ -66,10 +70,9 @@ class ModbusScan {
       }
       return;
     }
-    for (const ModbusDeviceConfig& device : config_.devices) {
-      progress_("bus " + config_.name + ": reading device " + device.name);
-      bus.devices.push_back(scan(device));
-    }
+    progress_("bus " + config_.name + ": asking its devices as the daemon does");
+    ask_as_the_daemon();
+    for (std::size_t i = 0; i < config_.devices.size(); ++i) bus.devices.push_back(scan(i));
     judge_silence(bus);
   }
 
@@ -91,8 +94,8 @@ class ModbusScan {
     return answer;
   }
 
-  ScanDevice scan(const ModbusDeviceConfig& device);
-  void split_refused(const ModbusDeviceConfig& device, ScanDevice& result);
+  void ask_as_the_daemon();
+  ScanDevice scan(std::size_t index);
   ScanChannel evaluate(const ModbusDeviceConfig& device, std::size_t index);
   void judge_value(const ModbusDeviceConfig& device, const ModbusChannel& channel,
                    std::span<const std::uint16_t> words, ScanChannel& result);
@@ -103,6 +106,8 @@ class ModbusScan {
   void hint_neighbours(const ModbusDeviceConfig& device, const ModbusChannel& channel,
                        ScanChannel& result);
   void judge_silence(ScanBus& bus) const;
+  [[nodiscard]] bool would_answer(const ModbusLine& line) const;
+  [[nodiscard]] std::string working_line() const;
   [[nodiscard]] std::string describe(const ModbusDeviceConfig& device,
                                      const Exchange& exchange) const;
   [[nodiscard]] const PlausibleRange& range_of(const ModbusChannel& channel) const {
@@ -113,6 +118,7 @@ class ModbusScan {
   const ScanSensors& sensors_;
   const std::function<void(const std::string&)>& progress_;
   ModbusConnection connection_;
+  ModbusPoller poller_;
   // Of the device under way, in the order of its channels.
   std::vector<Answer> values_;
   std::vector<std::optional<Answer>> statuses_;
@@ -123,67 +129,51 @@ std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchang
     return "the device answers with " + exception_name(exchange.exception_code);
   }
   if (exchange.outcome == ExchangeOutcome::timeout) {
-    return "unit " + std::to_string(device.unit) + " does not answer within " +
-           short_number(config_.line.timeout_ms) + " ms, asked twice";
+    return "unit " + std::to_string(device.unit) + ": " + exchange.detail;
   }
   return exchange.detail;
 }
 
-ScanDevice ModbusScan::scan(const ModbusDeviceConfig& device) {
-  const ModbusPlan plan = plan_requests(device);
-  std::vector<Answer> answers;
-  for (const PlannedRequest& request : plan.requests) {
-    answers.push_back(ask(device.unit, request.table, request.address, request.count));
-    if (!answers.back().exchange.unit_answered() && answers.size() == 1) {
-      return without_answer(device, sensors_, describe(device, answers.back().exchange));
-    }
-  }
-  ScanDevice result{device.name, "unit " + std::to_string(device.unit), true, "", {}};
-  values_.clear();
-  statuses_.clear();
-  const auto part = [&](const WordPlace& place, std::size_t count) {
-    Answer answer{answers[place.request].exchange, {}};
-    const auto begin = answers[place.request].words.begin() + static_cast<long>(place.offset);
-    answer.words.assign(begin, begin + static_cast<long>(count));
-    return answer;
-  };
-  for (std::size_t i = 0; i < device.channels.size(); ++i) {
-    const ModbusChannel& channel = device.channels[i];
-    values_.push_back(part(plan.channels[i].value, words_of(channel.table, channel.encoding)));
-    statuses_.push_back(channel.status ? std::optional(part(*plan.channels[i].status, 1))
-                                       : std::nullopt);
-  }
-  if (plan.requests.size() < device.channels.size()) split_refused(device, result);
-  for (std::size_t i = 0; i < device.channels.size(); ++i) {
-    result.channels.push_back(evaluate(device, i));
-  }
-  return result;
+/// Until every device was asked for everything, and again where the daemon tries again.
+void ModbusScan::ask_as_the_daemon() {
+  const std::size_t count = config_.devices.size();
+  const auto has_asked = [this](std::size_t device) { return poller_.has_asked(device); };
+  // A gateway may keep each of them for some seconds.
+  const nanoseconds give_up_at =
+      connection_.now() + static_cast<long>(count + 1) * 2 * gateway_wait_max;
+  std::vector<std::size_t> all(count);
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  while (!std::all_of(all.begin(), all.end(), has_asked) && connection_.now() < give_up_at)
+    poller_.act();
 }
 
-/// A request for several values that the device refuses: which of them is it? Each is asked alone.
-void ModbusScan::split_refused(const ModbusDeviceConfig& device, ScanDevice& result) {
-  const auto refused = [](const Answer& answer) {
-    return answer.exchange.outcome == ExchangeOutcome::exception && answer.exchange.unit_answered();
+ScanDevice ModbusScan::scan(std::size_t index) {
+  const ModbusDeviceConfig& device = config_.devices[index];
+  ScanDevice result{device.name, "unit " + std::to_string(device.unit), false, "", {}};
+  values_.clear();
+  statuses_.clear();
+  const auto copied = [&](const ModbusPoller::Answer& answer) {
+    result.answers = result.answers || answer.exchange.unit_answered();
+    return Answer{answer.exchange, {answer.words.begin(), answer.words.end()}};
   };
-  bool split = false;
-  bool all_good = true;
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
-    const ModbusChannel& channel = device.channels[i];
-    if (refused(values_[i])) {
-      values_[i] = ask(device.unit, channel.table, channel.address, values_[i].words.size());
-      split = true;
-      all_good = all_good && values_[i].exchange.ok();
-    }
-    if (statuses_[i] && refused(*statuses_[i])) {
-      statuses_[i] = ask(device.unit, channel.status->table, channel.status->address, 1);
-      split = true;
-      all_good = all_good && statuses_[i]->exchange.ok();
-    }
+    values_.push_back(copied(poller_.value_of(index, i)));
+    const auto status = poller_.status_of(index, i);
+    statuses_.push_back(status ? std::optional(copied(*status)) : std::nullopt);
   }
-  if (!split) return;
-  result.note = all_good ? "refuses to be read in one request, but answers for each register: "
-                           "gap_registers_max = 0 or one_register_a_request = true"
-                         : "refuses to be read in one request; asked for each value alone";
+  if (!result.answers) result.note = describe(device, values_.front().exchange);
+  if (poller_.is_split(index)) {
+    const auto is_ok = [](const Answer& answer) { return answer.exchange.ok(); };
+    result.note = std::all_of(values_.begin(), values_.end(), is_ok)
+                      ? "refuses to be read in one request, but answers for each register: "
+                        "gap_registers_max = 0 or one_register_a_request = true"
+                      : "refuses to be read in one request; asked for each value alone";
+  }
+  for (std::size_t i = 0; i < device.channels.size(); ++i) {
+    result.channels.push_back(evaluate(device, i));
+    if (!result.answers) result.channels.back().why.clear();  // the note says it
+  }
+  return result;
 }
 
 ScanChannel ModbusScan::evaluate(const ModbusDeviceConfig& device, std::size_t index) {
@@ -223,8 +213,7 @@ ScanChannel ModbusScan::evaluate(const ModbusDeviceConfig& device, std::size_t i
 
 void ModbusScan::judge_value(const ModbusDeviceConfig& device, const ModbusChannel& channel,
                              std::span<const std::uint16_t> words, ScanChannel& result) {
-  const NumberFormat format = format_in(
-      channel.table, {channel.encoding, channel.word_order, channel.scale, channel.offset_degC});
+  const NumberFormat format = format_of(channel);
   const Decoded decoded = decode(words, format, channel.sentinels);
   const Decoded number = decode(words, format, {});
   if (decoded.fault != Fault::none && number.fault == Fault::none) {
@@ -267,9 +256,7 @@ std::optional<double> ModbusScan::look_at(const ModbusDeviceConfig& device,
   if (address < 0 || address + static_cast<int>(count) > 65536) return std::nullopt;
   const Answer answer = ask(device.unit, table, static_cast<std::uint16_t>(address), count);
   if (!answer.exchange.ok()) return std::nullopt;
-  const NumberFormat format =
-      format_in(table, {channel.encoding, channel.word_order, channel.scale, channel.offset_degC});
-  const Decoded decoded = decode(answer.words, format, channel.sentinels);
+  const Decoded decoded = decode(answer.words, format_of(channel), channel.sentinels);
   const bool fits = decoded.fault == Fault::none && decoded.value != channel.offset_degC &&
                     is_plausible(channel, decoded.value, range_of(channel));
   return fits ? std::optional(decoded.value) : std::nullopt;
@@ -303,15 +290,55 @@ void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChan
   }
 }
 
+/// Whether the first request of the first device is answered on a line like this.
+bool ModbusScan::would_answer(const ModbusLine& line) const {
+  const ModbusDeviceConfig& device = config_.devices.front();
+  const ModbusChannel& channel = device.channels.front();
+  ModbusConnection connection(line);
+  std::vector<std::uint16_t> words(words_of(channel.table, channel.encoding));
+  return connection.connect() &&
+         connection.read(device.unit, channel.table, channel.address, words, device.wide_registers)
+             .unit_answered();
+}
+
+/// What makes a line work on which no unit answers, tried; empty: nothing of it.
+std::string ModbusScan::working_line() const {
+  const auto* tcp = std::get_if<ModbusTcp>(&config_.line.link);
+  if (tcp == nullptr) return "";
+  const auto with = [&](auto change) {
+    ModbusLine line = config_.line;
+    change(line, std::get<ModbusTcp>(line.link));
+    return would_answer(line);
+  };
+  if (with([](auto& line, auto&) { line.ignore_transaction = true; }))
+    return "ignore_transaction = true";
+  if (config_.devices.front().unit > 0 && !tcp->rtu_frames &&
+      with([](auto&, auto& link) { link.rtu_frames = true; }))
+    return "kind = \"modbus_rtu_over_tcp\"";
+  if (tcp->rtu_frames && with([](auto&, auto& link) { link.rtu_frames = false; }))
+    return "kind = \"modbus_tcp\"";
+  constexpr double patient_ms = 3000.0;
+  if (config_.line.timeout_ms < patient_ms &&
+      with([](auto& line, auto&) { line.timeout_ms = patient_ms; }))
+    return "timeout_ms = " + short_number(patient_ms);
+  return "";
+}
+
 /// One unit that is silent has a fault of its own; all of them rather a common one.
 void ModbusScan::judge_silence(ScanBus& bus) const {
   const auto silent = static_cast<std::size_t>(std::count_if(
       bus.devices.begin(), bus.devices.end(), [](const auto& device) { return !device.answers; }));
   if (silent == 0) return;
+  const bool nothing_came = poller_.value_of(0, 0).exchange.outcome == ExchangeOutcome::timeout;
   if (silent == bus.devices.size()) {
-    bus.note = is_serial() ? "no unit answers: baud, parity, A and B swapped, termination, or "
-                             "the units' numbers; --find asks other numbers"
-                           : "connected, but no unit answers: the unit numbers; --find asks others";
+    const std::string works = working_line();
+    if (!works.empty())
+      bus.note = "no unit answers as configured, but one does with " + works;
+    else if (nothing_came)
+      bus.note = is_serial()
+                     ? "no unit answers: baud, parity, A and B swapped, termination, or the units' "
+                       "numbers; --find asks other numbers"
+                     : "connected, but no unit answers: the unit numbers; --find asks others";
     return;
   }
   for (ScanDevice& device : bus.devices) {

@@ -3,8 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -19,7 +19,7 @@ namespace thermocomp::sections {
 struct BusFiles {
   DbcFiles& dbc;
   EdsFiles& eds;
-  std::set<std::string> serial_devices;  ///< used by a bus; the controller must not use them
+  std::map<std::string, ModbusRtu> serial_lines;  ///< of buses; a controller on one shares it
 };
 
 /// A [[sensor]] on a device of the bus.

@@ -7,14 +7,14 @@ namespace {
 
 class ModbusSection final : public BusSection {
  public:
-  ModbusSection(const TomlTable& table, const std::string& name, bool is_tcp, BusFiles& files)
-      : is_tcp_(is_tcp) {
+  ModbusSection(const TomlTable& table, const std::string& name, const std::string& kind,
+                BusFiles& files) {
     bus_.name = name;
-    bus_.line = read_modbus_line(table, is_tcp);
+    bus_.line = read_modbus_line(table, kind);
     refuse_all(table, {"interface", "dbc"}, "makes no sense on a Modbus bus");
     if (const auto* rtu = std::get_if<ModbusRtu>(&bus_.line.link)) {
-      if (!rtu->device.empty() && !files.serial_devices.insert(rtu->device).second) {
-        table.problem("device", "is used by two buses");
+      if (!rtu->device.empty() && !files.serial_lines.try_emplace(rtu->device, *rtu).second) {
+        table.problem("device", "is used by two buses: put the devices of a line on one bus");
       }
     }
   }
@@ -22,13 +22,14 @@ class ModbusSection final : public BusSection {
   void read_device(const TomlTable& table, const std::string& name) override {
     ModbusDeviceConfig device;
     device.name = name;
-    device.unit = read_unit(table, is_tcp_);
+    device.unit = read_unit(table, bus_.line);
     device.period_s = table.number("period_s", Range::between(0.01, 3600), device.period_s);
     device.registers_per_request_max =
         table.integer("registers_per_request_max", 1, 125, device.registers_per_request_max);
     device.gap_registers_max = table.integer("gap_registers_max", 0, 124, device.gap_registers_max);
     device.one_register_a_request =
         table.flag("one_register_a_request", device.one_register_a_request);
+    device.wide_registers = table.flag("wide_registers", device.wide_registers);
     if (table.has("renewal")) device.renewal = read_modbus_renewal(table.table("renewal"));
     bus_.devices.push_back(std::move(device));
   }
@@ -38,6 +39,10 @@ class ModbusSection final : public BusSection {
     ModbusChannel channel = read_modbus_channel(tables.sensor, tables.device);
     channel.sensor = tables.index;
     check_request(tables.sensor, channel, on);
+    if (on.wide_registers && registers_of(channel.encoding) != 2)
+      tables.sensor.problem("encoding",
+                            "must be int32, uint32 or float32: a register has 32 bits "
+                            "(wide_registers)");
     tables.check_period(on.period_s, "period_s of the device " + on.name);
     on.channels.push_back(std::move(channel));
   }
@@ -56,7 +61,6 @@ class ModbusSection final : public BusSection {
     }
   }
 
-  bool is_tcp_;
   ModbusBusConfig bus_;
 };
 
@@ -64,7 +68,7 @@ class ModbusSection final : public BusSection {
 
 std::unique_ptr<BusSection> open_modbus(const TomlTable& bus, const std::string& name,
                                         const std::string& kind, BusFiles& files) {
-  return std::make_unique<ModbusSection>(bus, name, kind == "modbus_tcp", files);
+  return std::make_unique<ModbusSection>(bus, name, kind, files);
 }
 
 }  // namespace thermocomp::sections

@@ -102,7 +102,7 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
       sections::read_buses(root, {sensors, config.estimator.sensors}, presets, bus_files);
 
   sections::ControllerReading controller = sections::read_controller(
-      root.table("controller"), tables.axes, config.estimator.axes, bus_files.serial_devices);
+      root.table("controller"), tables.axes, config.estimator.axes, bus_files.serial_lines);
   config.controller = std::move(controller.config);
   config.estimator.signals = std::move(controller.signals);
   config.dry_run = controller.dry_run;

@@ -17,7 +17,18 @@
 namespace thermocomp::sections {
 namespace {
 
-enum class Kind { dry_run, modbus_tcp, modbus_rtu, piezo_tcp, piezo_rtu, can, linuxcnc, unknown };
+enum class Kind {
+  dry_run,
+  modbus_tcp,
+  modbus_rtu,
+  modbus_rtu_over_tcp,
+  modbus_udp,
+  piezo_tcp,
+  piezo_rtu,
+  can,
+  linuxcnc,
+  unknown
+};
 
 /// Of a controller that cannot interpolate along the travel.
 void refuse_travel(const TomlTable& axis) {
@@ -45,12 +56,14 @@ class ControllerReader {
     for (const AxisSpan& span : axis_spans(axes)) axes_.push_back(axes[span.first]);
   }
 
-  ControllerReading read(const std::set<std::string>& serial_devices) {
+  ControllerReading read(const std::map<std::string, ModbusRtu>& serial_lines) {
     name_ = table_.text("name");
     const Kind kind = table_.choice<Kind>("kind",
                                           {{"dry_run", Kind::dry_run},
                                            {"modbus_tcp", Kind::modbus_tcp},
                                            {"modbus_rtu", Kind::modbus_rtu},
+                                           {"modbus_rtu_over_tcp", Kind::modbus_rtu_over_tcp},
+                                           {"modbus_udp", Kind::modbus_udp},
                                            {"piezo_tcp", Kind::piezo_tcp},
                                            {"piezo_rtu", Kind::piezo_rtu},
                                            {"can", Kind::can},
@@ -63,11 +76,15 @@ class ControllerReader {
         break;
       case Kind::modbus_tcp:
       case Kind::modbus_rtu:
-        read_modbus(kind == Kind::modbus_tcp, false, serial_devices);
+      case Kind::modbus_rtu_over_tcp:
+      case Kind::modbus_udp:
+        read_modbus(table_.text("kind"), false, serial_lines);
         break;
       case Kind::piezo_tcp:
+        read_modbus("modbus_tcp", true, serial_lines);
+        break;
       case Kind::piezo_rtu:
-        read_modbus(kind == Kind::piezo_tcp, true, serial_devices);
+        read_modbus("modbus_rtu", true, serial_lines);
         break;
       case Kind::can:
         read_can();
@@ -164,14 +181,24 @@ class ControllerReader {
   }
 
   /// @param volts  the offsets go to piezos, by the voltage of their amplifiers
-  void read_modbus(bool is_tcp, bool volts, const std::set<std::string>& serial_devices) {
+  void read_modbus(std::string_view kind, bool volts,
+                   const std::map<std::string, ModbusRtu>& serial_lines) {
     ModbusControllerConfig config;
     config.name = name_;
-    config.line = read_modbus_line(table_, is_tcp);
+    config.line = read_modbus_line(table_, kind);
     if (const auto* rtu = std::get_if<ModbusRtu>(&config.line.link)) {
-      if (serial_devices.contains(rtu->device)) table_.problem("device", "is used by two buses");
+      const auto of_bus = serial_lines.find(rtu->device);
+      if (of_bus != serial_lines.end() && of_bus->second != *rtu)
+        table_.problem("device",
+                       "is the line of a bus too: baud, parity, data_bits, stop_bits and "
+                       "rs485 must be the same in both");
     }
-    config.unit = read_unit(table_, is_tcp);
+    config.unit = read_unit(table_, config.line);
+    config.registers_per_request_max =
+        table_.integer("registers_per_request_max", 1, 125, config.registers_per_request_max);
+    config.gap_registers_max =
+        table_.integer("gap_registers_max", 0, 124, config.gap_registers_max);
+    config.write_function = read_write_function(config.write_function);
     config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
     refuse_all(table_, {"interface", "silent_after_s"}, "makes no sense for a Modbus controller");
     WrittenRegisters written;
@@ -181,11 +208,33 @@ class ControllerReader {
     config.valid_bits = read_written_bits("valid_bits", written);
     if (config.valid_bits) check_bits(table_, reach(*config.valid_bits).max, axes_.size());
     config.heartbeat = read_written_bits("heartbeat", written);
+    if (config.write_function == ModbusControllerConfig::one_register) check_single(config);
     read_signals([&](const TomlTable& table, std::size_t index) {
       config.signals.push_back({index, read_modbus_value(table, RegisterUse::signal)});
     });
     result_.period_s = config.period_s;
     result_.config = std::move(config);
+  }
+
+  [[nodiscard]] int read_write_function(int otherwise) const {
+    const int function = table_.integer("write_function", 6, 16, otherwise);
+    if (function != ModbusControllerConfig::one_register && function != otherwise)
+      table_.problem("write_function", "must be 6 (one register a request) or 16");
+    return function;
+  }
+
+  /// A value of several registers would stand there half old and half new.
+  void check_single(const ModbusControllerConfig& config) const {
+    constexpr std::string_view rule = "must be of one register: write_function = 6 writes no more";
+    for (std::size_t i = 0; i < config.axes.size(); ++i) {
+      if (config.axes[i].travel)
+        travel_table(axis_tables_[i]).problem("values", rule);
+      else if (registers_of(config.axes[i].offset.encoding) != 1)
+        axis_tables_[i].problem("offset", rule);
+    }
+    for (const auto& [key, value] :
+         {std::pair("valid_bits", config.valid_bits), std::pair("heartbeat", config.heartbeat)})
+      if (value && registers_of(value->encoding) != 1) table_.problem(key, rule);
   }
 
   [[nodiscard]] std::optional<ModbusValue> read_written_bits(std::string_view key,
@@ -371,8 +420,8 @@ class ControllerReader {
 
 ControllerReading read_controller(const TomlTable& table, const std::vector<TomlTable>& axis_tables,
                                   const std::vector<AxisConfig>& axes,
-                                  const std::set<std::string>& serial_devices) {
-  return ControllerReader(table, axis_tables, axes).read(serial_devices);
+                                  const std::map<std::string, ModbusRtu>& serial_lines) {
+  return ControllerReader(table, axis_tables, axes).read(serial_lines);
 }
 
 }  // namespace thermocomp::sections

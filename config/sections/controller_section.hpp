@@ -1,7 +1,7 @@
 /// [controller], [[controller.signal]] and where each [[axis]] takes its offset.
 #pragma once
 
-#include <set>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,10 +20,9 @@ struct ControllerReading {
 };
 
 /// @param axis_tables  the [[axis]] tables, in the order of `axes`; of one with a travel all nodes
-/// @param serial_devices  those that a bus uses already
-[[nodiscard]] ControllerReading read_controller(const TomlTable& table,
-                                                const std::vector<TomlTable>& axis_tables,
-                                                const std::vector<AxisConfig>& axes,
-                                                const std::set<std::string>& serial_devices);
+/// @param serial_lines  those of the buses
+[[nodiscard]] ControllerReading read_controller(
+    const TomlTable& table, const std::vector<TomlTable>& axis_tables,
+    const std::vector<AxisConfig>& axes, const std::map<std::string, ModbusRtu>& serial_lines);
 
 }  // namespace thermocomp::sections

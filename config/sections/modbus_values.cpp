@@ -5,6 +5,8 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "config/sections/common.hpp"
 
@@ -88,15 +90,17 @@ bool is_host(const std::string& host) {
          host.front() != '-' && host.find("..") == std::string::npos;
 }
 
-ModbusTcp read_tcp(const TomlTable& table) {
+ModbusTcp read_tcp(const TomlTable& table, std::string_view kind) {
   ModbusTcp tcp;
+  tcp.rtu_frames = kind == "modbus_rtu_over_tcp";
+  tcp.datagrams = kind == "modbus_udp";
   tcp.host = table.text("host");
   if (!tcp.host.empty() && !is_host(tcp.host)) {
     table.problem("host", "must be a host's name or an IP address");
   }
   tcp.port = table.integer("port", 1, 65535, tcp.port);
   refuse_all(table, {"device", "baud", "parity", "data_bits", "stop_bits", "rs485"},
-             "makes no sense for kind = \"modbus_tcp\"");
+             "makes no sense for kind = \"" + std::string(kind) + "\"");
   return tcp;
 }
 
@@ -118,7 +122,10 @@ ModbusRtu read_rtu(const TomlTable& table) {
   rtu.data_bits = table.integer("data_bits", 7, 8, rtu.data_bits);
   rtu.stop_bits = table.integer("stop_bits", 1, 2, rtu.stop_bits);
   rtu.rs485 = table.flag("rs485", rtu.rs485);
-  refuse_all(table, {"host", "port"}, "makes no sense for kind = \"modbus_rtu\"");
+  refuse_all(
+      table, {"host", "port"},
+      "makes no sense for kind = \"modbus_rtu\", which is a serial port; serial frames through "
+      "a serial server are kind = \"modbus_rtu_over_tcp\"");
   return rtu;
 }
 
@@ -130,15 +137,53 @@ void check_address(const TomlTable& table, int address, Encoding encoding) {
                                " registers and would pass register 65535");
 }
 
-std::uint16_t read_address(const TomlTable& table) {
-  return static_cast<std::uint16_t>(table.integer("address", 0, address_max));
+struct NumberedTable {
+  int first;  ///< the number of its first register in a manual; with six digits ten times as much
+  ModbusTable table;
+};
+constexpr std::array numbered_tables{NumberedTable{10001, ModbusTable::discrete_input},
+                                     NumberedTable{30001, ModbusTable::input},
+                                     NumberedTable{40001, ModbusTable::holding}};
+
+/// "400021" is no address on the wire, but the manual's number of holding register 20.
+std::optional<std::pair<ModbusTable, int>> numbered_address(int address) {
+  for (const NumberedTable& each : numbered_tables) {
+    const int first = 10 * (each.first - 1) + 1;
+    if (address >= first && address <= first + address_max)
+      return std::pair(each.table, address - first);
+  }
+  return std::nullopt;
+}
+
+/// What a register's number in a manual means, for a rule.
+std::string number_rule(int address) {
+  const auto found = numbered_address(address);
+  const std::string table = !found                                 ? ""
+                            : found->first == ModbusTable::input   ? "input"
+                            : found->first == ModbusTable::holding ? "holding"
+                                                                   : "discrete_input";
+  return found ? "the number in a manual: on the wire it is table = \"" + table +
+                     "\", address = " + std::to_string(found->second)
+               : "must be a whole number in [0, 65535]";
+}
+
+/// @param table  of the register; a manual's number (400021) must be one of it
+std::uint16_t read_address(const TomlTable& table, ModbusTable of) {
+  const int address =
+      table.integer("address", std::numeric_limits<int>::min(), std::numeric_limits<int>::max());
+  if (!table.has("address")) return 0;
+  if (address >= 0 && address <= address_max) return static_cast<std::uint16_t>(address);
+  const auto found = numbered_address(address);
+  if (found && found->first == of) return static_cast<std::uint16_t>(found->second);
+  table.problem("address", number_rule(address));
+  return 0;
 }
 
 /// @param base_address  where the device's registers begin; bits do not move with them
 ModbusStatus read_status(const TomlTable& table, int base_address) {
   ModbusStatus status;
   status.table = table.choice("table", all_tables());
-  status.address = read_address(table);
+  status.address = read_address(table, status.table);
   if (is_bit_table(status.table)) {
     table.refuse("mask", "makes no sense for a bit");
     status.codes = read_status_codes(table, 1, 1);
@@ -157,13 +202,17 @@ ModbusStatus read_status(const TomlTable& table, int base_address) {
 
 }  // namespace
 
-ModbusLine read_modbus_line(const TomlTable& table, bool is_tcp) {
+ModbusLine read_modbus_line(const TomlTable& table, std::string_view kind) {
   ModbusLine line;
-  if (is_tcp) {
-    line.link = read_tcp(table);
-  } else {
+  if (kind == "modbus_rtu") {
     line.link = read_rtu(table);
+  } else {
+    line.link = read_tcp(table, kind);
   }
+  if (kind == "modbus_tcp" || kind == "modbus_udp")
+    line.ignore_transaction = table.flag("ignore_transaction", line.ignore_transaction);
+  else
+    table.refuse("ignore_transaction", "makes no sense for serial frames, which have no number");
   line.timeout_ms = table.number("timeout_ms", Range::between(1, 60000), line.timeout_ms);
   line.inter_frame_delay_ms =
       table.number("inter_frame_delay_ms", Range::between(0, 1000), line.inter_frame_delay_ms);
@@ -174,7 +223,9 @@ ModbusLine read_modbus_line(const TomlTable& table, bool is_tcp) {
   return line;
 }
 
-int read_unit(const TomlTable& table, bool is_tcp) {
+int read_unit(const TomlTable& table, const ModbusLine& line) {
+  const auto* tcp = std::get_if<ModbusTcp>(&line.link);
+  const bool is_tcp = tcp != nullptr && !tcp->rtu_frames;
   const int unit = table.integer("unit", 0, 255);
   if (!is_tcp && unit == 0 && table.has("unit")) {
     table.problem("unit", "0 is the broadcast, which nobody answers; must be in [1, 247]");
@@ -192,7 +243,7 @@ ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use) {
                                      : use == RegisterUse::signal ? all_tables()
                                                                   : register_tables();
   value.table = table.choice("table", tables);
-  value.address = read_address(table);
+  value.address = read_address(table, value.table);
   if (is_bit_table(value.table)) {
     refuse_all(table, {"encoding", "word_order", "scale"}, "makes no sense for a bit");
     value.encoding = Encoding::uint16;
@@ -231,8 +282,12 @@ ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& devi
   channel.scale = read_scale(sensor, read_scale(device, channel.scale));
   channel.offset_degC = sensor.number("offset_degC", Range::between(-1e4, 1e4),
                                       device.number("offset_degC", Range::between(-1e4, 1e4), 0));
+  const int default_mask = device.integer("mask", 1, 0xFFFF, 0xFFFF);
+  channel.mask = static_cast<std::uint16_t>(sensor.integer("mask", 1, 0xFFFF, default_mask));
+  if (channel.mask != 0xFFFF && registers_of(channel.encoding) != 1)
+    sensor.problem("mask", "makes sense for int16 and uint16 only");
   const int base_address = device.integer("base_address", 0, address_max, 0);
-  const int address = base_address + read_address(sensor);
+  const int address = base_address + read_address(sensor, channel.table);
   check_address(sensor, address, channel.encoding);
   channel.address = static_cast<std::uint16_t>(std::min(address, address_max));
   const Codes codes = codes_of(channel.encoding);
@@ -247,7 +302,7 @@ ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& devi
 ModbusRenewal read_modbus_renewal(const TomlTable& table) {
   ModbusRenewal renewal;
   renewal.table = table.choice("table", register_tables());
-  renewal.address = read_address(table);
+  renewal.address = read_address(table, renewal.table);
   return renewal;
 }
 

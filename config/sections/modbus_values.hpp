@@ -8,9 +8,10 @@
 namespace thermocomp::sections {
 
 /// Keys of a line: host, port or device, baud, ..., and timing. Keys of the other kind are refused.
-[[nodiscard]] ModbusLine read_modbus_line(const TomlTable& table, bool is_tcp);
-/// 1..247; on TCP also 0 and 255. Required.
-[[nodiscard]] int read_unit(const TomlTable& table, bool is_tcp);
+/// @param kind  one of modbus_kinds
+[[nodiscard]] ModbusLine read_modbus_line(const TomlTable& table, std::string_view kind);
+/// 1..247; with the frames of Modbus TCP also 0 and 255. Required.
+[[nodiscard]] int read_unit(const TomlTable& table, const ModbusLine& line);
 
 enum class RegisterUse {
   written,       ///< an offset: holding registers

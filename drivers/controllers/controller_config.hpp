@@ -78,12 +78,22 @@ struct ModbusControllerConfig {
   std::string name;
   ModbusLine line;
   int unit{1};
-  double period_s{0.1};          ///< write and read every so often
+  double period_s{0.1};  ///< write and read every so often
+  int registers_per_request_max{125};
+  int gap_registers_max{8};  ///< unused registers read along to save a request
+  static constexpr int one_register = 6;
+  int write_function{16};        ///< or one_register a request
   std::vector<ModbusAxis> axes;  ///< order of the configuration's axes, one with all its nodes
   std::vector<ModbusSignal> signals;
   std::optional<ModbusValue> valid_bits;  ///< register: bit i = offset of axis i is valid
   std::optional<ModbusValue> heartbeat;   ///< register: counts up with every write
 
+  [[nodiscard]] std::size_t registers_per_write() const noexcept {
+    constexpr int limit = 123;  // of the protocol
+    return write_function == one_register
+               ? 1
+               : static_cast<std::size_t>(std::min(registers_per_request_max, limit));
+  }
   [[nodiscard]] std::size_t offsets() const noexcept {
     std::size_t count = 0;
     for (const ModbusAxis& axis : axes) count += axis.offsets();

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 
 #include <modbus/modbus.h>
 
 #include "drivers/driver_error.hpp"
+#include "drivers/modbus/frames.hpp"
 #include "drivers/modbus/late_answers.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "drivers/modbus/rtu_port.hpp"
@@ -18,18 +20,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::size_t frame_bytes_max = MODBUS_TCP_MAX_ADU_LENGTH;
-constexpr std::size_t mbap_bytes = 7;  // transaction, protocol, length, unit
 constexpr int time_outs_of_dead_connection = 2;
+constexpr int closings_of_a_habit = 3;
 constexpr std::uint8_t exception_bit = 0x80;
 constexpr milliseconds silence_min{10};
 
-constexpr std::uint8_t high_byte(std::size_t word) noexcept {
-  return static_cast<std::uint8_t>((word >> 8) & 0xFF);
-}
-constexpr std::uint8_t low_byte(std::size_t word) noexcept {
-  return static_cast<std::uint8_t>(word & 0xFF);
-}
 constexpr std::uint16_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
   return static_cast<std::uint16_t>((bytes[at] << 8) | bytes[at + 1]);
 }
@@ -55,8 +50,8 @@ struct Pdu {
 
   void push(std::uint8_t byte) noexcept { bytes[size++] = byte; }
   void push_word(std::size_t word) noexcept {
-    push(high_byte(word));
-    push(low_byte(word));
+    push(static_cast<std::uint8_t>((word >> 8) & 0xFF));
+    push(static_cast<std::uint8_t>(word & 0xFF));
   }
   [[nodiscard]] std::span<const std::uint8_t> view() const noexcept { return {bytes.data(), size}; }
 };
@@ -125,61 +120,78 @@ class ModbusConnection::Implementation {
   void disconnect() noexcept;
   [[nodiscard]] bool connected() const noexcept { return connected_; }
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
+  [[nodiscard]] std::uint64_t connects() const noexcept { return connects_; }
+  [[nodiscard]] std::uint64_t links() const noexcept { return links_; }
+  [[nodiscard]] nanoseconds held() const noexcept { return held_; }
+  void share() noexcept { shared_ = true; }
+  [[nodiscard]] bool is_shared() const noexcept { return shared_; }
+  void time_as(const ModbusLine& line) noexcept;
   [[nodiscard]] nanoseconds ready_at(int unit, const ModbusQuestion& question) const noexcept;
 
-  /// One request and its answer, which is left in answer_. `answer_bytes` is the size of the
-  /// expected answer's PDU, for the time it takes on the line.
+  /// One request and its answer, which is left in answer(). `answer_bytes` is the size of the
+  /// expected answer's PDU.
   Exchange exchange(int unit, const Pdu& request, std::size_t answer_bytes);
-  [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return answer_; }
+  [[nodiscard]] std::span<const std::uint8_t> answer() const noexcept { return frames_.answer(); }
+  Exchange write(int unit, const Pdu& request, std::size_t word);
   /// The answer was of the right function but not what was asked for.
-  void reject(int unit, Exchange& exchange, const char* detail) noexcept;
+  void reject(int unit, Exchange& exchange, const std::string& detail);
 
  private:
-  enum class Frame { ours, foreign, bad, lost };
-
-  [[nodiscard]] bool tcp_frame_waits() const noexcept;
-  bool drain_stream() noexcept;
-  bool take_from_stream() noexcept;
-  PortBytes take_tcp_frame(nanoseconds deadline) noexcept;
-  bool send(int unit, const Pdu& request) noexcept;
-  Frame receive(int unit, std::uint8_t function, std::size_t answer_bytes, const char*& detail);
-  Frame classify_tcp(std::size_t size, int unit, const char*& detail) noexcept;
-  Exchange await_answer(int unit, std::uint8_t function, std::size_t answer_bytes,
-                        Exchange exchange);
-  void take_exception(Exchange& exchange) const noexcept;
-  void settle(int unit, Exchange& exchange) noexcept;
+  bool open();
+  bool open_anew();
+  bool discard();
+  Exchange try_once(int unit, const Pdu& request, std::size_t answer_bytes, nanoseconds deadline);
+  void await_answer(nanoseconds deadline, Exchange& exchange);
+  void judge_silence(Exchange& exchange) const;
+  void take_exception(Exchange& exchange) const;
+  void settle(int unit, Exchange& exchange);
 
   ModbusLine line_;
-  bool serial_;
+  bool serial_;    ///< a serial port: nobody at the other end opens or closes it
+  bool rtu_;       ///< serial frames
+  bool numbered_;  ///< answers carry the number of their request
   nanoseconds timeout_;
   nanoseconds gap_;
   std::unique_ptr<ModbusPort> port_;
+  ModbusFrames frames_;
   bool connected_{false};
+  std::uint64_t connects_{0};
+  std::uint64_t links_{0};
   std::string last_error_;
-  std::uint16_t transaction_{0};
+  int answers_{0};   ///< on this connection
+  int closings_{0};  ///< in a row, by the peer, after one answer
   int time_outs_in_a_row_{0};
   nanoseconds line_free_at_{0};
   std::array<LateAnswers, 256> units_;
   ModbusQuestion question_;  ///< of the exchange under way
-  std::array<std::uint8_t, frame_bytes_max> frame_{};
-  std::array<std::uint8_t, 2 * frame_bytes_max> stream_{};  ///< TCP: received, not yet taken
-  std::size_t received_{0};                                 ///< bytes of stream_
-  std::size_t unasked_{0};   ///< ... at its front that were there before the request was sent
-  bool was_unasked_{false};  ///< the frame taken last began with such
-  std::span<const std::uint8_t> answer_;
+  bool was_sent_{false};     ///< its request
+  bool in_step_{true};       ///< where the next frame begins is known
+  int silent_unit_{-1};      ///< that had no answer last
+  int silent_asked_{0};      ///< requests for which a gateway may still wait
+  nanoseconds silent_since_{0};
+  nanoseconds held_{0};
+  std::atomic<bool> shared_{false};
 };
 
 ModbusConnection::Implementation::Implementation(const ModbusLine& line,
                                                  std::unique_ptr<ModbusPort> port)
     : line_(line),
       serial_(std::holds_alternative<ModbusRtu>(line.link)),
-      timeout_(from_seconds(line.timeout_ms * 1e-3)),
-      gap_(inter_frame_delay(line)),
-      port_(std::move(port)) {}
+      rtu_(serial_ || std::get<ModbusTcp>(line.link).rtu_frames),
+      numbered_(!rtu_ && !line.ignore_transaction),
+      port_(std::move(port)),
+      frames_(rtu_, numbered_) {
+  time_as(line);
+}
+
+void ModbusConnection::Implementation::time_as(const ModbusLine& line) noexcept {
+  timeout_ = from_seconds(line.timeout_ms * 1e-3);
+  gap_ = inter_frame_delay(line);
+}
 
 nanoseconds ModbusConnection::Implementation::ready_at(
     int unit, const ModbusQuestion& question) const noexcept {
-  if (!serial_ || unit < 0 || unit > 255) return nanoseconds{0};
+  if (numbered_ || unit < 0 || unit > 255) return nanoseconds{0};
   return units_[static_cast<std::size_t>(unit)].ready_at(question);
 }
 
@@ -187,12 +199,23 @@ nanoseconds ModbusConnection::Implementation::ready_at(
 
 bool ModbusConnection::Implementation::connect() {
   if (connected_) return true;
+  if (!open()) return false;
+  ++links_;
+  return true;
+}
+
+bool ModbusConnection::Implementation::open() {
   if (port_->cancelled()) {
     last_error_ = "cancelled";
     return false;
   }
-  if (!port_->open(last_error_)) return false;
-  connected_ = true;
+  if (!port_->open(last_error_)) {
+    closings_ = 0;
+    return false;
+  }
+  connected_ = in_step_ = true;
+  ++connects_;
+  answers_ = 0;
   time_outs_in_a_row_ = 0;
   line_free_at_ = port_->now() + gap_;
   last_error_.clear();
@@ -202,191 +225,110 @@ bool ModbusConnection::Implementation::connect() {
 void ModbusConnection::Implementation::disconnect() noexcept {
   if (!connected_) return;
   connected_ = false;
-  received_ = 0;
-  unasked_ = 0;
+  frames_.forget();
   port_->close();
+}
+
+bool ModbusConnection::Implementation::open_anew() {
+  disconnect();
+  return open();
 }
 
 // ---- one exchange
 
-bool ModbusConnection::Implementation::send(int unit, const Pdu& request) noexcept {
-  const auto unit_byte = static_cast<std::uint8_t>(unit);
-  std::array<std::uint8_t, frame_bytes_max> frame{};
-  if (serial_) {
-    frame[0] = unit_byte;
-    std::copy_n(request.bytes.begin(), request.size, frame.begin() + 1);
-    return port_->send({frame.data(), request.size + 1});
-  }
-  ++transaction_;
-  const std::size_t following = request.size + 1;
-  const std::array<std::uint8_t, mbap_bytes> head{
-      high_byte(transaction_), low_byte(transaction_), 0,        0,
-      high_byte(following),    low_byte(following),    unit_byte};
-  std::copy(head.begin(), head.end(), frame.begin());
-  std::copy_n(request.bytes.begin(), request.size, frame.begin() + mbap_bytes);
-  return port_->send({frame.data(), mbap_bytes + request.size});
-}
-
-ModbusConnection::Implementation::Frame ModbusConnection::Implementation::classify_tcp(
-    std::size_t size, int unit, const char*& detail) noexcept {
-  const std::span<const std::uint8_t> frame(frame_.data(), size);
-  const bool well_formed = word_at(frame, 2) == 0 && word_at(frame, 4) + std::size_t{6} == size;
-  if (!well_formed) {
-    detail = "the answer's header does not fit it";
-    return Frame::bad;
-  }
-  // Late: of an earlier request. Or early: who guesses the next number has answered nothing.
-  if (was_unasked_ || word_at(frame, 0) != transaction_) return Frame::foreign;
-  if (frame[6] != static_cast<std::uint8_t>(unit)) {
-    detail = "another unit answered";
-    return Frame::bad;
-  }
-  answer_ = frame.subspan(mbap_bytes);
-  return Frame::ours;
-}
-
-bool ModbusConnection::Implementation::tcp_frame_waits() const noexcept {
-  return received_ >= mbap_bytes && received_ >= word_at(std::span(stream_), 4) + std::size_t{6};
-}
-
-/// Takes a whole frame off the front of the stream, into frame_. @return whether there was one
-bool ModbusConnection::Implementation::take_from_stream() noexcept {
-  if (!tcp_frame_waits()) return false;
-  const std::size_t size = word_at(std::span(stream_), 4) + std::size_t{6};
-  if (size <= mbap_bytes || size > frame_.size()) return false;
-  std::copy_n(stream_.begin(), size, frame_.begin());
-  std::copy(stream_.begin() + static_cast<std::ptrdiff_t>(size),
-            stream_.begin() + static_cast<std::ptrdiff_t>(received_), stream_.begin());
-  received_ -= size;
-  was_unasked_ = unasked_ > 0;
-  unasked_ -= std::min(unasked_, size);
-  return true;
-}
-
-/// What came before the question is no answer to it: whole frames go, the beginning of one is
-/// remembered. @return false when the line is lost or the peer does not stop
-bool ModbusConnection::Implementation::drain_stream() noexcept {
+/// What has come unasked answers nothing. @return false when the line is lost or the peer does not
+/// stop
+bool ModbusConnection::Implementation::discard() {
   constexpr int pieces_max = 64;
   for (int piece = 0; piece < pieces_max; ++piece) {
-    while (take_from_stream()) {
-    }
-    const PortBytes came = port_->receive(std::span(stream_).subspan(received_), {});
-    if (came.kind == PortBytes::Kind::nothing) {
-      unasked_ = received_;
-      return true;
-    }
-    if (came.kind != PortBytes::Kind::bytes) return false;
-    received_ += came.size;
-    if (received_ == stream_.size() && !tcp_frame_waits()) return false;
+    if (!frames_.discard()) return false;
+    const PortBytes came = port_->receive(frames_.room());
+    if (came.kind == PortBytes::Kind::nothing) return true;
+    if (came.kind == PortBytes::Kind::lost) return false;
+    frames_.took(came.size);
   }
   return false;
 }
 
-/// The next frame of the stream into frame_, with what comes until `deadline`.
-PortBytes ModbusConnection::Implementation::take_tcp_frame(nanoseconds deadline) noexcept {
+/// Takes what comes until it is the answer, or too late for one.
+void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchange& exchange) {
+  constexpr milliseconds rest_max{700};
+  constexpr milliseconds block{100};  // serial adapters deliver in blocks
+  constexpr milliseconds full{50};
+  // For a frame that has begun.
+  const nanoseconds rest = rtu_ ? block : std::min<nanoseconds>(timeout_, rest_max);
+  const nanoseconds end = deadline + rest;
+  nanoseconds until = deadline;
   while (true) {
-    if (received_ >= mbap_bytes) {
-      const std::size_t size = word_at(std::span(stream_), 4) + std::size_t{6};
-      if (size <= mbap_bytes || size > frame_.size()) return {PortBytes::Kind::too_long};
-      if (take_from_stream()) return {PortBytes::Kind::bytes, size};
+    const ModbusFrames::Found found = frames_.look();
+    in_step_ = found != ModbusFrames::Found::no_frame;
+    if (found == ModbusFrames::Found::answer) {
+      exchange.arrived_at = port_->now();
+      exchange.outcome = ExchangeOutcome::ok;
+      return;
     }
-    const PortBytes came = port_->receive(std::span(stream_).subspan(received_), {});
-    if (came.kind == PortBytes::Kind::bytes) {
-      received_ += came.size;
-      continue;
+    if (found != ModbusFrames::Found::nothing) {
+      exchange.outcome = ExchangeOutcome::bad_frame;
+      exchange.detail = frames_.came();
+      return;
     }
-    if (came.kind != PortBytes::Kind::nothing) return came;
-    const PortWait wait = port_->wait_for_input(deadline);
-    if (wait == PortWait::late) return {PortBytes::Kind::broke_off};
-    if (wait == PortWait::cancelled) return {PortBytes::Kind::lost};
-  }
-}
-
-/// Takes one frame of which the first byte is there. Bounded by the time the rest may take.
-ModbusConnection::Implementation::Frame ModbusConnection::Implementation::receive(
-    int unit, std::uint8_t function, std::size_t answer_bytes, const char*& detail) {
-  constexpr milliseconds allowance{100};  // serial adapters deliver in blocks
-  constexpr milliseconds rest_max{700};   // so that stop() is prompt on the slowest lines too
-  const nanoseconds rest =
-      serial_ ? std::min<nanoseconds>(time_on_line(line_, answer_bytes + 3) + allowance, rest_max)
-              : std::min<nanoseconds>(timeout_, rest_max);
-  const PortBytes came =
-      serial_ ? port_->receive(frame_, rest) : take_tcp_frame(port_->now() + rest);
-  switch (came.kind) {
-    case PortBytes::Kind::bytes:
-      break;
-    case PortBytes::Kind::nothing:
-      return Frame::foreign;
-    case PortBytes::Kind::wrong_checksum:
-      detail = "wrong checksum";
-      return Frame::bad;
-    case PortBytes::Kind::too_long:
-      detail = "the answer is too long";
-      return Frame::bad;
-    case PortBytes::Kind::broke_off:
-      detail = "the answer broke off";
-      return Frame::bad;
-    case PortBytes::Kind::lost:
-      detail = "the line was lost";
-      return Frame::lost;
-  }
-  const std::size_t size = came.size;
-  if (!serial_) {
-    const Frame frame = classify_tcp(size, unit, detail);
-    if (frame != Frame::ours) return frame;
-  } else {
-    if (frame_[0] != static_cast<std::uint8_t>(unit)) return Frame::foreign;
-    answer_ = std::span<const std::uint8_t>(frame_.data() + 1, size - 1);
-  }
-  if (answer_.empty()) {
-    detail = "the answer is empty";
-    return Frame::bad;
-  }
-  const bool fits = answer_[0] == function || answer_[0] == (function | exception_bit);
-  if (!fits) detail = "answer to another function";
-  return fits ? Frame::ours : Frame::bad;
-}
-
-Exchange ModbusConnection::Implementation::await_answer(int unit, std::uint8_t function,
-                                                        std::size_t answer_bytes,
-                                                        Exchange exchange) {
-  const nanoseconds deadline =
-      port_->now() + timeout_ + time_on_line(line_, answer_bytes < 8 ? 8 : answer_bytes);
-  bool foreign_seen = false;
-  while (true) {
-    const PortWait wait = tcp_frame_waits() ? PortWait::ready : port_->wait_for_input(deadline);
+    const PortWait wait = port_->wait_for_input(until);
     if (wait == PortWait::cancelled) {
       exchange.outcome = ExchangeOutcome::cancelled;
-      return exchange;
+      return;
     }
-    if (wait == PortWait::late) break;
-    exchange.detail = "";
-    switch (receive(unit, function, answer_bytes, exchange.detail)) {
-      case Frame::ours:
-        exchange.arrived_at = port_->now();
-        exchange.outcome = ExchangeOutcome::ok;
-        return exchange;
-      case Frame::bad:
-        exchange.outcome = ExchangeOutcome::bad_frame;
-        return exchange;
-      case Frame::lost:
-        exchange.outcome = ExchangeOutcome::disconnected;
-        return exchange;
-      case Frame::foreign:
-        foreign_seen = true;
-        break;
+    if (wait == PortWait::late) return judge_silence(exchange);
+    const PortBytes came = port_->receive(frames_.room());
+    if (came.kind == PortBytes::Kind::lost) {
+      exchange.outcome = ExchangeOutcome::disconnected;
+      exchange.detail = answers_ > 0 ? "the device closes the connection in place of an answer"
+                                     : "the line was lost";
+      return;
     }
-    if (port_->now() >= deadline) break;
+    frames_.took(came.size);
+    const nanoseconds now = port_->now();
+    if (frames_.is_full())
+      until = std::min(deadline, now + full);
+    else if (frames_.has_part())
+      until = std::min(end, std::max(deadline, now + rest));
   }
-  const bool noise = foreign_seen && serial_;
-  exchange.outcome = noise ? ExchangeOutcome::bad_frame : ExchangeOutcome::timeout;
-  exchange.detail = noise ? "only frames of other units came" : "no answer in time";
+}
+
+void ModbusConnection::Implementation::judge_silence(Exchange& exchange) const {
+  const std::string within =
+      " within timeout_ms = " + std::to_string(std::chrono::round<milliseconds>(timeout_).count());
+  const std::string came = frames_.came();
+  // What has begun in TCP is followed by its rest, or by nothing that could be told apart from it.
+  const bool is_silent = came.empty() || (frames_.came_late() && (rtu_ || !frames_.has_part()));
+  exchange.outcome = is_silent ? ExchangeOutcome::timeout : ExchangeOutcome::bad_frame;
+  exchange.detail = came.empty()                       ? "no answer" + within
+                    : frames_.has_part() && !is_silent ? came + within
+                                                       : came + ", no answer" + within;
+}
+
+Exchange ModbusConnection::Implementation::try_once(int unit, const Pdu& request,
+                                                    std::size_t answer_bytes,
+                                                    nanoseconds deadline) {
+  Exchange exchange;
+  exchange.sent_at = port_->now();
+  was_sent_ = false;
+  if (!discard()) {
+    exchange.detail = "the line was lost, or bytes come without end that answer nothing";
+    return exchange;
+  }
+  const auto frame = frames_.request(unit, request.view(), answer_bytes);
+  if (!port_->send(frame)) {
+    exchange.detail = "the request could not be sent";
+    return exchange;
+  }
+  was_sent_ = true;
+  await_answer(deadline, exchange);
   return exchange;
 }
 
 Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request,
                                                     std::size_t answer_bytes) {
-  THERMOCOMP_ENSURE(unit >= (serial_ ? 1 : 0) && unit <= 255);
+  THERMOCOMP_ENSURE(unit >= (rtu_ ? 1 : 0) && unit <= 255);
   Exchange exchange;
   if (!connected_) {
     exchange.detail = "not connected";
@@ -397,52 +339,80 @@ Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request
     exchange.outcome = ExchangeOutcome::cancelled;
     return exchange;
   }
-  exchange.sent_at = port_->now();
-  if (!serial_ && !drain_stream()) {
-    exchange.detail = "the line was lost, or bytes come without end that answer nothing";
-  } else if (send(unit, request)) {
-    exchange = await_answer(unit, request.bytes[0], answer_bytes, exchange);
-  } else {
-    exchange.detail = "the request could not be sent";
+  nanoseconds deadline =
+      port_->now() + timeout_ + time_on_line(line_, answer_bytes < 8 ? 8 : answer_bytes);
+  if (numbered_ && silent_asked_ > 0 && silent_unit_ != unit)
+    deadline = std::max(deadline, silent_since_ + gateway_wait_max + timeout_);
+  const auto opened_anew = [&] {
+    if (open_anew()) return true;
+    exchange.detail = last_error_;
+    return false;
+  };
+  if (closings_ < closings_of_a_habit || answers_ == 0 || opened_anew()) {
+    const bool has_answered = answers_ > 0;
+    exchange = try_once(unit, request, answer_bytes, deadline);
+    // What was written may have been taken: whoever writes looks before he writes again.
+    const bool may_repeat = !was_sent_ || question_.function <= MODBUS_FC_READ_INPUT_REGISTERS;
+    if (exchange.outcome == ExchangeOutcome::disconnected && has_answered && may_repeat) {
+      closings_ = answers_ == 1 ? closings_ + 1 : 0;
+      if (opened_anew()) exchange = try_once(unit, request, answer_bytes, deadline);
+    }
   }
-  if (exchange.ok() && (answer_[0] & exception_bit) != 0) take_exception(exchange);
+  if (exchange.ok() && (answer()[0] & exception_bit) != 0) take_exception(exchange);
   settle(unit, exchange);
   return exchange;
 }
 
-void ModbusConnection::Implementation::take_exception(Exchange& exchange) const noexcept {
-  if (answer_.size() != 2 || answer_[1] == 0) {
+void ModbusConnection::Implementation::take_exception(Exchange& exchange) const {
+  if (answer().size() < 2 || answer()[1] == 0) {
     exchange.outcome = ExchangeOutcome::bad_frame;
-    exchange.detail = "an exception without a code";
+    exchange.detail = "an exception without a code (" + hex_text(answer()) + ")";
     return;
   }
   exchange.outcome = ExchangeOutcome::exception;
-  exchange.exception_code = answer_[1];
-  exchange.detail = exception_text(answer_[1]);
+  exchange.exception_code = answer()[1];
+  exchange.detail = exception_text(answer()[1]);
 }
 
 /// What an exchange's end means for the ones to come.
-void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) noexcept {
+void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) {
   LateAnswers& late = units_[static_cast<std::size_t>(unit)];
   const nanoseconds now = port_->now();
   line_free_at_ = now + gap_;
   switch (exchange.outcome) {
     case ExchangeOutcome::ok:
     case ExchangeOutcome::exception:
+      ++answers_;
       late.answered(exchange.sent_at, exchange.arrived_at);
       time_outs_in_a_row_ = 0;
+      if (silent_unit_ == unit) silent_asked_ = 0;
+      if (silent_asked_ > 0) {
+        const bool was_held = exchange.arrived_at - exchange.sent_at > timeout_;
+        held_ = was_held ? exchange.arrived_at - silent_since_ : nanoseconds{0};
+        silent_asked_ = was_held ? silent_asked_ - 1 : 0;
+      }
       return;
     case ExchangeOutcome::timeout:
       late.unanswered(question_, exchange.sent_at, now);
+      silent_unit_ = unit;
+      ++silent_asked_;
+      silent_since_ = exchange.sent_at;
       // A peer that went without a word (power cut) is only found by connecting anew.
       if (!serial_ && ++time_outs_in_a_row_ >= time_outs_of_dead_connection) disconnect();
       return;
     case ExchangeOutcome::bad_frame:
-      late.spoiled(question_, exchange.sent_at, timeout_);
-      if (serial_) {
-        port_->drain(std::max<nanoseconds>(gap_, silence_min));
+      // The rest of an answer that broke off may come as late as the answer.
+      late.spoiled(question_, frames_.has_part() && !frames_.is_full() ? now : exchange.sent_at,
+                   timeout_);
+      if (rtu_) {
+        // Until the line is silent; bounded.
+        constexpr milliseconds drain_max{300};
+        const nanoseconds silence = std::max<nanoseconds>(gap_, silence_min);
+        while (port_->now() < now + drain_max && discard() &&
+               port_->wait_for_input(port_->now() + silence) == PortWait::ready) {
+        }
         line_free_at_ = port_->now();
-      } else {
+      } else if (!in_step_ || frames_.has_part()) {
         disconnect();  // where the next frame of the stream begins is not known any more
       }
       return;
@@ -455,13 +425,25 @@ void ModbusConnection::Implementation::settle(int unit, Exchange& exchange) noex
 }
 
 void ModbusConnection::Implementation::reject(int unit, Exchange& exchange,
-                                              const char* detail) noexcept {
+                                              const std::string& detail) {
   exchange.outcome = ExchangeOutcome::bad_frame;
-  exchange.detail = detail;
+  exchange.detail = detail + " (" + hex_text(answer()) + ")";
   settle(unit, exchange);
 }
 
 // ---- the public face: what is asked, and whether the answer fits
+
+/// A write and its answer, which repeats the address and this word.
+Exchange ModbusConnection::Implementation::write(int unit, const Pdu& request, std::size_t word) {
+  constexpr std::size_t answer_bytes = 5;
+  Exchange written = exchange(unit, request, answer_bytes);
+  if (!written.ok()) return written;
+  const bool confirmed = answer().size() >= answer_bytes &&
+                         word_at(answer(), 1) == word_at(request.view(), 1) &&
+                         word_at(answer(), 3) == word;
+  if (!confirmed) reject(unit, written, "the answer confirms another write");
+  return written;
+}
 
 std::unique_ptr<ModbusPort> make_modbus_port(const ModbusLine& line) {
   if (const auto* rtu = std::get_if<ModbusRtu>(&line.link)) return std::make_unique<RtuPort>(*rtu);
@@ -488,6 +470,24 @@ bool ModbusConnection::connected() const noexcept {
 const std::string& ModbusConnection::last_error() const noexcept {
   return implementation_->last_error();
 }
+std::uint64_t ModbusConnection::connects() const noexcept {
+  return implementation_->connects();
+}
+std::uint64_t ModbusConnection::links() const noexcept {
+  return implementation_->links();
+}
+nanoseconds ModbusConnection::held() const noexcept {
+  return implementation_->held();
+}
+void ModbusConnection::share() noexcept {
+  implementation_->share();
+}
+bool ModbusConnection::is_shared() const noexcept {
+  return implementation_->is_shared();
+}
+void ModbusConnection::time_as(const ModbusLine& line) noexcept {
+  implementation_->time_as(line);
+}
 nanoseconds ModbusConnection::ready_at(int unit, ModbusTable table, std::uint16_t address,
                                        std::size_t words) const noexcept {
   return implementation_->ready_at(unit,
@@ -507,19 +507,27 @@ nanoseconds ModbusConnection::now() const noexcept {
 }
 
 Exchange ModbusConnection::read(int unit, ModbusTable table, std::uint16_t address,
-                                std::span<std::uint16_t> words) {
+                                std::span<std::uint16_t> words, bool wide) {
   const bool bits = is_bit_table(table);
   THERMOCOMP_ENSURE(!words.empty() && words.size() <= (bits ? 2000U : 125U));
   Pdu request;
   request.push(read_function(table));
   request.push_word(address);
-  request.push_word(words.size());
+  request.push_word(wide ? words.size() / 2 : words.size());
   const std::size_t answer_bytes = answer_bytes_of(table, words.size());
   Exchange exchange = implementation_->exchange(unit, request, answer_bytes);
   if (!exchange.ok()) return exchange;
   const auto answer = implementation_->answer();
-  if (answer.size() != answer_bytes || answer[1] + std::size_t{2} != answer_bytes) {
-    implementation_->reject(unit, exchange, "the answer has the wrong length");
+  const std::size_t data_bytes = answer_bytes - 2;
+  // Some gateways fill their frames up.
+  if (answer.size() < answer_bytes || answer[1] != data_bytes) {
+    const std::size_t came = answer.size() < 2 ? 0 : answer[1];
+    implementation_->reject(unit, exchange,
+                            "expected " + std::to_string(data_bytes) + " bytes of data, got " +
+                                std::to_string(came) +
+                                (!bits && !wide && came == 2 * data_bytes
+                                     ? ": if a register has 32 bits, wide_registers = true"
+                                     : ""));
     return exchange;
   }
   if (bits) {
@@ -528,6 +536,14 @@ Exchange ModbusConnection::read(int unit, ModbusTable table, std::uint16_t addre
     unpack_words(answer.subspan(2), words);
   }
   return exchange;
+}
+
+Exchange ModbusConnection::write_register(int unit, std::uint16_t address, std::uint16_t word) {
+  Pdu request;
+  request.push(MODBUS_FC_WRITE_SINGLE_REGISTER);
+  request.push_word(address);
+  request.push_word(word);
+  return implementation_->write(unit, request, word);
 }
 
 Exchange ModbusConnection::write_registers(int unit, std::uint16_t address,
@@ -539,13 +555,7 @@ Exchange ModbusConnection::write_registers(int unit, std::uint16_t address,
   request.push_word(words.size());
   request.push(static_cast<std::uint8_t>(2 * words.size()));
   for (const std::uint16_t word : words) request.push_word(word);
-  Exchange exchange = implementation_->exchange(unit, request, 5);
-  if (!exchange.ok()) return exchange;
-  const auto answer = implementation_->answer();
-  const bool confirmed =
-      answer.size() == 5 && word_at(answer, 1) == address && word_at(answer, 3) == words.size();
-  if (!confirmed) implementation_->reject(unit, exchange, "the answer confirms another write");
-  return exchange;
+  return implementation_->write(unit, request, words.size());
 }
 
 }  // namespace thermocomp

@@ -27,7 +27,7 @@ struct Exchange {
   int exception_code{0};     ///< 1..255 when outcome is exception
   nanoseconds sent_at{};     ///< CLOCK_MONOTONIC
   nanoseconds arrived_at{};  ///< the whole answer was here; 0 without one
-  const char* detail{""};    ///< static text for a person; empty when ok
+  std::string detail{};      ///< what came, for a person; empty when ok
 
   [[nodiscard]] bool ok() const noexcept { return outcome == ExchangeOutcome::ok; }
   /// The fault a reading gets: busy (6) device_busy; a gateway's 10 and 11, a time-out and a lost
@@ -40,6 +40,9 @@ struct Exchange {
 /// Checks a line before anything is opened.
 /// @throws DriverError naming what cannot work (unknown baud rate, parity, port, empty host, ...)
 void check_line(const ModbusLine& line);
+
+/// How long a gateway may wait for a unit that does not answer.
+inline constexpr nanoseconds gateway_wait_max = std::chrono::seconds(3);
 
 /// Silence kept between frames on the line: as configured, else 3.5 characters, 1.75 ms above
 /// 19200 baud; TCP: 0 unless configured.
@@ -55,6 +58,12 @@ void check_line(const ModbusLine& line);
 /// is not asked again before ready_at(), while the answers of one unit that arrive during an
 /// exchange with another are thrown away. The exchange calls wait for ready_at() by themselves;
 /// whoever has other units to ask looks at it first.
+///
+/// A gateway that still waits for a silent unit answers nobody: the next unit that is asked over
+/// TCP is waited for until the gateway must have given the silent one up (gateway_wait_max).
+///
+/// A peer that closes a connection which has brought answers is connected again within the
+/// exchange; one that closes after each answer gets a connection for each request.
 class ModbusConnection {
  public:
   /// @throws DriverError as check_line()
@@ -73,10 +82,24 @@ class ModbusConnection {
   void disconnect() noexcept;
   [[nodiscard]] bool connected() const noexcept;
   [[nodiscard]] const std::string& last_error() const noexcept;
+  /// Times the line was opened; of them, those by connect(): a line that connect() opens is another
+  /// one, of whose far end nothing is known.
+  [[nodiscard]] std::uint64_t connects() const noexcept;
+  [[nodiscard]] std::uint64_t links() const noexcept;
+  /// How long the last unit without an answer kept a gateway from answering others.
+  [[nodiscard]] nanoseconds held() const noexcept;
+  void share() noexcept;  ///< others than sensors ask on this line too
+  [[nodiscard]] bool is_shared() const noexcept;
+  /// The timing of `line` from now on: of several users of one line each has its own.
+  void time_as(const ModbusLine& line) noexcept;
 
   /// Reads words.size() registers (at most 125), or bits, one per word (at most 2000).
   /// `words` is written only when the outcome is ok.
-  Exchange read(int unit, ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words);
+  /// @param wide  a register has 32 bits, two of the words
+  Exchange read(int unit, ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words,
+                bool wide = false);
+  /// Writes one holding register (function 6). ok: the unit has confirmed it.
+  Exchange write_register(int unit, std::uint16_t address, std::uint16_t word);
   /// Writes holding registers (function 16; at most 123). ok: the unit has confirmed them.
   Exchange write_registers(int unit, std::uint16_t address, std::span<const std::uint16_t> words);
 

@@ -48,6 +48,8 @@ enum class ModbusTable { coil, discrete_input, holding, input };
 struct ModbusTcp {
   std::string host;
   int port{502};
+  bool rtu_frames{false};  ///< as on a serial line: a serial server that passes bytes on
+  bool datagrams{false};   ///< UDP
   bool operator==(const ModbusTcp&) const = default;
 };
 struct ModbusRtu {
@@ -69,6 +71,8 @@ struct ModbusLine {
   double reconnect_s{1.0};            ///< pause before a connection is tried again
   double backoff_s_max{30.0};         ///< longest pause before a dead unit is asked again
   int retries{1};                     ///< further tries of one request before it has failed
+  /// TCP, UDP: answers carry any transaction number; late ones are told as on a serial line.
+  bool ignore_transaction{false};
   bool operator==(const ModbusLine&) const = default;
 };
 
@@ -88,7 +92,8 @@ struct ModbusChannel {
   std::uint16_t address{0};  ///< 0-based, as on the wire
   Encoding encoding{Encoding::int16};
   WordOrder word_order{WordOrder::abcd};
-  double scale{1.0};  ///< temp = raw * scale + offset_degC
+  std::uint16_t mask{0xFFFF};  ///< of a 16-bit value: the bits that are the number
+  double scale{1.0};           ///< temp = raw * scale + offset_degC
   double offset_degC{0.0};
   std::vector<Sentinel> sentinels;
   std::optional<ModbusStatus> status;
@@ -110,19 +115,27 @@ struct ModbusDeviceConfig {
   int registers_per_request_max{125};
   int gap_registers_max{8};  ///< unused registers read along to save a request
   bool one_register_a_request{false};
+  bool wide_registers{false};  ///< a register has 32 bits: a value one address, its answer 4 bytes
   std::optional<ModbusRenewal> renewal;
   std::vector<ModbusChannel> channels;
   bool operator==(const ModbusDeviceConfig&) const = default;
 };
 
+/// What the key `kind` of a line may say.
+inline constexpr std::array modbus_kinds{"modbus_tcp", "modbus_rtu", "modbus_rtu_over_tcp",
+                                         "modbus_udp"};
+[[nodiscard]] constexpr const char* kind_of(const ModbusLine& line) noexcept {
+  const auto* tcp = std::get_if<ModbusTcp>(&line.link);
+  if (tcp == nullptr) return modbus_kinds[1];
+  return tcp->rtu_frames ? modbus_kinds[2] : tcp->datagrams ? modbus_kinds[3] : modbus_kinds[0];
+}
+
 struct ModbusBusConfig {
-  static constexpr std::array kinds{"modbus_tcp", "modbus_rtu"};  ///< in the order of `link`
+  static constexpr auto kinds = modbus_kinds;
   std::string name;
   ModbusLine line;
   std::vector<ModbusDeviceConfig> devices;
-  [[nodiscard]] BusOutline outline() const {
-    return {kinds.at(line.link.index()), "", devices.size(), "device"};
-  }
+  [[nodiscard]] BusOutline outline() const { return {kind_of(line), "", devices.size(), "device"}; }
   bool operator==(const ModbusBusConfig&) const = default;
 };
 

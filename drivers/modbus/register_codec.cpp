@@ -54,6 +54,17 @@ std::int64_t integer_of(std::uint64_t bits, Encoding encoding) noexcept {
   }
 }
 
+/// The number in the bits of the mask.
+std::uint64_t masked(std::uint64_t bits, const NumberFormat& format) noexcept {
+  if (format.mask == 0xFFFF || registers_of(format.encoding) != 1) return bits;
+  const int shift = std::countr_zero(format.mask);
+  const unsigned part = (static_cast<unsigned>(bits) & format.mask) >> shift;
+  const unsigned sign = format.encoding == Encoding::int16
+                            ? std::bit_floor(static_cast<unsigned>(format.mask) >> shift)
+                            : 0;
+  return static_cast<std::uint16_t>((part ^ sign) - sign);
+}
+
 double number_of(std::uint64_t bits, Encoding encoding) noexcept {
   switch (encoding) {
     case Encoding::float32:
@@ -106,7 +117,7 @@ std::uint64_t bits_of(std::span<const std::uint16_t> registers, Encoding encodin
 
 Decoded decode(std::span<const std::uint16_t> registers, const NumberFormat& format,
                std::span<const Sentinel> sentinels) noexcept {
-  const std::uint64_t bits = bits_of(registers, format.encoding, format.word_order);
+  const std::uint64_t bits = masked(bits_of(registers, format.encoding, format.word_order), format);
   const double number = number_of(bits, format.encoding);
   const bool integer = is_integer(format.encoding);
   for (const Sentinel& sentinel : sentinels) {

@@ -28,12 +28,20 @@ struct NumberFormat {
   WordOrder word_order{WordOrder::abcd};
   double scale{1.0};
   double offset{0.0};
+  /// Of a 16-bit value: the bits that are the number, shifted down. int16: the highest of them is
+  /// its sign.
+  std::uint16_t mask{0xFFFF};
 };
 
 /// The format of a value in `table`: as given, but a bit is always 0 or 1 before scale and offset.
 [[nodiscard]] inline NumberFormat format_in(ModbusTable table, NumberFormat format) noexcept {
   if (!is_bit_table(table)) return format;
   return {Encoding::uint16, WordOrder::abcd, format.scale, format.offset};
+}
+
+[[nodiscard]] inline NumberFormat format_of(const ModbusChannel& channel) noexcept {
+  return format_in(channel.table, {channel.encoding, channel.word_order, channel.scale,
+                                   channel.offset_degC, channel.mask});
 }
 
 /// The value's bit pattern, right-aligned, its bytes brought into order.

@@ -1,13 +1,9 @@
 #include "drivers/modbus/rtu_port.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <poll.h>
 #include <unistd.h>
-
-#include <sys/select.h>
 
 #include "drivers/driver_error.hpp"
 #include "drivers/monotonic_clock.hpp"
@@ -19,8 +15,6 @@ RtuPort::RtuPort(const ModbusRtu& rtu)
       context_(
           modbus_new_rtu(rtu.device.c_str(), rtu.baud, rtu.parity, rtu.data_bits, rtu.stop_bits)) {
   if (!context_) throw DriverError(std::string("Modbus line: ") + modbus_strerror(errno));
-  modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
-  modbus_set_byte_timeout(context_.get(), 0, 0);  // one time-out for the rest of a frame
 }
 
 nanoseconds RtuPort::now() const noexcept {
@@ -38,11 +32,6 @@ bool RtuPort::open(std::string& why) {
     modbus_close(context_.get());
     return false;
   }
-  if (fd() >= FD_SETSIZE) {  // libmodbus waits with select()
-    why = "too many open files for libmodbus";
-    modbus_close(context_.get());
-    return false;
-  }
   modbus_flush(context_.get());
   open_ = true;
   return true;
@@ -57,44 +46,23 @@ void RtuPort::close_device() noexcept {
 }
 
 bool RtuPort::send(std::span<const std::uint8_t> bytes) noexcept {
-  modbus_set_slave(context_.get(), bytes[0]);
-  modbus_flush(context_.get());  // whatever is there answers nothing that was asked
-  return modbus_send_raw_request(context_.get(), bytes.data(), static_cast<int>(bytes.size())) > 0;
+  return ::write(fd(), bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
 }
 
 PortWait RtuPort::wait_for_input(nanoseconds deadline) noexcept {
   return wait_.wait_for(fd(), POLLIN, deadline);
 }
 
-PortBytes RtuPort::receive(std::span<std::uint8_t> into, nanoseconds rest) noexcept {
-  constexpr std::size_t checksum_bytes = 2;
-  const auto rest_us = std::chrono::duration_cast<std::chrono::microseconds>(rest).count();
-  modbus_set_response_timeout(context_.get(), static_cast<std::uint32_t>(rest_us / 1000000),
-                              static_cast<std::uint32_t>(rest_us % 1000000));
-  std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH> frame{};
-  const int received = modbus_receive_confirmation(context_.get(), frame.data());
-  if (received == 0) return {PortBytes::Kind::nothing};  // a frame of another unit
-  if (received > static_cast<int>(checksum_bytes)) {
-    const std::size_t size =
-        std::min(static_cast<std::size_t>(received) - checksum_bytes, into.size());
-    std::copy_n(frame.begin(), size, into.begin());
-    return {PortBytes::Kind::bytes, size};
-  }
-  if (errno == EMBBADCRC) return {PortBytes::Kind::wrong_checksum};
-  if (errno == EMBBADDATA) return {PortBytes::Kind::too_long};
-  if (errno == ETIMEDOUT) return {PortBytes::Kind::broke_off};
-  return {PortBytes::Kind::lost};
-}
-
-void RtuPort::drain(nanoseconds silence) noexcept {
-  constexpr std::chrono::milliseconds drain_max{300};
-  const nanoseconds give_up_at = monotonic_now() + drain_max;
-  modbus_flush(context_.get());
-  while (monotonic_now() < give_up_at) {
-    if (wait_.wait_for(fd(), POLLIN, monotonic_now() + silence) != PortWait::ready) break;
-    std::array<std::uint8_t, 256> rubbish{};
-    if (::read(fd(), rubbish.data(), rubbish.size()) <= 0) break;
-  }
+PortBytes RtuPort::receive(std::span<std::uint8_t> into) noexcept {
+  const ssize_t count = ::read(fd(), into.data(), into.size());
+  if (count > 0) return {PortBytes::Kind::bytes, static_cast<std::size_t>(count)};
+  if (count < 0 && (errno == EAGAIN || errno == EINTR)) return {PortBytes::Kind::nothing};
+  if (count < 0) return {PortBytes::Kind::lost};
+  // 0: nothing is there, or the port is gone.
+  pollfd port{fd(), POLLIN, 0};
+  const timespec at_once{};
+  const bool is_gone = ::ppoll(&port, 1, &at_once, nullptr) > 0 && (port.revents & ~POLLIN) != 0;
+  return {is_gone ? PortBytes::Kind::lost : PortBytes::Kind::nothing};
 }
 
 }  // namespace thermocomp

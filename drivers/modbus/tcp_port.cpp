@@ -34,13 +34,14 @@ bool TcpPort::open(std::string& why) {
 }
 
 bool TcpPort::open_socket(const SocketAddress& address, std::string& why) {
-  const int fd = ::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int type = tcp_.datagrams ? SOCK_DGRAM : SOCK_STREAM;
+  const int fd = ::socket(address.storage.ss_family, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (fd < 0) {
     why = std::strerror(errno);
     return false;
   }
   const int on = 1;
-  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  if (!tcp_.datagrams) ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   int error = 0;
   const auto* target = reinterpret_cast<const sockaddr*>(&address.storage);
   if (::connect(fd, target, address.length) != 0) {
@@ -78,7 +79,7 @@ PortWait TcpPort::wait_for_input(nanoseconds deadline) noexcept {
   return wait_.wait_for(fd_, POLLIN, deadline);
 }
 
-PortBytes TcpPort::receive(std::span<std::uint8_t> into, nanoseconds /*rest*/) noexcept {
+PortBytes TcpPort::receive(std::span<std::uint8_t> into) noexcept {
   while (true) {
     const ssize_t count = ::recv(fd_, into.data(), into.size(), MSG_DONTWAIT);
     if (count > 0) return {PortBytes::Kind::bytes, static_cast<std::size_t>(count)};
@@ -87,8 +88,5 @@ PortBytes TcpPort::receive(std::span<std::uint8_t> into, nanoseconds /*rest*/) n
     return {PortBytes::Kind::lost};
   }
 }
-
-/// Where the next frame of a stream begins cannot be found by waiting.
-void TcpPort::drain(nanoseconds /*silence*/) noexcept {}
 
 }  // namespace thermocomp

@@ -1,4 +1,5 @@
-/// A Modbus TCP connection's socket. Only for the .cpp files of this folder.
+/// A socket to a host and port, of a stream or of datagrams. Only for the .cpp files of this
+/// folder.
 #pragma once
 
 #include <memory>
@@ -21,8 +22,7 @@ class TcpPort final : public ModbusPort {
   void close() noexcept override { close_socket(); }
   bool send(std::span<const std::uint8_t> bytes) noexcept override;
   PortWait wait_for_input(nanoseconds deadline) noexcept override;
-  PortBytes receive(std::span<std::uint8_t> into, nanoseconds rest) noexcept override;
-  void drain(nanoseconds silence) noexcept override;
+  PortBytes receive(std::span<std::uint8_t> into) noexcept override;
   bool pause_until(nanoseconds time) noexcept override { return wait_.pause_until(time); }
   void cancel() noexcept override { wait_.cancel(); }
   [[nodiscard]] bool cancelled() const noexcept override { return wait_.cancelled(); }

@@ -12,15 +12,17 @@ namespace {
 struct Item {
   ModbusTable table;
   std::size_t address;
-  std::size_t words;
+  std::size_t count;  ///< registers or bits
   WordPlace* place;
+  bool is_low_word{false};  ///< of its register
 
-  [[nodiscard]] std::size_t end() const noexcept { return address + words; }
+  [[nodiscard]] std::size_t end() const noexcept { return address + count; }
 };
 
 /// A plan whose places are all made, so that items can point at them.
 ModbusPlan empty_plan(const ModbusDeviceConfig& device) {
   ModbusPlan plan;
+  if (device.wide_registers) plan.words_a_register = 2;
   plan.channels.resize(device.channels.size());
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
     if (device.channels[i].status) plan.channels[i].status.emplace();
@@ -30,21 +32,23 @@ ModbusPlan empty_plan(const ModbusDeviceConfig& device) {
 }
 
 std::vector<Item> items_of(const ModbusDeviceConfig& device, ModbusPlan& plan) {
+  constexpr std::size_t one = 1;
   std::vector<Item> items;
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
     const ModbusChannel& channel = device.channels[i];
     ChannelPlace& place = plan.channels[i];
-    items.push_back(
-        {channel.table, channel.address, words_of(channel.table, channel.encoding), &place.value});
+    const std::size_t words = words_of(channel.table, channel.encoding);
+    items.push_back({channel.table, channel.address, std::max(words / plan.words_a_register, one),
+                     &place.value});
     if (channel.status) {
-      items.push_back({channel.status->table, channel.status->address, 1, &*place.status});
+      items.push_back({channel.status->table, channel.status->address, one, &*place.status, true});
     }
   }
   if (device.renewal) {
-    items.push_back({device.renewal->table, device.renewal->address, 1, &*plan.renewal});
+    items.push_back({device.renewal->table, device.renewal->address, one, &*plan.renewal, true});
   }
   std::stable_sort(items.begin(), items.end(), [](const Item& a, const Item& b) {
-    return std::tuple(a.table, a.address, a.words) < std::tuple(b.table, b.address, b.words);
+    return std::tuple(a.table, a.address, a.count) < std::tuple(b.table, b.address, b.count);
   });
   return items;
 }
@@ -59,14 +63,15 @@ Limits limits_of(const ModbusDeviceConfig& device, ModbusTable table, int line_r
   if (is_bit_table(table)) return {bits_per_request_limit, 16 * gap};
   const int length =
       std::min({device.registers_per_request_max, line_registers_max, registers_per_request_limit});
-  return {static_cast<std::size_t>(std::max(length, 1)), gap};
+  const int registers = device.wide_registers ? length / 2 : length;
+  return {static_cast<std::size_t>(std::max(registers, 1)), gap};
 }
 
 bool joins(const PlannedRequest& request, const Item& item, const Limits& limits,
            bool one_register_a_request) {
   if (request.table != item.table) return false;
   const std::size_t end = std::size_t{request.address} + request.count;
-  if (item.end() <= end && item.address == request.address && item.words == request.count) {
+  if (item.end() <= end && item.address == request.address && item.count == request.count) {
     return true;  // the very same words
   }
   if (one_register_a_request) return false;
@@ -105,7 +110,9 @@ ModbusPlan plan_requests(const ModbusDeviceConfig& device, int line_registers_ma
     PlannedRequest& request = plan.requests.back();
     const std::size_t count = std::max<std::size_t>(request.count, item.end() - request.address);
     request.count = static_cast<std::uint16_t>(count);
-    *item.place = {plan.requests.size() - 1, item.address - request.address};
+    const std::size_t each = is_bit_table(item.table) ? 1 : plan.words_a_register;
+    *item.place = {plan.requests.size() - 1,
+                   (item.address - request.address) * each + (item.is_low_word ? each - 1 : 0)};
   }
   if (plan.renewal) counter_first(plan);
   return plan;

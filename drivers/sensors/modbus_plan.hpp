@@ -32,6 +32,7 @@ struct ChannelPlace {
 };
 
 struct ModbusPlan {
+  std::size_t words_a_register{1};  ///< of the answers; 2: of 32-bit registers
   std::vector<PlannedRequest> requests;
   std::vector<ChannelPlace> channels;  ///< order of the device's channels
   /// In the first request: a counter read before the values never calls old values new.

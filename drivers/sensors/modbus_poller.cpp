@@ -76,14 +76,6 @@ std::size_t channels_of(const ModbusBusConfig& config) {
   return channels;
 }
 
-nanoseconds longest_pause(const ModbusBusConfig& config) {
-  // A unit alone on its line takes nothing from others by being asked often.
-  const double pause_s = config.devices.size() == 1
-                             ? std::min(config.line.backoff_s_max, config.line.reconnect_s)
-                             : config.line.backoff_s_max;
-  return from_seconds(pause_s);
-}
-
 }  // namespace
 
 ModbusPoller::ModbusPoller(const ModbusBusConfig& config, ModbusConnection& connection)
@@ -96,14 +88,9 @@ ModbusPoller::ModbusPoller(const ModbusBusConfig& config, ModbusConnection& conn
   health_.kind = config.outline().kind;
   for (const ModbusDeviceConfig& device_config : config.devices) {
     check_device(config.line, device_config);
-    Device device{device_config,
-                  plan_requests(device_config, registers_max_of(config.line)),
-                  {},
-                  UnitBackoff(backoff_first, longest_pause(config))};
+    Device device{device_config, {}, {}, UnitBackoff(backoff_first)};
+    plan(device);
     device.first_reading = sensors_.size();
-    for (const PlannedRequest& planned : device.plan.requests) {
-      device.requests.push_back({planned, std::vector<std::uint16_t>(planned.count)});
-    }
     for (const ModbusChannel& channel : device_config.channels) {
       sensors_.push_back(channel.sensor);
     }
@@ -112,6 +99,42 @@ ModbusPoller::ModbusPoller(const ModbusBusConfig& config, ModbusConnection& conn
   }
   if (devices_.empty()) throw DriverError("bus " + config.name + ": has no device");
   for (Device& device : devices_) device.next_due = connection_.now();
+}
+
+void ModbusPoller::plan(Device& device) const {
+  device.plan = plan_requests(device.config, registers_max_of(config_.line));
+  device.requests.clear();
+  for (const PlannedRequest& planned : device.plan.requests) {
+    const std::size_t each = is_bit_table(planned.table) ? 1 : device.plan.words_a_register;
+    device.requests.push_back({planned, std::vector<std::uint16_t>(each * planned.count)});
+  }
+}
+
+ModbusPoller::Answer ModbusPoller::value_of(std::size_t device, std::size_t channel) const {
+  const Device& of = devices_[device];
+  const WordPlace& place = of.plan.channels[channel].value;
+  const Request& request = of.requests[place.request];
+  const ModbusChannel& config = of.config.channels[channel];
+  return {request.newest, request.planned,
+          std::span(request.words).subspan(place.offset, words_of(config.table, config.encoding))};
+}
+
+std::optional<ModbusPoller::Answer> ModbusPoller::status_of(std::size_t device,
+                                                            std::size_t channel) const {
+  const Device& of = devices_[device];
+  const auto& place = of.plan.channels[channel].status;
+  if (!place) return std::nullopt;
+  const Request& request = of.requests[place->request];
+  return Answer{request.newest, request.planned,
+                std::span(request.words).subspan(place->offset, 1)};
+}
+
+bool ModbusPoller::has_asked(std::size_t device) const noexcept {
+  const Device& of = devices_[device];
+  const bool all = std::none_of(of.requests.begin(), of.requests.end(), [](const Request& request) {
+    return request.fault == Fault::never_read;
+  });
+  return of.rounds > 0 && (all || of.rounds > of.requests.size());
 }
 
 void ModbusPoller::newest(std::span<Reading> all) noexcept {
@@ -136,6 +159,7 @@ nanoseconds ModbusPoller::next_action_at() const noexcept {
 }
 
 void ModbusPoller::act() {
+  if (connects_ != connection_.connects()) note_connected();
   if (connection_.connected()) {
     Device& device = devices_[most_due()];
     if (connection_.pause_until(due(device))) poll(device);
@@ -150,17 +174,17 @@ void ModbusPoller::connect() {
   next_connect_at_ = connection_.now() + reconnect_;
   const bool connected = connection_.connect();
   if (connection_.cancelled()) return;
+  if (connected) return note_connected();
   {
     const std::lock_guard lock(health_mutex_);
-    health_.connected = connected;
     health_.last_error = connection_.last_error();
-    if (connected) ++health_.connects;
   }
-  answers_since_connect_ = false;
-  if (!connected) {
-    set_lost();
-    return;
-  }
+  set_lost();
+}
+
+/// By this poller, within an exchange or by another user of the line.
+void ModbusPoller::note_connected() {
+  connects_ = connection_.connects();
   if (lost_) {  // whoever was dead may have come back with the line
     for (Device& device : devices_) {
       device.backoff.answered();
@@ -169,6 +193,10 @@ void ModbusPoller::connect() {
   }
   lost_ = false;
   loss_told_ = false;
+  const std::lock_guard lock(health_mutex_);
+  health_.connected = true;
+  health_.connects = connects_;
+  health_.last_error.clear();
 }
 
 /// No line: no reading of the bus may be believed any longer.
@@ -201,6 +229,14 @@ std::size_t ModbusPoller::most_due() const noexcept {
                                   devices_.begin());
 }
 
+/// A unit alone on its line takes nothing from others by being asked often.
+nanoseconds ModbusPoller::pause_max() const noexcept {
+  const bool is_alone = devices_.size() == 1 && !connection_.is_shared();
+  const ModbusLine& line = config_.line;
+  return from_seconds(is_alone ? std::min(line.backoff_s_max, line.reconnect_s)
+                               : line.backoff_s_max);
+}
+
 std::size_t ModbusPoller::dead_units() const noexcept {
   return static_cast<std::size_t>(
       std::count_if(devices_.begin(), devices_.end(),
@@ -227,42 +263,69 @@ void ModbusPoller::poll(Device& device) {
     }
   }
   if (step == Step::line_lost) {
-    if (connection_.cancelled()) return;
-    // A connection that had worked may just have been closed for idling: connecting again decides.
-    if (!answers_since_connect_) set_lost();
-    lost_ = true;
+    if (!connection_.cancelled()) set_lost();
     return;
   }
   if (step != Step::again && device.next_due <= began_at) {
     device.next_due += period * ((began_at - device.next_due) / period + 1);  // keeps its phase
   }
+  if (step != Step::again) ++device.rounds;
   finish_round(device, from_start);
   publish();
 }
 
+/// Asks for fewer values at once. @return false: that cannot be
+bool ModbusPoller::split(Device& device, std::size_t index) const {
+  constexpr int illegal_address = 2;
+  constexpr int illegal_value = 3;
+  const Request& request = device.requests[index];
+  const int code = request.newest.exception_code;
+  const bool is_refused = code == illegal_address || code == illegal_value;
+  if (!is_refused || request.arrived_at != nanoseconds{0}) return false;
+  const std::size_t before = device.requests.size();
+  ModbusDeviceConfig fewer = device.config;
+  const auto count = [&] {
+    return plan_requests(fewer, registers_max_of(config_.line)).requests.size();
+  };
+  fewer.gap_registers_max = 0;
+  if (count() == before) fewer.one_register_a_request = true;
+  if (count() == before) return false;
+  device.config = fewer;
+  device.is_split = true;
+  plan(device);
+  return true;
+}
+
 ModbusPoller::Step ModbusPoller::ask(Device& device, std::size_t index) {
   Request& request = device.requests[index];
-  const Exchange exchange = connection_.read(device.config.unit, request.planned.table,
-                                             request.planned.address, request.words);
+  const Exchange exchange =
+      connection_.read(device.config.unit, request.planned.table, request.planned.address,
+                       request.words, device.config.wide_registers);
   if (exchange.outcome == ExchangeOutcome::cancelled) return Step::line_lost;
+  request.newest = exchange;
   note(static_cast<std::size_t>(&device - devices_.data()), exchange);
   if (exchange.outcome == ExchangeOutcome::disconnected) {
     device.cursor = index;
     return Step::line_lost;
   }
   if (!exchange.unit_answered()) return give_up(device, index, exchange);
-  answers_since_connect_ = true;
   device.tries = 0;
   device.backoff.answered();
+  if (split(device, index)) return Step::again;
   request.settled = true;
   request.fault = exchange.fault();
-  if (exchange.ok()) request.arrived_at = exchange.arrived_at;
+  if (exchange.ok()) {
+    // What a gateway has kept may have been read at any time since it was asked for.
+    const nanoseconds timeout = from_seconds(1e-3 * config_.line.timeout_ms);
+    request.arrived_at = std::min(exchange.arrived_at, exchange.sent_at + timeout);
+  }
   return Step::next;
 }
 
 /// A request without a usable answer: another try, or the fault.
 ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
                                          const Exchange& exchange) {
+  // A gateway that answers in a unit's place has asked it already.
   const bool gateway = exchange.outcome == ExchangeOutcome::exception;
   if (!gateway && !device.backoff.dead() && device.tries < config_.line.retries) {
     ++device.tries;
@@ -282,7 +345,8 @@ ModbusPoller::Step ModbusPoller::give_up(Device& device, std::size_t index,
   if (!any_answered) {
     const bool was_dead = device.backoff.dead();
     const nanoseconds now = connection_.now();
-    device.backoff.failed(now, now - exchange.sent_at, dead_units() + (was_dead ? 0 : 1));
+    const nanoseconds cost = std::max(now - exchange.sent_at, connection_.held());
+    device.backoff.failed(now, cost, dead_units() + (was_dead ? 0 : 1), pause_max());
   }
   return Step::end_of_round;
 }
@@ -324,10 +388,8 @@ Reading ModbusPoller::evaluate(const Device& device, std::size_t channel, const 
                 : decode_status(*config.status, status.words[place.status->offset]);
   }
   if (fault != Fault::none) return {not_a_number, before.taken_at, fault};
-  const NumberFormat format = format_in(
-      config.table, {config.encoding, config.word_order, config.scale, config.offset_degC});
   const auto words = std::span(request.words).subspan(place.value.offset);
-  const Decoded decoded = decode(words, format, config.sentinels);
+  const Decoded decoded = decode(words, format_of(config), config.sentinels);
   if (decoded.fault != Fault::none) return {not_a_number, before.taken_at, decoded.fault};
   const bool stamp = renewed_now || before.taken_at == nanoseconds{0};
   return {decoded.value, stamp ? arrived_at : before.taken_at, Fault::none};

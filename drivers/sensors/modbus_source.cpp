@@ -5,21 +5,20 @@
 namespace thermocomp {
 
 ModbusSource::ModbusSource(const ModbusBusConfig& config)
-    : name_("mb-" + config.name), connection_(config.line), poller_(config, connection_) {}
+    : name_("mb-" + config.name),
+      line_(SharedLine::of(config.line)),
+      poller_(config, line_->connection()) {}
 
 ModbusSource::~ModbusSource() {
   stop();
 }
 
 void ModbusSource::start() {
-  thread_.start(name_, [this] {
-    while (!connection_.cancelled()) poller_.act();
-  });
+  line_->join(poller_, name_);
 }
 
 void ModbusSource::stop() noexcept {
-  connection_.cancel();
-  thread_.join();
+  line_->leave(poller_, {});
 }
 
 std::unique_ptr<SensorSource> make_bus_source(const ModbusBusConfig& bus) {

@@ -1,8 +1,7 @@
-/// Thermocouples behind one Modbus line (TCP or RTU), polled by a thread of its own.
+/// Thermocouples behind one Modbus line (TCP or RTU), polled by the line's thread.
 #pragma once
 
-#include "drivers/bus_thread.hpp"
-#include "drivers/modbus/connection.hpp"
+#include "drivers/modbus/shared_line.hpp"
 #include "drivers/sensors/modbus_poller.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 
@@ -21,9 +20,8 @@ class ModbusSource final : public SensorSource {
 
  private:
   std::string name_;
-  ModbusConnection connection_;
+  std::shared_ptr<SharedLine> line_;
   ModbusPoller poller_;
-  BusThread thread_;
 };
 
 }  // namespace thermocomp

@@ -9,15 +9,16 @@ namespace thermocomp {
 
 /// Pauses double from `pause_first` to `pause_max`; an answer ends them at once. From the third
 /// failure on they are also long enough that all dead units of the line together take no more than
-/// `line_share_max` of its time with their time-outs, as far as `pause_max` allows.
+/// `line_share_max` of its time with their time-outs, as far as `stretch_max` times `pause_max`
+/// allows.
 class UnitBackoff {
  public:
   using nanoseconds = std::chrono::nanoseconds;
   static constexpr double line_share_max = 0.02;
   static constexpr int failures_before_budget = 2;
+  static constexpr double stretch_max = 1.8;
 
-  UnitBackoff(nanoseconds pause_first, nanoseconds pause_max) noexcept
-      : pause_first_(std::min(pause_first, pause_max)), pause_max_(pause_max) {}
+  explicit UnitBackoff(nanoseconds pause_first) noexcept : pause_first_(pause_first) {}
 
   void answered() noexcept {
     failures_ = 0;
@@ -27,14 +28,15 @@ class UnitBackoff {
   /// The unit failed (all tries) at `now`.
   /// @param cost        time of the line that the failed request took
   /// @param dead_units  units of the line that do not answer, this one among them
-  void failed(nanoseconds now, nanoseconds cost, std::size_t dead_units) noexcept {
-    pause_ = failures_ == 0 ? pause_first_ : std::min(2 * pause_, pause_max_);
+  void failed(nanoseconds now, nanoseconds cost, std::size_t dead_units,
+              nanoseconds pause_max) noexcept {
+    pause_ = std::min(failures_ == 0 ? pause_first_ : 2 * pause_, pause_max);
     ++failures_;
     nanoseconds pause = pause_;
     if (failures_ > failures_before_budget) {
       const double budget =
           static_cast<double>(cost.count()) * static_cast<double>(dead_units) / line_share_max;
-      const auto ceiling = static_cast<double>(pause_max_.count());
+      const auto ceiling = stretch_max * static_cast<double>(pause_max.count());
       pause =
           std::max(pause, nanoseconds{static_cast<nanoseconds::rep>(std::min(budget, ceiling))});
     }
@@ -46,7 +48,6 @@ class UnitBackoff {
 
  private:
   nanoseconds pause_first_;
-  nanoseconds pause_max_;
   nanoseconds pause_{0};
   nanoseconds not_before_{0};
   int failures_{0};

@@ -37,11 +37,12 @@ BUGS = [
      "!{P} && command_.look < stands_since_[axis];"),
     ("write_repeated_blindly", "drivers/controllers/kinds/modbus/modbus_dialogue.cpp",
      "  const Exchange exchange =\n"
-     "      connection_.write_registers(config_.unit, request.address, request.words);\n",
+     "      config_.write_function",
      "  const auto once = [&] {\n"
      "    return connection_.write_registers(config_.unit, request.address, request.words);\n"
      "  };\n"
-     "  const Exchange exchange = {P} ? with_retries(once) : once();\n"),
+     "  const Exchange exchange = {P} ? with_retries(once) :\n"
+     "      config_.write_function"),
     ("unwritten_compensates", "estimator/pipeline/mode_decision.cpp",
      "input.controller_written;",
      "(input.controller_written || {P});"),
@@ -102,9 +103,9 @@ BUGS = [
      "if (reading.fault != Fault::none) return reading.fault;",
      "if (reading.fault != Fault::none && reading.fault != Fault::no_answer) return reading.fault;\n"
      "  if (reading.fault != Fault::none) return {P} ? Fault::none : reading.fault;"),
-    ("transaction_not_compared", "drivers/modbus/connection.cpp",
-     "if (was_unasked_ || word_at(frame, 0) != transaction_) return Frame::foreign;",
-     "if (was_unasked_ || (word_at(frame, 0) != transaction_ && !{P})) return Frame::foreign;"),
+    ("transaction_not_compared", "drivers/modbus/frames.cpp",
+     "if (numbered_ && number != number_) {",
+     "if (numbered_ && number != number_ && !{P}) {"),
     ("late_answer_taken", "drivers/modbus/late_answers.hpp",
      "return confusable(question_, question) ? std::max(ready_at_, others_at_) : ready_at_;",
      "return confusable(question_, question) && !{P} ? std::max(ready_at_, others_at_) : ready_at_;"),

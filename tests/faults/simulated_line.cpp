@@ -21,6 +21,15 @@ void push_word(std::vector<std::uint8_t>& bytes, std::uint16_t word) {
   bytes.push_back(static_cast<std::uint8_t>(word >> 8));
   bytes.push_back(static_cast<std::uint8_t>(word & 0xFFu));
 }
+void push_checksum(std::vector<std::uint8_t>& bytes) {
+  unsigned sum = 0xFFFF;
+  for (const std::uint8_t byte : bytes) {
+    sum ^= byte;
+    for (int bit = 0; bit < 8; ++bit) sum = (sum & 1u) != 0 ? (sum >> 1) ^ 0xA001u : sum >> 1;
+  }
+  bytes.push_back(static_cast<std::uint8_t>(sum));
+  bytes.push_back(static_cast<std::uint8_t>(sum >> 8));
+}
 void push_registers(std::vector<std::uint8_t>& answer, std::uint8_t function,
                     std::span<const std::uint16_t> words) {
   answer.push_back(function);
@@ -145,7 +154,8 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
   if (mute_ || hit(FaultKind::frames_lost, 3)) return gone();
   clock_ += microseconds(200);
   answer_.clear();
-  end_.ask(bytes[head - 1], bytes.subspan(head), clock_, answer_);
+  const std::size_t tail = serial_ ? 2 : 0;  // the checksum
+  end_.ask(bytes[head - 1], bytes.subspan(head, bytes.size() - head - tail), clock_, answer_);
   if (answer_.empty() || hit(FaultKind::frames_lost, 3)) return true;
   Frame frame;
   frame.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(head));
@@ -154,6 +164,7 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
     frame.bytes[5] = static_cast<std::uint8_t>(answer_.size() + 1);
   }
   frame.bytes.insert(frame.bytes.end(), answer_.begin(), answer_.end());
+  if (serial_) push_checksum(frame.bytes);
   frame.arrives_at =
       clock_ + draw(chance_, milliseconds(1), milliseconds(25)) + end_.takes(bytes[head], clock_);
   if (hit(FaultKind::frames_late, 2))
@@ -181,8 +192,10 @@ bool SimulatedLine::send(std::span<const std::uint8_t> bytes) noexcept {
 /// Serial: the checksum shows it. TCP protects its data itself; what a bad gateway garbles is what
 /// it composes: head, function and length.
 void SimulatedLine::spoil(Frame& frame) {
-  frame.spoiled = true;
-  if (serial_) return;
+  if (serial_) {
+    frame.bytes.back() = static_cast<std::uint8_t>(frame.bytes.back() ^ 0x40u);
+    return;
+  }
   // Not the number of the transaction: another request's answer with this one's number could be
   // told by nobody.
   const std::size_t at = 2 + chance_.below(std::min(frame.bytes.size(), head_bytes + 2) - 2);
@@ -207,26 +220,16 @@ PortWait SimulatedLine::wait_for_input(nanoseconds deadline) noexcept {
   return PortWait::late;
 }
 
-PortBytes SimulatedLine::receive(std::span<std::uint8_t> into, nanoseconds rest) noexcept {
+PortBytes SimulatedLine::receive(std::span<std::uint8_t> into) noexcept {
   if (!frames_.empty() && frames_.front().arrives_at <= clock_) {
     const Frame frame = std::move(frames_.front());
     frames_.erase(frames_.begin());
-    if (serial_ && frame.cut) {
-      clock_ += rest;
-      return {PortBytes::Kind::broke_off};
-    }
-    if (frame.cut) frames_.clear();  // late frames do not fill up the gap either
-    if (serial_ && frame.spoiled) return {PortBytes::Kind::wrong_checksum};
+    if (!serial_ && frame.cut) frames_.clear();  // late frames do not fill up the gap either
     const std::size_t size = std::min(into.size(), frame.bytes.size());
     std::copy_n(frame.bytes.begin(), size, into.begin());
     return {PortBytes::Kind::bytes, size};
   }
   return {broken_ ? PortBytes::Kind::lost : PortBytes::Kind::nothing};
-}
-
-void SimulatedLine::drain(nanoseconds silence) noexcept {
-  for (int i = 0; i < 20 && wait_for_input(clock_ + silence) == PortWait::ready; ++i)
-    std::erase_if(frames_, [this](const Frame& frame) { return frame.arrives_at <= clock_; });
 }
 
 bool SimulatedLine::pause_until(nanoseconds time) noexcept {

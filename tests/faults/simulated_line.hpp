@@ -86,8 +86,7 @@ class SimulatedLine final : public ModbusPort {
   void close() noexcept override;
   bool send(std::span<const std::uint8_t> bytes) noexcept override;
   PortWait wait_for_input(nanoseconds deadline) noexcept override;
-  PortBytes receive(std::span<std::uint8_t> into, nanoseconds rest) noexcept override;
-  void drain(nanoseconds silence) noexcept override;
+  PortBytes receive(std::span<std::uint8_t> into) noexcept override;
   bool pause_until(nanoseconds time) noexcept override;
   void cancel() noexcept override {}
   [[nodiscard]] bool cancelled() const noexcept override { return false; }
@@ -96,7 +95,6 @@ class SimulatedLine final : public ModbusPort {
   struct Frame {
     nanoseconds arrives_at{};
     std::vector<std::uint8_t> bytes;
-    bool spoiled{false};
     bool cut{false};
   };
   [[nodiscard]] bool up(nanoseconds time) const;

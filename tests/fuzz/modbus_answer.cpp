@@ -4,7 +4,6 @@
 /// Input: how the line is, then for each exchange what is asked and the pieces of the answer.
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <string>
 #include <vector>
 
@@ -139,7 +138,7 @@ void check_ended(const Exchange& exchange, nanoseconds began, const fuzz::Virtua
   // Left alone after a late answer (6 s), waited for, drained, and the looks at the clock.
   FUZZ_PROMISE(took <= std::chrono::milliseconds(7500));
   FUZZ_PROMISE(exchange.ok() == (exchange.fault() == Fault::none));
-  FUZZ_PROMISE(exchange.ok() || std::strlen(exchange.detail) > 0);
+  FUZZ_PROMISE(exchange.ok() || !exchange.detail.empty());
   const bool is_exception = exchange.outcome == ExchangeOutcome::exception;
   FUZZ_PROMISE(!is_exception || (exchange.exception_code >= 1 && exchange.exception_code <= 255));
   FUZZ_PROMISE(is_exception || exchange.exception_code == 0);
@@ -216,7 +215,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   // A detail is static text: still there after the exchanges that followed.
   for (const Exchange& exchange : ended) {
-    FUZZ_PROMISE(exchange.ok() || std::strlen(exchange.detail) > 0);
+    FUZZ_PROMISE(exchange.ok() || !exchange.detail.empty());
   }
   return 0;
 }

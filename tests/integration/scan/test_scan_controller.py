@@ -189,7 +189,7 @@ def test_a_controller_that_is_silent_or_gone_is_told_so(simulate, relay, tmp_pat
                          silent.replace("timeout_ms = 3000.0", "timeout_ms = 200.0"))
     report, _ = scan(path)
     assert report["good"] == 1  # the sensors are not its fault
-    assert "unit 1 does not answer within 200 ms, asked twice" in report["controller"]["error"]
+    assert "unit 1: no answer within timeout_ms = 200" in report["controller"]["error"]
     assert all(each["why"] == "no answer" for each in report["controller"]["values"])
 
     gone = socket.create_server(("127.0.0.1", 0))

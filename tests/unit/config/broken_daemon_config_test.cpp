@@ -128,6 +128,12 @@ const std::vector<Broken>& broken_small_machine() {
        "must name a device: bed_module, column_module"},
       {"address missing", "address = 1\n", "# no address\n", "[[sensor]]\nname = \"bed_rear\"",
        "sensor[bed_rear].address", "must be given"},
+      {"address of another table as a manual has it", "address = 1\n", "address = 400002\n", "",
+       "sensor[bed_rear].address", "table = \"holding\", address = 1"},
+      {"serial transaction numbers", "rs485 = false ", "ignore_transaction = true ", "",
+       "bus[column_line].ignore_transaction", "serial frames"},
+      {"function of writes", "write_function = 16 ", "write_function = 5 ", "",
+       "controller.write_function", "[6, 16]"},
       {"address negative", "address = 1\n", "address = -1\n", "", "sensor[bed_rear].address",
        "[0, 65535]"},
       {"value passes the last register", "address = 6\n", "address = 65535\n", "",
@@ -181,7 +187,8 @@ const std::vector<Broken>& broken_small_machine() {
       // ---- controller
       {"controller kind", "kind = \"modbus_tcp\"                      # dry_run",
        "kind = \"profinet\"                      # dry_run", "", "controller.kind",
-       "\"dry_run\" \"modbus_tcp\" \"modbus_rtu\" \"piezo_tcp\" \"piezo_rtu\" \"can\" "
+       "\"dry_run\" \"modbus_tcp\" \"modbus_rtu\" \"modbus_rtu_over_tcp\" \"modbus_udp\" "
+       "\"piezo_tcp\" \"piezo_rtu\" \"can\" "
        "\"linuxcnc\""},
       {"controller host", "host = \"192.168.10.30\"", "host = \"1.2.3\"", "", "controller.host",
        "IP address"},

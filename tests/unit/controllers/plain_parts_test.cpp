@@ -242,7 +242,7 @@ TEST_CASE("neighbours are read in one request and far ones are not", "[controlle
       value_at(ModbusTable::discrete_input, 3),
       value_at(ModbusTable::input, 21),  // 9 unused registers after 10..11
   };
-  const ReadPlan plan = plan_reads(values);
+  const ReadPlan plan = plan_reads(values, {});
   REQUIRE(plan.requests.size() == 3);
   CHECK(plan.requests[0].table == ModbusTable::discrete_input);
   CHECK(plan.requests[0].address == 3);
@@ -258,15 +258,31 @@ TEST_CASE("neighbours are read in one request and far ones are not", "[controlle
   }
 }
 
+TEST_CASE("a controller's gaps and requests are as it allows", "[controllers]") {
+  const std::vector<ModbusValue> values{value_at(ModbusTable::input, 0),
+                                        value_at(ModbusTable::input, 4),
+                                        value_at(ModbusTable::input, 5)};
+  ModbusControllerConfig config;
+  CHECK(plan_reads(values, config).requests.size() == 1);
+  config.gap_registers_max = 0;
+  CHECK(plan_reads(values, config).requests.size() == 2);
+  config.registers_per_request_max = 1;
+  CHECK(plan_reads(values, config).requests.size() == 3);
+  config.write_function = ModbusControllerConfig::one_register;
+  CHECK(join_writes({{0, WriteStage::offset, {1}}, {1, WriteStage::offset, {2}}},
+                    config.registers_per_write())
+            .size() == 2);
+}
+
 TEST_CASE("no read request is larger than the protocol allows", "[controllers]") {
   std::vector<ModbusValue> values;
   for (std::uint16_t i = 0; i < 200; ++i) {
     values.push_back(
         value_at(ModbusTable::holding, static_cast<std::uint16_t>(2 * i), Encoding::int32));
   }
-  for (const ReadRequest& request : plan_reads(values).requests) CHECK(request.count <= 125);
-  CHECK(plan_reads(values).requests.size() == 4);
-  CHECK(plan_reads({}).requests.empty());
+  for (const ReadRequest& request : plan_reads(values, {}).requests) CHECK(request.count <= 125);
+  CHECK(plan_reads(values, {}).requests.size() == 4);
+  CHECK(plan_reads({}, {}).requests.empty());
 }
 
 TEST_CASE("touching registers are written together, others are left alone", "[controllers]") {
@@ -274,7 +290,8 @@ TEST_CASE("touching registers are written together, others are left alone", "[co
                                      {2, WriteStage::offset, {3, 4}},
                                      {0, WriteStage::offset, {1, 2}},
                                      {10, WriteStage::valid_bits, {7}},
-                                     {20, WriteStage::offset, {5, 6}}});
+                                     {20, WriteStage::offset, {5, 6}}},
+                                    123);
   REQUIRE(requests.size() == 3);
   CHECK(requests[0].address == 0);
   CHECK(requests[0].words == std::vector<std::uint16_t>{1, 2, 3, 4});
@@ -288,7 +305,8 @@ TEST_CASE("the heartbeat reaches the controller after the offsets it vouches for
   const auto requests = join_writes({{0, WriteStage::heartbeat, {1}},
                                      {2, WriteStage::valid_bits, {1}},
                                      {4, WriteStage::offset, {1}},
-                                     {6, WriteStage::offset, {1}}});
+                                     {6, WriteStage::offset, {1}}},
+                                    123);
   REQUIRE(requests.size() == 4);
   CHECK(requests[0].address == 4);
   CHECK(requests[1].address == 6);
@@ -296,7 +314,7 @@ TEST_CASE("the heartbeat reaches the controller after the offsets it vouches for
   CHECK(requests[3].address == 0);
   std::vector<WriteField> many;
   for (std::uint16_t i = 0; i < 200; ++i) many.push_back({i, WriteStage::offset, {i}});
-  const auto split = join_writes(many);
+  const auto split = join_writes(many, 123);
   REQUIRE(split.size() == 2);
   CHECK(split[0].words.size() == 123);
   CHECK(split[1].address == 123);

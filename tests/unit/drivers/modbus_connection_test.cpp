@@ -226,11 +226,11 @@ TEST_CASE("RTU: answers that are always late never land in another request", "[c
   CHECK(answers_of_others > 50);
 }
 
-TEST_CASE("RTU: rubbish before an answer is not believed and does not last", "[connection]") {
+TEST_CASE("RTU: rubbish in place of an answer is not believed and does not last", "[connection]") {
   std::atomic<bool> rubbish{true};
   peer::SerialLine serial([&rubbish](const peer::Request& request) {
     peer::Reply reply = peer::honest(request);
-    if (rubbish) reply.raw = {0x55, 0x04, 0xFF, 0x00, 0x13};
+    if (rubbish) reply = {.raw = {0x55, 0x04, 0xFF, 0x00, 0x13}};
     return reply;
   });
   ModbusConnection connection(rtu_line(serial.device()));
@@ -240,6 +240,96 @@ TEST_CASE("RTU: rubbish before an answer is not believed and does not last", "[c
   rubbish = false;
   CHECK(peer::eventually([&] { return read_inputs(connection, 3, 0, words).ok(); }));
   CHECK(words == Words{3000, 3001});
+}
+
+TEST_CASE("RTU: the echo of the request and bytes before the answer are skipped", "[connection]") {
+  std::atomic<bool> echoes{true};
+  std::atomic<bool> is_silent{false};
+  peer::SerialLine serial([&](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    if (request.function == 6) reply.pdu = request.pdu;
+    if (!echoes) {
+      reply.raw = {0x00, 0x00};
+      return reply;
+    }
+    peer::Bytes echo{static_cast<std::uint8_t>(request.unit)};
+    echo.insert(echo.end(), request.pdu.begin(), request.pdu.end());
+    const std::uint16_t sum = peer::crc(echo);
+    echo.push_back(static_cast<std::uint8_t>(sum & 0xFF));
+    echo.push_back(static_cast<std::uint8_t>(sum >> 8));
+    reply.raw = echo;
+    if (is_silent) reply.pdu.clear();
+    return reply;
+  });
+  ModbusConnection connection(rtu_line(serial.device(), 150.0));
+  REQUIRE(connection.connect());
+  Words words(2);
+  REQUIRE(read_inputs(connection, 3, 0, words).ok());
+  CHECK(words == Words{3000, 3001});
+  CHECK(connection.write_registers(3, 5, words).ok());
+  CHECK(connection.write_register(3, 5, 77).ok());
+  // A request that only the adapter has heard confirms nothing.
+  is_silent = true;
+  const Exchange written = connection.write_register(3, 5, 78);
+  CHECK(written.outcome == ExchangeOutcome::timeout);
+  CHECK_THAT(written.detail, Catch::Contains("only the echo of the request came"));
+  is_silent = echoes = false;
+  REQUIRE(peer::eventually([&] { return read_inputs(connection, 3, 0, words).ok(); }));
+  CHECK(connection.write_register(3, 5, 79).ok());
+}
+
+TEST_CASE("what came in place of an answer is said", "[connection]") {
+  Lines lines;
+  const auto said = [&](bool rtu, const peer::Handler& handler) {
+    lines.handle(handler);
+    ModbusConnection connection(lines.line(rtu));
+    REQUIRE(connection.connect());
+    Words words(2);
+    const Exchange exchange = read_inputs(connection, 3, 0, words);
+    CHECK(exchange.outcome == ExchangeOutcome::bad_frame);
+    return exchange.detail;
+  };
+  const auto of_unit_9 = [](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    reply.unit = 9;
+    return reply;
+  };
+  for (const bool rtu : {false, true})
+    CHECK_THAT(said(rtu, of_unit_9), Catch::Contains("unit 9 answered, asked was unit 3"));
+  const auto of_transaction_0 = [](const peer::Request&) {
+    return peer::Reply{.raw = {0, 0, 0, 0, 0, 7, 3, 4, 4, 0, 1, 0, 2}};
+  };
+  CHECK_THAT(said(false, of_transaction_0), Catch::Contains("expected transaction 1, got 0") &&
+                                                Catch::Contains("ignore_transaction = true"));
+  const auto wide = [](const peer::Request&) {
+    return peer::Reply{peer::registers_pdu(4, {1, 2, 3, 4})};
+  };
+  for (const bool rtu : {false, true})
+    CHECK_THAT(said(rtu, wide), Catch::Contains("expected 4 bytes of data, got 8") &&
+                                    Catch::Contains("wide_registers = true"));
+  const auto part = [](const peer::Request&) { return peer::Reply{.raw = {3, 4, 4, 0, 7}}; };
+  CHECK_THAT(said(true, part),
+             Catch::Contains("broke off: 5 of 9 bytes (03 04 04 00 07) within timeout_ms = 300"));
+}
+
+TEST_CASE("answers of any transaction are taken where the line says so, late ones are not",
+          "[connection][late]") {
+  std::atomic<int> count{0};
+  peer::TcpDevice device([&](const peer::Request& request) {
+    const auto address = static_cast<std::uint8_t>(request.address);
+    return peer::Reply{.delay = count++ == 1 ? 400ms : 0ms,
+                       .raw = {0, 0, 0, 0, 0, 7, 1, 4, 4, 0, address, 0, address}};
+  });
+  ModbusLine line = tcp_line(device.port(), 150.0);
+  line.ignore_transaction = true;
+  ModbusConnection connection(line);
+  REQUIRE(connection.connect());
+  Words words(2);
+  REQUIRE(read_inputs(connection, 1, 10, words).ok());
+  CHECK(words == Words{10, 10});
+  CHECK(read_inputs(connection, 1, 20, words).outcome == ExchangeOutcome::timeout);
+  REQUIRE(read_inputs(connection, 1, 30, words).ok());
+  CHECK(words == Words{30, 30});
 }
 
 TEST_CASE("a connection closed by the peer is lost, not a time-out", "[connection]") {
@@ -257,6 +347,25 @@ TEST_CASE("a connection closed by the peer is lost, not a time-out", "[connectio
   device.handle(peer::honest);
   REQUIRE(connection.connect());
   CHECK(read_inputs(connection, 1, 0, words).ok());
+}
+
+TEST_CASE("a connection that is closed after it has answered is opened again", "[connection]") {
+  const int answers = GENERATE(1, 3);
+  std::atomic<int> count{0};
+  peer::TcpDevice device([&](const peer::Request& request) {
+    peer::Reply reply = peer::honest(request);
+    if (request.function == 6) reply.pdu = request.pdu;
+    reply.close_after = ++count % answers == 0;
+    return reply;
+  });
+  ModbusConnection connection(tcp_line(device.port()));
+  REQUIRE(connection.connect());
+  Words words(1);
+  for (int i = 0; i < 12; ++i) CHECK(read_inputs(connection, 1, i, words).ok());
+  CHECK(connection.links() == 1);
+  CHECK(connection.connects() >= static_cast<std::uint64_t>(12 / answers));
+  std::this_thread::sleep_for(50ms);
+  CHECK(connection.write_register(1, 0, 5).ok());  // nothing of it was sent before
 }
 
 TEST_CASE("TCP: two time-outs in a row end a connection that may be half open", "[connection]") {

@@ -40,12 +40,13 @@ struct Request {
 };
 
 struct Reply {
-  Bytes pdu;  ///< function and data; empty: no answer
+  Bytes pdu{};  ///< function and data; empty: no answer
   milliseconds delay{0};
   int unit{-1};  ///< -1: the one that was asked
   bool spoil_checksum{false};
-  bool close{false};  ///< TCP: close the connection instead
-  Bytes raw{};        ///< sent as it is instead of a frame
+  bool close{false};        ///< TCP: close the connection instead
+  bool close_after{false};  ///< TCP: close it after the answer
+  Bytes raw{};              ///< sent as it is instead of a frame
 };
 
 using Handler = std::function<Reply(const Request&)>;
@@ -183,9 +184,11 @@ class TcpDevice : public Device {
         take();
       }
       if (client_ >= 0) send_due(client_);
+      if (is_last_answer_ && pending_.empty()) drop();
     }
   }
   void drop() {
+    is_last_answer_ = false;
     if (client_ >= 0) ::close(client_);
     client_ = -1;
     buffer_.clear();
@@ -203,6 +206,7 @@ class TcpDevice : public Device {
       buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<long>(size));
       const Reply reply = answer(parse(adu[6], Bytes(adu.begin() + 7, adu.end())));
       if (reply.close) return drop();
+      is_last_answer_ = reply.close_after;
       if (!reply.raw.empty()) later(reply, reply.raw);
       if (reply.pdu.empty()) continue;
       const auto length = reply.pdu.size() + 1;
@@ -218,6 +222,7 @@ class TcpDevice : public Device {
     }
   }
 
+  bool is_last_answer_{false};
   int listener_{-1};
   int client_{-1};
   int port_{0};

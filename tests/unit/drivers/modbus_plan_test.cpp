@@ -144,13 +144,29 @@ TEST_CASE("one register a request gives every value its own request", "[plan]") 
   CHECK(plan.requests[2].count == 1);
 }
 
+TEST_CASE("a register of 32 bits is one address and two words", "[plan]") {
+  ModbusDeviceConfig device;
+  device.wide_registers = true;
+  device.channels = {channel_at(10), channel_at(11), channel_at(14)};
+  for (ModbusChannel& channel : device.channels) channel.encoding = Encoding::float32;
+  device.channels[0].status = ModbusStatus{ModbusTable::input, 12, 0xFFFF, {}};
+  const ModbusPlan plan = plan_requests(device);
+  REQUIRE(plan.requests.size() == 1);
+  CHECK(plan.words_a_register == 2);
+  CHECK(plan.requests[0].address == 10);
+  CHECK(plan.requests[0].count == 5);
+  CHECK(plan.channels[1].value.offset == 2);
+  CHECK(plan.channels[2].value.offset == 8);
+  CHECK(plan.channels[0].status->offset == 5);  // its low word
+}
+
 TEST_CASE("back-off doubles up to its end and an answer ends it at once", "[backoff]") {
-  UnitBackoff backoff(1s, 30s);
+  UnitBackoff backoff(1s);
   CHECK_FALSE(backoff.dead());
   std::chrono::nanoseconds now = 100s;
   std::vector<std::chrono::nanoseconds> pauses;
   for (int i = 0; i < 8; ++i) {
-    backoff.failed(now, 1ms, 1);
+    backoff.failed(now, 1ms, 1, 30s);
     pauses.push_back(backoff.not_before() - now);
     now = backoff.not_before();
   }
@@ -158,21 +174,21 @@ TEST_CASE("back-off doubles up to its end and an answer ends it at once", "[back
   backoff.answered();
   CHECK_FALSE(backoff.dead());
   CHECK(backoff.not_before() == 0s);
-  backoff.failed(now, 1ms, 1);
+  backoff.failed(now, 1ms, 1, 30s);
   CHECK(backoff.not_before() - now == 1s);
 }
 
 TEST_CASE("dead units keep to their share of the line", "[backoff]") {
-  UnitBackoff backoff(1s, 30s);
+  UnitBackoff backoff(1s);
   const auto cost = 200ms;
-  backoff.failed(0s, cost, 1);
+  backoff.failed(0s, cost, 1, 30s);
   CHECK(backoff.not_before() == 1s);  // a short outage is found out soon
-  backoff.failed(0s, cost, 1);
+  backoff.failed(0s, cost, 1, 30s);
   CHECK(backoff.not_before() == 2s);
-  backoff.failed(0s, cost, 1);
+  backoff.failed(0s, cost, 1, 30s);
   CHECK(backoff.not_before() == 10s);  // 200 ms in 10 s are 2 %
-  backoff.failed(0s, cost, 8);
-  CHECK(backoff.not_before() == 30s);  // 80 s would be 2 %, but no unit waits for longer
+  backoff.failed(0s, cost, 8, 30s);
+  CHECK(backoff.not_before() == 54s);  // 80 s would be 2 %, but no unit waits for longer
 }
 
 namespace {

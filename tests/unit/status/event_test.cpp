@@ -40,7 +40,7 @@ TEST_CASE("each kind of event has its words", "[status][events]") {
   CHECK(event_text(command) == "measured z 3 um, by root");
   CHECK(event_text({.kind = EventKind::fault,
                     .subject = {SubjectKind::reason, "controller_offline"},
-                    .code = "controller_offline"}) == "the controller does not answer");
+                    .code = "controller_offline"}) == "the controller cannot be read");
   CHECK(event_text({.kind = EventKind::fault,
                     .subject = {SubjectKind::suspected_sensor, "bed"},
                     .code = "suspected",

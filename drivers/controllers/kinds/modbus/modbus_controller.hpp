@@ -1,15 +1,10 @@
-/// A controller reached over Modbus, spoken to by a thread of its own.
+/// A controller reached over Modbus, spoken to by the line's thread.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
-
-#include "drivers/bus_thread.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
-#include "drivers/modbus/connection.hpp"
+#include "drivers/modbus/shared_line.hpp"
 #include "drivers/monotonic_clock.hpp"
-#include "drivers/wake_event.hpp"
 
 namespace thermocomp {
 
@@ -28,16 +23,9 @@ class ModbusController final : public ControllerLink {
   [[nodiscard]] ControllerHealth health() const override { return dialogue_.health(); }
 
  private:
-  void run();
-
   std::string name_;
-  ModbusConnection connection_;
+  std::shared_ptr<SharedLine> line_;
   ModbusDialogue dialogue_;
-  WakeEvent wake_;
-  std::mutex done_mutex_;
-  std::condition_variable done_changed_;
-  bool done_{false};
-  BusThread thread_;
 };
 
 }  // namespace thermocomp

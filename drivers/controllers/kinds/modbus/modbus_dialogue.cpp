@@ -24,9 +24,6 @@ NumberFormat raw_format(const ModbusValue& value) noexcept {
 constexpr int gateway_path_unavailable = 10;
 constexpr int gateway_target_silent = 11;
 
-/// Write multiple registers.
-constexpr int function_of_writes = 16;
-
 /// The first count that the register cannot hold exactly.
 std::uint64_t counts_of(Encoding encoding) noexcept {
   switch (encoding) {
@@ -137,7 +134,7 @@ ModbusDialogue::ModbusDialogue(ModbusControllerConfig config, ModbusConnection& 
     written_.push_back(axis.reads_back() ? std::nullopt : std::optional<WrittenOffsets>(axis));
   }
   health_.name = config_.name;
-  health_.kind = std::holds_alternative<ModbusTcp>(config_.line.link) ? "modbus_tcp" : "modbus_rtu";
+  health_.kind = kind_of(config_.line);
 }
 
 void ModbusDialogue::plan_values() {
@@ -160,7 +157,7 @@ void ModbusDialogue::plan_values() {
   }
   for (const ModbusSignal& signal : config_.signals)
     read(signal.value, state_.signals[signal.signal]);
-  read_plan_ = plan_reads(read_values_);
+  read_plan_ = plan_reads(read_values_, config_);
 }
 
 void ModbusDialogue::newest(ControllerState& state) noexcept {
@@ -185,6 +182,7 @@ nanoseconds ModbusDialogue::next_action_at() const noexcept {
 void ModbusDialogue::act() {
   const nanoseconds began = connection_.now();
   const nanoseconds period = from_seconds(config_.period_s);
+  if (gate_.in_sync() && link_number() != link_) lose(false);  // another user opened the line anew
   if (!gate_.in_sync()) {
     if (!synchronise()) {
       retry_at_ = connection_.now() + from_seconds(config_.line.reconnect_s);
@@ -209,18 +207,26 @@ void ModbusDialogue::act() {
 void ModbusDialogue::end() {
   look_for_command();
   if (gate_.verdict(connection_.now()) == SendVerdict::send) write_command();
-  connection_.disconnect();
+}
+
+/// A peer that closes and is there again within an exchange has not restarted; where nothing is
+/// read back nobody would see it if it had.
+std::uint64_t ModbusDialogue::link_number() const noexcept {
+  const bool reads_back = std::none_of(written_.begin(), written_.end(),
+                                       [](const auto& written) { return written.has_value(); });
+  return reads_back ? connection_.links() : connection_.connects();
 }
 
 /// Connects where needed, reads everything, and only then takes the new epoch.
 bool ModbusDialogue::synchronise() {
-  if (!connection_.connected()) {
-    if (!connection_.connect()) {
-      const std::scoped_lock lock(health_mutex_);
-      health_.connected = false;
-      health_.last_error = connection_.last_error();
-      return false;
-    }
+  if (!connection_.connected() && !connection_.connect()) {
+    const std::scoped_lock lock(health_mutex_);
+    health_.connected = false;
+    health_.last_error = connection_.last_error();
+    return false;
+  }
+  if (link_number() != link_) {
+    link_ = link_number();
     gate_.lost();
     const std::scoped_lock lock(health_mutex_);
     ++health_.connects;
@@ -248,11 +254,7 @@ bool ModbusDialogue::read_set_numbers() {
       return connection_.read(config_.unit, ModbusTable::holding, travel->end.address, words);
     });
     if (!exchange.ok()) {
-      const std::scoped_lock lock(health_mutex_);
-      ++health_.read_errors;
-      health_.last_error =
-          "reading from " + std::to_string(travel->end.address) + ": " + describe(exchange);
-      return false;
+      return note_unread({ModbusTable::holding, travel->end.address, words.size()}, exchange);
     }
     set_numbers_[axis] = bits_of(words, travel->end.encoding, travel->end.word_order);
   }
@@ -272,11 +274,7 @@ bool ModbusDialogue::read_written() {
       // A device may do without these registers, with an exception or in silence.
       const bool is_refused = refused_ && exchange.fault() == Fault::device_error;
       if (!exchange.ok() && !is_refused && ++written_asked_ < asked_max) {
-        const std::scoped_lock lock(health_mutex_);
-        ++health_.read_errors;
-        health_.last_error =
-            "reading from " + std::to_string(request.address) + ": " + describe(exchange);
-        return false;
+        return note_unread(request, exchange);
       }
       if (!exchange.ok()) words.clear();
     }
@@ -386,7 +384,8 @@ void ModbusDialogue::add_axis(std::size_t axis, const OffsetCommand& command,
 
 bool ModbusDialogue::write_command() {
   if (config_.heartbeat) heartbeat_ = (heartbeat_ + 1) % counts_of(config_.heartbeat->encoding);
-  const std::vector<WriteField> requests = join_writes(fields_of(gate_.command()));
+  const std::vector<WriteField> requests =
+      join_writes(fields_of(gate_.command()), config_.registers_per_write());
   for (const WriteField& request : requests) {
     if (!write(request)) return false;
   }
@@ -411,19 +410,23 @@ void ModbusDialogue::note_confirmed(nanoseconds now) {
 
 bool ModbusDialogue::write(const WriteField& request) {
   const Exchange exchange =
-      connection_.write_registers(config_.unit, request.address, request.words);
+      config_.write_function == ModbusControllerConfig::one_register
+          ? connection_.write_register(config_.unit, request.address, request.words.front())
+          : connection_.write_registers(config_.unit, request.address, request.words);
   note_refusal(exchange);
   if (exchange.ok()) return true;
   const std::scoped_lock lock(health_mutex_);
   ++health_.write_errors;
   WriteHealth& told = health_.write;
   ++(refused_ ? told.refused : told.unanswered);
-  told.function = function_of_writes;
+  told.function = config_.write_function;
   told.address = request.address;
   told.exception = exchange.exception_code;
   told.error = std::string(refused_ ? "the controller refuses writes" : "no write is answered") +
                " (function " + std::to_string(told.function) + ", register " +
                std::to_string(told.address) + "): " + describe(exchange);
+  if (config_.write_function != ModbusControllerConfig::one_register && told.exception == 1)
+    told.error += "; if it takes single registers only, write_function = 6";
   health_.last_error = told.error;
   return false;
 }
@@ -441,6 +444,18 @@ Exchange ModbusDialogue::with_retries(Request&& request) {
   return exchange;
 }
 
+bool ModbusDialogue::note_unread(const ReadRequest& request, const Exchange& exchange) {
+  const std::size_t last = request.address + request.count - 1;
+  const bool is_block = request.count > registers_of(Encoding::float64) && refused_;
+  const std::scoped_lock lock(health_mutex_);
+  ++health_.read_errors;
+  health_.last_error =
+      "reading " + std::to_string(request.address) +
+      (request.count > 1 ? ".." + std::to_string(last) : "") + ": " + describe(exchange) +
+      (is_block ? "; gap_registers_max = 0 in [controller] reads none between the values" : "");
+  return false;
+}
+
 void ModbusDialogue::note_refusal(const Exchange& exchange) noexcept {
   refused_ = exchange.outcome == ExchangeOutcome::exception &&
              exchange.exception_code != gateway_path_unavailable &&
@@ -451,7 +466,7 @@ std::string ModbusDialogue::describe(const Exchange& exchange) const {
   if (exchange.outcome == ExchangeOutcome::exception) {
     return "exception " + std::to_string(exchange.exception_code) + " (" + exchange.detail + ")";
   }
-  if (*exchange.detail != '\0') return exchange.detail;
+  if (!exchange.detail.empty()) return exchange.detail;
   return connection_.last_error();
 }
 
@@ -465,11 +480,7 @@ bool ModbusDialogue::read_all() {
       return connection_.read(config_.unit, request.table, request.address, answers.back());
     });
     if (!exchange.ok()) {
-      const std::scoped_lock lock(health_mutex_);
-      ++health_.read_errors;
-      health_.last_error =
-          "reading from " + std::to_string(request.address) + ": " + describe(exchange);
-      return false;
+      return note_unread(request, exchange);
     }
     if (answers.size() == 1) taken_at = exchange.sent_at;
   }

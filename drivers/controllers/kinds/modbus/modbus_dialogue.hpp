@@ -15,7 +15,7 @@
 #include "drivers/controllers/kinds/modbus/piezo_drive.hpp"
 #include "drivers/controllers/kinds/modbus/written_offsets.hpp"
 #include "drivers/controllers/write_gate.hpp"
-#include "drivers/modbus/connection.hpp"
+#include "drivers/modbus/shared_line.hpp"
 #include "drivers/wait_free_slot.hpp"
 
 namespace thermocomp {
@@ -41,21 +41,21 @@ namespace thermocomp {
 /// An axis whose command is not valid keeps its register as it is; its valid bit is 0. The
 /// heartbeat counts up with every command written and starts anew when its register is full. Valid
 /// bits and heartbeat are raw numbers: their scale is not used.
-class ModbusDialogue {
+class ModbusDialogue final : public LineUser {
  public:
   /// @param connection  of the configuration's line; outlives the dialogue
   /// @throws InvalidValue for values that cannot be
   ModbusDialogue(ModbusControllerConfig config, ModbusConnection& connection);
 
-  /// When act() is to be called next.
-  [[nodiscard]] nanoseconds next_action_at() const noexcept;
+  [[nodiscard]] const ModbusLine& line() const noexcept override { return config_.line; }
+  [[nodiscard]] nanoseconds next_action_at() const noexcept override;
   /// One period's exchange, connecting and reading everything back before it where needed.
-  void act();
+  void act() override;
   /// From any thread: the exchange under way does not try again.
   void end_soon() noexcept { ending_.store(true); }
   [[nodiscard]] bool ending() const noexcept { return ending_.load(); }
-  /// Writes the last command, if it may be written, and disconnects.
-  void end();
+  /// Writes the last command, if it may be written.
+  void end() override;
 
   void newest(ControllerState& state) noexcept;  ///< wait-free; one reader
   /// Wait-free; one writer.
@@ -63,6 +63,7 @@ class ModbusDialogue {
   [[nodiscard]] ControllerHealth health() const;  ///< any ordinary thread
 
  private:
+  [[nodiscard]] std::uint64_t link_number() const noexcept;
   bool synchronise();
   /// The numbers of the sets that stand in the registers. False: they could not be read.
   bool read_set_numbers();
@@ -96,6 +97,7 @@ class ModbusDialogue {
   template <class Request>
   Exchange with_retries(Request&& request);
   void note_refusal(const Exchange& exchange) noexcept;
+  bool note_unread(const ReadRequest& request, const Exchange& exchange);  ///< @return false
   [[nodiscard]] std::string describe(const Exchange& exchange) const;
 
   const ModbusControllerConfig config_;
@@ -116,8 +118,9 @@ class ModbusDialogue {
   WaitFreeSlot<ControllerState> states_;
   WaitFreeSlot<OfferedCommand> commands_;
   nanoseconds next_exchange_at_;
-  nanoseconds retry_at_;  ///< while not in sync
-  bool refused_{false};   ///< the controller itself answered the last exchange, with an exception
+  nanoseconds retry_at_;   ///< while not in sync
+  std::uint64_t link_{0};  ///< link_number() of what is read back
+  bool refused_{false};    ///< the controller itself answered the last exchange, with an exception
   bool write_failed_{false};  ///< in the newest turn
   std::atomic<bool> ending_{false};
   mutable std::mutex health_mutex_;

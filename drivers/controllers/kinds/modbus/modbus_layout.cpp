@@ -8,13 +8,13 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t registers_a_read_max = 125;
 constexpr std::size_t bits_a_read_max = 2000;
-constexpr std::size_t registers_a_write_max = 123;
 
 }  // namespace
 
-ReadPlan plan_reads(std::span<const ModbusValue> values, std::size_t gap_max) {
+ReadPlan plan_reads(std::span<const ModbusValue> values, const ModbusControllerConfig& config) {
+  const auto gap_max = static_cast<std::size_t>(config.gap_registers_max);
+  const auto registers_max = static_cast<std::size_t>(config.registers_per_request_max);
   std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -27,7 +27,7 @@ ReadPlan plan_reads(std::span<const ModbusValue> values, std::size_t gap_max) {
     const ModbusValue& value = values[index];
     const std::size_t begin = value.address;
     const std::size_t end = begin + words_of(value.table, value.encoding);
-    const std::size_t most = is_bit_table(value.table) ? bits_a_read_max : registers_a_read_max;
+    const std::size_t most = is_bit_table(value.table) ? bits_a_read_max : registers_max;
     if (plan.requests.empty() || plan.requests.back().table != value.table ||
         begin > plan.requests.back().address + plan.requests.back().count + gap_max ||
         end - plan.requests.back().address > most) {
@@ -40,7 +40,7 @@ ReadPlan plan_reads(std::span<const ModbusValue> values, std::size_t gap_max) {
   return plan;
 }
 
-std::vector<WriteField> join_writes(std::vector<WriteField> fields) {
+std::vector<WriteField> join_writes(std::vector<WriteField> fields, std::size_t registers_max) {
   std::sort(fields.begin(), fields.end(),
             [](const WriteField& a, const WriteField& b) { return a.address < b.address; });
   std::vector<WriteField> requests;
@@ -48,7 +48,7 @@ std::vector<WriteField> join_writes(std::vector<WriteField> fields) {
     if (!requests.empty()) {
       WriteField& last = requests.back();
       const bool touches = last.address + last.words.size() == field.address;
-      if (touches && last.words.size() + field.words.size() <= registers_a_write_max) {
+      if (touches && last.words.size() + field.words.size() <= registers_max) {
         last.words.insert(last.words.end(), field.words.begin(), field.words.end());
         last.stage = std::max(last.stage, field.stage);
         continue;

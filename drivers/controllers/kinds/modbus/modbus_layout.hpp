@@ -27,9 +27,11 @@ struct ReadPlan {
   std::vector<ValuePlace> places;  ///< one a value, in the order given
 };
 
-/// Few requests that cover all values: neighbours of one table are joined over at most `gap_max`
-/// unused words; a request has at most 125 registers or 2000 bits.
-[[nodiscard]] ReadPlan plan_reads(std::span<const ModbusValue> values, std::size_t gap_max = 8);
+/// Few requests that cover all values: neighbours of one table are joined over at most
+/// gap_registers_max unused words; a request has at most registers_per_request_max registers or
+/// 2000 bits.
+[[nodiscard]] ReadPlan plan_reads(std::span<const ModbusValue> values,
+                                  const ModbusControllerConfig& config);
 
 /// Values of a higher stage reach the controller after those of a lower one, unless one request
 /// carries both.
@@ -41,9 +43,10 @@ struct WriteField {
   std::vector<std::uint16_t> words;
 };
 
-/// Joins fields whose registers touch into one request each (at most 123 registers), never writing
-/// a register that is in no field. The requests come in the order of their latest stage.
+/// Joins fields whose registers touch into one request each, of at most so many registers, never
+/// writing a register that is in no field. The requests come in the order of their latest stage.
 /// @pre the fields do not overlap
-[[nodiscard]] std::vector<WriteField> join_writes(std::vector<WriteField> fields);
+[[nodiscard]] std::vector<WriteField> join_writes(std::vector<WriteField> fields,
+                                                  std::size_t registers_max);
 
 }  // namespace thermocomp

@@ -1,0 +1,240 @@
+#include "drivers/modbus/frames.hpp"
+
+#include <algorithm>
+
+namespace thermocomp {
+namespace {
+
+constexpr std::size_t head_bytes = 7;  // TCP: number, protocol, length, unit
+constexpr std::size_t checksum_bytes = 2;
+constexpr std::uint8_t exception_bit = 0x80;
+constexpr std::uint8_t write_single_register = 6;
+
+constexpr std::uint16_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
+  return static_cast<std::uint16_t>((bytes[at] << 8) | bytes[at + 1]);
+}
+constexpr std::uint8_t high_byte(std::size_t word) noexcept {
+  return static_cast<std::uint8_t>((word >> 8) & 0xFF);
+}
+constexpr std::uint8_t low_byte(std::size_t word) noexcept {
+  return static_cast<std::uint8_t>(word & 0xFF);
+}
+
+/// "MODBUS over serial line specification and implementation guide V1.02", 6.2.2.
+constexpr std::uint16_t checksum(std::span<const std::uint8_t> bytes) noexcept {
+  unsigned sum = 0xFFFF;
+  for (const std::uint8_t byte : bytes) {
+    sum ^= byte;
+    for (int bit = 0; bit < 8; ++bit) sum = (sum & 1) != 0 ? (sum >> 1) ^ 0xA001 : sum >> 1;
+  }
+  return static_cast<std::uint16_t>(sum);
+}
+
+/// Length of the answer that begins here; 0: not known.
+constexpr std::size_t rtu_answer_bytes(std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() < 4) return 0;
+  const std::uint8_t function = bytes[1];
+  if ((function & exception_bit) != 0) return 5;
+  if (function >= 1 && function <= 4) return std::size_t{5} + bytes[2];
+  const bool confirms = function == 5 || function == 6 || function == 15 || function == 16;
+  return confirms ? 8 : 0;
+}
+
+/// The whole answer that begins here, its checksum right; empty: there is none.
+std::span<const std::uint8_t> rtu_answer(std::span<const std::uint8_t> bytes) noexcept {
+  const std::size_t size = rtu_answer_bytes(bytes);
+  if (size == 0 || size > bytes.size()) return {};
+  const std::uint16_t sum = checksum(bytes.first(size - checksum_bytes));
+  const bool fits = bytes[size - 2] == low_byte(sum) && bytes[size - 1] == high_byte(sum);
+  return fits ? bytes.first(size) : std::span<const std::uint8_t>{};
+}
+
+std::string of_unit(std::uint8_t unit, int asked, std::span<const std::uint8_t> bytes) {
+  return "unit " + std::to_string(unit) + " answered, asked was unit " + std::to_string(asked) +
+         " (" + hex_text(bytes) + ")";
+}
+
+std::string of_function(std::span<const std::uint8_t> pdu, int asked) {
+  return "an answer to function " + std::to_string(pdu[0] & ~exception_bit) +
+         " came, asked was function " + std::to_string(asked) + " (" + hex_text(pdu) + ")";
+}
+
+}  // namespace
+
+std::string hex_text(std::span<const std::uint8_t> bytes) {
+  constexpr std::size_t shown_max = 16;
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string text;
+  for (const std::uint8_t byte : bytes.first(std::min(bytes.size(), shown_max))) {
+    if (!text.empty()) text += ' ';
+    text += digits[byte >> 4];
+    text += digits[byte & 15];
+  }
+  return bytes.size() > shown_max ? text + " ..." : text;
+}
+
+std::span<const std::uint8_t> ModbusFrames::request(int unit, std::span<const std::uint8_t> pdu,
+                                                    std::size_t answer_bytes) noexcept {
+  answer_bytes_ = answer_bytes;
+  begin_ = 0;
+  echoed_ = late_ = false;
+  other_.clear();
+  std::size_t size = 0;
+  const auto push = [&](std::uint8_t byte) { request_[size++] = byte; };
+  if (!rtu_) {
+    ++number_;
+    for (const std::size_t word : {std::size_t{number_}, std::size_t{0}, pdu.size() + 1}) {
+      push(high_byte(word));
+      push(low_byte(word));
+    }
+  }
+  push(static_cast<std::uint8_t>(unit));
+  for (const std::uint8_t byte : pdu) push(byte);
+  if (rtu_) {
+    const std::uint16_t sum = checksum(std::span(request_).first(size));
+    push(low_byte(sum));
+    push(high_byte(sum));
+  }
+  request_bytes_ = size;
+  return std::span(request_).first(size);
+}
+
+std::span<std::uint8_t> ModbusFrames::room() noexcept {
+  if (received_ == stream_.size()) {  // of so much noise the newest part is enough
+    std::copy(stream_.begin() + frame_bytes_max, stream_.end(), stream_.begin());
+    received_ -= frame_bytes_max;
+    begin_ -= std::min(begin_, frame_bytes_max);
+  }
+  return std::span(stream_).subspan(received_);
+}
+
+void ModbusFrames::forget() noexcept {
+  received_ = begin_ = unasked_ = 0;
+}
+
+bool ModbusFrames::discard() noexcept {
+  begin_ = 0;
+  if (rtu_) {
+    received_ = 0;
+    return true;
+  }
+  while (take_tcp()) {
+  }
+  // Some gateways fill their frames up with zeros.
+  if (std::all_of(received().begin(), received().end(), [](auto byte) { return byte == 0; }))
+    received_ = 0;
+  unasked_ = received_;
+  return received_ < frame_bytes_max + head_bytes;
+}
+
+bool ModbusFrames::is_full() const noexcept {
+  if (!rtu_) return false;
+  const auto part = received().subspan(begin_);
+  return part.size() >= answer_bytes_ + 1 + checksum_bytes ||
+         (part.size() >= 5 && (part[1] & exception_bit) != 0);
+}
+
+ModbusFrames::Found ModbusFrames::look() {
+  return rtu_ ? look_rtu() : look_tcp();
+}
+
+ModbusFrames::Found ModbusFrames::look_rtu() {
+  const auto asked = std::span(request_).first(request_bytes_);
+  for (std::size_t at = begin_; at < received_; ++at) {
+    const auto rest = received().subspan(at);
+    // The confirmation of a single register is the same as its request.
+    const bool may_be_echo = asked[1] != write_single_register || echoes_;
+    if (may_be_echo && !echoed_ && rest.size() >= asked.size() &&
+        std::equal(asked.begin(), asked.end(), rest.begin())) {
+      echoed_ = echoes_ = true;
+      at += asked.size() - 1;
+      begin_ = at + 1;
+      continue;
+    }
+    const auto frame = rtu_answer(rest);
+    if (frame.empty()) continue;
+    const auto pdu = frame.subspan(1, frame.size() - 1 - checksum_bytes);
+    if (frame[0] == asked[0] && (pdu[0] & ~exception_bit) == asked[1]) {
+      if (!echoed_ && asked[1] != write_single_register) echoes_ = false;
+      answer_ = pdu;
+      return Found::answer;
+    }
+    other_ = frame[0] != asked[0] ? of_unit(frame[0], asked[0], frame) : of_function(pdu, asked[1]);
+    at += frame.size() - 1;
+    begin_ = at + 1;
+  }
+  return Found::nothing;
+}
+
+/// Takes a whole frame off the front of the stream, into frame_. @return whether there was one
+bool ModbusFrames::take_tcp() noexcept {
+  if (received_ < head_bytes) return false;
+  const std::size_t size = word_at(received(), 4) + std::size_t{6};
+  if (size <= head_bytes || size > frame_.size() || received_ < size) return false;
+  std::copy_n(stream_.begin(), size, frame_.begin());
+  frame_bytes_ = size;
+  std::copy(stream_.begin() + static_cast<std::ptrdiff_t>(size),
+            stream_.begin() + static_cast<std::ptrdiff_t>(received_), stream_.begin());
+  received_ -= size;
+  return true;
+}
+
+ModbusFrames::Found ModbusFrames::look_tcp() {
+  while (received_ >= head_bytes) {
+    const std::size_t size = word_at(received(), 4) + std::size_t{6};
+    if (word_at(received(), 2) != 0 || size <= head_bytes || size > frame_.size()) {
+      other_ = rtu_answer(received()).empty()
+                   ? "what came is no Modbus TCP frame (" + hex_text(received()) + ")"
+                   : "a serial frame came (" + hex_text(received()) +
+                         "): kind = \"modbus_rtu_over_tcp\"";
+      return Found::no_frame;
+    }
+    if (!take_tcp()) return Found::nothing;
+    const bool is_unasked = unasked_ > 0;
+    unasked_ -= std::min(unasked_, size);
+    if (is_unasked) continue;
+    const Found found = judge_tcp();
+    if (found != Found::nothing) return found;
+  }
+  return Found::nothing;
+}
+
+ModbusFrames::Found ModbusFrames::judge_tcp() {
+  constexpr int numbers_owed_max = 64;
+  const auto frame = std::span<const std::uint8_t>(frame_).first(frame_bytes_);
+  const std::uint16_t number = word_at(frame, 0);
+  if (numbered_ && number != number_) {
+    const int behind = static_cast<std::uint16_t>(number_ - number);
+    late_ = number != 0 && behind < numbers_owed_max;
+    other_ = "expected transaction " + std::to_string(number_) + ", got " + std::to_string(number) +
+             (late_ ? ": an answer that was late"
+                    : ": if the device always sends its own, "
+                      "ignore_transaction = true") +
+             " (" + hex_text(frame) + ")";
+    return Found::nothing;
+  }
+  const std::uint8_t asked_unit = request_[head_bytes - 1];
+  const std::uint8_t asked_function = request_[head_bytes];
+  if (frame[6] != asked_unit) {
+    other_ = of_unit(frame[6], asked_unit, frame);
+    return Found::other;
+  }
+  answer_ = frame.subspan(head_bytes);
+  if ((answer_[0] & ~exception_bit) == asked_function) return Found::answer;
+  other_ = of_function(answer_, asked_function);
+  return Found::other;
+}
+
+std::string ModbusFrames::came() const {
+  if (!other_.empty()) return other_;
+  if (has_part()) {
+    const auto part = received().subspan(begin_);
+    const std::size_t whole = answer_bytes_ + (rtu_ ? 1 + checksum_bytes : head_bytes);
+    const std::string count = std::to_string(part.size()) + " of " + std::to_string(whole) +
+                              " bytes (" + hex_text(part) + ")";
+    return part.size() < whole ? "the answer broke off: " + count : "wrong checksum: " + count;
+  }
+  return echoed_ ? "only the echo of the request came" : "";
+}
+
+}  // namespace thermocomp
