@@ -5,9 +5,11 @@ what `thermocomp diagnose` makes of a ridge model.
 
 The last lines: each split's RMS by method (mean over its outputs); what `fit` stated of its model
 beside what it left of the test rows (the median over outputs of their ratio; `told_as_range` where
-it states no figure); how many rows were said to be outside, and the error inside and outside. Then
-ours over the best peer of the split: the median, the largest; rows that are worse than no model
-without being called outside; and how many stated figures are right within 0.7 to 1.5.
+it states no figure); how many rows were said to be outside, the error inside and outside, and of
+95 % intervals the share that holds there and their mean width over that of split-conformal ones
+about ridge regression with lags. Then ours over the best peer of the split: the median, the
+largest; over no model; rows that are worse than no model without being called outside; and how many
+stated figures are right within 0.7 to 1.5.
 """
 
 import argparse
@@ -48,9 +50,11 @@ def arguments(runs, folder, prefix):
 
 
 def left_by(program, model, runs, split):
-    """Left-over rows, measured rows and flags of `outside`, each output behind the other's."""
+    """Left-over rows, measured rows, their stated standard deviation (one a row of each output), and
+    flags of `outside`."""
     left = {name: [] for name in split.outputs}
     moved = {name: [] for name in split.outputs}
+    stated = {name: [] for name in split.outputs}
     outside = []
     for run in runs:
         out = model.with_name("predicted.csv")
@@ -62,8 +66,10 @@ def left_by(program, model, runs, split):
             stem, unit = name.rsplit("_", 1)
             left[name].append(columns[f"{stem}_residual_{unit}"])
             moved[name].append(columns[f"{stem}_measured_{unit}"])
+            stated[name].append(columns.get(f"{stem}_sd_{unit}", np.zeros(len(outside[-1]))))
     return ([np.concatenate(left[name]) for name in split.outputs],
             [np.concatenate(moved[name]) for name in split.outputs],
+            [np.concatenate(stated[name]) for name in split.outputs],
             np.concatenate(outside) > 0.5)
 
 
@@ -107,11 +113,11 @@ def fitted(program, split, train, model):
     return json.loads(said.stdout), time.monotonic() - start
 
 
-def share_covered(columns, name):
-    """Rows on which the error is less than twice the stated standard deviation."""
-    stem, unit = name.rsplit("_", 1)
-    error, sd = columns[f"{stem}_residual_{unit}"], columns[f"{stem}_sd_{unit}"]
-    return float(np.mean(np.abs(error) <= 2 * sd))
+def share_covered(left, sd, rows):
+    """Of 95 % intervals on the rows, mean over outputs; NaN without rows."""
+    if not rows.any():
+        return float("nan")
+    return float(np.mean([np.mean(np.abs(e[rows]) <= 1.96 * s[rows]) for e, s in zip(left, sd)]))
 
 
 def judge(program, split, names, folder):
@@ -124,13 +130,15 @@ def judge(program, split, names, folder):
     train, test = arguments(split.train, folder, "train"), arguments(split.test, folder, "test")
     model = folder / "model.toml"
     answer, seconds = fitted(program, split, train, model)
-    left, moved, outside = left_by(program, model, test, split)
+    left, moved, sd, outside = left_by(program, model, test, split)
     figures["family"] = answer["family"]
     figures["runs"] = len(train)
     figures["stated"] = float(np.median([rms(e) / answer["left_out_rms_um"][name]
                                          for name, e in zip(split.outputs, left)]))
-    last = data.read(model.with_name("predicted.csv"))
-    figures["covered"] = float(np.mean([share_covered(last, name) for name in split.outputs]))
+    figures["covered_inside"] = share_covered(left, sd, ~outside)
+    figures["covered_outside"] = share_covered(left, sd, outside)
+    figures["width"] = float(np.mean([np.mean(1.96 * s) / w for s, w in
+                                      zip(sd, peers.conformal_lags_um(split))]))
     figures["fit"] = float(np.mean([rms(each) for each in left]))
     left_diagnosed, figures["diagnose_seconds"] = diagnosed(program, split, train, test, folder)
     figures["diagnose"] = float(np.mean([rms(each) for each in left_diagnosed]))
@@ -157,6 +165,7 @@ def main():
         return 77
     names = options.peers.split(",")
     ratios, lines, worse, stated = {"fit": [], "diagnose": []}, [], 0, []
+    covered, widths, over_none = {"inside": [], "outside": []}, [], []
     with tempfile.TemporaryDirectory() as folder:
         for split in data.all_splits(options.data):
             if options.splits not in split.name:
@@ -175,7 +184,13 @@ def main():
             lines.append(f"{split.name}_family {figures['family']} name")
             lines.append(f"{split.name}_true_over_stated {figures['stated']:.3f} "
                          f"{'ratio' if figures['runs'] >= 3 else 'told_as_range'}")
-            lines.append(f"{split.name}_within_two_sd {figures['covered']:.3f} share")
+            lines.append(f"{split.name}_fit_over_none {figures['fit'] / figures['none']:.3f} ratio")
+            for where in ("inside", "outside"):
+                covered[where].append(figures[f"covered_{where}"])
+                lines.append(f"{split.name}_covered_{where} {covered[where][-1]:.3f} share")
+            widths.append(figures["width"])
+            over_none.append(figures["fit"] / figures["none"])
+            lines.append(f"{split.name}_width_over_conformal {widths[-1]:.2f} ratio")
             if figures["runs"] >= 3:  # fewer: `fit` tells a range in words
                 stated.append(figures["stated"])
             lines.append(f"{split.name}_outside {figures['outside_share']:.3f} share")
@@ -187,6 +202,10 @@ def main():
     for name, of_splits in ratios.items():
         print(f"{name}_over_best_peer_median {np.median(of_splits):.3f} ratio")
         print(f"{name}_over_best_peer_largest {max(of_splits):.3f} ratio")
+    print(f"fit_over_none_largest {max(over_none):.3f} ratio")
+    for where, of_splits in covered.items():
+        print(f"covered_{where}_mean {np.nanmean(of_splits):.3f} share")
+    print(f"width_over_conformal_median {np.median(widths):.2f} ratio")
     print(f"splits_worse_than_none_inside {worse} splits")
     right = sum(0.7 <= ratio <= 1.5 for ratio in stated)
     print(f"stated_figures_right {right} of_{len(stated)}")

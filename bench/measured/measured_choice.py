@@ -97,7 +97,7 @@ def test_um(program, split, folder, family):
                           capture_output=True, text=True, check=False)
     if said.returncode != 0:
         return None
-    left, _, _ = left_by(program, model, arguments(split.test, folder, "test"), split)
+    left, _, _, _ = left_by(program, model, arguments(split.test, folder, "test"), split)
     return json.loads(said.stdout)["family"], float(np.mean([rms(each) for each in left]))
 
 

@@ -104,6 +104,25 @@ def ridge_gains_um_per_K(split):
     return train.temperatures, np.array(gains)
 
 
+def conformal_lags_um(split):
+    """Half width of split-conformal 95 % intervals about `ridge_lags`, one an output: the quantile
+    of what is left of the blocks of the training rows, each left out."""
+    train = Table(split.train, split.outputs, LOW_PASSES_S, True)
+    x, ys = train.stacked()
+    widths = []
+    for i in range(len(split.outputs)):
+        y, ok = ys[:, i], np.isfinite(ys[:, i])
+        parts = [part[np.isfinite(out[:, i])] for part, out in zip(train.x, train.y)]
+        best = chosen(parts, x[ok], y[ok], PENALTIES, ridge_predict)
+        left = []
+        for block in blocks_of(parts):
+            rest = np.setdiff1d(np.arange(ok.sum()), block)
+            left.append(np.abs(y[ok][block] - ridge_predict(x[ok][rest], y[ok][rest],
+                                                            x[ok][block], best)))
+        widths.append(float(np.quantile(np.concatenate(left), 0.95)))
+    return widths
+
+
 def ridge_lags(split):
     return each_output(split, LOW_PASSES_S, True, PENALTIES, ridge_predict)
 

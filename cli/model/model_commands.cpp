@@ -12,6 +12,7 @@
 #include "cli/model/prediction.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/model/model_file.hpp"
+#include "config/runs/blunders.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
@@ -88,7 +89,11 @@ int run_covariance(const CovarianceOptions& options) {
   }
   std::vector<RunFile> runs;
   RunLoader loader(options.columns);
-  for (const std::string& record : options.records) runs.push_back(load_record(record, loader));
+  for (const std::string& record : options.records) {
+    runs.push_back(load_record(record, loader));
+    for (const Blunders& each : leave_out_blunders(runs.back(), model.outputs))
+      std::fprintf(stderr, "%s: %s\n", runs.back().name.c_str(), each.text().c_str());
+  }
   const CovarianceFit fit = fit_covariance(runs, model.inputs);
   model.covariance_K2 = fit.matrix_K2;
   model.covariance_growth = fit.growth;
@@ -121,7 +126,11 @@ int run_correction(const CourseOptions& options) {
   ThermalModel model = load_model(config.model_file);
   std::vector<RunFile> runs;
   RunLoader loader(options.columns);
-  for (const std::string& record : options.records) runs.push_back(load_record(record, loader));
+  for (const std::string& record : options.records) {
+    runs.push_back(load_record(record, loader));
+    for (const Blunders& each : leave_out_blunders(runs.back(), model.outputs))
+      std::fprintf(stderr, "%s: %s\n", runs.back().name.c_str(), each.text().c_str());
+  }
   const CourseFit fit = fit_course(runs, model, correction, options.every_s);
   model.course = fit.course;
   OutputFile file(options.output);

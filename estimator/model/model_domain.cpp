@@ -46,7 +46,8 @@ std::vector<double> whitening(const MadeFrom& made_from) {
 }  // namespace
 
 double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output) {
-  if (!made_from.within_one_run || !(output.no_model_rms_um > output.left_out_rms_um))
+  const bool by_stretches = made_from.within_one_run && output.freedom > 1.0;
+  if (!by_stretches || !(output.no_model_rms_um > output.left_out_rms_um))
     return output.left_out_rms_um;
   return std::sqrt(output.left_out_rms_um * output.no_model_rms_um);
 }
@@ -69,7 +70,6 @@ struct ModelDomain::Metric {
   std::vector<double> lower;  ///< L^-1, row by row
   double distance_max{0.0};
   std::vector<double> spread_um;  ///< one an output
-  std::vector<double> freedom;
   struct State {
     bool started{false};
     nanoseconds looked_at{};
@@ -133,7 +133,6 @@ ModelDomain::ModelDomain(const ThermalModel& model) : metric_(std::make_unique<M
     const auto output = made_from.outputs.find(name);
     const bool known = output != made_from.outputs.end();
     metric_->spread_um.push_back(known ? spread_um(made_from, output->second) : not_a_number);
-    metric_->freedom.push_back(known ? output->second.freedom : 1.0);
   }
 }
 
@@ -180,11 +179,7 @@ double ModelDomain::believed_share() const noexcept {
 }
 
 double ModelDomain::sd_um(std::size_t output) const noexcept {
-  const double count = static_cast<double>(metric_->feature.size());
-  const double excess =
-      std::max(1.0, metric_->state.distance) * std::max(1.0, metric_->state.distance);
-  const double freedom = metric_->freedom[output];
-  return metric_->spread_um[output] * std::sqrt((freedom + count * excess) / (freedom + count));
+  return metric_->spread_um[output] * std::sqrt(std::max(1.0, metric_->state.distance));
 }
 
 void ModelDomain::visit_state(StateArchive& archive) {

@@ -11,9 +11,9 @@
 
 namespace thermocomp {
 
-/// What a prediction may be off by [um, 1 sd] at states of the record: the left-out error. One run
-/// says nothing of how another day differs: between what is left within it and no use at all only
-/// the scale is known, so the middle of the logarithms of both.
+/// What a prediction may be off by [um, 1 sd] at states of the record: the left-out error of whole
+/// runs, or (freedom 1) of the halves of one. Of one run cut in stretches (fit up to 0.2.0), which
+/// leave a third of what another day does: middle of the logarithms of that and of no model.
 [[nodiscard]] double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output);
 
 /// The distance of what the model reads from the rows that it was made from, in the metric of their
@@ -44,9 +44,9 @@ class ModelDomain {
   /// The share of the model's displacement that is still believed: 1 inside, (distance_max / d)^2
   /// outside.
   [[nodiscard]] double believed_share() const noexcept;
-  /// Standard deviation of an output's prediction: spread_um(), times
-  /// sqrt((1 + n d^2 / f) / (1 + n / f)), f: the rows that the data are worth (freedom), d: at
-  /// least 1. NaN: nothing is known about the output.
+  /// Standard deviation of a new value of an output: spread_um() times sqrt(max(1, d)): gains that
+  /// were penalised err less than in proportion to the distance. NaN: nothing is known about the
+  /// output.
   [[nodiscard]] double sd_um(std::size_t output) const noexcept;
 
   void visit_state(StateArchive& archive);

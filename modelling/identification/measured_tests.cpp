@@ -6,10 +6,10 @@
 #include <limits>
 #include <set>
 
+#include "config/runs/blunders.hpp"
 #include "config/runs/run_overlap.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
-#include "modelling/blunders/blunders.hpp"
 #include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {

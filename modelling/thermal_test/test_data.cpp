@@ -6,9 +6,9 @@
 #include <iterator>
 #include <optional>
 
+#include "config/runs/blunders.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
-#include "modelling/blunders/blunders.hpp"
 #include "modelling/thermal_test/axis_binding.hpp"
 
 namespace thermocomp::thermal_test {

@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "config/model/model_file.hpp"
+#include "config/runs/blunders.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/runs/run_overlap.hpp"
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
@@ -123,8 +124,12 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   if (!options.thermal.empty())
     return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
                             options.test, report);
-  return diagnose(load_model(options.model), std::move(train), options.train, std::move(test),
-                  options.test, report);
+  const ThermalModel model = load_model(options.model);
+  for (std::vector<RunFile>* runs : {&train, &test})
+    for (RunFile& run : *runs)
+      for (const Blunders& each : leave_out_blunders(run, model.outputs))
+        std::fprintf(stderr, "%s: %s\n", run.name.c_str(), each.text().c_str());
+  return diagnose(model, std::move(train), options.train, std::move(test), options.test, report);
 }
 
 /// What the test runs do not speak against.

@@ -426,7 +426,7 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
   const BankEquations bank(tests, columns);
   fit.results = judged(tests, options, forced, bank, done);
   std::vector<Judgement> judgements{{tests, fit.results}};
-  if (!further.folds.empty() && !forced)
+  if (!further.folds.empty())
     judgements.emplace_back(
         further, judged(further, options, forced, BankEquations(further, columns), done));
   choose(judgements, fit);
@@ -434,6 +434,8 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
     fit.chosen = *forced;
     fit.chosen_because = "as asked for";
   }
+  if (one_run && judgements.size() > 1)
+    fit.other_half_um = judgements[1].second[index_of_family(fit.chosen)].left_out_rms_um;
   fit.together = moved_together(tests);
   if (!fit.chosen_result().answers)
     throw std::runtime_error(std::string(to_string(fit.chosen)) + ": " +

@@ -36,8 +36,10 @@ struct FamilyResult {
 struct FamiliesFit {
   std::vector<FamilyResult> results;  ///< order of all_families
   Family chosen{Family::none};
-  bool chosen_by_stretches{false};  ///< of two or three runs; `results` are of whole runs
-  std::string chosen_because;       ///< one line, with the figures that decided
+  bool chosen_by_stretches{false};    ///< of two or three runs; `results` are of whole runs
+  std::vector<double> other_half_um;  ///< of an only run: what the chosen one leaves of each half
+                                      ///< by a model of the other, one an output
+  std::string chosen_because;         ///< one line, with the figures that decided
   std::vector<std::vector<std::string>> together;  ///< places that always moved alike
   ThermalModel model;      ///< of the chosen family, on all rows, with [made_from]
   std::optional<Fit> few;  ///< the equation, where it is one of few sensors

@@ -60,9 +60,10 @@ std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom
   const std::string no_model = about(output.no_model_rms_um);
   if (runs == 1)
     return printed(
-        "%s: another day is not known; on it expect about %s um, that is between %s (stretches of "
-        "this run) and %s (no model)\n",
-        of, about(spread_um(made_from, output)).c_str(), left_out.c_str(), no_model.c_str());
+        "%s: another day is not known; on it expect about %s um (each half of this run by a model "
+        "of the other; rows fitted %s, no model %s)\n",
+        of, about(spread_um(made_from, output)).c_str(), about(output.remainder_rms_um).c_str(),
+        no_model.c_str());
   if (runs == 2)
     return printed(
         "%s: on a third run expect between %s um (rows fitted) and %s (each run by a model of the "

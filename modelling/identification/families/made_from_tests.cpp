@@ -218,6 +218,10 @@ MadeFrom made_from_tests(const MeasuredTests& tests, const FamiliesFit& fit) {
     output.remainder_rms_um = remainder_um[o];
     output.left_out_rms_um = chosen.left_out_rms_um[o];
     output.no_model_rms_um = none.left_out_rms_um[o];
+    if (!fit.other_half_um.empty()) {
+      output.left_out_rms_um = fit.other_half_um[o];
+      output.freedom = 1.0;  // two halves
+    }
   }
   return made_from;
 }

@@ -126,6 +126,25 @@ def test_fit_without_options_compares_families_and_says_where_its_model_holds(tm
     assert predicted.stderr.splitlines()[-1] == "outside 1.000"
 
 
+def test_probings_that_missed_are_left_out_by_diagnose_with_a_line(tmp_path):
+    files = write_tests(tmp_path, 2)
+    model = tmp_path / "model.toml"
+    model.write_text('format = 1\ninputs = ["t1_degC", "t3_degC"]\noutputs = ["z_um"]\n'
+                     'reference = "first_sample"\nmatrix_um_per_K = [[5.0, -2.0]]\n')
+    lines = files[0].read_text().splitlines()
+    for row in (1, 90, 150):  # the first one, from which displacement counts, too
+        rest, z_um = lines[row].rsplit(",", 1)
+        lines[row] = f"{rest},{float(z_um) + 4300.0}"
+    missed = tmp_path / "missed.csv"
+    missed.write_text("\n".join(lines) + "\n")
+    answer = run("diagnose", "--model", model, "--train", files[1], "--test", missed,
+                 "--json", tmp_path / "out.json")
+    assert answer.returncode == 0, answer.stderr
+    assert "missed.csv: z_um: 3 values are left out" in answer.stderr, answer.stderr
+    said = json.loads((tmp_path / "out.json").read_text())
+    assert said["baseline"]["z_um"]["test_rms_um"] < 1.0, said["baseline"]
+
+
 def test_one_run_is_said_to_judge_itself_and_the_same_rows_twice_are_refused(tmp_path):
     files = write_tests(tmp_path, 1)
     model = tmp_path / "model.toml"

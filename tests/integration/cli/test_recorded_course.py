@@ -71,6 +71,19 @@ def test_two_days_stand_in_for_probings_on_a_third(lab):
     assert abs(recorded_um - true_um) < 0.25 * abs(bare_um - true_um)
 
 
+def test_a_probing_that_missed_teaches_nothing(lab):
+    clean = correction(lab, "day_1.csv", "day_2.csv").stderr
+    lines = (lab / "day_1.csv").read_text().splitlines()
+    for row in (60, 61, 200):
+        rest, z_um = lines[row].rsplit(",", 1)
+        lines[row] = f"{rest},{float(z_um) + 4300.0}"
+    (lab / "missed.csv").write_text("\n".join(lines) + "\n")
+    said = correction(lab, "missed.csv", "day_2.csv").stderr
+    assert "missed.csv: z_um: 3 values are left out" in said, said
+    rms_um = [float(re.search(r"a run left out: RMS ([\d.]+) um", each)[1]) for each in (clean, said)]
+    assert abs(rms_um[1] - rms_um[0]) < 0.2, rms_um
+
+
 def test_one_day_is_said_to_prove_nothing_of_another(lab):
     answer = correction(lab, "day_1.csv")
     assert answer.returncode == 0, answer.stderr

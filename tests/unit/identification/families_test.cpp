@@ -158,10 +158,14 @@ TEST_CASE("what one run cannot tell widens what a prediction may be off by", "[f
   MadeFrom::Output output;
   output.left_out_rms_um = 2.0;
   output.no_model_rms_um = 18.0;
+  output.freedom = 20.0;
   CHECK(spread_um(made_from, output) == 2.0);
   made_from.within_one_run = true;
   CHECK(spread_um(made_from, output) == 6.0);
   output.no_model_rms_um = 1.0;  // a model that is worse than none says so already
+  CHECK(spread_um(made_from, output) == 2.0);
+  output.no_model_rms_um = 18.0;
+  output.freedom = 1.0;  // judged by halves
   CHECK(spread_um(made_from, output) == 2.0);
 }
 
@@ -336,6 +340,12 @@ TEST_CASE("blunders of a probe are left out with a word, the first row's too", "
   CHECK(tests.notes[0].find("z_um: 5 values are left out") != std::string::npos);
   CHECK(tests.runs[0].time_s[0] == 60.0);
   CHECK(tests.runs[0].outputs_um.cwiseAbs().maxCoeff() < 100.0);
+  RunFile stuck = machine_run("stuck", 3, moved);
+  for (std::size_t row = 5; row < 45; ++row) stuck.values[4][row] = stuck.values[4][5];
+  const MeasuredTests unstuck = measured_tests({stuck}, options);
+  REQUIRE(unstuck.notes.size() == 1);
+  CHECK(unstuck.notes[0].find("z_um: 39 values are left out, the same from 360 to 2640 s") !=
+        std::string::npos);
   RunFile steps = machine_run("steps", 3, moved);  // a step of the machine is no blunder
   for (std::size_t row = 100; row < steps.rows(); ++row) steps.values[4][row] += 60.0;
   CHECK(measured_tests({steps}, options).notes.empty());

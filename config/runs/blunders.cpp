@@ -1,4 +1,4 @@
-#include "modelling/blunders/blunders.hpp"
+#include "config/runs/blunders.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +17,8 @@ constexpr double share_of_way = 0.25;
 /// At an end nothing tells a blunder from a first step of the machine but its size.
 constexpr double share_of_way_at_end = 0.5;
 constexpr double share_max = 0.1;  ///< of the values; more are no blunders but the course itself
+constexpr std::size_t stuck_rows_min = 10;
+constexpr std::size_t stuck_longer_min = 3;  ///< than the second longest stretch of one value
 constexpr std::size_t times_named_max = 6;
 constexpr double as_sd = 1.4826;  ///< of the median of |x|, for Gaussian x
 
@@ -106,10 +108,54 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
   return found;
 }
 
+/// The longest stretch of one value, when it ends with a leap that the column does not make else.
+Blunders stuck_of(const RunFile& run, const std::string& column) {
+  Blunders found;
+  found.column = column;
+  found.stuck = true;
+  const Values& values = run.column(column);
+  std::size_t begin = 0;
+  std::size_t longest = 0;
+  std::size_t second = 1;
+  std::size_t row = 0;
+  for (std::size_t end = 1; end <= values.size(); ++end) {
+    if (end < values.size() && values[end] == values[row]) continue;
+    if (end - row > longest) {
+      second = std::max(second, longest);
+      longest = end - row;
+      begin = row;
+    } else {
+      second = std::max(second, end - row);
+    }
+    row = end;
+  }
+  const std::size_t end = begin + longest;
+  if (longest < stuck_rows_min || longest < stuck_longer_min * second || end >= values.size())
+    return found;
+  Values changes;
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if ((i <= begin || i > end) && std::isfinite(values[i] - values[i - 1]))
+      changes.push_back(values[i] - values[i - 1]);
+  if (changes.size() < rows_min) return found;
+  Values finite = values;
+  std::erase_if(finite, [](double each) { return !std::isfinite(each); });
+  const auto [least, most] = std::minmax_element(finite.begin(), finite.end());
+  found.limit_um =
+      std::max(usual_deviations * size_of_most(changes), share_of_way * (*most - *least));
+  found.size_um = values[end] - values[end - 1];
+  if (!(found.limit_um > 0 && std::abs(found.size_um) > found.limit_um)) return found;
+  for (std::size_t i = begin + 1; i < end; ++i) found.times_s.push_back(run.time_s()[i]);
+  return found;
+}
+
 }  // namespace
 
 std::string Blunders::text() const {
   const std::string unit(unit_of(column).symbol);
+  if (stuck)
+    return column + ": " + std::to_string(times_s.size()) + " values are left out, the same from " +
+           number_text(times_s.front()) + " to " + number_text(times_s.back()) +
+           " s, then a leap of " + number_text(std::round(10.0 * size_um) / 10.0) + " " + unit;
   std::string text = column + ": " + std::to_string(times_s.size()) +
                      (times_s.size() == 1 ? " value is" : " values are") +
                      " left out, off the neighbours by up to ";
@@ -127,6 +173,8 @@ std::vector<Blunders> find_blunders(const RunFile& run, const std::vector<std::s
     if (!run.find(column)) continue;
     Blunders found = blunders_of(run, column);
     if (!found.times_s.empty()) all.push_back(std::move(found));
+    Blunders stuck = stuck_of(run, column);
+    if (!stuck.times_s.empty()) all.push_back(std::move(stuck));
   }
   return all;
 }

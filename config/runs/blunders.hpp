@@ -14,6 +14,7 @@ struct Blunders {
   std::vector<double> times_s;
   double size_um{0.0};   ///< the largest, with its sign
   double limit_um{0.0};  ///< beyond which a value is one
+  bool stuck{false};     ///< the same value again and again; size_um: of the leap after it
 
   /// One line: how many, of what, when and how far off.
   [[nodiscard]] std::string text() const;
@@ -22,7 +23,9 @@ struct Blunders {
 /// A value is a blunder that stands off the median of its neighbours (four on each side; at an end
 /// off the straight line through those of its one side) by more than twelve usual deviations from
 /// that median and a quarter (at an end half) of the way that the column goes. A step is none: the
-/// values after it agree with each other.
+/// values after it agree with each other. Stuck are ten rows or more of one value, three times as
+/// long as any other such stretch, that end with a leap beyond twelve usual changes of a row and a
+/// quarter of the way.
 /// @param columns  of displacement or tilt
 [[nodiscard]] std::vector<Blunders> find_blunders(const RunFile& run,
                                                   const std::vector<std::string>& columns);
