@@ -24,7 +24,8 @@ std::shared_ptr<SharedLine> SharedLine::of(const ModbusLine& line) {
   const std::scoped_lock lock(mutex);
   std::weak_ptr<SharedLine>& known = lines[address_of(line)];
   std::shared_ptr<SharedLine> shared = known.lock();
-  if (!shared) known = shared = std::make_shared<SharedLine>(line);
+  if (!shared || shared->connection().cancelled())
+    known = shared = std::make_shared<SharedLine>(line);
   return shared;
 }
 

@@ -104,18 +104,6 @@ def test_a_search_finds_the_units_that_answer_and_says_what_it_sends(simulate, t
     assert "3, 4 answer; not in the configuration: 3, 4" in done.stdout, done.stdout
 
 
-def test_registers_numbered_as_in_a_manual_are_recognised(simulate, tmp_path):
-    simulator = simulate(MACHINE)
-    sensors = [("bed", {"device": "bed_module", "address": 30001})]
-    devices = table("[[device]]", name="bed_module", bus="bus", unit=4, table="input",
-                    encoding="int16", scale=0.1)
-    path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=10000.0), devices,
-                         sensors)
-    _, seen = scan(path)
-    assert seen["bed"]["hints"] == ['addresses count from 0 on the wire: 30001 in a manual is '
-                                    'table = "input", address = 0']
-
-
 def test_a_bus_that_cannot_be_opened_and_a_name_that_is_none(simulate, tmp_path):
     simulator = simulate(MACHINE)
     sensors = [("bed", {"device": "bed_module", "address": 0})]

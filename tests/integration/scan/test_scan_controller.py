@@ -147,40 +147,6 @@ def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, rela
     assert "channels give a temperature" not in done.stdout  # only the controller was asked for
 
 
-def test_values_that_cannot_be_read_together_are_told_as_the_daemon_would_find_them(
-        simulate, relay, tmp_path):
-    simulator = simulate(MACHINE)
-    between = relay(simulator.ports["cnc"])
-    path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES,
-                         SENSORS, controller(between.port))
-    report, _ = scan(path)
-    assert report["controller"]["refused"] == ""
-
-    class Strict(Relay):
-        """Refuses more than two registers at once, as a controller does that has nothing between."""
-
-        def serve(self, link):
-            with link, link.makefile("rb") as requests:
-                while len(head := requests.read(7)) == 7:
-                    body = requests.read(struct.unpack(">H", head[4:6])[0] - 1)
-                    function, _, count = struct.unpack(">BHH", body)
-                    size = 2 * count if function in (3, 4) else 1
-                    answer = struct.pack(">BB", function, size) + bytes(size)
-                    if function == 4 and count > 2:
-                        answer = bytes([function | 0x80, 2])
-                    link.sendall(head[:4] + struct.pack(">HB", len(answer) + 1, head[6]) + answer)
-
-    strict = Strict(0)
-    near = SIGNALS.replace("address = 20", "address = 14")
-    path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES,
-                         SENSORS, controller(strict.port, near))
-    report, _ = scan(path)
-    strict.close()
-    assert all(each["why"] == "" for each in report["controller"]["values"])
-    assert not report["controller"]["complete"]
-    assert "the daemon reads input 10..24 in one request" in report["controller"]["refused"]
-
-
 def test_a_controller_that_is_silent_or_gone_is_told_so(simulate, relay, tmp_path):
     simulator = simulate(MACHINE)
     sensors = bus(simulator, "modbus_tcp", timeout_ms=3000.0)
