@@ -26,7 +26,7 @@ while read -r _ bug; do
 done < <("$program" --list | grep '^planted ')
 # Each way of lying alone is enough to find a bug of what guards against it.
 while read -r lie bug; do
-  out=$("$program" --planted "$bug" --only "$lie" --expect-found --seeds 0:40 "${lives[@]}" \
+  out=$("$program" --planted "$bug" --only "$lie" --expect-found --seeds 0:200 "${lives[@]}" \
     2>/dev/null) || true
   if ! read -r _ invariant seed hours < <(grep '^FOUND' <<<"$out"); then
     printf '%-34s NOT FOUND by %s alone\n' "$bug" "$lie"

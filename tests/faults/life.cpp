@@ -209,8 +209,10 @@ class Life {
     if (in_order) return kept_->end(then);
     if (!power_was_cut_) return kept_->kill();
     kept_->cut_power();
+    // While an axis is driven the file is never behind.
     for (std::size_t i = 0; i < axes_count; ++i)
-      if (kept_->is_behind(then, shape_.estimator.axes[i].name)) judge_.lost(i);
+      if (!report_.axes[i].driven && kept_->is_behind(then, shape_.estimator.axes[i].name))
+        judge_.lost(i);
   }
 
   [[nodiscard]] nanoseconds done_at() const {

@@ -92,7 +92,10 @@ Sample Thermocouples::convert(std::size_t sensor, nanoseconds time) const noexce
                         0.01 * static_cast<double>(noise % 100);
     sample.impossible = true;
   }
-  sample.temp_degC = through_unit(sensor, sample.temp_degC, time);
+  const double shown_degC = through_unit(sensor, sample.temp_degC, time);
+  // Of 330 degC a unit in tenths shows 33, which may be.
+  sample.impossible = sample.impossible && shown_degC == sample.temp_degC;
+  sample.temp_degC = shown_degC;
   sample.good = whole(sensor, time);
   return sample;
 }
