@@ -186,6 +186,17 @@ struct Jump {
   }
 };
 
+struct JumpedSensor {
+  std::string name{};
+  Jump jump{};
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("name", self.name);
+    Jump::fields(self.jump, visit);
+  }
+};
+
 struct SensorStatus {
   std::string name{};
   std::vector<std::string> blocks{};
@@ -471,6 +482,7 @@ struct Status {
   std::vector<InputStatus> inputs{};
   ReferenceStatus reference{};
   std::vector<std::string> sensors_bad{};
+  std::vector<JumpedSensor> sensors_jumped{};
   std::vector<SuspectedSensor> sensors_suspected{};
   std::vector<BusStatus> buses{};
   ControllerStatus controller{};
@@ -497,6 +509,7 @@ struct Status {
     visit("inputs", self.inputs);
     visit("reference", self.reference);
     visit("sensors_bad", self.sensors_bad);
+    visit("sensors_jumped", self.sensors_jumped);
     visit("sensors_suspected", self.sensors_suspected);
     visit("buses", self.buses);
     visit("controller", self.controller);

@@ -142,6 +142,9 @@ std::vector<Trouble> troubles(const Status& status) {
   for (const std::string& estimate : estimate_lines(status.inputs, status.axes)) add(estimate, "");
   if (!status.sensors_bad.empty())
     add("bad sensors: " + joined(status.sensors_bad), "thermocomp sensors says why");
+  for (const JumpedSensor& sensor : status.sensors_jumped)
+    add("sensor " + sensor.name + " jumped by " + fixed_signed(sensor.jump.size_K, 1) + " K",
+        "where that is right: thermocomp accept " + sensor.name);
   for (const SuspectedSensor& sensor : status.sensors_suspected)
     add("sensor " + sensor.name + " is " + suspicion_text(sensor.suspicion), "");
   add_bus_troubles(status, add);

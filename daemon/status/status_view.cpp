@@ -334,6 +334,8 @@ Status status_of(const StatusView& view) {
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
     const std::string& name = view.config.estimator.sensors[i].name;
     if (view.report.sensors[i].fault != Fault::none) status.sensors_bad.push_back(name);
+    if (const auto jump = jump_of(view, view.report.sensors[i]))
+      status.sensors_jumped.push_back({name, *jump});
     if (const auto suspicion = suspicion_of(view, view.report.sensors[i]))
       status.sensors_suspected.push_back({name, *suspicion});
   }

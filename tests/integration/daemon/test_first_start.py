@@ -168,3 +168,32 @@ def test_proving_waits_shows_progress_and_tells_what_was_read(day):
     status, out, said = daemon.cli("prove", "z", "4")
     assert status == 1, (out, said)
     assert "axis z: " in out and "NOT" in out and "read back +0.00 um there" in out, out
+
+
+def test_a_sensor_that_jumps_counts_only_once_an_operator_accepts_it(day):
+    def show_column(temp_degC):
+        (day.lab.folder / "run.csv").write_text(
+            f"time_s,column_degC,spindle_degC,z_um\n0,{temp_degC},20,0\n")
+        day.show("0:1")
+
+    show_column(20)
+    daemon = day.daemon("enabled_at_first_start = true\n")
+    daemon.config.write_text(daemon.config.read_text().replace(
+        "settle_s = 0.0\n", "settle_s = 0.5\n").replace("rate_allowance_K = 100.0\n", ""))
+    daemon.start().wait_for_mode("compensating")
+    assert daemon.cli("accept", "column")[0] != 0  # nothing is asked
+    show_column(68)  # degF
+    eventually(lambda: "sensor_unconfirmed" in daemon.status()["reasons"] and
+               daemon.status()["mode"] == "holding", "the jump is told")
+    before_um = daemon.axis()["offset"]
+    status, out, _ = daemon.cli("status")
+    assert status == 1 and "accept column" in out, out
+    assert "+48" in out, out
+    assert daemon.cli("accept", "spindle")[0] != 0
+    assert daemon.axis()["offset"] == before_um
+
+    assert daemon.cli("accept", "column")[0] == 0
+    daemon.wait_for_mode("compensating")
+    assert column(daemon)["temp_degC"] == pytest.approx(68.0, abs=0.02)
+    assert "sensor_unconfirmed" not in daemon.status()["reasons"]
+    assert any("accept" in line for line in daemon.log_text().splitlines())

@@ -145,6 +145,7 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
   status.mode = Mode::holding;
   status.reasons = only(Reason::block_lost);
   status.sensors_bad = {"table"};
+  status.sensors_jumped = {{"table", {48.0, 0.0}}};
   status.buses = {{.name = "cabinet",
                    .kind = "modbus_tcp",
                    .last_error = "refused",
@@ -153,6 +154,8 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
   CHECK_THAT(text, Contains("no (data lost: holding the last offsets"));
   CHECK_THAT(text, Contains("no good sensor left -> thermocomp sensors"));
   CHECK_THAT(text, Contains("bad sensors: table"));
+  CHECK_THAT(text, Contains("sensor table jumped by +48.0 K -> where that is right: "
+                            "thermocomp accept table"));
   CHECK_THAT(text, Contains("bus cabinet is not connected (refused) -> check the module's power"));
 }
 
