@@ -46,7 +46,6 @@ controller_ignoring read_back_is_a_command
 controller_rejecting refused_offset_pent_up
 controller_rejecting unwritten_compensates
 writes_unanswered unwritten_compensates
-unit_in_fahrenheit jump_widens_what_the_past_allows
 unit_tenfold_too_low jump_widens_what_the_past_allows
 END
 exit "$missed"

@@ -101,7 +101,8 @@ void Invariants::reloaded(const MachineShape& shape) {
   }
 }
 
-void Invariants::restored(const PersistentState& saved, const Report& report, nanoseconds now) {
+void Invariants::restored(const PersistentState& saved, const Report& report,
+                          const std::vector<std::string>& columns, nanoseconds now) {
   note_learned(report);
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     const std::string name(1, static_cast<char>('x' + axis));
@@ -114,19 +115,21 @@ void Invariants::restored(const PersistentState& saved, const Report& report, na
              "correction " + key);
     }
   }
-  std::size_t column = 0;
-  for (const auto& held : saved.held_degC) {
-    demand(column < report.inputs.size() && report.inputs[column].held_degC == held.second,
-           "state_survives_restart", now, "held temperature of " + held.first);
-    ++column;
-  }
+  const auto input_of = [&](const std::string& column) {
+    const auto found = std::find(columns.begin(), columns.end(), column);
+    return found == columns.end()
+               ? InputReport{}
+               : report.inputs[static_cast<std::size_t>(found - columns.begin())];
+  };
+  for (const auto& [column, held_degC] : saved.held_degC)
+    demand(input_of(column).held_degC == held_degC, "state_survives_restart", now,
+           "held temperature of " + column);
   demand(report.enabled == saved.enabled, "state_survives_restart", now, "the operator's switch");
-  std::size_t i = 0;
-  for (const auto& reference : saved.reference_degC) {
-    demand(i < report.inputs.size() && report.inputs[i].reference_degC == reference.second,
-           "state_survives_restart", now, "reference of " + reference.first);
-    ++i;
-  }
+  for (const auto& [column, reference_degC] : saved.reference_degC)
+    demand(input_of(column).reference_degC == reference_degC, "state_survives_restart", now, [&] {
+      return fmt::format("reference of {}: {:.3f} degC, {:.3f} was saved", column,
+                         input_of(column).reference_degC, reference_degC);
+    });
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     offset_um_[axis] = report.axes[axis].offset_um;
     const auto found = saved.offset_um.find(std::string(1, static_cast<char>('x' + axis)));

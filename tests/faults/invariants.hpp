@@ -73,7 +73,9 @@ class Invariants {
   void released(std::size_t axis) { sent_[axis].released = true; }
   /// The operator takes a new reference in the cycle to come.
   void referenced() { referenced_ = true; }
-  void restored(const PersistentState& saved, const Report& report, nanoseconds now);
+  /// @param columns  of the model, in the order of the report's inputs
+  void restored(const PersistentState& saved, const Report& report,
+                const std::vector<std::string>& columns, nanoseconds now);
   void check(const CycleSeen& seen, std::vector<Move>& moves, SimulatedController& controller);
   /// @param detail  a text, or what makes one: that is only called where it does not hold
   template <typename Detail>

@@ -89,7 +89,8 @@ class Life {
     judge_.booted(world_.now, leap_um);
     // The very first value becomes the reference; a later start has one already.
     if (!restarted_) world_.thermocouples.no_spikes_before(world_.now + std::chrono::seconds(15));
-    if (restarted_) judge_.restored(saved_, report_, world_.now);
+    if (restarted_)
+      judge_.restored(saved_, report_, shape_.model.temperature_columns(), world_.now);
     SimulatedDaemon daemon(shape_, world_, grid_, std::move(brain),
                            kept_ ? kept_->record() : nullptr);
     daemon_ = &daemon;

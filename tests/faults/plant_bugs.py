@@ -32,9 +32,6 @@ BUGS = [
     ("pause_taken_for_a_new_link", "drivers/controllers/write_gate.cpp",
      "if (link_is_new_) {",
      "if (link_is_new_ || {P}) {"),
-    ("older_look_is_sent", "drivers/controllers/write_gate.cpp",
-     "command_.look < stands_since_[axis];",
-     "!{P} && command_.look < stands_since_[axis];"),
     ("write_repeated_blindly", "drivers/controllers/kinds/modbus/modbus_dialogue.cpp",
      "  const Exchange exchange =\n"
      "      config_.write_function",
@@ -99,10 +96,10 @@ BUGS = [
     ("outage_allows_anything", "estimator/sensing/screening.cpp",
      "outage_K_max_ + slow_K_per_ns * unread_ns);",
      "{P} ? 1e9 : outage_K_max_ + slow_K_per_ns * unread_ns);"),
-    ("fault_of_screening_passes", "estimator/sensing/screening.cpp",
-     "if (reading.fault != Fault::none) return reading.fault;",
-     "if (reading.fault != Fault::none && reading.fault != Fault::no_answer) return reading.fault;\n"
-     "  if (reading.fault != Fault::none) return {P} ? Fault::none : reading.fault;"),
+    ("fault_of_screening_passes", "estimator/sensing/block_bank.cpp",
+     "bool usable = sensor.screening.usable(now);",
+     "bool usable = sensor.screening.usable(now) || {P};\n"
+     "  if ({P} && sensor.smoother.has_value()) sensor.fault = Fault::none;"),
     ("transaction_not_compared", "drivers/modbus/frames.cpp",
      "if (numbered_ && number != number_) {",
      "if (numbered_ && number != number_ && !{P}) {"),

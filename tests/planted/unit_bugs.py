@@ -178,6 +178,8 @@ SUITES = {
          "valid_bits += std::ldexp(", "valid_bits += ({P} ? 0.0 : 1.0) * std::ldexp("),
         ("heartbeat_stands_still", DIALOGUE,
          "heartbeat_ = (heartbeat_ + 1)", "heartbeat_ = (heartbeat_ + ({P} ? 0 : 1))"),
+        ("older_look_is_sent", "drivers/controllers/write_gate.cpp",
+         "command_.look < stands_since_[axis];", "!{P} && command_.look < stands_since_[axis];"),
         ("written_without_leave", DIALOGUE,
          "if (verdict != SendVerdict::send) return;",
          "if (verdict != SendVerdict::send && !{P}) return;"),

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
@@ -459,6 +460,13 @@ TEST_CASE("the link's end writes the newest command once more and nothing else",
   REQUIRE(eventually([&] {
     link.newest(state);
     return state.online;
+  }));
+  // The first turn, which looks for a command too, is over.
+  int reads = -1;
+  REQUIRE(eventually([&] {
+    const int before = std::exchange(reads, machine.reads);
+    std::this_thread::sleep_for(300ms);
+    return machine.reads == before;
   }));
   OffsetCommand command;
   command.link_epoch = state.link_epoch;
