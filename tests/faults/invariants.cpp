@@ -511,7 +511,8 @@ void Invariants::check_move(const CycleSeen& seen, const Move& move,
   demand(std::isfinite(move.to_um), "only_finite_numbers", seen.now, "register of the controller");
   // In the time that answers are waited for a controller can restart: what is written was looked at
   // just before.
-  const double looked_s_max = 2.0 * link_timeout_s_ + 0.05;
+  // The rest of an answer that has begun may take as long again.
+  const double looked_s_max = 2.0 * (link_timeout_s_ + std::min(link_timeout_s_, 0.7)) + 0.05;
   demand(to_s(move.at - move.looked_at) <= looked_s_max, "looked_before_written", seen.now, [&] {
     return fmt::format("axis {}: written {:.3f} s after the last look, {:.3f} allowed", move.axis,
                        to_s(move.at - move.looked_at), looked_s_max);
