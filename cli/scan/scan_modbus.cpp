@@ -56,11 +56,9 @@ class ModbusScan {
  public:
   ModbusScan(const ModbusBusConfig& config, const ScanSensors& sensors,
              const std::function<void(const std::string&)>& progress)
-      : config_(config),
-        sensors_(sensors),
-        progress_(progress),
-        connection_(config.line),
-        poller_(config, connection_) {}
+      : config_(config), sensors_(sensors), progress_(progress), connection_(config.line) {
+    if (!config.devices.empty()) poller_.emplace(config, connection_);
+  }
 
   void run(ScanBus& bus) {
     if (!connection_.connect()) {
@@ -70,8 +68,7 @@ class ModbusScan {
       }
       return;
     }
-    progress_("bus " + config_.name + ": asking its devices as the daemon does");
-    ask_as_the_daemon();
+    if (poller_) ask_as_the_daemon();
     for (std::size_t i = 0; i < config_.devices.size(); ++i) bus.devices.push_back(scan(i));
     judge_silence(bus);
   }
@@ -118,7 +115,7 @@ class ModbusScan {
   const ScanSensors& sensors_;
   const std::function<void(const std::string&)>& progress_;
   ModbusConnection connection_;
-  ModbusPoller poller_;
+  std::optional<ModbusPoller> poller_;  ///< none: nothing is configured on the bus yet
   // Of the device under way, in the order of its channels.
   std::vector<Answer> values_;
   std::vector<std::optional<Answer>> statuses_;
@@ -136,15 +133,16 @@ std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchang
 
 /// Until every device was asked for everything, and again where the daemon tries again.
 void ModbusScan::ask_as_the_daemon() {
+  progress_("bus " + config_.name + ": asking its devices as the daemon does");
   const std::size_t count = config_.devices.size();
-  const auto has_asked = [this](std::size_t device) { return poller_.has_asked(device); };
+  const auto has_asked = [this](std::size_t device) { return poller_->has_asked(device); };
   // A gateway may keep each of them for some seconds.
   const nanoseconds give_up_at =
       connection_.now() + static_cast<long>(count + 1) * 2 * gateway_wait_max;
   std::vector<std::size_t> all(count);
   std::iota(all.begin(), all.end(), std::size_t{0});
   while (!std::all_of(all.begin(), all.end(), has_asked) && connection_.now() < give_up_at)
-    poller_.act();
+    poller_->act();
 }
 
 ScanDevice ModbusScan::scan(std::size_t index) {
@@ -157,12 +155,12 @@ ScanDevice ModbusScan::scan(std::size_t index) {
     return Answer{answer.exchange, {answer.words.begin(), answer.words.end()}};
   };
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
-    values_.push_back(copied(poller_.value_of(index, i)));
-    const auto status = poller_.status_of(index, i);
+    values_.push_back(copied(poller_->value_of(index, i)));
+    const auto status = poller_->status_of(index, i);
     statuses_.push_back(status ? std::optional(copied(*status)) : std::nullopt);
   }
   if (!result.answers) result.note = describe(device, values_.front().exchange);
-  if (poller_.is_split(index)) {
+  if (poller_->is_split(index)) {
     const auto is_ok = [](const Answer& answer) { return answer.exchange.ok(); };
     result.note = std::all_of(values_.begin(), values_.end(), is_ok)
                       ? "refuses to be read in one request, but answers for each register: "
@@ -329,7 +327,7 @@ void ModbusScan::judge_silence(ScanBus& bus) const {
   const auto silent = static_cast<std::size_t>(std::count_if(
       bus.devices.begin(), bus.devices.end(), [](const auto& device) { return !device.answers; }));
   if (silent == 0) return;
-  const bool nothing_came = poller_.value_of(0, 0).exchange.outcome == ExchangeOutcome::timeout;
+  const bool nothing_came = poller_->value_of(0, 0).exchange.outcome == ExchangeOutcome::timeout;
   if (silent == bus.devices.size()) {
     const std::string works = working_line();
     if (!works.empty())
