@@ -45,7 +45,7 @@ class SharedLine {
 
  private:
   struct Member {
-    LineUser* user;
+    LineUser* user{nullptr};
     bool is_leaving{false};
   };
   void run();
