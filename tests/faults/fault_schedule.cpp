@@ -46,10 +46,6 @@ constexpr std::array<std::string_view, fault_kinds> names{"sensor_open",
                                                           "history_disk_full",
                                                           "history_files_removed"};
 
-nanoseconds seconds_of(double time_s) {
-  return nanoseconds{static_cast<nanoseconds::rep>(time_s * 1e9)};
-}
-
 /// Shortest and longest time of a fault [s].
 std::pair<double, double> duration_s(FaultKind kind) {
   switch (kind) {
@@ -107,7 +103,7 @@ FaultEvent FaultSchedule::draw(Chance& chance, FaultKind kind, nanoseconds begin
   FaultEvent event;
   event.kind = kind;
   event.begin = begin;
-  event.end = begin + seconds_of(scale * chance.between(low_s, high_s));
+  event.end = begin + from_s(scale * chance.between(low_s, high_s));
   event.subject = chance.below(64);
   event.strength = chance.fraction();
   event.number = ++numbers_;
@@ -119,7 +115,7 @@ FaultSchedule::FaultSchedule(std::uint64_t seed, const ScheduleOptions& options)
   Chance chance(seed, 7);
   const double scale = options.seconds_scale;
   const nanoseconds last = options.start + options.length;
-  nanoseconds at = options.start + seconds_of(scale * chance.between(60.0, 120.0));
+  nanoseconds at = options.start + from_s(scale * chance.between(60.0, 120.0));
   for (std::size_t index = 0;; ++index) {
     Episode episode;
     episode.begin = at;
@@ -139,7 +135,7 @@ FaultSchedule::FaultSchedule(std::uint64_t seed, const ScheduleOptions& options)
       episode.end = std::max(episode.end, episode.faults.back().end);
     }
     if (episode.end >= last) break;
-    at = episode.end + seconds_of(scale * chance.between(100.0, 200.0));
+    at = episode.end + from_s(scale * chance.between(100.0, 200.0));
     episodes_.push_back(std::move(episode));
   }
 }

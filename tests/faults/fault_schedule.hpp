@@ -16,6 +16,13 @@ namespace thermocomp::faults {
 
 using std::chrono::nanoseconds;
 
+[[nodiscard]] constexpr double to_s(nanoseconds time) noexcept {
+  return 1e-9 * static_cast<double>(time.count());
+}
+[[nodiscard]] constexpr nanoseconds from_s(double time_s) noexcept {
+  return nanoseconds{static_cast<nanoseconds::rep>(time_s * 1e9)};
+}
+
 enum class FaultKind : std::uint8_t {
   sensor_open,
   sensor_short,

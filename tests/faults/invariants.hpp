@@ -15,6 +15,8 @@
 
 namespace thermocomp::faults {
 
+inline constexpr double tiny_um = 1e-9;
+
 /// So far may a register of 0.1 um be off the offset that it holds [um].
 inline constexpr double register_rounding_um = 0.1;
 

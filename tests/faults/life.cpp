@@ -24,10 +24,6 @@ constexpr nanoseconds saved_every = std::chrono::seconds(10);
 constexpr nanoseconds watchdog = std::chrono::seconds(5);
 constexpr nanoseconds restarted_after = std::chrono::seconds(2);
 
-double to_s(nanoseconds time) {
-  return 1e-9 * static_cast<double>(time.count());
-}
-
 class Life {
  public:
   explicit Life(const LifeOptions& options)

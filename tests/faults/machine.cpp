@@ -11,9 +11,6 @@ namespace {
 constexpr nanoseconds conversion_period = std::chrono::milliseconds(500);
 /// Between the requests for a value and for its status, where they are two.
 constexpr nanoseconds status_apart_max = std::chrono::seconds(12);
-constexpr double seconds_of(nanoseconds time) {
-  return 1e-9 * static_cast<double>(time.count());
-}
 
 }  // namespace
 
@@ -29,7 +26,7 @@ Thermocouples::Thermocouples(std::uint64_t seed, const FaultSchedule& schedule)
 double Thermocouples::true_degC(std::size_t sensor, nanoseconds time) const noexcept {
   const Course& course = courses_[sensor];
   return course.mean_degC +
-         course.swing_K * std::sin(course.rate_per_s * seconds_of(time) + course.phase);
+         course.swing_K * std::sin(course.rate_per_s * to_s(time) + course.phase);
 }
 
 /// It works loose at a rate that screening lets through, and is pressed back.
@@ -37,7 +34,7 @@ double Thermocouples::lie_K(std::size_t sensor, nanoseconds time) const noexcept
   constexpr double rate_K_per_s = 0.3;
   constexpr double lie_K_max = 4.0;
   if (!judges_sensors(seed_) || sensor != seed_ / 3 % sensors_count) return 0.0;
-  const double in_period_s = std::fmod(seconds_of(time), 7200.0);
+  const double in_period_s = std::fmod(to_s(time), 7200.0);
   return std::clamp(rate_K_per_s * std::min(in_period_s - 1800.0, 5400.0 - in_period_s), 0.0,
                     lie_K_max);
 }
@@ -45,7 +42,7 @@ double Thermocouples::lie_K(std::size_t sensor, nanoseconds time) const noexcept
 double Thermocouples::creep_K(std::size_t sensor, nanoseconds at) const noexcept {
   const FaultEvent* drift = schedule_.find(FaultKind::sensor_drifting, at, sensor, sensors_count);
   const double drift_K =
-      drift == nullptr ? 0.0 : (drift->strength - 0.5) * 0.05 * seconds_of(at - drift->begin);
+      drift == nullptr ? 0.0 : (drift->strength - 0.5) * 0.05 * to_s(at - drift->begin);
   return drift_K + lie_K(sensor, at);
 }
 
@@ -225,7 +222,7 @@ double SimulatedController::shown_um(std::size_t axis, nanoseconds time) {
   if (const FaultEvent* shifted = lie(FaultKind::read_back_shifted, axis, time))
     shown += (shifted->strength < 0.5 ? -1.0 : 1.0) * (3.0 + 20.0 * shifted->strength);
   if (const FaultEvent* drift = lie(FaultKind::read_back_drifting, axis, time))
-    shown += (drift->strength - 0.5) * seconds_of(time - drift->begin);
+    shown += (drift->strength - 0.5) * to_s(time - drift->begin);
   if (const FaultEvent* jumped = lie(FaultKind::read_back_jumped, axis, time))
     shown += jumped->strength < 0.5 ? -1000.0 : 1000.0;
   if (const FaultEvent* frozen = lie(FaultKind::read_back_frozen, axis, time)) {
@@ -283,7 +280,7 @@ bool SimulatedController::read(std::size_t address, std::span<std::uint16_t> wor
   std::array<std::uint16_t, 9> image{};
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     if (const FaultEvent* other = lie(FaultKind::second_writer, axis, time))
-      disturb(axis, 60.0 * (other->strength - 0.5) + 0.02 * seconds_of(time - other->begin));
+      disturb(axis, 60.0 * (other->strength - 0.5) + 0.02 * to_s(time - other->begin));
     const double shown = shown_um(axis, time);
     if (floats_) {
       const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(shown));
