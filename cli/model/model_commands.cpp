@@ -89,11 +89,7 @@ int run_covariance(const CovarianceOptions& options) {
   }
   std::vector<RunFile> runs;
   RunLoader loader(options.columns);
-  for (const std::string& record : options.records) {
-    runs.push_back(load_record(record, loader));
-    for (const Blunders& each : leave_out_blunders(runs.back(), model.outputs))
-      std::fprintf(stderr, "%s: %s\n", runs.back().name.c_str(), each.text().c_str());
-  }
+  for (const std::string& record : options.records) runs.push_back(load_record(record, loader));
   const CovarianceFit fit = fit_covariance(runs, model.inputs);
   model.covariance_K2 = fit.matrix_K2;
   model.covariance_growth = fit.growth;
