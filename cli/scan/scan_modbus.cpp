@@ -299,7 +299,7 @@ bool ModbusScan::would_answer(const ModbusLine& line) const {
              .unit_answered();
 }
 
-/// What makes a line work on which no unit answers, tried; empty: nothing of it.
+/// The first of these changes with which a unit answers; empty: none answers with any.
 std::string ModbusScan::working_line() const {
   const auto* tcp = std::get_if<ModbusTcp>(&config_.line.link);
   if (tcp == nullptr) return "";

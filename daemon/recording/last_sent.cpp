@@ -113,7 +113,7 @@ void LastSent::note(const OffsetCommand& command, std::uint32_t forgotten) noexc
   if (next.known == now_.known && next.forgotten == now_.forgotten &&
       next.offset_um == now_.offset_um)
     return;
-  // Nothing has been sent: a record of another format is still true.
+  // The daemon has sent nothing yet, so a record of another format is still true.
   if (next.number == 0 && next.known == 0 && !problem_.empty()) return;
   // What others left would be found again by them, and be wrong by then.
   if (next.number == 0) *file_ = File{magic, format, {}};

@@ -87,7 +87,10 @@ void SharedLine::run() {
     acting_ = member.user;
     lock.unlock();
     connection_.time_as(member.user->line());
-    member.is_leaving ? member.user->end() : member.user->act();
+    if (member.is_leaving)
+      member.user->end();
+    else
+      member.user->act();
     lock.lock();
     acting_ = nullptr;
     if (member.is_leaving) remove(*member.user);

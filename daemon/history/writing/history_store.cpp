@@ -181,8 +181,8 @@ void HistoryStore::rescue(const std::string& changed) {
   } catch (const DatabaseError&) {
     // The log cannot be read any more: what is in the database is what is left.
   }
-  // Of a log that was removed this connection has the only copy: it stays open until all of it can
-  // be written. Half of it would leave a database that is damaged.
+  // This connection has the only copy of a removed log: it stays open until the disk takes all of
+  // it. Half of it would leave a database that is damaged.
   const DatabaseError failed(code, changed + " was removed, and the disk takes nothing (" +
                                        sqlite3_errstr(code) + "): tried again");
   if (failed.is_for_now() && has_database) throw failed;

@@ -190,7 +190,7 @@ void ModbusDialogue::act() {
     }
     next_exchange_at_ = connection_.now();
   }
-  // What a new beginning takes on a line that loses frames says nothing of the controller's pace.
+  // The time that a reconnection takes says nothing of the controller's pace.
   const nanoseconds exchange_began = connection_.now();
   exchange();
   const nanoseconds now = connection_.now();
