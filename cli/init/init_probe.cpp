@@ -137,7 +137,8 @@ ScanReport probe(const InitDraft& draft, const fs::path& folder) {
   ScanReport report{"", {}, {}};
   for (const BusConfig& bus : config.buses)
     report.buses.push_back(scan_bus(std::get<ModbusBusConfig>(bus), sensors, task));
-  report.controller = scan_controller(config, listen_s, progress);
+  constexpr bool writes_back = false;
+  report.controller = scan_controller(config, listen_s, writes_back, progress);
   return report;
 }
 

@@ -22,6 +22,7 @@ struct ScanOptions {
   std::string bus;  ///< only this one; empty: all
   bool as_json{false};
   double listen_s{3.0};
+  bool read_only{false};
   UnitSearch search;
   std::string units{"1-32"};
 };
@@ -58,7 +59,8 @@ ScanReport scan(const DaemonConfig& config, const ScanOptions& options) {
       report.buses.push_back(
           std::visit([&](const auto& each) { return scan_bus(each, sensors, task); }, bus));
   if (wanted(controller_name(config)))
-    report.controller = scan_controller(config, options.listen_s, task.progress);
+    report.controller =
+        scan_controller(config, options.listen_s, !options.read_only, task.progress);
   if (report.buses.empty() && !report.controller) {
     throw Failure(options.bus + ": no such bus in " + options.file + " that can be scanned");
   }
@@ -93,6 +95,9 @@ void add_scan_command(CLI::App& app, Action& action) {
       ->type_name("NAME");
   sub->add_option("--listen", options->listen_s, "seconds to listen to a CAN bus for (default 3)")
       ->check(CLI::Range(0.1, 600.0));
+  sub->add_flag("--read-only", options->read_only,
+                "do not try whether the controller takes writes. Else what stands in its registers "
+                "is written once more where every axis applies it already");
   sub->add_flag("--find", options->search.wanted,
                 "also ask the units and CANopen nodes that the configuration does not name");
   sub->add_option("--units", options->units, "Modbus units that --find asks (default 1-32)")

@@ -6,16 +6,21 @@
 #include <variant>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "cli/common/modbus_names.hpp"
 #include "cli/scan/scan_can.hpp"
 #include "cli/scan/serial_holder.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
+#include "daemon/socket/status_client.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/driver_error.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
+#include "drivers/monotonic_clock.hpp"
 #include "estimator/axis_spans.hpp"
+#include "status/status_json.hpp"
 
 namespace thermocomp::cli {
 namespace {
@@ -27,6 +32,8 @@ struct Place {
   ModbusValue value;
   ScanValue shown;
   std::vector<std::uint16_t> words;
+  WriteStage stage{WriteStage::offset};
+  std::size_t axis{axes_max};  ///< whose single offset, sent or applied, it is
 };
 
 Place place_of(const ModbusValue& value, const std::string& what, const std::string& unit,
@@ -35,6 +42,7 @@ Place place_of(const ModbusValue& value, const std::string& what, const std::str
   place.shown.what = what;
   place.shown.unit = unit;
   place.shown.is_written = is_written;
+  place.shown.is_needed = !is_written;
   place.shown.place = place_name(value) + " " + type_name(value);
   if (value.scale != 1.0) place.shown.place += " x " + number_text(value.scale);
   return place;
@@ -67,6 +75,7 @@ std::vector<Place> read_places(const DaemonConfig& config, const ModbusControlle
     if (!modbus.axes[i].applied) continue;
     const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
     places.push_back(place_of(*modbus.axes[i].applied, "applied of axis " + axis.name, unit));
+    places.back().axis = i;
   }
   for (const ModbusSignal& signal : modbus.signals) {
     const std::string& name = config.estimator.signals[signal.signal];
@@ -87,16 +96,71 @@ std::vector<Place> written_places(const DaemonConfig& config,
       for (Place& place : places_of_set(*travel, axis, travel->values, "", true))
         places.push_back(std::move(place));
       places.push_back(place_of(travel->end, "end" + of_axis, "", true));
+      places.back().shown.is_needed = true;  // the number of the next set follows from it
       continue;
     }
     const std::string unit = modbus.axes[i].piezo ? "V" : std::string(unit_of(axis.output).symbol);
     places.push_back(place_of(modbus.axes[i].offset, "offset of axis " + axis.name, unit, true));
+    places.back().axis = i;
   }
-  if (modbus.valid_bits)
-    places.push_back(place_of(without_sign(*modbus.valid_bits), "valid_bits", "", true));
-  if (modbus.heartbeat)
-    places.push_back(place_of(without_sign(*modbus.heartbeat), "heartbeat", "", true));
+  const auto add = [&](const std::optional<ModbusValue>& value, const char* what,
+                       WriteStage stage) {
+    if (!value) return;
+    places.push_back(place_of(without_sign(*value), what, "", true));
+    places.back().stage = stage;
+  };
+  add(modbus.valid_bits, "valid_bits", WriteStage::valid_bits);
+  add(modbus.heartbeat, "heartbeat", WriteStage::heartbeat);
   return places;
+}
+
+const Place* of_axis(const std::vector<Place>& places, std::size_t axis) {
+  const auto found = std::find_if(places.begin(), places.end(),
+                                  [&](const Place& place) { return place.axis == axis; });
+  return found == places.end() ? nullptr : &*found;
+}
+
+/// Why writing what stands in the registers once more might move an axis; empty: it does not,
+/// because all of it is in effect.
+std::string why_it_may_move(const ModbusControllerConfig& modbus, const std::vector<Place>& read,
+                            const std::vector<Place>& written) {
+  const Place* valid_bits = nullptr;
+  for (const Place& place : written) {
+    if (!place.shown.is_there()) return place.shown.what + " cannot be read";
+    if (place.stage == WriteStage::valid_bits) valid_bits = &place;
+  }
+  for (std::size_t axis = 0; axis < modbus.axes.size(); ++axis) {
+    const Place* applied = of_axis(read, axis);
+    const Place* offset = of_axis(written, axis);
+    if (offset == nullptr) return "each set along a travel has a number of its own";
+    if (applied == nullptr) return offset->shown.what + " is not read back";
+    const double step = std::abs(applied->value.scale) + std::abs(offset->value.scale);
+    if (!(std::abs(applied->shown.value - offset->shown.value) <= step))
+      return offset->shown.what + " is not what is applied";
+    const bool is_valid =
+        valid_bits == nullptr ||
+        (bits_of(valid_bits->words, valid_bits->value.encoding, valid_bits->value.word_order) >>
+             axis &
+         1U) != 0;
+    if (!is_valid && std::abs(applied->shown.value) > step)
+      return "valid_bits is not what is applied";
+  }
+  return "";
+}
+
+/// What a daemon that runs with this configuration has seen; false: none runs.
+bool ask_running_daemon(const DaemonConfig& config, ScanController& result) {
+  try {
+    constexpr std::chrono::milliseconds patience{500};
+    StatusClient client(config.socket.path, patience);
+    const auto status = part_from<Status>(client.call("status", nlohmann::json::object()));
+    if (has_reason(status.reasons, Reason::not_written))
+      result.refused = "the running daemon: " + status.controller.last_error;
+    result.writes = "writes were not tried: a daemon is running, thermocomp status shows its own";
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
 }
 
 class ControllerScan {
@@ -105,7 +169,9 @@ class ControllerScan {
       : config_(config), connection_(config.line) {}
 
   /// @param read  as the daemon asks for them, together; @param written  each alone
-  void run(std::vector<Place>& read, std::vector<Place>& written, ScanController& result) {
+  /// @param writes_back  what stands there is written once more
+  void run(std::vector<Place>& read, std::vector<Place>& written, bool writes_back,
+           ScanController& result) {
     if (!connection_.connect()) {
       result.error = "cannot be opened: " + connection_.last_error();
       mark_all(read, written, "was not asked");
@@ -116,6 +182,15 @@ class ControllerScan {
       return;
     }
     for (Place& place : written) ask_alone(place);
+    if (!writes_back) return;
+    const bool is_read = std::all_of(read.begin(), read.end(),
+                                     [](const Place& place) { return place.shown.is_there(); });
+    if (!is_read || !result.refused.empty()) return;
+    const std::string why_not_tried = why_it_may_move(config_, read, written);
+    if (why_not_tried.empty())
+      write_back(written, result);
+    else
+      result.writes = "writes were not tried: " + why_not_tried;
   }
 
  private:
@@ -128,6 +203,9 @@ class ControllerScan {
   Exchange ask(ModbusTable table, std::uint16_t address, std::span<std::uint16_t> words) {
     Exchange exchange;
     for (int tried = 0; tried < tries_max; ++tried) {
+      // A gateway for one client may still have the one of the sensors' bus.
+      if (!connection_.connected() && tried > 0)
+        connection_.pause_until(connection_.now() + from_seconds(config_.line.reconnect_s));
       if (!connection_.connected() && !connection_.connect()) return exchange;
       exchange = connection_.read(config_.unit, table, address, words);
       if (exchange.ok() || exchange.outcome == ExchangeOutcome::exception) break;
@@ -176,6 +254,20 @@ class ControllerScan {
                      "): gap_registers_max = 0 in [controller] reads none between";
   }
 
+  void write_back(const std::vector<Place>& written, ScanController& result) {
+    std::vector<WriteField> fields;
+    for (const Place& place : written)
+      fields.push_back({place.value.address, place.stage, place.words});
+    for (const WriteField& request : join_writes(fields, config_.registers_per_write())) {
+      if (!connection_.connected()) connection_.connect();
+      const Exchange exchange = write_field(connection_, config_, request);
+      if (exchange.ok()) continue;
+      result.refused = write_error(config_, request, exchange);
+      return;
+    }
+    result.writes = "writes are taken: what stands in the registers was written once more";
+  }
+
   void ask_alone(Place& place) {
     const Exchange exchange = ask(place.value.table, place.value.address, place.words);
     if (exchange.ok())
@@ -213,7 +305,7 @@ class ControllerScan {
 };
 
 ScanController scan_modbus_controller(const DaemonConfig& config,
-                                      const ModbusControllerConfig& modbus,
+                                      const ModbusControllerConfig& modbus, bool writes_back,
                                       const std::function<void(const std::string&)>& progress) {
   ScanController result;
   result.name = modbus.name;
@@ -231,9 +323,10 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
     for (std::vector<Place>* places : {&read, &written})
       for (Place& place : *places) place.shown.why = "was not asked";
   } else {
-    progress("controller " + modbus.name + ": reading its registers, writing none");
+    progress("controller " + modbus.name + ": reading its registers");
+    const bool may_write = writes_back && !config.dry_run && !ask_running_daemon(config, result);
     try {
-      ControllerScan(modbus).run(read, written, result);
+      ControllerScan(modbus).run(read, written, may_write, result);
     } catch (const DriverError& error) {
       result.error = error.what();
     }
@@ -246,10 +339,10 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
 }  // namespace
 
 std::optional<ScanController> scan_controller(
-    const DaemonConfig& config, double listen_s,
+    const DaemonConfig& config, double listen_s, bool writes_back,
     const std::function<void(const std::string&)>& progress) {
   if (const auto* modbus = std::get_if<ModbusControllerConfig>(&config.controller))
-    return scan_modbus_controller(config, *modbus, progress);
+    return scan_modbus_controller(config, *modbus, writes_back, progress);
   if (const auto* can = std::get_if<CanControllerConfig>(&config.controller))
     return scan_can_controller(config, *can, listen_s, progress);
   if (const auto* bridge = std::get_if<BridgeControllerConfig>(&config.controller))

@@ -75,7 +75,7 @@ void append(std::string& text, const ScanDevice& device, bool colours) {
 
 void append(std::string& text, const ScanController& controller, bool colours) {
   text += "controller " + controller.name + " (" + controller.kind + ", " + controller.where + ")" +
-          (controller.address.empty() ? "" : ", " + controller.address) + ", only read\n";
+          (controller.address.empty() ? "" : ", " + controller.address) + "\n";
   for (const std::string& trouble : {controller.error, controller.refused})
     if (!trouble.empty()) text += "    " + coloured(trouble, Colour::red, colours) + "\n";
   std::size_t what_width = 0;
@@ -90,27 +90,27 @@ void append(std::string& text, const ScanController& controller, bool colours) {
     text += "    " + padded(value.what, what_width) + "  " + padded(value.place, place_width) +
             "  " + padded(value.raw.empty() ? "-" : value.raw, raw_width) + "  -> ";
     const std::string shown =
-        value.is_there() ? fixed(value.value, 2) + (value.unit.empty() ? "" : " " + value.unit)
-                         : "missing";
-    text += coloured(shown, value.is_there() ? Colour::green : Colour::red, colours);
+        value.is_there()  ? fixed(value.value, 2) + (value.unit.empty() ? "" : " " + value.unit)
+        : value.is_needed ? "missing"
+                          : "cannot be read, is only written";
+    text += coloured(shown, value.is_missing() ? Colour::red : Colour::green, colours);
     if (value.round_trip_ms) text.append("  ").append(fixed(*value.round_trip_ms, 1)).append(" ms");
     text += '\n';
     if (!value.is_there()) text.append("        ").append(value.why).append("\n");
   }
+  if (!controller.writes.empty()) text.append("    ").append(controller.writes).append("\n");
 }
 
 /// "9 of 11 places of the controller are there; missing: x_mm, heartbeat"
 std::string controller_summary(const ScanController& controller) {
-  std::string text = std::to_string(controller.count_there()) + " of " +
-                     std::to_string(controller.values.size()) +
-                     " places of the controller are there";
-  const char* separator = "; missing: ";
+  std::string missing;
+  std::size_t there = 0;
   for (const ScanValue& value : controller.values) {
-    if (value.is_there()) continue;
-    text.append(separator).append(value.what);
-    separator = ", ";
+    if (value.is_missing()) missing += (missing.empty() ? "; missing: " : ", ") + value.what;
+    if (!value.is_missing()) ++there;
   }
-  return text + "\n";
+  return std::to_string(there) + " of " + std::to_string(controller.values.size()) +
+         " places of the controller are there" + missing + "\n";
 }
 
 ordered_json optional_number(const std::optional<double>& value) {
@@ -149,14 +149,12 @@ ordered_json json_of(const ScanController& controller) {
                       {"value", optional_number(value.value)},
                       {"unit", value.unit},
                       {"why", value.why},
+                      {"needed", value.is_needed},
                       {"round_trip_ms", optional_number(value.round_trip_ms)}});
-  return {{"name", controller.name},
-          {"kind", controller.kind},
-          {"where", controller.where},
-          {"address", controller.address},
-          {"error", controller.error},
-          {"refused", controller.refused},
-          {"complete", controller.is_complete()},
+  return {{"name", controller.name},     {"kind", controller.kind},
+          {"where", controller.where},   {"address", controller.address},
+          {"error", controller.error},   {"refused", controller.refused},
+          {"writes", controller.writes}, {"complete", controller.is_complete()},
           {"values", std::move(values)}};
 }
 
@@ -181,13 +179,9 @@ std::size_t count_good(const ScanReport& report) {
   return count;
 }
 
-std::size_t ScanController::count_there() const {
-  return static_cast<std::size_t>(
-      std::count_if(values.begin(), values.end(), [](const auto& v) { return v.is_there(); }));
-}
-
 bool ScanController::is_complete() const {
-  return error.empty() && refused.empty() && count_there() == values.size();
+  return error.empty() && refused.empty() &&
+         std::none_of(values.begin(), values.end(), [](const auto& v) { return v.is_missing(); });
 }
 
 bool is_complete(const ScanReport& report) {

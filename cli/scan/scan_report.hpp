@@ -53,12 +53,14 @@ struct ScanValue {
   std::string what;  ///< "applied offset of axis z", "spindle_rpm"
   std::string place;
   bool is_written{false};      ///< by the daemon; what stands there was read all the same
+  bool is_needed{true};        ///< the daemon does not go without reading it
   std::string raw;             ///< as of a channel
   double value{not_a_number};  ///< in `unit`
   std::string unit;
   std::string why;  ///< empty: it is there
   std::optional<double> round_trip_ms;
   [[nodiscard]] bool is_there() const noexcept { return why.empty(); }
+  [[nodiscard]] bool is_missing() const noexcept { return is_needed && !is_there(); }
 };
 
 struct ScanController {
@@ -67,9 +69,9 @@ struct ScanController {
   std::string where;    ///< as of a bus
   std::string address;  ///< "unit 1"; empty on a CAN bus
   std::string error;    ///< empty: it could be asked
-  std::string refused;  ///< not empty: values are there, but not as the daemon asks for them
+  std::string refused;  ///< not empty: the daemon could not read all of it together, or not write
+  std::string writes;   ///< whether they were tried, and if not, why
   std::vector<ScanValue> values;
-  [[nodiscard]] std::size_t count_there() const;
   [[nodiscard]] bool is_complete() const;
 };
 

@@ -122,6 +122,7 @@ class ModbusConnection::Implementation {
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
   [[nodiscard]] std::uint64_t connects() const noexcept { return connects_; }
   [[nodiscard]] std::uint64_t links() const noexcept { return links_; }
+  [[nodiscard]] std::uint64_t breaks() const noexcept { return links_ + closed_unexpectedly_; }
   [[nodiscard]] nanoseconds held() const noexcept { return held_; }
   void share() noexcept { shared_ = true; }
   [[nodiscard]] bool is_shared() const noexcept { return shared_; }
@@ -157,6 +158,7 @@ class ModbusConnection::Implementation {
   bool connected_{false};
   std::uint64_t connects_{0};
   std::uint64_t links_{0};
+  std::uint64_t closed_unexpectedly_{0};
   std::string last_error_;
   int answers_{0};   ///< on this connection
   int closings_{0};  ///< in a row, by the peer, after one answer
@@ -355,6 +357,7 @@ Exchange ModbusConnection::Implementation::exchange(int unit, const Pdu& request
     const bool may_repeat = !was_sent_ || question_.function <= MODBUS_FC_READ_INPUT_REGISTERS;
     if (exchange.outcome == ExchangeOutcome::disconnected && has_answered && may_repeat) {
       closings_ = answers_ == 1 ? closings_ + 1 : 0;
+      ++closed_unexpectedly_;
       if (opened_anew()) exchange = try_once(unit, request, answer_bytes, deadline);
     }
   }
@@ -475,6 +478,9 @@ std::uint64_t ModbusConnection::connects() const noexcept {
 }
 std::uint64_t ModbusConnection::links() const noexcept {
   return implementation_->links();
+}
+std::uint64_t ModbusConnection::breaks() const noexcept {
+  return implementation_->breaks();
 }
 nanoseconds ModbusConnection::held() const noexcept {
   return implementation_->held();

@@ -86,6 +86,9 @@ class ModbusConnection {
   /// one, of whose far end nothing is known.
   [[nodiscard]] std::uint64_t connects() const noexcept;
   [[nodiscard]] std::uint64_t links() const noexcept;
+  /// Those by connect(), and those after a peer closed that does not close after each answer: it
+  /// may have restarted.
+  [[nodiscard]] std::uint64_t breaks() const noexcept;
   /// How long the last unit without an answer kept a gateway from answering others.
   [[nodiscard]] nanoseconds held() const noexcept;
   void share() noexcept;  ///< others than sensors ask on this line too

@@ -1,5 +1,5 @@
-"""`thermocomp scan` of the controller: every register and signal is read, none is written, and what
-is missing is named with what answered."""
+"""`thermocomp scan` of the controller: every register and signal is read, what stands there is written
+once more where that moves nothing, and what is missing is named with what answered."""
 
 import socket
 import struct
@@ -101,13 +101,13 @@ def written(simulator):
     return answer[9:]
 
 
-def test_every_register_is_read_and_none_is_written(simulate, relay, tmp_path):
+def test_every_register_is_read_and_none_is_changed(simulate, relay, tmp_path):
     simulator = simulate(MACHINE)
     between = relay(simulator.ports["cnc"])
     before = written(simulator)
     path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES,
                          SENSORS, controller(between.port))
-    report, seen = scan(path)
+    report, seen = scan(path, "--read-only")
     assert seen["t"]["fault"] == "none"
     found = report["controller"]
     assert found["complete"] and found["name"] == "cnc" and found["address"] == "unit 1"
@@ -126,9 +126,33 @@ def test_every_register_is_read_and_none_is_written(simulate, relay, tmp_path):
     assert done.returncode == 0, done.stdout
     assert "controller cnc (modbus_tcp, 127.0.0.1:" in done.stdout
     assert "-> 250.00 mm" in done.stdout
-    assert done.stdout.endswith("1 of 1 channels give a temperature\n"
-                                "7 of 7 places of the controller are there\n")
-    assert "writing none" in done.stderr
+    assert done.stdout.endswith(
+        "    writes are taken: what stands in the registers was written once more\n"
+        "1 of 1 channels give a temperature\n7 of 7 places of the controller are there\n")
+    assert 16 in between.functions
+    assert written(simulator) == before
+
+
+def write(simulator, address, words):
+    with socket.create_connection(("127.0.0.1", simulator.ports["cnc"]), timeout=30) as link:
+        link.sendall(struct.pack(">HHHBBHHB", 1, 0, 7 + 2 * len(words), 1, 16, address, len(words),
+                                 2 * len(words)) + struct.pack(f">{len(words)}H", *words))
+        assert link.recv(100)[7] == 16
+
+
+@pytest.mark.parametrize("keys, why", [
+    ({}, "offset of axis z is not what is applied"),  # no axis is valid, so nothing of it is
+    ({"dry_run": True}, "")])
+def test_nothing_is_written_that_might_move_an_axis(simulate, relay, tmp_path, keys, why):
+    simulator = simulate(MACHINE)
+    between = relay(simulator.ports["cnc"])
+    write(simulator, 0, [0, 5000])
+    path = configuration(tmp_path, bus(simulator, "modbus_tcp", timeout_ms=3000.0), DEVICES,
+                         SENSORS, controller(between.port, **keys))
+    report, _ = scan(path)
+    assert report["controller"]["complete"]
+    assert report["controller"]["writes"] == (f"writes were not tried: {why}" if why else "")
+    assert 16 not in between.functions
 
 
 def test_a_register_that_is_not_there_is_named_with_the_exception(simulate, relay, tmp_path):

@@ -20,10 +20,6 @@ NumberFormat raw_format(const ModbusValue& value) noexcept {
   return format;
 }
 
-/// Exceptions of a gateway about the controller behind it, which may be off.
-constexpr int gateway_path_unavailable = 10;
-constexpr int gateway_target_silent = 11;
-
 /// The first count that the register cannot hold exactly.
 std::uint64_t counts_of(Encoding encoding) noexcept {
   switch (encoding) {
@@ -214,7 +210,7 @@ void ModbusDialogue::end() {
 std::uint64_t ModbusDialogue::link_number() const noexcept {
   const bool reads_back = std::none_of(written_.begin(), written_.end(),
                                        [](const auto& written) { return written.has_value(); });
-  return reads_back ? connection_.links() : connection_.connects();
+  return reads_back ? connection_.links() : connection_.breaks();
 }
 
 /// Connects where needed, reads everything, and only then takes the new epoch.
@@ -272,8 +268,8 @@ bool ModbusDialogue::read_written() {
       const Exchange exchange = with_retries(
           [&] { return connection_.read(config_.unit, request.table, request.address, words); });
       // A device may do without these registers, with an exception or in silence.
-      const bool is_refused = refused_ && exchange.fault() == Fault::device_error;
-      if (!exchange.ok() && !is_refused && ++written_asked_ < asked_max) {
+      const bool goes_without = refused_ && exchange.fault() == Fault::device_error;
+      if (!exchange.ok() && !goes_without && ++written_asked_ < asked_max) {
         return note_unread(request, exchange);
       }
       if (!exchange.ok()) words.clear();
@@ -409,10 +405,7 @@ void ModbusDialogue::note_confirmed(nanoseconds now) {
 }
 
 bool ModbusDialogue::write(const WriteField& request) {
-  const Exchange exchange =
-      config_.write_function == ModbusControllerConfig::one_register
-          ? connection_.write_register(config_.unit, request.address, request.words.front())
-          : connection_.write_registers(config_.unit, request.address, request.words);
+  const Exchange exchange = write_field(connection_, config_, request);
   note_refusal(exchange);
   if (exchange.ok()) return true;
   const std::scoped_lock lock(health_mutex_);
@@ -422,12 +415,7 @@ bool ModbusDialogue::write(const WriteField& request) {
   told.function = config_.write_function;
   told.address = request.address;
   told.exception = exchange.exception_code;
-  told.error = std::string(refused_ ? "the controller refuses writes" : "no write is answered") +
-               " (function " + std::to_string(told.function) + ", register " +
-               std::to_string(told.address) + "): " + describe(exchange);
-  if (config_.write_function != ModbusControllerConfig::one_register && told.exception == 1)
-    told.error += "; if it takes single registers only, write_function = 6";
-  health_.last_error = told.error;
+  health_.last_error = told.error = write_error(config_, request, exchange);
   return false;
 }
 
@@ -457,17 +445,7 @@ bool ModbusDialogue::note_unread(const ReadRequest& request, const Exchange& exc
 }
 
 void ModbusDialogue::note_refusal(const Exchange& exchange) noexcept {
-  refused_ = exchange.outcome == ExchangeOutcome::exception &&
-             exchange.exception_code != gateway_path_unavailable &&
-             exchange.exception_code != gateway_target_silent;
-}
-
-std::string ModbusDialogue::describe(const Exchange& exchange) const {
-  if (exchange.outcome == ExchangeOutcome::exception) {
-    return "exception " + std::to_string(exchange.exception_code) + " (" + exchange.detail + ")";
-  }
-  if (!exchange.detail.empty()) return exchange.detail;
-  return connection_.last_error();
+  refused_ = is_refused(exchange);
 }
 
 /// Reads every value into state_; all of them or, by the time of the first request, none.

@@ -98,7 +98,6 @@ class ModbusDialogue final : public LineUser {
   Exchange with_retries(Request&& request);
   void note_refusal(const Exchange& exchange) noexcept;
   bool note_unread(const ReadRequest& request, const Exchange& exchange);  ///< @return false
-  [[nodiscard]] std::string describe(const Exchange& exchange) const;
 
   const ModbusControllerConfig config_;
   std::vector<ModbusValue> read_values_;  ///< applied offsets, then signals

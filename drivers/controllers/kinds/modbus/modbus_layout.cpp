@@ -9,6 +9,7 @@ namespace thermocomp {
 namespace {
 
 constexpr std::size_t bits_a_read_max = 2000;
+constexpr int illegal_function = 1;
 
 }  // namespace
 
@@ -59,6 +60,33 @@ std::vector<WriteField> join_writes(std::vector<WriteField> fields, std::size_t 
   std::stable_sort(requests.begin(), requests.end(),
                    [](const WriteField& a, const WriteField& b) { return a.stage < b.stage; });
   return requests;
+}
+
+Exchange write_field(ModbusConnection& connection, const ModbusControllerConfig& config,
+                     const WriteField& request) {
+  return config.write_function == ModbusControllerConfig::one_register
+             ? connection.write_register(config.unit, request.address, request.words.front())
+             : connection.write_registers(config.unit, request.address, request.words);
+}
+
+bool is_refused(const Exchange& exchange) noexcept {
+  return exchange.outcome == ExchangeOutcome::exception && exchange.unit_answered();
+}
+
+std::string describe(const Exchange& exchange) {
+  if (exchange.outcome != ExchangeOutcome::exception) return exchange.detail;
+  return "exception " + std::to_string(exchange.exception_code) + " (" + exchange.detail + ")";
+}
+
+std::string write_error(const ModbusControllerConfig& config, const WriteField& request,
+                        const Exchange& exchange) {
+  const bool may_take_one = config.write_function != ModbusControllerConfig::one_register &&
+                            exchange.exception_code == illegal_function;
+  return std::string(is_refused(exchange) ? "the controller refuses writes"
+                                          : "no write is answered") +
+         " (function " + std::to_string(config.write_function) + ", register " +
+         std::to_string(request.address) + "): " + describe(exchange) +
+         (may_take_one ? "; if it takes single registers only, write_function = 6" : "");
 }
 
 }  // namespace thermocomp

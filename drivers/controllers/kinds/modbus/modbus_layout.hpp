@@ -1,12 +1,14 @@
-/// Which requests carry a controller's values: pure planning, no I/O.
+/// Which requests carry a controller's values, and what one that failed is called.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "drivers/controllers/controller_config.hpp"
+#include "drivers/modbus/connection.hpp"
 
 namespace thermocomp {
 
@@ -48,5 +50,19 @@ struct WriteField {
 /// @pre the fields do not overlap
 [[nodiscard]] std::vector<WriteField> join_writes(std::vector<WriteField> fields,
                                                   std::size_t registers_max);
+
+/// By the function that the configuration names.
+Exchange write_field(ModbusConnection& connection, const ModbusControllerConfig& config,
+                     const WriteField& request);
+
+/// Whether the controller itself refused, and not a gateway because the controller behind it may be
+/// off.
+[[nodiscard]] bool is_refused(const Exchange& exchange) noexcept;
+/// "exception 1 (Illegal function)", or what came.
+[[nodiscard]] std::string describe(const Exchange& exchange);
+/// "the controller refuses writes (function 16, register 200): exception 1 (Illegal function)", and
+/// what may help.
+[[nodiscard]] std::string write_error(const ModbusControllerConfig& config,
+                                      const WriteField& request, const Exchange& exchange);
 
 }  // namespace thermocomp
