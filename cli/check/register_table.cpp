@@ -9,6 +9,7 @@
 #include "cli/common/modbus_names.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "estimator/axis_spans.hpp"
 #include "status/figures.hpp"
 
@@ -60,11 +61,8 @@ std::string valid_text(const std::vector<AxisConfig>& axes) {
 }
 
 std::string line_of(const ModbusControllerConfig& config) {
-  const std::string unit = ", unit " + std::to_string(config.unit);
-  if (const auto* tcp = std::get_if<ModbusTcp>(&config.line.link))
-    return "Modbus TCP " + tcp->host + ":" + std::to_string(tcp->port) + unit;
-  const auto& rtu = std::get<ModbusRtu>(config.line.link);
-  return "Modbus RTU " + rtu.device + ", " + std::to_string(rtu.baud) + " baud" + unit;
+  return std::string(kind_of(config.line)) + " " + line_name(config.line) + ", unit " +
+         std::to_string(config.unit);
 }
 
 Row axis_row(const ModbusAxis& place, const ModbusValue& value, const AxisConfig& axis,
@@ -120,18 +118,48 @@ std::string set_text(const DaemonConfig& config, const Controller& controller,
          taken_over + "):\n" + text;
 }
 
+/// The registers between values that one request reads along: they must be there.
+std::string gaps_text(const ModbusControllerConfig& controller,
+                      const std::vector<ModbusValue>& values) {
+  std::string text;
+  const auto add = [&](const ReadRequest& request, std::size_t from, std::size_t to) {
+    if (from >= to) return;
+    text += (text.empty() ? "" : ", ") + table_name(request.table) + " " + std::to_string(from);
+    if (to - from > 1) text += ".." + std::to_string(to - 1);
+  };
+  const ReadPlan plan = plan_reads(values, controller);
+  for (std::size_t r = 0; r < plan.requests.size(); ++r) {
+    const ReadRequest& request = plan.requests[r];
+    std::map<std::size_t, std::size_t> used;  // first register of each value, and the one behind
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (plan.places[i].request == r)
+        used[values[i].address] = values[i].address + words_of(values[i].table, values[i].encoding);
+    std::size_t reached = request.address;
+    for (const auto& [begin, end] : used) {
+      add(request, reached, begin);
+      reached = std::max(reached, end);
+    }
+  }
+  return text.empty()
+             ? text
+             : "  read along, so they must be there (gap_registers_max = 0: none): " + text + "\n";
+}
+
 std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfig& controller) {
   const std::vector<AxisConfig>& axes = config.estimator.axes;
   std::vector<Row> written;
   std::vector<Row> read;
+  std::vector<ModbusValue> values;  // that are read
   const std::vector<AxisSpan> spans = axis_spans(axes);
   for (std::size_t i = 0; i < spans.size(); ++i) {
     const ModbusAxis& place = controller.axes[i];
     const AxisConfig& axis = axes[spans[i].first];
     if (place.travel) {
       add_set(*place.travel, axis, written, read);
+      values.insert(values.end(), place.travel->applied.begin(), place.travel->applied.end());
       continue;
     }
+    if (place.applied) values.push_back(*place.applied);
     written.push_back(axis_row(place, place.offset, axis, ""));
     if (place.applied) read.push_back(axis_row(place, *place.applied, axis, "applied "));
   }
@@ -142,16 +170,18 @@ std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfi
                        "heartbeat; counts up with every write, begins anew when full", "-"});
   for (const ModbusSignal& signal : controller.signals) {
     const std::string& name = config.estimator.signals[signal.signal];
+    values.push_back(signal.value);
     read.push_back({place_name(signal.value), type_name(signal.value), name,
                     scaled(std::string(unit_of(name).symbol), signal.value.scale)});
   }
   std::string text = line_of(controller) + ", every " + number_text(controller.period_s) +
-                     " s; addresses from 0, as on the wire\n\nWritten by the daemon (function 16; "
-                     "offsets, then valid bits, then heartbeat):\n" +
+                     " s; addresses from 0, as on the wire\n\nWritten by the daemon (function " +
+                     std::to_string(controller.write_function) +
+                     "; offsets, then valid bits, then heartbeat):\n" +
                      table_text(registers, std::move(written));
   if (read.empty()) return text + "\nWritten by the controller: nothing\n";
   return text + "\nWritten by the controller, read by the daemon (functions 1 to 4):\n" +
-         table_text(registers, std::move(read));
+         table_text(registers, std::move(read)) + gaps_text(controller, values);
 }
 
 std::string place_of(const CanSignal& signal) {

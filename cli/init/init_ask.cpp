@@ -21,7 +21,7 @@ void ask_for_buses(InitDraft& draft, Questions& questions) {
     const bool is_first = draft.buses.empty();
     std::string answer;
     questions.ask_until(
-        is_first ? "Bus of the thermocouple modules: tcp:HOST[:PORT] or rtu:DEVICE[:BAUD[:PARITY]]"
+        is_first ? std::string("Bus of the thermocouple modules: ") + link_forms
                  : "Another bus? Enter: no more",
         is_first ? "rtu:/dev/ttyUSB0:19200:even" : "", [&](const std::string& text) {
           answer = text;
@@ -53,46 +53,83 @@ std::vector<std::string> proposed_names(const InitDraft& draft, const InitModule
   return names;
 }
 
+/// Where not all channels give a temperature as they were described, but do in another order.
+void offer_word_order(const InitDraft& draft, const InitModule& form, InitModule& asked,
+                      Questions& questions, const InitEyes& eyes) {
+  if (!form.preset.empty() || asked.channels.size() == form.channels.size() ||
+      form.registers.encoding.ends_with("16"))
+    return;
+  for (const char* order : {"CDAB", "BADC", "DCBA", "ABCD"}) {
+    InitModule other = form;
+    other.registers.word_order = order;
+    const std::vector<std::string> lines = eyes.try_module(draft, other);
+    if (other.channels.size() != form.channels.size()) continue;
+    for (const std::string& line : lines) questions.say("    " + line);
+    questions.ask_until(std::string("In word order ") + order + " all give a temperature; take it?",
+                        "yes", [&](const std::string& text) {
+                          if (text.starts_with("y")) asked = other;
+                        });
+    return;
+  }
+}
+
 void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& questions,
                     const InitEyes& eyes) {
+  const std::string where = "unit " + std::to_string(unit) + " on " + bus_text(draft.buses.at(bus));
   InitModule module;
   module.bus = bus;
   module.unit = unit;
   module.name = "module" + std::to_string(draft.modules.size() + 1);
   bool is_wanted = false;
   questions.ask_until(
-      "Module of unit " + std::to_string(unit) +
+      "Module of " + where +
           ": its preset, or TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES] such as "
           "input:int16:0.1:0-7; ? lists the presets, Enter: none",
       "", [&](const std::string& text) {
         is_wanted = !text.empty();
         if (!is_wanted) return;
         if (text == "?") throw Failure(joined(eyes.preset_names()));
-        InitModule asked = module;
-        parse_form(text, asked);
+        InitModule form = module;
+        parse_form(text, form);
+        InitModule asked = form;
         const std::vector<std::string> lines = eyes.try_module(draft, asked);
         for (const std::string& line : lines) questions.say("    " + line);
+        offer_word_order(draft, form, asked, questions, eyes);
         if (asked.channels.empty()) throw Failure("no channel gives a temperature");
         module = asked;
       });
   if (!is_wanted) return;
   const std::vector<std::string> proposed = proposed_names(draft, module);
-  questions.ask_until("Names of these sensors", joined(proposed), [&](const std::string& text) {
+  const std::string names_of = "Names of the sensors of " + where;
+  questions.ask_until(names_of, joined(proposed), [&](const std::string& text) {
     const std::vector<std::string> names = parse_words(text);
     if (names.size() != module.channels.size())
       throw Failure(std::to_string(module.channels.size()) + " names, please: " + joined(proposed));
-    for (std::size_t i = 0; i < names.size(); ++i) module.channels[i].sensor = names[i];
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (is_used(draft, names[i]) || std::count(names.begin(), names.end(), names[i]) > 1)
+        throw Failure(names[i] + ": each sensor needs a name of its own");
+      module.channels[i].sensor = names[i];
+    }
   });
   draft.modules.push_back(module);
 }
 
 void ask_for_modules(InitDraft& draft, Questions& questions, const InitEyes& eyes) {
-  for (std::size_t bus = 0; bus < draft.buses.size(); ++bus) {
+  for (std::size_t bus = 0; bus < draft.buses.size();) {
+    const std::string name = bus_text(draft.buses[bus]);
     std::vector<int> units = eyes.find_units(draft.buses[bus]);
     if (units.empty())
-      questions.ask_until("No unit answers on this bus. Units to use all the same", "1",
+      questions.ask_until("No unit answers on " + name + ". Units to use all the same", "1",
                           [&](const std::string& text) { units = parse_numbers(text); });
+    const std::size_t before = draft.modules.size();
     for (const int unit : units) ask_for_module(draft, bus, unit, questions, eyes);
+    if (draft.modules.size() > before) {
+      ++bus;
+      continue;
+    }
+    if (draft.buses.size() == 1) throw Failure("a machine needs a module with a sensor");
+    questions.say(name + " is left out: no module is on it");
+    draft.buses.erase(draft.buses.begin() + static_cast<std::ptrdiff_t>(bus));
   }
 }
 
@@ -117,12 +154,14 @@ void ask_for_places(InitController& controller, Questions& questions) {
 }
 
 void ask_for_controller(InitDraft& draft, Questions& questions) {
-  questions.ask_until("Controller: tcp:HOST[:PORT][@UNIT], rtu:..., linuxcnc, or none", "none",
-                      [&](const std::string& text) {
-                        const bool dry_run = draft.controller.dry_run;
-                        draft.controller = parse_controller(text);
-                        draft.controller.dry_run = dry_run;
-                      });
+  questions.ask_until(
+      "Controller: tcp:HOST[:PORT][@UNIT], udp:..., rtu_over_tcp:..., rtu:..., "
+      "linuxcnc, or none",
+      "none", [&](const std::string& text) {
+        const bool dry_run = draft.controller.dry_run;
+        draft.controller = parse_controller(text);
+        draft.controller.dry_run = dry_run;
+      });
   if (!draft.controller.is_modbus()) return;
   questions.ask_until(
       "Registers as in docs/controllers/plc.md? Offsets from holding 0 on, applied from input 0 on "
@@ -149,29 +188,57 @@ void ask_for_controller(InitDraft& draft, Questions& questions) {
 }  // namespace
 
 std::string Questions::ask(const std::string& question, const std::string& otherwise) {
+  if (next_ < answers_.size()) return answers_[next_++];
   ++count_;
   out_ << question << (otherwise.empty() ? "" : " [" + otherwise + "]") << ": " << std::flush;
   std::string line;
-  if (!std::getline(in_, line)) throw Failure("init: the input ended before everything was said");
+  if (!std::getline(in_, line))
+    throw InputEnded("init: the input ended before everything was said");
   const std::size_t first = line.find_first_not_of(" \t\r");
-  if (first == std::string::npos) return otherwise;
-  return line.substr(first, line.find_last_not_of(" \t\r") - first + 1);
+  if (first == std::string::npos)
+    line = otherwise;
+  else
+    line = line.substr(first, line.find_last_not_of(" \t\r") - first + 1);
+  if (line == "<") throw GoBack{};
+  answers_.push_back(line);
+  ++next_;
+  return line;
 }
 
 void Questions::ask_until(const std::string& question, const std::string& otherwise,
                           const std::function<void(const std::string&)>& take) {
   while (true) {
+    const std::size_t before = next_;
     const std::string answer = ask(question, otherwise);
     try {
       return take(answer);
+    } catch (const InputEnded&) {
+      throw;
     } catch (const Failure& failure) {
+      answers_.resize(next_ = before);
       say(failure.what());
     }
   }
 }
 
+void Questions::interview(const std::function<void()>& body) {
+  while (true) {
+    next_ = 0;
+    try {
+      return body();
+    } catch (const GoBack&) {
+    } catch (const InputEnded&) {
+      throw;
+    } catch (const Failure& failure) {
+      if (answers_.empty()) throw;
+      say(failure.what());
+    }
+    if (!answers_.empty()) answers_.pop_back();
+  }
+}
+
 void Questions::say(const std::string& text) {
-  out_ << text << '\n';
+  if (next_ == answers_.size()) out_ << text << '\n';
 }
 
 std::vector<std::string> missing_signals(const InitDraft& draft) {

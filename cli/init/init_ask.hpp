@@ -11,24 +11,37 @@
 
 namespace thermocomp::cli {
 
-/// Asks on a terminal and counts; an answer that cannot be understood is asked for again.
+/// Asks on a terminal and counts; an answer that cannot be understood is asked for again, and "<"
+/// goes back to the question before. The answers are kept: the interview is then gone through anew
+/// with all but the last of them, and only shows what is new.
 class Questions {
  public:
+  /// @throws Failure that interview() could not take an answer back for: the input has ended
+  class InputEnded : public Failure {
+    using Failure::Failure;
+  };
+
   Questions(std::istream& in, std::ostream& out) : in_(in), out_(out) {}
 
+  /// Calls `body` until it ends. A Failure that it throws is shown, and the last answer asked for
+  /// again; one without any answer is the caller's.
+  void interview(const std::function<void()>& body);
+  /// Until `take` does not throw a Failure. It may ask itself.
   /// @param otherwise  what Enter means; shown in brackets
-  /// @throws Failure at the end of the input
-  [[nodiscard]] std::string ask(const std::string& question, const std::string& otherwise);
-  /// Until `take` does not throw a Failure.
   void ask_until(const std::string& question, const std::string& otherwise,
                  const std::function<void(const std::string&)>& take);
   void say(const std::string& text);
   [[nodiscard]] int count() const noexcept { return count_; }
 
  private:
+  struct GoBack {};
+  [[nodiscard]] std::string ask(const std::string& question, const std::string& otherwise);
+
   std::istream& in_;
   std::ostream& out_;
   int count_{0};
+  std::vector<std::string> answers_;
+  std::size_t next_{0};  ///< of them: up to here they were gone through
 };
 
 /// What the questions need to know of the machine while they are asked.
@@ -41,7 +54,7 @@ struct InitEyes {
   std::function<std::vector<std::string>(const InitDraft&, InitModule&)> try_module;
 };
 
-/// Asks for what the draft does not have yet.
+/// Asks for what the draft does not have yet: part of an interview.
 void ask_for_rest(InitDraft& draft, bool has_controller, Questions& questions,
                   const InitEyes& eyes);
 

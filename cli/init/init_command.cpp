@@ -63,6 +63,7 @@ void take_model(InitDraft& draft, const InitOptions& options, const fs::path& fo
   const ThermalModel model = load_model(options.model);
   draft.model_inputs = model.temperature_columns();
   draft.model_signals = model.signal_columns();
+  draft.model_outputs = model.outputs;
   const fs::path path = fs::absolute(options.model).lexically_normal();
   draft.model_file = path.parent_path() == folder ? path.filename().string() : path.string();
   if (!options.axes.empty()) return;
@@ -218,6 +219,17 @@ void tell_next(const InitDraft& draft, const std::string& file) {
             << "  " << tool << " enable\n";
 }
 
+/// Whether all of the draft is there. What it can do about a refusal itself goes into the draft.
+bool look(InitDraft& draft, const fs::path& folder) {
+  ScanReport report = probe(draft, folder);
+  if (report.controller && !report.controller->refused.empty()) {
+    draft.controller.reads_gaps = false;
+    report = probe(draft, folder);
+  }
+  std::cout << scan_text(report, stdout_is_terminal());
+  return is_complete(report);
+}
+
 int run_init(const InitOptions& options) {
   const fs::path folder = folder_of(options.file);
   const fs::path model = folder / "model.toml";
@@ -226,26 +238,31 @@ int run_init(const InitOptions& options) {
          {fs::path(options.file), options.model.empty() ? model : fs::path()})
       if (!each.empty() && fs::exists(each))
         throw Failure(each.string() + ": is there already; --force replaces it");
-  InitDraft draft = draft_of(options, folder);
+  const auto settle_modules = [&](InitDraft& draft) {
+    try_modules(draft, options, folder);
+    name_sensors(draft, options.names);
+    refuse_missing_sensors(draft);
+  };
+  InitDraft given = draft_of(options, folder);
+  InitDraft draft;
   Questions questions(std::cin, std::cout);
-  const bool is_complete_draft = !draft.buses.empty() && !draft.modules.empty() &&
-                                 !options.controller.empty() && !draft.axes.empty();
+  const bool is_complete_draft = !given.buses.empty() && !given.modules.empty() &&
+                                 !options.controller.empty() && !given.axes.empty();
   if (!is_complete_draft) {
-    if (!stdin_is_terminal()) refuse_what_is_missing(draft, options);
-    ask_for_rest(draft, !options.controller.empty(), questions, eyes_of(folder));
+    if (!stdin_is_terminal()) refuse_what_is_missing(given, options);
+    questions.say("< goes back to the question before.");
   }
-  if (draft.modules.empty()) throw Failure("init: a machine needs a module with a sensor");
-  refuse_missing_signals(draft);
-  try_modules(draft, options, folder);
-  name_sensors(draft, options.names);
-  refuse_missing_sensors(draft);
-
-  bool is_all_there = true;
-  if (!options.no_scan) {
-    const ScanReport report = probe(draft, folder);
-    std::cout << scan_text(report, stdout_is_terminal());
-    is_all_there = is_complete(report);
-  }
+  const bool are_asked_for = given.modules.empty();
+  if (!are_asked_for) settle_modules(given);  // no answer could mend them
+  const InitEyes eyes = eyes_of(folder);
+  questions.interview([&] {
+    draft = given;
+    if (!is_complete_draft) ask_for_rest(draft, !options.controller.empty(), questions, eyes);
+    refuse_missing_signals(draft);
+    if (are_asked_for) settle_modules(draft);
+    check_draft(draft, folder);
+  });
+  const bool is_all_there = options.no_scan || look(draft, folder);
   if (draft.model_inputs.empty()) {
     keep_old(model);
     write_file(model.string(), first_model_text(draft));
@@ -253,8 +270,9 @@ int run_init(const InitOptions& options) {
   keep_old(options.file);
   write_file(options.file, configuration_text(draft));
   const DaemonConfig written = load_daemon_config(options.file);  // what check says, now
-  std::cout << options.file << ": written, OK; " << written.estimator.sensors.size() << " sensors, "
-            << questions.count() << " questions\n";
+  std::cout << options.file << ": written, OK; " << written.estimator.sensors.size() << " sensors";
+  if (questions.count() > 0) std::cout << ", " << questions.count() << " questions";
+  std::cout << '\n';
   if (!is_all_there)
     std::cout << "Not everything is there yet: see above, then thermocomp scan " << options.file
               << '\n';
@@ -275,9 +293,9 @@ void add_init_command(CLI::App& app, Action& action) {
                   "the configuration; outside of /etc its state, history and socket are put beside "
                   "it (default /etc/thermocomp/thermocompd.toml)")
       ->type_name("FILE");
-  sub->add_option("--bus", options->buses,
-                  "a Modbus bus of modules: tcp:HOST[:PORT] or rtu:DEVICE[:BAUD[:PARITY]]; may be "
-                  "given several times")
+  sub->add_option(
+         "--bus", options->buses,
+         std::string("a Modbus bus of modules: ") + link_forms + "; may be given several times")
       ->type_name("BUS");
   sub->add_option("--module", options->modules,
                   "UNIT=PRESET[/THERMOCOUPLE][@BASE][:CHANNELS], or without a preset "
@@ -288,8 +306,8 @@ void add_init_command(CLI::App& app, Action& action) {
                   "names of the sensors, in order of modules and channels, commas between")
       ->type_name("NAMES");
   sub->add_option("--controller", options->controller,
-                  "tcp:HOST[:PORT][@UNIT], rtu:DEVICE[:BAUD[:PARITY]][@UNIT], linuxcnc or none; "
-                  "registers as in docs/controllers/plc.md")
+                  "a line as of a bus and [@UNIT], linuxcnc or none; registers as in "
+                  "docs/controllers/plc.md")
       ->type_name("WHERE");
   sub->add_option("--offset", options->offset,
                   "where the controller takes the offset of the first axis, the others behind it: "

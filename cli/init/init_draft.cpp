@@ -1,8 +1,10 @@
 #include "cli/init/init_draft.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 
+#include "cli/common/modbus_names.hpp"
 #include "config/text/number_text.hpp"
 #include "config/toml/toml_text.hpp"
 #include "daemon/history/replay/replay.hpp"
@@ -24,7 +26,7 @@ std::string parity_word(char parity) {
 
 std::string link_text(const std::variant<ModbusTcp, ModbusRtu>& link) {
   if (const auto* tcp = std::get_if<ModbusTcp>(&link)) {
-    return key_text("kind", "modbus_tcp") + key_text("host", tcp->host) +
+    return key_text("kind", kind_of({link})) + key_text("host", tcp->host) +
            key_number("port", tcp->port);
   }
   const auto& rtu = std::get<ModbusRtu>(link);
@@ -132,6 +134,8 @@ std::string controller_text(const InitController& controller) {
   }
   text +=
       link_text(controller.link) + key_number("unit", controller.unit) + dry_run_text(controller);
+  if (!controller.reads_gaps)
+    text += "gap_registers_max = 0 # it refuses to have registers between its values read along\n";
   if (const auto& valid = controller.valid_bits)
     text += "valid_bits = " + place_text(*valid, valid->address) + "\n";
   if (const auto& count = controller.heartbeat)
@@ -160,7 +164,7 @@ std::string axes_text(const InitDraft& draft) {
     const auto index = static_cast<int>(i);
     text.append("[[axis]]\n")
         .append(key_text("name", axis))
-        .append(key_text("output", axis + "_um"))
+        .append(key_text("output", output_name(draft, axis)))
         .append("sign = 1                 # prove it with an indicator: thermocomp prove ")
         .append(axis)
         .append(" 5; -1 where the tool moves the other way\noffset_um_max = ")
@@ -186,6 +190,21 @@ std::string files_text(const InitDraft& draft) {
 }
 
 }  // namespace
+
+std::string output_name(const InitDraft& draft, const std::string& axis) {
+  const auto small = [](std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+    return text;
+  };
+  for (const std::string& output : draft.model_outputs)
+    if (small(output.substr(0, output.rfind('_'))) == small(axis)) return output;
+  return small(axis) + "_um";
+}
+
+std::string bus_text(const InitBus& bus) {
+  return bus.name + " (" + line_name({bus.link}) + ")";
+}
 
 std::string input_name(const std::string& sensor) {
   return sensor_column(sensor);
@@ -214,7 +233,7 @@ std::string first_model_text(const InitDraft& draft) {
   for (const InitModule& module : draft.modules)
     for (const InitChannel& channel : module.channels) inputs.push_back(input_name(channel.sensor));
   std::vector<std::string> outputs;
-  for (const std::string& axis : draft.axes) outputs.push_back(axis + "_um");
+  for (const std::string& axis : draft.axes) outputs.push_back(output_name(draft, axis));
   const std::vector<std::vector<double>> rows(outputs.size(),
                                               std::vector<double>(inputs.size(), 0.0));
   return "# The model of a machine of which nothing is known yet, written by `thermocomp init`: it "

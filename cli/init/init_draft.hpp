@@ -51,7 +51,7 @@ struct InitSignal {
 };
 
 struct InitController {
-  std::string kind{"dry_run"};  ///< or modbus_tcp, modbus_rtu, linuxcnc
+  std::string kind{"dry_run"};  ///< or one of modbus_kinds, linuxcnc
   std::variant<ModbusTcp, ModbusRtu> link;
   int unit{1};
   InitPlace offset{"holding", 0, "int32", "ABCD", 0.01};
@@ -59,8 +59,9 @@ struct InitController {
   std::optional<InitPlace> valid_bits{InitPlace{"holding", 10, "uint16", "ABCD", 1.0}};
   std::optional<InitPlace> heartbeat{InitPlace{"holding", 11, "uint16", "ABCD", 1.0}};
   std::vector<InitSignal> signals;
-  bool dry_run{false};  ///< of a Modbus controller: all of it is read and nothing is written
-  [[nodiscard]] bool is_modbus() const { return kind == "modbus_tcp" || kind == "modbus_rtu"; }
+  bool dry_run{false};    ///< of a Modbus controller: all of it is read and nothing is written
+  bool reads_gaps{true};  ///< registers between its values can be read along
+  [[nodiscard]] bool is_modbus() const { return kind.starts_with("modbus_"); }
 };
 
 struct InitDraft {
@@ -73,12 +74,17 @@ struct InitDraft {
   std::vector<std::string> model_inputs;
   /// What it reads from the controller.
   std::vector<std::string> model_signals;
+  std::vector<std::string> model_outputs;
   double offset_um_max{5.0};
   double rate_um_per_s_max{0.5};
   /// State, history and socket beside the configuration, for one that is not the machine's own.
   std::string own_folder;  ///< absolute; empty: where the package puts them
 };
 
+/// "Z" -> "z_um", or what the model calls it: "z_um", "Z_um", "c_urad".
+[[nodiscard]] std::string output_name(const InitDraft& draft, const std::string& axis);
+/// "bus1 (192.168.10.20:502)"
+[[nodiscard]] std::string bus_text(const InitBus& bus);
 /// "bed" -> "bed_degC".
 [[nodiscard]] std::string input_name(const std::string& sensor);
 /// The commented configuration.

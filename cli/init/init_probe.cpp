@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <set>
 #include <unistd.h>
 #include <utility>
@@ -142,6 +143,18 @@ ScanReport probe(const InitDraft& draft, const fs::path& folder) {
   return report;
 }
 
+void check_draft(const InitDraft& draft, const fs::path& folder) {
+  const TrialFiles files(draft, folder);
+  try {
+    static_cast<void>(load_trial(files.config()));
+  } catch (const ConfigurationError& error) {
+    std::string text;
+    for (const Problem& problem : error.problems())
+      text += (text.empty() ? "" : "\n") + to_string(problem);
+    throw Failure(text);
+  }
+}
+
 std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
                                     const fs::path& folder) {
   const bool has_preset = !module.preset.empty();
@@ -178,7 +191,11 @@ std::vector<std::string> try_module(const InitDraft& draft, InitModule& module,
 
 InitEyes eyes_of(const fs::path& folder) {
   InitEyes eyes;
-  eyes.find_units = [](const InitBus& bus) {
+  // An interview that goes back does not search anew.
+  eyes.find_units = [known =
+                         std::map<std::string, std::vector<int>>{}](const InitBus& bus) mutable {
+    const std::string name = bus_text(bus);
+    if (const auto found = known.find(name); found != known.end()) return found->second;
     ModbusBusConfig config;
     config.name = bus.name;
     config.line = line_of(bus);
@@ -187,8 +204,8 @@ InitEyes eyes_of(const fs::path& folder) {
     if (!found.error.empty()) progress("bus " + bus.name + ": " + found.error);
     if (!found.found.empty()) progress("bus " + bus.name + ": " + found.found);
     // A device that answers to every number is one device.
-    if (found.found_numbers.size() == last) return std::vector<int>{1};
-    return found.found_numbers;
+    return known[name] =
+               found.found_numbers.size() == last ? std::vector<int>{1} : found.found_numbers;
   };
   eyes.preset_names = [folder] { return preset_names(folder); };
   eyes.try_module = [folder](const InitDraft& draft, InitModule& module) {

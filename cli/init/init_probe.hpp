@@ -18,6 +18,9 @@ namespace thermocomp::cli {
 /// @throws ConfigurationError, Failure
 [[nodiscard]] ScanReport probe(const InitDraft& draft, const std::filesystem::path& folder);
 
+/// Whether the daemon would take the draft as it is. @throws Failure with every problem
+void check_draft(const InitDraft& draft, const std::filesystem::path& folder);
+
 /// Fills in the channels of the module's preset where it has none, and takes those away that give
 /// no temperature.
 /// @return what was read, a line a channel. @throws Failure

@@ -25,11 +25,20 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
+/// Whole numbers also as 0x8000.
 template <class Number>
 std::optional<Number> number_of_text(const std::string& text) {
   Number value{};
   const char* end = text.data() + text.size();
-  const auto [rest, code] = std::from_chars(text.data(), end, value);
+  std::from_chars_result result{};
+  if constexpr (std::is_integral_v<Number>) {
+    constexpr int hexadecimal = 16;
+    const bool is_hex = text.starts_with("0x") || text.starts_with("0X");
+    result = std::from_chars(text.data() + (is_hex ? 2 : 0), end, value, is_hex ? hexadecimal : 10);
+  } else {
+    result = std::from_chars(text.data(), end, value);
+  }
+  const auto [rest, code] = result;
   if (code != std::errc() || rest != end || text.empty()) return std::nullopt;
   return value;
 }
@@ -80,7 +89,7 @@ std::vector<std::int64_t> parse_codes(const std::string& text) {
   std::vector<std::int64_t> codes;
   for (const std::string& word : parse_words(text)) {
     const auto code = number_of_text<std::int64_t>(word);
-    if (!code) throw Failure(text + ": codes must be whole numbers such as 32767,-9999");
+    if (!code) throw Failure(text + ": codes must be whole numbers such as 32767,-9999,0x8000");
     codes.push_back(*code);
   }
   return codes;
@@ -104,15 +113,16 @@ void parse_registers(const std::vector<std::string>& parts, const std::string& t
 }  // namespace
 
 std::variant<ModbusTcp, ModbusRtu> parse_link(const std::string& text) {
+  constexpr std::array<std::string_view, 4> forms{"tcp", "udp", "rtu_over_tcp", "rtu"};
   std::vector<std::string> parts = split(text, ':');
-  if (parts[0] != "tcp" && parts[0] != "rtu")
+  if (std::find(forms.begin(), forms.end(), parts[0]) == forms.end())
     parts.insert(parts.begin(), text.starts_with('/') ? "rtu" : "tcp");
   if (parts.size() < 2 || parts[1].empty())
-    throw Failure("\"" + text + "\": must be tcp:HOST[:PORT] or rtu:DEVICE[:BAUD[:PARITY]]");
-  if (parts[0] == "tcp") {
-    ModbusTcp tcp{parts[1], 502};
+    throw Failure("\"" + text + "\": must be " + link_forms);
+  if (parts[0] != "rtu") {
+    ModbusTcp tcp{parts[1], 502, parts[0] == "rtu_over_tcp", parts[0] == "udp"};
     if (parts.size() > 2) tcp.port = whole_number(parts[2], 1, 65535, "port of " + text);
-    if (parts.size() > 3) throw Failure(text + ": must be tcp:HOST[:PORT]");
+    if (parts.size() > 3) throw Failure(text + ": must be " + parts[0] + ":HOST[:PORT]");
     return tcp;
   }
   ModbusRtu rtu;
@@ -222,8 +232,7 @@ InitController parse_controller(const std::string& text) {
     link.resize(at);
   }
   controller.link = parse_link(link);
-  controller.kind =
-      std::holds_alternative<ModbusTcp>(controller.link) ? "modbus_tcp" : "modbus_rtu";
+  controller.kind = kind_of({controller.link});
   return controller;
 }
 

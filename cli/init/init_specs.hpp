@@ -9,7 +9,10 @@
 
 namespace thermocomp::cli {
 
-/// "tcp:192.168.10.20", "tcp:HOST:PORT", "rtu:/dev/ttyUSB0", "rtu:DEVICE:BAUD:PARITY"; a host alone
+inline constexpr const char* link_forms =
+    "tcp:HOST[:PORT], udp:HOST[:PORT], rtu_over_tcp:HOST[:PORT] or rtu:DEVICE[:BAUD[:PARITY]]";
+
+/// "tcp:192.168.10.20", "udp:HOST:PORT", "rtu:/dev/ttyUSB0", "rtu:DEVICE:BAUD:PARITY"; a host alone
 /// or a path alone will do too. @throws Failure naming what is wrong
 [[nodiscard]] std::variant<ModbusTcp, ModbusRtu> parse_link(const std::string& text);
 

@@ -355,14 +355,19 @@ void ModbusScan::find(const UnitSearch& search, ScanBus& bus) {
   const int count = search.last - search.first + 1;
   progress_("bus " + config_.name + ": asking units " + std::to_string(search.first) + " to " +
             std::to_string(search.last) +
-            " for holding register 0 (function 3), one request each, at most " +
-            short_number(count * config_.line.timeout_ms / 1e3) + " s");
+            " for holding register 0 (function 3), one request each, " +
+            short_number(count * config_.line.timeout_ms / 1e3) + " s; behind a gateway longer");
   std::string unknown;
   std::string numbers;
+  bool may_hold = true;  // a gateway that waits for a silent unit answers for no other
+  bool was_silent = false;
   for (int unit = search.first; unit <= search.last; ++unit) {
     std::array<std::uint16_t, 1> word{};
     if (!connection_.connected() && !connection_.connect()) break;
+    if (!may_hold) connection_.forget_silence();
     const Exchange exchange = connection_.read(unit, ModbusTable::holding, 0, word);
+    if (was_silent && exchange.unit_answered()) may_hold = connection_.held() > nanoseconds{0};
+    was_silent = exchange.outcome == ExchangeOutcome::timeout;
     if (!exchange.unit_answered()) continue;
     bus.found_numbers.push_back(unit);
     numbers.append(numbers.empty() ? "" : ", ").append(std::to_string(unit));

@@ -57,7 +57,8 @@ class BusReader {
       read_channel(sensors.tables[i], i, sensors.sensors[i].screening.stale_after_s);
     }
     for (const auto& [name, bus] : buses_) {
-      if (!bus.used && !misnamed_bus_) bus.table.problem("name", "no device is on this bus");
+      if (!bus.used && !misnamed_bus_)
+        bus.table.problem("name", "no device is on this bus: enter a module or leave the bus out");
     }
     for (const auto& [name, device] : devices_) {
       if (device.used) continue;

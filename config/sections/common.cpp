@@ -14,12 +14,16 @@ std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base, st
       {"under_range_codes", Fault::out_of_range},
       {"error_codes", Fault::device_error},
   }};
+  // Manuals give the bits of a signed number too: 0x8000 for -32768.
+  const bool is_signed = low == -high - 1 && high <= 0x7FFFFFFF;
+  const std::int64_t greatest = is_signed ? 2 * high + 1 : high;
   std::vector<Sentinel> sentinels;
   std::map<std::int64_t, std::string_view> listed;
   for (const auto& [key, fault] : lists) {
     const bool in_base = base.has(key);
     const TomlTable& source = !own.has(key) && in_base ? base : own;
-    for (const std::int64_t code : source.integers(key, low, high, {})) {
+    for (const std::int64_t bits : source.integers(key, low, greatest, {})) {
+      const std::int64_t code = bits > high ? bits + 2 * low : bits;
       const auto [entry, is_new] = listed.emplace(code, key);
       if (is_new) {
         sentinels.push_back({code, fault});

@@ -36,9 +36,9 @@ inline std::string unique_name(const TomlTable& table, std::set<std::string>& se
   return 1.0;
 }
 
-/// The codes within `[low, high]` that are messages, not values, by the lists open_circuit_codes,
-/// short_circuit_codes, over_range_codes, under_range_codes and error_codes; a list in `own`
-/// replaces that of `base`.
+/// The codes within `[low, high]`, of a signed number also as its bits, that are messages, not
+/// values, by the lists open_circuit_codes, short_circuit_codes, over_range_codes,
+/// under_range_codes and error_codes; a list in `own` replaces that of `base`.
 [[nodiscard]] std::vector<Sentinel> read_codes(const TomlTable& own, const TomlTable& base,
                                                std::int64_t low, std::int64_t high);
 

@@ -91,6 +91,8 @@ class ModbusConnection {
   [[nodiscard]] std::uint64_t breaks() const noexcept;
   /// How long the last unit without an answer kept a gateway from answering others.
   [[nodiscard]] nanoseconds held() const noexcept;
+  /// A silent unit keeps nobody waiting here: the next one is not waited for longer than others.
+  void forget_silence() noexcept;
   void share() noexcept;  ///< others than sensors ask on this line too
   [[nodiscard]] bool is_shared() const noexcept;
   /// The timing of `line` from now on: of several users of one line each has its own.

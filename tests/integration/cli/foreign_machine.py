@@ -6,14 +6,16 @@ PLC on another. The machine's room is at 20 degC; a module's channels are tenths
 Unit 3: a module as WAGO's 750-458 (input registers 0 to 7, 32767: broken): three thermocouples, five open
 channels. Unit 4: one without a preset, float32 with the low word first in holding registers 100 to 103.
 PLC, unit 1: docs/controllers/plc.md. It shows at input 0 and 1 what stands in holding 0 and 1 while valid
-bit 0 is set and the heartbeat changes, and a spindle speed at input 26.
+bit 0 is set and the heartbeat changes, a feed at input 6 and a spindle speed at input 26; it has no other
+input register.
 """
 
 import asyncio
 import struct
 import sys
 
-from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext, ModbusSlaveContext
+from pymodbus.datastore import (ModbusSequentialDataBlock, ModbusServerContext,
+                                ModbusSlaveContext, ModbusSparseDataBlock)
 from pymodbus.server import StartAsyncTcpServer
 
 OPEN = 32767
@@ -21,6 +23,8 @@ OPEN = 32767
 
 def slave(inputs=None, holdings=None):
     def block(values):
+        if isinstance(values, ModbusSparseDataBlock):
+            return values
         words = [0] * 200
         for address, word in (values or {}).items():
             words[address] = word
@@ -58,7 +62,7 @@ async def act(plc):
 
 
 async def main():
-    plc = slave(inputs={26: 3000})
+    plc = slave(inputs=ModbusSparseDataBlock({0: 0, 1: 0, 2: 0, 3: 0, 6: 120, 26: 3000}))
     ports = [int(port) for port in sys.argv[1:3]]
     servers = [StartAsyncTcpServer(context=context, address=("127.0.0.1", port))
                for context, port in ((modules(), ports[0]),

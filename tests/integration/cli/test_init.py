@@ -134,6 +134,34 @@ def test_asked_on_a_terminal(foreign, folder):
     print(f"{len(answers)} questions, 0 edits, {time.monotonic() - begun:.1f} s to compensating")
 
 
+def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
+    """From init to a scan without a complaint: 3 commands and no edit."""
+    modules, plc = foreign
+    config = folder / "thermocompd.toml"
+    bus = f"tcp:127.0.0.1:{modules}"
+    answers = [bus, f"udp:127.0.0.1:{free_port()}", "",  # a bus that has no module in the end
+               "wago_750", "wago_750_458", "bed bed spindle", NAMES,
+               "holding:float32:1:100,102", "yes",  # the low word comes first: offered
+               "ram table", "<", "ram bed", "ram slide",
+               "1", "",  # on the second bus: left out
+               f"tcp:127.0.0.1:{plc}", "yes", "spindle_rpm=input:26:uint16 feed_mm_per_min=input:6:uint16",
+               "Z"]
+    status, shown = converse(["init", config], answers)
+    assert status == 0, shown
+    for said in ("wago_750 is no preset", "bed: each sensor needs a name of its own",
+                 f"Module of unit 4 on bus1 (127.0.0.1:{modules})", "In word order CDAB all give",
+                 "is left out: no module is on it"):
+        assert said in shown, (said, shown)
+    text = config.read_text()
+    assert text.count('\n[[bus]]\n') == 1 and 'word_order = "CDAB"' in text
+    assert "gap_registers_max = 0 " in text  # the PLC refuses to have input 0 to 6 read together
+    assert 'name = "Z"\noutput = "z_um"' in text
+    for command in ("check", "scan"):
+        answer = run(command, config)
+        assert answer.returncode == 0, answer.stdout + answer.stderr
+    print(f"3 commands, {len(answers)} answers, 0 edits")
+
+
 def test_by_options_without_a_terminal(foreign, folder):
     modules, plc = foreign
     config = folder / "thermocompd.toml"
@@ -195,7 +223,7 @@ def test_what_a_model_needs_is_asked_for(foreign, folder):
         assert answer.returncode == 2 and said in answer.stderr, answer.stdout + answer.stderr
         assert answer.stderr.count("\n") - answer.stderr.count("reading") <= 1, answer.stderr
         assert not config.exists()
-    status, shown = converse(arguments, ["bed column", f"tcp:127.0.0.1:{plc}", "yes", "none",
+    status, shown = converse([*arguments, "--names", "bed,x"], ["bed column", f"tcp:127.0.0.1:{plc}", "yes", "none",
                                          "spindle_rpm=input:26:uint16"][1:])
     assert "(the model needs spindle_rpm)" in shown and "the model needs spindle_rpm\r" in shown
 
@@ -204,11 +232,11 @@ def test_the_code_of_an_open_circuit_is_taken_without_an_edit(foreign, folder):
     modules, plc = foreign
     config = folder / "thermocompd.toml"
     answer = run("init", config, "--bus", f"tcp:127.0.0.1:{modules}", "--module",
-                 "3=input:int16:0.1:0-2:32767,-9999", "--names", "bed,column,table",
+                 "3=input:int16:0.1:0-2:0x7FFF,-9999,0x8000", "--names", "bed,column,table",
                  "--controller", f"tcp:127.0.0.1:{plc}", "--axes", "z")
     assert answer.returncode == 1, answer.stdout + answer.stderr  # the third channel is open
     assert "open_circuit" in answer.stdout and "the device's code for it" in answer.stdout
-    assert "\nopen_circuit_codes = [32767, -9999]" in config.read_text()
+    assert "\nopen_circuit_codes = [32767, -9999, 32768]" in config.read_text()
 
 
 def test_a_code_that_a_channel_shows_is_written_down(foreign, folder):

@@ -20,7 +20,7 @@ DaemonConfig example(const char* name) {
 
 TEST_CASE("the table names every register, its unit and who writes it", "[cli][registers]") {
   const std::string text = register_table(example("small_machine.toml"));
-  CHECK_THAT(text, Contains("controller cnc: Modbus TCP 192.168.10.30:502, unit 1, every 0.1 s"));
+  CHECK_THAT(text, Contains("controller cnc: modbus_tcp 192.168.10.30:502, unit 1, every 0.1 s"));
   const auto read = text.find("Written by the controller");
   REQUIRE(read != std::string::npos);
   const std::string written = text.substr(0, read);

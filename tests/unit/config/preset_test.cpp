@@ -85,6 +85,21 @@ TEST_CASE("base_address moves the registers of a device, but no bits, and must n
   CHECK(far.all_problems().size() == 1);
 }
 
+TEST_CASE("a code of a signed number may be given as its bits") {
+  const TomlDocument device = TomlDocument::from_text(
+      "table = \"input\"\nencoding = \"int16\"\nopen_circuit_codes = [0x8000, 0x7FFF, 0xFFFF]\n"
+      "error_codes = [-1]\n",
+      "device.toml");
+  const TomlDocument sensor = TomlDocument::from_text("address = 2\n", "sensor.toml");
+  const ModbusChannel channel = read_modbus_channel(sensor.root(), device.root());
+  REQUIRE(channel.sentinels.size() == 3);
+  CHECK(channel.sentinels[0].code == -32768);
+  CHECK(channel.sentinels[1].code == 32767);
+  CHECK(channel.sentinels[2].code == -1);
+  REQUIRE(device.all_problems().size() == 1);  // 0xFFFF and -1 are the same
+  CHECK(device.all_problems()[0].key == "error_codes");
+}
+
 TEST_CASE("without folders no preset is looked for and none is a problem") {
   Presets presets({});
   const TomlDocument device = TomlDocument::from_text("preset = \"wago_750_458\"\n", "d.toml");
