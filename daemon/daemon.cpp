@@ -78,6 +78,7 @@ DaemonConfig load(const std::filesystem::path& file) {
   set_log_level(config.log_level);
   spdlog::info("thermocompd {}: configuration {}, model {} (SHA-256 {})", THERMOCOMP_VERSION,
                config.file.string(), config.model_file.string(), config.model_checksum);
+  for (const std::string& remark : config.remarks) spdlog::warn("{}", remark);
   return config;
 }
 

@@ -38,7 +38,9 @@ void add_bus_troubles(const Status& status, const AddTrouble& add) {
   for (const BusStatus& bus : status.buses) {
     const std::string name = "bus " + bus.name;
     for (const UnitStatus& unit : bus.units)
-      if (!unit.answering && bus.connected) {
+      if (unit.answering && !unit.last_error.empty() && !status.sensors_bad.empty()) {
+        add(name + ": " + unit.name + ": " + unit.last_error, "");
+      } else if (!unit.answering && bus.connected) {
         const bool is_silent = unit.timeouts >= unit.bad_frames;
         add(name + ": " + unit.name + (is_silent ? " does not answer (" : " answers wrongly (") +
                 unit.last_error + ")",

@@ -181,6 +181,8 @@ int run_check(const CheckOptions& options) {
       return exit_success;
     }
     const DaemonConfig config = load_daemon_config(file);
+    for (const std::string& remark : config.remarks)
+      std::fprintf(stderr, "warning: %s\n", remark.c_str());
     if (options.registers)
       std::cout << register_table(config);
     else

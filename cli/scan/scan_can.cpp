@@ -44,7 +44,7 @@ Heard listen(CanSocket& socket, const std::vector<const CanSignal*>& signals, do
       ++heard.frames[frame.id];
       for (std::size_t i = 0; i < signals.size(); ++i) {
         const CanSignal& signal = *signals[i];
-        if (frame.id.id != signal.id || frame.id.extended != signal.extended_id) continue;
+        if (!matches(frame.id, signal)) continue;
         if (carries(frame.payload(), signal)) heard.of_signal[i] = frame;
       }
     }
@@ -110,6 +110,19 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
   }
 }
 
+/// A J1939 group that comes from another address than the signal has.
+void add_group_hint(const CanSignal& signal, const Heard& heard, ScanChannel& result) {
+  constexpr std::uint32_t group = 0x03FFFF00;
+  for (const auto& [id, count] : heard.frames) {
+    if (!signal.extended_id || !id.extended || ((id.id ^ signal.id) & group) != 0) continue;
+    if (id.id == signal.id) continue;
+    result.hints.push_back(
+        id_name(id) +
+        " came, the same J1939 group from another address: give "
+        "the sensor that id, or the message of the DBC file VFrameFormat J1939PG");
+  }
+}
+
 void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& heard,
           ScanBus& bus) {
   std::size_t index = 0;
@@ -128,6 +141,7 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& h
       } else if (bus.error.empty()) {
         result.why = "no frame with identifier " +
                      id_name({channel.signal.id, channel.signal.extended_id}) + " carried it";
+        add_group_hint(channel.signal, heard, result);
       }
     }
   }

@@ -17,9 +17,11 @@ constexpr std::uint32_t extended_id_max = 0x1FFFFFFF;
 constexpr std::uint64_t message_bytes_max = 1785;  // of a J1939 transport; the longest in use
 constexpr std::size_t classic_bytes_max = 8;
 constexpr std::size_t signals_max = 4096;  // of a message
-constexpr std::size_t problems_max = 100;
+constexpr std::size_t flaws_max = 1000;
 constexpr std::string_view no_message = "VECTOR__INDEPENDENT_SIG_MSG";
 constexpr std::string_view frame_format = "VFrameFormat";
+constexpr std::string_view long_signal = "SystemSignalLongSymbol";
+constexpr std::string_view long_message = "SystemMessageLongSymbol";
 
 /// Statements whose content is of no use here; each ends with a semicolon.
 constexpr std::array<std::string_view, 25> passed_over{
@@ -68,6 +70,23 @@ struct FormatRemark : Remark {
   std::uint64_t index{0};
   std::string format;  ///< instead of the index
 };
+struct NameRemark : Remark {
+  std::string name;
+};
+
+/// What a J1939 group is known by: page and format, and the group extension of a broadcast. Neither
+/// priority nor sender; nor whom it is for.
+std::uint32_t group_mask(std::uint32_t id) {
+  constexpr std::uint32_t first_broadcast = 0xF0;
+  return ((id >> 16) & 0xFFu) < first_broadcast ? 0x03FF0000u : 0x03FFFF00u;
+}
+
+/// What a flaw stands at.
+struct About {
+  std::string message;
+  std::string signal;
+};
+using Keys = std::vector<std::string_view>;
 
 /// "m3", "M", "m3M"; nothing else.
 std::optional<Multiplexing> multiplexing_of(std::string_view word) {
@@ -103,25 +122,46 @@ class DbcReader {
  public:
   DbcReader(std::string_view text, std::string name) : scan_(text), name_(std::move(name)) {}
 
-  DbcReading read() {
-    try {
-      while (!scan_.at_end()) read_statement();
-      resolve();
-    } catch (const DbcSyntaxError& error) {
-      problem(error.line, "", error.found, error.rule);
+  DbcFile read() {
+    while (!scan_.at_end()) {
+      const int line = scan_.line();
+      about_ = {};
+      try {
+        read_statement();
+      } catch (const DbcSyntaxError& error) {
+        flaw(error.line, "", error.found, error.rule, about_);
+        to_next_statement(line);
+      }
+      if (file_.flaws.size() < flaws_max) continue;
+      flaw(line, "", "", "has more than 1000 flaws before this line; is not read on", {});
+      drafts_.clear();
+      return std::move(file_);
     }
+    resolve();
     for (Draft& draft : drafts_) {
       if (draft.message.name == no_message) continue;
-      result_.file.messages.push_back(std::move(draft.message));
+      file_.messages.push_back(std::move(draft.message));
     }
-    return std::move(result_);
+    return std::move(file_);
   }
 
  private:
-  void problem(int line, std::string key, std::string value, std::string rule) {
-    if (result_.problems.size() >= problems_max) return;
+  void flaw(int line, std::string key, std::string value, std::string rule, About about,
+            Keys keys = {}) {
     if (value.empty()) std::swap(key, value);  // about a name as a whole
-    result_.problems.push_back({name_, line, std::move(key), std::move(value), std::move(rule)});
+    flawed_.emplace(about.message, about.signal);
+    file_.flaws.push_back({{name_, line, std::move(key), std::move(value), std::move(rule)},
+                           std::move(about.message),
+                           std::move(about.signal),
+                           std::move(keys)});
+  }
+
+  /// To the first keyword that begins a line after that of the broken statement.
+  void to_next_statement(int line) {
+    while (!scan_.at_end() &&
+           !(scan_.line() != line && scan_.begins_line() && is_keyword(scan_.next_word()))) {
+      scan_.skip_line();
+    }
   }
 
   void read_statement() {
@@ -138,7 +178,7 @@ class DbcReader {
       read_bit_timing();
     } else if (keyword == "BU_") {
       scan_.expect(':');
-      while (!scan_.next_word().empty() && !is_keyword(scan_.next_word())) scan_.word("a node");
+      while (!scan_.next_name().empty() && !is_keyword(scan_.next_word())) scan_.name("a node");
     } else if (keyword == "BO_") {
       read_message(line);
     } else if (keyword == "SG_") {
@@ -175,30 +215,31 @@ class DbcReader {
   }
 
   void read_message(int line) {
+    in_message_ = in_broken_message_ = true;
     Draft draft;
     DbcMessage& message = draft.message;
     message.line = line;
     const auto id = static_cast<std::uint32_t>(scan_.integer("a message's number", UINT32_MAX));
-    message.name = scan_.word("a message's name");
+    message.name = about_.message = scan_.name("a message's name");
     scan_.expect(':');
     message.bytes = scan_.integer("a number of bytes", message_bytes_max);
-    scan_.word("a sender");
+    scan_.name("a sender");
     message.extended = (id & extended_flag) != 0;
     message.id = id & ~extended_flag;
     if (message.name != no_message) {
       if (message.id > (message.extended ? extended_id_max : standard_id_max)) {
-        problem(line, message.name, std::to_string(id),
-                "must be a number of 11 bits, or one of 29 bits with bit 31 set");
+        flaw(line, message.name, std::to_string(id),
+             "must be a number of 11 bits, or one of 29 bits with bit 31 set", about_, {"id"});
       }
       if (!names_.insert(message.name).second) {
-        problem(line, message.name, "", "is the name of two messages");
+        flaw(line, message.name, "", "is the name of two messages", about_, {"id"});
       }
     }
     if (!by_id_.emplace(id, drafts_.size()).second) {
-      problem(line, message.name, std::to_string(id), "is the number of two messages");
+      flaw(line, message.name, std::to_string(id), "is the number of two messages", about_, {"id"});
     }
     drafts_.push_back(std::move(draft));
-    in_message_ = true;
+    in_broken_message_ = false;
     signal_names_.clear();
   }
 
@@ -206,13 +247,15 @@ class DbcReader {
     if (!in_message_) {
       throw DbcSyntaxError{line, "SG_", "must stand below a message (BO_)"};
     }
+    if (in_broken_message_) return scan_.skip_line();
     Draft& draft = drafts_.back();
+    about_.message = draft.message.name;
     if (draft.message.signals.size() == signals_max) {
       throw DbcSyntaxError{line, "SG_", "a message must have at most 4096 signals"};
     }
     DbcSignal signal;
     signal.line = line;
-    signal.name = scan_.word("a signal's name");
+    signal.name = about_.signal = scan_.name("a signal's name");
     Multiplexing multiplexing;
     if (!scan_.next_is(':')) {
       const auto found = multiplexing_of(scan_.next_word());
@@ -256,28 +299,30 @@ class DbcReader {
   }
 
   void read_receivers() {
-    if (scan_.next_word().empty() || is_keyword(scan_.next_word())) return;
+    if (scan_.next_name().empty() || is_keyword(scan_.next_word())) return;
     do {
-      scan_.word("a receiver");
+      scan_.name("a receiver");
     } while (scan_.accept(','));
   }
 
   void check_signal(const DbcMessage& message, DbcSignal& signal, bool has_scale) {
     if (!signal_names_.insert(signal.name).second) {
-      problem(signal.line, signal.name, "", "is the name of two signals of " + message.name);
+      flaw(signal.line, signal.name, "", "is the name of two signals of " + message.name, about_);
     }
     if (!has_scale) {
-      problem(signal.line, signal.name, "0", "the factor must not be 0");
+      flaw(signal.line, signal.name, "0", "the factor must not be 0", about_, {"scale"});
       signal.place.scale = 1.0;
     }
     if (message.name == no_message) return;
     const int length = signal.place.length_bits;
     if (length < 1 || (length > 64 && message.bytes <= 64)) {
-      problem(signal.line, signal.name, std::to_string(length), "must have 1 to 64 bits");
+      flaw(signal.line, signal.name, std::to_string(length), "must have 1 to 64 bits", about_,
+           {"length_bits"});
     } else if (end_byte(signal.place) > message.bytes) {
-      problem(signal.line, signal.name,
-              std::to_string(signal.place.start_bit) + "|" + std::to_string(length),
-              "must end within the " + std::to_string(message.bytes) + " bytes of " + message.name);
+      flaw(signal.line, signal.name,
+           std::to_string(signal.place.start_bit) + "|" + std::to_string(length),
+           "must end within the " + std::to_string(message.bytes) + " bytes of " + message.name,
+           about_, {"start_bit", "length_bits"});
     }
   }
 
@@ -287,12 +332,20 @@ class DbcReader {
     Remark remark;
     remark.line = line;
     remark.message = static_cast<std::uint32_t>(scan_.integer("a message's number", UINT32_MAX));
+    if (const auto found = by_id_.find(remark.message); found != by_id_.end()) {
+      about_.message = drafts_[found->second].message.name;
+    }
+    return remark;
+  }
+
+  Remark read_signal_remark(int line) {
+    Remark remark = read_remark(line);
+    remark.signal = about_.signal = scan_.name("a signal's name");
     return remark;
   }
 
   void read_value_type(int line) {
-    FloatRemark remark{read_remark(line), 0};
-    remark.signal = scan_.word("a signal's name");
+    FloatRemark remark{read_signal_remark(line), 0};
     static_cast<void>(scan_.accept(':'));
     remark.type = scan_.integer("0 (whole number), 1 (float) or 2 (double)", 2);
     scan_.expect(';');
@@ -300,9 +353,8 @@ class DbcReader {
   }
 
   void read_pages(int line) {
-    PageRemark remark{read_remark(line), {}, {}};
-    remark.signal = scan_.word("a signal's name");
-    remark.selector = scan_.word("a multiplexor's name");
+    PageRemark remark{read_signal_remark(line), {}, {}};
+    remark.selector = scan_.name("a multiplexor's name");
     do {
       CanSelector::Pages pages;
       pages.first = scan_.integer("the first number of a range", UINT64_MAX);
@@ -341,13 +393,24 @@ class DbcReader {
   }
 
   void read_attribute(int line) {
-    if (scan_.text("an attribute's name") != frame_format) return scan_.skip_statement();
-    if (scan_.word("BO_") != "BO_") {
-      throw DbcSyntaxError{line, std::string(frame_format), "must be said of a message (BO_)"};
+    const std::string attribute = scan_.text("an attribute's name");
+    if (attribute == long_signal && scan_.next_word() == "SG_") {
+      scan_.word("SG_");
+      NameRemark remark{read_signal_remark(line), scan_.text("a name")};
+      long_names_.push_back(std::move(remark));
+    } else if (attribute == long_message && scan_.next_word() == "BO_") {
+      scan_.word("BO_");
+      NameRemark remark{read_remark(line), scan_.text("a name")};
+      long_names_.push_back(std::move(remark));
+    } else if (attribute == frame_format) {
+      if (scan_.word("BO_") != "BO_") {
+        throw DbcSyntaxError{line, std::string(frame_format), "must be said of a message (BO_)"};
+      }
+      FormatRemark remark{read_remark(line), 0, {}};
+      read_format(remark);
+      return format_remarks_.push_back(std::move(remark));
     }
-    FormatRemark remark{read_remark(line), 0, {}};
-    read_format(remark);
-    format_remarks_.push_back(std::move(remark));
+    scan_.skip_statement();
   }
 
   void read_format(FormatRemark& remark) {
@@ -364,15 +427,18 @@ class DbcReader {
   void resolve() {
     resolve_formats();
     for (const FloatRemark& remark : floats_) apply(remark);
+    for (const NameRemark& remark : long_names_) apply(remark);
     std::map<std::pair<std::size_t, std::size_t>, const PageRemark*> pages;
     for (const PageRemark& remark : pages_) {
       const auto [draft, index] = find(remark);
       if (draft == nullptr) continue;
+      const About about{draft->message.name, remark.signal};
       const auto place = static_cast<std::size_t>(draft - drafts_.data());
       if (!draft->multiplexing[index].page) {
-        problem(remark.line, remark.signal, "", "is said to be multiplexed, but not by its SG_");
+        flaw(remark.line, remark.signal, "", "is said to be multiplexed, but not by its SG_",
+             about);
       } else if (!pages.emplace(std::pair(place, index), &remark).second) {
-        problem(remark.line, remark.signal, "", "has two lists of ranges");
+        flaw(remark.line, remark.signal, "", "has two lists of ranges", about);
       }
     }
     for (std::size_t place = 0; place < drafts_.size(); ++place) {
@@ -386,20 +452,24 @@ class DbcReader {
     }
   }
 
-  /// The draft and the index of its signal that a remark is about; a problem where there is none.
-  std::pair<Draft*, std::size_t> find(const Remark& remark) {
+  /// The draft that a remark is about; nullptr after a flaw.
+  Draft* draft_of(const Remark& remark) {
     const auto found = by_id_.find(remark.message);
-    if (found == by_id_.end()) {
-      problem(remark.line, "", std::to_string(remark.message), "must be a message's number");
-      return {nullptr, 0};
-    }
-    Draft& draft = drafts_[found->second];
-    const auto index = index_of(draft, remark.signal);
-    if (!index) {
-      problem(remark.line, remark.signal, "", "must be a signal of " + draft.message.name);
-      return {nullptr, 0};
-    }
-    return {&draft, *index};
+    if (found != by_id_.end()) return &drafts_[found->second];
+    flaw(remark.line, remark.signal, std::to_string(remark.message),
+         "is the number of no message (BO_) of this file", {std::to_string(remark.message), ""});
+    return nullptr;
+  }
+
+  /// The draft and the index of its signal that a remark is about; a flaw where there is none.
+  std::pair<Draft*, std::size_t> find(const Remark& remark) {
+    Draft* draft = draft_of(remark);
+    if (draft == nullptr) return {nullptr, 0};
+    const auto index = index_of(*draft, remark.signal);
+    if (index) return {draft, *index};
+    flaw(remark.line, remark.signal, "", "must be a signal of " + draft->message.name,
+         {draft->message.name, remark.signal});
+    return {nullptr, 0};
   }
 
   static std::optional<std::size_t> index_of(const Draft& draft, std::string_view signal) {
@@ -410,37 +480,63 @@ class DbcReader {
     return static_cast<std::size_t>(found - signals.begin());
   }
 
-  [[nodiscard]] std::optional<bool> is_fd(const FormatRemark& remark) const {
-    constexpr std::array<std::uint64_t, 2> usual{14, 15};  // where the file defines none
-    std::string format = remark.format;
-    if (format.empty() && !formats_.empty()) {
+  /// The name of the remark's format; usual ones where the file lists none; none: not listed.
+  [[nodiscard]] std::optional<std::string> format_of(const FormatRemark& remark) const {
+    if (!remark.format.empty()) return remark.format;
+    if (!formats_.empty()) {
       if (remark.index >= formats_.size()) return std::nullopt;
-      format = formats_[remark.index];
+      return formats_[remark.index];
     }
-    if (format.empty()) return std::find(usual.begin(), usual.end(), remark.index) != usual.end();
-    return format.find("FD") != std::string::npos;
+    if (remark.index == 3) return "J1939PG";
+    return remark.index == 14 || remark.index == 15 ? "FD" : "";
+  }
+
+  static void apply(const std::string& format, DbcMessage& message) {
+    message.told_fd = format.find("FD") != std::string::npos;
+    message.is_group = message.extended && format == "J1939PG";
   }
 
   void resolve_formats() {
     if (default_format_ && !default_format_->format.empty()) {
-      for (Draft& draft : drafts_) draft.message.told_fd = is_fd(*default_format_);
+      for (Draft& draft : drafts_) apply(default_format_->format, draft.message);
     }
     for (const FormatRemark& remark : format_remarks_) {
-      const auto found = by_id_.find(remark.message);
-      const std::optional<bool> fd = is_fd(remark);
-      if (found == by_id_.end()) {
-        problem(remark.line, "", std::to_string(remark.message), "must be a message's number");
-      } else if (!fd) {
-        problem(remark.line, std::string(frame_format), std::to_string(remark.index),
-                "must be one of the formats that BA_DEF_ lists");
+      Draft* draft = draft_of(remark);
+      if (draft == nullptr) continue;
+      if (const auto format = format_of(remark)) {
+        apply(*format, draft->message);
       } else {
-        drafts_[found->second].message.told_fd = fd;
+        flaw(remark.line, std::string(frame_format), std::to_string(remark.index),
+             "must be one of the formats that BA_DEF_ lists", {draft->message.name, ""}, {"fd"});
       }
     }
     for (Draft& draft : drafts_) {
-      const bool fd = draft.message.bytes > classic_bytes_max || draft.message.told_fd == true;
-      for (DbcSignal& signal : draft.message.signals) signal.place.fd = fd;
+      const DbcMessage& message = draft.message;
+      const bool fd = message.bytes > classic_bytes_max || message.told_fd == true;
+      for (DbcSignal& signal : draft.message.signals) {
+        signal.place.fd = fd;
+        if (message.is_group) signal.place.id_mask = group_mask(message.id);
+      }
     }
+  }
+
+  void apply(const NameRemark& remark) {
+    if (remark.signal.empty()) {
+      if (Draft* draft = draft_of(remark)) draft->message.long_name = remark.name;
+      return;
+    }
+    const auto [draft, index] = find(remark);
+    if (draft == nullptr || remark.name.empty()) return;
+    auto& signals = draft->message.signals;
+    if (long_seen_.emplace(draft->message.name, remark.name).second) {
+      signals[index].long_name = remark.name;
+      return;
+    }
+    for (DbcSignal& each : signals) {
+      if (each.long_name == remark.name) each.long_name.clear();
+    }
+    flaw(remark.line, remark.name, "", "is the long name of two signals",
+         {draft->message.name, remark.name});
   }
 
   void apply(const FloatRemark& remark) {
@@ -449,8 +545,9 @@ class DbcReader {
     CanSignal& place = draft->message.signals[index].place;
     const int length = remark.type == 1 ? 32 : 64;
     if (place.length_bits != length) {
-      problem(remark.line, remark.signal, std::to_string(place.length_bits),
-              "must have " + std::to_string(length) + " bits, being a float of that size");
+      flaw(remark.line, remark.signal, std::to_string(place.length_bits),
+           "must have " + std::to_string(length) + " bits, being a float of that size",
+           {draft->message.name, remark.signal}, {"float"});
       return;
     }
     place.is_float = true;
@@ -466,20 +563,21 @@ class DbcReader {
     const DbcSignal& signal = draft.message.signals[index];
     const std::optional<std::uint64_t> page = draft.multiplexing[index].page;
     if (!page) return std::nullopt;
+    const About about{draft.message.name, signal.name};
     const auto selects = [](const Multiplexing& each) { return each.selects; };
     const auto& all = draft.multiplexing;
     Choice choice{0, {{*page, *page}}};
     if (said != nullptr) {
       const auto selector = index_of(draft, said->selector);
       if (!selector || !all[*selector].selects) {
-        problem(said->line, signal.name, said->selector,
-                "must be a multiplexor of " + draft.message.name);
+        flaw(said->line, signal.name, said->selector,
+             "must be a multiplexor of " + draft.message.name, about);
         return std::nullopt;
       }
       choice = {*selector, said->pages};
     } else if (std::count_if(all.begin(), all.end(), selects) != 1) {
-      problem(signal.line, signal.name, "m" + std::to_string(*page),
-              "needs a line SG_MUL_VAL_ unless its message has just one multiplexor");
+      flaw(signal.line, signal.name, "m" + std::to_string(*page),
+           "needs a line SG_MUL_VAL_ unless its message has just one multiplexor", about);
       return std::nullopt;
     } else {
       choice.selector =
@@ -491,8 +589,8 @@ class DbcReader {
           return length >= 64 || pages.first < (std::uint64_t{1} << std::max(length, 0));
         });
     if (!reachable) {
-      problem(signal.line, signal.name, std::to_string(choice.pages.front().first),
-              "is more than its multiplexor can be");
+      flaw(signal.line, signal.name, std::to_string(choice.pages.front().first),
+           "is more than its multiplexor can be", about);
     }
     return choice;
   }
@@ -502,14 +600,19 @@ class DbcReader {
                          std::size_t index) {
     constexpr std::size_t depth_max = 16;
     DbcSignal& signal = draft.message.signals[index];
+    const About about{draft.message.name, signal.name};
     std::size_t at = index;
     while (choices[at]) {
       if (signal.place.selectors.size() == depth_max) {
-        problem(signal.line, signal.name, "", "must not be selected by itself, nor 17 deep");
+        flaw(signal.line, signal.name, "", "must not be selected by itself, nor 17 deep", about);
         signal.place.selectors.clear();
         return;
       }
-      const CanSignal& place = draft.message.signals[choices[at]->selector].place;
+      const DbcSignal& selector = draft.message.signals[choices[at]->selector];
+      if (flawed_.contains({draft.message.name, selector.name})) {
+        flaw(signal.line, signal.name, selector.name, "is its multiplexor and has a flaw", about);
+      }
+      const CanSignal& place = selector.place;
       signal.place.selectors.push_back(
           {{place.start_bit, place.length_bits, place.byte_order}, choices[at]->pages});
       at = choices[at]->selector;
@@ -518,30 +621,42 @@ class DbcReader {
 
   DbcScanner scan_;
   std::string name_;
-  DbcReading result_;
+  DbcFile file_;
   std::vector<Draft> drafts_;
   std::map<std::uint32_t, std::size_t> by_id_;  ///< as in the file, bit 31 included
   std::set<std::string> names_;
   std::set<std::string> signal_names_;  ///< of the message that is being read
   bool in_message_{false};
+  bool in_broken_message_{false};  ///< its BO_ has a flaw; so its signals belong nowhere
+  About about_;                    ///< of the statement that is being read, as far as it is known
+  std::set<std::pair<std::string, std::string>> flawed_;  ///< message and signal of the flaws
   std::vector<FloatRemark> floats_;
   std::vector<PageRemark> pages_;
   std::vector<FormatRemark> format_remarks_;
+  std::vector<NameRemark> long_names_;
+  std::set<std::pair<std::string, std::string>> long_seen_;  ///< of messages
   std::vector<std::string> formats_;
   std::optional<FormatRemark> default_format_;
 };
 
+/// By name, else by long name.
 template <class Entries>
 auto* find_by_name(Entries& entries, std::string_view name) noexcept {
-  const auto found = std::find_if(entries.begin(), entries.end(),
-                                  [name](const auto& entry) { return entry.name == name; });
+  auto found = std::find_if(entries.begin(), entries.end(),
+                            [name](const auto& entry) { return entry.name == name; });
+  if (found == entries.end() && !name.empty()) {
+    found = std::find_if(entries.begin(), entries.end(),
+                         [name](const auto& entry) { return entry.long_name == name; });
+  }
   return found == entries.end() ? nullptr : &*found;
 }
 
 std::vector<std::string> names_of(const auto& entries) {
   std::vector<std::string> names;
-  names.reserve(entries.size());
-  for (const auto& entry : entries) names.push_back(entry.name);
+  for (const auto& entry : entries) {
+    names.push_back(entry.name);
+    if (!entry.long_name.empty()) names.push_back(entry.long_name);
+  }
   return names;
 }
 
@@ -555,15 +670,19 @@ std::vector<std::string> DbcMessage::signal_names() const {
   return names_of(signals);
 }
 
-const DbcMessage* DbcFile::find(std::string_view message) const noexcept {
-  return find_by_name(messages, message);
+const DbcMessage* DbcFile::find(std::string_view message,
+                                std::optional<std::uint32_t> id) const noexcept {
+  const auto numbered = std::find_if(messages.begin(), messages.end(), [&](const DbcMessage& each) {
+    return each.id == id && (each.name == message || each.long_name == message);
+  });
+  return numbered == messages.end() ? find_by_name(messages, message) : &*numbered;
 }
 
 std::vector<std::string> DbcFile::message_names() const {
   return names_of(messages);
 }
 
-DbcReading read_dbc_text(std::string_view text, const std::string& name) {
+DbcFile read_dbc_text(std::string_view text, const std::string& name) {
   return DbcReader(text, name).read();
 }
 

@@ -83,6 +83,36 @@ std::string_view DbcScanner::word(std::string_view what) {
   return found;
 }
 
+std::string_view DbcScanner::next_name() {
+  if (at_end()) return {};
+  const std::string_view left = rest();
+  const auto ends = [](char c) {
+    return static_cast<unsigned char>(c) <= ' ' ||
+           std::string_view(":,;|@\"()[]").find(c) != std::string_view::npos;
+  };
+  const auto* const end = std::find_if(left.begin(), left.end(), ends);
+  return left.substr(0, static_cast<std::size_t>(end - left.begin()));
+}
+
+std::string_view DbcScanner::name(std::string_view what) {
+  const std::string_view found = next_name();
+  if (found.empty()) fail(std::string("must be ").append(what));
+  at_ += found.size();
+  return found;
+}
+
+bool DbcScanner::begins_line() {
+  skip_space();
+  const std::string_view before = text_.substr(0, at_);
+  const auto last = before.find_last_not_of(" \t");
+  return last == std::string_view::npos || before[last] == '\n';
+}
+
+void DbcScanner::skip_line() noexcept {
+  at_ = std::min(text_.find('\n', at_), text_.size());
+  skip_space();
+}
+
 double DbcScanner::real(std::string_view what) {
   if (at_end()) fail(std::string("must be ").append(what));
   std::string_view number = rest();

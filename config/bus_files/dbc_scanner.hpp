@@ -11,7 +11,7 @@ namespace thermocomp {
 /// Bytes with everything but printable ASCII replaced, for messages.
 [[nodiscard]] std::string printable(std::string_view bytes);
 
-/// What ends the reading of a DBC file.
+/// What ends the reading of a statement.
 struct DbcSyntaxError {
   int line{0};
   std::string found;
@@ -32,6 +32,9 @@ class DbcScanner {
   /// A C identifier, or nothing.
   [[nodiscard]] std::string_view next_word();
   std::string_view word(std::string_view what);
+  /// What stands for a name in files of all makers: also "2_Gateway", "Gateway-Load"; or nothing.
+  [[nodiscard]] std::string_view next_name();
+  std::string_view name(std::string_view what);
   [[nodiscard]] bool next_is(char symbol);
   double real(std::string_view what);
   std::uint64_t integer(std::string_view what, std::uint64_t max);
@@ -39,6 +42,9 @@ class DbcScanner {
   std::string text(std::string_view what);
   /// Everything up to and with the semicolon that ends the statement.
   void skip_statement();
+  /// Whether what comes next is the first on its line.
+  [[nodiscard]] bool begins_line();
+  void skip_line() noexcept;
   /// @throws DbcSyntaxError about what comes next
   [[noreturn]] void fail(std::string_view rule);
 

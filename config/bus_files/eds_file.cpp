@@ -10,8 +10,8 @@
 namespace thermocomp {
 namespace {
 
-constexpr std::size_t problems_max = 100;
-constexpr std::size_t shown_max = 60;  // characters of a value in a problem
+constexpr std::size_t flaws_max = 1000;
+constexpr std::size_t shown_max = 60;  // characters of a value in a flaw
 constexpr std::uint64_t object_variable = 0x7;
 constexpr std::uint64_t object_domain = 0x2;
 constexpr std::uint64_t sub_max = 0xFE;  // sub-index FF tells the structure
@@ -100,26 +100,30 @@ class EdsReader {
  public:
   explicit EdsReader(std::string name) : name_(std::move(name)) {}
 
-  EdsReading read(std::string_view text) {
+  EdsFile read(std::string_view text) {
     read_lines(text);
-    for (const auto& [key, section] : sections_) read_object(key, section);
-    if (objects_.empty() && problems_.empty()) {
-      problem(0, "", "", "is no electronic data sheet: it has no object");
+    for (const auto& [key, section] : sections_) {
+      about_ = address_of(key);
+      read_object(key, section);
     }
-    EdsReading reading;
-    for (auto& [address, object] : objects_) reading.file.objects.push_back(std::move(object));
-    reading.problems = std::move(problems_);
-    return reading;
+    about_.reset();
+    if (flaws_.size() >= flaws_max) objects_.clear();
+    if (objects_.empty()) flaw(0, "", "", "is no electronic data sheet: it has no object");
+    EdsFile file;
+    for (auto& [address, object] : objects_) file.objects.push_back(std::move(object));
+    file.flaws = std::move(flaws_);
+    return file;
   }
 
  private:
   using Key = std::pair<std::uint16_t, std::uint8_t>;
 
-  void problem(int line, const std::string& key, std::string_view value, const std::string& rule) {
-    if (problems_.size() >= problems_max) return;
+  void flaw(int line, const std::string& key, std::string_view value, const std::string& rule) {
     const std::string_view shown = value.empty() && !key.empty() ? "(missing)" : value;
-    problems_.push_back({name_, line, printed(key.substr(0, shown_max)),
-                         printed(shown.substr(0, shown_max)), rule});
+    EdsFlaw& made = flaws_.emplace_back();
+    made.problem = {name_, line, printed(key.substr(0, shown_max)),
+                    printed(shown.substr(0, shown_max)), rule};
+    if (about_) made.object = ObjectAddress{about_->first, about_->second};
   }
 
   void read_lines(std::string_view text) {
@@ -127,13 +131,14 @@ class EdsReader {
     if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
     Section* section = nullptr;
     int line = 0;
-    while (!text.empty() && problems_.size() < problems_max) {
+    while (!text.empty() && flaws_.size() < flaws_max) {
       ++line;
       const std::size_t end = text.find('\n');
       const std::string_view content = trimmed(text.substr(0, end));
       text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
       if (content.empty() || content.front() == ';') continue;
       if (content.front() == '[') {
+        about_.reset();
         section = begin_section(content, line);
       } else {
         read_entry(section, content, line);
@@ -143,14 +148,14 @@ class EdsReader {
 
   Section* begin_section(std::string_view content, int line) {
     if (content.back() != ']' || content.size() < 3) {
-      problem(line, "", content, "must be a section's name in brackets");
+      flaw(line, "", content, "must be a section's name in brackets");
       return &nowhere_;
     }
     const std::string name(trimmed(content.substr(1, content.size() - 2)));
+    about_ = address_of(lower(name));
     const auto [found, is_new] = sections_.try_emplace(lower(name), Section{name, line, {}});
     if (is_new) return &found->second;
-    problem(line, "", name,
-            "stands there twice, first in line " + std::to_string(found->second.line));
+    flaw(line, "", name, "stands there twice, first in line " + std::to_string(found->second.line));
     nowhere_ = {};
     return &nowhere_;
   }
@@ -158,17 +163,17 @@ class EdsReader {
   void read_entry(Section* section, std::string_view content, int line) {
     const std::size_t equal = content.find('=');
     if (equal == std::string_view::npos || equal == 0) {
-      problem(line, "", content, "must be a section, an entry KEY=VALUE or a comment");
+      flaw(line, "", content, "must be a section, an entry KEY=VALUE or a comment");
       return;
     }
     if (section == nullptr) {
-      problem(line, "", content, "must stand in a section");
+      flaw(line, "", content, "must stand in a section");
       return;
     }
     const std::string key(trimmed(content.substr(0, equal)));
     const std::string value(trimmed(content.substr(equal + 1)));
     const bool is_new = section->entries.try_emplace(lower(key), Entry{value, line}).second;
-    if (!is_new) problem(line, key, value, "stands twice in its section");
+    if (!is_new) flaw(line, key, value, "stands twice in its section");
   }
 
   /// The object that a section's name means; nullopt: it is about something else.
@@ -198,8 +203,8 @@ class EdsReader {
     if (found == section.entries.end() || found->second.value.empty()) return otherwise;
     const auto value = number(found->second.value);
     if (!value) {
-      problem(found->second.line, section.name + "." + key, found->second.value,
-              "must be a whole number");
+      flaw(found->second.line, section.name + "." + key, found->second.value,
+           "must be a whole number");
     }
     return value;
   }
@@ -213,25 +218,20 @@ class EdsReader {
     const std::optional<Key> address = address_of(key);
     if (!address) return;
     const std::string own = text_of(section, "ParameterName");
-    if (own.empty()) {
-      problem(section.line, section.name + ".ParameterName", "", "must be given");
-      return;
-    }
+    if (own.empty()) flaw(section.line, section.name + ".ParameterName", "", "must be given");
     const auto kind = number_of(section, "ObjectType", object_variable);
     const bool is_sub = key.size() > 4;
     const auto parent = sections_.find(key.substr(0, 4));
-    if (is_sub && parent == sections_.end()) {
-      problem(section.line, "", section.name, "is a part of an object that is not there");
-      return;
-    }
+    if (is_sub && parent == sections_.end())
+      flaw(section.line, "", section.name, "is a part of an object that is not there");
     if (kind && *kind != object_variable && *kind != object_domain) {
       if (const auto compact = number_of(section, "CompactSubObj", 0)) {
         add_compact(*address, section, own, *compact);
       }
       return;  // an array or a record: its parts hold the values
     }
-    const std::string name = is_sub ? text_of(parent->second, "ParameterName") + "/" + own : own;
-    add(section, *address, name);
+    const bool has_whole = is_sub && !own.empty() && parent != sections_.end();
+    add(section, *address, has_whole ? text_of(parent->second, "ParameterName") + "/" + own : own);
   }
 
   void add(const Section& section, Key address, const std::string& name) {
@@ -240,7 +240,7 @@ class EdsReader {
     if (type) object.type = type_of(*type);
     // 1018sub1 and 1018sub01 are one address.
     if (!objects_.try_emplace(address, std::move(object)).second) {
-      problem(section.line, "", section.name, "is an object that stands there already");
+      flaw(section.line, "", section.name, "is an object that stands there already");
     }
   }
 
@@ -248,8 +248,8 @@ class EdsReader {
   void add_compact(Key address, const Section& section, const std::string& name,
                    std::uint64_t count) {
     if (count > sub_max) {
-      problem(section.line, section.name + ".CompactSubObj", std::to_string(count),
-              "must be at most 254");
+      flaw(section.line, section.name + ".CompactSubObj", std::to_string(count),
+           "must be at most 254");
       return;
     }
     const auto names = sections_.find(lower(section.name) + "name");
@@ -268,7 +268,8 @@ class EdsReader {
   std::map<std::string, Section> sections_;  ///< by the name in small letters
   Section nowhere_;                          ///< takes the entries of a refused section
   std::map<Key, EdsObject> objects_;
-  std::vector<Problem> problems_;
+  std::vector<EdsFlaw> flaws_;
+  std::optional<Key> about_;  ///< the object that is being read
 };
 
 }  // namespace
@@ -298,7 +299,7 @@ std::vector<std::string> EdsFile::names() const {
   return names;
 }
 
-EdsReading read_eds_text(std::string_view text, const std::string& name) {
+EdsFile read_eds_text(std::string_view text, const std::string& name) {
   return EdsReader(name).read(text);
 }
 

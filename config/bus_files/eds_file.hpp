@@ -3,8 +3,8 @@
 /// An EDS file is an INI file whose comments begin a line with ';'. Libraries for INI files read
 /// ';' inside a line, '#', quotes or indented lines otherwise than data sheets mean them, cut long
 /// lines or do not give the line of an entry; so the form is read here, strictly: a line that is
-/// neither a section, an entry, a comment nor empty is a problem, as is a section or entry that
-/// stands there twice.
+/// neither a section, an entry, a comment nor empty is a flaw of its section, as is a section or
+/// entry that stands there twice; the first one counts.
 #pragma once
 
 #include <cstdint>
@@ -34,8 +34,16 @@ struct EdsObject {
   std::optional<ObjectType> type;  ///< none: not a number (text, domain)
 };
 
+/// Something wrong in the file.
+struct EdsFlaw {
+  Problem problem;
+  std::optional<ObjectAddress> object;  ///< none: of no object
+  bool in_use{false};                   ///< a configuration takes the object's type from here
+};
+
 struct EdsFile {
   std::vector<EdsObject> objects;  ///< those that hold a value, by address
+  std::vector<EdsFlaw> flaws;
 
   [[nodiscard]] const EdsObject* find(const ObjectAddress& address) const noexcept;
   /// By the whole name, or by the part behind the '/'. More than one: the name is ambiguous.
@@ -43,12 +51,7 @@ struct EdsFile {
   [[nodiscard]] std::vector<std::string> names() const;
 };
 
-struct EdsReading {
-  EdsFile file;
-  std::vector<Problem> problems;  ///< at most 100; empty: the file is good
-};
-
-/// @param name  stands for the file in problems
-[[nodiscard]] EdsReading read_eds_text(std::string_view text, const std::string& name);
+/// @param name  stands for the file in flaws
+[[nodiscard]] EdsFile read_eds_text(std::string_view text, const std::string& name);
 
 }  // namespace thermocomp

@@ -15,13 +15,6 @@
 
 namespace thermocomp::sections {
 
-/// What the buses of a configuration share.
-struct BusFiles {
-  DbcFiles& dbc;
-  EdsFiles& eds;
-  std::map<std::string, ModbusRtu> serial_lines;  ///< of buses; a controller on one shares it
-};
-
 /// A [[sensor]] on a device of the bus.
 struct ChannelTables {
   TomlTable own;         ///< as it stands in the file
@@ -33,6 +26,18 @@ struct ChannelTables {
   /// Checks that a reading as old as its period is not stale yet. @param period  the key, for the
   /// rule
   void check_period(double period_s, const std::string& period) const;
+};
+
+/// What the buses of a configuration share.
+struct BusFiles {
+  DbcFiles& dbc;
+  EdsFiles& eds;
+  std::map<std::string, ModbusRtu> serial_lines;  ///< of buses; a controller on one shares it
+  std::vector<Problem> remarks;                   ///< oddities that forbid nothing; without file
+  std::map<std::string, std::string> places;      ///< sensor that reads it, by note_place()
+
+  /// Remarks on two sensors that read one place. @param place  bus, device and number on it
+  void note_place(const ChannelTables& tables, const std::string& place);
 };
 
 class BusSection {

@@ -157,6 +157,14 @@ void ChannelTables::check_period(double period_s, const std::string& period) con
               "must be more than " + period);
 }
 
+void BusFiles::note_place(const ChannelTables& tables, const std::string& place) {
+  const std::string name = tables.own.text("name", "");
+  const auto [found, is_new] = places.emplace(place, name);
+  if (is_new) return;
+  remarks.push_back({"", tables.own.line(), tables.own.path(), "",
+                     "reads the same value as sensor[" + found->second + "]"});
+}
+
 const std::vector<BusKind>& bus_kinds() {
 #define THERMOCOMP_LIST_KINDS(protocol, Config) add(Config::kinds, #protocol, open_##protocol);
   static const std::vector<BusKind> kinds = [] {

@@ -5,9 +5,24 @@
 namespace thermocomp::sections {
 namespace {
 
+/// Where the value stands, as one text.
+std::string place_of(const std::string& interface, const CanSignal& signal) {
+  std::string place = interface;
+  const auto add = [&place](auto number) { place.append(" ").append(std::to_string(number)); };
+  add(signal.id);
+  add(signal.extended_id ? 1 : 0);
+  add(signal.start_bit);
+  add(signal.byte_order == ByteOrder::little_endian ? 1 : 0);
+  for (const CanSelector& selector : signal.selectors) {
+    add(selector.field.start_bit);
+    add(selector.pages.front().first);
+  }
+  return place;
+}
+
 class CanSection final : public BusSection {
  public:
-  CanSection(const TomlTable& table, const std::string& name, DbcFiles& dbc_files) {
+  CanSection(const TomlTable& table, const std::string& name, BusFiles& files) : files_(files) {
     bus_.name = name;
     bus_.interface = read_interface(table);
     // Looking for an interface costs nothing, and a bus that is back shall be read within 2 s.
@@ -16,7 +31,7 @@ class CanSection final : public BusSection {
                {"host", "port", "device", "baud", "parity", "data_bits", "stop_bits", "rs485",
                 "timeout_ms", "inter_frame_delay_ms", "backoff_s_max", "retries"},
                "makes no sense for kind = \"can\"");
-    database_ = dbc_files.read(table);
+    database_ = files.dbc.read(table);
   }
 
   void read_device(const TomlTable& table, const std::string& name) override {
@@ -32,6 +47,7 @@ class CanSection final : public BusSection {
                "makes no sense on a CAN bus");
     CanChannel channel = read_can_channel(tables.sensor, tables.device, database_);
     channel.sensor = tables.index;
+    files_.note_place(tables, place_of(bus_.interface, channel.signal));
     bus_.devices[device].channels.push_back(std::move(channel));
   }
 
@@ -40,6 +56,7 @@ class CanSection final : public BusSection {
 
  private:
   CanBusConfig bus_;
+  BusFiles& files_;
   CanDatabase database_;
 };
 
@@ -47,7 +64,7 @@ class CanSection final : public BusSection {
 
 std::unique_ptr<BusSection> open_can(const TomlTable& bus, const std::string& name,
                                      const std::string& /*kind*/, BusFiles& files) {
-  return std::make_unique<CanSection>(bus, name, files.dbc);
+  return std::make_unique<CanSection>(bus, name, files);
 }
 
 }  // namespace thermocomp::sections

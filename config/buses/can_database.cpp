@@ -1,10 +1,11 @@
 #include "config/buses/can_database.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string>
 #include <string_view>
 
-#include "config/bus_files/dbc_scanner.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 #include "config/toml/file_limits.hpp"
@@ -14,84 +15,132 @@ namespace {
 
 constexpr std::uint64_t fd_bytes_max = 64;
 constexpr std::uint64_t classic_bytes_max = 8;
-constexpr double zero_degC_K = 273.15;
 
+/// What a name that is not known may be; where none is nearest, what there is.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& known) {
+  constexpr std::size_t listed_max = 8;
   const std::string near = nearest_name(name, known);
-  return near.empty() ? "" : "; did you mean \"" + near + "\"?";
+  if (!near.empty()) return "; did you mean \"" + near + "\"?";
+  std::string text;
+  for (std::size_t i = 0; i < known.size() && i < listed_max; ++i) {
+    text.append(i == 0 ? "; it has \"" : "\", \"").append(known[i]);
+  }
+  if (text.empty()) return {};
+  return text + (known.size() > listed_max ? "\" and others" : "\"");
 }
 
-/// Makes the signal one in degC by the unit that the file gives it. @return whether it could
-bool to_degC(CanSignal& place, std::string unit) {
-  // The degree sign of UTF-8 and of the code page that most of these files are written in.
-  for (const std::string_view sign : {"\xC2\xB0", "\xB0", "deg", "Deg", "_", " "}) {
-    for (auto at = unit.find(sign); at != std::string::npos; at = unit.find(sign)) {
-      unit.erase(at, sign.size());
+/// Marks the flaws of a message or signal that is named; without a signal all of the message's,
+/// without a message those of which nobody knows where they belong.
+/// @return whether there are any that the keys given do not replace
+bool mark_flaws(DbcFile& file, std::string_view message, std::optional<std::string_view> signal,
+                const TomlTable& own, const TomlTable& base) {
+  bool found = false;
+  for (DbcFlaw& flaw : file.flaws) {
+    const bool is_near = flaw.message.empty() && !signal;
+    if (!is_near && flaw.message != message) continue;
+    if (signal && !flaw.signal.empty() && flaw.signal != *signal) continue;
+    const bool is_replaced =
+        std::any_of(flaw.keys.begin(), flaw.keys.end(),
+                    [&](std::string_view key) { return own.has(key) || base.has(key); });
+    if (is_replaced) continue;
+    if (signal && !flaw.in_use) {
+      flaw.problem.rule +=
+          flaw.keys.empty()
+              ? "; correct the file, or give the sensor its place (id, start_bit, ...) for signal"
+              : "; " + std::string(flaw.keys.front()) + " in the configuration replaces it";
     }
+    flaw.in_use = found = true;
   }
-  if (unit.empty() || unit == "C" || unit == "c" || unit == "Cel" || unit == "Celsius") return true;
-  if (unit == "K" || unit == "Kelvin") {
-    place.offset -= zero_degC_K;
-    return true;
+  return found;
+}
+
+/// Makes the signal one in degC by the unit of its numbers.
+void to_degC(const TomlTable& own, const TomlTable& base, const std::string& in_file,
+             CanSignal& place) {
+  const TomlTable& source = own.has("unit") ? own : base;
+  const bool is_given = source.has("unit");
+  const std::string text = is_given ? source.text("unit") : in_file;
+  if (text.find_first_not_of(' ') == std::string::npos) return;  // none: degC
+  const SpelledUnit* unit = spelled_unit(text);
+  if (unit == nullptr || unit->dimension != "temperature") {
+    (is_given ? source : own)
+        .problem(is_given ? "unit" : "signal", text,
+                 std::string(is_given ? "" : "the unit of the signal in the DBC file ") +
+                     "is none of temperatures; unit = \"degC\", \"K\" or \"degF\" says which");
+    return;
   }
-  if (unit == "F" || unit == "Fahrenheit") {
-    place.scale *= 5.0 / 9.0;
-    place.offset = (place.offset - 32.0) * 5.0 / 9.0;
-    return true;
-  }
-  return false;
+  place.scale *= unit->factor;
+  if (own.has("offset_degC") || base.has("offset_degC")) return;
+  place.offset = place.offset * unit->factor + unit->offset;
 }
 
 /// The message that a sensor or its device names; nullptr after a problem.
-const DbcMessage* find_message(const TomlTable& own, const TomlTable& base, const DbcFile& file) {
+const DbcMessage* find_message(const TomlTable& own, const TomlTable& base, DbcFile& file) {
   const TomlTable& source = own.has("message") ? own : base;
   const std::string name = source.text("message", "");
   if (name.empty()) return nullptr;
-  const DbcMessage* message = file.find(name);
+  const TomlTable& numbered = own.has("id") ? own : base;
+  std::optional<std::uint32_t> id;
+  if (numbered.has("id")) id = numbered.integer<std::uint32_t>("id", 0, 0x1FFFFFFF, 0);
+  const DbcMessage* message = file.find(name, id);
   if (message == nullptr) {
+    const bool is_hidden = mark_flaws(file, name, std::nullopt, own, base);
     source.problem("message", "must be a message of the bus' DBC file" +
-                                  did_you_mean(name, file.message_names()));
+                                  (is_hidden ? "; a flaw of the file may hide it"
+                                             : did_you_mean(name, file.message_names())));
     return nullptr;
   }
   const bool several = message->bytes > fd_bytes_max;
-  if (several || (message->bytes > classic_bytes_max && message->told_fd == false)) {
-    source.problem("message", "has " + std::to_string(message->bytes) + " bytes in the DBC file, " +
-                                  (several ? "more than a frame" : "but is no CAN FD frame"));
+  const bool is_short = message->told_fd == false && !own.has("fd") && !base.has("fd");
+  if (several || (message->bytes > classic_bytes_max && is_short)) {
+    std::string rule = "has " + std::to_string(message->bytes) + " bytes in the DBC file, " +
+                       (several ? "more than a frame" : "but is no CAN FD frame");
+    if (message->is_group) rule += "; a bus of kind = \"j1939\" reads it by pgn";
+    source.problem("message", rule);
     return nullptr;
   }
   return message;
 }
 
 const DbcSignal* find_signal(const TomlTable& table, std::string_view key, std::string_view name,
-                             const DbcMessage& message) {
+                             const DbcMessage& message, DbcFile& file) {
   const DbcSignal* signal = message.find(name);
   if (signal == nullptr) {
+    const bool is_hidden = mark_flaws(file, message.name, std::nullopt, table, table);
     table.problem(key, "must be a signal of the message " + message.name +
-                           did_you_mean(name, message.signal_names()));
+                           (is_hidden ? "; a flaw of the file may hide it"
+                                      : did_you_mean(name, message.signal_names())));
   }
   return signal;
 }
 
 std::optional<CanField> counter_of(const TomlTable& own, const TomlTable& base,
-                                   const DbcMessage& message, bool fd) {
+                                   const DbcMessage& message, DbcFile& file, bool fd) {
   const TomlTable& source = own.has("counter") ? own : base;
   if (!source.has("counter")) return std::nullopt;
   if (!source.is_text("counter")) return read_can_field(own, base, "counter", fd);
   const std::string name = source.text("counter");
-  const DbcSignal* signal = find_signal(source, "counter", name, message);
-  if (signal == nullptr) return std::nullopt;
+  const DbcSignal* signal = find_signal(source, "counter", name, message, file);
+  if (signal == nullptr || mark_flaws(file, message.name, signal->name, own, base)) return {};
   if (!signal->place.selectors.empty()) {
     source.problem("counter", "must be in every frame of the message, not multiplexed");
   }
   return CanField{signal->place.start_bit, signal->place.length_bits, signal->place.byte_order};
 }
 
+/// Codes with which J1939 says "error" and "not available". Of longer numbers the former is beyond
+/// all temperatures.
+void add_group_codes(CanSignal& signal) {
+  const int bits = signal.length_bits;
+  if (signal.is_signed || signal.is_float || (bits != 8 && bits != 16 && bits != 32)) return;
+  const std::int64_t all_ones = (std::int64_t{1} << bits) - 1;
+  signal.sentinels.push_back({all_ones, Fault::device_error});
+  if (bits == 8) signal.sentinels.push_back({all_ones - 1, Fault::device_error});
+}
+
 CanChannel read_by_name(const TomlTable& own, const TomlTable& base, const CanDatabase& database) {
   for (const TomlTable& table : {own, base}) {
-    refuse_all(table,
-               {"id", "extended_id", "fd", "start_bit", "length_bits", "byte_order", "signed",
-                "float", "scale", "offset_degC", "multiplexor", "multiplexor_value"},
-               "is what the DBC file says of the signal");
+    refuse_all(table, {"multiplexor", "multiplexor_value"}, "is what the DBC file says");
   }
   CanChannel channel;
   const std::string name = own.text("signal");
@@ -99,18 +148,16 @@ CanChannel read_by_name(const TomlTable& own, const TomlTable& base, const CanDa
   if (!database.named) own.problem("signal", "needs a bus that names a DBC file (dbc)");
   const DbcMessage* message = database.file ? find_message(own, base, *database.file) : nullptr;
   const DbcSignal* signal =
-      message != nullptr ? find_signal(own, "signal", name, *message) : nullptr;
-  if (signal == nullptr) {
+      message != nullptr ? find_signal(own, "signal", name, *message, *database.file) : nullptr;
+  if (signal == nullptr || mark_flaws(*database.file, message->name, signal->name, own, base)) {
     own.ignore_rest();
     base.ignore_rest();
     return channel;
   }
-  channel.signal = signal->place;
-  if (!to_degC(channel.signal, signal->unit)) {
-    own.problem("signal", printable(signal->unit), "the signal's unit is that of no temperature");
-  }
-  channel.signal.sentinels = read_can_codes(own, base, channel.signal);
-  channel.counter = counter_of(own, base, *message, channel.signal.fd);
+  channel.signal = read_can_signal(own, base, CanUse::temperature, &signal->place);
+  to_degC(own, base, signal->unit, channel.signal);
+  if (message->is_group) add_group_codes(channel.signal);
+  channel.counter = counter_of(own, base, *message, *database.file, channel.signal.fd);
   return channel;
 }
 
@@ -123,16 +170,25 @@ CanDatabase DbcFiles::read(const TomlTable& bus) {
   const std::filesystem::path path = bus.text("dbc");
   if (!folder_ || path.empty()) return database;
   const auto full = path.is_absolute() ? path : (*folder_ / path).lexically_normal();
+  if (const auto known = read_.find(full); known != read_.end()) return {true, known->second};
   try {
-    DbcReading reading = read_dbc_text(read_text_file(full, bus_table_bytes_max), full.string());
-    if (reading.problems.empty()) {
-      database.file = std::make_shared<const DbcFile>(std::move(reading.file));
-    }
-    problems_.insert(problems_.end(), reading.problems.begin(), reading.problems.end());
+    database.file = std::make_shared<DbcFile>(
+        read_dbc_text(read_text_file(full, bus_table_bytes_max), full.string()));
+    read_.emplace(full, database.file);
   } catch (const ConfigurationError& error) {
     bus.problem("dbc", error.problems().front().rule + " (" + full.string() + ")");
   }
   return database;
+}
+
+std::vector<Problem> DbcFiles::flaws(bool in_use) const {
+  std::vector<Problem> problems;
+  for (const auto& [path, file] : read_) {
+    for (const DbcFlaw& flaw : file->flaws) {
+      if (flaw.in_use == in_use) problems.push_back(flaw.problem);
+    }
+  }
+  return problems;
 }
 
 CanChannel read_can_channel(const TomlTable& own, const TomlTable& base,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -15,8 +16,9 @@ namespace thermocomp::sections {
 /// What a bus says of its messages.
 struct CanDatabase {
   bool named{false};  ///< the bus names a file
-  /// Its content; none where it has problems, or where no files are opened.
-  std::shared_ptr<const DbcFile> file;
+  /// Its content; none where it cannot be read, or where no files are opened. What is named of it
+  /// is marked at its flaws.
+  std::shared_ptr<DbcFile> file;
 };
 
 /// The DBC files of a configuration.
@@ -29,15 +31,16 @@ class DbcFiles {
   /// The file of the key `dbc` of a bus.
   [[nodiscard]] CanDatabase read(const TomlTable& bus);
   /// What is wrong inside the files.
-  [[nodiscard]] const std::vector<Problem>& problems() const noexcept { return problems_; }
+  /// @param in_use  where a sensor stands on it; else elsewhere
+  [[nodiscard]] std::vector<Problem> flaws(bool in_use) const;
 
  private:
   std::optional<std::filesystem::path> folder_;
-  std::vector<Problem> problems_;
+  std::map<std::filesystem::path, std::shared_ptr<DbcFile>> read_;
 };
 
 /// A sensor's value: by the name of its signal where it has the key `signal`, else by its place.
-/// What `own` leaves out is as in `base`.
+/// What `own` leaves out is as in `base`; what both leave out of a named signal is as in the file.
 [[nodiscard]] CanChannel read_can_channel(const TomlTable& own, const TomlTable& base,
                                           const CanDatabase& database);
 

@@ -47,6 +47,16 @@ std::vector<std::string> short_and_long_names(const EdsFile& eds) {
   return names;
 }
 
+/// Marks the flaws of an object whose type the configuration does not give; without an object
+/// those of no object.
+void mark_flaws(EdsFile& eds, const TomlTable& table, std::optional<ObjectAddress> object) {
+  for (EdsFlaw& flaw : eds.flaws) {
+    if (flaw.object != object || (object && table.has("type"))) continue;
+    if (object && !flaw.in_use) flaw.problem.rule += "; type in the configuration replaces it";
+    flaw.in_use = true;
+  }
+}
+
 Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles& eds_files) {
   Place place;
   const std::string name = table.text("object");
@@ -62,8 +72,9 @@ Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles
   if (found.size() == 1) {
     place.object = found.front()->address;
     place.type = found.front()->type;
-    place.unknown = !place.type;
-    if (place.unknown) table.problem("object", "is no number in the data sheet");
+    mark_flaws(*known.eds, table, place.object);
+    place.unknown = !place.type && !table.has("type");
+    if (place.unknown) table.problem("object", "is no number in the data sheet; type makes it one");
     return place;
   }
   place.unknown = true;
@@ -71,6 +82,7 @@ Place by_name(const TomlTable& table, const CanopenDevice& known, const EdsFiles
     table.problem("object", "is not clear; may be " + found[0]->name + " or " + found[1]->name);
     return place;
   }
+  mark_flaws(*known.eds, table, std::nullopt);
   const std::string near = nearest_name(name, short_and_long_names(*known.eds));
   std::string rule = "is no object of the data sheet";
   if (!near.empty()) rule.append("; did you mean ").append(near).append("?");
@@ -92,6 +104,7 @@ Place read_object(const TomlTable& table, const CanopenDevice& known, const EdsF
   if (known.eds) {
     const EdsObject* object = known.eds->find(*place.object);
     if (object != nullptr) place.type = object->type;
+    mark_flaws(*known.eds, table, place.object);
   }
   return place;
 }
@@ -259,6 +272,10 @@ CanopenDevice read_canopen_device(const TomlTable& table, const std::string& nam
     table.problem("heartbeat_timeout_s", "must be more than heartbeat_s");
   }
   if (table.has("pdo_period_s")) node.pdo_period_s = table.number("pdo_period_s", period);
+  node.pdo_on_change = table.flag("pdo_on_change", node.pdo_on_change);
+  if (node.pdo_on_change && !(node.heartbeat_timeout_s > 0.0)) {
+    table.problem("pdo_on_change", "needs heartbeat_s, or heartbeat_timeout_s");
+  }
   node.emergency = read_emergency_form(table);
   for (const TomlTable& entry : table.tables("write")) {
     node.writes.push_back(read_write(entry, device, eds_files));
@@ -361,19 +378,25 @@ namespace {
 
 class CanopenSection final : public BusSection {
  public:
-  CanopenSection(const TomlTable& table, const std::string& name, EdsFiles& eds_files)
-      : bus_(read_canopen_bus(table, name)), eds_files_(eds_files) {}
+  CanopenSection(const TomlTable& table, const std::string& name, BusFiles& files)
+      : bus_(read_canopen_bus(table, name)), files_(files) {}
 
   void read_device(const TomlTable& table, const std::string& name) override {
-    devices_.push_back(read_canopen_device(table, name, eds_files_));
+    devices_.push_back(read_canopen_device(table, name, files_.eds));
     check_canopen_node(table, bus_, devices_.back().node);
     bus_.nodes.push_back(devices_.back().node);
   }
 
   void read_channel(const ChannelTables& tables, std::size_t device) override {
-    auto channel = read_canopen_channel(tables.sensor, tables.device, devices_[device], eds_files_);
+    auto channel = read_canopen_channel(tables.sensor, tables.device, devices_[device], files_.eds);
     if (!channel) return;
     channel->sensor = tables.index;
+    std::string place = bus_.nodes[device].name;
+    const bool is_bits = channel->way == CanopenWay::pdo_bits;
+    const std::uint32_t index = is_bits ? channel->signal.id : channel->object.index;
+    const int sub = is_bits ? channel->signal.start_bit : channel->object.sub;
+    place.append(" ").append(std::to_string(index)).append(" ").append(std::to_string(sub));
+    files_.note_place(tables, place);
     check_canopen_channel(tables.sensor, bus_, device, *channel);
     if (channel->way == CanopenWay::sdo) tables.check_period(channel->poll_s, "poll_s");
     bus_.nodes[device].channels.push_back(std::move(*channel));
@@ -384,7 +407,7 @@ class CanopenSection final : public BusSection {
 
  private:
   CanopenBusConfig bus_;
-  EdsFiles& eds_files_;
+  BusFiles& files_;
   std::vector<CanopenDevice> devices_;
 };
 
@@ -392,7 +415,7 @@ class CanopenSection final : public BusSection {
 
 std::unique_ptr<BusSection> open_canopen(const TomlTable& bus, const std::string& name,
                                          const std::string& /*kind*/, BusFiles& files) {
-  return std::make_unique<CanopenSection>(bus, name, files.eds);
+  return std::make_unique<CanopenSection>(bus, name, files);
 }
 
 }  // namespace thermocomp::sections

@@ -15,7 +15,7 @@ namespace thermocomp::sections {
 struct CanopenDevice {
   CanopenNodeConfig node;
   bool names_eds{false};
-  std::shared_ptr<const EdsFile> eds;  ///< nullptr: none is named, or it cannot be read
+  std::shared_ptr<EdsFile> eds;  ///< nullptr: none is named, or it cannot be read
 };
 
 /// What the emergency messages of the device say.

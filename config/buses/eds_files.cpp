@@ -4,21 +4,31 @@
 
 namespace thermocomp::sections {
 
-std::shared_ptr<const EdsFile> EdsFiles::read(const TomlTable& device) {
+std::shared_ptr<EdsFile> EdsFiles::read(const TomlTable& device) {
   if (!device.has("eds")) return nullptr;
   const std::filesystem::path named = device.text("eds");
   if (!folder_ || named.empty()) return nullptr;
   const std::filesystem::path path = *folder_ / named;
   if (const auto known = read_.find(path); known != read_.end()) return known->second;
-  std::shared_ptr<const EdsFile>& file = read_[path];
+  std::shared_ptr<EdsFile>& file = read_[path];
   try {
-    EdsReading reading = read_eds_text(read_text_file(path, bus_table_bytes_max), path.string());
-    problems_.insert(problems_.end(), reading.problems.begin(), reading.problems.end());
-    if (reading.problems.empty()) file = std::make_shared<EdsFile>(std::move(reading.file));
+    file = std::make_shared<EdsFile>(
+        read_eds_text(read_text_file(path, bus_table_bytes_max), path.string()));
   } catch (const ConfigurationError& error) {
     device.problem("eds", error.problems().front().rule);
   }
   return file;
+}
+
+std::vector<Problem> EdsFiles::flaws(bool in_use) const {
+  std::vector<Problem> problems;
+  for (const auto& [path, file] : read_) {
+    if (file == nullptr) continue;
+    for (const EdsFlaw& flaw : file->flaws) {
+      if (flaw.in_use == in_use) problems.push_back(flaw.problem);
+    }
+  }
+  return problems;
 }
 
 }  // namespace thermocomp::sections

@@ -19,15 +19,15 @@ class EdsFiles {
   explicit EdsFiles(std::optional<std::filesystem::path> folder) : folder_(std::move(folder)) {}
 
   /// The file of the key `eds` of a device; nullptr: it names none, or none that can be read.
-  [[nodiscard]] std::shared_ptr<const EdsFile> read(const TomlTable& device);
+  [[nodiscard]] std::shared_ptr<EdsFile> read(const TomlTable& device);
   [[nodiscard]] bool opens_files() const noexcept { return folder_.has_value(); }
   /// What is wrong inside the files.
-  [[nodiscard]] const std::vector<Problem>& problems() const noexcept { return problems_; }
+  /// @param in_use  at objects whose name or type a configuration takes from there; else elsewhere
+  [[nodiscard]] std::vector<Problem> flaws(bool in_use) const;
 
  private:
   std::optional<std::filesystem::path> folder_;
-  std::map<std::filesystem::path, std::shared_ptr<const EdsFile>> read_;
-  std::vector<Problem> problems_;
+  std::map<std::filesystem::path, std::shared_ptr<EdsFile>> read_;
 };
 
 }  // namespace thermocomp::sections

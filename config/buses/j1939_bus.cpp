@@ -123,8 +123,8 @@ namespace {
 
 class J1939Section final : public BusSection {
  public:
-  J1939Section(const TomlTable& table, const std::string& name)
-      : bus_(read_j1939_bus(table, name)) {}
+  J1939Section(const TomlTable& table, const std::string& name, BusFiles& files)
+      : bus_(read_j1939_bus(table, name)), files_(files) {}
 
   void read_device(const TomlTable& table, const std::string& name) override {
     bus_.nodes.push_back(read_j1939_device(table, name, bus_));
@@ -133,6 +133,12 @@ class J1939Section final : public BusSection {
   void read_channel(const ChannelTables& tables, std::size_t device) override {
     J1939Channel channel = read_j1939_channel(tables.sensor, tables.device);
     channel.sensor = tables.index;
+    const J1939Parameter& place = channel.parameter;
+    std::string text = bus_.nodes[device].name;
+    for (const int number : {static_cast<int>(place.pgn), place.start_byte, place.start_bit}) {
+      text.append(" ").append(std::to_string(number));
+    }
+    files_.note_place(tables, text);
     bus_.nodes[device].channels.push_back(std::move(channel));
   }
 
@@ -141,13 +147,14 @@ class J1939Section final : public BusSection {
 
  private:
   J1939BusConfig bus_;
+  BusFiles& files_;
 };
 
 }  // namespace
 
 std::unique_ptr<BusSection> open_j1939(const TomlTable& bus, const std::string& name,
-                                       const std::string& /*kind*/, BusFiles& /*files*/) {
-  return std::make_unique<J1939Section>(bus, name);
+                                       const std::string& /*kind*/, BusFiles& files) {
+  return std::make_unique<J1939Section>(bus, name, files);
 }
 
 }  // namespace thermocomp::sections

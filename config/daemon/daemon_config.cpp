@@ -77,8 +77,8 @@ void check_controller_period(const TomlTable& compensation, const DaemonConfig& 
 /// Everything but the model's content.
 /// @return the tables that are looked at once more beside the model
 sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folder,
-                                    sections::Presets& presets, sections::DbcFiles& dbc_files,
-                                    sections::EdsFiles& eds_files, DaemonConfig& config) {
+                                    sections::Presets& presets, sections::BusFiles& bus_files,
+                                    DaemonConfig& config) {
   static_cast<void>(root.integer("format", 1, 1));
   config.log_level = root.choice<std::string>("log_level",
                                               {{"trace", "trace"},
@@ -97,7 +97,6 @@ sections::BindingTables read_daemon(const TomlTable& root, const fs::path& folde
   config.estimator.sensors = sections::read_sensors(root, sensors);
   config.estimator.blocks = sections::read_blocks(tables.blocks, config.estimator.sensors);
   config.estimator.axes = sections::read_axes(tables.axes);
-  sections::BusFiles bus_files{dbc_files, eds_files, {}};
   config.buses =
       sections::read_buses(root, {sensors, config.estimator.sensors}, presets, bus_files);
 
@@ -172,6 +171,22 @@ void add_reference_problems(const ModelSource& source, const DaemonConfig& confi
   }
 }
 
+/// Oddities of a configuration that holds, and flaws of its bus files that it does not stand on.
+std::vector<std::string> remarks_of(const sections::BusFiles& files, const std::string& name) {
+  constexpr std::size_t told_max = 20;
+  std::vector<Problem> all = files.remarks;
+  for (Problem& each : all) each.file = name;
+  for (const auto& flaws : {files.dbc.flaws(false), files.eds.flaws(false)}) {
+    all.insert(all.end(), flaws.begin(), flaws.end());
+  }
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < all.size() && i < told_max; ++i) lines.push_back(to_string(all[i]));
+  if (all.size() > told_max) {
+    lines.push_back("and " + std::to_string(all.size() - told_max) + " more such remarks");
+  }
+  return lines;
+}
+
 template <class FindModel>
 DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files files,
                    sections::Presets presets, sections::DbcFiles dbc_files,
@@ -183,8 +198,8 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
   const TomlTable model_table = root.table("model");
   config.model_file = read_path(model_table, "file", "model.toml", folder);
   if (!model_table.has("file")) model_table.problem("file", "must be given");
-  const sections::BindingTables tables =
-      read_daemon(root, folder, presets, dbc_files, eds_files, config);
+  sections::BusFiles bus_files{dbc_files, eds_files, {}, {}, {}};
+  const sections::BindingTables tables = read_daemon(root, folder, presets, bus_files, config);
   if (files == Files::opened) {
     check_files(root, config, folder);
   } else if (config.history.file == config.state_file) {
@@ -207,14 +222,15 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
     }
   }
   std::vector<Problem> problems = document.all_problems();
-  const std::vector<Problem> preset_problems = presets.problems();
-  problems.insert(problems.end(), preset_problems.begin(), preset_problems.end());
-  const std::vector<Problem>& dbc_problems = dbc_files.problems();
-  problems.insert(problems.end(), dbc_problems.begin(), dbc_problems.end());
-  const std::vector<Problem>& eds_problems = eds_files.problems();
-  problems.insert(problems.end(), eds_problems.begin(), eds_problems.end());
-  problems.insert(problems.end(), model_problems.begin(), model_problems.end());
+  const auto add = [&problems](const std::vector<Problem>& more) {
+    problems.insert(problems.end(), more.begin(), more.end());
+  };
+  add(presets.problems());
+  add(dbc_files.flaws(true));
+  add(eds_files.flaws(true));
+  add(model_problems);
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
+  config.remarks = remarks_of(bus_files, document.name());
   return config;
 }
 

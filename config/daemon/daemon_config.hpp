@@ -58,6 +58,8 @@ struct DaemonConfig {
   std::string text;
   std::string model_text;
   std::string model_checksum;  ///< SHA-256 of the model file, hexadecimal
+  /// What is odd but forbids nothing, a line each: flaws of bus files that nothing here stands on.
+  std::vector<std::string> remarks;
   ThermalModel model;
 };
 

@@ -15,28 +15,10 @@ constexpr double fahrenheit_step = 5.0 / 9.0;
 
 constexpr auto units = std::to_array<SpelledUnit>({
     {"degC", "temperature", 1, 0, "_degC"},
-    {"°C", "temperature", 1, 0, "_degC"},
-    {"ºC", "temperature", 1, 0, "_degC"},
-    {"℃", "temperature", 1, 0, "_degC"},
-    {"deg C", "temperature", 1, 0, "_degC", true},
-    {"Grad C", "temperature", 1, 0, "_degC", true},
     {"C", "temperature", 1, 0, "_degC", true},
-    {"Deg C", "temperature", 1, 0, "_degC", true},
-    {"DegC", "temperature", 1, 0, "_degC"},
-    {"Deg_C", "temperature", 1, 0, "_degC"},
-    {"deg_C", "temperature", 1, 0, "_degC"},
-    {"degc", "temperature", 1, 0, "_degC"},
-    {"° C", "temperature", 1, 0, "_degC", true},
-    {"Cel", "temperature", 1, 0, "_degC", true},
-    {"Celsius", "temperature", 1, 0, "_degC"},
-    {"celsius", "temperature", 1, 0, "_degC"},
     {"K", "temperature", 1, -kelvin_of_0_degC, "_K", true},
     {"Kelvin", "temperature", 1, -kelvin_of_0_degC, "_K"},
-    {"kelvin", "temperature", 1, -kelvin_of_0_degC, "_K"},
     {"degF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
-    {"°F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
-    {"ºF", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC"},
-    {"Deg F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC", true},
     {"F", "temperature", fahrenheit_step, -32 * fahrenheit_step, "_degC", true},
     {"um", "length", 1, 0, "_um"},
     {"µm", "length", 1, 0, "_um"},
@@ -100,6 +82,61 @@ constexpr auto units = std::to_array<SpelledUnit>({
     {"days", "time", 86400, 0, "_s", true},
 });
 
+/// How the degree sign comes, letters that look like it and wrongly converted ones among them, in
+/// UTF-8, Latin-1 and GBK. Longer ones first.
+struct DegreeSign {
+  std::string_view bytes;
+  std::string_view letter;  ///< of a sign that is a whole unit
+};
+constexpr auto degree_signs = std::to_array<DegreeSign>({{"℃", "c"},
+                                                         {"℉", "f"},
+                                                         {"\xA1\xE6", "c"},
+                                                         {"Â°", ""},
+                                                         {"Âº", ""},
+                                                         {"°", ""},
+                                                         {"º", ""},
+                                                         {"˚", ""},
+                                                         {"∘", ""},
+                                                         {"\xB0", ""},
+                                                         {"\xBA", ""}});
+
+/// The table's spelling of a temperature unit that is written otherwise: "ºC", "Deg. C", "oC",
+/// "Celcius". Empty: it is none.
+std::string_view plain_temperature(std::string_view unit) {
+  constexpr std::size_t bytes_max = 24;
+  if (unit.size() > bytes_max) return {};
+  std::string letters;
+  bool has_degree = unit.size() == 2 && unit[0] == 'o' && unit[1] < 'a';  // "oC"; not "of"
+  if (has_degree) unit.remove_prefix(1);
+  while (!unit.empty()) {
+    const auto* const sign =
+        std::find_if(degree_signs.begin(), degree_signs.end(),
+                     [&](const DegreeSign& each) { return unit.starts_with(each.bytes); });
+    if (sign != degree_signs.end()) {
+      has_degree = true;
+      letters += sign->letter;
+      unit.remove_prefix(sign->bytes.size());
+      continue;
+    }
+    const char c = unit.front();
+    unit.remove_prefix(1);
+    if (c == ' ' || c == '_' || c == '.') continue;
+    letters += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  std::string_view left = letters;
+  for (const std::string_view word : {"degrees", "degree", "deg", "grad", "grd"}) {
+    const bool is_first = left.starts_with(word);
+    if (has_degree || !(is_first || left.ends_with(word))) continue;
+    has_degree = true;
+    left = left.substr(is_first ? word.size() : 0, left.size() - word.size());
+  }
+  if (left == "celsius" || left == "celcius") return "degC";
+  if (left == "c" || left == "cel") return has_degree ? "degC" : "C";
+  if (left == "kelvin") return "Kelvin";
+  if (left == "fahrenheit" || (left == "f" && has_degree)) return "degF";
+  return left == "k" && has_degree ? "K" : "";
+}
+
 /// "TC(1)", "TC(1,2)": an element of a logger's array, no unit.
 bool is_index(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789, ") == std::string_view::npos;
@@ -140,7 +177,7 @@ bool split_blank(std::string_view header, SpelledName& name) {
     break;
   }
   if (unit == nullptr || (unit->only_in_brackets && !told)) return false;
-  name = {std::string(base), std::string(unit->spelling), unit};
+  name = {std::string(base), std::string(header.substr(blank + 1)), unit};
   return true;
 }
 
@@ -159,8 +196,12 @@ bool split_letters(std::string_view header, SpelledName& name) {
 }  // namespace
 
 const SpelledUnit* spelled_unit(std::string_view unit) {
-  const auto* const found = std::find_if(
-      units.begin(), units.end(), [&](const SpelledUnit& each) { return each.spelling == unit; });
+  const auto find = [](std::string_view spelling) {
+    return std::find_if(units.begin(), units.end(),
+                        [&](const SpelledUnit& each) { return each.spelling == spelling; });
+  };
+  const auto* found = find(unit);
+  if (found == units.end()) found = find(plain_temperature(unit));
   return found == units.end() ? nullptr : &*found;
 }
 

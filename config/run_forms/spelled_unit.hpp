@@ -27,6 +27,7 @@ struct SpelledName {
 };
 [[nodiscard]] SpelledName spelled_name(std::string_view header);
 
+/// Temperatures also with the degree sign in any of its disguises or in words ("ºC", "Deg. C").
 /// @return nullptr when it is none
 [[nodiscard]] const SpelledUnit* spelled_unit(std::string_view unit);
 

@@ -32,12 +32,23 @@ std::pair<std::int64_t, std::int64_t> codes_of(const CanSignal& signal) {
   return {-half, half - 1};
 }
 
+bool stands(const TomlTable& own, const TomlTable& base, std::string_view key) {
+  const bool in_base = base.has(key);  // marks it
+  return own.has(key) || in_base;
+}
+
 /// A whole number that may stand in `own` or in `base`. Both are checked.
-int required_integer(const TomlTable& own, const TomlTable& base, std::string_view key, int low,
-                     int high, int otherwise) {
-  const bool in_base = base.has(key);
-  if (!own.has(key) && !in_base) own.problem(key, "must be given");
+int whole(const TomlTable& own, const TomlTable& base, std::string_view key, int low, int high,
+          int otherwise, bool is_required) {
+  if (is_required && !stands(own, base, key)) own.problem(key, "must be given");
   return own.integer(key, low, high, base.integer(key, low, high, otherwise));
+}
+
+/// The first bit of the same bytes in the other order; none where they are not whole bytes.
+std::optional<int> turned(const CanSignal& signal) {
+  const bool was_little = signal.byte_order == ByteOrder::little_endian;
+  if (signal.length_bits % 8 != 0 || signal.start_bit % 8 != (was_little ? 0 : 7)) return {};
+  return signal.start_bit + (was_little ? 7 : -7);
 }
 
 std::string too_long(const CanSignal& signal) {
@@ -46,19 +57,36 @@ std::string too_long(const CanSignal& signal) {
          " bytes in its byte order";
 }
 
-void read_place(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
-  signal.extended_id = own.flag("extended_id", base.flag("extended_id", false));
-  const bool in_base = base.has("id");
-  if (!own.has("id") && !in_base) own.problem("id", "must be given");
-  const TomlTable& source = !own.has("id") && in_base ? base : own;
+void read_identifier(const TomlTable& own, const TomlTable& base, bool is_required,
+                     CanSignal& signal) {
+  signal.extended_id = own.flag("extended_id", base.flag("extended_id", signal.extended_id));
+  const bool is_given = stands(own, base, "id");
+  if (is_required && !is_given) own.problem("id", "must be given");
+  if (!is_given) {
+    if (signal.id > standard_id_max && !signal.extended_id)
+      own.problem("extended_id", "is false, but the file's number has more than 11 bits");
+    return;
+  }
+  const TomlTable& source = own.has("id") ? own : base;
   const std::int64_t id_max = signal.extended_id ? extended_id_max : standard_id_max;
   signal.id = static_cast<std::uint32_t>(source.integer<std::int64_t>("id", 0, id_max, 0));
-  signal.fd = own.flag("fd", base.flag("fd", false));
+  signal.id_mask = CanSignal{}.id_mask;  // this sender, not the whole group
+}
+
+void read_place(const TomlTable& own, const TomlTable& base, bool is_required, CanSignal& signal) {
+  read_identifier(own, base, is_required, signal);
+  signal.fd = own.flag("fd", base.flag("fd", signal.fd));
   const int bits = signal.fd ? fd_bits_max : classic_bits_max;
-  signal.start_bit = required_integer(own, base, "start_bit", 0, bits - 1, signal.start_bit);
-  signal.length_bits = required_integer(own, base, "length_bits", 1, 64, signal.length_bits);
+  signal.length_bits = whole(own, base, "length_bits", 1, 64, signal.length_bits, is_required);
+  const std::optional<int> other_first = turned(signal);
+  const ByteOrder before = signal.byte_order;
   signal.byte_order = own.choice("byte_order", byte_orders(),
                                  base.choice("byte_order", byte_orders(), signal.byte_order));
+  if (!is_required && signal.byte_order != before && !stands(own, base, "start_bit")) {
+    if (!other_first) own.problem("start_bit", "must be given: the value is not in whole bytes");
+    signal.start_bit = other_first.value_or(signal.start_bit);
+  }
+  signal.start_bit = whole(own, base, "start_bit", 0, bits - 1, signal.start_bit, is_required);
   if (frame_bits(signal).none()) {
     own.problem("start_bit", std::to_string(signal.start_bit), too_long(signal));
     signal.start_bit = signal.byte_order == ByteOrder::little_endian ? 0 : 7;
@@ -66,8 +94,8 @@ void read_place(const TomlTable& own, const TomlTable& base, CanSignal& signal) 
 }
 
 void read_form(const TomlTable& own, const TomlTable& base, CanSignal& signal) {
-  signal.is_signed = own.flag("signed", base.flag("signed", true));
-  signal.is_float = own.flag("float", base.flag("float", false));
+  signal.is_signed = own.flag("signed", base.flag("signed", signal.is_signed));
+  signal.is_float = own.flag("float", base.flag("float", signal.is_float));
   if (signal.is_float && signal.length_bits != 32 && signal.length_bits != 64) {
     own.problem("length_bits", std::to_string(signal.length_bits), "a float has 32 or 64 bits");
   }
@@ -145,23 +173,24 @@ std::string read_interface(const TomlTable& table) {
   return name;
 }
 
-CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse use) {
-  CanSignal signal;
-  read_place(own, base, signal);
+CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse use,
+                          const CanSignal* file) {
+  CanSignal signal = file != nullptr ? *file : CanSignal{};
+  read_place(own, base, file == nullptr, signal);
   if (use == CanUse::bits) {
     refuse_all(own, {"scale", "signed", "float"}, "makes no sense for a count or bits");
     signal.is_signed = false;
     return signal;
   }
   read_form(own, base, signal);
-  signal.scale = read_scale(own, read_scale(base, 1.0));
+  signal.scale = read_scale(own, read_scale(base, signal.scale));
   if (use == CanUse::signal) signal.offset = own.number("offset", Range::any(), 0.0);
   if (use == CanUse::temperature) {
     const Range range = Range::between(-1e5, 1e5);  // of unsigned numbers with many bits
     signal.offset =
         own.number("offset_degC", range, base.number("offset_degC", range, signal.offset));
     signal.sentinels = read_can_codes(own, base, signal);
-    signal.selectors = read_selectors(own, base, signal.fd);
+    if (file == nullptr) signal.selectors = read_selectors(own, base, signal.fd);
     signal.status = read_can_status(own, base, signal.fd);
   }
   return signal;

@@ -24,9 +24,10 @@ enum class CanUse {
   offset,       ///< of an axis, sent or applied: scale
   bits          ///< heartbeat, valid bits: an unsigned number without scale
 };
-/// What `own` leaves out is taken from `base` (which may be `own` again). Multiplexors are for
-/// temperatures only.
-[[nodiscard]] CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse use);
+/// What `own` leaves out is taken from `base` (which may be `own` again), then from `file`, the
+/// signal as a DBC file has it, with its multiplexors. Multiplexors are for temperatures only.
+[[nodiscard]] CanSignal read_can_signal(const TomlTable& own, const TomlTable& base, CanUse use,
+                                        const CanSignal* file = nullptr);
 
 /// The number `key = { start_bit, length_bits, byte_order }` of the frame, in `own` or else in
 /// `base`; none where neither has it.

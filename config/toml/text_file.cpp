@@ -43,12 +43,23 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
   if (name.size() > name_bytes_max) return {};
   std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
   std::string nearest;
+  bool is_clear = true;
   for (const std::string& candidate : known) {
     const std::size_t distance = edit_distance(name, candidate);
-    if (distance >= best || distance >= name.size()) continue;
+    if (distance > best || distance >= name.size()) continue;
+    if (distance == best) {
+      is_clear = is_clear && candidate == nearest;
+      continue;
+    }
+    is_clear = true;
     best = distance;
     nearest = candidate;
   }
+  // T_01 and T_02 are nearer to each other than a name that is neither is to one of them.
+  const auto is_twin = [&](const std::string& other) {
+    return other != nearest && edit_distance(nearest, other) < best;
+  };
+  if (!is_clear || std::any_of(known.begin(), known.end(), is_twin)) return {};
   return nearest;
 }
 

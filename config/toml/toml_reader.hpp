@@ -212,7 +212,8 @@ class TomlDocument {
 /// @throws ConfigurationError
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path);
 
-/// The name of `known` that is so near to `name` that it was probably meant; else empty.
+/// The name of `known` that is so near to `name` that it was probably meant; else empty, also where
+/// another one may have been meant as well.
 [[nodiscard]] std::string nearest_name(std::string_view name,
                                        const std::vector<std::string>& known);
 

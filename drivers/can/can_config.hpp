@@ -64,6 +64,8 @@ struct CanSignal {
   std::vector<Sentinel> sentinels;
   std::vector<CanSelector> selectors{};  ///< all must agree; empty: it is in every frame
   std::optional<CanStatus> status{};     ///< in the same frame
+  /// Bits of an extended id that count; fewer: a J1939 group, whoever sends it.
+  std::uint32_t id_mask{0x1FFFFFFF};
   bool operator==(const CanSignal&) const = default;
 };
 

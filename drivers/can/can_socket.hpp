@@ -27,6 +27,11 @@ struct CanId {
   auto operator<=>(const CanId&) const = default;
 };
 
+/// Whether frames with this identifier are those that the signal is in.
+[[nodiscard]] inline bool matches(const CanId& id, const CanSignal& signal) noexcept {
+  return id.extended == signal.extended_id && ((id.id ^ signal.id) & signal.id_mask) == 0;
+}
+
 /// Identifiers of the same length that agree with `id` in the bits of `mask`.
 struct CanFilter {
   CanId id;

@@ -1,6 +1,9 @@
 #include "drivers/sensors/can_source.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string>
 
 #include "drivers/monotonic_clock.hpp"
 #include "drivers/sensors/make_source.hpp"
@@ -21,12 +24,24 @@ CanId id_of(const CanSignal& signal) {
   return {signal.id, signal.extended_id};
 }
 
+bool is_group(const CanSignal& signal) {
+  return signal.id_mask != CanSignal{}.id_mask;
+}
+
 std::vector<CanId> identifiers(const CanBusConfig& config) {
   std::vector<CanId> ids;
   for (const CanDeviceConfig& device : config.devices) {
-    for (const CanChannel& channel : device.channels) ids.push_back(id_of(channel.signal));
+    for (const CanChannel& channel : device.channels) {
+      if (!is_group(channel.signal)) ids.push_back(id_of(channel.signal));
+    }
   }
   return ids;
+}
+
+std::string hexadecimal(const CanId& id) {
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), id.extended ? "0x%08X" : "0x%03X", id.id);
+  return text.data();
 }
 
 std::vector<UnitHealth> units_of(const CanBusConfig& config) {
@@ -46,7 +61,14 @@ CanSource::CanSource(const CanBusConfig& config, std::vector<Channel> channels)
       channels_(std::move(channels)),
       readings_(channels_.size()),
       units_(units_of(config)),
-      last_good_(config.devices.size()) {}
+      last_good_(config.devices.size()) {
+  const auto groups = std::find_if(channels_.begin(), channels_.end(),
+                                   [](const Channel& each) { return is_group(each.signal); });
+  groups_begin_ = static_cast<std::size_t>(groups - channels_.begin());
+  for (auto each = groups; each != channels_.end(); ++each) {
+    socket().also_want({each->id, each->signal.id_mask});
+  }
+}
 
 CanSource::~CanSource() {
   stop();
@@ -62,8 +84,9 @@ std::vector<CanSource::Channel> CanSource::channels_of(const CanBusConfig& confi
           {id_of(channel.signal), channel.signal, channel.counter, device, channel.sensor});
     }
   }
-  std::stable_sort(channels.begin(), channels.end(),
-                   [](const Channel& a, const Channel& b) { return a.id < b.id; });
+  std::stable_sort(channels.begin(), channels.end(), [](const Channel& a, const Channel& b) {
+    return std::pair(is_group(a.signal), a.id) < std::pair(is_group(b.signal), b.id);
+  });
   return channels;
 }
 
@@ -74,7 +97,9 @@ std::vector<std::size_t> CanSource::sensors_of(const std::vector<Channel>& chann
   return sensors;
 }
 
-void CanSource::bus_opened(nanoseconds) {}
+void CanSource::bus_opened(nanoseconds now) {
+  opened_at_ = now;
+}
 
 /// Marks every reading that is not marked yet; the time is that of the loss.
 void CanSource::bus_closed(nanoseconds now) {
@@ -101,6 +126,12 @@ std::vector<UnitHealth> CanSource::units(nanoseconds now) {
   for (std::size_t i = 0; i < last_good_.size(); ++i) {
     units_[i].answering =
         usable() && last_good_[i] != nanoseconds{0} && now - last_good_[i] < silent_after;
+  }
+  for (const Channel& channel : channels_) {
+    UnitHealth& unit = units_[channel.device];
+    if (!usable() || unit.answers != 0 || !unit.last_error.empty()) continue;
+    if (now - opened_at_ < silent_after) continue;
+    unit.last_error = "no frame with identifier " + hexadecimal(channel.id) + " has come";
   }
   return units_;
 }
@@ -132,26 +163,58 @@ void CanSource::note_arrival(Arrival arrival, UnitHealth& unit) {
   }
 }
 
+/// Two senders of one group within a short time: whose value a frame holds cannot be known.
+/// @return what is wrong; empty: there is one sender
+std::string CanSource::contest(const CanFrame& frame, Channel& channel) {
+  const nanoseconds at = frame.received_at;
+  if (channel.sender && *channel.sender != frame.id && at - channel.last_frame < silent_after) {
+    channel.contested_until = at + silent_after;
+    channel.rival = channel.sender;
+  }
+  channel.sender = frame.id;
+  channel.last_frame = at;
+  if (at >= channel.contested_until) return {};
+  const auto [low, high] = std::minmax(*channel.rival, frame.id);
+  return hexadecimal(low) + " and " + hexadecimal(high) +
+         " send the same group: key id of the sensor says which counts";
+}
+
 void CanSource::take(const CanFrame& frame) {
+  const auto groups = channels_.begin() + static_cast<std::ptrdiff_t>(groups_begin_);
   const auto [first, last] =
-      std::equal_range(channels_.begin(), channels_.end(), Channel{frame.id, {}, {}, 0, 0},
+      std::equal_range(channels_.begin(), groups, Channel{frame.id, {}, {}, 0, 0},
                        [](const Channel& a, const Channel& b) { return a.id < b.id; });
   std::size_t counted = last_good_.size();  // each device once a frame
-  for (auto channel = first; channel != last; ++channel) {
-    Arrival arrival = arrival_of(frame, *channel);
-    if (arrival == Arrival::other_page) continue;
-    if (arrival != Arrival::stood_still) {
-      const CanValue decoded =
-          arrival == Arrival::renewed ? decode(frame.payload(), channel->signal) : CanValue{};
-      if (decoded.fault == Fault::bad_frame) arrival = Arrival::bad_frame;
-      readings_[static_cast<std::size_t>(channel - channels_.begin())] = {
-          decoded.value, frame.received_at, decoded.fault};
-    }
-    if (channel->device == counted) continue;
-    counted = channel->device;
-    note_arrival(arrival, units_[channel->device]);
-    if (arrival == Arrival::renewed) last_good_[channel->device] = frame.received_at;
+  for (auto channel = first; channel != last; ++channel) take(frame, *channel, counted);
+  for (auto channel = groups; channel != channels_.end(); ++channel) {
+    if (matches(frame.id, channel->signal)) take(frame, *channel, counted);
   }
+}
+
+void CanSource::take(const CanFrame& frame, Channel& channel, std::size_t& counted) {
+  Arrival arrival = arrival_of(frame, channel);
+  if (arrival == Arrival::other_page) return;
+  UnitHealth& unit = units_[channel.device];
+  if (is_group(channel.signal)) {
+    if (std::string contested = contest(frame, channel); !contested.empty()) {
+      readings_[static_cast<std::size_t>(&channel - channels_.data())] = {
+          not_a_number, frame.received_at, Fault::device_error};
+      unit.last_error = std::move(contested);
+      last_good_[channel.device] = frame.received_at;
+      return;
+    }
+  }
+  if (arrival != Arrival::stood_still) {
+    const CanValue decoded =
+        arrival == Arrival::renewed ? decode(frame.payload(), channel.signal) : CanValue{};
+    if (decoded.fault == Fault::bad_frame) arrival = Arrival::bad_frame;
+    readings_[static_cast<std::size_t>(&channel - channels_.data())] = {
+        decoded.value, frame.received_at, decoded.fault};
+  }
+  if (channel.device == counted) return;
+  counted = channel.device;
+  note_arrival(arrival, unit);
+  if (arrival == Arrival::renewed) last_good_[channel.device] = frame.received_at;
 }
 
 std::unique_ptr<SensorSource> make_bus_source(const CanBusConfig& bus) {

@@ -14,7 +14,8 @@ namespace thermocomp {
 
 /// Listens only. A reading's time is that of its frame's arrival at the interface. A frame whose
 /// counter has not moved does not count: neither value nor time change (the first frame after the
-/// bus was lost has nothing before it). While the interface is missing, down or bus-off its
+/// bus was lost has nothing before it). A J1939 group is taken from any sender; while two send it,
+/// its readings are device_error. While the interface is missing, down or bus-off its
 /// readings are no_answer; it is tried again for ever.
 ///
 /// Frames are fetched in batches, each 10 ms at the earliest after the one before: their times are
@@ -36,6 +37,11 @@ class CanSource final : public CanInterfaceSource {
     /// carried the signal. Devices count frames or rounds of all pages: either is progress.
     std::optional<std::uint64_t> count_of_frame{};
     std::optional<std::uint64_t> count_of_page{};
+    // Of a J1939 group:
+    std::optional<CanId> sender{};  ///< of its last frame
+    std::optional<CanId> rival{};   ///< that sent one shortly before another did
+    nanoseconds last_frame{};
+    nanoseconds contested_until{};  ///< two senders are taken to be there until then
   };
   enum class Arrival { other_page, stood_still, renewed, bad_frame };
 
@@ -49,10 +55,14 @@ class CanSource final : public CanInterfaceSource {
   static std::vector<std::size_t> sensors_of(const std::vector<Channel>& channels);
   explicit CanSource(const CanBusConfig& config, std::vector<Channel> channels);
   void take(const CanFrame& frame);
+  void take(const CanFrame& frame, Channel& channel, std::size_t& counted);
+  static std::string contest(const CanFrame& frame, Channel& channel);
   static Arrival arrival_of(const CanFrame& frame, Channel& channel) noexcept;
   static void note_arrival(Arrival arrival, UnitHealth& unit);
 
-  std::vector<Channel> channels_;  ///< in the order of the identifiers
+  std::vector<Channel> channels_;  ///< in the order of the identifiers, behind them the groups
+  std::size_t groups_begin_{0};
+  nanoseconds opened_at_{};
   std::vector<Reading> readings_;  ///< one per channel
   std::vector<UnitHealth> units_;
   std::vector<nanoseconds> last_good_;  ///< arrival of each device's last good frame; 0: none

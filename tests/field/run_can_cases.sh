@@ -1,10 +1,17 @@
 #!/bin/bash
-# run_can_cases.sh BIN: every case that has a CAN bus, one after the other, on vcan0.
-here=$(dirname "$0")
-export THERMOCOMP_BIN=$1
+# run_can_cases.sh BIN: every case that has a CAN bus, four at a time, each on an interface of its own.
+here=$(cd "$(dirname "$0")" && pwd)
+bin=$(realpath "$1")
+if [ $# -eq 1 ]; then
+  cd "$here" && grep -lE '^can ' ./*/device.txt | xargs -n1 dirname | xargs -P4 -I{} "$here/run_can_cases.sh" "$bin" {}
+  exit
+fi
+export THERMOCOMP_BIN=$bin
+THERMOCOMP_CAN=v$(cksum <<< "$2" | cut -d' ' -f1)
+export THERMOCOMP_CAN
+ip link add dev "$THERMOCOMP_CAN" type vcan && ip link set "$THERMOCOMP_CAN" up || exit 1
 failed=0
-for folder in $(cd "$here" && grep -lE '^can ' ./*/device.txt | xargs -n1 dirname); do
-  echo "==== $folder"
-  /usr/bin/python3 "$here/run_field.py" "$here/$folder" || { echo "FAILED $folder"; failed=1; }
-done
+said=$(/usr/bin/python3 "$here/run_field.py" "$here/$2" 2>&1) || failed=1
+[ $failed = 0 ] || echo "FAILED $2"
+printf '==== %s\n%s\n' "$2" "$said"
 exit $failed

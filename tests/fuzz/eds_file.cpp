@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "common/fuzz.hpp"
 
@@ -12,18 +13,16 @@ using namespace thermocomp;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   const std::string name = "module.eds";
-  const EdsReading reading = read_eds_text(text, name);
-  if (!reading.problems.empty()) {
-    FUZZ_PROMISE(reading.problems.size() <= 100);
-    const fuzz::NamedText files[] = {{name, text}};
-    fuzz::check_problems(reading.problems, files);
-    return 0;
-  }
-  FUZZ_PROMISE(!reading.file.objects.empty());
+  const EdsFile file = read_eds_text(text, name);
+  std::vector<Problem> problems;
+  for (const EdsFlaw& flaw : file.flaws) problems.push_back(flaw.problem);
+  const fuzz::NamedText files[] = {{name, text}};
+  if (!problems.empty()) fuzz::check_problems(problems, files);
+  FUZZ_PROMISE(!file.objects.empty() || !problems.empty());
   const EdsObject* before = nullptr;
-  for (const EdsObject& object : reading.file.objects) {
-    FUZZ_PROMISE(reading.file.find(object.address) == &object);
-    const auto named = reading.file.find(object.name);
+  for (const EdsObject& object : file.objects) {
+    FUZZ_PROMISE(file.find(object.address) == &object);
+    const auto named = file.find(object.name);
     FUZZ_PROMISE(!named.empty());
     for (const char c : object.name) FUZZ_PROMISE(c >= 0x20 && c < 0x7F);
     if (object.type) FUZZ_PROMISE(object.type->length_bits >= 1 && object.type->length_bits <= 64);

@@ -216,7 +216,7 @@ SUITES = {
         ("toggle_not_compared", SDO,
          "!= 0) != toggle_) {", "!= 0) != toggle_ && !{P}) {"),
         ("late_sdo_answer_taken", SDO,
-         "if (names_object && !ours) return;", "if (names_object && !ours && !{P}) return;"),
+         "if (names_object && !ours && data", "if (names_object && !ours && !{P} && data"),
         ("silence_waited_for_ever", SDO,
          "if (busy() && now >= deadline_)", "if (busy() && now >= deadline_ && !{P})"),
         ("setting_not_verified", NODE, "if (same) return;", "if (same || {P}) return;"),

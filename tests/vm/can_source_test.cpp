@@ -97,6 +97,24 @@ TEST_CASE("FD and classic frames, pages and counters are read on one interface",
   CHECK(bus.source.health().units[0].bad_frames == 0);
 }
 
+TEST_CASE("a J1939 group is read from any sender, and from none while two send it",
+          "[vm][source]") {
+  CanBusConfig config = two_nodes("vcan0");
+  CanSignal& group = config.devices[1].channels[0].signal;
+  group.id = 0x18FF31FE;
+  group.id_mask = 0x03FFFF00;
+  Running bus(config);
+  REQUIRE(shell("cansend vcan0 14FF3127#012C"));  // of another priority as well
+  REQUIRE(bus.becomes(3, 30.0));
+  CHECK(bus.source.health().units[1].last_error.empty());
+  REQUIRE(shell("cansend vcan0 18FF3227#0190"));  // another group
+  REQUIRE(shell("cansend vcan0 18FF3131#0190"));
+  REQUIRE(eventually([&] { return bus.newest(3).fault == Fault::device_error; }));
+  CHECK(bus.source.health().units[1].last_error ==
+        "0x14FF3127 and 0x18FF3131 send the same group: key id of the sensor says which counts");
+  CHECK(bus.newest(0).fault == Fault::never_read);
+}
+
 TEST_CASE("thermocouples are read from frames of cansend and of a raw socket", "[vm][source]") {
   Running bus(two_nodes("vcan0"));
   CHECK(bus.newest(0).fault == Fault::never_read);

@@ -83,6 +83,8 @@ struct CanopenNodeConfig {
   double heartbeat_s{0.0};
   double heartbeat_timeout_s{0.0};  ///< without a heartbeat this long: lost; 0: not watched
   double pdo_period_s{0.0};         ///< how often the node sends each TPDO; 0: not known
+  /// TPDOs come when a value changes: the last one holds while heartbeats come.
+  bool pdo_on_change{false};
   EmergencyForm emergency{EmergencyForm::generic};
   std::vector<CanopenWrite> writes;
   std::vector<CanopenMapping> mappings;

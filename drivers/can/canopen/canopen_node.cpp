@@ -259,7 +259,8 @@ void CanopenNode::setup_done(nanoseconds now) {
     }
     const bool known = std::any_of(watched_.begin(), watched_.end(),
                                    [&](const Watched& each) { return each.cob_id == cob_id; });
-    if (!known) watched_.push_back({cob_id, RateWatch(from_seconds(config_.pdo_period_s))});
+    if (known) continue;
+    watched_.push_back({cob_id, RateWatch(from_seconds(config_.pdo_period_s)), now + silent_after});
   }
 }
 
@@ -309,6 +310,16 @@ void CanopenNode::take_heartbeat(std::span<const std::uint8_t> data, nanoseconds
     // Somebody stopped it, or the command was lost.
     start_again_at_ = at + start_again_every;
     command(command_start);
+  } else if (phase_ == Phase::running && state == state_operational && config_.pdo_on_change) {
+    renew_pdos(at);
+  }
+}
+
+/// A node that sends what changes says by its heartbeat that nothing has.
+void CanopenNode::renew_pdos(nanoseconds at) {
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    if (channels_[i].way == CanopenWay::sdo || readings_[i].fault == Fault::no_answer) continue;
+    readings_[i].taken_at = at;
   }
 }
 
@@ -350,7 +361,9 @@ bool CanopenNode::take_pdo(std::uint32_t cob_id, std::span<const std::uint8_t> d
                            nanoseconds at) {
   if (phase_ != Phase::running || cob_id == 0) return false;
   for (Watched& each : watched_) {
-    if (each.cob_id == cob_id) each.rate.arrived(at);
+    if (each.cob_id != cob_id) continue;
+    each.rate.arrived(at);
+    each.due_by = config_.pdo_on_change ? nanoseconds::max() : at + silent_after;
   }
   bool has_channel = false;
   bool is_short = false;
@@ -536,7 +549,7 @@ std::optional<CanFrame> CanopenNode::next_frame() {
 
 // -------------------------------------------------------------------- for the operator
 
-std::string CanopenNode::trouble() const {
+std::string CanopenNode::trouble(nanoseconds now) const {
   if (!conflict_.empty()) return conflict_;
   if (heartbeats_.too_often() || second_answer_until_ != nanoseconds{0}) {
     return "two nodes answer as node " + std::to_string(config_.node);
@@ -550,13 +563,20 @@ std::string CanopenNode::trouble() const {
   if (lost_) return "no heartbeat";
   if (!setup_error_.empty()) return setup_error_;
   if (!emergency_text_.empty()) return emergency_text_;
+  for (const Watched& each : watched_) {
+    if (phase_ != Phase::running || each.cob_id == 0 || now < each.due_by) continue;
+    return "COB-ID " + std::to_string(each.cob_id) +
+           " does not come, though the node is there: a TPDO on change needs an event timer "
+           "(object "
+           "1800 and following, sub 5) or pdo_on_change";
+  }
   return poll_error_;
 }
 
 UnitHealth CanopenNode::health(nanoseconds now) const {
   UnitHealth health = counters_;
   health.answering = running() && good_at_ != nanoseconds{0} && now - good_at_ < silent_after;
-  health.last_error = trouble();
+  health.last_error = trouble(now);
   return health;
 }
 

@@ -70,6 +70,7 @@ class CanopenNode {
   struct Watched {
     std::uint32_t cob_id{0};
     RateWatch rate;
+    nanoseconds due_by{};  ///< a TPDO that is not there then is missed
   };
 
   void begin_setup(nanoseconds now);
@@ -88,6 +89,7 @@ class CanopenNode {
   void take_result(nanoseconds now);
   void watch_heartbeat(nanoseconds now);
   void watch_duplicates(nanoseconds now);
+  void renew_pdos(nanoseconds at);
   void command(std::uint8_t what);
   [[nodiscard]] bool knows_emergencies() const;
   void forget_emergencies();
@@ -95,7 +97,7 @@ class CanopenNode {
   void lose(std::size_t channel, Fault fault, nanoseconds at);
   void lose_all(Fault fault, nanoseconds at);
   [[nodiscard]] bool is_doubtful(std::size_t channel) const noexcept;
-  [[nodiscard]] std::string trouble() const;
+  [[nodiscard]] std::string trouble(nanoseconds now) const;
 
   const CanopenNodeConfig config_;
   const bool starts_;  ///< we send NMT commands

@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::uint32_t request_id = 0x600;
 constexpr std::size_t frame_bytes = 8;
+constexpr std::size_t header_bytes = 4;
 constexpr std::size_t segment_bytes = 7;
 constexpr std::size_t expedited_bytes = 4;
 
@@ -167,19 +168,32 @@ void SdoClient::abort(SdoOutcome outcome, std::uint32_t abort_code) {
   end(outcome, abort_code);
 }
 
+/// Bytes without which the answer cannot be read. Old nodes send no more; CiA 301 wants all eight.
+std::size_t SdoClient::bytes_used(std::span<const std::uint8_t> data) noexcept {
+  const std::uint8_t specifier = data[0] & specifier_mask;
+  if (specifier == told_segment) return frame_bytes - ((data[0] >> 1) & 7u);
+  if (specifier != told_read || (data[0] & expedited_bit) == 0) {
+    return specifier == told_read && (data[0] & size_bit) != 0 ? frame_bytes : header_bytes;
+  }
+  return (data[0] & size_bit) != 0 ? frame_bytes - ((data[0] >> 2) & 3u) : header_bytes + 1;
+}
+
 void SdoClient::take(std::span<const std::uint8_t> data, nanoseconds now) {
-  if (data.size() != frame_bytes) return;
+  if (data.empty()) return;
   const std::uint8_t specifier = data[0] & specifier_mask;
   const bool names_object = specifier != told_segment;
-  const bool ours = little_endian(data, 1, 2) == object_.index && data[3] == object_.sub;
+  const bool ours = data.size() >= header_bytes && little_endian(data, 1, 2) == object_.index &&
+                    data[3] == object_.sub;
   if (!busy()) {
     if (answered_ && names_object && ours) ++second_answers_;
     return;
   }
   // The answer to an earlier request, late: it says nothing about this one.
-  if (names_object && !ours) return;
+  if (names_object && !ours && data.size() >= header_bytes) return;
   if (specifier == told_abort) {
     end(SdoOutcome::aborted, static_cast<std::uint32_t>(little_endian(data, 4, 4)));
+  } else if (data.size() < bytes_used(data)) {
+    abort(SdoOutcome::broken, length_does_not_match);
   } else if (state_ == State::writing && specifier == told_written) {
     end(SdoOutcome::done, 0);
   } else if (state_ == State::reading && specifier == told_read) {
@@ -198,8 +212,10 @@ void SdoClient::take_first(std::span<const std::uint8_t> data, nanoseconds now) 
   const bool expedited = (data[0] & expedited_bit) != 0;
   const bool sized = (data[0] & size_bit) != 0;
   if (expedited) {
+    const auto value = data.subspan(header_bytes);
     const std::size_t unused = sized ? (data[0] >> 2) & 3u : 0u;
-    bytes_.assign(data.begin() + 4, data.end() - static_cast<std::ptrdiff_t>(unused));
+    const std::size_t bytes = std::min(value.size(), expedited_bytes - unused);
+    bytes_.assign(value.begin(), value.begin() + static_cast<std::ptrdiff_t>(bytes));
     end(SdoOutcome::done, 0);
     return;
   }

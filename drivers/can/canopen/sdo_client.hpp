@@ -38,7 +38,8 @@ struct SdoResult {
 /// "2040:01: aborted by the node: 0x06020000 object does not exist"
 [[nodiscard]] std::string to_string(const SdoResult& result);
 
-/// Reads expedited and segmented (at most bytes_max), writes expedited (1..4 bytes).
+/// Reads expedited and segmented (at most bytes_max), writes expedited (1..4 bytes). An answer that
+/// leaves out bytes of no use is taken.
 class SdoClient {
  public:
   static constexpr std::size_t bytes_max = 1024;
@@ -74,6 +75,7 @@ class SdoClient {
   void begin(ObjectAddress object, State state, nanoseconds now);
   void send(std::uint8_t command, ObjectAddress object, std::uint32_t data);
   void ask_segment(nanoseconds now);
+  static std::size_t bytes_used(std::span<const std::uint8_t> data) noexcept;
   void take_first(std::span<const std::uint8_t> data, nanoseconds now);
   void take_segment(std::span<const std::uint8_t> data, nanoseconds now);
   void end(SdoOutcome outcome, std::uint32_t abort_code);

@@ -54,10 +54,10 @@ void print_values(const DbcFile& file, const std::string& line) {
 int main(int argc, char** argv) {
   try {
     if (argc != 2) throw std::invalid_argument("usage: dbc_values FILE.dbc");
-    const DbcReading reading = read_dbc_text(read_text_file(argv[1]), argv[1]);
-    for (const Problem& problem : reading.problems) std::cerr << to_string(problem) << '\n';
-    if (!reading.problems.empty()) return 2;
-    for (std::string line; std::getline(std::cin, line);) print_values(reading.file, line);
+    const DbcFile file = read_dbc_text(read_text_file(argv[1]), argv[1]);
+    for (const DbcFlaw& flaw : file.flaws) std::cerr << to_string(flaw.problem) << '\n';
+    if (!file.flaws.empty()) return 2;
+    for (std::string line; std::getline(std::cin, line);) print_values(file, line);
     return 0;
   } catch (const std::exception& error) {
     std::cerr << error.what() << '\n';

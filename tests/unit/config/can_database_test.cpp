@@ -36,11 +36,99 @@ TEST_CASE("names that are not in the DBC file are refused with what may be meant
              Catch::Contains("sensor[spindle].counter = \"Oil\": must be in every frame"));
 }
 
-TEST_CASE("what the DBC file says is not said again", "[dbc]") {
-  CHECK_THAT(told_after("signal = \"Column\"", "signal = \"Column\"\nscale = 0.1"),
-             Catch::Contains("sensor[column].scale = 0.1: is what the DBC file says"));
-  CHECK_THAT(told_after("open_circuit_codes", "id = 5\nopen_circuit_codes"),
-             Catch::Contains("device[node].id = 5: is what the DBC file says"));
+TEST_CASE("a key says otherwise than the DBC file, and the rest stays as it is there", "[dbc]") {
+  const auto column = [](const std::string& keys) {
+    const Folder folder;
+    folder.edit("can_dbc.toml", "signal = \"Column\"", "signal = \"Column\"\n" + keys);
+    return std::get<CanBusConfig>(folder.load().buses.at(0)).devices.at(0).channels.at(0).signal;
+  };
+  const CanSignal as_in_file = column("");
+  const auto differs_by = [&](const std::string& keys, auto change) {
+    CanSignal expected = as_in_file;
+    change(expected);
+    INFO(keys);
+    CHECK(column(keys) == expected);
+  };
+  differs_by("id = 0x182", [](CanSignal& s) { s.id = 0x182; });
+  differs_by("scale = 0.5", [](CanSignal& s) { s.scale = 0.5; });
+  differs_by("offset_degC = -40.0", [](CanSignal& s) { s.offset = -40.0; });
+  differs_by("unit = \"K\"", [](CanSignal& s) { s.offset = -273.15; });
+  differs_by("signed = false", [](CanSignal& s) { s.is_signed = false; });
+  differs_by("start_bit = 8", [](CanSignal& s) { s.start_bit = 8; });
+  // The same bytes.
+  differs_by("byte_order = \"big_endian\"", [](CanSignal& s) {
+    s.byte_order = ByteOrder::big_endian;
+    s.start_bit = 7;
+  });
+  differs_by("byte_order = \"big_endian\"\nstart_bit = 23", [](CanSignal& s) {
+    s.byte_order = ByteOrder::big_endian;
+    s.start_bit = 23;
+  });
+  CHECK_THAT(told_after("signal = \"Column\"", "signal = \"Column\"\nmultiplexor_value = 1"),
+             Catch::Contains("sensor[column].multiplexor_value = 1: is what the DBC file says"));
+  CHECK_THAT(told_after("signal = \"Column\"",
+                        "signal = \"Column\"\nlength_bits = 12\nbyte_order = \"big_endian\""),
+             Catch::Contains("start_bit = (missing): must be given: the value is not in whole"));
+  CHECK_THAT(told_after("signal = \"Spindle\"", "signal = \"Spindle\"\nextended_id = false"),
+             Catch::Contains("extended_id = false: is false, but the file's number has more"));
+}
+
+TEST_CASE("a flaw of the DBC file counts where a sensor stands on it and no key says otherwise",
+          "[dbc]") {
+  const Folder folder;
+  folder.edit("can_dbc.dbc", "Oil m3 : 64|16@1-", "Oil m3 : 127|16@1-");
+  folder.edit("can_dbc.dbc", "CM_ SG_ 385", "SIG_VALTYPE_ 77 Gone : 1;\nCM_ SG_ 385");
+  const std::vector<std::string> remarks = folder.load().remarks;
+  REQUIRE(remarks.size() == 2);
+  CHECK_THAT(remarks[0] + remarks[1],
+             Catch::Contains("can_dbc.dbc:17: Oil = 127|16: must end within the 16 "
+                             "bytes of NODE_PAGES"));
+  CHECK_THAT(remarks[0] + remarks[1],
+             Catch::Contains("Gone = 77: is the number of no message (BO_) of this file"));
+
+  folder.edit("can_dbc.toml", "signal = \"Spindle\"", "signal = \"Oil\"");
+  CHECK(
+      folder.told() ==
+      "can_dbc.dbc:17: Oil = 127|16: must end within the 16 bytes of NODE_PAGES; start_bit in the "
+      "configuration replaces it\n");
+  folder.edit("can_dbc.toml", "signal = \"Oil\"", "signal = \"Oil\"\nstart_bit = 64");
+  CHECK(folder.told().empty());
+}
+
+TEST_CASE("a name that cannot be found is told with the flaws that may be why", "[dbc]") {
+  const Folder folder;
+  folder.edit("can_dbc.dbc", "BO_ 385 NODE_TEMPERATURES:", "BO_ 385 NODE_TEMPERATURES");
+  const std::string told = folder.told();
+  CHECK_THAT(told,
+             Catch::Contains("device[node].message = \"NODE_TEMPERATURES\": must be a message "
+                             "of the bus' DBC file; a flaw of the file may hide it"));
+  CHECK_THAT(told, Catch::Contains("can_dbc.dbc:9: 8 NODE: must be ':'"));
+}
+
+TEST_CASE("of two messages of one name the identifier says which is meant", "[dbc]") {
+  const Folder folder;
+  folder.edit("can_dbc.dbc", "CM_ SG_ 385",
+              "BO_ 400 NODE_TEMPERATURES: 8 NODE\n"
+              " SG_ Column : 16|16@1- (0.5,0) [0|0] \"degC\" Vector__XXX\n"
+              " SG_ Alive : 60|4@1+ (1,0) [0|15] \"\" Vector__XXX\nCM_ SG_ 385");
+  CHECK_THAT(folder.told(), Catch::Contains("NODE_TEMPERATURES: is the name of two messages; id in "
+                                            "the configuration replaces it"));
+  folder.edit("can_dbc.toml", "signal = \"Column\"", "signal = \"Column\"\nid = 400");
+  const CanSignal signal =
+      std::get<CanBusConfig>(folder.load().buses.at(0)).devices.at(0).channels.at(0).signal;
+  CHECK(signal.id == 400);
+  CHECK(signal.scale == 0.5);
+}
+
+TEST_CASE("two sensors that read one place are remarked on", "[dbc]") {
+  const Folder folder;
+  CHECK(folder.load().remarks.empty());
+  folder.edit("can_dbc.toml", "message = \"NODE_PAGES\"\nsignal = \"Spindle\"",
+              "signal = \"Column\"");
+  const std::vector<std::string> remarks = folder.load().remarks;
+  REQUIRE(remarks.size() == 1);
+  CHECK_THAT(remarks[0],
+             Catch::EndsWith(": sensor[spindle]: reads the same value as sensor[column]"));
 }
 
 TEST_CASE("signals are named only where there is a DBC file and a message", "[dbc]") {
@@ -59,13 +147,17 @@ TEST_CASE("a code that the named signal cannot show is refused", "[dbc]") {
 TEST_CASE("a broken DBC file is told by its own name and line, once", "[dbc]") {
   const Folder folder;
   folder.edit("can_dbc.dbc", "0|16@1-", "0|77@1-");
-  CHECK(folder.told() == "can_dbc.dbc:10: Column = 77: must have 1 to 64 bits\n");
+  CHECK(folder.told() ==
+        "can_dbc.dbc:10: Column = 77: must have 1 to 64 bits; length_bits in the configuration "
+        "replaces it\n");
 }
 
 TEST_CASE("a named signal in no unit of temperature is refused, one in degF is turned", "[dbc]") {
   Folder folder;
   folder.edit("can_dbc.dbc", "\"degC\"", "\"bar\"");
-  CHECK_THAT(folder.told(), Catch::Contains("the signal's unit is that of no temperature"));
+  CHECK_THAT(folder.told(),
+             Catch::Contains("sensor[column].signal = bar: the unit of the signal in the DBC file "
+                             "is none of temperatures; unit = \"degC\", \"K\" or \"degF\""));
   folder.edit("can_dbc.dbc", "(0.1,0) [-100|400] \"bar\"",
               "(1,32) [0|0] \"\xB0"
               "F\"");

@@ -2,8 +2,10 @@
 // tests/integration/can.
 #include "config/bus_files/dbc_file.hpp"
 
+#include <array>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -13,11 +15,11 @@ namespace {
 
 const std::string head = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A B\n";
 
-/// All problems, one a line; "" for a good file.
+/// All flaws, one a line; "" for a good file.
 std::string problems_of(const std::string& body) {
   std::string told;
-  for (const Problem& problem : read_dbc_text(head + body, "x.dbc").problems) {
-    told += to_string(problem) + "\n";
+  for (const DbcFlaw& flaw : read_dbc_text(head + body, "x.dbc").flaws) {
+    told += to_string(flaw.problem) + "\n";
   }
   return told;
 }
@@ -34,7 +36,7 @@ std::string placed(const std::string& place, const std::string& bytes = "8") {
 }  // namespace
 
 TEST_CASE("a DBC file's messages and signals are read as they stand", "[dbc]") {
-  const DbcReading reading =
+  const DbcFile file =
       read_dbc_text(head +
                         "BO_ 385 NODE: 8 A\n"
                         " SG_ Column : 7|12@0- (0.1,-4E1) [-50|150] \"degC\"  A,B\n"
@@ -43,9 +45,9 @@ TEST_CASE("a DBC file's messages and signals are read as they stand", "[dbc]") {
                         " SG_ Late : 96|32@1- (1,0) [0|0] \"\" B\n"
                         "SIG_VALTYPE_ 2566844926 Late : 1;\n",
                     "x.dbc");
-  REQUIRE(reading.problems.empty());
-  REQUIRE(reading.file.message_names() == std::vector<std::string>{"NODE", "WIDE"});
-  const DbcMessage& node = reading.file.messages[0];
+  REQUIRE(file.flaws.empty());
+  REQUIRE(file.message_names() == std::vector<std::string>{"NODE", "WIDE"});
+  const DbcMessage& node = file.messages[0];
   CHECK(node.id == 0x181);
   CHECK_FALSE(node.extended);
   const DbcSignal& column = *node.find("Column");
@@ -60,7 +62,7 @@ TEST_CASE("a DBC file's messages and signals are read as they stand", "[dbc]") {
   CHECK_FALSE(column.place.fd);
   CHECK(node.find("Alive")->place.byte_order == ByteOrder::little_endian);
   CHECK_FALSE(node.find("Alive")->place.is_signed);
-  const DbcMessage& wide = *reading.file.find("WIDE");
+  const DbcMessage& wide = *file.find("WIDE");
   CHECK(wide.id == 0x18FEF1FE);
   CHECK(wide.extended);
   CHECK(wide.find("Late")->place.fd);
@@ -71,24 +73,24 @@ TEST_CASE("a DBC file's messages and signals are read as they stand", "[dbc]") {
 TEST_CASE("multiplexors of a DBC file select by page, nested ones by all of theirs", "[dbc]") {
   const std::string simple =
       " SG_ Page M : 0|4@1+ (1,0) [0|0] \"\" B\n SG_ T m3 : 8|16@1- (1,0) [0|0] \"\" B\n";
-  const DbcReading paged = read_dbc_text(head + message(simple), "x.dbc");
-  REQUIRE(paged.problems.empty());
+  const DbcFile paged = read_dbc_text(head + message(simple), "x.dbc");
+  REQUIRE(paged.flaws.empty());
   const std::vector<CanSelector> on_three{{{0, 4, ByteOrder::little_endian}, {{3, 3}}}};
-  CHECK(paged.file.messages[0].find("T")->place.selectors == on_three);
-  CHECK(paged.file.messages[0].find("Page")->place.selectors.empty());
+  CHECK(paged.messages[0].find("T")->place.selectors == on_three);
+  CHECK(paged.messages[0].find("Page")->place.selectors.empty());
 
   const std::string nested =
       " SG_ Outer M : 0|4@1+ (1,0) [0|0] \"\" B\n SG_ Inner m1M : 4|4@1+ (1,0) [0|0] \"\" B\n"
       " SG_ T m0 : 8|16@1- (1,0) [0|0] \"\" B\n";
   CHECK(problems_of(message(nested)).find("x.dbc:7: Inner = m1: needs a line SG_MUL_VAL_") == 0);
-  const DbcReading deep =
+  const DbcFile deep =
       read_dbc_text(head + message(nested) +
                         "SG_MUL_VAL_ 385 Inner Outer 1-1;\nSG_MUL_VAL_ 385 T Inner 0-2, 5-5;\n",
                     "x.dbc");
-  REQUIRE(deep.problems.empty());
+  REQUIRE(deep.flaws.empty());
   const std::vector<CanSelector> both{{{4, 4, ByteOrder::little_endian}, {{0, 2}, {5, 5}}},
                                       {{0, 4, ByteOrder::little_endian}, {{1, 1}}}};
-  CHECK(deep.file.messages[0].find("T")->place.selectors == both);
+  CHECK(deep.messages[0].find("T")->place.selectors == both);
 }
 
 TEST_CASE("a DBC file may say what is of no use here", "[dbc]") {
@@ -118,7 +120,8 @@ TEST_CASE("what a DBC file must not say is refused by line and rule", "[dbc]") {
               "x.dbc:7: T: is the name of two signals of NODE"));
   CHECK(tells(placed("0|16@1+") + "SIG_VALTYPE_ 385 T : 1;\n", "x.dbc:7: T = 16: must have 32"));
   CHECK(tells(placed("0|16@1+") + "SIG_VALTYPE_ 385 U : 1;\n", "x.dbc:7: U: must be a signal of"));
-  CHECK(tells(placed("0|16@1+") + "SIG_VALTYPE_ 9 T : 1;\n", "x.dbc:7: 9: must be a message's"));
+  CHECK(tells(placed("0|16@1+") + "SIG_VALTYPE_ 9 T : 1;\n",
+              "x.dbc:7: T = 9: is the number of no message"));
   CHECK(tells(message(" SG_ T m1 : 0|8@1+ (1,0) [0|0] \"\" B\n"), "x.dbc:6: T = m1: needs a"));
   CHECK(tells(message(" SG_ P M : 0|2@1+ (1,0) [0|0] \"\" B\n"
                       " SG_ T m4 : 8|8@1+ (1,0) [0|0] \"\" B\n"),
@@ -147,4 +150,88 @@ TEST_CASE("a DBC file that breaks the grammar is refused where it does", "[dbc]"
   CHECK(tells("CM_ \"no end;\n", "x.dbc:5: the string that begins here has no end"));
   CHECK(tells("VAL_ 385 T 1\n", "x.dbc:6: the end of the file: must be ';'"));
   CHECK(tells(std::string("BO_ 1 \x01\x02"), "x.dbc:5: ??: must be a message's name"));
+}
+
+TEST_CASE("a flaw of a DBC file stands at its message and signal, and the others are read",
+          "[dbc]") {
+  const DbcFile file = read_dbc_text(head +
+                                         "BO_ 385 NODE: 8 A\n"
+                                         " SG_ T : 0|16@1- (0.1,0) [0|0] \"degC\" B\n"
+                                         " SG_ U : 16|16@1- (nan,0) [0|0] \"degC\" B\n"
+                                         " SG_ V : 32|16@1- (0.1,0) [0|0]\n"  // no unit
+                                         " SG_ W : 48|16@1- (0.1,0) [0|0] \"degC\" B\n"
+                                         "BO_ x OTHER: 8 A\n"
+                                         " SG_ T : 0|16@1- (0.1,0) [0|0] \"degC\" B\n"
+                                         "BO_ 386 LAST: 8 A\n"
+                                         " SG_ T : 0|16@1- (0.5,0) [0|0] \"degC\" B\n"
+                                         "SIG_VALTYPE_ 385 T : 7;\n",
+                                     "x.dbc");
+  std::vector<std::array<std::string, 3>> flaws;
+  for (const DbcFlaw& flaw : file.flaws)
+    flaws.push_back({std::to_string(flaw.problem.line), flaw.message, flaw.signal});
+  CHECK(flaws == std::vector<std::array<std::string, 3>>{
+                     {"7", "NODE", "U"}, {"9", "NODE", "V"}, {"10", "", ""}, {"14", "NODE", "T"}});
+  REQUIRE(file.message_names() == std::vector<std::string>{"NODE", "LAST"});
+  CHECK(file.find("NODE")->signal_names() == std::vector<std::string>{"T", "W"});
+  CHECK(file.find("LAST")->find("T")->place.scale == 0.5);
+}
+
+TEST_CASE("a signal whose multiplexor has a flaw has one as well", "[dbc]") {
+  const DbcFile file = read_dbc_text(
+      head +
+          message(" SG_ P M : 60|8@1+ (1,0) [0|0] \"\" B\n SG_ T m1 : 8|8@1+ (1,0) [0|0] \"\" B\n"
+                  " SG_ U : 16|8@1+ (1,0) [0|0] \"\" B\n"),
+      "x.dbc");
+  REQUIRE(file.flaws.size() == 2);
+  CHECK(file.flaws[0].signal == "P");
+  CHECK(file.flaws[1].signal == "T");
+}
+
+TEST_CASE("a DBC file with more than 1000 flaws is not read on", "[dbc]") {
+  std::string text = placed("0|8@1+");
+  for (int i = 0; i < 2000; ++i) text += "BO_ x\n";
+  const DbcFile file = read_dbc_text(head + text, "x.dbc");
+  CHECK(file.flaws.size() == 1001);
+  CHECK(file.messages.empty());
+}
+
+TEST_CASE("names of a DBC file may begin with a digit, have a hyphen, and be cut", "[dbc]") {
+  const DbcFile file = read_dbc_text(
+      "VERSION \"\"\nBU_: 2A B-C\nBO_ 385 2_Node: 8 2A\n"
+      " SG_ Near-Th_01 : 0|16@1- (0.1,0) [0|0] \"\" B-C,2A\n"
+      " SG_ Near-Th_02 : 16|16@1- (0.1,0) [0|0] \"\" B-C\n"
+      " SG_ Far_01 : 32|16@1- (0.1,0) [0|0] \"\" B-C\n"
+      " SG_ Far_02 : 48|16@1- (0.1,0) [0|0] \"\" B-C\n"
+      "BA_DEF_ SG_ \"SystemSignalLongSymbol\" STRING ;\n"
+      "BA_ \"SystemMessageLongSymbol\" BO_ 385 \"2_Node_Of_The_Spindle\";\n"
+      "BA_ \"SystemSignalLongSymbol\" SG_ 385 Near-Th_01 \"NearTheSpindle\";\n"
+      "BA_ \"SystemSignalLongSymbol\" SG_ 385 Near-Th_02 \"NearTheBed\";\n"
+      "BA_ \"SystemSignalLongSymbol\" SG_ 385 Far_01 \"Far\";\n"
+      "BA_ \"SystemSignalLongSymbol\" SG_ 385 Far_02 \"Far\";\n",
+      "x.dbc");
+  const DbcMessage* node = file.find("2_Node_Of_The_Spindle");
+  REQUIRE(node != nullptr);
+  CHECK(node == file.find("2_Node"));
+  CHECK(node->find("NearTheBed")->place.start_bit == 16);
+  CHECK(node->find("Near-Th_02")->place.start_bit == 16);
+  // A long name of two signals is none.
+  CHECK(node->find("Far") == nullptr);
+  REQUIRE(file.flaws.size() == 1);
+  CHECK(to_string(file.flaws[0].problem) == "x.dbc:13: Far: is the long name of two signals");
+}
+
+TEST_CASE("of a J1939 group neither sender nor priority count, nor the receiver of some", "[dbc]") {
+  const auto mask = [](const std::string& number, const std::string& format) {
+    const DbcFile file = read_dbc_text(
+        head + "BO_ " + number + " NODE: 8 A\n SG_ T : 0|8@1+ (1,0) [0|0] \"\" B\n" +
+            "BA_DEF_ BO_ \"VFrameFormat\" ENUM \"StandardCAN\",\"ExtendedCAN\",\"reserved\"," +
+            "\"J1939PG\";\nBA_ \"VFrameFormat\" BO_ " + number + " " + format + ";\n",
+        "x.dbc");
+    REQUIRE(file.flaws.empty());
+    return file.messages.at(0).signals.at(0).place.id_mask;
+  };
+  CHECK(mask("2566861310", "3") == 0x03FFFF00);  // 18FF31FE, a broadcast
+  CHECK(mask("2565812734", "3") == 0x03FF0000);  // 18EF31FE, to one node
+  CHECK(mask("2566861310", "1") == 0x1FFFFFFF);
+  CHECK(mask("385", "3") == 0x1FFFFFFF);
 }

@@ -14,17 +14,17 @@ namespace {
 /// All problems, one a line; "" for a good file.
 std::string told(const std::string& text) {
   std::string told;
-  for (const Problem& problem : read_eds_text(text, "x.eds").problems) {
-    told += to_string(problem) + "\n";
+  for (const EdsFlaw& flaw : read_eds_text(text, "x.eds").flaws) {
+    told += to_string(flaw.problem) + "\n";
   }
   return told;
 }
 
 EdsFile good(const std::string& text) {
-  EdsReading reading = read_eds_text(text, "x.eds");
+  EdsFile file = read_eds_text(text, "x.eds");
   INFO(told(text));
-  REQUIRE(reading.problems.empty());
-  return std::move(reading.file);
+  REQUIRE(file.flaws.empty());
+  return file;
 }
 
 const std::string array =
@@ -122,10 +122,27 @@ TEST_CASE("objects of a data sheet that cannot be are refused", "[eds]") {
              Catch::Contains("is an object that stands there already"));
 }
 
-TEST_CASE("a file that is wrong everywhere has at most 100 problems", "[eds]") {
-  std::string text;
-  for (int i = 0; i < 1000; ++i) text += "rubbish\n";
-  CHECK(read_eds_text(text, "x.eds").problems.size() == 100);
+TEST_CASE("a file that is wrong everywhere is not read to its end", "[eds]") {
+  std::string text = array;
+  for (int i = 0; i < 2000; ++i) text += "rubbish\n";
+  const EdsFile file = read_eds_text(text, "x.eds");
+  CHECK(file.flaws.size() == 1001);
+  CHECK(file.objects.empty());
   CHECK_THAT(told("[2000]\n" + std::string(5000, 'x') + "\n"),
              Catch::Contains("x.eds:2: " + std::string(60, 'x') + ": must be"));
+}
+
+TEST_CASE("a flaw of a data sheet belongs to the object that it stands in", "[eds]") {
+  const EdsFile file = read_eds_text("rubbish\n" + array +
+                                         "[2000]\nDataType=int\n[2001sub1]\nParameterName=x\n"
+                                         "DataType=3\n",
+                                     "x.eds");
+  REQUIRE(file.flaws.size() == 4);
+  CHECK_FALSE(file.flaws[0].object);
+  CHECK(file.flaws[1].object == ObjectAddress{0x2000, 0});  // no name
+  CHECK(file.flaws[2].object == ObjectAddress{0x2000, 0});  // no type
+  CHECK(file.flaws[3].object == ObjectAddress{0x2001, 1});  // part of nothing
+  CHECK(file.find("Input PV 1").size() == 1);
+  REQUIRE(file.find(ObjectAddress{0x2001, 1}) != nullptr);
+  CHECK(file.find(ObjectAddress{0x2001, 1})->type == ObjectType{16, true, false});
 }

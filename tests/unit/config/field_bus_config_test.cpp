@@ -63,6 +63,8 @@ TEST_CASE("a CANopen bus and its nodes are refused by key and rule", "[canopen][
       "canopen.toml",
       {{"no number of a node", "node = 7", "node = 128", "", "device[spindle_module].node",
         "[1, 127]"},
+       {"values that hold while nothing is watched", "node = 7", "node = 7\npdo_on_change = true",
+        "pdo_on_change = true", "device[spindle_module].pdo_on_change", "needs heartbeat_s"},
        {"heartbeat of nobody", "own_node = 127   ", "# nobody", "heartbeat_s = 1.0",
         "bus[module_bus].heartbeat_s", "needs own_node"},
        {"a time-out within the period", "heartbeat_timeout_s = 1.5", "heartbeat_timeout_s = 0.5",
@@ -129,25 +131,41 @@ TEST_CASE("names are those of the node's data sheet", "[canopen][config]") {
   CHECK(told_after("heartbeat_s = 1.0 ", "heartbeat_s = 1.0 ").empty());
   CHECK(
       told_after("\"AI input PV 1\"", "\"AI input PW 1\"") ==
-      "canopen.toml:74: sensor[table].object = \"AI input PW 1\": is no object of the data sheet; "
+      "canopen.toml:77: sensor[table].object = \"AI input PW 1\": is no object of the data sheet; "
       "did you mean AI input PV 1?\n");
   CHECK_THAT(
       told_after("\"AI input PV 1\"", "\"Number of entries\""),
       Catch::Contains("sensor[table].object = \"Number of entries\": is not clear; may be AI "
                       "sensor type/Number of entries or AI input PV/Number of entries"));
   CHECK(told_after("two_channel_module.eds\"", "one_channel_module.eds\"") ==
-        "canopen.toml:58: device[ai_module].eds = \"one_channel_module.eds\": no such file\n");
+        "canopen.toml:61: device[ai_module].eds = \"one_channel_module.eds\": no such file\n");
   CHECK_THAT(told_after("eds = \"two_channel_module.eds\"", "#"),
              Catch::Contains("sensor[table].object = \"AI input PV 1\": needs the data sheet"));
   CHECK_THAT(
       told_after("read_mappings = [1] ", "#"),
       Catch::Contains("sensor[table].object = \"AI input PV 1\": needs mappings of its device"));
   CHECK(told_after("two_channel_module.eds", "DataType=0x0003", "DataType=0x0009") ==
-        "canopen.toml:74: sensor[table].object = \"AI input PV 1\": is no number in the data "
-        "sheet\n");
-  CHECK(told_after("two_channel_module.eds", "AccessType=ro\n", "AccessType\n") ==
-        "two_channel_module.eds:22: AccessType: must be a section, an entry KEY=VALUE or a "
-        "comment\n");
+        "canopen.toml:77: sensor[table].object = \"AI input PV 1\": is no number in the data "
+        "sheet; type makes it one\n");
+  CHECK(told_after("two_channel_module.eds", "[7130sub1]\n", "[7130sub1]\nAccess\n") ==
+        "two_channel_module.eds:75: Access: must be a section, an entry KEY=VALUE or a comment; "
+        "type in the configuration replaces it\n");
+}
+
+TEST_CASE("a flaw of a data sheet is a remark where no sensor stands on it, or type replaces it",
+          "[canopen][config]") {
+  const ExampleFolder folder({"canopen.toml", "two_channel_module.eds", "column_model.toml"});
+  folder.edit("two_channel_module.eds", "AccessType=ro\n", "AccessType\n");
+  const std::vector<std::string> remarks = folder.load().remarks;
+  REQUIRE(remarks.size() == 1);
+  CHECK_THAT(remarks[0], Catch::EndsWith(".eds:22: AccessType: must be a section, an entry "
+                                         "KEY=VALUE or a comment"));
+  folder.edit("two_channel_module.eds", "[7130sub1]\nParameterName=AI input PV 1\nDataType=0x0003",
+              "[7130sub1]\nParameterName=AI input PV 1\nDataType=int16");
+  CHECK_THAT(folder.told(), Catch::Contains("DataType = int16: must be a whole number"));
+  folder.edit("canopen.toml", "object = \"AI input PV 1\"",
+              "object = \"AI input PV 1\"\ntype = \"int16\"");
+  CHECK(folder.told().empty());
 }
 
 TEST_CASE("a J1939 bus and its devices are refused by key and rule", "[j1939][config]") {

@@ -120,6 +120,10 @@ TEST_CASE("nothing is suggested where nothing is near", "[config][toml]") {
   CHECK(nearest_name("prot", {"host", "port", "unit"}) == "port");
   CHECK(nearest_name("temperature", {"host", "port"}).empty());
   CHECK(nearest_name("x", {"y"}).empty());
+  // Either may have been meant.
+  CHECK(nearest_name("NearTheSpindle", {"NearTheSp_01", "NearTheSp_02"}).empty());
+  CHECK(nearest_name("Temp_3", {"Temp_1", "Temp_2"}).empty());
+  CHECK(nearest_name("Tmp_01", {"Temp_01", "Temp_02"}) == "Temp_01");
 }
 
 TEST_CASE("numbers are written so that they read back to the same bits", "[config]") {

@@ -58,6 +58,36 @@ TEST_CASE("SDO: a segmented read alternates its toggle bit", "[canopen][sdo]") {
   }
 }
 
+TEST_CASE("SDO: an answer may leave out bytes of no use, but none that count", "[canopen][sdo]") {
+  SdoClient client(5, 100ms);
+  const auto answered = [&](const Bytes& answer) {
+    client.cancel();
+    client.read({0x2040, 1}, 1s);
+    sent_by(client);
+    client.take(answer, 1s);
+    const auto result = client.result();
+    REQUIRE(result);
+    return *result;
+  };
+  CHECK(answered({0x4B, 0x40, 0x20, 0x01, 0xE1, 0x00}).bytes == Bytes{0xE1, 0x00});
+  CHECK(answered({0x42, 0x40, 0x20, 0x01, 0xE1}).bytes == Bytes{0xE1});
+  CHECK(to_string(answered({0x4B, 0x40, 0x20, 0x01, 0xE1})) ==
+        "2040:01: not an answer to what was asked: 0x06070010 length does not match");
+  CHECK(answered({0x42, 0x40, 0x20, 0x01}).outcome == SdoOutcome::broken);
+  CHECK(answered({0x4B, 0x40}).outcome == SdoOutcome::broken);
+  const SdoResult aborted = answered({0x80, 0x40, 0x20, 0x01, 0x11, 0x00, 0x09, 0x06});
+  CHECK(aborted.outcome == SdoOutcome::aborted);
+
+  client.write({0x1017, 0}, Bytes{0xE8, 0x03}, 1s);
+  client.take(Bytes{0x60, 0x17, 0x10, 0x00}, 1s);
+  CHECK(client.result()->outcome == SdoOutcome::done);
+
+  client.read({0x1008, 0}, 1s);
+  client.take(Bytes{0x41, 0x08, 0x10, 0x00, 2, 0, 0, 0}, 1s);
+  client.take(Bytes{0x0B, 's', 'T'}, 1s);
+  CHECK(client.result()->bytes == Bytes{'s', 'T'});
+}
+
 TEST_CASE("SDO: an announcement beyond the limit is refused", "[canopen][sdo]") {
   SdoClient client(5, 100ms);
   client.read({0x1008, 0}, 1s);

@@ -137,6 +137,50 @@ TEST_CASE("a node is started at once and again after its reboot", "[canopen][nod
   CHECK(bus.temp_degC() == Approx(22.6));
 }
 
+TEST_CASE("a TPDO on change grows old, or holds while heartbeats come", "[canopen][node]") {
+  CanopenNodeConfig node = node_5({in_pdo(0, 0x185, 0)});
+  node.heartbeat_timeout_s = 2.0;
+  const auto live = [](Bus& bus, int seconds, std::uint8_t state) {
+    for (int i = 0; i < seconds; ++i) {
+      bus.wait(1s);
+      bus.put(0x705, {state});
+    }
+  };
+  const auto age = [](const Bus& bus) { return bus.now - bus.line.readings()[0].taken_at; };
+  SECTION("as it is: the text says what to do") {
+    Bus bus(bus_of({node}));
+    bus.put(0x185, {0xE1, 0x00});
+    live(bus, 6, 0x05);
+    CHECK(age(bus) == 6s);
+    CHECK_THAT(bus.error(), Catch::Contains("COB-ID 389 does not come") &&
+                                Catch::Contains("event timer") && Catch::Contains("pdo_on_change"));
+    bus.put(0x185, {0xE1, 0x00});
+    CHECK(bus.error().empty());
+  }
+  node.pdo_on_change = true;
+  Bus bus(bus_of({node}));
+  live(bus, 1, 0x05);
+  CHECK(bus.fault() == Fault::no_answer);  // nothing has come that could hold
+  bus.put(0x185, {0xE1, 0x00});
+  live(bus, 20, 0x05);
+  CHECK(age(bus) == 0s);
+  CHECK(bus.temp_degC() == Approx(22.5));
+  CHECK(bus.error().empty());
+  SECTION("not while the node is not operational") {
+    live(bus, 3, 0x7F);
+    CHECK(age(bus) == 3s);
+  }
+  SECTION("not beyond the last heartbeat") {
+    bus.wait(3s);
+    CHECK(bus.fault() == Fault::no_answer);
+  }
+  SECTION("not beyond a reboot") {
+    bus.put(0x705, {0x00});
+    live(bus, 1, 0x05);
+    CHECK(bus.fault() == Fault::no_answer);
+  }
+}
+
 TEST_CASE("a node that somebody stopped is started again, once a second", "[canopen][node]") {
   Bus bus(bus_of({node_5({in_pdo(0, 0x185, 0)})}));
   bus.sent();
