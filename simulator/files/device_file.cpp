@@ -191,9 +191,18 @@ std::uint16_t moved(const TomlTable& table, std::uint16_t address, int base_addr
   return address;
 }
 
-void check_codes(const TomlTable& table, const SimulatedChannel& channel) {
-  for (const auto& [fault, codes] : channel.codes) {
-    for (const std::int64_t code : codes) {
+/// A code given as the bits of a signed number, such as 0x8000 for -32768, is that number.
+std::int64_t signed_code(std::int64_t code, Encoding encoding) {
+  if (encoding == Encoding::int16 && code > INT16_MAX && code <= UINT16_MAX) return code - 0x10000;
+  if (encoding == Encoding::int32 && code > INT32_MAX && code <= UINT32_MAX)
+    return code - 0x100000000;
+  return code;
+}
+
+void check_codes(const TomlTable& table, SimulatedChannel& channel) {
+  for (auto& [fault, codes] : channel.codes) {
+    for (std::int64_t& code : codes) {
+      code = signed_code(code, channel.place.encoding);
       if (is_representable(code, channel.place.encoding)) continue;
       table.problem("open_circuit_codes", std::to_string(code),
                     "cannot be expressed in the channel's encoding");

@@ -25,6 +25,7 @@ import tty
 BIN = pathlib.Path(os.environ.get("THERMOCOMP_BIN", "build/release/bin")).resolve()
 PATIENCE_S = float(os.environ.get("THERMOCOMP_PATIENCE_S", "30"))
 NOT_HERE = 77
+PRESETS = pathlib.Path(__file__).resolve().parents[2] / "config" / "devices"
 
 
 # ---- the device
@@ -304,6 +305,7 @@ class Case:
                 target = self.room / each.relative_to(folder)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(each, target)
+        (self.room / "devices").symlink_to(PRESETS)
         self.device = folder / self.expected.get("device", "device.txt")
         self.config = self.room / "config.toml"
         self.faults, self.is_well, self.beside = {}, None, ""

@@ -58,6 +58,49 @@ DEVICES = {
         ("over_range", RANGE, (HOLDING, 1), 0xFFFF), ("under_range", RANGE, (HOLDING, 1), 0)]),
     "advantech_adam_6018": (1, HOLDING, 1, [round(125.0 / 500 * 65535)], {"thermocouple": "T"}, [
         ("over_range", RANGE, (HOLDING, 1), 0xFFFF), ("under_range", RANGE, (HOLDING, 1), 0)]),
+    "beckhoff_kl320x": (2, INPUT, 3, TENTHS, {}, [
+        ("under_range", RANGE, KL331X_STATUS, 0x41), ("over_range", RANGE, KL331X_STATUS, 0x42),
+        ("channel_error", ERROR, KL331X_STATUS, 0x40)]),
+    "wago_750_461": (2, INPUT, 1, TENTHS, {}, []),
+    "calex_excelog_6": (2, INPUT, 0x1002, [0, 250], {}, []),
+    "moxa_iologik_e1260": (1, INPUT, 1537, TENTHS, {}, []),
+    "sequent_smtc": (2, INPUT, 1, [2500], {}, []),
+    "sequent_rtd": (2, INPUT, 1, TENTHS, {}, []),
+    "sequent_multiio": (2, INPUT, 1, TENTHS, {}, []),
+    "sequent_two_channel_converter": (1, INPUT, 2, float_words(25.0), {}, []),
+    "comwintop_8pt1000": (2, HOLDING, 1, TENTHS, {}, []),
+    "mb8art": (1, INPUT, 1, TENTHS, {}, [
+        ("open_circuit", OPEN, (INPUT, 1), 30000), ("channel_error", ERROR, (INPUT, 1), 0x8AD0)]),
+    "emko_eplc9600": (2, INPUT, 1, TENTHS, {}, []),
+    "eurotherm_3500": (2, HOLDING, 1313, TENTHS, {}, []),
+    "eurotherm_3216": (1, HOLDING, 1, TENTHS, {}, []),
+    "omega_cn7500": (1, HOLDING, 0x1000, TENTHS, {}, []),
+    "owen_mv110_8a": (2, HOLDING, 10, float_words(25.0), {}, []),
+    "wirenboard_mai6": (2, INPUT, 0x2504, TENTHS, {}, [
+        ("channel_error", ERROR, (INPUT, 0x2504), 0x7FFF)]),
+    "wirenboard_m1w2": (2, INPUT, 8, [400], {}, [("open_circuit", OPEN, (DISCRETE, 17), 0)]),
+    "wirenboard_msw2": (1, INPUT, 0, TENTHS, {}, [
+        ("channel_error", ERROR, (INPUT, 0), 0x7FFF)]),
+    "xy_md02": (1, INPUT, 1, TENTHS, {}, []),
+    "benshaw_rtd_module": (2, INPUT, 1, [25], {}, []),
+    "maxwell_ft200": (1, HOLDING, 0, TENTHS, {}, []),
+    "controlbox_tb260": (1, HOLDING, 0, float_words(25.0), {}, []),
+    "controlbox_tb232": (1, HOLDING, 0, float_words(25.0), {}, []),
+    "egnite_querx_th": (1, INPUT, 10, TENTHS, {}, []),
+    "eletechsup_n4dsc08": (2, INPUT, 1, TENTHS, {}, [("open_circuit", OPEN, (INPUT, 1), 0x8000)]),
+    "eletechsup_r4dcb08": (2, HOLDING, 1, TENTHS, {}, [
+        ("open_circuit", OPEN, (HOLDING, 1), 0x8000)]),
+    "eletechsup_pta8d08": (2, HOLDING, 1, TENTHS, {}, []),
+    "eletechsup_pta8c04": (2, HOLDING, 1, TENTHS, {}, []),
+    "eletechsup_pta8e16": (2, HOLDING, 1, TENTHS, {}, []),
+    "eletechsup_ampti04": (2, INPUT, 1, [2500], {}, []),
+    "eletechsup_nt18b07": (2, HOLDING, 1, TENTHS, {}, []),
+    "seneca_z_4rtd2": (2, HOLDING, 3, TENTHS, {}, [("over_range", RANGE, (HOLDING, 3), 8500)]),
+    "andivi_andrtf3": (1, INPUT, 50, TENTHS, {}, []),
+    "pixsys_atr141": (1, HOLDING, 1000, TENTHS, {}, [
+        ("open_circuit", OPEN, (HOLDING, 1008), 8), ("channel_error", ERROR, (HOLDING, 1008), 4)]),
+    "atal_awp_c": (2, HOLDING, 0x9C7A, float_words(25.0), {}, []),
+    "sm100": (1, INPUT, 0x7534, TENTHS, {}, []),
 }
 MODBUS = sorted(DEVICES)
 
