@@ -8,6 +8,7 @@
 
 #include "cli/scan/scan_hints.hpp"
 #include "cli/scan/scan_report.hpp"
+#include "drivers/monotonic_clock.hpp"
 #include "drivers/sensors/bus_config.hpp"
 #include "estimator/estimator_config.hpp"
 
@@ -20,7 +21,15 @@ namespace thermocomp::cli {
 struct ScanSensors {
   std::vector<std::string> names;
   std::vector<PlausibleRange> ranges;
+  std::vector<double> stale_after_s;
 };
+
+/// Whether to wait for a value once more: none has come in the last second of the listening, and
+/// the daemon would not call this one stale yet.
+[[nodiscard]] bool may_come_again(nanoseconds taken_at, double stale_after_s, nanoseconds end,
+                                  nanoseconds now);
+/// Calls a value stale that the daemon would call so.
+void judge_age(double stale_after_s, ScanChannel& result);
 
 [[nodiscard]] ScanSensors scan_sensors(std::span<const SensorConfig> sensors);
 

@@ -32,11 +32,20 @@ std::vector<const CanSignal*> signals_of(const CanBusConfig& config) {
   return signals;
 }
 
-Heard listen(CanSocket& socket, const std::vector<const CanSignal*>& signals, double listen_s) {
+/// @param stale_after_s  of each signal; empty: what came once is enough
+Heard listen(CanSocket& socket, const std::vector<const CanSignal*>& signals, double listen_s,
+             const std::vector<double>& stale_after_s) {
   Heard heard;
   heard.of_signal.resize(signals.size());
   const nanoseconds end = monotonic_now() + from_seconds(listen_s);
-  while (socket.is_open() && monotonic_now() < end) {
+  const auto goes_on = [&](nanoseconds now) {
+    for (std::size_t i = 0; i < stale_after_s.size(); ++i) {
+      const auto& frame = heard.of_signal[i];
+      if (frame && may_come_again(frame->received_at, stale_after_s[i], end, now)) return true;
+    }
+    return now < end;
+  };
+  while (socket.is_open() && goes_on(monotonic_now())) {
     pollfd wait{socket.descriptor(), POLLIN, 0};
     constexpr int slice_ms = 50;
     static_cast<void>(::poll(&wait, 1, slice_ms));
@@ -138,6 +147,7 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& h
       if (frame) {
         shown.answers = true;
         judge(channel.signal, *frame, sensors.ranges.at(channel.sensor), result);
+        judge_age(sensors.stale_after_s.at(channel.sensor), result);
       } else if (bus.error.empty()) {
         result.why = "no frame with identifier " +
                      id_name({channel.signal.id, channel.signal.extended_id}) + " carried it";
@@ -199,7 +209,12 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
     bus.error = "cannot be opened: " + socket.error();
   } else {
     task.progress("bus " + config.name + ": listening for " + short_number(task.listen_s) + " s");
-    heard = listen(socket, signals, task.listen_s);
+    std::vector<double> stale_after_s;
+    for (const CanDeviceConfig& device : config.devices) {
+      for (const CanChannel& channel : device.channels)
+        stale_after_s.push_back(sensors.stale_after_s.at(channel.sensor));
+    }
+    heard = listen(socket, signals, task.listen_s, stale_after_s);
     if (!socket.error().empty()) bus.error = socket.error();
     bus.note = heard_text(heard);
     if (heard.frames.empty() && bus.error.empty()) {
@@ -252,7 +267,7 @@ ScanController scan_can_controller(const DaemonConfig& config,
   heard.of_signal.resize(signals.size());
   if (socket.open()) {
     progress("controller " + controller.name + ": listening for " + short_number(listen_s) + " s");
-    heard = listen(socket, signals, listen_s);
+    heard = listen(socket, signals, listen_s, {});
     result.error = socket.error();
   } else {
     result.error = "cannot be opened: " + socket.error();

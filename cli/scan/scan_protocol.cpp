@@ -19,11 +19,22 @@ struct Worked {
 };
 
 /// Feeds the protocol with the bus for `listen_s`, and sends what it wants to send.
-Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s) {
+Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s, const ScanSensors& sensors) {
   Worked worked;
   const nanoseconds end = monotonic_now() + from_seconds(listen_s);
+  const std::vector<std::size_t> order = protocol.sensors();
+  const auto goes_on = [&](nanoseconds now) {
+    const std::span<const Reading> readings = protocol.readings();
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const double stale_after_s = sensors.stale_after_s.at(order[i]);
+      if (readings[i].fault == Fault::none &&
+          may_come_again(readings[i].taken_at, stale_after_s, end, now))
+        return true;
+    }
+    return now < end;
+  };
   protocol.opened(monotonic_now());
-  while (socket.is_open() && monotonic_now() < end) {
+  while (socket.is_open() && goes_on(monotonic_now())) {
     pollfd wait{socket.descriptor(), POLLIN, 0};
     constexpr int slice_ms = 10;
     static_cast<void>(::poll(&wait, 1, slice_ms));
@@ -110,7 +121,7 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
   if (socket.open()) {
     task.progress("bus " + what.name + ": working it as the daemon would, for " +
                   short_number(task.listen_s) + " s");
-    worked = work(protocol, socket, task.listen_s);
+    worked = work(protocol, socket, task.listen_s, sensors);
     bus.error = socket.error();
     bus.note = heard_text(worked);
     if (afterwards) afterwards(socket, bus);
@@ -130,6 +141,7 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
     }
     ScanChannel shown =
         show(reading, raw, place.why, worked.ended_at, sensors.ranges.at(place.sensor));
+    judge_age(sensors.stale_after_s.at(place.sensor), shown);
     shown.sensor = sensors.names.at(place.sensor);
     shown.place = place.text;
     what.devices[place.device].channels.push_back(std::move(shown));

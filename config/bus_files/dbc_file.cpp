@@ -19,6 +19,7 @@ constexpr std::size_t classic_bytes_max = 8;
 constexpr std::size_t signals_max = 4096;  // of a message
 constexpr std::size_t flaws_max = 1000;
 constexpr std::string_view no_message = "VECTOR__INDEPENDENT_SIG_MSG";
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 constexpr std::string_view frame_format = "VFrameFormat";
 constexpr std::string_view long_signal = "SystemSignalLongSymbol";
 constexpr std::string_view long_message = "SystemMessageLongSymbol";
@@ -120,7 +121,9 @@ std::uint64_t end_byte(const CanSignal& place) {
 
 class DbcReader {
  public:
-  DbcReader(std::string_view text, std::string name) : scan_(text), name_(std::move(name)) {}
+  DbcReader(std::string_view text, std::string name)
+      : scan_(text.substr(text.starts_with(byte_order_mark) ? byte_order_mark.size() : 0)),
+        name_(std::move(name)) {}
 
   DbcFile read() {
     while (!scan_.at_end()) {
@@ -228,8 +231,10 @@ class DbcReader {
     message.id = id & ~extended_flag;
     if (message.name != no_message) {
       if (message.id > (message.extended ? extended_id_max : standard_id_max)) {
+        const Keys keys = message.id > extended_id_max ? Keys{"id"} : Keys{"extended_id", "id"};
         flaw(line, message.name, std::to_string(id),
-             "must be a number of 11 bits, or one of 29 bits with bit 31 set", about_, {"id"});
+             "must be a number of 11 bits, or one of 29 bits with bit 31 set", about_, keys);
+        message.extended = true;  // it cannot be one of 11 bits
       }
       if (!names_.insert(message.name).second) {
         flaw(line, message.name, "", "is the name of two messages", about_, {"id"});
@@ -291,10 +296,7 @@ class DbcReader {
     place.offset = scan_.real("an offset");
     scan_.expect(')');
     scan_.expect('[');
-    scan_.real("a minimum");
-    scan_.expect('|');
-    scan_.real("a maximum");
-    scan_.expect(']');
+    scan_.skip_behind(']');  // minimum and maximum are of no use here
     return place.scale != 0.0;
   }
 

@@ -13,6 +13,13 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
+/// "CM_ ...", " SG_ ...": no line of a comment, but what a quote too many or too few runs into.
+bool begins_statement(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+  const std::size_t end = text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ_");
+  return end != std::string_view::npos && end > 2 && text[end] == ' ' && text[end - 1] == '_';
+}
+
 bool begins_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
 }
@@ -150,17 +157,28 @@ std::string DbcScanner::text(std::string_view what) {
       at_ = i + 1;
       return found;
     }
-    if (c == '\n') ++line_;
+    if (c == '\n') {
+      if (begins_statement(text_.substr(i + 1))) break;
+      ++line_;
+    }
     const bool quoted = c == '\\' && i + 1 < text_.size() && text_[i + 1] == '"';
     if (quoted) ++i;
     found.push_back(text_[i]);
   }
+  line_ = first_line;
   throw DbcSyntaxError{first_line, "", "the string that begins here has no end"};
+}
+
+void DbcScanner::skip_behind(char symbol) {
+  while (!at_end() && !accept(symbol)) {
+    if (begins_line()) fail(std::string("must be '") + symbol + "'");
+    ++at_;
+  }
 }
 
 void DbcScanner::skip_statement() {
   while (!accept(';')) {
-    if (at_end()) fail("must be ';'");
+    if (at_end() || (begins_line() && begins_statement(rest()))) fail("must be ';'");
     if (next_is('"')) {
       static_cast<void>(text("a text"));
     } else {

@@ -40,6 +40,8 @@ class DbcScanner {
   std::uint64_t integer(std::string_view what, std::uint64_t max);
   /// A string without its quotes; `\"` inside it is a quote.
   std::string text(std::string_view what);
+  /// Everything of this line up to and with the symbol.
+  void skip_behind(char symbol);
   /// Everything up to and with the semicolon that ends the statement.
   void skip_statement();
   /// Whether what comes next is the first on its line.

@@ -176,6 +176,23 @@ TEST_CASE("a flaw of a DBC file stands at its message and signal, and the others
   CHECK(file.find("LAST")->find("T")->place.scale == 0.5);
 }
 
+TEST_CASE("a quote too many or a semicolon too few costs no more than its statement", "[dbc]") {
+  for (const char* comment :
+       {"CM_ SG_ 385 T \"a 5\" pipe\";\n", "CM_ \"no end;\n", "CM_ \"none\"\n"}) {
+    INFO(comment);
+    const DbcFile file = read_dbc_text(
+        "\xEF\xBB\xBF" + head + comment + "BO_ 385 NODE: 8 A\n" +
+            " SG_ T : 0|32@1- (0.1,0) [-inf|inf] \"degC\" B\n SG_ U : 32|8@1- (1,0) [|] \"\" B\n" +
+            "SIG_VALTYPE_ 385 T : 1;\n",
+        "x.dbc");
+    REQUIRE(file.flaws.size() == 1);
+    CHECK(file.flaws[0].problem.line <= 6);
+    CHECK(file.flaws[0].message.empty());
+    REQUIRE(file.find("NODE") != nullptr);
+    CHECK(file.find("NODE")->find("T")->place.is_float);
+  }
+}
+
 TEST_CASE("a signal whose multiplexor has a flaw has one as well", "[dbc]") {
   const DbcFile file = read_dbc_text(
       head +
