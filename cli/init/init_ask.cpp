@@ -73,6 +73,13 @@ void offer_word_order(const InitDraft& draft, const InitModule& form, InitModule
   }
 }
 
+/// @throws Failure with them: the question is asked again
+[[noreturn]] void show_presets(const std::string& word, const InitEyes& eyes) {
+  std::string text;
+  for (const std::string& line : eyes.preset_lines(word)) text += "\n    " + line;
+  throw Failure(text.empty() ? word + ": no preset has this word" : "presets:" + text);
+}
+
 void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& questions,
                     const InitEyes& eyes) {
   const std::string where = "unit " + std::to_string(unit) + " on " + bus_text(draft.buses.at(bus));
@@ -84,11 +91,11 @@ void ask_for_module(InitDraft& draft, std::size_t bus, int unit, Questions& ques
   questions.ask_until(
       "Module of " + where +
           ": its preset, or TABLE:TYPE:DEGC_A_COUNT:ADDRESSES[:OPEN_CIRCUIT_CODES] such as "
-          "input:int16:0.1:0-7; ? lists the presets, Enter: none",
+          "input:int16:0.1:0-7; ? lists the presets, ?WORD those with the word, Enter: none",
       "", [&](const std::string& text) {
         is_wanted = !text.empty();
         if (!is_wanted) return;
-        if (text == "?") throw Failure(joined(eyes.preset_names()));
+        if (text.starts_with("?")) show_presets(text.substr(1), eyes);
         InitModule form = module;
         parse_form(text, form);
         InitModule asked = form;

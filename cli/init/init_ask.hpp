@@ -48,7 +48,8 @@ class Questions {
 struct InitEyes {
   /// The units that answer on a bus.
   std::function<std::vector<int>(const InitBus&)> find_units;
-  std::function<std::vector<std::string>()> preset_names;
+  /// A line for each preset that has the word.
+  std::function<std::vector<std::string>(const std::string&)> preset_lines;
   /// Fills in the channels that give a temperature, and says what was read, a line a channel.
   /// @throws Failure when the module cannot be described so
   std::function<std::vector<std::string>(const InitDraft&, InitModule&)> try_module;

@@ -75,6 +75,24 @@ std::vector<int> channels_of_preset(const std::string& name, const fs::path& fol
   return numbers;
 }
 
+/// Empty for a preset that is not for Modbus, or that cannot be read.
+std::string preset_line(const fs::path& path) {
+  try {
+    const TomlDocument preset = TomlDocument::from_file(path);
+    if (preset.root().text("protocol", "") != "modbus") return "";
+    return path.stem().string() + ": " + preset.root().text("maker", "") + ", " +
+           preset.root().text("model", "");
+  } catch (const ConfigurationError&) {
+    return "";
+  }
+}
+
+std::string lower(std::string text) {
+  for (char& letter : text)
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  return text;
+}
+
 ModbusLine line_of(const InitBus& bus) {
   ModbusLine line;
   line.link = bus.link;
@@ -119,14 +137,21 @@ DaemonConfig load_trial(const fs::path& file) {
 
 }  // namespace
 
-std::vector<std::string> preset_names(const fs::path& folder) {
-  std::set<std::string> names;
+std::vector<std::string> preset_lines(const fs::path& folder, const std::string& word) {
+  std::map<std::string, std::string> lines;  // by name
   for (const fs::path& each : sections::preset_folders(folder)) {
     std::error_code error;
-    for (const auto& entry : fs::directory_iterator(each, error))
-      if (entry.path().extension() == ".toml") names.insert(entry.path().stem().string());
+    for (const auto& entry : fs::directory_iterator(each, error)) {
+      const std::string name = entry.path().stem().string();
+      if (entry.path().extension() == ".toml" && !lines.contains(name))
+        lines[name] = preset_line(entry.path());
+    }
   }
-  return {names.begin(), names.end()};
+  std::vector<std::string> found;
+  for (const auto& [name, line] : lines) {
+    if (!line.empty() && lower(line).find(lower(word)) != std::string::npos) found.push_back(line);
+  }
+  return found;
 }
 
 ScanReport probe(const InitDraft& draft, const fs::path& folder) {
@@ -207,7 +232,7 @@ InitEyes eyes_of(const fs::path& folder) {
     return known[name] =
                found.found_numbers.size() == last ? std::vector<int>{1} : found.found_numbers;
   };
-  eyes.preset_names = [folder] { return preset_names(folder); };
+  eyes.preset_lines = [folder](const std::string& word) { return preset_lines(folder, word); };
   eyes.try_module = [folder](const InitDraft& draft, InitModule& module) {
     return try_module(draft, module, folder);
   };

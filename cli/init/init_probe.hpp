@@ -11,8 +11,10 @@
 
 namespace thermocomp::cli {
 
-/// Names of all presets that a configuration in this folder may use.
-[[nodiscard]] std::vector<std::string> preset_names(const std::filesystem::path& folder);
+/// A line for each preset for Modbus that a configuration in this folder may use: name, maker and
+/// model; of them those that have this word.
+[[nodiscard]] std::vector<std::string> preset_lines(const std::filesystem::path& folder,
+                                                    const std::string& word);
 
 /// Reads everything that the draft describes: every channel, and the controller's side.
 /// @throws ConfigurationError, Failure

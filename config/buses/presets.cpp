@@ -29,9 +29,13 @@ std::vector<std::string> names_in(const std::vector<fs::path>& folders) {
 }
 
 std::string unknown_rule(const std::string& name, const std::vector<fs::path>& folders) {
-  const std::vector<std::string> names = names_in(folders);
+  std::vector<std::string> names = names_in(folders);
   const std::string near = nearest_name(name, names);
   if (!near.empty()) return "is no preset; did you mean \"" + near + "\"?";
+  const auto others = std::stable_partition(
+      names.begin(), names.end(),
+      [&](const std::string& known) { return known.find(name) != std::string::npos; });
+  if (others != names.begin()) names.erase(others, names.end());
   std::string rule = "is no preset; there are: ";
   for (const std::string& known : names) rule.append(known).append(" ");
   if (names.empty()) rule += "none ";

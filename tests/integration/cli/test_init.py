@@ -140,7 +140,7 @@ def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
     config = folder / "thermocompd.toml"
     bus = f"tcp:127.0.0.1:{modules}"
     answers = [bus, f"udp:127.0.0.1:{free_port()}", "",  # a bus that has no module in the end
-               "wago_750", "wago_750_458", "bed bed spindle", NAMES,
+               "?Wago", "wago_750", "wago_750_458", "bed bed spindle", NAMES,
                "holding:float32:1:100,102", "yes",  # the low word comes first: offered
                "ram table", "<", "ram bed", "ram slide",
                "1", "",  # on the second bus: left out
@@ -148,10 +148,12 @@ def test_nothing_answered_is_lost_to_a_mistake_or_a_step_back(foreign, folder):
                "Z"]
     status, shown = converse(["init", config], answers)
     assert status == 0, shown
-    for said in ("wago_750 is no preset", "bed: each sensor needs a name of its own",
+    for said in ("    wago_750_464: WAGO, 750-464, two or four RTD", "wago_750 is no preset",
+                 "bed: each sensor needs a name of its own",
                  f"Module of unit 4 on bus1 (127.0.0.1:{modules})", "In word order CDAB all give",
                  "is left out: no module is on it"):
         assert said in shown, (said, shown)
+    assert "pixsys" not in shown  # has no word "Wago"
     text = config.read_text()
     assert text.count('\n[[bus]]\n') == 1 and 'word_order = "CDAB"' in text
     assert "gap_registers_max = 0 " in text  # the PLC refuses to have input 0 to 6 read together

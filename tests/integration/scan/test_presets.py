@@ -61,7 +61,10 @@ DEVICES = {
     "beckhoff_kl320x": (2, INPUT, 3, TENTHS, {}, [
         ("under_range", RANGE, KL331X_STATUS, 0x41), ("over_range", RANGE, KL331X_STATUS, 0x42),
         ("channel_error", ERROR, KL331X_STATUS, 0x40)]),
-    "wago_750_461": (2, INPUT, 1, TENTHS, {}, []),
+    "wago_750_461": (2, INPUT, 1, TENTHS, {}, [
+        ("over_range", RANGE, (INPUT, 1), 0x2134), ("under_range", RANGE, (INPUT, 1), 0xF830)]),
+    "wago_750_464": (2, INPUT, 1, TENTHS, {}, [
+        ("over_range", RANGE, (INPUT, 1), 0x2134), ("under_range", RANGE, (INPUT, 1), 0xF830)]),
     "calex_excelog_6": (2, INPUT, 0x1002, [0, 250], {}, []),
     "moxa_iologik_e1260": (1, INPUT, 1537, TENTHS, {}, []),
     "sequent_smtc": (2, INPUT, 1, [2500], {}, []),
@@ -73,7 +76,9 @@ DEVICES = {
         ("open_circuit", OPEN, (INPUT, 1), 30000), ("channel_error", ERROR, (INPUT, 1), 0x8AD0)]),
     "emko_eplc9600": (2, INPUT, 1, TENTHS, {}, []),
     "eurotherm_3500": (2, HOLDING, 1313, TENTHS, {}, []),
-    "eurotherm_3216": (1, HOLDING, 1, TENTHS, {}, []),
+    "eurotherm_3216": (1, HOLDING, 0x8002, float_words(25.0), {}, [
+        ("open_circuit", OPEN, (HOLDING, 75), 0x20), ("over_range", RANGE, (HOLDING, 75), 0x400)]),
+    "omron_e5c": (1, HOLDING, 0x2000, TENTHS, {}, []),
     "omega_cn7500": (1, HOLDING, 0x1000, TENTHS, {}, []),
     "owen_mv110_8a": (2, HOLDING, 10, float_words(25.0), {}, []),
     "wirenboard_mai6": (2, INPUT, 0x2504, TENTHS, {}, [
