@@ -181,16 +181,6 @@ CanDatabase DbcFiles::read(const TomlTable& bus) {
   return database;
 }
 
-std::vector<Problem> DbcFiles::flaws(bool in_use) const {
-  std::vector<Problem> problems;
-  for (const auto& [path, file] : read_) {
-    for (const DbcFlaw& flaw : file->flaws) {
-      if (flaw.in_use == in_use) problems.push_back(flaw.problem);
-    }
-  }
-  return problems;
-}
-
 CanChannel read_can_channel(const TomlTable& own, const TomlTable& base,
                             const CanDatabase& database) {
   if (own.has("signal")) return read_by_name(own, base, database);

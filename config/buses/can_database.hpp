@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "config/bus_files/dbc_file.hpp"
+#include "config/buses/eds_files.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "drivers/can/can_config.hpp"
 
@@ -32,7 +33,7 @@ class DbcFiles {
   [[nodiscard]] CanDatabase read(const TomlTable& bus);
   /// What is wrong inside the files.
   /// @param in_use  where a sensor stands on it; else elsewhere
-  [[nodiscard]] std::vector<Problem> flaws(bool in_use) const;
+  [[nodiscard]] std::vector<Problem> flaws(bool in_use) const { return flaws_of(read_, in_use); }
 
  private:
   std::optional<std::filesystem::path> folder_;

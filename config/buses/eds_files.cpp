@@ -20,15 +20,4 @@ std::shared_ptr<EdsFile> EdsFiles::read(const TomlTable& device) {
   return file;
 }
 
-std::vector<Problem> EdsFiles::flaws(bool in_use) const {
-  std::vector<Problem> problems;
-  for (const auto& [path, file] : read_) {
-    if (file == nullptr) continue;
-    for (const EdsFlaw& flaw : file->flaws) {
-      if (flaw.in_use == in_use) problems.push_back(flaw.problem);
-    }
-  }
-  return problems;
-}
-
 }  // namespace thermocomp::sections

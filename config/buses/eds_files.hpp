@@ -12,6 +12,19 @@
 
 namespace thermocomp::sections {
 
+/// Problems of those flaws of bus files that are in use, or of those that are not.
+template <class Files>
+std::vector<Problem> flaws_of(const Files& files, bool in_use) {
+  std::vector<Problem> problems;
+  for (const auto& [path, file] : files) {
+    if (file == nullptr) continue;
+    for (const auto& flaw : file->flaws) {
+      if (flaw.in_use == in_use) problems.push_back(flaw.problem);
+    }
+  }
+  return problems;
+}
+
 class EdsFiles {
  public:
   /// @param folder  where relative paths begin; none: no file is opened, and objects by name are
@@ -23,7 +36,7 @@ class EdsFiles {
   [[nodiscard]] bool opens_files() const noexcept { return folder_.has_value(); }
   /// What is wrong inside the files.
   /// @param in_use  at objects whose name or type a configuration takes from there; else elsewhere
-  [[nodiscard]] std::vector<Problem> flaws(bool in_use) const;
+  [[nodiscard]] std::vector<Problem> flaws(bool in_use) const { return flaws_of(read_, in_use); }
 
  private:
   std::optional<std::filesystem::path> folder_;
