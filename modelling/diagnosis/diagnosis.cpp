@@ -2,102 +2,129 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "modelling/diagnosis/answer/extended_model.hpp"
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
 #include "modelling/diagnosis/answer/named_finding.hpp"
 #include "modelling/diagnosis/answer/remainder_bank.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/rank/search.hpp"
 #include "modelling/diagnosis/report/report_data.hpp"
-#include "modelling/diagnosis/search/search_beside_fit.hpp"
+#include "modelling/diagnosis/report/report_texts.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
 
+/// Candidates whose gain alone is measured.
+constexpr std::size_t candidates_tried = 3;
+
 /// What a finding that no term can carry corrects, if it acts in every run.
-std::optional<Correction> correction_of(const NamedFinding& name, std::size_t output) {
-  const Cause& cause = cause_named(name.cause);
+std::optional<Correction> correction_of(const std::string& cause_name,
+                                        const std::vector<Parameter>& parameters,
+                                        std::size_t output) {
+  const Cause& cause = cause_named(cause_name);
   if (cause.correction == nullptr) return std::nullopt;
-  Correction correction = cause.correction(name.parameters);
+  Correction correction = cause.correction(parameters);
   correction.output = output;
   return correction;
 }
 
-/// A search in rows that the model was fitted to must leave less by this share than one that takes
-/// the coefficients as right.
-constexpr double fitted_share = 0.2;
+/// A model with what no term of it carries.
+struct Extended {
+  ThermalModel model;
+  Corrections corrections;
+};
 
-/// Adds terms; what one kind does to one subject stays one term.
-void add_terms(ThermalModel& model, const std::vector<TermSpec>& terms) {
-  for (const TermSpec& term : terms) {
-    const auto known = std::find_if(model.terms.begin(), model.terms.end(), [&](const auto& each) {
-      return each.kind == "wrong_coefficient" && each.kind == term.kind &&
-             each.subject == term.subject;
-    });
-    if (known == model.terms.end()) {
-      model.terms.push_back(term);
-      continue;
-    }
-    for (const auto& [name, values] : term.per_output)
-      for (const auto& [output, value] : values) known->per_output[name][output] += value;
+/// The model with one finding more; nothing where neither a term nor a correction carries it.
+std::optional<Extended> with_finding(const Extended& before, const Finding& finding,
+                                     const MeasuredData& train) {
+  Extended longer = before;
+  const std::optional<TermSpec> term = term_of(finding, train);
+  if (term) longer.model.terms.push_back(*term);
+  const std::string& cause = finding.explanation.hypothesis->cause;
+  for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
+    if (finding.explanation.gains[output].size() > 0)
+      if (const auto correction = correction_of(cause, parameters_of(finding, train), output))
+        longer.corrections.push_back(*correction);
+  if (!term && longer.corrections.size() == before.corrections.size()) return std::nullopt;
+  return longer;
+}
+
+std::map<std::string, TestGain> gains_on_test(const Extended& before, const Extended& after,
+                                              const std::vector<std::string>& outputs,
+                                              const MeasuredData& test) {
+  std::map<std::string, TestGain> gains;
+  for (const std::string& output : outputs) {
+    const auto index = static_cast<std::size_t>(
+        std::find(test.model.outputs.begin(), test.model.outputs.end(), output) -
+        test.model.outputs.begin());
+    const Residuals was = residuals(before.model, before.corrections, test, index);
+    if (std::isfinite(root_mean_square(was)))
+      gains[output] = test_gain(was, residuals(after.model, after.corrections, test, index));
   }
+  return gains;
 }
 
 /// The model with each finding added after those before it, and what each gains. One that the test
-/// runs speak against is told, and the model goes without it.
-/// @return what terms cannot carry, over the test runs
-/// @param fitted  if given, the search that they come from: what their causes had put into the
-///                coefficients is taken out of them
-Corrections extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
-                   const SearchBesideFit* fitted, const PlaceGroups& groups,
-                   const MeasuredData& train, const MeasuredData& test) {
-  Corrections corrections;
+/// runs speak against is named, and the model goes without it.
+Extended extend(Diagnosis& diagnosis, const std::vector<Finding>& findings,
+                const MeasuredData& train, const MeasuredData& test) {
+  Extended extended{train.model, {}};
   for (const Finding& finding : findings) {
     NamedFinding name = named_finding(finding, train, parameters_of(finding, train));
-    name.group = group_of(groups, name.subject, finding.explanation.other_subjects);
-    const std::optional<TermSpec> term = term_of(finding, train);
-    ThermalModel longer = diagnosis.extended;
-    Corrections more = corrections;
-    if (term) longer.terms.push_back(*term);
-    // Without what acts in every run the coefficients would be right for nothing.
-    const bool new_coefficients = fitted != nullptr && (term || name.run);
-    if (new_coefficients) {
-      add_terms(longer, fitted->corrections(finding));
-      name.evidence +=
-          "; the model was fitted to these rows, which hides most of a cause: its coefficients "
-          "change with it, and the gain on test rows says more than the name";
-    }
-    for (const std::string& output : name.outputs) {
-      const auto index = static_cast<std::size_t>(
-          std::find(train.model.outputs.begin(), train.model.outputs.end(), output) -
-          train.model.outputs.begin());
-      const std::optional<Correction> correction = correction_of(name, index);
-      if (correction) more.push_back(*correction);
-      if (!term && !correction && !new_coefficients) continue;
-      const Residuals before = residuals(diagnosis.extended, corrections, test, index);
-      if (std::isfinite(root_mean_square(before)))
-        name.test[output] = test_gain(before, residuals(longer, more, test, index));
-    }
-    if (!fails_on_test_runs(name)) {
-      diagnosis.extended = std::move(longer);
-      corrections = std::move(more);
+    if (std::optional<Extended> longer = with_finding(extended, finding, train)) {
+      name.test = gains_on_test(extended, *longer, name.outputs, test);
+      if (!fails_on_test_runs(name)) extended = std::move(*longer);
     }
     diagnosis.findings.push_back(std::move(name));
   }
-  return corrections;
+  return extended;
 }
 
-/// What no term carries, over the training runs.
-Corrections train_corrections(const Diagnosis& diagnosis, const MeasuredData& train) {
-  Corrections corrections;
-  for (const NamedFinding& finding : diagnosis.findings) {
-    if (fails_on_test_runs(finding)) continue;
-    for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
-      if (finding.outputs.front() == train.model.outputs[output])
-        if (const auto correction = correction_of(finding, output))
-          corrections.push_back(*correction);
+/// What was weighed, the likeliest with what each would gain alone.
+std::vector<Candidate> candidates_of(const std::vector<Explanation>& weighed,
+                                     const MeasuredData& train, const MeasuredData& test) {
+  std::vector<Candidate> all;
+  for (const Explanation& each : weighed) {
+    const Hypothesis& of = *each.hypothesis;
+    Candidate candidate{of.cause, of.subject, {}, each.probability, share_of_remainder(each)};
+    if (of.run) candidate.run = train.runs[*of.run].name;
+    candidate.score = each.score;
+    candidate.witness = each.witness;
+    candidate.left_out = each.left_out;
+    candidate.left_out_of_best = each.left_out_of_best;
+    candidate.parameters = free_parameters(of);
+    std::vector<std::string> outputs;
+    for (std::size_t output = 0; output < each.gains.size(); ++output)
+      if (each.gains[output].size() > 0) outputs.push_back(train.model.outputs[output]);
+    candidate.outputs = outputs.size();
+    if (all.size() < candidates_tried) {
+      Finding alone{each};
+      alone.shape_ci.resize(each.shape.size());
+      for (const Eigen::VectorXd& gains : each.gains)
+        alone.gains_ci.emplace_back(static_cast<std::size_t>(gains.size()));
+      const Extended base{train.model, {}};
+      if (const auto longer = with_finding(base, alone, train))
+        candidate.test = gains_on_test(base, *longer, outputs, test);
+      const Explanation& rival =
+          &each == &weighed.front() && weighed.size() > 1 ? weighed[1] : weighed.front();
+      candidate.would_decide = experiment_between(
+          {of.cause, of.subject, 0.0}, {rival.hypothesis->cause, rival.hypothesis->subject, 0.0});
+    }
+    all.push_back(std::move(candidate));
   }
-  return corrections;
+  return all;
+}
+
+/// Coefficients fitted anew beside the findings. A model with terms or guideways keeps its own.
+void correct_coefficients(ThermalModel& extended, const ThermalModel& model,
+                          const std::vector<Eigen::VectorXd>& errors) {
+  if (!model.terms.empty() || !model.guideways.empty()) return;
+  for (std::size_t output = 0; output < errors.size(); ++output)
+    for (std::size_t input = 0; input < model.inputs.size(); ++input)
+      extended.matrix_um_per_K[output][input] *=
+          1.0 + errors[output][static_cast<Eigen::Index>(input)];
 }
 
 /// The bank last.
@@ -112,31 +139,35 @@ void forget_output(RemainderBank& remainder, const std::string& output) {
 }
 
 /// Adds a bank of lags for the outputs of which enough can be predicted without a name.
-void carry_remainder(Diagnosis& diagnosis, const std::vector<Headroom>& headroom,
-                     const Corrections& of_train, const Corrections& of_test,
-                     const MeasuredData& train, const MeasuredData& test) {
+/// @return of each output the share that can
+std::vector<double> carry_remainder(Diagnosis& diagnosis, Extended& extended,
+                                    const MeasuredData& train, const MeasuredData& test) {
   std::vector<Residuals> left;
+  for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
+    left.push_back(residuals(extended.model, extended.corrections, train, output));
   std::vector<double> predictable;
-  for (std::size_t output = 0; output < headroom.size(); ++output) {
-    left.push_back(residuals(diagnosis.extended, of_train, train, output));
-    predictable.push_back(headroom[output].predictable);
-  }
   diagnosis.remainder = remainder_bank(train, left, predictable);
-  if (!diagnosis.remainder) return;
-  ThermalModel longer = diagnosis.extended;
-  add_remainder(longer, *diagnosis.remainder);
-  for (const auto& [name, gain] : diagnosis.remainder->left_out) {
-    const auto output = static_cast<std::size_t>(
-        std::find(train.model.outputs.begin(), train.model.outputs.end(), name) -
-        train.model.outputs.begin());
-    const Residuals before = residuals(diagnosis.extended, of_test, test, output);
-    if (std::isfinite(root_mean_square(before)))
-      diagnosis.remainder->test[name] = test_gain(before, residuals(longer, of_test, test, output));
-  }
+  if (!diagnosis.remainder) return predictable;
+  Extended longer = extended;
+  add_remainder(longer.model, *diagnosis.remainder);
+  std::vector<std::string> outputs;
+  for (const auto& [name, gain] : diagnosis.remainder->left_out) outputs.push_back(name);
+  diagnosis.remainder->test = gains_on_test(extended, longer, outputs, test);
   for (const auto& [name, gain] : diagnosis.remainder->test)
     if (!(gain.reduction > 0)) forget_output(*diagnosis.remainder, name);
   if (!diagnosis.remainder->term.bank.gain_um_per_unit.empty())
-    add_remainder(diagnosis.extended, *diagnosis.remainder);
+    add_remainder(extended.model, *diagnosis.remainder);
+  return predictable;
+}
+
+Headroom headroom(double noise, double unexplained, double predictable) {
+  Headroom of;
+  of.noise = std::clamp(noise, 0.0, 1.0);
+  of.named = (1.0 - of.noise) * (1.0 - std::clamp(unexplained, 0.0, 1.0));
+  const double left = 1.0 - of.noise - of.named;
+  of.predictable = std::min(left, predictable * (left + of.noise));
+  of.not_recorded = left - of.predictable;
+  return of;
 }
 
 }  // namespace
@@ -149,41 +180,36 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   const MeasuredData test_data = measured_data(model, test, test_names, columns);
   train.clear();
   test.clear();
-  Search search(train_data, Thresholds{});
-  SearchResult result = search.run();
-  SearchBesideFit beside_fit(train_data, Thresholds{});
-  SearchResult of_fitted = beside_fit.run();
-  const bool fitted =
-      !of_fitted.findings.empty() &&
-      (result.findings.empty() || log_left_by(of_fitted) < log_left_by(result) - fitted_share);
+  const StackedRows rows = stacked_rows(train_data);
+  const std::vector<Hypothesis> all = hypotheses(train_data, rows);
+  const SearchResult result = search(train_data, rows, all, Rules{});
 
   Diagnosis diagnosis;
-  diagnosis.extended = model;
-  diagnosis.weighed = result.weighed;
-  diagnosis.weighed.insert(diagnosis.weighed.end(), of_fitted.weighed.begin(),
-                           of_fitted.weighed.end());
-  if (fitted) result = std::move(of_fitted);
-  const Corrections corrections = extend(diagnosis, result.findings, fitted ? &beside_fit : nullptr,
-                                         search.groups(), train_data, test_data);
   diagnosis.verdict = verdict_of(result);
   diagnosis.families = result.families;
-  const std::vector<Headroom> headroom = search.headrooms(result);
-  carry_remainder(diagnosis, headroom, train_corrections(diagnosis, train_data), corrections,
-                  train_data, test_data);
+  diagnosis.weighed = candidates_of(result.weighed, train_data, test_data);
+  Extended extended = extend(diagnosis, result.findings, train_data, test_data);
+  if (!diagnosis.findings.empty())
+    correct_coefficients(extended.model, model, result.coefficient_errors);
+  const Corrections corrections = extended.corrections;
+  const std::vector<double> predictable =
+      carry_remainder(diagnosis, extended, train_data, test_data);
+  diagnosis.extended = extended.model;
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
     const Residuals base = residuals(test_data, output);
-    const Residuals extended = residuals(diagnosis.extended, corrections, test_data, output);
-    diagnosis.outputs[model.outputs[output]] = {root_mean_square(residuals(train_data, output)),
-                                                root_mean_square(base),
-                                                peak(base),
-                                                root_mean_square(extended),
-                                                peak(extended),
-                                                result.unexplained_share[output],
-                                                headroom[output]};
+    const Residuals after = residuals(extended.model, corrections, test_data, output);
+    diagnosis.outputs[model.outputs[output]] = {
+        root_mean_square(residuals(train_data, output)),
+        root_mean_square(base),
+        peak(base),
+        root_mean_square(after),
+        peak(after),
+        result.unexplained_share[output],
+        headroom(result.noise_share[output], result.unexplained_share[output],
+                 predictable[output])};
   }
   if (report != nullptr) {
-    add_runs(*report, diagnosis, model, train_corrections(diagnosis, train_data), train_data,
-             false);
+    add_runs(*report, diagnosis, model, corrections, train_data, false);
     add_runs(*report, diagnosis, model, corrections, test_data, true);
   }
   return diagnosis;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "config/runs/run_file.hpp"
 #include "modelling/diagnosis/answer/answer.hpp"
 
 namespace thermocomp::diagnosis {

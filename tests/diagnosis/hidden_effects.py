@@ -119,36 +119,6 @@ class Case:
         row = self.model[self.outputs.index(output)]
         return float(np.hypot(self.level["noise_um"], reading_K * np.linalg.norm(row)))
 
-    def nothing_to_find(self):
-        """Whether no crude extension takes a tenth of the RMS that is left in the training rows."""
-        return all(self._crude_gain(output) < 0.1 for output in self.outputs)
-
-    def _crude_gain(self, output):
-        runs = self.train()
-        row = self.model[self.outputs.index(output)]
-
-        def stacked(column):
-            values = [column(run)[::self.sample] for run in runs]
-            return np.concatenate([v - v.mean() for v in values])
-        left = stacked(lambda r: r["moved"][output] - sum(
-            k * self.rise(r, n) for k, n in zip(row, self.inputs)))
-        noise = len(left) * self._noise_um(output) ** 2
-        columns = [lambda r, u=u, t=t, p=p: low_pass(r["signals"][u] ** p, t)
-                   for u in ("spindle_rpm", "feed_mm_per_min", "coolant_on") for p in (1, 2)
-                   for t in (1.0, 600.0, 1800.0, 5400.0)]
-        columns += [lambda r, n=n, t=t: low_pass(self.rise(r, n), t)
-                    for n in list(plant.PLACES) + ["room_degC"] for t in (1.0, 900.0, 3600.0)]
-        columns += [lambda r, n=n, t=t: low_pass(self.rise(r, n), t) - self.rise(r, n)
-                    for n in self.inputs for t in (300.0, 1200.0, 4800.0)]
-        columns += [lambda r, n=n: self.rise(r, n) ** 2 for n in self.inputs]
-        columns += [lambda r, n=n: self.rise(r, n) * r["signals"]["x_mm"] for n in self.inputs]
-        best = 0.0
-        for column in columns:
-            values = stacked(column)
-            if values @ values > 0:
-                best = max(best, (values @ left) ** 2 / (values @ values))
-        return 1.0 - np.sqrt((left @ left - best + noise) / (left @ left + noise))
-
     def train(self):
         return [self.runs[name] for name, _ in RUNS if name != "test.csv"]
 
@@ -461,12 +431,9 @@ class Case:
 
 
 def make(folder, seed, level, causes):
-    """Tries machines by seed until every cause finds a place that carries it; without a cause,
-    until a machine has nothing to find."""
+    """Tries machines by seed until every cause finds a place that carries it."""
     for attempt in range(200):
         case = Case(seed * 1000 + attempt, level)
-        if not causes and not case.nothing_to_find():
-            continue
         try:
             for cause in causes:
                 case.hide(cause)

@@ -107,6 +107,24 @@ def printer(_):
     return one_run("printer", thinned(run, 55.0), ["z_um"], [])
 
 
+def other_printer(_):
+    run = columns(DATA / "printer_other" / "run_2021-06-12.csv")
+    del run["bed_target"]
+    return one_run("other_printer", thinned(run, 20.0), ["z_um"], [])
+
+
+def probe(random):
+    """Two runs of one probe, or of one kind of probe: bed, nozzle and chamber warm what it reads."""
+    pair = (("superpinda", "superpinda_covered"), ("superpinda_fysetc", "superpinda_fysetc_covered"),
+            ("GX_H8A", "N3F_H4NB"))[int(random.integers(3))]
+    runs = [columns(DATA / "probe_drift" / ("%s.csv" % name)) for name in pair]
+    for run in runs:
+        del run["bed_target"], run["hotend_target"]
+    runs = [thinned(run, 6.0) for run in runs]
+    train = [slice(0, len(runs[0]["time_s"])), slice(0, 0)]
+    return Machine("probe", runs, ["z_um"], [], train)
+
+
 def cell(random):
     unit = ("Q30_S001", "Q30_S002")[int(random.integers(2))]
     files = [columns(DATA / "cell_under_load" / ("%s_%s.csv" % (unit, rate)))
@@ -132,7 +150,7 @@ def spindle_outputs(random):
 
 
 MACHINES = {"spindle": spindle, "spindle_outputs": spindle_outputs, "printer": printer,
-            "cell": cell, "mirror": mirror}
+            "cell": cell, "mirror": mirror, "other_printer": other_printer, "probe": probe}
 
 
 class Model:

@@ -81,7 +81,8 @@ class Planted:
 
     def _tau_s(self, low_s, high_s):
         longest_s = max(r["time_s"][-1] for r in self.machine.runs) / 6.0
-        return float(np.exp(self.random.uniform(np.log(low_s), np.log(min(high_s, longest_s)))))
+        high_s = min(high_s, longest_s)
+        return float(np.exp(self.random.uniform(np.log(min(low_s, 0.5 * high_s)), np.log(high_s))))
 
     def _coefficients(self, name):
         """Of the group of places that cannot be told apart, by output."""

@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "modelling/diagnosis/evidence/headroom.hpp"
+#include "estimator/thermal_model.hpp"
 #include "modelling/diagnosis/hypothesis/parameter.hpp"
-#include "modelling/diagnosis/search/search.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -42,6 +41,25 @@ struct NamedFinding {
   std::vector<std::string> group{};  ///< places that cannot be told apart, the subject's first
 };
 
+/// What was weighed for the first finding, whether it became one or not.
+struct Candidate {
+  std::string cause;
+  std::string subject;
+  std::optional<std::string> run;
+  double probability{0.0};
+  double share_of_remainder{0.0};  ///< of the RMS of left-out training rows, of the best output
+  /// Alone in the model, on test rows, which decide nothing; empty where no term carries it.
+  std::map<std::string, TestGain> test{};
+  std::string would_decide{};  ///< the experiment that tells it from the likeliest other one
+  // What the probability comes from (rank/explanation.hpp):
+  double score{0.0};
+  double witness{0.0};
+  double left_out{0.0};
+  double left_out_of_best{0.0};
+  std::size_t parameters{0};  ///< that were free: of its shape, and gains of an output
+  std::size_t outputs{0};     ///< on which it acts
+};
+
 /// RMS of training rows that were left out in turn.
 struct LeftOutRms {
   double before_um{0.0};
@@ -56,6 +74,14 @@ struct RemainderBank {
   bool changes_coefficients{false};            ///< that had been fitted to the training rows
   /// Beside the findings; an output that does not gain goes without it.
   std::map<std::string, TestGain> test;
+};
+
+/// Shares of the variance that a model leaves of an output; they add to 1.
+struct Headroom {
+  double noise{0.0};         ///< of single values
+  double named{0.0};         ///< what the findings carry
+  double predictable{0.0};   ///< from what was recorded, but without a name
+  double not_recorded{1.0};  ///< by nothing in this recording
 };
 
 struct OutputFigures {
@@ -77,13 +103,14 @@ struct Diagnosis {
   /// With every finding that a term can carry and the test runs do not speak against.
   ThermalModel extended;
   std::optional<RemainderBank> remainder;  ///< its terms are the extended model's last
-  std::vector<Weighed> weighed;            ///< what came into question in every round of the search
-  /// Probability of each family, whether it is named or not; empty where nothing was weighed so.
+  std::vector<Candidate> weighed;          ///< likeliest first
+  /// Probability of each family, whether it is named or not, and of `none`; empty where nothing was
+  /// weighed so.
   std::map<std::string, double> families{};
 };
 
 /// The answer as JSON (indented, a newline at the end). Numbers that are not known are null.
-/// @param weighed  adds what came into question
+/// @param weighed  adds every candidate and what its probability comes from
 [[nodiscard]] std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed = false);
 
 }  // namespace thermocomp::diagnosis

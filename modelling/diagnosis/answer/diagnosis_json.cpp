@@ -9,6 +9,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::size_t candidates_told = 3;
+
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
@@ -87,19 +89,31 @@ Json finding_json(const NamedFinding& finding, const std::string& unit) {
           {key_of("test_rms", unit), finding.test.empty() ? Json(nullptr) : test}};
 }
 
-Json weighed_json(const Diagnosis& diagnosis) {
+/// @param in_full  with what the probability comes from
+Json candidate_json(const Candidate& of, const std::string& unit, bool in_full) {
+  Json json = {{"cause", of.cause},
+               {"subject", of.subject},
+               {"probability", number(of.probability)},
+               {"share_of_remainder", number(of.share_of_remainder)},
+               {key_of("test_rms", unit), of.test.empty() ? Json(nullptr) : test_json(of.test)},
+               {"would_decide", of.would_decide}};
+  if (of.run) json["run"] = *of.run;
+  if (!in_full) return json;
+  json["score"] = number(of.score);
+  json["witness"] = number(of.witness);
+  json["left_out"] = number(of.left_out);
+  json["left_out_of_best"] = number(of.left_out_of_best);
+  json["parameters"] = of.parameters;
+  json["outputs"] = of.outputs;
+  return json;
+}
+
+Json weighed_json(const Diagnosis& diagnosis, bool in_full) {
   Json all = Json::array();
-  for (const Weighed& each : diagnosis.weighed)
-    all.push_back({{"round", each.round},
-                   {"cause", each.cause},
-                   {"subject", each.subject},
-                   {"score", number(each.score)},
-                   {"left_out_gain", number(each.left_out_gain)},
-                   {"left_out_gain_of_best", number(each.left_out_gain_of_best)},
-                   {"log_left", number(each.log_left)},
-                   {"witness", number(each.witness)},
-                   {"free_parameters", each.free_parameters},
-                   {"beside_fit", each.beside_fit}});
+  for (const Candidate& each : diagnosis.weighed) {
+    if (!in_full && all.size() >= candidates_told) break;
+    all.push_back(candidate_json(each, diagnosis.unit, in_full));
+  }
   return all;
 }
 
@@ -138,7 +152,7 @@ std::string diagnosis_json(const Diagnosis& diagnosis, bool weighed) {
   if (!headroom.empty()) answer["headroom"] = headroom;
   if (diagnosis.remainder) answer["remainder"] = remainder_json(*diagnosis.remainder, unit);
   if (!diagnosis.families.empty()) answer["families"] = diagnosis.families;
-  if (weighed) answer["weighed"] = weighed_json(diagnosis);
+  if (!diagnosis.weighed.empty()) answer["weighed"] = weighed_json(diagnosis, weighed);
   return answer.dump(2) + "\n";
 }
 

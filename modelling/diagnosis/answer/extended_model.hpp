@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "modelling/diagnosis/answer/answer.hpp"
+#include "modelling/diagnosis/rank/search.hpp"
 
 namespace thermocomp::diagnosis {
 

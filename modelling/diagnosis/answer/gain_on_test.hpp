@@ -5,6 +5,7 @@
 
 #include "modelling/diagnosis/answer/answer.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis {
 

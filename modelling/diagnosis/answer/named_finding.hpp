@@ -2,8 +2,12 @@
 #pragma once
 
 #include "modelling/diagnosis/answer/answer.hpp"
+#include "modelling/diagnosis/rank/search.hpp"
 
 namespace thermocomp::diagnosis {
+
+/// Of the RMS of left-out rows, of the output that gains most.
+[[nodiscard]] double share_of_remainder(const Explanation& explanation);
 
 /// Everything but the gain on test runs.
 /// @param data  whose outputs and runs the finding is of

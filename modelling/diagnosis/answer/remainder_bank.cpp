@@ -215,7 +215,8 @@ Judged judged(const MeasuredTests& tests, const BankEquations& bank,
 
 std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
                                             const std::vector<Residuals>& left,
-                                            const std::vector<double>& predictable) {
+                                            std::vector<double>& predictable) {
+  predictable.assign(left.size(), 0.0);
   Eigen::Index rows = 0;
   for (const MeasuredRun& run : train.runs) rows += run.rows();
   const Eigen::Index apart = 1 + (rows - 1) / rows_max;
@@ -230,10 +231,12 @@ std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
     set_output(tests, train, left[output], apart);
     const Eigen::VectorXd row = matrix_row(train.model, output);
     const std::optional<BankEquations> static_fit = fit_like_the_matrix(tests, train.model, row);
-    if (!static_fit && predictable[output] < predictable_share_min) continue;
     if (static_fit) add_matrix(tests, row);
     const BankEquations equations(tests, columns);
     const Judged of_output = judged(tests, equations, static_fit ? &*static_fit : nullptr);
+    if (of_output.gain.before_um > 0)
+      predictable[output] =
+          std::max(0.0, 1.0 - std::pow(of_output.gain.after_um / of_output.gain.before_um, 2));
     if (!of_output.helps) continue;
     outputs.push_back(train.model.outputs[output]);
     gains.emplace_back(equations.fit(tests.folds.size()));

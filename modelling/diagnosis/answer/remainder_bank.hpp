@@ -11,10 +11,6 @@
 
 namespace thermocomp::diagnosis {
 
-/// Least share of an output's variance before the findings that must be predictable without a name
-/// for a bank to be tried.
-inline constexpr double predictable_share_min = 0.1;
-
 /// A bank for each output whose left-out rows it predicts better: each of eight blocks of the
 /// training rows is left out, and what is left of them must fall by a tenth (RMS), about the
 /// run's mean too, and by more than the standard error over the blocks. Everything counts from the
@@ -26,11 +22,11 @@ inline constexpr double predictable_share_min = 0.1;
 /// without the blocks, from the inputs as they are and with the bank, and compared so; the bank
 /// then holds what the coefficients change by, too.
 /// @param left         by the model with the findings, over the training runs, order of the outputs
-/// @param predictable  share of each output's variance; less than predictable_share_min: no bank
-///                     unless it is fitted anew
+/// @param predictable  receives of each output the share of the variance of its left-out rows that
+///                     the bank predicts, whether it gets one or not
 /// @return nullopt: no output gains
 [[nodiscard]] std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
                                                           const std::vector<Residuals>& left,
-                                                          const std::vector<double>& predictable);
+                                                          std::vector<double>& predictable);
 
 }  // namespace thermocomp::diagnosis

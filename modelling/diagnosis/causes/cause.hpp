@@ -47,13 +47,6 @@ enum class Experiment {
   other_duty,      ///< anything else
 };
 
-/// What a fit to the same rows takes into the model's coefficients.
-enum class TakenByFit {
-  in_part,      ///< of its columns what looks like the inputs
-  all,          ///< it is a sum of the inputs
-  but_a_pivot,  ///< in part; the second column is an input
-};
-
 /// What a finding changes that no term of the model file carries, in one output: a shift in time,
 /// or a sine of known period and size. The sine's phase is another one in every run and is taken
 /// from the run itself.
@@ -63,11 +56,6 @@ struct Correction {
   double period_s{0.0};
   double amplitude_um{0.0};
 };
-
-/// Error of a reading with a fault of gain 1, over all rows of the run.
-/// @param onset_s  the shape's one parameter
-using ErrorOfReading = Column (*)(const MeasuredData& data, const MeasuredRun& run,
-                                  std::size_t input, double onset_s);
 
 struct Cause {
   std::string name;    ///< fixed: in answers and, as `kind`, in model files
@@ -80,7 +68,6 @@ struct Cause {
   std::optional<CauseTexts> texts_without_unit{};
   Experiment experiment{Experiment::other_duty};
   std::string term{};  ///< kind of the `[[term]]` that carries it; empty: none does
-  TakenByFit taken_by_fit{TakenByFit::in_part};
   /// What it would do to the displacement, if the subject is one that it can have. Null: it is a
   /// cause of the thermal layer alone.
   std::vector<Hypothesis> (*hypotheses)(const Material& material, const Subject& subject){nullptr};
@@ -89,10 +76,6 @@ struct Cause {
   /// Of a cause that acts in every run and that no term carries: what is corrected in its place,
   /// from its parameters. Null: nothing.
   Correction (*correction)(const std::vector<Parameter>& parameters){nullptr};
-  ErrorOfReading error_of_reading{nullptr};  ///< of a fault of one reading in one run
-  /// The error is in proportion to the reading: what is left of its motion is smaller than the
-  /// motion was, what is left of its noise is not.
-  bool shrinks_reading{false};
 
   /// What it would do to the temperatures of a thermal network. Null: the thermal layer does not
   /// have it.

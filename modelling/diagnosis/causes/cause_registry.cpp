@@ -40,7 +40,6 @@ class Catalogue {
     for (const Cause& cause : all_causes()) {
       if (cause.hypotheses == nullptr) continue;
       for (Hypothesis& each : cause.hypotheses(material_, subject)) {
-        each.rows = material_.rows().time_s.size();
         found_.push_back(std::move(each));
       }
     }
@@ -108,9 +107,9 @@ std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& 
   const auto material = std::make_shared<Material>(data, rows);
   std::vector<Hypothesis> all = Catalogue(*material).all();
   for (Hypothesis& hypothesis : all)
-    hypothesis.write_columns = [material, write = std::move(hypothesis.write_columns)](
-                                   const Shapes& shapes, std::size_t output, PanelPart into) {
-      write(shapes, output, into);
+    hypothesis.columns = [material, columns = std::move(hypothesis.columns)](const Shapes& shapes,
+                                                                             std::size_t output) {
+      return columns(shapes, output);
     };
   return all;
 }

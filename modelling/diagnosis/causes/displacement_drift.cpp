@@ -4,20 +4,16 @@ namespace thermocomp::diagnosis::causes {
 namespace {
 
 constexpr const char* name = "displacement_drift";
-/// Whatever wanders resembles a ramp for the length of a run.
-constexpr double clear_share = 0.6;
 
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::output_in_run) return {};
   Hypothesis drift{name,       material.name_of(subject), Form::own_gains,
                    {},         {"rate_um_per_h"},         subject.index,
                    subject.run};
-  drift.clear_share = clear_share;
-  drift.write_columns = one_by_one([&material, run = subject.run](const Shape&, std::size_t) {
-    return material.in_run(run, [&](const MeasuredRun& of) -> Column {
-      return (of.time_s.array() - of.time_s[of.begin]) / 3600.0;
-    });
-  });
+  drift.columns = [&material, run = subject.run](const Shapes&, std::size_t) {
+    const MeasuredRun& of = material.data().runs[run];
+    return material.in_run(run, (of.time_s.array() - of.time_s[of.begin]) / 3600.0);
+  };
   return {std::move(drift)};
 }
 

@@ -8,16 +8,17 @@ constexpr const char* name = "displacement_step";
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::output_in_run) return {};
   const std::size_t run = subject.run;
-  Hypothesis step{name,
-                  material.name_of(subject),
-                  Form::own_gains,
-                  {{"at_s", material.onsets_s(run, 0.02, 0.98, 64)}},
-                  {"step_um"},
-                  subject.index,
-                  run};
-  step.write_columns = [&material, run](const Shapes& shapes, std::size_t, PanelPart into) {
-    material.write_since(run, firsts_of(shapes), Column::Ones(material.data().runs[run].rows()),
-                         into);
+  Hypothesis step{
+      name,
+      material.name_of(subject),
+      Form::own_gains,
+      {{"at_s", material.onsets_s(run, 0.02, 0.98, 52,
+                                  material.data().runs[run].measured_um[subject.index])}},
+      {"step_um"},
+      subject.index,
+      run};
+  step.columns = [&material, run](const Shapes& shapes, std::size_t) {
+    return material.in_run(run, since(material.data().runs[run].time_s, firsts_of(shapes)));
   };
   return {std::move(step)};
 }

@@ -16,15 +16,10 @@ std::vector<Hypothesis> of_input(const Material& material, const Subject& subjec
                   material.name_of(subject),
                   Form::no_gain,
                   {{"width_K", linear_grid(0.04 * range_K, 0.8 * range_K, 16)}}};
-  play.in_every_output = true;
-  play.write_columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output,
-                                                          PanelPart into) {
-    const std::vector<double> widths_K = firsts_of(shapes);
-    material.write_stacked(into, [&](const MeasuredRun& run, PanelPart of_run) {
-      Panel missed_K(run.rows(), std::ssize(widths_K));
-      played_less_values(run.calm_inputs_K[input], widths_K, Column::Ones(run.rows()), missed_K);
-      answer_to_errors(material.data(), run, output, input, missed_K);
-      of_run = missed_K;
+  play.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
+    return material.stacked([&](const MeasuredRun& run) {
+      return answer_to_errors(material.data(), run, output, input,
+                              played_less_values(run.calm_inputs_K[input], firsts_of(shapes)));
     });
   };
   return {std::move(play)};
@@ -41,11 +36,9 @@ std::vector<Hypothesis> of_output(const Material& material, const Subject& subje
                   Form::no_gain,
                   {{"width_um", linear_grid(0.03 * range_um, 0.7 * range_um, 20)}}};
   play.output = subject.index;
-  play.write_columns = [&material, model_um](const Shapes& shapes, std::size_t, PanelPart into) {
-    const std::vector<double> widths_um = firsts_of(shapes);
-    material.write_stacked(into, [&](const MeasuredRun& run, PanelPart of_run) {
-      played_less_values(calm(run.time_s, model_um(run)), widths_um, Column::Ones(run.rows()),
-                         of_run);
+  play.columns = [&material, model_um](const Shapes& shapes, std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
+      return played_less_values(calm(run.time_s, model_um(run)), firsts_of(shapes));
     });
   };
   return {std::move(play)};

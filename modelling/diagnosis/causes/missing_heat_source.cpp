@@ -10,20 +10,6 @@ constexpr const char* name = "missing_heat_source";
 constexpr CauseParameter tau{"tau_s", "s", 120.0, 6 * 3600.0, "time constant"};
 constexpr CauseParameter power{"power", "1", 1.0, 2.0, "power of the signal"};
 
-void write(const Material& material, const ColumnOf& values, const Shapes& shapes, PanelPart into) {
-  Eigen::Array<bool, Eigen::Dynamic, 1> is_squared(into.cols());
-  for (std::size_t i = 0; i < shapes.size(); ++i)
-    is_squared[static_cast<Eigen::Index>(i)] = shapes[i][1] > 1.5;
-  const std::vector<double> taus_s = firsts_of(shapes);
-  material.write_stacked(into, [&](const MeasuredRun& run, PanelPart of_run) {
-    const Column& u = values(run);
-    for (Eigen::Index row = 0; row < of_run.rows(); ++row)
-      for (Eigen::Index i = 0; i < of_run.cols(); ++i)
-        of_run(row, i) = is_squared[i] ? u[row] * u[row] : u[row];
-    lag_each(run.time_s, taus_s, of_run);
-  });
-}
-
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::signal) return {};
   Hypothesis heat{name,
@@ -32,9 +18,23 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
                   {{std::string(tau.name), material.lag_times_s(tau.low, tau.high, 22), true},
                    {std::string(power.name), {power.low, power.high}, false, true}},
                   {"gain_um_per_unit"}};
-  heat.write_columns = [&material, values = material.values_of(subject)](
-                           const Shapes& shapes, std::size_t, PanelPart into) {
-    write(material, values, shapes, into);
+  heat.columns = [&material, values = material.values_of(subject)](const Shapes& shapes,
+                                                                   std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
+      const Column& u = values(run);
+      Panel all(run.rows(), std::ssize(shapes));
+      for (const double exponent : {power.low, power.high}) {
+        std::vector<double> taus_s;
+        std::vector<Eigen::Index> places;
+        for (std::size_t i = 0; i < shapes.size(); ++i) {
+          if (shapes[i][1] != exponent) continue;
+          taus_s.push_back(shapes[i][0]);
+          places.push_back(static_cast<Eigen::Index>(i));
+        }
+        all(Eigen::all, places) = lagged(run.time_s, u.array().pow(exponent), taus_s);
+      }
+      return all;
+    });
   };
   return {std::move(heat)};
 }
@@ -66,7 +66,7 @@ std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
   heat.hypothesis.form = Form::shared_gain;
   heat.hypothesis.gains = {"heat_W"};
   heat.hypothesis.shape = {{std::string(power.name), {power.low, power.high}, false, true}};
-  heat.hypothesis.possible = [](double gain, std::size_t) { return gain > 0.0; };
+  heat.hypothesis.bounds = [](std::size_t) { return Interval{0.0, 1e9}; };
   heat.at = largest(material.runs, signal);
   heat.apply = [&place, &column, at = heat.at](HeatNetwork& network, const Shape& shape,
                                                double gain) {

@@ -17,12 +17,10 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
                      Form::own_gains,
                      {{std::string(tau.name), taus_s, true}},
                      {"gain_um_per_K"}};
-  missing.write_columns = [&material, rise_K = material.values_of(subject)](
-                              const Shapes& shapes, std::size_t, PanelPart into) {
-    material.write_stacked(
-        into, [&, taus_s = firsts_of(shapes)](const MeasuredRun& run, PanelPart of_run) {
-          lagged(run.time_s, rise_K(run), taus_s, of_run);
-        });
+  missing.columns = [&material, rise_K = material.values_of(subject)](const Shapes& shapes,
+                                                                      std::size_t) {
+    return material.stacked(
+        [&](const MeasuredRun& run) { return lagged(run.time_s, rise_K(run), firsts_of(shapes)); });
   };
   return {std::move(missing)};
 }

@@ -9,11 +9,10 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::other_temperature)
     return {};
   Hypothesis square{name, material.name_of(subject), Form::own_gains, {}, {"gain_um_per_K2"}};
-  square.write_columns =
-      one_by_one([&material, rise_K = material.values_of(subject)](const Shape&, std::size_t) {
-        return material.stacked(
-            [&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
-      });
+  square.columns = [&material, rise_K = material.values_of(subject)](const Shapes&, std::size_t) {
+    return material.stacked(
+        [&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
+  };
   return {std::move(square)};
 }
 

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "modelling/diagnosis/causes/cause.hpp"
-#include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis::causes {
 namespace {
@@ -26,19 +26,22 @@ std::vector<double> periods_of(const Material& material) {
   return periods;
 }
 
-/// A sine and a cosine for each run.
-void write(const Material& material, const Shapes& shapes, PanelPart into) {
+/// A sine and a cosine for each run, those of one period after those of another.
+Panel waves(const Material& material, const Shapes& shapes) {
   const StackedRows& rows = material.rows();
-  const std::vector<double> periods_s = firsts_of(shapes);
-  const Eigen::Index apart = into.cols() / std::ssize(shapes);
-  if (rows.runs.size() > 1) into.setZero();
-  for (std::size_t run = 0; run < rows.runs.size(); ++run) {
-    const Block& block = rows.runs[run];
-    const Eigen::Index count = block.end - block.begin;
-    const Eigen::Index first = 2 * static_cast<Eigen::Index>(run);
-    waves(rows.time_s.segment(block.begin, count), periods_s, apart,
-          into.block(block.begin, first, count, into.cols() - first));
-  }
+  const Eigen::Index width = 2 * std::ssize(rows.runs);
+  Panel all = Panel::Zero(rows.time_s.size(), width * std::ssize(shapes));
+  for (std::size_t i = 0; i < shapes.size(); ++i)
+    for (std::size_t run = 0; run < rows.runs.size(); ++run) {
+      const Block& block = rows.runs[run];
+      const Eigen::Index count = block.end - block.begin;
+      const Eigen::ArrayXd angle =
+          2.0 * std::numbers::pi / shapes[i][0] * rows.time_s.segment(block.begin, count).array();
+      const auto first = width * static_cast<Eigen::Index>(i) + 2 * static_cast<Eigen::Index>(run);
+      all.col(first).segment(block.begin, count) = angle.sin();
+      all.col(first + 1).segment(block.begin, count) = angle.cos();
+    }
+  return all;
 }
 
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
@@ -54,8 +57,8 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
                     {{"period_s", periods, true, false}},
                     gains};
   period.output = subject.index;
-  period.write_columns = [&material](const Shapes& shapes, std::size_t, PanelPart into) {
-    write(material, shapes, into);
+  period.columns = [&material](const Shapes& shapes, std::size_t) {
+    return waves(material, shapes);
   };
   return {std::move(period)};
 }

@@ -13,20 +13,17 @@ Hypothesis along(const Material& material, const Subject& place, const Subject& 
   const std::string& axis = material.name_of(position);
   const std::string subject = std::min(temperature, axis) + "|" + std::max(temperature, axis);
   Hypothesis along{name, subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}};
-  along.handicap = special_case_handicap;
-  along.special_case = {
-      place.kind == SubjectKind::input ? "wrong_coefficient" : "missing_temperature",
-      temperature};  // without the position
-  along.write_columns =
-      one_by_one([&material, rise_K = material.values_of(place),
-                  position_mm = material.values_of(position)](const Shape&, std::size_t) {
-        Eigen::MatrixXd both(material.rows().time_s.size(), 2);
-        both.col(0) = material.stacked([&](const MeasuredRun& run) -> Column {
-          return position_mm(run).cwiseProduct(rise_K(run));
-        });
-        both.col(1) = material.stacked(rise_K);
-        return both;
-      });
+  along.simpler_cause =
+      place.kind == SubjectKind::input ? "wrong_coefficient" : "missing_temperature";
+  along.simpler_subject = temperature;  // without the position
+  along.columns = [&material, rise_K = material.values_of(place),
+                   position_mm = material.values_of(position)](const Shapes&, std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
+      Panel both(run.rows(), 2);
+      both << position_mm(run).cwiseProduct(rise_K(run)), rise_K(run);
+      return both;
+    });
+  };
   return along;
 }
 
@@ -74,7 +71,6 @@ Cause position_dependence() {
                  "Use the extended model, or give the model a guideway along this axis."};
   cause.experiment = Experiment::along_the_axis;
   cause.term = name;
-  cause.taken_by_fit = TakenByFit::but_a_pivot;
   cause.hypotheses = of;
   cause.gains = gains;
   return cause;

@@ -8,49 +8,31 @@ namespace {
 /// Share of the run before which nothing is sought to have begun.
 constexpr double last_onset = 0.95;
 
-void write(const Material& material, const Subject& subject, ErrorOfReading error,
-           std::size_t output, const Shapes& shapes, PanelPart into) {
-  const MeasuredData& data = material.data();
-  const MeasuredRun& run = data.runs[subject.run];
-  Panel errors_K(run.rows(), std::ssize(shapes));
-  for (std::size_t i = 0; i < shapes.size(); ++i)
-    errors_K.col(static_cast<Eigen::Index>(i)) = error(data, run, subject.index, shapes[i][0]);
-  answer_to_errors(data, run, output, subject.index, errors_K);
-  const Block& block = material.rows().runs[subject.run];
-  into.setZero();
-  into.middleRows(block.begin, block.end - block.begin) =
-      -errors_K.bottomRows(block.end - block.begin);
-}
-
 }  // namespace
 
 Hypothesis of_reading_fault(const Material& material, const Subject& subject,
                             const ReadingFault& fault) {
-  Hypothesis of{
-      fault.cause,
-      material.name_of(subject),
-      Form::shared_gain,
-      {{fault.onset, material.onsets_s(subject.run, fault.first, last_onset, fault.onsets)}},
-      {fault.gain}};
+  const MeasuredRun& run = material.data().runs[subject.run];
+  Hypothesis of{fault.cause,
+                material.name_of(subject),
+                Form::shared_gain,
+                {{fault.onset, material.onsets_s(subject.run, fault.first, last_onset, fault.onsets,
+                                                 run.inputs_K[subject.index])}},
+                {fault.gain}};
   of.run = subject.run;
   of.sensor = subject.index;
-  of.handicap = special_case_handicap;  // from the run's start on: a fault of the datum
-  of.in_every_output = true;
-  of.write_columns = [&material, subject, error = fault.error](const Shapes& shapes,
-                                                               std::size_t output, PanelPart into) {
-    write(material, subject, error, output, shapes, into);
+  const auto errors_K = [&material, &run, input = subject.index,
+                         error = fault.error](const Shapes& shapes) {
+    return error(material.data(), run, input, firsts_of(shapes));
+  };
+  of.errors_K = [&material, number = subject.run, errors_K](const Shapes& shapes) {
+    return material.in_run(number, errors_K(shapes));
+  };
+  of.columns = [&material, &run, subject, errors_K](const Shapes& shapes, std::size_t output) {
+    return material.in_run(subject.run, -answer_to_errors(material.data(), run, output,
+                                                          subject.index, errors_K(shapes)));
   };
   return of;
-}
-
-void share_columns(Hypothesis& fault, const Material& material, const Subject& subject) {
-  // With guideways the coefficient changes from row to row, terms answer late.
-  const ThermalModel& model = material.data().model;
-  if (!model.guideways.empty() || has_terms_of(model, subject.index)) return;
-  fault.pattern = fault.cause + std::to_string(*fault.run);
-  fault.scale = [&model, input = subject.index](std::size_t output) {
-    return -model.matrix_um_per_K[output][input];
-  };
 }
 
 NetworkHypothesis of_reading_in_network(

@@ -5,6 +5,10 @@
 
 namespace thermocomp::diagnosis::causes {
 
+/// Error of a reading with a fault of gain 1 over all rows of the run [K], shape (rows, onsets).
+using ErrorOfReading = Panel (*)(const MeasuredData& data, const MeasuredRun& run,
+                                 std::size_t input, const std::vector<double>& onsets_s);
+
 struct ReadingFault {
   const char* cause;
   const char* onset;  ///< the shape's one parameter
@@ -18,9 +22,6 @@ struct ReadingFault {
 /// @pre the subject is an input in one run
 [[nodiscard]] Hypothesis of_reading_fault(const Material& material, const Subject& subject,
                                           const ReadingFault& fault);
-
-/// A fault that is alike at every sensor of a run acts through the sensor's coefficient alone.
-void share_columns(Hypothesis& fault, const Material& material, const Subject& subject);
 
 /// A fault of a sensor of a thermal network in one run: a displacement of its reading alone.
 /// @param value  of gain 1, at a time

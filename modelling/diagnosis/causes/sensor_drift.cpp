@@ -6,16 +6,19 @@ namespace {
 constexpr const char* name = "sensor_drift";
 
 /// Time since the onset [h], for a gain in K/h.
-Column error_h(const MeasuredData&, const MeasuredRun& run, std::size_t, double onset_s) {
-  return ((run.time_s.array() - onset_s) / 3600.0).max(0.0);
+Panel errors_h(const MeasuredData&, const MeasuredRun& run, std::size_t,
+               const std::vector<double>& onsets_s) {
+  Panel all(run.rows(), std::ssize(onsets_s));
+  for (Eigen::Index i = 0; i < all.cols(); ++i)
+    all.col(i) =
+        ((run.time_s.array() - onsets_s[static_cast<std::size_t>(i)]) / 3600.0).max(0.0).matrix();
+  return all;
 }
 
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input_in_run) return {};
-  Hypothesis drift =
-      of_reading_fault(material, subject, {name, "start_s", "rate_K_per_h", 0.0, 24, error_h});
-  share_columns(drift, material, subject);
-  return {std::move(drift)};
+  return {
+      of_reading_fault(material, subject, {name, "start_s", "rate_K_per_h", 0.0, 24, errors_h})};
 }
 
 /// From the run's start on.
@@ -42,7 +45,6 @@ Cause sensor_drift() {
   cause.hypotheses = of;
   cause.gains = single_gain;
   cause.in_network = in_network;
-  cause.error_of_reading = error_h;
   return cause;
 }
 

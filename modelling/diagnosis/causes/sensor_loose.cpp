@@ -1,5 +1,6 @@
+#include <algorithm>
+
 #include "modelling/diagnosis/causes/reading_fault.hpp"
-#include "modelling/diagnosis/data/false_reading.hpp"
 #include "modelling/diagnosis/data/room.hpp"
 
 namespace thermocomp::diagnosis::causes {
@@ -16,43 +17,33 @@ double kept(double lost) {
 
 /// reading = room + gain (T - room): the reading misses (1 / gain - 1) (reading - room), from the
 /// onset on. Without a column of the room, its first value stands for it.
-Column error_K(const MeasuredData& data, const MeasuredRun& run, std::size_t input,
-               double onset_s) {
-  const Column since = (run.time_s.array() >= onset_s).cast<double>();
+Panel errors_K(const MeasuredData& data, const MeasuredRun& run, std::size_t input,
+               const std::vector<double>& onsets_s) {
   const Column& reading_degC = run.inputs_degC[input];
   const Column* const room = room_degC(data, run);
   Column lost_K = double(reading_degC[0]) - reading_degC.array();
   if (room != nullptr) lost_K = *room - reading_degC;
-  return since.cwiseProduct(lost_K);
+  return lost_K.asDiagonal() * since(run.time_s, onsets_s);
 }
 
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input_in_run) return {};
   const MeasuredData& data = material.data();
   if (room_among(data.model.inputs) == material.name_of(subject)) return {};
-  Hypothesis loose = of_reading_fault(material, subject, {name, "at_s", "gain", 0.03, 48, error_K});
-  loose.possible = [](double lost, std::size_t) { return lost > lost_min && lost < lost_max; };
-  if (has_terms_of(data.model, subject.index)) return {std::move(loose)};
-  const auto whole = [&data, subject](std::size_t output) -> Column {
-    const MeasuredRun& run = data.runs[subject.run];
-    const Column lost_K = error_K(data, run, subject.index, run.time_s[0]);
-    return -data.coefficient(run, output, subject.index).cwiseProduct(lost_K);
-  };
-  loose.write_columns = [&material, subject, whole](const Shapes& shapes, std::size_t output,
-                                                    PanelPart into) {
-    material.write_since(subject.run, firsts_of(shapes), whole(output), into);
-  };
-  loose.from_onset = [&material, subject, whole](std::size_t output) {
-    return material.in_run(subject.run, [&](const MeasuredRun&) { return whole(output); });
-  };
+  Hypothesis loose =
+      of_reading_fault(material, subject, {name, "at_s", "gain", 0.03, 40, errors_K});
+  loose.bounds = [](std::size_t) { return Interval{lost_min, lost_max}; };
+  loose.shrinks_reading = true;
   return {std::move(loose)};
 }
 
 /// Of what is lost, what is left.
 std::vector<Parameter> gain(const FoundGains& found) {
   const std::size_t output = first_output(found);
-  const double left = kept(found.gains[output][0]);
-  return {{"gain", {{"", left}}, {{"", around(left, found.reach[output][0] * left * left)}}}};
+  const Interval& lost = found.ci95[output].front();
+  return {{"gain",
+           {{"", kept(found.gains[output][0])}},
+           {{"", {kept(lost.high), kept(std::max(lost.low, lost_min))}}}}};
 }
 
 }  // namespace
@@ -76,8 +67,6 @@ Cause sensor_loose() {
   cause.experiment = Experiment::another_run;
   cause.hypotheses = of;
   cause.gains = gain;
-  cause.error_of_reading = error_K;
-  cause.shrinks_reading = true;
   return cause;
 }
 

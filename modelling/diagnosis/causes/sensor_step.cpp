@@ -1,5 +1,4 @@
 #include "modelling/diagnosis/causes/reading_fault.hpp"
-#include "modelling/diagnosis/data/false_reading.hpp"
 
 namespace thermocomp::diagnosis::causes {
 namespace {
@@ -8,24 +7,14 @@ constexpr const char* name = "sensor_step";
 constexpr std::size_t onsets_in_network = 48;
 
 /// 1 K from the onset on.
-Column error_K(const MeasuredData&, const MeasuredRun& run, std::size_t, double onset_s) {
-  return (run.time_s.array() >= onset_s).cast<double>();
+Panel errors_K(const MeasuredData&, const MeasuredRun& run, std::size_t,
+               const std::vector<double>& onsets_s) {
+  return since(run.time_s, onsets_s);
 }
 
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input_in_run) return {};
-  const MeasuredData& data = material.data();
-  Hypothesis step =
-      of_reading_fault(material, subject, {name, "at_s", "step_K", 0.02, 64, error_K});
-  // Where the reading has no more than a coefficient, many of these share one column.
-  if (!has_terms_of(data.model, subject.index))
-    step.write_columns = [&material, &data, subject](const Shapes& shapes, std::size_t output,
-                                                     PanelPart into) {
-      material.write_since(subject.run, firsts_of(shapes),
-                           -data.coefficient(data.runs[subject.run], output, subject.index), into);
-    };
-  share_columns(step, material, subject);
-  return {std::move(step)};
+  return {of_reading_fault(material, subject, {name, "at_s", "step_K", 0.02, 52, errors_K})};
 }
 
 /// A jump at any of many moments.
@@ -56,7 +45,6 @@ Cause sensor_step() {
   cause.hypotheses = of;
   cause.gains = single_gain;
   cause.in_network = in_network;
-  cause.error_of_reading = error_K;
   return cause;
 }
 

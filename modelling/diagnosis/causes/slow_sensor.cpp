@@ -10,47 +10,21 @@ constexpr CauseParameter tau{"tau_s", "s", 20.0, 3600.0, "time constant"};
 /// A derivative is taken of readings smoothed with this share of the time constant that it is for.
 constexpr double slope_smoothing = 0.25;
 
-std::vector<double> spans_of(const std::vector<double>& taus_s) {
-  std::vector<double> spans_s;
-  spans_s.reserve(taus_s.size());
-  for (const double tau_s : taus_s) spans_s.push_back(slope_smoothing * tau_s);
-  return spans_s;
-}
-
-/// A reading that is late misses tau times its slope.
-void write_through_coefficient(const Material& material, std::size_t input, const Shapes& shapes,
-                               std::size_t output, PanelPart into) {
-  const std::vector<double> taus_s = firsts_of(shapes);
-  material.write_stacked(into, [&](const MeasuredRun& run, PanelPart of_run) {
-    slopes(run.time_s, run.inputs_K[input], spans_of(taus_s),
-           material.data().coefficient(run, output, input), taus_s, of_run);
-  });
-}
-
-void write_through_terms(const Material& material, std::size_t input, const Shapes& shapes,
-                         std::size_t output, PanelPart into) {
-  const std::vector<double> taus_s = firsts_of(shapes);
-  material.write_stacked(into, [&](const MeasuredRun& run, PanelPart of_run) {
-    Panel missed_K(run.rows(), std::ssize(taus_s));
-    slopes(run.time_s, run.inputs_K[input], spans_of(taus_s), Column::Ones(run.rows()), taus_s,
-           missed_K);
-    answer_to_errors(material.data(), run, output, input, missed_K);
-    of_run = missed_K;
-  });
-}
-
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input) return {};
   Hypothesis slow{name,
                   material.name_of(subject),
                   Form::no_gain,
                   {{std::string(tau.name), material.lag_times_s(tau.low, tau.high, 16), true}}};
-  slow.in_every_output = true;
-  const auto write = has_terms_of(material.data().model, subject.index) ? write_through_terms
-                                                                        : write_through_coefficient;
-  slow.write_columns = [&material, write, input = subject.index](
-                           const Shapes& shapes, std::size_t output, PanelPart into) {
-    write(material, input, shapes, output, into);
+  slow.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
+    return material.stacked([&](const MeasuredRun& run) {
+      // A reading that is late misses tau times its slope.
+      Panel missed_K(run.rows(), std::ssize(shapes));
+      for (std::size_t i = 0; i < shapes.size(); ++i)
+        missed_K.col(static_cast<Eigen::Index>(i)) =
+            shapes[i][0] * slope(run.time_s, run.inputs_K[input], slope_smoothing * shapes[i][0]);
+      return answer_to_errors(material.data(), run, output, input, missed_K);
+    });
   };
   return {std::move(slow)};
 }

@@ -11,11 +11,10 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   const auto unit = unit_of(material.name_of(subject)).suffix;
   if (unit != "_rpm" && unit != "_mm_per_min" && !unit.empty()) return {};
   Hypothesis growth{name, material.name_of(subject), Form::own_gains, {}, {"gain_um_per_unit2"}};
-  growth.write_columns =
-      one_by_one([&material, values = material.values_of(subject)](const Shape&, std::size_t) {
-        return material.stacked(
-            [&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
-      });
+  growth.columns = [&material, values = material.values_of(subject)](const Shapes&, std::size_t) {
+    return material.stacked(
+        [&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
+  };
   return {std::move(growth)};
 }
 

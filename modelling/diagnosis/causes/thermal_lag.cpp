@@ -9,22 +9,14 @@ constexpr CauseParameter tau{"tau_s", "s", 60.0, 4 * 3600.0, "time constant"};
 /// The share of a place's effect that may be late: a fit settles it hardly better than this.
 constexpr double share_max = 1.1;
 
-/// A share of what the input or its whole group does in the end.
-std::function<bool(double gain, std::size_t output)> possible(const Material& material,
-                                                              const Subject& subject) {
-  const auto& inputs = material.data().model.inputs;
-  // Of places that move alike a fit settles the sum, hardly each coefficient.
-  const Eigen::MatrixXd& settled_um_per_K = material.settled_um_per_K();
-  Eigen::VectorXd of_group_um_per_K = Eigen::VectorXd::Zero(settled_um_per_K.rows());
-  for (std::size_t other = 0; other < inputs.size(); ++other)
-    if (same_places(material.groups(), inputs[subject.index], inputs[other]))
-      of_group_um_per_K += settled_um_per_K.col(static_cast<Eigen::Index>(other));
-  return [&settled_um_per_K, of_group_um_per_K, input = subject.index](double gain,
-                                                                       std::size_t output) {
+/// Of gains, as a share of what the input or its whole group does in the end.
+std::function<Interval(std::size_t output)> shares_of(const Material& material, std::size_t input) {
+  return [&material, input](std::size_t output) {
     const auto row = static_cast<Eigen::Index>(output);
-    const double own = gain / settled_um_per_K(row, static_cast<Eigen::Index>(input));
-    const double of_group = gain / of_group_um_per_K[row];
-    return (own > 0.0 && own <= share_max) || (of_group > 0.0 && of_group <= share_max);
+    const auto column = static_cast<Eigen::Index>(input);
+    const double own = share_max * material.settled_um_per_K()(row, column);
+    const double of_group = share_max * material.settled_of_group_um_per_K()(row, column);
+    return Interval{std::min({0.0, own, of_group}), std::max({0.0, own, of_group})};
   };
 }
 
@@ -35,14 +27,13 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
                  Form::own_gains,
                  {{std::string(tau.name), material.lag_times_s(tau.low, tau.high, 20), true}},
                  {"gain_um_per_K"}};
-  lag.write_columns = [&material, rise_K = material.values_of(subject)](
-                          const Shapes& shapes, std::size_t, PanelPart into) {
-    material.write_stacked(
-        into, [&, taus_s = firsts_of(shapes)](const MeasuredRun& run, PanelPart of_run) {
-          lagged_less_values(run.time_s, rise_K(run), taus_s, of_run);
-        });
+  lag.columns = [&material, rise_K = material.values_of(subject)](const Shapes& shapes,
+                                                                  std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) -> Panel {
+      return lagged(run.time_s, rise_K(run), firsts_of(shapes)).colwise() - rise_K(run);
+    });
   };
-  if (material.data().model.guideways.empty()) lag.possible = possible(material, subject);
+  if (material.data().model.guideways.empty()) lag.bounds = shares_of(material, subject.index);
   return {std::move(lag)};
 }
 

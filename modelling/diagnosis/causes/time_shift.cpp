@@ -22,15 +22,15 @@ std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   Hypothesis late{
       name, material.name_of(subject), Form::no_gain, {{std::string(shift.name), shifts}}};
   late.output = subject.index;
-  late.write_columns = [&material, model_um](const Shapes& shapes, std::size_t, PanelPart into) {
-    material.write_stacked(into, [&](const MeasuredRun& run, PanelPart of_run) {
+  late.columns = [&material, model_um](const Shapes& shapes, std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
       // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
-      Panel smooth(run.rows(), 1);
-      smoothed(run.time_s, model_um(run), {2.0 * material.step_s()}, smooth);
-      const Column smooth_um = smooth.col(0);
+      const Column smooth_um = smoothed(run.time_s, model_um(run), 2.0 * material.step_s());
+      Panel all(run.rows(), std::ssize(shapes));
       for (std::size_t i = 0; i < shapes.size(); ++i)
-        of_run.col(static_cast<Eigen::Index>(i)) =
+        all.col(static_cast<Eigen::Index>(i)) =
             shifted(run.time_s, smooth_um, shapes[i][0]) - smooth_um;
+      return all;
     });
   };
   return {std::move(late)};

@@ -8,10 +8,9 @@ constexpr const char* name = "wrong_coefficient";
 std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
   if (subject.kind != SubjectKind::input) return {};
   Hypothesis wrong{name, material.name_of(subject), Form::own_gains, {}, {"delta_um_per_K"}};
-  wrong.write_columns =
-      one_by_one([&material, rise_K = material.values_of(subject)](const Shape&, std::size_t) {
-        return material.stacked(rise_K);
-      });
+  wrong.columns = [&material, rise_K = material.values_of(subject)](const Shapes&, std::size_t) {
+    return material.stacked(rise_K);
+  };
   return {std::move(wrong)};
 }
 
@@ -27,7 +26,6 @@ Cause wrong_coefficient() {
       "Use the extended model; look at the support or material that the coefficient came from."};
   cause.experiment = Experiment::steady_levels;
   cause.term = name;
-  cause.taken_by_fit = TakenByFit::all;
   cause.hypotheses = of;
   cause.gains = gain_of_each_output;
   return cause;

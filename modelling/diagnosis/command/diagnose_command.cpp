@@ -27,6 +27,8 @@
 namespace thermocomp::diagnosis {
 namespace {
 
+constexpr double probability_told_min = 0.001;
+
 struct Options {
   std::string model;
   std::string thermal;
@@ -109,10 +111,12 @@ void print(const Diagnosis& diagnosis) {
 }
 
 void print_weighed(const Diagnosis& diagnosis) {
-  for (const Weighed& each : diagnosis.weighed)
-    std::printf("weighed %zu%s: %s of %s: 2 ln L %.0f, left-out rows %.0f %%, ln %.3f\n",
-                each.round, each.beside_fit > 0 ? " beside the fit" : "", each.cause.c_str(),
-                each.subject.c_str(), each.score, 100 * each.left_out_gain, each.log_left);
+  for (const Candidate& each : diagnosis.weighed)
+    if (each.probability >= probability_told_min)
+      std::printf("weighed: %s of %s%s%s: probability %.3f, ln L %.0f, left-out rows %.0f %%\n",
+                  each.cause.c_str(), each.subject.c_str(), each.run ? " in " : "",
+                  each.run ? each.run->c_str() : "", each.probability, each.score,
+                  100 * each.share_of_remainder);
 }
 
 Diagnosis diagnosis_of(const Options& options, ReportData* report) {

@@ -83,17 +83,17 @@ ThermalModel part_of_reading(const ThermalModel& model, std::size_t input) {
 
 }  // namespace
 
-bool has_terms_of(const ThermalModel& model, std::size_t input) {
+static bool has_terms_of(const ThermalModel& model, std::size_t input) {
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const TermSpec& term) {
     return names_one_of(term, {model.inputs[input]});
   });
 }
 
-void answer_to_errors(const MeasuredData& data, const MeasuredRun& run, std::size_t output,
-                      std::size_t input, Panel& errors_K) {
+Panel answer_to_errors(const MeasuredData& data, const MeasuredRun& run, std::size_t output,
+                       std::size_t input, Panel errors_K) {
   if (!has_terms_of(data.model, input)) {
     errors_K.array().colwise() *= data.coefficient(run, output, input).array();
-    return;
+    return errors_K;
   }
   const ThermalModel part = part_of_reading(data.model, input);
   const Column right_um = model_over(part, run, data)[output];
@@ -102,14 +102,13 @@ void answer_to_errors(const MeasuredData& data, const MeasuredRun& run, std::siz
     wrong.inputs_K[input] = run.inputs_K[input] + errors_K.col(i);
     errors_K.col(i) = model_over(part, wrong, data)[output] - right_um;
   }
+  return errors_K;
 }
 
 double settled_um_per_K(const MeasuredData& data, std::size_t output, std::size_t input) {
   const MeasuredRun& run = data.runs.front();
   // Lags start as if their input had stood at its first value for long.
-  Panel errors_K = Panel::Ones(run.rows(), 1);
-  answer_to_errors(data, run, output, input, errors_K);
-  return errors_K(0, 0);
+  return answer_to_errors(data, run, output, input, Panel::Ones(run.rows(), 1))(0, 0);
 }
 
 }  // namespace thermocomp::diagnosis

@@ -1,24 +1,31 @@
 #include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 
+#include <utility>
+
 namespace thermocomp::diagnosis {
+
+std::size_t free_parameters(const Hypothesis& hypothesis) {
+  const auto of_shape = std::count_if(hypothesis.shape.begin(), hypothesis.shape.end(),
+                                      [](const ShapeParameter& each) { return !each.discrete; });
+  return static_cast<std::size_t>(of_shape) + hypothesis.gains.size();
+}
 
 Shapes grid_of(const Hypothesis& hypothesis) {
   std::size_t points = 1;
   for (const ShapeParameter& parameter : hypothesis.shape) points *= parameter.grid.size();
   Shapes all;
   all.reserve(points);
-  for (std::size_t i = 0; i < points; ++i) all.push_back(point_of_grid(hypothesis, i));
-  return all;
-}
-
-Shape point_of_grid(const Hypothesis& hypothesis, std::size_t index) {
-  Shape point(hypothesis.shape.size());
-  for (std::size_t i = point.size(); i-- > 0;) {
-    const std::vector<double>& grid = hypothesis.shape[i].grid;
-    point[i] = grid[index % grid.size()];
-    index /= grid.size();
+  for (std::size_t number = 0; number < points; ++number) {
+    Shape point(hypothesis.shape.size());
+    std::size_t index = number;
+    for (std::size_t i = point.size(); i-- > 0;) {
+      const std::vector<double>& grid = hypothesis.shape[i].grid;
+      point[i] = grid[index % grid.size()];
+      index /= grid.size();
+    }
+    all.push_back(std::move(point));
   }
-  return point;
+  return all;
 }
 
 std::vector<double> firsts_of(const Shapes& shapes) {

@@ -13,6 +13,7 @@
 #include "modelling/diagnosis/data/measured_runs.hpp"
 #include "modelling/diagnosis/data/panel.hpp"
 #include "modelling/diagnosis/data/stacked_rows.hpp"
+#include "modelling/diagnosis/hypothesis/parameter.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -35,20 +36,6 @@ struct ShapeParameter {
   bool discrete{false};      ///< not refined
 };
 
-/// What a hypothesis pays that contains a simpler one as a special case.
-inline constexpr double special_case_handicap = 20.0;
-
-struct ReadingShare {
-  std::size_t input{0};
-  double weight{0.0};
-};
-
-/// A cause with its subject, by name.
-struct Named {
-  std::string cause;
-  std::string subject;
-};
-
 struct Hypothesis {
   std::string cause{};
   std::string subject{};
@@ -57,60 +44,36 @@ struct Hypothesis {
   std::vector<std::string> gains{};     ///< names of the gains, one a column
   std::optional<std::size_t> output{};  ///< acts on this output alone
   std::optional<std::size_t> run{};     ///< a fault of this run alone
-  std::optional<std::size_t> sensor{};  ///< a fault of the reading of this input
-  /// 2 ln L that it must gain beyond others: for what contains a simpler cause as a special case.
-  double handicap{0.0};
-  /// The simpler one, which explains all that this one does where what it adds is nothing.
-  std::optional<Named> special_case{};
-  /// Least share of the RMS with which it is clear by itself, where likelihood shall not make it
-  /// so; 0: as others.
-  double clear_share{0.0};
-  bool in_every_output{false};  ///< an output without its share speaks against it
-  /// Writes the columns for an output over the stacked rows, those of one shape after those of
-  /// another.
-  std::function<void(const Shapes& shapes, std::size_t output, PanelPart into)> write_columns{};
-  Eigen::Index rows{0};  ///< of all columns
-  /// How the same columns come from others that many hypotheses share; both may be empty.
-  /// Of the model's calm readings: how much of which for an output.
-  std::function<std::vector<ReadingShare>(std::size_t output)> of_readings{};
-  /// Of a column of the output: it counts from the shape's one time on in `run`, before it is zero.
-  /// Hypotheses of one cause and run have the same times.
-  std::function<Column(std::size_t output)> from_onset{};
-  /// Hypotheses of one pattern have the same form, price and grid and the same columns, each times
-  /// its scale for the output; empty: it shares its columns with none.
-  std::string pattern{};
-  std::function<double(std::size_t output)> scale{};
-  /// Whether a gain is physically possible; empty: all are.
-  std::function<bool(double gain, std::size_t output)> possible{};
+  /// Displacement of an output over the stacked rows, the columns of one shape after those of
+  /// another: shape (rows, width() shapes).
+  std::function<Panel(const Shapes& shapes, std::size_t output)> columns{};
+  /// What is physically possible of a gain; empty: everything is.
+  std::function<Interval(std::size_t output)> bounds{};
+
+  /// Cause that explains, at the subject `simpler_subject`, all that this one does where what it
+  /// adds is nothing; empty: none.
+  std::string simpler_cause{};
+  std::string simpler_subject{};
+
+  // Of a fault of one reading:
+  std::optional<std::size_t> sensor{};  ///< the input
+  /// Its error for a gain of 1 [K] over the stacked rows, one column a shape.
+  std::function<Panel(const Shapes& shapes)> errors_K{};
+  bool shrinks_reading{false};  ///< the error is in proportion to the reading
 
   /// Columns for one shape: as many as gains, or one.
   [[nodiscard]] Eigen::Index width() const { return std::max<Eigen::Index>(1, std::ssize(gains)); }
-  /// What write_columns writes, shape (rows, shapes times width).
-  [[nodiscard]] Panel columns(const Shapes& shapes, std::size_t of_output) const {
-    Panel all(rows, width() * std::ssize(shapes));
-    write_columns(shapes, of_output, all);
-    return all;
-  }
 };
+
+/// Parameters that are fitted: of its shape those that are not discrete, and the gains of an
+/// output.
+[[nodiscard]] std::size_t free_parameters(const Hypothesis& hypothesis);
 
 /// Every point of the grid of its shape; one without values where it has no shape.
 [[nodiscard]] Shapes grid_of(const Hypothesis& hypothesis);
-/// One of them.
-[[nodiscard]] Shape point_of_grid(const Hypothesis& hypothesis, std::size_t index);
 
 /// The first parameter of each shape.
 [[nodiscard]] std::vector<double> firsts_of(const Shapes& shapes);
-
-/// Columns that are made for one shape at a time.
-/// @param make  Eigen::MatrixXd(const Shape&, std::size_t output)
-template <class Make>
-[[nodiscard]] std::function<void(const Shapes&, std::size_t, PanelPart)> one_by_one(Make make) {
-  return [make](const Shapes& shapes, std::size_t output, PanelPart into) {
-    const Eigen::Index width = into.cols() / std::ssize(shapes);
-    for (std::size_t i = 0; i < shapes.size(); ++i)
-      into.middleCols(width * static_cast<Eigen::Index>(i), width) = make(shapes[i], output);
-  };
-}
 
 /// Every cause (causes/cause.hpp) with every subject that it can have in these data.
 [[nodiscard]] std::vector<Hypothesis> hypotheses(const MeasuredData& data, const StackedRows& rows);

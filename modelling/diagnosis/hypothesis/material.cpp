@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/checks.hpp"
 #include "modelling/diagnosis/data/false_reading.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
+
+/// Moments of largest jumps that are tried beside a grid.
+constexpr std::ptrdiff_t jumps_max = 12;
 
 double median_step_s(const MeasuredData& data) {
   std::vector<double> steps;
@@ -27,15 +31,24 @@ bool moves(const Column& column) {
 }  // namespace
 
 Material::Material(const MeasuredData& data, const StackedRows& rows)
-    : data_(data), rows_(rows), groups_(place_groups(data)), step_s_(median_step_s(data)) {
+    : data_(data), rows_(rows), step_s_(median_step_s(data)) {
   for (const MeasuredRun& run : data.runs)
     length_s_ = std::max(length_s_, run.time_s[run.rows() - 1] - run.time_s[run.begin]);
-  settled_um_per_K_.setZero(std::ssize(data.model.outputs), std::ssize(data.model.inputs));
+  const auto& inputs = data.model.inputs;
+  settled_.setZero(std::ssize(data.model.outputs), std::ssize(inputs));
+  settled_of_group_ = settled_;
   if (!data.model.guideways.empty()) return;
   for (std::size_t output = 0; output < data.model.outputs.size(); ++output)
-    for (std::size_t input = 0; input < data.model.inputs.size(); ++input)
-      settled_um_per_K_(static_cast<Eigen::Index>(output), static_cast<Eigen::Index>(input)) =
+    for (std::size_t input = 0; input < inputs.size(); ++input)
+      settled_(static_cast<Eigen::Index>(output), static_cast<Eigen::Index>(input)) =
           diagnosis::settled_um_per_K(data, output, input);
+  // Of places that move alike a fit settles the sum, hardly each coefficient.
+  const PlaceGroups groups = place_groups(data);
+  for (std::size_t input = 0; input < inputs.size(); ++input)
+    for (std::size_t other = 0; other < inputs.size(); ++other)
+      if (same_places(groups, inputs[input], inputs[other]))
+        settled_of_group_.col(static_cast<Eigen::Index>(input)) +=
+            settled_.col(static_cast<Eigen::Index>(other));
 }
 
 const std::string& Material::name_of(const Subject& subject) const {
@@ -84,39 +97,41 @@ std::vector<double> Material::lag_times_s(double low_s, double high_s, std::size
 }
 
 std::vector<double> Material::onsets_s(std::size_t run, double first, double last,
-                                       std::size_t count) const {
+                                       std::size_t count, const Column& values) const {
   const MeasuredRun& of = data_.runs[run];
   const double begin_s = of.time_s[of.begin];
   const double span_s = of.time_s[of.rows() - 1] - begin_s;
-  return linear_grid(begin_s + first * span_s, begin_s + last * span_s, count);
-}
-
-void Material::write_since(std::size_t run, const std::vector<double>& onsets_s,
-                           const Column& whole, PanelPart into) const {
-  const Block& block = rows_.runs[run];
-  into.setZero();
-  for (std::size_t i = 0; i < onsets_s.size(); ++i) {
-    const double* const time_s = rows_.time_s.data();
-    const Eigen::Index first =
-        std::lower_bound(time_s + block.begin, time_s + block.end, onsets_s[i]) - time_s;
-    into.col(static_cast<Eigen::Index>(i)).segment(first, block.end - first) =
-        whole.tail(block.end - first);
+  std::vector<double> onsets =
+      linear_grid(begin_s + first * span_s, begin_s + last * span_s, count);
+  std::vector<std::pair<double, double>> jumps;  // how far, when
+  double before = not_a_number;
+  for (Eigen::Index row = of.begin; row < of.rows(); ++row) {
+    if (!std::isfinite(values[row])) continue;
+    const double time_s = of.time_s[row];
+    if (time_s >= onsets.front() && time_s <= onsets.back() && std::isfinite(before))
+      jumps.emplace_back(-std::abs(values[row] - before), time_s);
+    before = values[row];
   }
+  const auto most = jumps.begin() + std::min(std::ssize(jumps), jumps_max);
+  std::partial_sort(jumps.begin(), most, jumps.end());
+  for (auto jump = jumps.begin(); jump != most; ++jump) onsets.push_back(jump->second);
+  std::sort(onsets.begin(), onsets.end());
+  onsets.erase(std::unique(onsets.begin(), onsets.end()), onsets.end());
+  return onsets;
 }
 
-std::vector<double> logarithmic_grid(double low, double high, std::size_t count) {
-  std::vector<double> grid;
-  for (std::size_t i = 0; i < count; ++i)
-    grid.push_back(low *
-                   std::pow(high / low, static_cast<double>(i) / static_cast<double>(count - 1)));
-  return grid;
+Panel Material::in_run(std::size_t run, const Panel& whole) const {
+  const Block& block = rows_.runs[run];
+  Panel all = Panel::Zero(rows_.time_s.size(), whole.cols());
+  all.middleRows(block.begin, block.end - block.begin) = whole.bottomRows(block.end - block.begin);
+  return all;
 }
 
-std::vector<double> linear_grid(double low, double high, std::size_t count) {
-  std::vector<double> grid;
-  for (std::size_t i = 0; i < count; ++i)
-    grid.push_back(low + (high - low) * static_cast<double>(i) / static_cast<double>(count - 1));
-  return grid;
+Panel since(const Column& time_s, const std::vector<double>& onsets_s) {
+  Panel all(time_s.size(), std::ssize(onsets_s));
+  for (Eigen::Index i = 0; i < all.cols(); ++i)
+    all.col(i) = (time_s.array() >= onsets_s[static_cast<std::size_t>(i)]).cast<double>().matrix();
+  return all;
 }
 
 }  // namespace thermocomp::diagnosis

@@ -11,6 +11,7 @@
 #include "modelling/diagnosis/data/measured_runs.hpp"
 #include "modelling/diagnosis/data/panel.hpp"
 #include "modelling/diagnosis/data/place_groups.hpp"
+#include "modelling/diagnosis/data/series.hpp"
 #include "modelling/diagnosis/data/stacked_rows.hpp"
 
 namespace thermocomp::diagnosis {
@@ -41,16 +42,16 @@ class Material {
 
   [[nodiscard]] const MeasuredData& data() const noexcept { return data_; }
   [[nodiscard]] const StackedRows& rows() const noexcept { return rows_; }
-  [[nodiscard]] const PlaceGroups& groups() const noexcept { return groups_; }
   /// Median step between two rows.
   [[nodiscard]] double step_s() const noexcept { return step_s_; }
   /// Of the longest run.
   [[nodiscard]] double length_s() const noexcept { return length_s_; }
-  /// What an output does in the end for each kelvin of an input, terms included, shape (outputs,
-  /// inputs).
+  /// What an output does in the end for each kelvin of an input, terms included, alone and with all
+  /// places of its group; shape (outputs, inputs).
   /// @pre the model has no guideways
-  [[nodiscard]] const Eigen::MatrixXd& settled_um_per_K() const noexcept {
-    return settled_um_per_K_;
+  [[nodiscard]] const Eigen::MatrixXd& settled_um_per_K() const noexcept { return settled_; }
+  [[nodiscard]] const Eigen::MatrixXd& settled_of_group_um_per_K() const noexcept {
+    return settled_of_group_;
   }
 
   [[nodiscard]] const std::string& name_of(const Subject& subject) const;
@@ -64,66 +65,40 @@ class Material {
   /// Time constants within the range that these rows can tell of.
   [[nodiscard]] std::vector<double> lag_times_s(double low_s, double high_s,
                                                 std::size_t count) const;
-  /// Moments between two shares of a run.
+  /// Moments between two shares of a run, and those at which its values jump most; ascending.
+  /// @param values  of all rows of the run; NaN: missing
   [[nodiscard]] std::vector<double> onsets_s(std::size_t run, double first, double last,
-                                             std::size_t count) const;
+                                             std::size_t count, const Column& values) const;
 
-  /// One column of all runs.
-  /// @param make  of a run
+  /// @param make  of a run: all its rows, shape (rows, m)
+  /// @return the selected rows of all runs
   template <class Make>
-  Column stacked(Make make) const {
-    Column out(rows_.time_s.size());
+  [[nodiscard]] Panel stacked(Make make) const {
+    Panel all;
     for (std::size_t i = 0; i < data_.runs.size(); ++i) {
-      const Column& whole = make(data_.runs[i]);
+      const Panel whole = make(data_.runs[i]);
       const Block& block = rows_.runs[i];
-      out.segment(block.begin, block.end - block.begin) =
-          whole.segment(data_.runs[i].begin, block.end - block.begin);
+      if (all.size() == 0) all.resize(rows_.time_s.size(), whole.cols());
+      all.middleRows(block.begin, block.end - block.begin) =
+          whole.bottomRows(block.end - block.begin);
     }
-    return out;
+    return all;
   }
 
-  /// A column for each value of a parameter, made of whole runs.
-  /// @param make  void(const MeasuredRun&, PanelPart into)
-  template <class Make>
-  void write_stacked(PanelPart into, Make make) const {
-    for (std::size_t i = 0; i < data_.runs.size(); ++i) {
-      const MeasuredRun& run = data_.runs[i];
-      PanelPart of_run = into.middleRows(rows_.runs[i].begin, run.rows() - run.begin);
-      if (run.begin == 0) {
-        make(run, of_run);
-        continue;
-      }
-      Panel whole(run.rows(), into.cols());
-      make(run, PanelPart(whole));
-      of_run = whole.bottomRows(of_run.rows());
-    }
-  }
-
-  /// Zero outside of one run.
-  template <class Make>
-  Column in_run(std::size_t run, Make make) const {
-    Column out = Column::Zero(rows_.time_s.size());
-    const Block& block = rows_.runs[run];
-    out.segment(block.begin, block.end - block.begin) =
-        make(data_.runs[run]).segment(data_.runs[run].begin, block.end - block.begin);
-    return out;
-  }
-
-  /// For each of the moments the values of a whole run from then on, else zero.
-  void write_since(std::size_t run, const std::vector<double>& onsets_s, const Column& whole,
-                   PanelPart into) const;
+  /// @param whole  of one run: all its rows
+  /// @return the same over the stacked rows, zero in the other runs
+  [[nodiscard]] Panel in_run(std::size_t run, const Panel& whole) const;
 
  private:
   const MeasuredData& data_;
   const StackedRows rows_;
-  const PlaceGroups groups_;
-  Eigen::MatrixXd settled_um_per_K_;
+  Eigen::MatrixXd settled_;
+  Eigen::MatrixXd settled_of_group_;
   double step_s_{1.0};
   double length_s_{0.0};
 };
 
-/// `count` values from low to high, each the same factor after the one before, or the same step.
-[[nodiscard]] std::vector<double> logarithmic_grid(double low, double high, std::size_t count);
-[[nodiscard]] std::vector<double> linear_grid(double low, double high, std::size_t count);
+/// 1 from each of the moments on, else 0, shape (rows, moments).
+[[nodiscard]] Panel since(const Column& time_s, const std::vector<double>& onsets_s);
 
 }  // namespace thermocomp::diagnosis

@@ -14,7 +14,7 @@ Parameter gain_table(const FoundGains& found, Eigen::Index index) {
     if (found.gains[output].size() == 0) continue;
     const std::string& name = found.outputs[output];
     parameter.values[name] = found.gains[output][index];
-    parameter.ci95[name] = around(found.gains[output][index], found.reach[output][index]);
+    parameter.ci95[name] = found.ci95[output][static_cast<std::size_t>(index)];
   }
   return parameter;
 }
@@ -31,12 +31,8 @@ std::vector<Parameter> gain_of_each_output(const FoundGains& found) {
 
 std::vector<Parameter> single_gain(const FoundGains& found) {
   const std::size_t output = first_output(found);
-  const double gain = found.gains[output][0];
-  return {{found.names.front(), {{"", gain}}, {{"", around(gain, found.reach[output][0])}}}};
-}
-
-Interval around(double value, double reach) {
-  return {value - reach, value + reach};
+  return {
+      {found.names.front(), {{"", found.gains[output][0]}}, {{"", found.ci95[output].front()}}}};
 }
 
 }  // namespace thermocomp::diagnosis

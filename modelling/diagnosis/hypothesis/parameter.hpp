@@ -27,10 +27,10 @@ struct Parameter {
 
 /// The gains of a finding as the search leaves them.
 struct FoundGains {
-  const std::vector<std::string>& names;      ///< one a column of the hypothesis
-  const std::vector<std::string>& outputs;    ///< of the model
-  const std::vector<Eigen::VectorXd>& gains;  ///< one an output; empty: it does not act on it
-  const std::vector<Eigen::VectorXd>& reach;  ///< the same: half of the interval of 95 %
+  const std::vector<std::string>& names;           ///< one a column of the hypothesis
+  const std::vector<std::string>& outputs;         ///< of the model
+  const std::vector<Eigen::VectorXd>& gains;       ///< one an output; empty: it does not act on it
+  const std::vector<std::vector<Interval>>& ci95;  ///< the same
 };
 
 /// Gain number `index` of every output that the finding acts on.
@@ -42,8 +42,5 @@ struct FoundGains {
 [[nodiscard]] std::vector<Parameter> gain_of_each_output(const FoundGains& found);
 /// The one gain of a fault:
 [[nodiscard]] std::vector<Parameter> single_gain(const FoundGains& found);
-
-/// `reach` to both sides.
-[[nodiscard]] Interval around(double value, double reach);
 
 }  // namespace thermocomp::diagnosis

@@ -35,9 +35,8 @@ const char* phase_name(Phase phase) {
 std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
   Column mean_K = Column::Zero(run.rows());
   for (const Column& input : run.inputs_K) mean_K += input;
-  Panel slope(run.rows(), 1);
-  slopes(run.time_s, mean_K, {slope_smoothing_s}, Column::Ones(run.rows()), {1.0}, slope);
-  const double steepest = slope.cwiseAbs().maxCoeff();
+  const Column slope_K_per_s = slope(run.time_s, mean_K, slope_smoothing_s);
+  const double steepest = slope_K_per_s.cwiseAbs().maxCoeff();
   std::vector<Phase> phases;
   double changed_at_s = -1e300;
   for (Eigen::Index row = 0; row < run.rows(); ++row) {
@@ -53,9 +52,9 @@ std::vector<Phase> phases_of(const MeasuredRun& run, const MeasuredData& data) {
     if (row < run.begin) continue;
     if (run.time_s[row] - changed_at_s < change_lasts_s)
       phases.push_back(Phase::change);
-    else if (slope(row, 0) > slope_share_min * steepest)
+    else if (slope_K_per_s[row] > slope_share_min * steepest)
       phases.push_back(Phase::heating);
-    else if (slope(row, 0) < -slope_share_min * steepest)
+    else if (slope_K_per_s[row] < -slope_share_min * steepest)
       phases.push_back(Phase::cooling);
     else
       phases.push_back(on ? Phase::steady : Phase::standstill);

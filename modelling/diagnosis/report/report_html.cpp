@@ -15,6 +15,7 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double support_told_min = 0.05;
+constexpr std::size_t candidates_told = 3;
 /// A share of what the model leaves that is worth an advice.
 constexpr double share_told_min = 0.25;
 
@@ -151,7 +152,12 @@ std::string next_steps(const Diagnosis& diagnosis) {
     all.push_back(
         {gain_um, title_of(finding) + by(diagnosis, gain_um) + ". " + what_to_do(finding)});
   }
-  if (diagnosis.remainder) {
+  if (diagnosis.remainder && diagnosis.remainder->term.bank.gain_um_per_unit.empty())
+    all.push_back({0.0,
+                   "A part of the error follows from readings and signals of the last hours in "
+                   "the training runs, and not in the test runs: the extended model goes "
+                   "without it. Record more runs, with other speeds and pauses."});
+  else if (diagnosis.remainder) {
     const double gain_um = largest_gain_um(diagnosis.remainder->test);
     all.push_back(
         {gain_um, "What can be predicted and has no name" + by(diagnosis, gain_um) +
@@ -217,13 +223,35 @@ std::string finding_html(const NamedFinding& finding, std::size_t number, const 
   for (const Alternative& other : finding.alternatives) {
     if (other.relative_support < support_told_min) continue;
     html += "<p>It could also be this: " + xml_text(title_of(other)) + " (" +
-            figure(100.0 * other.relative_support) +
-            " % as likely). To tell them apart: " + xml_text(experiment_for(finding, other)) +
-            "</p>\n";
+            figure(100.0 * other.relative_support) + " % as likely). To tell them apart: " +
+            xml_text(experiment_between({finding.cause, finding.subject, 1.0}, other)) + "</p>\n";
   }
   return html + "<p class=\"small\">" + xml_text(finding.cause) + " of " +
          xml_text(finding.subject) + (finding.family.empty() ? "" : ", family " + finding.family) +
          ": " + xml_text(finding.evidence) + ".</p>\n";
+}
+
+/// What was weighed where nothing is named.
+std::string candidates_html(const Diagnosis& diagnosis) {
+  if (!diagnosis.findings.empty() || diagnosis.weighed.empty()) return "";
+  std::string html =
+      "<h2>What it may be</h2><p>Nothing of this is more likely than all else "
+      "together. The gain on test rows is measured, and decides nothing.</p><table>" +
+      row({"", "probability", "of the error on left-out rows", "error on the test rows",
+           "what would decide"},
+          "th");
+  for (std::size_t i = 0; i < std::min(candidates_told, diagnosis.weighed.size()); ++i) {
+    const Candidate& each = diagnosis.weighed[i];
+    std::string gains;
+    for (const auto& [output, gain] : each.test)
+      gains += (gains.empty() ? "" : ", ") + name_of_column(output) + " " + figure(gain.before_um) +
+               " to " + figure(gain.after_um);
+    html += row({title_of(Alternative{each.cause, each.subject, 1.0}),
+                 fixed(100.0 * each.probability, 0) + " %",
+                 fixed(100.0 * each.share_of_remainder, 0) + " %", gains.empty() ? "-" : gains,
+                 each.would_decide});
+  }
+  return html + "</table>\n";
 }
 
 std::string phases_table(const ReportRun& run, const ReportData& report) {
@@ -312,6 +340,7 @@ std::string report_html(const Diagnosis& diagnosis, const ReportData& report) {
     html += finding_html(
         finding, ++number,
         unit_text(diagnosis, finding.outputs.empty() ? std::string() : finding.outputs.front()));
+  html += candidates_html(diagnosis);
   html += gains_table(diagnosis);
   std::size_t drawn = 0;
   for (const bool test : {true, false})

@@ -75,9 +75,9 @@ std::string what_to_do(const NamedFinding& finding) {
          usual;
 }
 
-std::string experiment_for(const NamedFinding& finding, const Alternative& other) {
-  const Experiment experiment = experiment_of(finding.cause, other.cause);
-  if (finding.cause == other.cause && experiment != Experiment::of_a_network)
+std::string experiment_between(const Alternative& one, const Alternative& other) {
+  const Experiment experiment = experiment_of(one.cause, other.cause);
+  if (one.cause == other.cause && experiment != Experiment::of_a_network)
     return "Warm one of the two places alone (a heating pad for half an hour) and read both.";
   switch (experiment) {
     case Experiment::of_a_network:

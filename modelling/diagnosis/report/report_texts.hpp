@@ -14,7 +14,7 @@ namespace thermocomp::diagnosis {
 /// One or two sentences with the finding's own figures.
 [[nodiscard]] std::string sentence_of(const NamedFinding& finding);
 [[nodiscard]] std::string what_to_do(const NamedFinding& finding);
-/// The experiment that tells the finding from one of its alternatives.
-[[nodiscard]] std::string experiment_for(const NamedFinding& finding, const Alternative& other);
+/// The experiment that tells one explanation from another.
+[[nodiscard]] std::string experiment_between(const Alternative& one, const Alternative& other);
 
 }  // namespace thermocomp::diagnosis

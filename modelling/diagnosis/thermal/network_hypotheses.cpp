@@ -9,27 +9,25 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-constexpr double normal_95 = 1.96;
 constexpr std::size_t columns_kept = 24;
 
-/// The shared gain and its spread: what each output knows of it, taken together.
+/// The shared gain with its interval.
 struct Gain {
-  double value{0.0};
-  double sd{0.0};
+  double value{1.0};
+  Interval ci95{1.0, 1.0};
 };
 
 Gain gain_of(const Finding& finding) {
-  Gain gain;
-  double weight = 0.0;
-  for (std::size_t output = 0; output < finding.explanation.gains.size(); ++output) {
-    const Eigen::VectorXd& gains = finding.explanation.gains[output];
-    if (gains.size() == 0) continue;
-    gain.value = gains[0];
-    if (output < finding.gain_sd.size() && finding.gain_sd[output].size() > 0)
-      weight += 1.0 / std::pow(finding.gain_sd[output][0], 2);
-  }
-  gain.sd = weight > 0 ? 1.0 / std::sqrt(weight) : 0.0;
-  return gain;
+  for (std::size_t output = 0; output < finding.explanation.gains.size(); ++output)
+    if (finding.explanation.gains[output].size() > 0 && !finding.gains_ci[output].empty())
+      return {finding.explanation.gains[output][0], finding.gains_ci[output].front()};
+  return {};
+}
+
+double gain_of(const Explanation& explanation) {
+  for (const Eigen::VectorXd& gains : explanation.gains)
+    if (gains.size() > 0) return gains[0];
+  return 1.0;
 }
 
 Parameter shared(const char* name, double value, double low, double high) {
@@ -71,10 +69,12 @@ std::vector<Hypothesis> NetworkHypotheses::all(const std::shared_ptr<NetworkHypo
   std::vector<Hypothesis> all;
   for (std::size_t i = 0; i < self->causes_.size(); ++i) {
     all.push_back(self->causes_[i].hypothesis);
-    all.back().rows = self->material_.rows.time_s.size();
-    all.back().write_columns = one_by_one([self, i](const Shape& shape, std::size_t output) {
-      return self->columns(i, shape, output);
-    });
+    all.back().columns = [self, i](const Shapes& shapes, std::size_t output) {
+      Panel columns(self->material_.rows.time_s.size(), std::ssize(shapes));
+      for (std::size_t shape = 0; shape < shapes.size(); ++shape)
+        columns.col(static_cast<Eigen::Index>(shape)) = self->columns(i, shapes[shape], output);
+      return columns;
+    };
   }
   return all;
 }
@@ -92,8 +92,7 @@ std::vector<Column> NetworkHypotheses::stacked(const NetworkSimulation& simulati
   return all;
 }
 
-Eigen::MatrixXd NetworkHypotheses::columns(std::size_t cause, const Shape& shape,
-                                           std::size_t output) {
+Column NetworkHypotheses::columns(std::size_t cause, const Shape& shape, std::size_t output) {
   const NetworkHypothesis& of = causes_[cause];
   if (of.fault) return of.fault(shape);
   const auto place = std::find(accepted_.begin(), accepted_.end(), cause);
@@ -131,7 +130,7 @@ void NetworkHypotheses::accept(const std::vector<Explanation>& found) {
     const std::size_t cause = cause_of(*each.hypothesis);
     if (!causes_[cause].apply) continue;
     HeatNetwork changed = bases_.back().simulation.network();
-    causes_[cause].apply(changed, each.shape, gain_of({each, {}, {}, {}}).value);
+    causes_[cause].apply(changed, each.shape, gain_of(each));
     accepted_.push_back(cause);
     NetworkSimulation simulation(changed, &bases_.back().simulation);
     std::vector<Column> readings = stacked(simulation);
@@ -141,7 +140,7 @@ void NetworkHypotheses::accept(const std::vector<Explanation>& found) {
 
 void NetworkHypotheses::apply(const Finding& finding, HeatNetwork& network) const {
   const NetworkHypothesis& cause = causes_[cause_of(*finding.explanation.hypothesis)];
-  if (cause.apply) cause.apply(network, finding.explanation.shape, gain_of(finding).value);
+  if (cause.apply) cause.apply(network, finding.explanation.shape, gain_of(finding.explanation));
 }
 
 std::vector<Parameter> NetworkHypotheses::parameters_of(const Finding& finding) const {
@@ -156,10 +155,8 @@ std::vector<Parameter> NetworkHypotheses::parameters_of(const Finding& finding) 
   };
   for (std::size_t i = 0; i < each.shape.size(); ++i) {
     const ShapeParameter& of = each.hypothesis->shape[i];
-    const double sd = i < finding.shape_sd.size() ? finding.shape_sd[i] : 0.0;
     const double value = each.shape[i];
-    const double low = of.logarithmic ? value * std::exp(-normal_95 * sd) : value - normal_95 * sd;
-    const double high = of.logarithmic ? value * std::exp(normal_95 * sd) : value + normal_95 * sd;
+    const auto [low, high] = finding.shape_ci[i];
     if (of.discrete)
       parameters.push_back({of.name, {{"", value}}, {}});
     else if (of.name == "factor")
@@ -169,12 +166,11 @@ std::vector<Parameter> NetworkHypotheses::parameters_of(const Finding& finding) 
   }
   if (each.hypothesis->gains.empty()) return parameters;
   const Gain gain = gain_of(finding);
-  const double reach = normal_95 * gain.sd;
   if (each.hypothesis->gains.front() == "factor")
-    with_file_value(1.0 + gain.value, 1.0 + gain.value - reach, 1.0 + gain.value + reach);
+    with_file_value(1.0 + gain.value, 1.0 + gain.ci95.low, 1.0 + gain.ci95.high);
   else
-    parameters.push_back(shared(each.hypothesis->gains.front().c_str(), gain.value,
-                                gain.value - reach, gain.value + reach));
+    parameters.push_back(
+        shared(each.hypothesis->gains.front().c_str(), gain.value, gain.ci95.low, gain.ci95.high));
   if (cause.at > 0.0) parameters.push_back({"at", {{"", cause.at}}, {}});
   return parameters;
 }

@@ -9,6 +9,7 @@
 
 #include "modelling/diagnosis/answer/answer.hpp"
 #include "modelling/diagnosis/hypothesis/network_hypothesis.hpp"
+#include "modelling/diagnosis/rank/search.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -39,7 +40,7 @@ class NetworkHypotheses {
   };
 
   void add(const NetworkSubject& subject);
-  [[nodiscard]] Eigen::MatrixXd columns(std::size_t cause, const Shape& shape, std::size_t output);
+  [[nodiscard]] Column columns(std::size_t cause, const Shape& shape, std::size_t output);
   [[nodiscard]] std::vector<Column> stacked(const NetworkSimulation& simulation) const;
   [[nodiscard]] std::size_t cause_of(const Hypothesis& hypothesis) const;
 

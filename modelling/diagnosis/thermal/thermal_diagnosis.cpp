@@ -120,19 +120,15 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   const MeasuredData train_data = data_of(plant, train_runs);
   const StackedRows rows = stacked_rows(train_data);
   const auto catalogue = std::make_shared<NetworkHypotheses>(plant, train_runs, rows);
-  Thresholds thresholds;
-  thresholds.one_unit = true;
-  thresholds.in_pairs = false;
-  thresholds.by_probability = false;
-  thresholds.by_gates = true;
-  thresholds.motion_share_min = motion_share_min;
-  Search search(train_data, thresholds, NetworkHypotheses::all(catalogue),
-                [&](const std::vector<Explanation>& found) { catalogue->accept(found); });
-  const SearchResult result = search.run();
+  Rules rules;
+  rules.motion_share_min = motion_share_min;
+  const std::vector<Hypothesis> hypotheses = NetworkHypotheses::all(catalogue);
+  const SearchResult result =
+      search(train_data, rows, hypotheses, rules,
+             [&](const std::vector<Explanation>& found) { catalogue->accept(found); });
 
   Diagnosis diagnosis;
   diagnosis.unit = "K";
-  diagnosis.weighed = result.weighed;
   diagnosis.verdict = verdict_of(result);
   const std::vector<Residuals> base = residuals_of(plant.network, test_runs);
   std::vector<Residuals> before = base;

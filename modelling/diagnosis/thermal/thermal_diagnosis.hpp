@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "config/runs/run_file.hpp"
 #include "modelling/diagnosis/answer/answer.hpp"
 #include "modelling/diagnosis/network/heat_network.hpp"
 

@@ -170,9 +170,9 @@ TEST_CASE("what a cause is tried with lies within its physical range", "[diagnos
     const Cause& cause = cause_named(each.cause);
     INFO(each.cause << " of " << each.subject);
     tried.insert(cause.name);
-    CHECK(each.columns({point_of_grid(each, 0)}, 0).allFinite());
+    CHECK(each.columns({grid_of(each).front()}, 0).allFinite());
     CHECK((cause.gains == nullptr) == each.gains.empty());
-    CHECK((cause.error_of_reading != nullptr) == each.sensor.has_value());
+    CHECK(static_cast<bool>(each.errors_K) == each.sensor.has_value());
     for (const ShapeParameter& shape : each.shape) {
       INFO(shape.name);
       const CauseParameter* const of = find_parameter(cause, shape.name);

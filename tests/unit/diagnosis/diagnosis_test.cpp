@@ -2,30 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
 
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/text/problems.hpp"
-#include "modelling/diagnosis/data/series.hpp"
-#include "modelling/diagnosis/evidence/coloured_noise.hpp"
-#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 #include "modelling/diagnosis/report/report_data.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;
 
 namespace {
-
-using Present = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
 ThermalModel one_input() {
   ThermalModel model;
@@ -121,6 +114,9 @@ RunFile along_axis(const Readings& machine, unsigned seed, double um_per_K_mm) {
     run.values.back().push_back(x_mm);
     run.values[2][row] += um_per_K_mm * x_mm * (run.values[3][row] - 20.0);
   }
+  // Without the speed, whose heat would be as good a name.
+  run.columns.erase(run.columns.begin() + 1);
+  run.values.erase(run.values.begin() + 1);
   return run;
 }
 
@@ -161,41 +157,6 @@ Diagnosis diagnosis_of_false_reading(std::size_t sensor, Error error_K) {
 
 }  // namespace
 
-TEST_CASE("whitened columns give the generalised least squares of the covariance",
-          "[diagnosis][noise]") {
-  const Eigen::Index n = 40;
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
-  Eigen::VectorXd time_s(n);
-  Eigen::VectorXd a(n);
-  Eigen::VectorXd b(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    time_s[i] = 60.0 * static_cast<double>(i) + (i % 3 == 0 ? 20.0 : 0.0);
-    a[i] = normal(random);
-    b[i] = normal(random);
-  }
-  const NoiseShape shape{4.0, 300.0};
-  const std::vector<Block> blocks = {{0, 15}, {15, n}};
-  Present present = Present::Constant(n, true);
-  present[7] = present[20] = false;
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(n, n);
-  for (const Block& block : blocks)
-    for (Eigen::Index i = block.begin; i < block.end; ++i)
-      for (Eigen::Index j = block.begin; j < block.end; ++j)
-        covariance(i, j) += shape.ratio * std::exp(-std::abs(time_s[i] - time_s[j]) / shape.tau_s);
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index i = 0; i < n; ++i)
-    if (present[i]) rows.push_back(i);
-  const Eigen::MatrixXd seen = covariance(rows, rows);
-  const double expected = a(rows).dot(seen.llt().solve(b(rows)));
-  for (const Eigen::Index i : {7, 20}) a[i] = b[i] = 0.0;
-  const Whitener whitener(shape, time_s, blocks, present);
-  CHECK(whitener.apply(a).dot(whitener.apply(b)) == Approx(expected));
-  const double log_determinant =
-      2.0 * Eigen::MatrixXd(seen.llt().matrixL()).diagonal().array().log().sum();
-  CHECK(whitener.log_determinant() == Approx(log_determinant));
-}
-
 TEST_CASE("growth with the squared speed is named, with its size and its gain", "[diagnosis]") {
   const Diagnosis answer = diagnosis_of([](double rpm, double, int) { return 4e-7 * rpm * rpm; });
   REQUIRE(answer.verdict == "effect");
@@ -210,7 +171,9 @@ TEST_CASE("growth with the squared speed is named, with its size and its gain", 
   CHECK(finding.test.at("z_um").after_um < 0.2);
   CHECK(finding.test.at("z_um").ci95.low > 0.8);
   CHECK(answer.extended.terms.size() == 1);
-  CHECK(answer.outputs.at("z_um").extended_test_rms_um == Approx(finding.test.at("z_um").after_um));
+  // Its coefficients are fitted anew beside it.
+  CHECK(answer.outputs.at("z_um").extended_test_rms_um ==
+        Approx(finding.test.at("z_um").after_um).epsilon(0.05));
   // What was found is a model file.
   CHECK_NOTHROW(parse_model(write_model(answer.extended), "extended"));
 }
@@ -288,84 +251,6 @@ TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "
   CHECK(answer.extended.terms.empty());
 }
 
-TEST_CASE("hypotheses of one pattern have the same columns but for their scale", "[diagnosis]") {
-  ThermalModel model = one_input();
-  model.inputs.emplace_back("t2_degC");
-  model.matrix_um_per_K = {{5.0, -3.0}};
-  RunFile run = run_with(1, 300, [](double, double, int) { return 0.0; });
-  run.columns.emplace_back("t2_degC");
-  run.values.push_back(run.values[1]);
-  const MeasuredData data = training_data(model, {run}, {"a"}, shared_columns(model, {run}));
-  std::map<std::string, std::vector<Hypothesis>> by_pattern;
-  for (const Hypothesis& each : hypotheses(data, stacked_rows(data)))
-    if (!each.pattern.empty()) by_pattern[each.pattern].push_back(each);
-  REQUIRE(by_pattern.size() == 2);  // steps and drifts
-  for (const auto& [pattern, alike] : by_pattern) {
-    CAPTURE(pattern);
-    REQUIRE(alike.size() == 2);
-    CHECK(alike[0].scale(0) == -5.0);
-    CHECK(alike[1].scale(0) == 3.0);
-    REQUIRE(alike[0].shape[0].grid == alike[1].shape[0].grid);
-    const std::vector<double> shape = {alike[0].shape[0].grid[7]};
-    CHECK(
-        (alike[0].columns({shape}, 0) / -5.0).isApprox(alike[1].columns({shape}, 0) / 3.0, 1e-12));
-  }
-}
-
-TEST_CASE("columns that come from shared ones are those that a hypothesis makes itself",
-          "[diagnosis]") {
-  ThermalModel model = one_input();
-  model.inputs.emplace_back("t2_degC");
-  model.matrix_um_per_K = {{5.0, -3.0}};
-  RunFile run = run_with(1, 300, [](double, double, int) { return 0.0; });
-  run.columns.emplace_back("t2_degC");
-  run.values.push_back(run.values[1]);
-  for (double& value : run.values.back()) value = 20.0 + 0.3 * (value - 20.0) * (value - 20.0);
-  const MeasuredData data =
-      training_data(model, {run, run}, {"a", "b"}, shared_columns(model, {run, run}));
-  const StackedRows rows = stacked_rows(data);
-  std::map<std::string, int> seen;
-  for (const Hypothesis& each : hypotheses(data, rows)) {
-    CAPTURE(each.cause, each.subject);
-    if (each.of_readings) {
-      Column sum = Column::Zero(rows.time_s.size());
-      for (const ReadingShare& share : each.of_readings(0))
-        for (std::size_t i = 0; i < rows.runs.size(); ++i)
-          sum.segment(rows.runs[i].begin, rows.runs[i].end - rows.runs[i].begin) +=
-              share.weight * data.runs[i].calm_inputs_K[share.input];
-      CHECK((sum - each.columns({{}}, 0).col(0)).norm() < 1e-9);
-      ++seen[each.cause];
-    }
-    if (each.from_onset) {
-      const double onset_s = each.shape.front().grid[20];
-      const Block& block = rows.runs[*each.run];
-      Column begun = each.from_onset(0);
-      for (Eigen::Index row = 0; row < begun.size(); ++row)
-        if (row < block.begin || row >= block.end || rows.time_s[row] < onset_s) begun[row] = 0.0;
-      REQUIRE(begun.norm() > 0);
-      CHECK(begun == each.columns({{onset_s}}, 0).col(0));
-      ++seen[each.cause];
-    }
-  }
-  CHECK(seen == std::map<std::string, int>{{"sensor_loose", 4}, {"sensor_swap", 1}});
-}
-
-TEST_CASE("a reading is calmed of its noise, and left alone where it has none", "[diagnosis]") {
-  const Eigen::Index n = 400;
-  std::mt19937 random(5);
-  std::normal_distribution<double> noise(0.0, 0.05);
-  Column time_s(n);
-  Column truth(n);
-  Column noisy(n);
-  for (Eigen::Index row = 0; row < n; ++row) {
-    time_s[row] = 60.0 * static_cast<double>(row);
-    truth[row] = 5.0 * std::sin(time_s[row] / 3000.0);
-    noisy[row] = truth[row] + noise(random);
-  }
-  CHECK((calm(time_s, noisy) - truth).norm() < 0.6 * (noisy - truth).norm());
-  CHECK((calm(time_s, truth) - truth).cwiseAbs().maxCoeff() < 1e-9);
-}
-
 TEST_CASE("a cause is named with its size beside small errors of all coefficients", "[diagnosis]") {
   Readings machine{{0.2, 0.05, 0.02, 0.01}, {9.0, -12.0, 10.0, 7.0}, {1.03, 0.96, 1.02, 0.97}};
   machine.heat_um = 20.0;
@@ -375,14 +260,15 @@ TEST_CASE("a cause is named with its size beside small errors of all coefficient
   CHECK(effect.findings[0].parameters.at(0).values.at("") == Approx(6000.0).epsilon(0.2));
 }
 
-TEST_CASE("a cause is named although errors of all coefficients could take most of it",
+TEST_CASE("a cause that errors of all coefficients could take most of is the first candidate",
           "[diagnosis]") {
   Readings machine = six_readings({0.99, 1.007, 0.981, 0.993, 1.007, 0.986});
   machine.heat_um = 12.0;
   const Diagnosis effect = diagnosis_of_machine(machine);
-  REQUIRE(effect.findings.size() == 1);
-  CHECK(effect.findings[0].cause == "missing_heat_source");
-  CHECK(effect.findings[0].subject == "spindle_rpm");
+  CHECK(effect.verdict != "none");
+  CHECK(effect.weighed[0].cause == "missing_heat_source");
+  CHECK(effect.weighed[0].subject == "spindle_rpm");
+  CHECK(effect.weighed[0].probability > 10.0 * effect.weighed[1].probability);
 }
 
 TEST_CASE("a small cause beside errors of all coefficients is left to them or named as it is",
@@ -399,8 +285,8 @@ TEST_CASE("a small cause beside errors of all coefficients is left to them or na
 TEST_CASE("an effect along an axis is no rival of a wrong coefficient where no axis matters",
           "[diagnosis]") {
   const auto weighed = [](const Diagnosis& answer, const std::string& cause) {
-    return std::any_of(answer.weighed.begin(), answer.weighed.end(), [&](const Weighed& each) {
-      return each.cause == cause && each.subject.starts_with("t1_degC");
+    return std::any_of(answer.weighed.begin(), answer.weighed.end(), [&](const Candidate& each) {
+      return each.cause == cause && each.subject.starts_with("t1_degC") && each.probability > 0.2;
     });
   };
   Readings machine{{0.05, 0.02}, {9.0, -12.0}, {1.0, 1.0}};
@@ -484,13 +370,24 @@ TEST_CASE("an output that no run has a value of is left out", "[diagnosis]") {
   CHECK(answer.findings[0].outputs == std::vector<std::string>{"z_um"});
 }
 
-TEST_CASE("what came into question stands in the JSON where it is asked for", "[diagnosis]") {
+TEST_CASE("the likeliest candidates stand in the JSON, all of them where they are asked for",
+          "[diagnosis]") {
   const Diagnosis answer = diagnosis_of([](double rpm, double, int) { return 4e-7 * rpm * rpm; });
-  CHECK(diagnosis_json(answer).find("\"weighed\"") == std::string::npos);
-  const std::string json = diagnosis_json(answer, true);
-  CHECK(json.find("\"weighed\"") != std::string::npos);
-  CHECK(json.find("\"log_left\"") != std::string::npos);
-  CHECK(json.find("\"beside_fit\": 0") != std::string::npos);
+  REQUIRE(answer.weighed.size() > 3);
+  CHECK(answer.weighed[0].cause == "speed_growth");
+  CHECK_FALSE(answer.weighed[0].would_decide.empty());
+  CHECK(answer.weighed[0].test.at("z_um").reduction > 0.8);
+  double sum = 0.0;
+  for (const auto& [family, probability] : answer.families) sum += probability;
+  CHECK(sum == Approx(1.0));
+  const auto count = [](const std::string& json) {
+    std::size_t found = 0;
+    for (std::size_t at = 0; (at = json.find("\"would_decide\"", at)) != std::string::npos; ++at)
+      ++found;
+    return found;
+  };
+  CHECK(count(diagnosis_json(answer)) == 3);
+  CHECK(count(diagnosis_json(answer, true)) == answer.weighed.size());
 }
 
 TEST_CASE("the answer as JSON has the parts that others read", "[diagnosis]") {

@@ -121,8 +121,9 @@ TEST_CASE("each finding is a sentence with its figures, what to do and what woul
   CHECK(has(html, "time constant 30 min (28 min to 33 min)"));
   CHECK(has(html, "Heat that no sensor sees"));
   CHECK(has(html, "from 6.7 to 2.4"));
-  CHECK(has(html, xml_text(experiment_for(diagnosis.findings[0],
-                                          diagnosis.findings[0].alternatives[0]))));
+  CHECK(has(html, xml_text(experiment_between(
+                      {diagnosis.findings[0].cause, diagnosis.findings[0].subject, 1.0},
+                      diagnosis.findings[0].alternatives[0]))));
 }
 
 TEST_CASE("names are shown as they are, whatever is in them", "[diagnosis][report]") {
@@ -201,6 +202,7 @@ TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][repor
   Diagnosis diagnosis = with_findings();
   diagnosis.remainder.emplace();
   diagnosis.remainder->test["z_um"] = {12.0, 2.0, 0.83, {0.7, 0.9}};
+  diagnosis.remainder->term.bank.gain_um_per_unit["z_um"] = {};
   const std::string html = report_html(diagnosis, one_run());
   const std::size_t bank = html.find("What can be predicted and has no name (up to 10.0 um");
   const std::size_t heat = html.find("(up to 4.3 um RMS less). Use the extended model");
@@ -208,6 +210,10 @@ TEST_CASE("what to do stands first, the largest gain on top", "[diagnosis][repor
   REQUIRE(heat != std::string::npos);
   CHECK(bank < heat);
   CHECK(heat < html.find("<h2>What was found"));
+  diagnosis.remainder->term.bank.gain_um_per_unit.clear();
+  const std::string without = report_html(diagnosis, one_run());
+  CHECK(without.find("The extended model carries it by readings") == std::string::npos);
+  CHECK(without.find("the extended model goes without it") != std::string::npos);
 }
 
 TEST_CASE("only what has the unit of a speed is called one", "[diagnosis][report]") {

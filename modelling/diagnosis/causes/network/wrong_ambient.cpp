@@ -14,9 +14,7 @@ NetworkHypothesis warmer(const std::string& subject, const Eigen::VectorXd& infl
   wrong.hypothesis.subject = subject;
   wrong.hypothesis.form = Form::shared_gain;
   wrong.hypothesis.gains = {std::string(offset.name)};
-  wrong.hypothesis.possible = [](double gain, std::size_t) {
-    return gain >= offset.low && gain <= offset.high;
-  };
+  wrong.hypothesis.bounds = [](std::size_t) { return Interval{offset.low, offset.high}; };
   // Air that is warmer by so much brings in a constant heat.
   wrong.apply = [inflow](HeatNetwork& network, const Shape&, double gain) {
     network.sources.push_back({"", gain, 1.0, 1.0, inflow});

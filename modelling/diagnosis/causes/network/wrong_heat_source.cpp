@@ -17,8 +17,8 @@ std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
   wrong.hypothesis.form = Form::shared_gain;
   wrong.hypothesis.gains = {std::string(factor.name)};
   // The gain is what the factor is beyond 1.
-  wrong.hypothesis.possible = [](double gain, std::size_t) {
-    return gain >= factor.low - 1.0 && gain <= factor.high - 1.0;
+  wrong.hypothesis.bounds = [](std::size_t) {
+    return Interval{factor.low - 1.0, factor.high - 1.0};
   };
   wrong.apply = [index = subject.index](HeatNetwork& network, const Shape&, double gain) {
     network.sources[index].heat_W *= 1.0 + gain;

@@ -1,0 +1,169 @@
+#include "modelling/diagnosis/fit/output_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace thermocomp::diagnosis {
+namespace {
+
+/// More rows tell hardly more of what lasts for minutes and hours.
+constexpr Eigen::Index rows_max = 480;
+/// Rows are not averaged over a gap that is so many times longer than a row shall be.
+constexpr double gap_factor = 3.0;
+/// Share of its own RMS by which a physical effect parts from its form: bodies without a sensor,
+/// joints and films of `tests/diagnosis/physical_effects.py` part by 5 to 20 %.
+constexpr double discrepancy = 0.1;
+constexpr double never_known = 1e-9;
+constexpr double least_variance = 1e-9;
+
+/// From second differences, which neither offsets nor slopes reach.
+double noise_of(const Column& values, const std::vector<Block>& runs) {
+  std::vector<double> bends;
+  for (const Block& run : runs)
+    for (Eigen::Index row = run.begin + 1; row + 1 < run.end; ++row)
+      bends.push_back(std::abs(values[row + 1] - 2.0 * values[row] + values[row - 1]));
+  if (bends.empty()) return 0.0;
+  const auto middle = bends.begin() + std::ssize(bends) / 2;
+  std::nth_element(bends.begin(), middle, bends.end());
+  return *middle / (0.6745 * std::sqrt(6.0));
+}
+
+}  // namespace
+
+double log_mean_exp(const Eigen::VectorXd& values) {
+  const double most = values.maxCoeff();
+  return std::isfinite(most) ? most + std::log((values.array() - most).exp().mean()) : most;
+}
+
+OutputRows::OutputRows(const StackedRows& rows,
+                       const Eigen::Array<bool, Eigen::Dynamic, 1>& present) {
+  const Eigen::Index apart = std::max<Eigen::Index>(1, (present.count() + rows_max - 1) / rows_max);
+  double length_s = 0.0;
+  for (const Block& run : rows.runs)
+    if (run.end > run.begin) length_s += rows.time_s[run.end - 1] - rows.time_s[run.begin];
+  const double longest_s = gap_factor * length_s / static_cast<double>(rows_max);
+  std::vector<Eigen::Triplet<double>> entries;
+  std::vector<double> times_s;
+  for (const Block& run : rows.runs) {
+    Block own{std::ssize(times_s), 0};
+    std::vector<Eigen::Index> together;
+    const auto close = [&] {
+      double sum_s = 0.0;
+      for (const Eigen::Index row : together) {
+        sum_s += rows.time_s[row];
+        entries.emplace_back(std::ssize(times_s), row, 1.0 / static_cast<double>(together.size()));
+      }
+      times_s.push_back(sum_s / static_cast<double>(together.size()));
+      together.clear();
+    };
+    for (Eigen::Index row = run.begin; row < run.end; ++row) {
+      if (!together.empty() && rows.time_s[row] - rows.time_s[together.front()] > longest_s)
+        close();
+      if (present[row]) together.push_back(row);
+      if (std::ssize(together) == apart) close();
+    }
+    if (!together.empty()) close();
+    own.end = std::ssize(times_s);
+    runs_.push_back(own);
+  }
+  time_s_ = Eigen::Map<const Column>(times_s.data(), std::ssize(times_s));
+  means_.resize(time_s_.size(), rows.time_s.size());
+  means_.setFromTriplets(entries.begin(), entries.end());
+}
+
+OutputFit::OutputFit(OutputRows rows, Column remainder, const Panel& common,
+                     const Eigen::VectorXd& sd, double least_noise)
+    : rows_(std::move(rows)),
+      remainder_(std::move(remainder)),
+      least_noise_(std::max(least_noise, std::sqrt(least_variance))),
+      noise_(noise_beside(Column::Zero(remainder_.size()))) {
+  Panel both(rows_.size(), 1 + common.cols());
+  both << remainder_, common;
+  const Eigen::VectorXd precision =
+      (noise_ / sd.array())
+          .square()
+          .max(never_known * common.colwise().squaredNorm().transpose().array() + 1e-12);
+  Eigen::VectorXd none(std::ssize(backgrounds()));
+  for (const Background& background : backgrounds()) {
+    Under under;
+    under.white = both;
+    under.log_determinant = whiten(background, rows_.time_s(), rows_.runs(), under.white);
+    const auto y = under.white.col(0);
+    const auto z = under.white.rightCols(common.cols());
+    Eigen::MatrixXd square = z.transpose() * z;
+    square.diagonal() += precision;
+    under.root.compute(square);
+    under.common_remainder = under.root.matrixL().solve(z.transpose() * y);
+    under.squares = y.squaredNorm() - under.common_remainder.squaredNorm();
+    under.log_determinant +=
+        2.0 * under.root.matrixLLT().diagonal().array().log().sum() - precision.array().log().sum();
+    under_.push_back(std::move(under));
+    none[std::ssize(under_) - 1] = log_likelihood(std::ssize(under_) - 1, 0.0, 0.0);
+  }
+  none_ = log_mean_exp(none);
+}
+
+double OutputFit::noise_beside(const Column& effect) const {
+  return std::max(noise_of(remainder_ - effect, rows_.runs()), least_noise_);
+}
+
+Equations OutputFit::equations(const Panel& columns, Eigen::Index width) const {
+  const Eigen::Index shapes = columns.cols() / width;
+  const auto count = static_cast<Eigen::Index>(under_.size());
+  Equations all{width, Eigen::MatrixXd(columns.cols(), count),
+                Eigen::MatrixXd(width * columns.cols(), count),
+                Eigen::MatrixXd(width * width, shapes)};
+  const auto products_within = [&](const Panel& of, Eigen::Index shape) -> Eigen::MatrixXd {
+    const auto group = of.middleCols(width * shape, width);
+    return group.transpose() * group;
+  };
+  Panel centred = columns;
+  for (const Block& run : rows_.runs()) {
+    auto part = centred.middleRows(run.begin, run.end - run.begin);
+    if (part.rows() > 0) part.rowwise() -= part.colwise().mean().eval();
+  }
+  for (Eigen::Index shape = 0; shape < shapes; ++shape)
+    all.size.col(shape) =
+        products_within(centred, shape).reshaped() / static_cast<double>(rows_.size());
+  for (Eigen::Index b = 0; b < count; ++b) {
+    const Under& under = under_[static_cast<std::size_t>(b)];
+    Panel white = columns;
+    whiten(backgrounds()[static_cast<std::size_t>(b)], rows_.time_s(), rows_.runs(), white);
+    const Eigen::MatrixXd common = under.root.matrixL().solve(
+        under.white.rightCols(under.white.cols() - 1).transpose() * white);
+    all.right.col(b) =
+        white.transpose() * under.white.col(0) - common.transpose() * under.common_remainder;
+    for (Eigen::Index shape = 0; shape < shapes; ++shape) {
+      const auto part = common.middleCols(width * shape, width);
+      all.square.col(b).segment(width * width * shape, width * width) =
+          (products_within(white, shape) - part.transpose() * part).reshaped();
+    }
+  }
+  return all;
+}
+
+double OutputFit::variance(Eigen::Index under, double explained) const {
+  const double left = under_[static_cast<std::size_t>(under)].squares - explained;
+  return std::max(least_variance, left / static_cast<double>(rows_.size()));
+}
+
+double OutputFit::log_likelihood(Eigen::Index under, double explained, double effect_square) const {
+  const Under& of = under_[static_cast<std::size_t>(under)];
+  const auto n = static_cast<double>(rows_.size());
+  const double ratio = std::max(1.0, backgrounds()[static_cast<std::size_t>(under)].ratio);
+  const double own = variance(under, explained);
+  const double held = std::max(own, discrepancy * discrepancy * effect_square / (ratio * ratio));
+  return -0.5 * (n * (std::log(held) + own / held) + of.log_determinant);
+}
+
+Eigen::VectorXd OutputFit::common_factors() const {
+  std::size_t best = 0;
+  for (std::size_t b = 1; b < under_.size(); ++b)
+    if (log_likelihood(static_cast<Eigen::Index>(b), 0.0, 0.0) >
+        log_likelihood(static_cast<Eigen::Index>(best), 0.0, 0.0))
+      best = b;
+  return under_[best].root.matrixU().solve(under_[best].common_remainder);
+}
+
+}  // namespace thermocomp::diagnosis

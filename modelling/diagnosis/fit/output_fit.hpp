@@ -1,0 +1,104 @@
+/// One output's remainder, and what columns explain of it under every background.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+
+#include "modelling/diagnosis/data/stacked_rows.hpp"
+#include "modelling/diagnosis/fit/background.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// The rows in which an output has a value; neighbours are averaged where there are many.
+class OutputRows {
+ public:
+  /// @param present  over the stacked rows
+  OutputRows(const StackedRows& rows, const Eigen::Array<bool, Eigen::Dynamic, 1>& present);
+
+  [[nodiscard]] Eigen::Index size() const { return time_s_.size(); }
+  [[nodiscard]] const Column& time_s() const { return time_s_; }
+  [[nodiscard]] const std::vector<Block>& runs() const { return runs_; }
+  /// @param columns  over the stacked rows, shape (rows, m)
+  /// @return shape (size(), m)
+  [[nodiscard]] Panel means_of(const Panel& columns) const { return means_ * columns; }
+
+ private:
+  Column time_s_;
+  std::vector<Block> runs_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> means_;
+};
+
+/// Normal equations of groups of columns, one group a shape, under each background.
+struct Equations {
+  Eigen::Index width{1};
+  Eigen::MatrixXd right;   ///< columns' remainder, shape (width shapes, backgrounds)
+  Eigen::MatrixXd square;  ///< columns' columns within a group, shape (width^2 shapes, backgrounds)
+  Eigen::MatrixXd size;    ///< mean square within a group, means of the runs off: (width^2, shapes)
+
+  [[nodiscard]] auto right_of(Eigen::Index shape, Eigen::Index under) const {
+    return right.col(under).segment(width * shape, width);
+  }
+  [[nodiscard]] Eigen::MatrixXd square_of(Eigen::Index shape, Eigen::Index under) const {
+    return square.col(under).segment(width * width * shape, width * width).reshaped(width, width);
+  }
+  /// Mean square of the group's columns times gains.
+  [[nodiscard]] double size_of(Eigen::Index shape, const Eigen::VectorXd& gains) const {
+    return gains.dot(size.col(shape).reshaped(width, width) * gains);
+  }
+};
+
+/// Remainder = common columns b + columns g + background, b known beforehand to a standard
+/// deviation each, or not at all.
+class OutputFit {
+ public:
+  /// @param remainder  one value a row
+  /// @param common     shape (rows, p): what every hypothesis has to compete with
+  /// @param sd         of their factors; infinite: nothing is known
+  /// @param least_noise  of a single value
+  OutputFit(OutputRows rows, Column remainder, const Panel& common, const Eigen::VectorXd& sd,
+            double least_noise);
+
+  [[nodiscard]] const OutputRows& rows() const { return rows_; }
+  [[nodiscard]] const Column& remainder() const { return remainder_; }
+  /// Standard deviation of a row's white noise, from second differences.
+  [[nodiscard]] double noise() const { return noise_; }
+  /// The same beside an effect, which may be quick itself.
+  [[nodiscard]] double noise_beside(const Column& effect) const;
+  /// @param columns  of the output's rows, `width` neighbours a group
+  [[nodiscard]] Equations equations(const Panel& columns, Eigen::Index width) const;
+  /// ln L under a background when `explained` is taken from the squares, of an effect of this mean
+  /// square. An effect is never quite of its form: what is nearly it is worth as much, so the
+  /// background holds at least `discrepancy` of the effect's RMS.
+  [[nodiscard]] double log_likelihood(Eigen::Index under, double explained,
+                                      double effect_square) const;
+  /// ln of the mean over all backgrounds, nothing explained.
+  [[nodiscard]] double log_likelihood_of_none() const { return none_; }
+  /// Variance of the white part under a background, `explained` taken from the squares.
+  [[nodiscard]] double variance(Eigen::Index under, double explained) const;
+  /// The common columns' factors under the background that is likeliest.
+  [[nodiscard]] Eigen::VectorXd common_factors() const;
+
+ private:
+  struct Under {
+    Panel white;                       ///< remainder, common columns
+    Eigen::LLT<Eigen::MatrixXd> root;  ///< of the common columns' products and prior
+    Eigen::VectorXd common_remainder;  ///< root^-1 common' remainder
+    double squares{0.0};               ///< of the remainder, the common columns taken out
+    double log_determinant{0.0};
+  };
+
+  OutputRows rows_;
+  Column remainder_;
+  double least_noise_{0.0};
+  double noise_{0.0};
+  double none_{0.0};
+  std::vector<Under> under_;
+};
+
+/// ln of the mean of exp(values).
+[[nodiscard]] double log_mean_exp(const Eigen::VectorXd& values);
+
+}  // namespace thermocomp::diagnosis

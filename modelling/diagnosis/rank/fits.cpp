@@ -1,0 +1,512 @@
+#include "modelling/diagnosis/rank/fits.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/QR>
+
+#include "modelling/diagnosis/data/false_reading.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+#include "modelling/diagnosis/rank/posterior.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::infinity();
+/// An output with fewer values is not compared.
+constexpr Eigen::Index values_min = 12;
+/// Temperatures that predict a reading: those that go with it most.
+constexpr std::size_t neighbours = 8;
+constexpr double neighbour_sd_K = 30.0;  ///< for a column whose largest value is 1
+constexpr double reading_noise_K = 1e-3;
+/// RMS that a model may leave, over that of a fit of its inputs, and count as fitted to the rows.
+constexpr double fitted_factor = 1.1;
+/// By which the cosine of two lists in proportion may miss 1, for each of their numbers: few
+/// numbers are so by accident.
+constexpr double ridge_angle = 0.0015;
+/// Utilities that differ by less are alike.
+constexpr double as_much = 1.0;
+constexpr int zooms = 2;
+constexpr int points_of_zoom = 9;
+
+Panel offsets_of(const OutputRows& rows) {
+  Panel offsets = Panel::Zero(rows.size(), std::ssize(rows.runs()));
+  for (std::size_t run = 0; run < rows.runs().size(); ++run) {
+    const Block& block = rows.runs()[run];
+    offsets.col(static_cast<Eigen::Index>(run))
+        .segment(block.begin, block.end - block.begin)
+        .setOnes();
+  }
+  return offsets;
+}
+
+/// The selected rows of all runs, one below the other.
+template <class Of>
+Column stacked(const MeasuredData& data, const StackedRows& rows, Of of) {
+  Column all(rows.time_s.size());
+  for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    const Eigen::Index count = rows.runs[i].end - rows.runs[i].begin;
+    all.segment(rows.runs[i].begin, count) = Column(of(data.runs[i])).tail(count);
+  }
+  return all;
+}
+
+Panel joined(const Panel& left, const Panel& right) {
+  Panel both(left.rows(), left.cols() + right.cols());
+  both << left, right;
+  return both;
+}
+
+void centre(const std::vector<Block>& runs, Column& values) {
+  for (const Block& run : runs) {
+    auto part = values.segment(run.begin, run.end - run.begin);
+    if (part.size() > 0) part.array() -= part.mean();
+  }
+}
+
+Panel centred_in(const std::vector<Block>& runs, Panel columns) {
+  for (const Block& run : runs) {
+    auto part = columns.middleRows(run.begin, run.end - run.begin);
+    if (part.rows() > 0) part.rowwise() -= part.colwise().mean().eval();
+  }
+  return columns;
+}
+
+Column left_by(const Column& values, const Panel& columns) {
+  if (columns.cols() == 0) return values;
+  return values - columns * Eigen::VectorXd(columns.colPivHouseholderQr().solve(values));
+}
+
+/// RMS of what no sum of the columns explains.
+double rms_beside(const Column& values, const Panel& columns) {
+  return std::sqrt(left_by(values, columns).squaredNorm() / static_cast<double>(values.size()));
+}
+
+/// Coefficients that were fitted to these very rows, with free offsets of the runs or without,
+/// leave nothing for a fit of the same columns: a cause may have gone into them.
+/// Those of a ridge on standardised inputs leave of each input's share c a product with the
+/// remainder that is in proportion to the variance of c.
+bool fitted_to(const Column& remainder, const Panel& free, const Panel& coefficients) {
+  const Eigen::VectorXd variances =
+      (coefficients.rowwise() - coefficients.colwise().mean()).colwise().squaredNorm();
+  const auto is_ridge = [&](const Panel& beside) {
+    const Eigen::VectorXd products = coefficients.transpose() * left_by(remainder, beside);
+    return products.dot(variances) > (1.0 - ridge_angle * static_cast<double>(variances.size())) *
+                                         products.norm() * variances.norm();
+  };
+  const auto leaves_nothing = [&](const Panel& beside) {
+    return rms_beside(remainder, beside) <
+           fitted_factor * rms_beside(remainder, joined(beside, coefficients));
+  };
+  const Panel nothing(remainder.size(), 0);
+  return leaves_nothing(free) || leaves_nothing(nothing) ||
+         (variances.size() > 2 && (is_ridge(free) || is_ridge(nothing)));
+}
+
+double log_add_exp(double a, double b) {
+  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
+}
+
+/// Gains of least squares, kept within their bounds where there is one gain.
+Eigen::VectorXd gains_of(const Equations& equations, Eigen::Index shape, Eigen::Index under,
+                         const Interval& bounds) {
+  Eigen::MatrixXd square = equations.square_of(shape, under);
+  square.diagonal().array() += 1e-9 * square.trace() + 1e-300;
+  Eigen::VectorXd gains = square.ldlt().solve(equations.right_of(shape, under));
+  if (gains.size() == 1) gains[0] = std::clamp(gains[0], bounds.low, bounds.high);
+  return gains;
+}
+
+double explained_by(const Equations& equations, Eigen::Index shape, Eigen::Index under,
+                    const Eigen::VectorXd& gains) {
+  return 2.0 * gains.dot(equations.right_of(shape, under)) -
+         gains.dot(equations.square_of(shape, under) * gains);
+}
+
+/// ln L of one output under each background, the gains given.
+Eigen::VectorXd likelihoods(const OutputFit& fit, const Equations& equations, Eigen::Index shape,
+                            const Eigen::VectorXd& gains) {
+  Eigen::VectorXd all(equations.right.cols());
+  const double square = equations.size_of(shape, gains);
+  for (Eigen::Index under = 0; under < all.size(); ++under)
+    all[under] = fit.log_likelihood(under, explained_by(equations, shape, under, gains), square);
+  return all;
+}
+
+Interval bounds_of(const Hypothesis& hypothesis, std::size_t output) {
+  return hypothesis.bounds ? hypothesis.bounds(output) : Interval{-unknown, unknown};
+}
+
+double price_of_gains(const Hypothesis& hypothesis, Eigen::Index rows) {
+  return 0.5 * static_cast<double>(hypothesis.gains.size()) * std::log(static_cast<double>(rows));
+}
+
+}  // namespace
+
+const OutputFit& Readings::of(std::size_t input) {
+  std::unique_ptr<OutputFit>& made = made_[input];
+  if (made) return *made;
+  OutputRows rows(rows_,
+                  Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(rows_.time_s.size(), true));
+  const auto mean = [&](const Column& column) -> Column { return rows.means_of(column); };
+  const auto input_K = [](std::size_t i) {
+    return [i](const MeasuredRun& run) -> const Column& { return run.inputs_K[i]; };
+  };
+  const Column own = mean(stacked(data_, rows_, input_K(input)));
+  std::vector<std::pair<double, Panel>> others;  // how closely it goes with the reading
+  const auto add = [&](const auto& of) {
+    Panel both(rows.size(), 2);
+    both.col(0) = mean(stacked(data_, rows_, of));
+    both.col(1) = mean(stacked(
+        data_, rows_, [&](const MeasuredRun& run) { return lagged(run.time_s, of(run), 1800.0); }));
+    Column a = own;
+    Column b = both.col(0);
+    centre(rows.runs(), a);
+    centre(rows.runs(), b);
+    others.emplace_back(-std::abs(a.dot(b)) / (b.norm() + 1e-12), both);
+  };
+  for (std::size_t i = 0; i < data_.model.inputs.size(); ++i)
+    if (i != input) add(input_K(i));
+  for (std::size_t i = 0; i < data_.others.size(); ++i)
+    add([i](const MeasuredRun& run) -> const Column& { return run.others_K[i]; });
+  std::sort(others.begin(), others.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  if (others.size() > neighbours) others.resize(neighbours);
+  const Panel offsets = offsets_of(rows);
+  Panel common = offsets;
+  for (const auto& [closeness, both] : others) common = joined(common, both);
+  for (std::size_t i = 0; i < data_.signals.size(); ++i)
+    for (const double tau_s : {600.0, 3600.0})
+      common = joined(common, mean(stacked(data_, rows_, [&](const MeasuredRun& run) {
+                        return lagged(run.time_s, run.signals[i], tau_s);
+                      })));
+  for (Eigen::Index i = offsets.cols(); i < common.cols(); ++i)
+    common.col(i) /= common.col(i).cwiseAbs().maxCoeff() + 1e-9;
+  Eigen::VectorXd sd = Eigen::VectorXd::Constant(common.cols(), neighbour_sd_K);
+  sd.head(offsets.cols()).setConstant(unknown);
+  made = std::make_unique<OutputFit>(std::move(rows), own, common, sd, reading_noise_K);
+  return *made;
+}
+
+Fits::Fits(const MeasuredData& data, const StackedRows& rows, Readings& readings,
+           const std::vector<Explanation>& accepted)
+    : data_(data), rows_(rows), readings_(readings), outputs_(data.model.outputs.size()) {
+  for (std::size_t output = 0; output < outputs_.size(); ++output) {
+    Column left = stacked(data, rows, [output](const MeasuredRun& run) -> Column {
+      return run.measured_um[output] - run.model_um[output];
+    });
+    const Eigen::Array<bool, Eigen::Dynamic, 1> present = left.array().isFinite();
+    if (present.count() < values_min) continue;
+    left = present.select(left.array(), 0.0);
+    OutputRows of(rows, present);
+    Panel free = offsets_of(of);
+    for (const Explanation& each : accepted) {
+      if (each.gains[output].size() == 0) continue;
+      const Panel columns = each.hypothesis->columns({each.shape}, output);
+      if (each.hypothesis->form == Form::no_gain)
+        left -= columns.col(0);
+      else
+        free = joined(free, of.means_of(columns));
+    }
+    // The coefficients may be a little wrong without being a cause of their own.
+    Panel coefficients(of.size(), data.coefficient_sd > 0 ? std::ssize(data.model.inputs) : 0);
+    for (Eigen::Index i = 0; i < coefficients.cols(); ++i)
+      coefficients.col(i) = of.means_of(stacked(data, rows, [&](const MeasuredRun& run) -> Column {
+        const auto input = static_cast<std::size_t>(i);
+        return answer_to_errors(data, run, output, input, run.inputs_K[input]);
+      }));
+    const Column means = of.means_of(left);
+    const bool fitted = coefficients.cols() > 0 && fitted_to(means, free, coefficients);
+    fitted_ = fitted_ || fitted;
+    Eigen::VectorXd sd = Eigen::VectorXd::Constant(free.cols() + coefficients.cols(), unknown);
+    sd.tail(coefficients.cols()).setConstant(fitted ? 1.0 : data.coefficient_sd);
+    const double least = data.least_noise_um.empty() ? 1e-3 : data.least_noise_um[output];
+    const std::vector<Block> runs = of.runs();
+    // What was fitted to these rows is fitted anew without those that are left out.
+    Panel beside = free.rightCols(free.cols() - std::ssize(runs));
+    if (fitted) beside = joined(beside, coefficients);
+    outputs_[output] = {OutputFit(std::move(of), means, joined(free, coefficients), sd, least),
+                        std::move(free),
+                        LeftOut(centred_in(runs, means).col(0), centred_in(runs, beside))};
+  }
+}
+
+bool Fits::concerns(const Hypothesis& hypothesis, std::size_t output) const {
+  return outputs_[output] && (!hypothesis.output || *hypothesis.output == output);
+}
+
+Fits::Trial Fits::with_own_gains(const Hypothesis& hypothesis,
+                                 const std::vector<Equations>& equations,
+                                 Eigen::Index shape) const {
+  Trial trial;
+  trial.gains.resize(outputs_.size());
+  trial.gain_sd.resize(outputs_.size());
+  const auto measured = std::count_if(outputs_.begin(), outputs_.end(),
+                                      [](const auto& each) { return each.has_value(); });
+  const bool may_spare = !hypothesis.output && measured > 1;
+  double most = -unknown;
+  std::size_t most_of = 0;
+  std::vector<Eigen::VectorXd> all_gains(outputs_.size());
+  std::vector<Eigen::VectorXd> all_sd(outputs_.size());
+  for (std::size_t output = 0; output < outputs_.size(); ++output) {
+    if (!concerns(hypothesis, output)) continue;
+    const OutputFit& fit = outputs_[output]->fit;
+    const Interval bounds = bounds_of(hypothesis, output);
+    Eigen::VectorXd of_background(equations[output].right.cols());
+    double best = -unknown;
+    Eigen::VectorXd best_gains;
+    Eigen::Index best_under = 0;
+    for (Eigen::Index under = 0; under < of_background.size(); ++under) {
+      const Eigen::VectorXd gains = gains_of(equations[output], shape, under, bounds);
+      of_background[under] =
+          fit.log_likelihood(under, explained_by(equations[output], shape, under, gains),
+                             equations[output].size_of(shape, gains));
+      if (of_background[under] > best) {
+        best = of_background[under];
+        best_gains = gains;
+        best_under = under;
+      }
+    }
+    const double none = fit.log_likelihood_of_none();
+    const double with =
+        log_mean_exp(of_background) - none - price_of_gains(hypothesis, fit.rows().size());
+    // An output on which a cause does not act is as likely as one on which it does.
+    trial.score += may_spare ? log_add_exp(with, 0.0) - std::log(2.0) : with;
+    const double variance =
+        fit.variance(best_under, explained_by(equations[output], shape, best_under, best_gains));
+    all_gains[output] = best_gains;
+    all_sd[output] = (variance * equations[output]
+                                     .square_of(shape, best_under)
+                                     .completeOrthogonalDecomposition()
+                                     .pseudoInverse()
+                                     .diagonal()
+                                     .array()
+                                     .max(0.0))
+                         .sqrt();
+    if (!may_spare || with > 0.0) {
+      trial.gains[output] = all_gains[output];
+      trial.gain_sd[output] = all_sd[output];
+    }
+    if (with <= most) continue;
+    most = with;
+    most_of = output;
+  }
+  // It acts somewhere.
+  trial.gains[most_of] = all_gains[most_of];
+  trial.gain_sd[most_of] = all_sd[most_of];
+  return trial;
+}
+
+Fits::Trial Fits::with_shared_gain(const Hypothesis& hypothesis,
+                                   const std::vector<Equations>& equations,
+                                   const Equations* of_reading, double shrunk_rows,
+                                   Eigen::Index shape) const {
+  struct Part {
+    const OutputFit* fit;
+    const Equations* equations;
+    Eigen::Index under;
+  };
+  std::vector<Part> parts;
+  double rows = 0.0;
+  const Eigen::VectorXd nothing = Eigen::VectorXd::Zero(1);
+  const auto add = [&](const OutputFit& fit, const Equations& of) {
+    Part part{&fit, &of, 0};
+    likelihoods(fit, of, shape, nothing).maxCoeff(&part.under);
+    parts.push_back(part);
+    rows += static_cast<double>(fit.rows().size());
+  };
+  for (std::size_t output = 0; output < outputs_.size(); ++output)
+    if (concerns(hypothesis, output)) add(outputs_[output]->fit, equations[output]);
+  if (of_reading != nullptr) add(readings_.of(*hypothesis.sensor), *of_reading);
+  const Interval bounds = bounds_of(hypothesis, 0);
+  Eigen::VectorXd gain = Eigen::VectorXd::Ones(1);
+  Eigen::VectorXd gain_sd = Eigen::VectorXd::Zero(1);
+  for (int again = 0; again < 3 && hypothesis.form == Form::shared_gain; ++again) {
+    double right = 0.0;
+    double square = 1e-300;
+    for (Part& part : parts) {
+      if (again > 0) likelihoods(*part.fit, *part.equations, shape, gain).maxCoeff(&part.under);
+      const double variance = part.fit->variance(
+          part.under, again > 0 ? explained_by(*part.equations, shape, part.under, gain) : 0.0);
+      right += part.equations->right_of(shape, part.under)[0] / variance;
+      square += part.equations->square_of(shape, part.under)(0, 0) / variance;
+    }
+    gain[0] = std::clamp(right / square, bounds.low, bounds.high);
+    gain_sd[0] = 1.0 / std::sqrt(square);
+  }
+  Trial trial;
+  trial.gains.resize(outputs_.size());
+  trial.gain_sd.resize(outputs_.size());
+  for (std::size_t output = 0; output < outputs_.size(); ++output)
+    if (concerns(hypothesis, output)) {
+      trial.gains[output] = gain;
+      trial.gain_sd[output] = gain_sd;
+    }
+  for (const Part& part : parts) {
+    const double gained = log_mean_exp(likelihoods(*part.fit, *part.equations, shape, gain)) -
+                          part.fit->log_likelihood_of_none();
+    trial.score += gained;
+    if (part.equations == of_reading) trial.witness = gained;
+  }
+  // What is left of a loose sensor's motion is smaller than the motion was.
+  if (of_reading != nullptr && shrunk_rows > 0) {
+    const double grown = shrunk_rows * std::log1p(gain[0]);
+    trial.score += grown;
+    trial.witness += grown;
+  }
+  if (hypothesis.form == Form::shared_gain) trial.score -= 0.5 * std::log(std::max(2.0, rows));
+  return trial;
+}
+
+std::vector<Fits::Trial> Fits::trials(const Hypothesis& hypothesis, const Shapes& shapes) const {
+  std::vector<Equations> equations(outputs_.size());
+  std::vector<Panel> columns(outputs_.size());
+  for (std::size_t output = 0; output < outputs_.size(); ++output)
+    if (concerns(hypothesis, output)) {
+      const OutputFit& fit = outputs_[output]->fit;
+      columns[output] = fit.rows().means_of(hypothesis.columns(shapes, output));
+      equations[output] = fit.equations(columns[output], hypothesis.width());
+    }
+  std::optional<Equations> of_reading;
+  Eigen::VectorXd shrunk = Eigen::VectorXd::Zero(std::ssize(shapes));
+  if (hypothesis.sensor) {
+    const OutputFit& reading = readings_.of(*hypothesis.sensor);
+    const Panel errors_K = reading.rows().means_of(hypothesis.errors_K(shapes));
+    of_reading = reading.equations(errors_K, 1);
+    if (hypothesis.shrinks_reading)
+      shrunk = (errors_K.array() != 0.0).cast<double>().colwise().sum().transpose();
+  }
+  std::vector<Trial> all;
+  for (Eigen::Index shape = 0; shape < std::ssize(shapes); ++shape)
+    all.push_back(hypothesis.form == Form::own_gains
+                      ? with_own_gains(hypothesis, equations, shape)
+                      : with_shared_gain(hypothesis, equations, of_reading ? &*of_reading : nullptr,
+                                         shrunk[shape], shape));
+  for (std::size_t output = 0; output < outputs_.size(); ++output)
+    if (concerns(hypothesis, output)) judge_left_out(hypothesis, output, columns[output], all);
+  return all;
+}
+
+namespace {
+
+/// The likeliest of the trials that are worth about the most.
+std::size_t best_of(const Hypothesis& hypothesis, const std::vector<Fits::Trial>& trials) {
+  std::vector<double> worth;
+  for (const Fits::Trial& trial : trials)
+    worth.push_back(utility({&hypothesis,
+                             {},
+                             trial.gains,
+                             trial.score,
+                             trial.witness,
+                             trial.left_out,
+                             trial.left_out_of_best}));
+  const double most = *std::max_element(worth.begin(), worth.end());
+  std::size_t best = trials.size();
+  for (std::size_t i = 0; i < trials.size(); ++i)
+    if (worth[i] >= most - as_much &&
+        (best == trials.size() || trials[i].score > trials[best].score))
+      best = i;
+  return best;
+}
+
+void take(const Fits::Trial& trial, const Shape& shape, Explanation& explanation) {
+  explanation.shape = shape;
+  explanation.gains = trial.gains;
+  explanation.score = trial.score;
+  explanation.witness = trial.witness;
+  explanation.left_out = trial.left_out;
+  explanation.left_out_of_best = trial.left_out_of_best;
+}
+
+}  // namespace
+
+Explanation Fits::weigh(const Hypothesis& hypothesis) const {
+  const Shapes grid = grid_of(hypothesis);
+  const std::vector<Trial> all = trials(hypothesis, grid);
+  const std::size_t best = best_of(hypothesis, all);
+  Explanation explanation{&hypothesis};
+  take(all[best], grid[best], explanation);
+  return explanation;
+}
+
+void Fits::refine(Explanation& explanation) const {
+  const Hypothesis& hypothesis = *explanation.hypothesis;
+  for (std::size_t parameter = 0; parameter < hypothesis.shape.size(); ++parameter) {
+    const ShapeParameter& of = hypothesis.shape[parameter];
+    if (of.discrete || of.grid.size() < 2) continue;
+    auto at = std::min_element(of.grid.begin(), of.grid.end(), [&](double a, double b) {
+      return std::abs(a - explanation.shape[parameter]) <
+             std::abs(b - explanation.shape[parameter]);
+    });
+    double low = at == of.grid.begin() ? *at : *(at - 1);
+    double high = at + 1 == of.grid.end() ? *at : *(at + 1);
+    const bool logarithmic = of.logarithmic && low > 0;
+    for (int zoom = 0; zoom < zooms; ++zoom) {
+      Shapes shapes;
+      for (const double value : logarithmic ? logarithmic_grid(low, high, points_of_zoom)
+                                            : linear_grid(low, high, points_of_zoom)) {
+        shapes.push_back(explanation.shape);
+        shapes.back()[parameter] = value;
+      }
+      const std::vector<Trial> all = trials(hypothesis, shapes);
+      const std::size_t best = best_of(hypothesis, all);
+      take(all[best], shapes[best], explanation);
+      low = shapes[best == 0 ? 0 : best - 1][parameter];
+      high = shapes[std::min(best + 1, shapes.size() - 1)][parameter];
+    }
+  }
+}
+
+void Fits::judge_left_out(const Hypothesis& hypothesis, std::size_t output, const Panel& columns,
+                          std::vector<Trial>& trials) const {
+  const LeftOut& left_out = outputs_[output]->left_out;
+  const std::vector<Block>& runs = outputs_[output]->fit.rows().runs();
+  const Panel centred = centred_in(runs, columns);
+  const Eigen::Index width = hypothesis.width();
+  const Column before = left_out.beside_accepted(left_out.values());
+  const Panel own = left_out.beside_accepted(centred);
+  // What has no gain of its own, or acts in one run alone, is settled by few numbers. Other gains
+  // are fitted to the other rows, or are those under its likeliest background, where that leaves
+  // less: what wanders besides does not bend these.
+  const bool as_fitted = hypothesis.run || hypothesis.form != Form::own_gains;
+  const Block rows = hypothesis.run ? runs[*hypothesis.run] : Block{0, before.size()};
+  std::vector<double> left;
+  if (!as_fitted) left = left_out.after(centred, width, bounds_of(hypothesis, output));
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    Trial& trial = trials[i];
+    if (trial.gains[output].size() == 0) continue;
+    const Column after =
+        before - own.middleCols(width * static_cast<Eigen::Index>(i), width) * trial.gains[output];
+    double was = before.segment(rows.begin, rows.end - rows.begin).squaredNorm();
+    double is = after.segment(rows.begin, rows.end - rows.begin).squaredNorm();
+    if (!as_fitted) {
+      was = left_out.before();
+      is = std::min(is, left[i]);
+    }
+    const double gained = 0.5 * std::log(std::max(was, 1e-12) / std::max(is, 1e-12));
+    trial.left_out += gained;
+    trial.left_out_of_best = std::max(trial.left_out_of_best, gained);
+  }
+}
+
+Eigen::VectorXd Fits::coefficient_errors(std::size_t output) const {
+  const auto inputs = std::ssize(data_.model.inputs);
+  if (!outputs_[output] || !(data_.coefficient_sd > 0)) return Eigen::VectorXd::Zero(inputs);
+  return outputs_[output]->fit.common_factors().tail(inputs);
+}
+
+Column Fits::effect_of(const Explanation& explanation, std::size_t output) const {
+  const OutputRows& rows = outputs_[output]->fit.rows();
+  Column effect = rows.means_of(explanation.hypothesis->columns({explanation.shape}, output)) *
+                  explanation.gains[output];
+  centre(rows.runs(), effect);
+  return effect;
+}
+
+double Fits::rms_left(std::size_t output) const {
+  return rms_beside(outputs_[output]->fit.remainder(), outputs_[output]->free);
+}
+
+}  // namespace thermocomp::diagnosis

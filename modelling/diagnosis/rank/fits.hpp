@@ -1,0 +1,90 @@
+/// Every output under one set of accepted explanations, and what a hypothesis explains of them.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "modelling/diagnosis/data/measured_runs.hpp"
+#include "modelling/diagnosis/fit/left_out.hpp"
+#include "modelling/diagnosis/fit/output_fit.hpp"
+#include "modelling/diagnosis/rank/explanation.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// Each reading of the model beside what the other temperatures and the signals predict of it: the
+/// fault of a reading must be seen here too.
+class Readings {
+ public:
+  /// Both must outlive it.
+  Readings(const MeasuredData& data, const StackedRows& rows) : data_(data), rows_(rows) {}
+  /// Made when it is asked for first.
+  [[nodiscard]] const OutputFit& of(std::size_t input);
+
+ private:
+  const MeasuredData& data_;
+  const StackedRows& rows_;
+  std::map<std::size_t, std::unique_ptr<OutputFit>> made_;
+};
+
+class Fits {
+ public:
+  /// All must outlive it.
+  /// @param accepted  what is found: gains of theirs are fitted anew beside each hypothesis
+  Fits(const MeasuredData& data, const StackedRows& rows, Readings& readings,
+       const std::vector<Explanation>& accepted);
+
+  /// A hypothesis at one shape.
+  struct Trial {
+    std::vector<Eigen::VectorXd> gains;
+    std::vector<Eigen::VectorXd> gain_sd;  ///< standard deviations of the gains
+    double score{0.0};
+    double witness{0.0};
+    double left_out{0.0};
+    double left_out_of_best{0.0};
+  };
+  [[nodiscard]] std::vector<Trial> trials(const Hypothesis& hypothesis, const Shapes& shapes) const;
+  /// At the best point of its grid.
+  [[nodiscard]] Explanation weigh(const Hypothesis& hypothesis) const;
+  /// The same between the points of the grid.
+  void refine(Explanation& explanation) const;
+
+  /// Whether coefficients were fitted to these very rows.
+  [[nodiscard]] bool fitted() const { return fitted_; }
+  [[nodiscard]] bool measured(std::size_t output) const { return outputs_[output].has_value(); }
+  [[nodiscard]] const OutputFit& output(std::size_t output) const { return outputs_[output]->fit; }
+  /// By what share each coefficient of an output is wrong, fitted beside what is accepted; 0 where
+  /// they are not doubted.
+  [[nodiscard]] Eigen::VectorXd coefficient_errors(std::size_t output) const;
+  /// What an explanation moves the rows of an output by, each run's mean off.
+  [[nodiscard]] Column effect_of(const Explanation& explanation, std::size_t output) const;
+  /// RMS of the remainder beside the runs' offsets and what is accepted.
+  [[nodiscard]] double rms_left(std::size_t output) const;
+
+ private:
+  struct Output {
+    OutputFit fit;
+    Panel free;        ///< offsets of the runs, columns of what is accepted
+    LeftOut left_out;  ///< of the remainder, each run's mean off
+  };
+  [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
+  [[nodiscard]] Trial with_own_gains(const Hypothesis& hypothesis,
+                                     const std::vector<Equations>& equations,
+                                     Eigen::Index shape) const;
+  [[nodiscard]] Trial with_shared_gain(const Hypothesis& hypothesis,
+                                       const std::vector<Equations>& equations,
+                                       const Equations* of_reading, double shrunk_rows,
+                                       Eigen::Index shape) const;
+  /// Adds to each trial what its columns take of an output's left-out rows.
+  void judge_left_out(const Hypothesis& hypothesis, std::size_t output, const Panel& columns,
+                      std::vector<Trial>& trials) const;
+
+  const MeasuredData& data_;
+  const StackedRows& rows_;
+  Readings& readings_;
+  std::vector<std::optional<Output>> outputs_;
+  bool fitted_{false};
+};
+
+}  // namespace thermocomp::diagnosis

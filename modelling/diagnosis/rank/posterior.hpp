@@ -1,0 +1,53 @@
+/// Probabilities of all hypotheses, and of nothing that has a name.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "modelling/diagnosis/data/place_groups.hpp"
+#include "modelling/diagnosis/rank/explanation.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// What belongs together for a person: `structure`, `heat`, `datum` or `sensor`.
+[[nodiscard]] const std::string& family_of(const std::string& cause);
+
+struct Posterior {
+  double none{1.0};                          ///< nothing that has a name
+  std::map<std::string, double> families{};  ///< `none` among them
+};
+
+enum class Round { first, later };
+
+/// ln of an explanation's weight among the others, a weighted sum of
+///
+///   - A(score) and A(witness), A(x) = sign(x) ln(1 + |x| / 20): neighbouring rows say the same,
+///   - what it takes of rows that it was not fitted to: ln of their RMS before over after, the mean
+///     over its outputs, and the share of the RMS, of the output that gains most,
+///   - how many parameters were free, and whether it acts in one run alone.
+///
+/// The weights are those under which effects planted in simulated machines, made by physics, and
+/// planted in measured ones are likeliest, one answer in a hundred being allowed to be beyond them
+/// (tests/diagnosis/calibrate_posterior.py). No cause is likelier than another by itself.
+[[nodiscard]] double utility(const Explanation& explanation);
+
+/// Sets the probability of each (0 where a simpler one that it contains is as likely): that there
+/// is something, by what the likeliest one takes, times exp(utility) over the sum of all.
+[[nodiscard]] Posterior weigh_against_each_other(std::vector<Explanation>& explanations,
+                                                 Round round);
+
+/// What is to be named, and how probable it is.
+struct Choice {
+  std::size_t index{0};
+  double probability{0.0};
+  std::vector<std::string> other_subjects{};  ///< between which and its own nothing decides
+};
+
+/// The likeliest cause with a place and all that cannot be told from it. Where that is less likely
+/// than not, the likeliest cause with any of its places.
+/// @param explanations  at least one
+[[nodiscard]] Choice likeliest(const std::vector<Explanation>& explanations,
+                               const PlaceGroups& groups);
+
+}  // namespace thermocomp::diagnosis

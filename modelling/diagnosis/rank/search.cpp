@@ -1,0 +1,209 @@
+#include "modelling/diagnosis/rank/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "modelling/diagnosis/rank/spread.hpp"
+
+namespace thermocomp::diagnosis {
+namespace {
+
+constexpr std::size_t refined = 24;
+constexpr std::size_t alternatives_max = 40;
+/// What exceeds the noise so many times, and so much of the motion, is structure.
+constexpr double structure_over_noise = 1.5;
+constexpr double structure_of_motion = 0.03;
+
+/// RMS of an output's measured motion.
+double motion_of(const MeasuredData& data, std::size_t output) {
+  double squares = 0.0;
+  double count = 0.0;
+  for (const MeasuredRun& run : data.runs) {
+    const auto values = run.measured_um[output].tail(run.rows() - run.begin).array();
+    const auto present = values.isFinite();
+    const auto n = static_cast<double>(present.count());
+    if (n == 0.0) continue;
+    const double mean = present.select(values, 0.0).sum() / n;
+    squares += present.select(values - mean, 0.0).square().sum();
+    count += n;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0.0;
+}
+
+class Search {
+ public:
+  Search(const MeasuredData& data, const StackedRows& rows,
+         const std::vector<Hypothesis>& hypotheses, const Rules& rules,
+         const std::function<void(const std::vector<Explanation>&)>& accepted)
+      : data_(data),
+        rows_(rows),
+        hypotheses_(hypotheses),
+        rules_(rules),
+        tell_(accepted),
+        readings_(data, rows),
+        groups_(place_groups(data)) {}
+
+  SearchResult run() {
+    SearchResult result;
+    std::vector<double> left_before;
+    for (std::size_t round = 0; round <= rules_.findings_max; ++round) {
+      const Fits fits = fits_beside(explanations_of(result.findings));
+      const std::vector<double> left = structure_left(fits);
+      if (round == 0) {
+        left_before = left;
+        result.noise_share = noise_shares(fits);
+      }
+      result.unexplained_share.clear();
+      for (std::size_t output = 0; output < left.size(); ++output)
+        result.unexplained_share.push_back(
+            left_before[output] > 0 ? std::min(1.0, left[output] / left_before[output]) : 0.0);
+      if (round == 0) result.unexplained = is_structure(fits, left);
+      if (round == rules_.findings_max || !add_finding(fits, round, result)) break;
+    }
+    if (!result.findings.empty()) {
+      settle_together(result.findings);
+      result.unexplained = result.unexplained && result.findings.empty();
+      const Fits fits = fits_beside(explanations_of(result.findings));
+      for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
+        result.coefficient_errors.push_back(fits.coefficient_errors(output));
+    }
+    return result;
+  }
+
+ private:
+  static std::vector<Explanation> explanations_of(const std::vector<Finding>& findings) {
+    std::vector<Explanation> all;
+    for (const Finding& each : findings) all.push_back(each.explanation);
+    return all;
+  }
+
+  Fits fits_beside(const std::vector<Explanation>& accepted) {
+    if (tell_) tell_(accepted);
+    return Fits(data_, rows_, readings_, accepted);
+  }
+
+  /// Variance that is more than noise, of each output.
+  std::vector<double> structure_left(const Fits& fits) const {
+    std::vector<double> left;
+    for (std::size_t output = 0; output < data_.model.outputs.size(); ++output) {
+      left.push_back(0.0);
+      if (!fits.measured(output)) continue;
+      const double rms = fits.rms_left(output);
+      const double noise = fits.output(output).noise();
+      left.back() = std::max(0.0, rms * rms - noise * noise);
+    }
+    return left;
+  }
+
+  std::vector<double> noise_shares(const Fits& fits) const {
+    std::vector<double> shares;
+    for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
+      shares.push_back(fits.measured(output)
+                           ? std::min(1.0, std::pow(fits.output(output).noise() /
+                                                        std::max(1e-12, fits.rms_left(output)),
+                                                    2))
+                           : 1.0);
+    return shares;
+  }
+
+  bool is_structure(const Fits& fits, const std::vector<double>& left) const {
+    for (std::size_t output = 0; output < left.size(); ++output)
+      if (fits.measured(output) &&
+          std::sqrt(left[output]) > structure_over_noise * fits.output(output).noise() &&
+          std::sqrt(left[output]) > structure_of_motion * motion_of(data_, output))
+        return true;
+    return false;
+  }
+
+  bool matters(const Fits& fits, const Explanation& explanation) const {
+    for (std::size_t output = 0; output < explanation.gains.size(); ++output) {
+      if (explanation.gains[output].size() == 0) continue;
+      const Column effect = fits.effect_of(explanation, output);
+      const double rms = std::sqrt(effect.squaredNorm() / static_cast<double>(effect.size()));
+      if (rms > fits.output(output).noise_beside(effect) &&
+          rms > rules_.motion_share_min * motion_of(data_, output))
+        return true;
+    }
+    return false;
+  }
+
+  /// @return whether there is one
+  bool add_finding(const Fits& fits, std::size_t round, SearchResult& result) const {
+    const Round kind = round == 0 && !fits.fitted() ? Round::first : Round::later;
+    std::vector<Explanation> all;
+    for (const Hypothesis& each : hypotheses_)
+      if (!is_known(each, result.findings)) all.push_back(fits.weigh(each));
+    if (all.empty()) return false;
+    const auto likelier = [](const Explanation& a, const Explanation& b) {
+      return utility(a) > utility(b);
+    };
+    std::sort(all.begin(), all.end(), likelier);
+    for (std::size_t i = 0; i < std::min(refined, all.size()); ++i) fits.refine(all[i]);
+    std::sort(all.begin(), all.end(), likelier);
+    const Posterior posterior = weigh_against_each_other(all, kind);
+    const Choice choice = likeliest(all, groups_);
+    if (round == 0) {
+      result.families = posterior.families;
+      result.weighed = all;
+    }
+    if (choice.probability < rules_.probability_min || !matters(fits, all[choice.index]) ||
+        (round > 0 && !(all[choice.index].score > 0)))
+      return false;
+    Finding finding{all[choice.index]};
+    const Hypothesis& of = *finding.explanation.hypothesis;
+    finding.probability = choice.probability;
+    finding.family_probability =
+        std::max(choice.probability, posterior.families.at(family_of(of.cause)));
+    finding.group = group_of(groups_, of.subject, choice.other_subjects);
+    for (const Explanation& each : all) {
+      if (finding.alternatives.size() >= alternatives_max) break;
+      if (each.hypothesis != &of) finding.alternatives.push_back(each);
+    }
+    result.findings.push_back(std::move(finding));
+    return true;
+  }
+
+  static bool is_known(const Hypothesis& hypothesis, const std::vector<Finding>& findings) {
+    return std::any_of(findings.begin(), findings.end(), [&](const Finding& each) {
+      return each.explanation.hypothesis == &hypothesis;
+    });
+  }
+
+  /// Each beside all others, with the intervals that this leaves. What others have taken over goes.
+  void settle_together(std::vector<Finding>& findings) {
+    for (std::size_t i = 0; i < findings.size();) {
+      std::vector<Explanation> others;
+      for (std::size_t j = 0; j < findings.size(); ++j)
+        if (j != i) others.push_back(findings[j].explanation);
+      const Fits fits = fits_beside(others);
+      if (!others.empty()) fits.refine(findings[i].explanation);
+      std::vector<Explanation> alone = {findings[i].explanation};
+      if (!others.empty() &&
+          (weigh_against_each_other(alone, Round::first).none > 1.0 - rules_.probability_min ||
+           !matters(fits, findings[i].explanation))) {
+        findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(i));
+        i = 0;
+        continue;
+      }
+      set_spread(fits, findings[i++]);
+    }
+  }
+
+  const MeasuredData& data_;
+  const StackedRows& rows_;
+  const std::vector<Hypothesis>& hypotheses_;
+  const Rules& rules_;
+  const std::function<void(const std::vector<Explanation>&)>& tell_;
+  Readings readings_;
+  PlaceGroups groups_;
+};
+
+}  // namespace
+
+SearchResult search(const MeasuredData& data, const StackedRows& rows,
+                    const std::vector<Hypothesis>& hypotheses, const Rules& rules,
+                    const std::function<void(const std::vector<Explanation>&)>& accepted) {
+  return Search(data, rows, hypotheses, rules, accepted).run();
+}
+
+}  // namespace thermocomp::diagnosis
