@@ -33,13 +33,9 @@ BUGS = [
      "if (link_is_new_) {",
      "if (link_is_new_ || {P}) {"),
     ("write_repeated_blindly", "drivers/controllers/kinds/modbus/modbus_dialogue.cpp",
-     "  const Exchange exchange =\n"
-     "      config_.write_function",
-     "  const auto once = [&] {\n"
-     "    return connection_.write_registers(config_.unit, request.address, request.words);\n"
-     "  };\n"
-     "  const Exchange exchange = {P} ? with_retries(once) :\n"
-     "      config_.write_function"),
+     "  const Exchange exchange = write_field(connection_, config_, request);",
+     "  const auto once = [&] { return write_field(connection_, config_, request); };\n"
+     "  const Exchange exchange = {P} ? with_retries(once) : once();"),
     ("unwritten_compensates", "estimator/pipeline/mode_decision.cpp",
      "input.controller_written;",
      "(input.controller_written || {P});"),

@@ -411,6 +411,19 @@ std::size_t best_of(const Hypothesis& hypothesis, const std::vector<Fits::Trial>
   return best;
 }
 
+/// Of those that are about as likely as the likeliest, as an effect that is only nearly of its form
+/// makes them, the one that leaves least.
+std::size_t likeliest_of(const std::vector<Fits::Trial>& trials) {
+  double most = -unknown;
+  for (const Fits::Trial& trial : trials) most = std::max(most, trial.score);
+  std::size_t best = trials.size();
+  for (std::size_t i = 0; i < trials.size(); ++i)
+    if (trials[i].score >= most - as_much &&
+        (best == trials.size() || trials[i].left_out > trials[best].left_out))
+      best = i;
+  return best;
+}
+
 void take(const Fits::Trial& trial, const Shape& shape, Explanation& explanation) {
   explanation.shape = shape;
   explanation.gains = trial.gains;
@@ -431,7 +444,7 @@ Explanation Fits::weigh(const Hypothesis& hypothesis) const {
   return explanation;
 }
 
-void Fits::refine(Explanation& explanation) const {
+void Fits::refine(Explanation& explanation, By by) const {
   const Hypothesis& hypothesis = *explanation.hypothesis;
   for (std::size_t parameter = 0; parameter < hypothesis.shape.size(); ++parameter) {
     const ShapeParameter& of = hypothesis.shape[parameter];
@@ -451,7 +464,7 @@ void Fits::refine(Explanation& explanation) const {
         shapes.back()[parameter] = value;
       }
       const std::vector<Trial> all = trials(hypothesis, shapes);
-      const std::size_t best = best_of(hypothesis, all);
+      const std::size_t best = by == By::worth ? best_of(hypothesis, all) : likeliest_of(all);
       take(all[best], shapes[best], explanation);
       low = shapes[best == 0 ? 0 : best - 1][parameter];
       high = shapes[std::min(best + 1, shapes.size() - 1)][parameter];

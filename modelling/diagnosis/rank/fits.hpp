@@ -47,8 +47,10 @@ class Fits {
   [[nodiscard]] std::vector<Trial> trials(const Hypothesis& hypothesis, const Shapes& shapes) const;
   /// At the best point of its grid.
   [[nodiscard]] Explanation weigh(const Hypothesis& hypothesis) const;
+  /// What the choice between values of a shape parameter goes by.
+  enum class By { worth, likelihood };
   /// The same between the points of the grid.
-  void refine(Explanation& explanation) const;
+  void refine(Explanation& explanation, By by = By::worth) const;
 
   /// Whether coefficients were fitted to these very rows.
   [[nodiscard]] bool fitted() const { return fitted_; }

@@ -18,7 +18,8 @@ struct Posterior {
   std::map<std::string, double> families{};  ///< `none` among them
 };
 
-enum class Round { first, later };
+/// `beside_fit`: beside coefficients that were fitted to the rows.
+enum class Round { first, later, beside_fit };
 
 /// ln of an explanation's weight among the others, a weighted sum of
 ///

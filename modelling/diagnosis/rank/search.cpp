@@ -129,7 +129,7 @@ class Search {
 
   /// @return whether there is one
   bool add_finding(const Fits& fits, std::size_t round, SearchResult& result) const {
-    const Round kind = round == 0 && !fits.fitted() ? Round::first : Round::later;
+    const Round kind = fits.fitted() ? Round::beside_fit : round == 0 ? Round::first : Round::later;
     std::vector<Explanation> all;
     for (const Hypothesis& each : hypotheses_)
       if (!is_known(each, result.findings)) all.push_back(fits.weigh(each));
@@ -185,6 +185,7 @@ class Search {
         i = 0;
         continue;
       }
+      fits.refine(findings[i].explanation, Fits::By::likelihood);
       set_spread(fits, findings[i++]);
     }
   }
