@@ -189,7 +189,9 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   diagnosis.families = result.families;
   diagnosis.weighed = candidates_of(result.weighed, train_data, test_data);
   Extended extended = extend(diagnosis, result.findings, train_data, test_data);
-  if (!diagnosis.findings.empty())
+  // Beside a finding that the model goes without they would be right for nothing.
+  if (!diagnosis.findings.empty() &&
+      std::none_of(diagnosis.findings.begin(), diagnosis.findings.end(), fails_on_test_runs))
     correct_coefficients(extended.model, model, result.coefficient_errors);
   const Corrections corrections = extended.corrections;
   const std::vector<double> predictable =

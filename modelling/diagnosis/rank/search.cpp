@@ -46,6 +46,12 @@ class Search {
   SearchResult run() {
     SearchResult result;
     std::vector<double> left_before;
+    const auto set_unexplained = [&](const std::vector<double>& left) {
+      result.unexplained_share.clear();
+      for (std::size_t output = 0; output < left.size(); ++output)
+        result.unexplained_share.push_back(
+            left_before[output] > 0 ? std::min(1.0, left[output] / left_before[output]) : 0.0);
+    };
     for (std::size_t round = 0; round <= rules_.findings_max; ++round) {
       const Fits fits = fits_beside(explanations_of(result.findings));
       const std::vector<double> left = structure_left(fits);
@@ -53,10 +59,7 @@ class Search {
         left_before = left;
         result.noise_share = noise_shares(fits);
       }
-      result.unexplained_share.clear();
-      for (std::size_t output = 0; output < left.size(); ++output)
-        result.unexplained_share.push_back(
-            left_before[output] > 0 ? std::min(1.0, left[output] / left_before[output]) : 0.0);
+      set_unexplained(left);
       if (round == 0) result.unexplained = is_structure(fits, left);
       if (round == rules_.findings_max || !add_finding(fits, round, result)) break;
     }
@@ -64,6 +67,7 @@ class Search {
       settle_together(result.findings);
       result.unexplained = result.unexplained && result.findings.empty();
       const Fits fits = fits_beside(explanations_of(result.findings));
+      set_unexplained(structure_left(fits));
       for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
         result.coefficient_errors.push_back(fits.coefficient_errors(output));
     }
