@@ -148,7 +148,7 @@ std::string why_it_may_move(const ModbusControllerConfig& modbus, const std::vec
   return "";
 }
 
-/// What a daemon that runs with this configuration has seen; false: none runs.
+/// Asks the daemon that runs with this configuration for what it has seen; false: none runs.
 bool ask_running_daemon(const DaemonConfig& config, ScanController& result) {
   try {
     constexpr std::chrono::milliseconds patience{500};

@@ -82,7 +82,7 @@ std::uint32_t group_mask(std::uint32_t id) {
   return ((id >> 16) & 0xFFu) < first_broadcast ? 0x03FF0000u : 0x03FFFF00u;
 }
 
-/// What a flaw stands at.
+/// The place that a flaw concerns.
 struct About {
   std::string message;
   std::string signal;

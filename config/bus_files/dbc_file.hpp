@@ -1,6 +1,6 @@
 /// DBC files: which messages a CAN bus has and where the signals stand in them.
 ///
-/// What breaks the grammar, refers to something that does not exist or does not fit into a frame is
+/// A statement that breaks the grammar, refers to nothing or does not fit into a frame is
 /// a flaw of the message or signal that it stands at, with file, line and rule; the others are
 /// read. Comments, nodes, value tables, environment variables and attributes other than
 /// VFrameFormat and those of long names are checked for their form only.

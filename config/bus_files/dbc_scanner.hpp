@@ -11,7 +11,7 @@ namespace thermocomp {
 /// Bytes with everything but printable ASCII replaced, for messages.
 [[nodiscard]] std::string printable(std::string_view bytes);
 
-/// What ends the reading of a statement.
+/// Ends the reading of one statement.
 struct DbcSyntaxError {
   int line{0};
   std::string found;
@@ -32,7 +32,7 @@ class DbcScanner {
   /// A C identifier, or nothing.
   [[nodiscard]] std::string_view next_word();
   std::string_view word(std::string_view what);
-  /// What stands for a name in files of all makers: also "2_Gateway", "Gateway-Load"; or nothing.
+  /// Reads a name as the files of all makers have it: also "2_Gateway", "Gateway-Load"; or nothing.
   [[nodiscard]] std::string_view next_name();
   std::string_view name(std::string_view what);
   [[nodiscard]] bool next_is(char symbol);

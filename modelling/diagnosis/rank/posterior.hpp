@@ -24,8 +24,8 @@ enum class Round { first, later, beside_fit };
 /// ln of an explanation's weight among the others, a weighted sum of
 ///
 ///   - A(score) and A(witness), A(x) = sign(x) ln(1 + |x| / 20): neighbouring rows say the same,
-///   - what it takes of rows that it was not fitted to: ln of their RMS before over after, the mean
-///     over its outputs, and the share of the RMS, of the output that gains most,
+///   - what it takes of rows that it was not fitted to: ln of their RMS before over after, over
+///     the root of the count of outputs, and the share of the RMS, of the output that gains most,
 ///   - how many parameters were free, and whether it acts in one run alone.
 ///
 /// The weights are those under which effects planted in simulated machines, made by physics, and
