@@ -189,9 +189,7 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   diagnosis.families = result.families;
   diagnosis.weighed = candidates_of(result.weighed, train_data, test_data);
   Extended extended = extend(diagnosis, result.findings, train_data, test_data);
-  // Beside a finding that the model goes without they would be right for nothing.
-  if (!diagnosis.findings.empty() &&
-      std::none_of(diagnosis.findings.begin(), diagnosis.findings.end(), fails_on_test_runs))
+  if (!diagnosis.findings.empty())
     correct_coefficients(extended.model, model, result.coefficient_errors);
   const Corrections corrections = extended.corrections;
   const std::vector<double> predictable =
