@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "report/svg_plot.hpp"
 #include "report/xml_text.hpp"
 
 namespace thermocomp {
@@ -17,9 +18,6 @@ constexpr const char* style =
     "td:first-child,th:first-child{text-align:left}th{background:#edf2f7;font-weight:600}"
     ".text td{text-align:left}figure{margin:.6em 0;overflow-x:auto}"
     "figcaption{color:#4a5568;font-size:.9em}svg{width:100%;min-width:560px;height:auto}"
-    "svg text{font:13px sans-serif}svg .title{font-weight:bold}"
-    "svg .note{fill:#4a5568}.zero{stroke:#718096}"
-    ".grid{stroke:#e2e8f0}.axis{stroke:#718096}.span{fill:#2b6cb0;fill-opacity:.07}"
     ".small{font-size:.85em;color:#4a5568}.good{color:#22543d}.bad{color:#9b2c2c}"
     "@media print{body{margin:0;max-width:none}svg{min-width:0}}";
 
@@ -38,7 +36,7 @@ std::string html_begin(const std::string& title) {
   std::string html =
       "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width,initial-scale=1\"><title>";
-  html.append(xml_text(title)).append("</title><style>").append(style);
+  html.append(xml_text(title)).append("</title><style>").append(style).append(svg_style);
   html.append("</style></head><body>\n<h1>").append(xml_text(title));
   return html.append("</h1>\n");
 }

@@ -22,6 +22,7 @@ constexpr double small_height = 190.0;
 constexpr double bar_height = 20.0;
 constexpr double bar_left = 120.0;
 constexpr double share_written_min = 0.06;
+constexpr double cell_size = 18.0;
 /// Of all lines of a panel together, and of one.
 constexpr std::size_t panel_points_max = 8000;
 constexpr std::size_t points_max = 2000;
@@ -159,26 +160,43 @@ double gap_max(const Range& x, Values time, Values values) {
   return std::max(10.0 * *middle, seen_share * (x.high - x.low));
 }
 
+/// The rows of the lowest and the highest finite value from `begin` to `end`, in their order.
+std::vector<std::size_t> extreme_rows(Values values, std::size_t begin, std::size_t end) {
+  std::size_t low = end;
+  std::size_t high = end;
+  for (std::size_t row = begin; row < end; ++row) {
+    if (!std::isfinite(values[row])) continue;
+    if (low == end || values[row] < values[low]) low = row;
+    if (high == end || values[row] > values[high]) high = row;
+  }
+  if (low == end) return {};
+  if (low == high) return {low};
+  return {std::min(low, high), std::max(low, high)};
+}
+
 std::string curve(const Box& box, const Range& x, const Range& y, Values time, const PlotLine& line,
                   std::size_t points) {
   std::string svg = "<path fill=\"none\" stroke=\"";
   svg.append(line.colour);
   if (line.as_dots) svg.append("\" stroke-width=\"5\" stroke-linecap=\"round");
+  if (line.dashed) svg.append("\" stroke-dasharray=\"5 4");
   svg.append("\" d=\"");
-  const std::size_t stride = 1 + (time.size() - 1) / points;
+  const std::size_t stride = time.size() <= points ? 1 : 1 + 2 * (time.size() - 1) / points;
   const double bridged = gap_max(x, time, line.values) + static_cast<double>(stride) *
                                                              (x.high - x.low) /
                                                              static_cast<double>(time.size());
   bool pen_down = false;
   double last = 0.0;
-  for (std::size_t row = 0; row < time.size(); row += stride) {
-    const double value = line.values[row];
-    if (!std::isfinite(value)) continue;
-    pen_down = pen_down && time[row] - last <= bridged;
-    last = time[row];
-    svg.append(pen_down ? "L" : "M").append(place(box.across(x, time[row]), box.up(y, value)));
-    if (line.as_dots) svg.append("h0");
-    pen_down = !line.as_dots;
+  for (std::size_t begin = 0; begin < time.size(); begin += stride) {
+    const std::size_t end = std::min(time.size(), begin + stride);
+    for (const std::size_t row : extreme_rows(line.values, begin, end)) {
+      pen_down = pen_down && time[row] - last <= bridged;
+      last = time[row];
+      svg.append(pen_down ? "L" : "M");
+      svg.append(place(box.across(x, time[row]), box.up(y, line.values[row])));
+      if (line.as_dots) svg.append("h0");
+      pen_down = !line.as_dots;
+    }
   }
   return svg + "\"/>";
 }
@@ -191,6 +209,21 @@ std::string span_svg(const PlotSpan& span, const Box& box, const Range& hours, b
   svg.append(place(from, box.y)).append(way('h', to - from)).append(way('v', box.height));
   svg.append(way('h', from - to)).append("z\"/>");
   return named ? svg + label(from + 3, box.y + 12, span.label, "class=\"note\"") : svg;
+}
+
+/// Light where alike. Below a ten thousandth everything is the lightest.
+std::string shade(double value) {
+  const double share = std::clamp(1.0 + std::log10(std::max(value, 1e-4)) / 4.0, 0.0, 1.0);
+  return "hsl(215,60%," + number(std::round(96.0 - 76.0 * share)) + "%)";
+}
+
+/// @param body  between the tags
+std::string square(double x, double y, double side, const std::string& attributes,
+                   const std::string& body = "") {
+  std::string svg = "<rect x=\"" + coordinate(x);
+  svg.append("\" y=\"").append(coordinate(y)).append("\" width=\"").append(coordinate(side));
+  svg.append("\" height=\"").append(coordinate(side)).append("\" ").append(attributes);
+  return svg.append(">").append(body).append("</rect>");
 }
 
 std::string panel_svg(const PlotPanel& panel, const Box& box, Values time, const Range& x) {
@@ -215,7 +248,50 @@ std::string panel_svg(const PlotPanel& panel, const Box& box, Values time, const
   return svg;
 }
 
+Drawing panels_drawing(Values along, const std::string& along_title,
+                       const std::vector<PlotPanel>& panels, const std::vector<PlotSpan>& spans,
+                       const std::vector<TimeTick>& ticks) {
+  Drawing drawing{width, axis_height, ""};
+  const Range x = range_of({along});
+  for (const PlotPanel& panel : panels) {
+    const double top = drawing.height - axis_height + title_height;
+    const Box box{left, top, width - left - right, panel.height};
+    std::string& svg = drawing.body;
+    for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
+    for (const TimeTick& tick : ticks)
+      svg += straight(box.across(x, tick.at_s / 3600.0), box.y, way('v', box.height), "grid");
+    svg += panel_svg(panel, box, along, x);
+    if (&panel == &panels.back())
+      svg += ticks.empty() ? horizontal_axis(box, x, along_title, 10) : named_axis(box, x, ticks);
+    drawing.height += title_height + panel.height + gap;
+  }
+  return drawing;
+}
+
 }  // namespace
+
+const char* const svg_style =
+    "svg text{font:13px sans-serif}svg .title{font-weight:bold}svg .note{fill:#4a5568}"
+    ".zero{stroke:#718096}.grid{stroke:#e2e8f0}.axis{stroke:#718096}"
+    ".span{fill:#2b6cb0;fill-opacity:.07}";
+
+std::string Drawing::svg() const {
+  return begin(width, height) + body + "</svg>\n";
+}
+
+std::string svg_file(const std::vector<Drawing>& drawings) {
+  Drawing all;
+  for (const Drawing& drawing : drawings) {
+    all.body.append("<g transform=\"translate(").append(place(0.0, all.height)).append(")\">");
+    all.body.append(drawing.body).append("</g>\n");
+    all.width = std::max(all.width, drawing.width);
+    all.height += drawing.height;
+  }
+  const std::string size =
+      " width=\"" + coordinate(all.width) + "\" height=\"" + coordinate(all.height) + "\"";
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + size + "><style>" + svg_style +
+         "</style>\n<rect" + size + " fill=\"white\"/>\n" + all.body + "</svg>\n";
+}
 
 std::vector<double> round_ticks(double low, double high, int wanted) {
   std::vector<double> ticks;
@@ -235,24 +311,41 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
 
 std::string panels_plot(Values time_s, const std::vector<PlotPanel>& panels,
                         const std::vector<PlotSpan>& spans, const std::vector<TimeTick>& ticks) {
-  double height = axis_height;
-  for (const PlotPanel& panel : panels) height += title_height + panel.height + gap;
-  std::string svg = begin(width, height);
   std::vector<double> hours(time_s.begin(), time_s.end());
   for (double& hour : hours) hour /= 3600.0;
-  const Range x = range_of({hours});
-  double top = title_height;
-  for (const PlotPanel& panel : panels) {
-    const Box box{left, top, width - left - right, panel.height};
-    for (const PlotSpan& span : spans) svg += span_svg(span, box, x, &panel == &panels.front());
-    for (const TimeTick& tick : ticks)
-      svg += straight(box.across(x, tick.at_s / 3600.0), box.y, way('v', box.height), "grid");
-    svg += panel_svg(panel, box, hours, x);
-    if (&panel == &panels.back())
-      svg += ticks.empty() ? horizontal_axis(box, x, "time, h", 10) : named_axis(box, x, ticks);
-    top += panel.height + gap + title_height;
+  return panels_drawing(hours, "time, h", panels, spans, ticks).svg();
+}
+
+Drawing curves_drawing(Values x, const std::string& x_title, const std::vector<PlotPanel>& panels) {
+  return panels_drawing(x, x_title, panels, {}, {});
+}
+
+Drawing heat_map_drawing(const HeatMap& map) {
+  const std::size_t count = map.names.size();
+  const auto at = [](std::size_t i) { return cell_size * static_cast<double>(i); };
+  double names_width = 0.0;
+  for (const std::string& name : map.names)
+    names_width = std::max(names_width, 1.2 * text_width(name) + 8.0);
+  Drawing drawing{std::max(width, names_width + at(count) + right),
+                  title_height + at(count) + names_width, ""};
+  std::string& svg = drawing.body;
+  svg += label(4, 14, map.title, "class=\"title\"");
+  for (std::size_t i = 0; i < count; ++i) {
+    const double y = title_height + at(i);
+    svg += label(names_width - 4, y + 13, map.names[i], "text-anchor=\"end\"");
+    svg += "<g transform=\"translate(" + place(names_width + at(i) + 13, title_height + at(count)) +
+           ") rotate(-90)\">" + label(-4, 0, map.names[i], "text-anchor=\"end\"") + "</g>";
+    for (std::size_t j = 0; j < count; ++j)
+      svg += square(names_width + at(j), y, cell_size, "fill=\"" + shade(map.values[i][j]) + "\"",
+                    "<title>" + number(map.values[i][j]) + "</title>");
   }
-  return svg + "</svg>\n";
+  std::size_t from = 0;
+  for (const std::size_t size : map.group_sizes) {
+    svg += square(names_width + at(from), title_height + at(from), at(size),
+                  "fill=\"none\" stroke=\"#c8502c\" stroke-width=\"2\"");
+    from += size;
+  }
+  return drawing;
 }
 
 std::string scatter_plot(const PlotDots& dots) {

@@ -1,4 +1,4 @@
-/// Pictures as SVG, for a page that needs nothing else.
+/// Pictures as SVG, for a page that needs nothing else or for a file of their own.
 #pragma once
 
 #include <span>
@@ -7,6 +7,20 @@
 
 namespace thermocomp {
 
+/// The rules of a page's style sheet for lines, grid and labels.
+extern const char* const svg_style;
+
+/// A picture with its size, in pixels of a page of usual width.
+struct Drawing {
+  double width{0.0};
+  double height{0.0};
+  std::string body;
+  [[nodiscard]] std::string svg() const;  ///< the element <svg>, for a page with svg_style
+};
+
+/// A file of pictures, one above the other.
+[[nodiscard]] std::string svg_file(const std::vector<Drawing>& drawings);
+
 struct PlotLine {
   std::string label;  ///< empty: not in the legend
   std::string colour;
@@ -14,6 +28,7 @@ struct PlotLine {
   /// line is not bridged.
   std::span<const double> values;
   bool as_dots{false};  ///< single values, not joined by a line
+  bool dashed{false};
 };
 
 /// A stretch of time behind all panels, shaded and named at its top.
@@ -29,7 +44,7 @@ struct TimeTick {
   std::string label;
 };
 
-/// Lines over the axis of time that all panels share.
+/// Lines over the axis that all panels share.
 struct PlotPanel {
   std::string title;
   std::string unit;
@@ -37,14 +52,30 @@ struct PlotPanel {
   double height{150.0};
 };
 
-/// Panels one above the other, with ticks, grid and units; long columns are thinned to what a
-/// screen shows when the picture is made wider.
+/// Panels one above the other over time, with ticks, grid and units. Of long columns the lowest and
+/// the highest value of each stretch are drawn, as many as a screen shows when the picture is made
+/// wider.
 /// @param ticks  in order; take the place of hours. A label stands to the right of its line, where
 ///               there is room before the next one
 [[nodiscard]] std::string panels_plot(std::span<const double> time_s,
                                       const std::vector<PlotPanel>& panels,
                                       const std::vector<PlotSpan>& spans = {},
                                       const std::vector<TimeTick>& ticks = {});
+
+/// The same over any axis.
+/// @param x_title  with its unit
+[[nodiscard]] Drawing curves_drawing(std::span<const double> x, const std::string& x_title,
+                                     const std::vector<PlotPanel>& panels);
+
+/// Squares from light (0) to dark (1) on a logarithmic scale, a name before each row and below each
+/// column, and a frame around each run of `group_sizes`.
+struct HeatMap {
+  std::string title;
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> values;  ///< square, in the order of the names
+  std::vector<std::size_t> group_sizes;
+};
+[[nodiscard]] Drawing heat_map_drawing(const HeatMap& map);
 
 /// Dots of y over x.
 struct PlotDots {

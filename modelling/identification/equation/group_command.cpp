@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "modelling/identification/equation/similarity.hpp"
-#include "modelling/identification/svg.hpp"
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -108,19 +108,6 @@ std::string text_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
   return text + table_of(tests, s, grouping);
 }
 
-std::string picture_of(const MeasuredTests& tests, const Eigen::MatrixXd& s,
-                       const Grouping& grouping) {
-  HeatMap map;
-  map.title = "similarity S of places, light: alike; frames: groups";
-  map.names = tests.places;
-  map.values = s;
-  for (const auto& group : grouping.groups) {
-    map.order.insert(map.order.end(), group.begin(), group.end());
-    map.group_sizes.push_back(group.size());
-  }
-  return svg_of(map);
-}
-
 int run(const Options& options) {
   const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
   const MeasuredTests tests = measured_tests(runs, {options.places, {}, 1});
@@ -137,7 +124,8 @@ int run(const Options& options) {
   }
   if (!options.picture.empty()) {
     cli::OutputFile picture(options.picture);
-    picture.stream() << picture_of(tests, s, grouping);
+    picture.stream() << svg_file({groups_drawing(
+        "similarity S of places, light: alike; frames: groups", tests.places, s, grouping)});
     picture.commit();
   }
   for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());

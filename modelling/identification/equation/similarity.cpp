@@ -6,6 +6,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "report/svg_plot.hpp"
+
 namespace thermocomp::identification {
 namespace {
 
@@ -178,6 +180,23 @@ Grouping group_places(const Eigen::MatrixXd& s, const Eigen::MatrixXd& floor) {
   Grouping grouping = group_places(raised, threshold);
   grouping.threshold_given = false;
   return grouping;
+}
+
+Drawing groups_drawing(const std::string& title, const std::vector<std::string>& names,
+                       const Eigen::MatrixXd& s, const Grouping& grouping) {
+  HeatMap map{title, {}, {}, {}};
+  std::vector<std::size_t> order;
+  for (const auto& group : grouping.groups) {
+    order.insert(order.end(), group.begin(), group.end());
+    map.group_sizes.push_back(group.size());
+  }
+  for (const std::size_t row : order) {
+    map.names.push_back(names[row]);
+    std::vector<double>& values = map.values.emplace_back();
+    for (const std::size_t column : order)
+      values.push_back(s(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)));
+  }
+  return heat_map_drawing(map);
 }
 
 }  // namespace thermocomp::identification

@@ -8,6 +8,10 @@
 
 #include "modelling/identification/measured_tests.hpp"
 
+namespace thermocomp {
+struct Drawing;
+}
+
 namespace thermocomp::identification {
 
 /// Over what max|dT_A| is taken: all tests, or each test for itself, so that a test in which a
@@ -46,5 +50,11 @@ struct Grouping {
 /// The threshold in the widest gap (by ratio) between one merging and the next, mergings below
 /// the noise floor counting as at it, none above 0.3.
 [[nodiscard]] Grouping group_places(const Eigen::MatrixXd& s, const Eigen::MatrixXd& floor);
+
+/// The heat map of `s` in the order of the groups, each in a frame.
+/// @param names  of the places of `s`
+[[nodiscard]] Drawing groups_drawing(const std::string& title,
+                                     const std::vector<std::string>& names,
+                                     const Eigen::MatrixXd& s, const Grouping& grouping);
 
 }  // namespace thermocomp::identification

@@ -7,7 +7,8 @@
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
 #include "modelling/identification/printed.hpp"
-#include "modelling/identification/svg.hpp"
+#include "report/html_page.hpp"
+#include "report/svg_plot.hpp"
 #include "report/xml_text.hpp"
 
 namespace thermocomp::identification {
@@ -42,62 +43,56 @@ std::string losses_text(const MeasuredTests& tests, const Fit& fit) {
 
 /// Measured, predicted and residual of an output over the folds, one behind the other.
 std::string curves(const MeasuredTests& tests, const Fit& fit, Eigen::Index output) {
-  Curve measured{"measured", {}, {}, "#606060", false};
-  Curve predicted{"predicted, left out", {}, {}, "#c8502c", false};
-  Curve residual{"residual", {}, {}, "#1b6ca8", false};
+  std::vector<double> hours;
+  std::vector<double> measured;
+  std::vector<double> predicted;
+  std::vector<double> residual;
+  double all_h = 0.0;
+  const auto length_h = [&](const Fold& fold) {
+    const Eigen::VectorXd& time_s = tests.runs[fold.run].time_s;
+    return (time_s[fold.end - 1] - time_s[fold.begin]) / 3600.0;
+  };
+  for (const Fold& fold : tests.folds) all_h += length_h(fold);
+  const double between_h = 0.03 * all_h;  // so wide a gap is seen between two tests
   double start_h = 0.0;
-  Eigen::Index stacked = 0;
   for (const Fold& fold : tests.folds) {
     const TestRun& run = tests.runs[fold.run];
-    const double first_s = run.time_s[fold.begin];
-    for (Eigen::Index row = fold.begin; row < fold.end; ++row, ++stacked) {
-      const double hour = start_h + (run.time_s[row] - first_s) / 3600.0;
-      const double value_um = run.outputs_um(row, output);
-      for (Curve* curve : {&measured, &predicted, &residual}) curve->x.push_back(hour);
-      measured.y.push_back(value_um);
-      predicted.y.push_back(fit.left_out_um(stacked, output));
-      residual.y.push_back(value_um - fit.left_out_um(stacked, output));
+    for (Eigen::Index row = fold.begin; row < fold.end; ++row) {
+      const double left_out_um = fit.left_out_um(static_cast<Eigen::Index>(hours.size()), output);
+      hours.push_back(start_h + (run.time_s[row] - run.time_s[fold.begin]) / 3600.0);
+      measured.push_back(run.outputs_um(row, output));
+      predicted.push_back(left_out_um);
+      residual.push_back(measured.back() - left_out_um);
     }
-    for (Curve* curve : {&measured, &predicted, &residual}) {
-      curve->x.push_back(curve->x.back());
-      curve->y.push_back(std::numeric_limits<double>::quiet_NaN());
-    }
-    start_h = measured.x.back();
+    start_h += length_h(fold) + between_h;
   }
   const std::string& name = tests.outputs[static_cast<std::size_t>(output)];
-  return svg_of({name + ", each test predicted without itself",
-                 "h, tests one behind the other",
-                 name,
-                 {measured, predicted, residual},
-                 960.0,
-                 320.0});
+  return html_figure(curves_drawing(hours, "h, tests one behind the other",
+                                    {{name + ", each test predicted without itself",
+                                      "",
+                                      {{"measured", "#606060", measured},
+                                       {"predicted, left out", "#c8502c", predicted},
+                                       {"residual", "#1b6ca8", residual}},
+                                      250.0}})
+                         .svg(),
+                     "");
 }
 
 std::string groups_map(const MeasuredTests& tests, const Fit& fit) {
-  HeatMap map;
-  map.title = fit.places.empty() ? "which places move alike: light"
-                                 : "which places move alike: light; chosen: *";
-  map.names = tests.places;
-  for (const std::size_t place : fit.places) map.names[place].insert(0, "* ");
-  map.values = similarity(tests, true);
-  for (const auto& group : fit.grouping.groups) {
-    map.order.insert(map.order.end(), group.begin(), group.end());
-    map.group_sizes.push_back(group.size());
-  }
-  return svg_of(map);
+  std::vector<std::string> names = tests.places;
+  for (const std::size_t place : fit.places) names[place].insert(0, "* ");
+  const char* title = fit.places.empty() ? "which places move alike: light"
+                                         : "which places move alike: light; chosen: *";
+  return html_figure(groups_drawing(title, names, similarity(tests, true), fit.grouping).svg(), "");
 }
 
 /// The text, the curves of each output and the map of the places.
 std::string page(const MeasuredTests& tests, const Fit& fit, const std::string& said) {
-  std::string text(
-      "<!DOCTYPE html>\n<html><head><meta charset=\"utf-8\"><title>thermocomp fit</title></head>\n"
-      "<body style=\"font-family:sans-serif;max-width:1000px\">\n<h1>Sensors and equation</h1>\n"
-      "<pre style=\"white-space:pre-wrap\">");
-  text.append(xml_text(said)).append("</pre>\n");
+  std::string text = html_begin("Sensors and equation");
+  text.append("<pre style=\"white-space:pre-wrap\">").append(xml_text(said)).append("</pre>\n");
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     text += curves(tests, fit, static_cast<Eigen::Index>(o));
-  text += groups_map(tests, fit);
-  return text.append("</body></html>\n");
+  return text + groups_map(tests, fit) + html_end();
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include "estimator/checks.hpp"
 #include "modelling/identification/printed.hpp"
-#include "modelling/identification/svg.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp::identification {
 namespace {
@@ -16,31 +16,31 @@ constexpr double um_per_mm = 1000.0;
 
 /// One curve a beta; `value` of a machine with the tie at l / a.
 template <class Value>
-std::string curves_over_a(const TiedColumns& columns, const std::string& title,
-                          const std::string& y_label, Value value) {
+Drawing curves_over_a(const TiedColumns& columns, const std::string& title, const std::string& unit,
+                      Value value) {
   const GateMachine machine = machine_of(columns);
   const double own_beta =
       stiffness_ratio(machine) *
       std::pow(machine.tie_height_mm / machine.working_height_mm, 3);  // km/kc = beta a^3
-  Diagram diagram{title, "l / l4", y_label, {}, 720.0, 320.0};
-  for (const double beta : {own_beta, 0.01, 0.1, 0.5, 1.0}) {
-    const bool own = diagram.curves.empty();
-    Curve curve{own ? printed("this machine, beta %.3g", beta) : printed("beta %.2g", beta),
-                {},
-                {},
-                own ? "#000000" : "",
-                !own};
+  std::vector<double> ratios;
+  for (double a = 1.0 / highest_tie; a <= 1.0 / lowest_tie; a += 0.01) ratios.push_back(a);
+  const std::vector betas{own_beta, 0.01, 0.1, 0.5, 1.0};
+  const std::vector colours{"#000000", "#1b6ca8", "#c8502c", "#3a8a3a", "#7b4fa0"};
+  std::vector<std::vector<double>> values(betas.size());
+  PlotPanel panel{title, unit, {}, 250.0};
+  for (std::size_t i = 0; i < betas.size(); ++i) {
     TiedColumns other = columns;
     Tie& tie = other.ties.front();
-    tie.area_mm2 *= own_beta / beta;
-    for (double a = 1.0 / highest_tie; a <= 1.0 / lowest_tie; a += 0.01) {
+    tie.area_mm2 *= own_beta / betas[i];
+    for (const double a : ratios) {
       tie.height_mm = columns.working_height_mm / a;
-      curve.x.push_back(a);
-      curve.y.push_back(value(tied_coefficients(other)));
+      values[i].push_back(value(tied_coefficients(other)));
     }
-    diagram.curves.push_back(std::move(curve));
+    const bool own = i == 0;
+    panel.lines.push_back({printed(own ? "this machine, beta %.3g" : "beta %.2g", betas[i]),
+                           colours[i], values[i], false, !own});
   }
-  return svg_of(diagram);
+  return curves_drawing(ratios, "l / l4", {panel});
 }
 
 }  // namespace
@@ -68,15 +68,12 @@ std::string design_curves_svg(const TiedColumns& columns) {
   const double free_um_per_K = um_per_mm * machine.column_expansion_per_K * l1 * (2.0 * l - l1) /
                                (2.0 * machine.column_width_mm);
   const double tie_um_per_K = um_per_mm * machine.tie_expansion_per_K * machine.tie_length_mm;
-  std::string text(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"720\" height=\"650\">\n<g>\n");
-  text += curves_over_a(columns, "Ki relative to the column without a tie", "Ki / Ki0",
-                        [&](const TiedCoefficients& k) { return k.ki_um_per_K / free_um_per_K; });
-  text += "</g>\n<g transform=\"translate(0 330)\">\n";
-  text += curves_over_a(
-      columns, "Kc relative to the expansion of the tie", "Kc / (alpha lc)",
-      [&](const TiedCoefficients& k) { return k.kc_um_per_K.front() / tie_um_per_K; });
-  return text.append("</g>\n</svg>\n");
+  return svg_file(
+      {curves_over_a(columns, "Ki relative to the column without a tie", "Ki / Ki0",
+                     [&](const TiedCoefficients& k) { return k.ki_um_per_K / free_um_per_K; }),
+       curves_over_a(
+           columns, "Kc relative to the expansion of the tie", "Kc / (alpha lc)",
+           [&](const TiedCoefficients& k) { return k.kc_um_per_K.front() / tie_um_per_K; })});
 }
 
 }  // namespace thermocomp::identification

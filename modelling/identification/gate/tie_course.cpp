@@ -6,14 +6,14 @@
 #include "estimator/checks.hpp"
 #include "modelling/identification/measured_tests.hpp"
 #include "modelling/identification/printed.hpp"
-#include "modelling/identification/svg.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp::identification {
 namespace {
 
 constexpr double s_per_min = 60.0;
 constexpr int heights = 200;  // of a curve of the picture
-constexpr double diagram_px = 320.0;
+constexpr double panel_px = 240.0;
 
 /// Every column that the file names, each once; and that each run has it.
 std::vector<std::string> named_places(const GateFile& file, const std::vector<RunFile>& runs) {
@@ -50,38 +50,47 @@ Eigen::VectorXd mean_K(const MeasuredTests& tests, const TestRun& run,
   return sum / static_cast<double>(names.size());
 }
 
-Curve course_curve(const TieCourse& course, const TiedCoefficients& k, const char* name,
-                   const char* colour, bool dashed) {
-  const Eigen::VectorXd um = displacement_um(course, k);
-  Curve curve{printed("%s: %.3g um", name, um.maxCoeff() - um.minCoeff()), {}, {}, colour, dashed};
-  for (Eigen::Index i = 0; i < um.size(); ++i) {
-    curve.x.push_back((course.time_s[i] - course.time_s[0]) / s_per_min);
-    curve.y.push_back(um[i]);
+struct NamedColumns {
+  const char* name;
+  const char* colour;
+  TiedColumns columns;
+};
+
+Drawing course_drawing(const TieCourse& course, const std::vector<NamedColumns>& all) {
+  std::vector<double> minutes;
+  for (const double time_s : course.time_s)
+    minutes.push_back((time_s - course.time_s[0]) / s_per_min);
+  std::vector<Eigen::VectorXd> values;
+  PlotPanel panel{course.name, "displacement, um", {}, panel_px};
+  for (const NamedColumns& each : all) {
+    const Eigen::VectorXd& um =
+        values.emplace_back(displacement_um(course, tied_coefficients(each.columns)));
+    panel.lines.push_back(
+        {printed("%s: %.3g um", each.name, um.maxCoeff() - um.minCoeff()), each.colour, {}});
   }
-  return curve;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    panel.lines[i].values = {values[i].data(), static_cast<std::size_t>(values[i].size())};
+  return curves_drawing(minutes, "min", {panel});
 }
 
-Diagram swing_diagram(const GateFile& file, const std::vector<TieCourse>& courses,
-                      const TiedColumns& best) {
-  Diagram diagram{"Swing over the height of a tie, the others at their best",
-                  "height, mm",
-                  "swing, um",
-                  {},
-                  720.0,
-                  diagram_px};
-  for (std::size_t j = 0; j < best.ties.size(); ++j) {
-    const Bounds bounds = file.choices[j].height_mm;
-    Curve curve{
-        printed("tie %zu, best at %.4g mm", j + 1, best.ties[j].height_mm), {}, {}, "", false};
-    TiedColumns other = best;
-    for (int i = 0; i <= heights; ++i) {
-      other.ties[j].height_mm = bounds.low + (bounds.high - bounds.low) * i / heights;
-      curve.x.push_back(other.ties[j].height_mm);
-      curve.y.push_back(swing_um(courses, tied_coefficients(other)));
-    }
-    diagram.curves.push_back(std::move(curve));
+/// The swing over the height of one tie, the others at their best.
+Drawing swing_drawing(const GateFile& file, const std::vector<TieCourse>& courses,
+                      const TiedColumns& best, std::size_t tie) {
+  const Bounds bounds = file.choices[tie].height_mm;
+  std::vector<double> heights_mm;
+  std::vector<double> swings_um;
+  TiedColumns other = best;
+  for (int i = 0; i <= heights; ++i) {
+    other.ties[tie].height_mm = bounds.low + (bounds.high - bounds.low) * i / heights;
+    heights_mm.push_back(other.ties[tie].height_mm);
+    swings_um.push_back(swing_um(courses, tied_coefficients(other)));
   }
-  return diagram;
+  const std::string name = printed("tie %zu, best at %.4g mm", tie + 1, best.ties[tie].height_mm);
+  return curves_drawing(heights_mm, "height, mm",
+                        {{"Swing over the height of a tie, the others at their best",
+                          "swing, um",
+                          {{name, "#1b6ca8", swings_um}},
+                          panel_px}});
 }
 
 }  // namespace
@@ -127,32 +136,15 @@ double swing_um(const std::vector<TieCourse>& courses, const TiedCoefficients& k
 
 std::string tie_picture(const GateFile& file, const std::vector<TieCourse>& courses,
                         const TiedColumns* best) {
-  TiedColumns free = file.columns;
-  free.ties.clear();
-  const std::size_t diagrams = courses.size() + (best == nullptr ? 0 : 1);
-  std::string text = printed(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"720\" "
-      "height=\"%.0f\">\n",
-      (diagram_px + 10.0) * static_cast<double>(diagrams));
-  double top_px = 0.0;
-  const auto add = [&](const Diagram& diagram) {
-    text += printed("<g transform=\"translate(0 %.0f)\">\n", top_px);
-    text += svg_of(diagram) + "</g>\n";
-    top_px += diagram_px + 10.0;
-  };
-  for (const TieCourse& course : courses) {
-    Diagram diagram{course.name, "min", "displacement, um", {}, 720.0, diagram_px};
-    diagram.curves.push_back(
-        course_curve(course, tied_coefficients(free), "no tie", "#a0a0a0", true));
-    diagram.curves.push_back(
-        course_curve(course, tied_coefficients(file.columns), "as drawn", "#1b6ca8", false));
-    if (best != nullptr)
-      diagram.curves.push_back(
-          course_curve(course, tied_coefficients(*best), "best ties", "#c8502c", false));
-    add(diagram);
-  }
-  if (best != nullptr) add(swing_diagram(file, courses, *best));
-  return text + "</svg>\n";
+  std::vector<NamedColumns> shown{{"no tie", "#a0a0a0", file.columns},
+                                  {"as drawn", "#1b6ca8", file.columns}};
+  shown.front().columns.ties.clear();
+  if (best != nullptr) shown.push_back({"best ties", "#c8502c", *best});
+  std::vector<Drawing> drawings;
+  for (const TieCourse& course : courses) drawings.push_back(course_drawing(course, shown));
+  for (std::size_t tie = 0; best != nullptr && tie < best->ties.size(); ++tie)
+    drawings.push_back(swing_drawing(file, courses, *best, tie));
+  return svg_file(drawings);
 }
 
 }  // namespace thermocomp::identification
