@@ -1,10 +1,9 @@
-#include "modelling/structure/picture.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numeric>
 
+#include "modelling/structure/pictures.hpp"
 #include "report/xml_text.hpp"
 
 namespace thermocomp::structure {

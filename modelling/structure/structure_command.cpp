@@ -13,9 +13,8 @@
 
 #include "config/model/model_file.hpp"
 #include "modelling/structure/body_reduction.hpp"
-#include "modelling/structure/picture.hpp"
+#include "modelling/structure/pictures.hpp"
 #include "modelling/structure/structure_model.hpp"
-#include "modelling/structure/vtu_file.hpp"
 #include "report/output_file.hpp"
 
 namespace thermocomp::structure {

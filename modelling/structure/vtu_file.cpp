@@ -1,7 +1,6 @@
-#include "modelling/structure/vtu_file.hpp"
-
 #include <cstring>
 
+#include "modelling/structure/pictures.hpp"
 #include "report/xml_text.hpp"
 
 namespace thermocomp::structure {

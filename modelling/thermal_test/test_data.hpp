@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "config/runs/run_file.hpp"
+#include "modelling/thermal_test/axis_binding.hpp"
 #include "modelling/thermal_test/drift_course.hpp"
-#include "modelling/thermal_test/test_options.hpp"
 
 namespace thermocomp::thermal_test {
 

@@ -9,7 +9,6 @@
 
 #include "modelling/identification/equation/heat_fit.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
-#include "modelling/identification/families/made_from_tests.hpp"
 #include "modelling/identification/printed.hpp"
 
 namespace thermocomp::identification {

@@ -4,7 +4,9 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "estimator/thermal_model.hpp"
 #include "modelling/identification/families/families_fit.hpp"
 
 namespace thermocomp::identification {
@@ -20,6 +22,19 @@ namespace thermocomp::identification {
 [[nodiscard]] FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
                                        std::optional<Family> forced,
                                        const std::function<void(double)>& progress);
+
+/// Ranges, covariance and left-out errors of `fit.model`, without its own `made_from`.
+[[nodiscard]] MadeFrom made_from_tests(const MeasuredTests& tests, const FamiliesFit& fit);
+
+/// `fitted` with all inputs and outputs of `frame`, in its order, then those of its own, so that
+/// the daemon's blocks and axes stay as they are: a place that the fit does not use has the
+/// coefficient 0; an output that was not fitted keeps its row. Terms and `[made_from]` are those of
+/// `fitted`.
+/// @param notes  gets what a user should know: outputs that are kept or new, what is not taken over
+/// @throws std::runtime_error when `frame` has terms, guideways or a course and an output that was
+///         not fitted, which would lose them
+[[nodiscard]] ThermalModel in_frame(const ThermalModel& fitted, const ThermalModel& frame,
+                                    std::vector<std::string>& notes);
 
 /// All families, and what the chosen one says of itself.
 [[nodiscard]] std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit);

@@ -12,7 +12,6 @@
 #include "config/model/model_file.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
-#include "modelling/identification/families/model_frame.hpp"
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"
 #include "report/terminal.hpp"

@@ -1,5 +1,3 @@
-#include "modelling/identification/families/made_from_tests.hpp"
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -11,6 +9,7 @@
 #include "estimator/model/displacement_model.hpp"
 #include "estimator/model/model_domain.hpp"
 #include "estimator/model/terms/low_pass.hpp"
+#include "modelling/identification/families/families.hpp"
 
 namespace thermocomp::identification {
 namespace {

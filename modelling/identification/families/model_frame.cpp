@@ -1,9 +1,9 @@
-#include "modelling/identification/families/model_frame.hpp"
-
 #include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "modelling/identification/families/families.hpp"
 
 namespace thermocomp::identification {
 namespace {

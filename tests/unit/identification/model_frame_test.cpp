@@ -1,6 +1,6 @@
-#include "modelling/identification/families/model_frame.hpp"
-
 #include <catch2/catch.hpp>
+
+#include "modelling/identification/families/families.hpp"
 
 using namespace thermocomp;
 using identification::in_frame;

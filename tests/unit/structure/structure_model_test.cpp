@@ -6,8 +6,7 @@
 #include <numeric>
 
 #include "config/model/model_file.hpp"
-#include "modelling/structure/picture.hpp"
-#include "modelling/structure/vtu_file.hpp"
+#include "modelling/structure/pictures.hpp"
 #include "models.hpp"
 
 using namespace thermocomp;

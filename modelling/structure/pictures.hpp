@@ -1,4 +1,5 @@
-/// Mesh, blocks and deformed shapes as a VTK XML file, for ParaView and its like.
+/// Mesh, blocks and deformed shapes: as a VTK XML file, for ParaView and its like, and as a picture
+/// that needs no other program (SVG).
 #pragma once
 
 #include <string>
@@ -17,5 +18,10 @@ struct BlockShape {
 /// Point data: `block` (counted from 0) and `NAME_um_per_K` for each shape; cell data: `part`.
 [[nodiscard]] std::string vtu_file(const Structure& structure,
                                    const std::vector<BlockShape>& shapes);
+
+/// One panel with the structure as it is, its blocks in colours, and one for each block: the shape
+/// with that block 1 K warm, enlarged so that it shows. The factor stands below each panel.
+[[nodiscard]] std::string svg_picture(const Structure& structure,
+                                      const std::vector<BlockShape>& shapes);
 
 }  // namespace thermocomp::structure
