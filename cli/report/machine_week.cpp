@@ -372,7 +372,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
   week.history = history.string();
   week.span = span;
   week.damage = reader.damage();
-  WeekEvents events{read_events(history).events, {}};
+  WeekEvents events{read_events(history), {}};
   for (const SegmentInfo& segment : reader.segments()) {
     double& end = events.run_ends_s[segment.run];
     end = std::max(end, end_s(segment));

@@ -118,15 +118,15 @@ PersistentState from_text(const std::string& text, bool& reference_lost,
   state.model_reference_degC = numbers(file, "model_reference_degC");
   state.reference_signals = numbers(file, "reference_signals");
   state.offset_um = numbers(file, "offset_um");
-  // Files of earlier versions have none.
+  state.temp_degC = numbers(file, "temp_degC");
+  state.held_degC = numbers(file, "held_degC");
+  state.held_signals = numbers(file, "held_signals");
+  state.correction = numbers(file, "correction");
+  // Version 0.1.0 wrote none of these.
   if (file.contains("sign")) state.sign = numbers(file, "sign");
   state.controller = file.value("controller", "");
   if (file.contains("corridor_um")) state.corridor_um = numbers(file, "corridor_um");
-  if (file.contains("temp_degC")) state.temp_degC = numbers(file, "temp_degC");
   if (file.contains("jumped_from_degC")) state.jumped_from_degC = numbers(file, "jumped_from_degC");
-  if (file.contains("held_degC")) state.held_degC = numbers(file, "held_degC");
-  if (file.contains("held_signals")) state.held_signals = numbers(file, "held_signals");
-  if (file.contains("correction")) state.correction = numbers(file, "correction");
   return state;
 }
 

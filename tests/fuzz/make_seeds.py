@@ -256,7 +256,8 @@ def state_seeds():
     state = {"format": 1, "program": "thermocomp", "enabled": True,
              "reference_degC": {"bed_degC": 20.5, "spindle_degC": 21},
              "model_reference_degC": {"bed_degC": 20.0}, "reference_signals": {"spindle_rpm": 0},
-             "offset_um": {"z": -12.25}, "held_degC": {"t1_degC": 24.5}, "held_signals": {"spindle_rpm": 1200.0},
+             "offset_um": {"z": -12.25}, "temp_degC": {"bed_degC": 21.5},
+             "held_degC": {"t1_degC": 24.5}, "held_signals": {"spindle_rpm": 1200.0},
              "correction": {"z.gain1": 1.125, "z.gain1_sd": 0.0625, "z.gain1_used": 1.0,
                             "z.bias_um": -0.5, "z.phase": 2}}
     write("state_file", "good", json.dumps(state, indent=2))

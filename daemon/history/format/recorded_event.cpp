@@ -42,20 +42,16 @@ bool has_event_records(Database& database) {
          0;
 }
 
-RecordedEvents read_events(const std::filesystem::path& history,
-                           const std::optional<HistoryTime>& from,
-                           const std::optional<HistoryTime>& to) {
+std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
+                                       const std::optional<HistoryTime>& from,
+                                       const std::optional<HistoryTime>& to) {
   Database database(history, DatabaseMode::read_only);
   require_history(database);
-  RecordedEvents found;
-  found.are_kept =
-      database.number(
-          "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'event'") != 0;
-  if (!found.are_kept) return found;
   const std::string query =
       "SELECT run, number, wall_ns, kind, subject, what, duration_ns, user, " +
       std::string(has_event_records(database) ? "record" : "''") +
       " FROM event ORDER BY run, number";
+  std::vector<RecordedEvent> events;
   Statement rows(database, query.c_str());
   std::optional<std::int64_t> first_ns;
   while (rows.step()) {
@@ -63,9 +59,9 @@ RecordedEvents read_events(const std::filesystem::path& history,
     if (!first_ns) first_ns = wall_ns;
     if (from && is_before(wall_ns, *first_ns, *from)) continue;
     if (to && !is_before(wall_ns, *first_ns, *to)) continue;
-    found.events.push_back(event_from(rows));
+    events.push_back(event_from(rows));
   }
-  return found;
+  return events;
 }
 
 }  // namespace thermocomp

@@ -1,6 +1,7 @@
 #include "daemon/history/format/row_checksum.hpp"
 
 #include <bit>
+#include <string>
 
 namespace thermocomp {
 
@@ -32,26 +33,17 @@ std::int64_t checksum_of(const ChunkNumbers& numbers, std::span<const std::byte>
   return checksum.add(numbers.wall_minus_grid_ns).add(records).value();
 }
 
-bool has_checksum_columns(Database& database) {
-  return database.number(
-             "SELECT count(*) FROM pragma_table_info('chunk')"
-             " WHERE name = 'checksum'") != 0 &&
-         database.number(
-             "SELECT count(*) FROM pragma_table_info('segment')"
-             " WHERE name = 'checksum'") != 0;
-}
-
-void add_checksum_columns(Database& database) {
-  // One of the two may be there: a history that was opened as its disk became full.
-  for (const char* add : {"ALTER TABLE chunk ADD COLUMN checksum INTEGER",
-                          "ALTER TABLE segment ADD COLUMN checksum INTEGER"}) {
-    if (has_checksum_columns(database)) return;
-    try {
-      database.run(add);
-    } catch (const DatabaseError& error) {
-      if (error.code() != SQLITE_ERROR) throw;  // SQLITE_ERROR: the column is there already
-    }
-  }
+std::optional<ChunkContent> read_chunk(Database& database, std::int64_t segment,
+                                       std::int64_t number) {
+  Statement row(database,
+                "SELECT records, count, through_cycle, wall_minus_grid_ns, checksum IS NULL,"
+                " checksum FROM chunk WHERE segment = ? AND number = ?");
+  row.bind(segment).bind(number);
+  if (!row.step()) return std::nullopt;
+  ChunkContent chunk{{number, row.number(1), row.number(2), row.number(3)}, row.blob(0)};
+  if (row.number(4) == 0 && row.number(5) != checksum_of(chunk.numbers, chunk.records))
+    throw HistoryError("chunk " + std::to_string(number) + " does not fit its checksum");
+  return chunk;
 }
 
 std::int64_t segment_checksum(Database& database, std::int64_t segment) {

@@ -2,14 +2,15 @@
 /// bit is still a value. Only for the .cpp files of this folder.
 ///
 /// `chunk.checksum` covers the chunk's numbers and records, `segment.checksum` what is written once
-/// for a segment and the texts of its setup. NULL, or no such column: written by an earlier
-/// version.
+/// for a segment and the texts of its setup. A row with NULL is judged by what else it says.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "daemon/history/format/database.hpp"
 
@@ -36,8 +37,13 @@ struct ChunkNumbers {
 [[nodiscard]] std::int64_t checksum_of(const ChunkNumbers& numbers,
                                        std::span<const std::byte> records) noexcept;
 
-[[nodiscard]] bool has_checksum_columns(Database& database);
-void add_checksum_columns(Database& database);
+struct ChunkContent {
+  ChunkNumbers numbers;
+  std::vector<std::byte> records;
+};
+/// Empty: there is no such row. @throws HistoryError when it does not fit its checksum
+[[nodiscard]] std::optional<ChunkContent> read_chunk(Database& database, std::int64_t segment,
+                                                     std::int64_t number);
 
 /// The checksum that the row of this segment should have. @throws HistoryError: no such row
 [[nodiscard]] std::int64_t segment_checksum(Database& database, std::int64_t segment);

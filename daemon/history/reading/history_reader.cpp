@@ -60,7 +60,6 @@ struct HistoryReader::Parts {
 
   std::filesystem::path file;
   mutable Database database;
-  bool has_checksums{false};
   std::vector<SegmentInfo> segments;
   std::vector<HistoryDamage> damage;
 };
@@ -112,7 +111,6 @@ HistoryReader::HistoryReader(const std::filesystem::path& file) {
   }
   parts_ = std::make_unique<Parts>(file);
   require_history(parts_->database);
-  parts_->has_checksums = has_checksum_columns(parts_->database);
   std::vector<SegmentInfo> found;
   try {
     parts_->read(" ORDER BY id", found);
@@ -155,7 +153,7 @@ SegmentSetup HistoryReader::setup(const SegmentInfo& segment) const {
 }
 
 SegmentStart HistoryReader::start(const SegmentInfo& segment) const {
-  if (parts_->has_checksums) check_segment_row(parts_->database, segment.id);
+  check_segment_row(parts_->database, segment.id);
   Statement row(parts_->database, "SELECT estimator_state, inputs FROM segment WHERE id = ?");
   row.bind(segment.id);
   if (!row.step()) {
@@ -174,13 +172,12 @@ RecordCursor HistoryReader::records(const SegmentInfo& segment) const {
 }
 
 struct RecordCursor::Parts {
-  Parts(Database& database_in, SegmentInfo segment_in, bool has_checksums_in)
-      : database(database_in), segment(std::move(segment_in)), has_checksums(has_checksums_in) {}
+  Parts(Database& database_in, SegmentInfo segment_in)
+      : database(database_in), segment(std::move(segment_in)) {}
   void decode(std::vector<std::byte> bytes, std::uint64_t count);
 
   Database& database;
   SegmentInfo segment;
-  bool has_checksums;
   std::int64_t next_chunk{0};
   std::int64_t through{-1};  ///< last cycle that the chunks read so far hold whole
   std::int64_t wall_minus_grid_ns{0};
@@ -191,8 +188,7 @@ struct RecordCursor::Parts {
 };
 
 RecordCursor::RecordCursor(const HistoryReader& reader, const SegmentInfo& segment)
-    : parts_(
-          std::make_unique<Parts>(reader.parts_->database, segment, reader.parts_->has_checksums)) {
+    : parts_(std::make_unique<Parts>(reader.parts_->database, segment)) {
   parts_->wall_minus_grid_ns = segment.wall_ns - segment.grid.time_of(segment.first_cycle).count();
   parts_->through = static_cast<std::int64_t>(segment.first_cycle) - 1;
   parts_->order = RecordOrder(segment.first_cycle);
@@ -227,25 +223,16 @@ bool RecordCursor::load_chunk() {
   Parts& parts = *parts_;
   // A statement of its own for each chunk: a read transaction that stays open would keep the
   // daemon's write-ahead log from being taken back.
-  Statement row(parts.database, parts.has_checksums
-                                    ? "SELECT records, count, through_cycle, wall_minus_grid_ns,"
-                                      " checksum IS NULL, checksum FROM chunk"
-                                      " WHERE segment = ? AND number = ?"
-                                    : "SELECT records, count, through_cycle, wall_minus_grid_ns, 1"
-                                      " FROM chunk WHERE segment = ? AND number = ?");
-  row.bind(parts.segment.id).bind(parts.next_chunk);
+  std::optional<ChunkContent> content =
+      read_chunk(parts.database, parts.segment.id, parts.next_chunk);
   const std::string chunk = "chunk " + std::to_string(parts.next_chunk);
-  if (!row.step()) {
+  if (!content) {
     if (parts.through >= parts.segment.last_cycle) return false;
     throw HistoryError(chunk + " is missing (damaged, or deleted meanwhile)");
   }
-  std::vector<std::byte> records = row.blob(0);
-  const ChunkNumbers numbers{parts.next_chunk, row.number(1), row.number(2), row.number(3)};
-  if (row.number(4) == 0 && row.number(5) != checksum_of(numbers, records)) {
-    throw HistoryError(chunk + " does not fit its checksum");
-  }
+  const ChunkNumbers& numbers = content->numbers;
   try {
-    parts.decode(std::move(records), static_cast<std::uint64_t>(numbers.count));
+    parts.decode(std::move(content->records), static_cast<std::uint64_t>(numbers.count));
   } catch (const HistoryError& error) {
     throw HistoryError(chunk + ": " + error.what());
   }

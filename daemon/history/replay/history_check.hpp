@@ -22,7 +22,7 @@ struct HistoryCheck {
   [[nodiscard]] bool is_sound() const noexcept;
 };
 
-/// Every row, chunk and record: checksums (histories of earlier versions have none), the order of
+/// Every row, chunk and record: checksums, the order of
 /// records, the state and inputs at the start of each segment, its configuration.
 /// @throws HistoryError when nothing can be taken from the file
 [[nodiscard]] HistoryCheck check_history(const std::filesystem::path& history,

@@ -57,7 +57,6 @@ class Thinning {
            const SetupParser& parser)
       : reader_(file),
         database_(file, DatabaseMode::read_only),
-        has_checksums_(has_checksum_columns(database_)),
         setups_(reader_, parser),
         from_s_(from_s),
         span_s_((to_s - from_s) / static_cast<double>(points)),
@@ -160,20 +159,10 @@ class Thinning {
 
   void take(const SegmentInfo& segment, std::int64_t number) {
     try {
-      Statement row(database_, has_checksums_
-                                   ? "SELECT records, count, through_cycle, wall_minus_grid_ns,"
-                                     " checksum IS NULL, checksum FROM chunk"
-                                     " WHERE segment = ? AND number = ?"
-                                   : "SELECT records, count, through_cycle, wall_minus_grid_ns, 1"
-                                     " FROM chunk WHERE segment = ? AND number = ?");
-      row.bind(segment.id).bind(number);
-      if (!row.step()) return;  // deleted meanwhile, or missing: its span stays empty
-      std::vector<std::byte> records = row.blob(0);
-      const ChunkNumbers numbers{number, row.number(1), row.number(2), row.number(3)};
-      if (row.number(4) == 0 && row.number(5) != checksum_of(numbers, records))
-        throw HistoryError("chunk " + std::to_string(number) + " does not fit its checksum");
+      std::optional<ChunkContent> content = read_chunk(database_, segment.id, number);
+      if (!content) return;  // deleted meanwhile, or missing: its span stays empty
       ++result_.chunks_read;
-      add_records(segment, numbers, std::move(records));
+      add_records(segment, content->numbers, std::move(content->records));
     } catch (const HistoryError& error) {
       note(segment.id, error.what());
     }
@@ -219,7 +208,6 @@ class Thinning {
 
   HistoryReader reader_;
   Database database_;
-  bool has_checksums_;
   ParsedSetups setups_;
   double from_s_;
   double span_s_;

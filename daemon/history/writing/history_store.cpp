@@ -43,13 +43,11 @@ constexpr const char* tables =
     " wall_minus_grid_ns INTEGER NOT NULL, count INTEGER NOT NULL, records BLOB NOT NULL,"
     " checksum INTEGER);"
     "CREATE UNIQUE INDEX chunk_of_segment ON chunk (segment, number);"
-    "INSERT INTO meta VALUES ('format', 'thermocomp history'), ('schema_version', '1');";
-
-constexpr const char* event_table =
-    "CREATE TABLE IF NOT EXISTS event (run INTEGER NOT NULL, number INTEGER NOT NULL,"
-    " wall_ns INTEGER NOT NULL, kind TEXT NOT NULL, subject TEXT NOT NULL, what TEXT NOT NULL,"
+    "CREATE TABLE event (run INTEGER NOT NULL, number INTEGER NOT NULL, wall_ns INTEGER NOT NULL,"
+    " kind TEXT NOT NULL, subject TEXT NOT NULL, what TEXT NOT NULL,"
     " duration_ns INTEGER NOT NULL, user INTEGER NOT NULL, record TEXT NOT NULL DEFAULT '',"
-    " PRIMARY KEY (run, number)) WITHOUT ROWID;";
+    " PRIMARY KEY (run, number)) WITHOUT ROWID;"
+    "INSERT INTO meta VALUES ('format', 'thermocomp history'), ('schema_version', '1');";
 
 /// So many events are kept, or as many as take a twentieth of the file.
 constexpr double events_max = 20000.0;
@@ -224,8 +222,6 @@ void HistoryStore::prepare() {
       // Every commit goes on into the database at once: a -wal that somebody removes holds nothing.
       "PRAGMA journal_mode = WAL; PRAGMA journal_size_limit = 1048576;"
       "PRAGMA wal_autocheckpoint = 1");
-  if (!has_checksum_columns(*database_)) add_checksum_columns(*database_);
-  database_->run(event_table);
   if (!has_event_records(*database_))
     database_->run("ALTER TABLE event ADD COLUMN record TEXT NOT NULL DEFAULT ''");
   if (run_ == 0)

@@ -9,10 +9,8 @@
 ///            force
 ///   chunk    the records of a segment in order, packed (chunk_codec.hpp), one row or more per
 ///            commit; wall_minus_grid_ns: wall clock minus the grid's time when it was written
-///   event    what happened (recorded_event.hpp), the newest; a file of an earlier version gets the
-///            table when it is opened for writing
-/// segment and chunk have a checksum (row_checksum.hpp); files of earlier versions get the columns
-/// when they are opened for writing.
+///   event    what happened (recorded_event.hpp), the newest
+/// segment and chunk have a checksum (row_checksum.hpp).
 #pragma once
 
 #include <array>

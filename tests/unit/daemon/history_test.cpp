@@ -97,7 +97,7 @@ TEST_CASE(
   machine.run(500);
   machine.stop();
   run_sql(config.file, damage.c_str());
-  // Without checksums, as in a history of an earlier version, what a row says is looked at itself.
+  // Without checksums what a row says is looked at itself.
   const bool has_checksums = GENERATE(false, true);
   if (!has_checksums) {
     run_sql(config.file, "UPDATE segment SET checksum = NULL; UPDATE chunk SET checksum = NULL");
@@ -169,32 +169,6 @@ TEST_CASE("a clock that was set beyond the year 2116 costs nothing but the wall 
   CHECK(after.rows == before.rows);
   CHECK_THAT(told(after.damage), Catch::Contains("segment 2: its wall time cannot be"));
   CHECK(replay_quietly(config.file).segments == 2);
-}
-
-TEST_CASE("a history of an earlier version is read, and gets checksums when it is written again",
-          "[history]") {
-  const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  {
-    RecordedMachine machine(config, 3);
-    machine.start();
-    machine.run(300);
-    machine.stop();
-  }
-  run_sql(config.file,
-          "ALTER TABLE chunk DROP COLUMN checksum; ALTER TABLE segment DROP COLUMN checksum");
-  CHECK(replay_quietly(config.file).damage.empty());
-  {
-    RecordedMachine machine(config, 4);
-    machine.start();
-    machine.run(300);
-    machine.stop();
-  }
-  const ReplaySummary summary = replay_quietly(config.file);
-  CHECK(summary.damage.empty());
-  CHECK(summary.different == 0);
-  run_sql(config.file, "UPDATE chunk SET count = count - 1 WHERE checksum IS NOT NULL");
-  CHECK(!check_history(config.file, {}, parse_test_setup).is_sound());
 }
 
 TEST_CASE("of a segment that claims more cycles than its chunks hold those there are are replayed",

@@ -63,7 +63,10 @@ TEST_CASE("no state file is the first start and no warning", "[state]") {
 
 TEST_CASE("an unusable state file is moved aside and said", "[state]") {
   const std::string head = R"({"program":"thermocomp",)";
-  const std::string rest = R"(,"model_reference_degC":{},"reference_signals":{},"offset_um":{}})";
+  const std::string without_correction =
+      R"(,"model_reference_degC":{},"reference_signals":{},"offset_um":{},"temp_degC":{},)"
+      R"("held_degC":{},"held_signals":{})";
+  const std::string rest = without_correction + R"(,"correction":{}})";
   const std::string good = R"("reference_degC":{})" + rest;
   const std::string text = GENERATE_COPY(
       std::string(), std::string("{"), std::string("[]"), std::string("null"),
@@ -73,9 +76,12 @@ TEST_CASE("an unusable state file is moved aside and said", "[state]") {
       head + R"("format":)" + std::string(400000, '[') + std::string(400000, ']') +
           R"(,"enabled":true,)" + good,
       head + R"("format":1,"enabled":true,"reference_degC":{"a":"hot"})" + rest,
-      head + R"("format":1,"enabled":true,"reference_degC":3)" + rest);
+      head + R"("format":1,"enabled":true,"reference_degC":3)" + rest,
+      head + R"("format":1,"enabled":true,"reference_degC":{})" + without_correction + "}");
   const TempFolder folder;
   const std::filesystem::path file = folder / "state.json";
+  std::ofstream(file) << head << R"("format":1,"enabled":true,)" << good;
+  REQUIRE(load_state_file(file, sample_state()).found);
   std::ofstream(file) << text;
   const LoadedState loaded = load_state_file(file, sample_state());
   CHECK_FALSE(loaded.found);
@@ -120,7 +126,7 @@ TEST_CASE("when the reference was taken comes back, and costs nothing where it c
   LoadedState loaded = load_state_file(file, {});
   CHECK(loaded.reference.wall_s == 1772350211.5);
   CHECK(loaded.reference.origin == ReferenceOrigin::command);
-  REQUIRE(save_state_file(file, sample_state()).empty());  // as an earlier version wrote it
+  REQUIRE(save_state_file(file, sample_state()).empty());
   CHECK_FALSE(load_state_file(file, {}).reference.is_known());
   const auto* record = GENERATE("7", "{}", R"({"wall_s": "noon", "by": "operator"})",
                                 R"({"wall_s": 1.0, "by": 2})", R"({"wall_s": 1.0, "by": "who"})");
