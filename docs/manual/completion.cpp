@@ -1,9 +1,9 @@
-#include "docs/manual/completion.hpp"
-
 #include <algorithm>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+
+#include "docs/manual/pages.hpp"
 
 namespace thermocomp::manual {
 namespace {

@@ -13,9 +13,7 @@
 #include "cli/commands.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/command_line.hpp"
-#include "docs/manual/command_page.hpp"
-#include "docs/manual/completion.hpp"
-#include "docs/manual/format_page.hpp"
+#include "docs/manual/pages.hpp"
 #include "simulator/command_line.hpp"
 #ifdef THERMOCOMP_WITH_GATEWAY
 #include "gateway/command_line.hpp"
