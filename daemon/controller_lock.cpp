@@ -20,6 +20,8 @@ std::string lower_case(std::string text) {
 }
 
 std::string line_name(const ModbusTcp& tcp, int unit) {
+  if (tcp.s7)
+    return fmt::format("controller at S7 {}:{} DB{}", lower_case(tcp.host), tcp.port, tcp.s7->db);
   return fmt::format("controller at Modbus TCP {}:{} unit {}", lower_case(tcp.host), tcp.port,
                      unit);
 }

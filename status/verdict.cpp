@@ -190,7 +190,8 @@ std::string write_text(const WriteStatus& write) {
   };
   const std::string how =
       (write.exception ? "refused" : "unanswered") + named(", function ", write.function) +
-      named(", address ", write.address) + named(", exception ", write.exception);
+      named(", address ", write.address) +
+      named(write.function ? ", exception " : ", S7 code ", write.exception);
   return "writes " + how + "; last confirmed " +
          (write.last_confirmed_s >= 0.0 ? duration_text(write.last_confirmed_s) + " ago" : "never");
 }

@@ -61,8 +61,8 @@ std::string valid_text(const std::vector<AxisConfig>& axes) {
 }
 
 std::string line_of(const ModbusControllerConfig& config) {
-  return std::string(kind_of(config.line)) + " " + line_name(config.line) + ", unit " +
-         std::to_string(config.unit);
+  const std::string line = std::string(kind_of(config.line)) + " " + line_name(config.line);
+  return s7_of(config.line) != nullptr ? line : line + ", unit " + std::to_string(config.unit);
 }
 
 Row axis_row(const ModbusAxis& place, const ModbusValue& value, const AxisConfig& axis,
@@ -122,6 +122,7 @@ std::string set_text(const DaemonConfig& config, const Controller& controller,
 std::string gaps_text(const ModbusControllerConfig& controller,
                       const std::vector<ModbusValue>& values) {
   std::string text;
+  if (s7_of(controller.line) != nullptr) return text;  // a data block has no holes
   const auto add = [&](const ReadRequest& request, std::size_t from, std::size_t to) {
     if (from >= to) return;
     text += (text.empty() ? "" : ", ") + table_name(request.table) + " " + std::to_string(from);
@@ -174,14 +175,19 @@ std::string modbus_table(const DaemonConfig& config, const ModbusControllerConfi
     read.push_back({place_name(signal.value), type_name(signal.value), name,
                     scaled(std::string(unit_of(name).symbol), signal.value.scale)});
   }
-  std::string text = line_of(controller) + ", every " + number_text(controller.period_s) +
-                     " s; addresses from 0, as on the wire\n\nWritten by the daemon (function " +
-                     std::to_string(controller.write_function) +
-                     "; offsets, then valid bits, then heartbeat):\n" +
-                     table_text(registers, std::move(written));
+  const bool is_s7 = s7_of(controller.line) != nullptr;
+  const char* places = is_s7 ? "address" : registers;
+  std::string text = line_of(controller) + ", every " + number_text(controller.period_s) + " s; " +
+                     (is_s7 ? "bytes of the data block, optimized block access off"
+                            : "addresses from 0, as on the wire") +
+                     "\n\nWritten by the daemon (" +
+                     (is_s7 ? "" : "function " + std::to_string(controller.write_function) + "; ") +
+                     "offsets, then valid bits, then heartbeat):\n" +
+                     table_text(places, std::move(written));
   if (read.empty()) return text + "\nWritten by the controller: nothing\n";
-  return text + "\nWritten by the controller, read by the daemon (functions 1 to 4):\n" +
-         table_text(registers, std::move(read)) + gaps_text(controller, values);
+  return text + "\nWritten by the controller, read by the daemon" +
+         (is_s7 ? "" : " (functions 1 to 4)") + ":\n" + table_text(places, std::move(read)) +
+         gaps_text(controller, values);
 }
 
 std::string place_of(const CanSignal& signal) {

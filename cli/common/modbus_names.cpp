@@ -15,6 +15,8 @@ std::string table_name(ModbusTable table) {
       return "discrete_input";
     case ModbusTable::holding:
       return "holding";
+    case ModbusTable::data_block:
+      return "data block";
     case ModbusTable::input:
       break;
   }
@@ -53,7 +55,33 @@ std::string encoding_name(Encoding encoding) {
   return "float64";
 }
 
+/// As STEP 7 and TIA Portal write it: "DBD 4".
+std::string data_block_place(const ModbusValue& value) {
+  const std::size_t words = registers_of(value.encoding);
+  const char* width = words == 1 ? "DBW " : words == 2 ? "DBD " : "DBB ";
+  return width + std::to_string(2 * value.address);
+}
+
+std::string data_block_type(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::int16:
+      return "INT";
+    case Encoding::uint16:
+      return "WORD";
+    case Encoding::int32:
+      return "DINT";
+    case Encoding::uint32:
+      return "DWORD";
+    case Encoding::float32:
+      return "REAL";
+    case Encoding::float64:
+      break;
+  }
+  return "LREAL";
+}
+
 std::string place_name(const ModbusValue& value) {
+  if (value.table == ModbusTable::data_block) return data_block_place(value);
   const auto words = words_of(value.table, value.encoding);
   std::string text = table_name(value.table) + " " + std::to_string(value.address);
   if (words > 1) text += ".." + std::to_string(value.address + words - 1);
@@ -61,6 +89,7 @@ std::string place_name(const ModbusValue& value) {
 }
 
 std::string type_name(const ModbusValue& value) {
+  if (value.table == ModbusTable::data_block) return data_block_type(value.encoding);
   if (is_bit_table(value.table)) return "bit";
   const std::string type = encoding_name(value.encoding);
   return registers_of(value.encoding) == 1 ? type : type + " " + order_name(value.word_order);
@@ -86,7 +115,11 @@ std::string line_name(const ModbusLine& line) {
            std::to_string(rtu->data_bits) + rtu->parity + std::to_string(rtu->stop_bits);
   }
   const auto& tcp = std::get<ModbusTcp>(line.link);
-  return std::string(tcp.host).append(":").append(std::to_string(tcp.port));
+  std::string text = tcp.host + ":" + std::to_string(tcp.port);
+  if (const auto& s7 = tcp.s7)
+    text += ", rack " + std::to_string(s7->rack) + ", slot " + std::to_string(s7->slot) + ", DB" +
+            std::to_string(s7->db);
+  return text;
 }
 
 std::string exception_name(int code) {

@@ -291,9 +291,12 @@ class ControllerScan {
   }
 
   [[nodiscard]] std::string why_not(const Exchange& exchange) const {
+    const bool is_s7 = s7_of(config_.line) != nullptr;
+    if (is_s7 && exchange.outcome == ExchangeOutcome::exception)
+      return "the controller answers with " + exchange.detail;
     if (exchange.outcome == ExchangeOutcome::exception)
       return "the controller answers with " + exception_name(exchange.exception_code);
-    if (exchange.outcome == ExchangeOutcome::timeout)
+    if (!is_s7 && exchange.outcome == ExchangeOutcome::timeout)
       return "unit " + std::to_string(config_.unit) + ": " + exchange.detail;
     if (exchange.outcome == ExchangeOutcome::disconnected && !connection_.last_error().empty())
       return connection_.last_error();
@@ -312,7 +315,9 @@ ScanController scan_modbus_controller(const DaemonConfig& config,
   const auto* rtu = std::get_if<ModbusRtu>(&modbus.line.link);
   result.kind = kind_of(modbus.line);
   result.where = line_name(modbus.line);
-  result.address = "unit " + std::to_string(modbus.unit);
+  const S7Block* s7 = s7_of(modbus.line);
+  result.address =
+      s7 != nullptr ? "DB" + std::to_string(s7->db) : "unit " + std::to_string(modbus.unit);
   std::vector<Place> read = read_places(config, modbus);
   std::vector<Place> written = written_places(config, modbus);
   const SerialHolder holder = rtu != nullptr ? holder_of(rtu->device) : SerialHolder{};

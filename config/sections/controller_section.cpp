@@ -23,6 +23,7 @@ enum class Kind {
   modbus_rtu,
   modbus_rtu_over_tcp,
   modbus_udp,
+  s7,
   piezo_tcp,
   piezo_rtu,
   can,
@@ -64,6 +65,7 @@ class ControllerReader {
                                            {"modbus_rtu", Kind::modbus_rtu},
                                            {"modbus_rtu_over_tcp", Kind::modbus_rtu_over_tcp},
                                            {"modbus_udp", Kind::modbus_udp},
+                                           {"s7", Kind::s7},
                                            {"piezo_tcp", Kind::piezo_tcp},
                                            {"piezo_rtu", Kind::piezo_rtu},
                                            {"can", Kind::can},
@@ -79,6 +81,9 @@ class ControllerReader {
       case Kind::modbus_rtu_over_tcp:
       case Kind::modbus_udp:
         read_modbus(table_.text("kind"), false, serial_lines);
+        break;
+      case Kind::s7:
+        read_s7();
         break;
       case Kind::piezo_tcp:
         read_modbus("modbus_tcp", true, serial_lines);
@@ -201,6 +206,26 @@ class ControllerReader {
     config.write_function = read_write_function(config.write_function);
     config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
     refuse_all(table_, {"interface", "silent_after_s"}, "makes no sense for a Modbus controller");
+    read_places(std::move(config), volts);
+  }
+
+  /// One data block: the bytes between its values are there, and may be read along.
+  void read_s7() {
+    ModbusControllerConfig config;
+    config.name = name_;
+    config.line = read_modbus_line(table_, "s7");
+    config.registers_per_request_max = config.gap_registers_max = S7Block::registers_per_request;
+    config.period_s = table_.number("period_s", Range::between(0.005, 60), config.period_s);
+    refuse_all(table_,
+               {"interface", "silent_after_s", "unit", "write_function",
+                "registers_per_request_max", "gap_registers_max", "ignore_transaction"},
+               "makes no sense for kind = \"s7\"");
+    for (const TomlTable& axis : axis_tables_) refuse_travel(axis);
+    read_value_ = read_s7_value;
+    read_places(std::move(config), false);
+  }
+
+  void read_places(ModbusControllerConfig config, bool volts) {
     WrittenRegisters written;
     for (std::size_t i = 0; i < axes_.size(); ++i)
       config.axes.push_back(read_axis(axis_tables_[i], axes_[i], volts, written));
@@ -210,7 +235,7 @@ class ControllerReader {
     config.heartbeat = read_written_bits("heartbeat", written);
     if (config.write_function == ModbusControllerConfig::one_register) check_single(config);
     read_signals([&](const TomlTable& table, std::size_t index) {
-      config.signals.push_back({index, read_modbus_value(table, RegisterUse::signal)});
+      config.signals.push_back({index, read_value_(table, RegisterUse::signal)});
     });
     result_.period_s = config.period_s;
     result_.config = std::move(config);
@@ -241,18 +266,18 @@ class ControllerReader {
                                                              WrittenRegisters& written) const {
     const TomlTable place = table_.table_or_empty(key);
     if (!place) return std::nullopt;
-    const ModbusValue value = read_modbus_value(place, RegisterUse::written_bits);
+    const ModbusValue value = read_value_(place, RegisterUse::written_bits);
     written.add(table_, key, value);
     return value;
   }
 
-  static ModbusAxis read_axis(const TomlTable& table, const AxisConfig& axis, bool volts,
-                              WrittenRegisters& written) {
+  ModbusAxis read_axis(const TomlTable& table, const AxisConfig& axis, bool volts,
+                       WrittenRegisters& written) const {
     if (volts) {
       refuse_travel(table);
       return read_piezo_axis(table, axis, written);
     }
-    if (!travel_table(table)) return read_modbus_axis(table, axis, written);
+    if (!travel_table(table)) return read_plain_axis(table, axis, written);
     refuse_plain_places(table);
     ModbusAxis place;
     place.travel = read_modbus_travel(table, axis.limiter, written);
@@ -309,17 +334,17 @@ class ControllerReader {
                   "must be at most tolerance_V = " + number_text(piezo.tolerance_V));
   }
 
-  static ModbusAxis read_modbus_axis(const TomlTable& table, const AxisConfig& axis,
-                                     WrittenRegisters& written) {
+  ModbusAxis read_plain_axis(const TomlTable& table, const AxisConfig& axis,
+                             WrittenRegisters& written) const {
     ModbusAxis place;
     const TomlTable offset = table.table("offset");
-    place.offset = read_modbus_value(offset, RegisterUse::written);
+    place.offset = read_value_(offset, RegisterUse::written);
     if (offset) {
       written.add(table, "offset", place.offset);
       check_place(table, "offset", place.offset, axis);
     }
     if (table.has("applied")) {
-      place.applied = read_modbus_value(table.table("applied"), RegisterUse::number);
+      place.applied = read_value_(table.table("applied"), RegisterUse::number);
       check_place(table, "applied", *place.applied, axis);
     }
     return place;
@@ -413,6 +438,7 @@ class ControllerReader {
   std::vector<AxisConfig> axes_;  ///< one a table; of a travel its first node
   std::size_t offsets_;           ///< nodes of travels counted
   std::string name_;
+  ModbusValue (*read_value_)(const TomlTable&, RegisterUse){read_modbus_value};
   ControllerReading result_;
 };
 

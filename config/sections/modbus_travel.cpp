@@ -100,10 +100,12 @@ struct TravelReader {
 }  // namespace
 
 void WrittenRegisters::add(const TomlTable& table, std::string_view key, const ModbusValue& value) {
+  const bool is_s7 = value.table == ModbusTable::data_block;
   for (int i = 0; i < static_cast<int>(words_of(value.table, value.encoding)); ++i) {
     const auto [entry, is_new] = used_.emplace(value.address + i, table.path());
     if (is_new) continue;
-    table.problem(key, "register " + std::to_string(value.address + i) + " is written by " +
+    const int place = is_s7 ? 2 * entry->first : entry->first;
+    table.problem(key, (is_s7 ? "byte " : "register ") + std::to_string(place) + " is written by " +
                            entry->second + " already");
     return;
   }

@@ -98,6 +98,14 @@ ModbusTcp read_tcp(const TomlTable& table, std::string_view kind) {
   if (!tcp.host.empty() && !is_host(tcp.host)) {
     table.problem("host", "must be a host's name or an IP address");
   }
+  if (kind == "s7") {
+    constexpr int db_max = 65535;
+    tcp.port = S7Block::port;
+    S7Block& block = tcp.s7.emplace();
+    block.db = table.integer("db", 1, db_max);
+    block.rack = table.integer("rack", 0, 7, block.rack);
+    block.slot = table.integer("slot", 0, S7Block::slots - 1, block.slot);
+  }
   tcp.port = table.integer("port", 1, 65535, tcp.port);
   refuse_all(table, {"device", "baud", "parity", "data_bits", "stop_bits", "rs485"},
              "makes no sense for kind = \"" + std::string(kind) + "\"");
@@ -211,7 +219,7 @@ ModbusLine read_modbus_line(const TomlTable& table, std::string_view kind) {
   }
   if (kind == "modbus_tcp" || kind == "modbus_udp")
     line.ignore_transaction = table.flag("ignore_transaction", line.ignore_transaction);
-  else
+  else if (kind != "s7")
     table.refuse("ignore_transaction", "makes no sense for serial frames, which have no number");
   line.timeout_ms = table.number("timeout_ms", Range::between(1, 60000), line.timeout_ms);
   line.inter_frame_delay_ms =
@@ -236,6 +244,21 @@ int read_unit(const TomlTable& table, const ModbusLine& line) {
   return unit;
 }
 
+namespace {
+
+void read_number(const TomlTable& table, RegisterUse use, ModbusValue& value) {
+  if (use == RegisterUse::written_bits) {
+    value.encoding = table.choice<Encoding>(
+        "encoding", {{"uint16", Encoding::uint16}, {"uint32", Encoding::uint32}});
+    table.refuse("scale", "makes no sense for a count or bits");
+  } else {
+    value.encoding = table.choice("encoding", encodings());
+    value.scale = read_scale(table, value.scale);
+  }
+}
+
+}  // namespace
+
 ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use) {
   ModbusValue value;
   const bool is_written = use == RegisterUse::written || use == RegisterUse::written_bits;
@@ -249,16 +272,21 @@ ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use) {
     value.encoding = Encoding::uint16;
     return value;
   }
-  if (use == RegisterUse::written_bits) {
-    value.encoding = table.choice<Encoding>(
-        "encoding", {{"uint16", Encoding::uint16}, {"uint32", Encoding::uint32}});
-    table.refuse("scale", "makes no sense for a count or bits");
-  } else {
-    value.encoding = table.choice("encoding", encodings());
-    value.scale = read_scale(table, value.scale);
-  }
+  read_number(table, use, value);
   value.word_order = table.choice("word_order", word_orders(), value.word_order);
   check_address(table, value.address, value.encoding);
+  return value;
+}
+
+ModbusValue read_s7_value(const TomlTable& table, RegisterUse use) {
+  ModbusValue value;
+  value.table = ModbusTable::data_block;
+  const int byte = table.integer("address", 0, S7Block::byte_max);
+  if (byte % 2 != 0)
+    table.problem("address", "must be even: it is the byte where the value begins");
+  value.address = static_cast<std::uint16_t>(byte / 2);
+  refuse_all(table, {"table", "word_order"}, "makes no sense for kind = \"s7\"");
+  read_number(table, use, value);
   return value;
 }
 

@@ -8,7 +8,7 @@
 namespace thermocomp::sections {
 
 /// Keys of a line: host, port or device, baud, ..., and timing. Keys of the other kind are refused.
-/// @param kind  one of modbus_kinds
+/// @param kind  one of modbus_kinds, or "s7"
 [[nodiscard]] ModbusLine read_modbus_line(const TomlTable& table, std::string_view kind);
 /// 1..247; with the frames of Modbus TCP also 0 and 255. Required.
 [[nodiscard]] int read_unit(const TomlTable& table, const ModbusLine& line);
@@ -20,6 +20,9 @@ enum class RegisterUse {
   signal         ///< any table; a bit has no encoding
 };
 [[nodiscard]] ModbusValue read_modbus_value(const TomlTable& table, RegisterUse use);
+
+/// A value in an S7 data block: `address` is the byte where it begins.
+[[nodiscard]] ModbusValue read_s7_value(const TomlTable& table, RegisterUse use);
 
 /// A sensor's channel; what `sensor` leaves out is as in `device`.
 [[nodiscard]] ModbusChannel read_modbus_channel(const TomlTable& sensor, const TomlTable& device);

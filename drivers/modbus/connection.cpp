@@ -36,6 +36,7 @@ constexpr std::uint8_t read_function(ModbusTable table) noexcept {
     case ModbusTable::discrete_input:
       return MODBUS_FC_READ_DISCRETE_INPUTS;
     case ModbusTable::holding:
+    case ModbusTable::data_block:
       return MODBUS_FC_READ_HOLDING_REGISTERS;
     case ModbusTable::input:
       break;
@@ -262,6 +263,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
   const nanoseconds rest = rtu_ ? block : std::min<nanoseconds>(timeout_, rest_max);
   const nanoseconds end = deadline + rest;
   nanoseconds until = deadline;
+  bool is_over = false;  // while bytes still come
   while (true) {
     const ModbusFrames::Found found = frames_.look();
     in_step_ = found != ModbusFrames::Found::no_frame;
@@ -275,6 +277,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
       exchange.detail = frames_.came();
       return;
     }
+    if (is_over) return judge_silence(exchange);
     const PortWait wait = port_->wait_for_input(until);
     if (wait == PortWait::cancelled) {
       exchange.outcome = ExchangeOutcome::cancelled;
@@ -294,6 +297,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
       until = std::min(deadline, now + full);
     else if (frames_.has_part())
       until = std::min(end, std::max(deadline, now + rest));
+    is_over = now >= until;
   }
 }
 
@@ -375,7 +379,8 @@ void ModbusConnection::Implementation::take_exception(Exchange& exchange) const 
   }
   exchange.outcome = ExchangeOutcome::exception;
   exchange.exception_code = answer()[1];
-  exchange.detail = exception_text(answer()[1]);
+  exchange.detail = port_->refusal();
+  if (exchange.detail.empty()) exchange.detail = exception_text(answer()[1]);
 }
 
 /// What an exchange's end means for the ones to come.
@@ -451,8 +456,11 @@ Exchange ModbusConnection::Implementation::write(int unit, const Pdu& request, s
 
 std::unique_ptr<ModbusPort> make_modbus_port(const ModbusLine& line) {
   if (const auto* rtu = std::get_if<ModbusRtu>(&line.link)) return std::make_unique<RtuPort>(*rtu);
-  return std::make_unique<TcpPort>(std::get<ModbusTcp>(line.link),
-                                   from_seconds(line.timeout_ms * 1e-3));
+  const auto& tcp = std::get<ModbusTcp>(line.link);
+  const nanoseconds timeout = from_seconds(line.timeout_ms * 1e-3);
+  auto port = std::make_unique<TcpPort>(tcp, timeout);
+  if (!tcp.s7) return port;
+  return make_s7_port(*tcp.s7, std::move(port), timeout);
 }
 
 ModbusConnection::ModbusConnection(const ModbusLine& line)

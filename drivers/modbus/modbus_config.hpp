@@ -18,7 +18,8 @@ namespace thermocomp {
 enum class Encoding { int16, uint16, int32, uint32, float32, float64 };
 /// Bytes of a value as they come over the wire; the most significant byte is A.
 enum class WordOrder { abcd, dcba, badc, cdab };
-enum class ModbusTable { coil, discrete_input, holding, input };
+/// The last is of an S7 CPU: a word of a data block.
+enum class ModbusTable { coil, discrete_input, holding, input, data_block };
 
 /// Number of registers a value takes: 1, 2 or 4.
 [[nodiscard]] constexpr std::size_t registers_of(Encoding encoding) noexcept {
@@ -45,11 +46,25 @@ enum class ModbusTable { coil, discrete_input, holding, input };
   return is_bit_table(table) ? 1 : registers_of(encoding);
 }
 
+/// One data block of an S7 CPU, over ISO-on-TCP: register n is its bytes 2 n and 2 n + 1.
+struct S7Block {
+  static constexpr int port = 102;
+  static constexpr int slots = 32;
+  static constexpr int byte_max = 65534;
+  static constexpr std::size_t pdu_bytes = 240;     ///< every CPU grants as many
+  static constexpr int registers_per_request{106};  ///< that can be written in one PDU
+  int db{1};
+  int rack{0};
+  int slot{1};
+  bool operator==(const S7Block&) const = default;
+};
+
 struct ModbusTcp {
   std::string host;
   int port{502};
   bool rtu_frames{false};  ///< as on a serial line: a serial server that passes bytes on
   bool datagrams{false};   ///< UDP
+  std::optional<S7Block> s7{};
   bool operator==(const ModbusTcp&) const = default;
 };
 struct ModbusRtu {
@@ -127,7 +142,13 @@ inline constexpr std::array modbus_kinds{"modbus_tcp", "modbus_rtu", "modbus_rtu
 [[nodiscard]] constexpr const char* kind_of(const ModbusLine& line) noexcept {
   const auto* tcp = std::get_if<ModbusTcp>(&line.link);
   if (tcp == nullptr) return modbus_kinds[1];
+  if (tcp->s7) return "s7";
   return tcp->rtu_frames ? modbus_kinds[2] : tcp->datagrams ? modbus_kinds[3] : modbus_kinds[0];
+}
+
+[[nodiscard]] constexpr const S7Block* s7_of(const ModbusLine& line) noexcept {
+  const auto* tcp = std::get_if<ModbusTcp>(&line.link);
+  return tcp != nullptr && tcp->s7 ? &*tcp->s7 : nullptr;
 }
 
 struct ModbusBusConfig {

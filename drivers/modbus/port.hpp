@@ -47,6 +47,9 @@ class ModbusPort {
   /// What is there, without waiting.
   virtual PortBytes receive(std::span<std::uint8_t> into) noexcept = 0;
 
+  /// Why the newest request was refused; empty: the code of the exception says all.
+  [[nodiscard]] virtual std::string refusal() const { return {}; }
+
   /// @return false when cancelled
   virtual bool pause_until(nanoseconds time) noexcept = 0;
   /// For good: every present and future wait ends at once.
@@ -58,5 +61,12 @@ class ModbusPort {
 /// @pre check_line() has passed
 /// @throws DriverError when the system has no more descriptors
 [[nodiscard]] std::unique_ptr<ModbusPort> make_modbus_port(const ModbusLine& line);
+
+/// A data block of an S7 CPU behind the face of a Modbus TCP line, so that time-outs, late answers
+/// and lost connections are handled in one place.
+/// @param tcp  carries the bytes. @param timeout  for each answer while it opens
+[[nodiscard]] std::unique_ptr<ModbusPort> make_s7_port(const S7Block& block,
+                                                       std::unique_ptr<ModbusPort> tcp,
+                                                       nanoseconds timeout);
 
 }  // namespace thermocomp

@@ -9,6 +9,8 @@ namespace {
 /// Lines with the same text are one.
 std::string address_of(const ModbusLine& line) {
   std::string text = kind_of(line);
+  if (const S7Block* s7 = s7_of(line))
+    for (const int part : {s7->db, s7->rack, s7->slot}) text += ' ' + std::to_string(part);
   if (const auto* tcp = std::get_if<ModbusTcp>(&line.link))
     return text + ' ' + tcp->host + ' ' + std::to_string(tcp->port) +
            (line.ignore_transaction ? " any" : "");

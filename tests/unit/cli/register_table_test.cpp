@@ -115,3 +115,13 @@ TEST_CASE("a piezo's registers are volts, and no controller has none", "[cli][re
   CHECK_THAT(register_table(example("piezo.toml")), Contains("voltage of axis"));
   CHECK_THAT(register_table(example("modbus_rtu.toml")), Contains("there is no controller"));
 }
+
+TEST_CASE("a data block is shown as a PLC's programmer writes it", "[cli][registers]") {
+  const std::string text = register_table(example("s7.toml"));
+  for (const char* part :
+       {"s7 192.168.10.30:102, rack 0, slot 1, DB100, every 0.1 s", "optimized block access off",
+        "DBD 0    DINT  offset of axis z", "DBW 6    WORD  heartbeat",
+        "DBD 8    DINT  applied offset of axis z", "DBW 12   INT   spindle_rpm"})
+    CHECK_THAT(text, Contains(part));
+  for (const char* part : {"function", "unit 1", "read along"}) CHECK_THAT(text, !Contains(part));
+}

@@ -187,7 +187,7 @@ const std::vector<Broken>& broken_small_machine() {
       // ---- controller
       {"controller kind", "kind = \"modbus_tcp\"                      # dry_run",
        "kind = \"profinet\"                      # dry_run", "", "controller.kind",
-       "\"dry_run\" \"modbus_tcp\" \"modbus_rtu\" \"modbus_rtu_over_tcp\" \"modbus_udp\" "
+       "\"dry_run\" \"modbus_tcp\" \"modbus_rtu\" \"modbus_rtu_over_tcp\" \"modbus_udp\" \"s7\" "
        "\"piezo_tcp\" \"piezo_rtu\" \"can\" "
        "\"linuxcnc\""},
       {"controller host", "host = \"192.168.10.30\"", "host = \"1.2.3\"", "", "controller.host",

@@ -157,7 +157,8 @@ TEST_CASE("a dry run reads back what it is offered", "[config]") {
 }
 
 TEST_CASE("any controller can be run dry", "[config]") {
-  for (const char* name : {"small_machine.toml", "modbus_tcp.toml", "can.toml", "piezo.toml"}) {
+  for (const char* name :
+       {"small_machine.toml", "modbus_tcp.toml", "can.toml", "piezo.toml", "s7.toml"}) {
     INFO(name);
     const std::string text = example(name);
     const bool is_small = std::string(name) == "small_machine.toml";
@@ -271,6 +272,31 @@ TEST_CASE("a correction's groups are inputs of the model, each named once", "[co
   for (const auto& [text, rule] : bad) {
     INFO(text);
     CHECK_THROWS_WITH(parse(with(text)), Catch::Contains(rule));
+  }
+}
+
+TEST_CASE("a data block's places are bytes, each written for one purpose", "[config]") {
+  const DaemonConfig config = load_daemon_config(examples / "s7.toml");
+  const auto& controller = std::get<ModbusControllerConfig>(config.controller);
+  const S7Block* block = s7_of(controller.line);
+  REQUIRE(block != nullptr);
+  CHECK(*block == S7Block{100, 0, 1});
+  CHECK(controller.heartbeat->address == 3);  // words
+  CHECK(config.estimator.controller_reads_back);
+  const std::string text = example("s7.toml");
+  const std::vector<std::pair<std::pair<std::string, std::string>, const char*>> bad = {
+      {{"heartbeat = { address = 6", "heartbeat = { address = 4"}, "byte 4 is written by"},
+      {{"heartbeat = { address = 6", "heartbeat = { address = 7"}, "must be even"},
+      {{"db = 100", "db = 0"}, "[1, 65535]"},
+      {{"db = 100", ""}, "must be given"},
+      {{"slot = 1", "slot = 32"}, "[0, 31]"},
+      {{"db = 100", "db = 100\nunit = 1"}, "makes no sense for kind = \"s7\""},
+      {{"address = 12\n", "address = 12\ntable = \"holding\"\n"}, "makes no sense"},
+  };
+  for (const auto& [edit, rule] : bad) {
+    INFO(edit.second);
+    CHECK_THROWS_WITH(parse(edited(text, edit.first, edit.second), "column_model.toml"),
+                      Catch::Contains(rule));
   }
 }
 

@@ -46,8 +46,8 @@ void check_place(const ModbusValue& value, const char* key) {
 
 void check_written(const ModbusValue& value, const char* key) {
   check_place(value, key);
-  require(value.table == ModbusTable::holding, key, value.address,
-          "only holding registers can be written");
+  require(value.table == ModbusTable::holding || value.table == ModbusTable::data_block, key,
+          value.address, "only holding registers can be written");
 }
 
 void check_config(const ModbusControllerConfig& config) {
@@ -412,9 +412,10 @@ bool ModbusDialogue::write(const WriteField& request) {
   ++health_.write_errors;
   WriteHealth& told = health_.write;
   ++(refused_ ? told.refused : told.unanswered);
-  told.function = config_.write_function;
-  told.address = request.address;
-  told.exception = exchange.exception_code;
+  const bool is_s7 = s7_of(config_.line) != nullptr;  // then the text alone has the place
+  told.function = is_s7 ? 0 : config_.write_function;
+  told.address = is_s7 ? 0 : request.address;
+  told.exception = is_s7 ? exchange.exception_code & 0x7F : exchange.exception_code;
   health_.last_error = told.error = write_error(config_, request, exchange);
   return false;
 }
@@ -437,6 +438,11 @@ bool ModbusDialogue::note_unread(const ReadRequest& request, const Exchange& exc
   const bool is_block = request.count > registers_of(Encoding::float64) && refused_;
   const std::scoped_lock lock(health_mutex_);
   ++health_.read_errors;
+  if (const S7Block* s7 = s7_of(config_.line)) {
+    health_.last_error =
+        "reading " + s7_place(*s7, request.address, request.count) + ": " + exchange.detail;
+    return false;
+  }
   health_.last_error =
       "reading " + std::to_string(request.address) +
       (request.count > 1 ? ".." + std::to_string(last) : "") + ": " + describe(exchange) +

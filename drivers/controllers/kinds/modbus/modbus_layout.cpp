@@ -78,13 +78,21 @@ std::string describe(const Exchange& exchange) {
   return "exception " + std::to_string(exchange.exception_code) + " (" + exchange.detail + ")";
 }
 
+std::string s7_place(const S7Block& s7, std::size_t address, std::size_t count) {
+  return "DB" + std::to_string(s7.db) + ", bytes " + std::to_string(2 * address) + ".." +
+         std::to_string(2 * (address + count) - 1);
+}
+
 std::string write_error(const ModbusControllerConfig& config, const WriteField& request,
                         const Exchange& exchange) {
+  const std::string begins =
+      is_refused(exchange) ? "the controller refuses writes" : "no write is answered";
+  if (const S7Block* s7 = s7_of(config.line))
+    return begins + " (" + s7_place(*s7, request.address, request.words.size()) +
+           "): " + exchange.detail;
   const bool may_take_one = config.write_function != ModbusControllerConfig::one_register &&
                             exchange.exception_code == illegal_function;
-  return std::string(is_refused(exchange) ? "the controller refuses writes"
-                                          : "no write is answered") +
-         " (function " + std::to_string(config.write_function) + ", register " +
+  return begins + " (function " + std::to_string(config.write_function) + ", register " +
          std::to_string(request.address) + "): " + describe(exchange) +
          (may_take_one ? "; if it takes single registers only, write_function = 6" : "");
 }

@@ -60,6 +60,8 @@ Exchange write_field(ModbusConnection& connection, const ModbusControllerConfig&
 [[nodiscard]] bool is_refused(const Exchange& exchange) noexcept;
 /// "exception 1 (Illegal function)", or what came.
 [[nodiscard]] std::string describe(const Exchange& exchange);
+/// "DB100, bytes 0..9"
+[[nodiscard]] std::string s7_place(const S7Block& s7, std::size_t address, std::size_t count);
 /// "the controller refuses writes (function 16, register 200): exception 1 (Illegal function)", and
 /// what may help.
 [[nodiscard]] std::string write_error(const ModbusControllerConfig& config,

@@ -14,7 +14,7 @@ double value_of(const ModbusValue& place, std::span<const std::uint16_t> words) 
 
 ReadRequest request_of(const ModbusAxis& axis) {
   if (!axis.travel)
-    return {ModbusTable::holding, axis.offset.address, registers_of(axis.offset.encoding)};
+    return {axis.offset.table, axis.offset.address, registers_of(axis.offset.encoding)};
   const ModbusValue& end = axis.travel->end;
   const std::uint16_t begin = axis.travel->begin.address;
   return {ModbusTable::holding, begin, end.address + registers_of(end.encoding) - begin};
