@@ -8,7 +8,8 @@ namespace {
 class ModbusSection final : public BusSection {
  public:
   ModbusSection(const TomlTable& table, const std::string& name, const std::string& kind,
-                BusFiles& files) {
+                BusFiles& files)
+      : files_(files) {
     bus_.name = name;
     bus_.line = read_modbus_line(table, kind);
     refuse_all(table, {"interface", "dbc"}, "makes no sense on a Modbus bus");
@@ -44,6 +45,11 @@ class ModbusSection final : public BusSection {
                             "must be int32, uint32 or float32: a register has 32 bits "
                             "(wide_registers)");
     tables.check_period(on.period_s, "period_s of the device " + on.name);
+    std::string place = "modbus " + bus_.name;
+    for (const int part :
+         {on.unit, static_cast<int>(channel.table), int{channel.address}, int{channel.mask}})
+      place += ' ' + std::to_string(part);
+    files_.note_place(tables, place);
     on.channels.push_back(std::move(channel));
   }
 
@@ -61,6 +67,7 @@ class ModbusSection final : public BusSection {
     }
   }
 
+  BusFiles& files_;
   ModbusBusConfig bus_;
 };
 

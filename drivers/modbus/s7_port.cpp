@@ -131,7 +131,7 @@ constexpr const char* permit =
 /// @param code  of the item
 std::string refusal_of(int code, const std::string& block) {
   const std::string optimised = "clear \"Optimized block access\" of it and load it again";
-  const std::string text = "return code " + hex_code(code);
+  std::string text = "return code " + hex_code(code);
   switch (code) {
     case 0x03:
       return text + " (access is not allowed): " + permit;

@@ -275,6 +275,17 @@ TEST_CASE("a correction's groups are inputs of the model, each named once", "[co
   }
 }
 
+TEST_CASE("two sensors on one register are remarked on", "[config]") {
+  const std::string text = example("modbus_tcp.toml");
+  CHECK(parse(text, "column_model.toml").remarks.empty());
+  const auto remarks =
+      parse(edited(text, "address = 1\nstatus", "address = 0\nstatus"), "column_model.toml")
+          .remarks;
+  REQUIRE(remarks.size() == 1);
+  CHECK_THAT(remarks.front(),
+             Catch::EndsWith(": sensor[spindle]: reads the same value as sensor[column]"));
+}
+
 TEST_CASE("a data block's places are bytes, each written for one purpose", "[config]") {
   const DaemonConfig config = load_daemon_config(examples / "s7.toml");
   const auto& controller = std::get<ModbusControllerConfig>(config.controller);
