@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "config/runs/robust.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
 
@@ -20,15 +21,8 @@ constexpr double share_max = 0.1;  ///< of the values; more are no blunders but 
 constexpr std::size_t stuck_rows_min = 10;
 constexpr std::size_t stuck_longer_min = 3;  ///< than the second longest stretch of one value
 constexpr std::size_t times_named_max = 6;
-constexpr double as_sd = 1.4826;  ///< of the median of |x|, for Gaussian x
 
 using Values = std::vector<double>;
-
-double median(Values values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The straight line through those beside an end, at the end; slopes are a median of pairs.
 double line_at_end(const Values& values, bool front) {
@@ -47,18 +41,10 @@ double line_at_end(const Values& values, bool front) {
 Values leaps_of(const Values& values) {
   Values leaps(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::size_t half = std::min({side, i, values.size() - 1 - i});
-    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(i - half);
-    const auto end = values.begin() + static_cast<std::ptrdiff_t>(i + half + 1);
-    leaps[i] = values[i] - (half == 0 ? line_at_end(values, i == 0) : median(Values(begin, end)));
+    const bool at_end = i == 0 || i + 1 == values.size();
+    leaps[i] = values[i] - (at_end ? line_at_end(values, i == 0) : median_around(values, i, side));
   }
   return leaps;
-}
-
-double size_of_most(const Values& values) {
-  Values sizes;
-  for (const double each : values) sizes.push_back(std::abs(each));
-  return as_sd * median(std::move(sizes));
 }
 
 /// The way from the least to the most of the running medians, without their outermost hundredths.
@@ -84,7 +70,7 @@ Blunders blunders_of(const RunFile& run, const std::string& column) {
   // Once more without those found: one beside an end bends the line there.
   while (values.size() >= rows_min) {
     const Values leaps = leaps_of(values);
-    const double usual_um = usual_deviations * size_of_most(leaps);
+    const double usual_um = usual_deviations * robust_deviation(leaps);
     const double way_um = way_of(values, leaps);
     const double limit_um = std::max(usual_um, share_of_way * way_um);
     const double limit_at_end_um = std::max(usual_um, share_of_way_at_end * way_um);
@@ -114,37 +100,24 @@ Blunders stuck_of(const RunFile& run, const std::string& column) {
   found.column = column;
   found.stuck = true;
   const Values& values = run.column(column);
-  std::size_t begin = 0;
-  std::size_t longest = 0;
-  std::size_t second = 1;
-  std::size_t row = 0;
-  for (std::size_t end = 1; end <= values.size(); ++end) {
-    if (end < values.size() && values[end] == values[row]) continue;
-    if (end - row > longest) {
-      second = std::max(second, longest);
-      longest = end - row;
-      begin = row;
-    } else {
-      second = std::max(second, end - row);
-    }
-    row = end;
-  }
-  const std::size_t end = begin + longest;
-  if (longest < stuck_rows_min || longest < stuck_longer_min * second || end >= values.size())
+  const auto [still, second] = longest_still(values);
+  if (still.rows() < stuck_rows_min || still.rows() < stuck_longer_min * second ||
+      still.end >= values.size())
     return found;
   Values changes;
   for (std::size_t i = 1; i < values.size(); ++i)
-    if ((i <= begin || i > end) && std::isfinite(values[i] - values[i - 1]))
+    if ((i <= still.begin || i > still.end) && std::isfinite(values[i] - values[i - 1]))
       changes.push_back(values[i] - values[i - 1]);
   if (changes.size() < rows_min) return found;
   Values finite = values;
   std::erase_if(finite, [](double each) { return !std::isfinite(each); });
   const auto [least, most] = std::minmax_element(finite.begin(), finite.end());
   found.limit_um =
-      std::max(usual_deviations * size_of_most(changes), share_of_way * (*most - *least));
-  found.size_um = values[end] - values[end - 1];
+      std::max(usual_deviations * robust_deviation(changes), share_of_way * (*most - *least));
+  found.size_um = values[still.end] - values[still.end - 1];
   if (!(found.limit_um > 0 && std::abs(found.size_um) > found.limit_um)) return found;
-  for (std::size_t i = begin + 1; i < end; ++i) found.times_s.push_back(run.time_s()[i]);
+  for (std::size_t i = still.begin + 1; i < still.end; ++i)
+    found.times_s.push_back(run.time_s()[i]);
   return found;
 }
 

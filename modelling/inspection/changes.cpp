@@ -6,10 +6,10 @@
 
 #include <Eigen/LU>
 
+#include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
 #include "modelling/inspection/expectation.hpp"
-#include "modelling/inspection/robust.hpp"
 
 namespace thermocomp::inspection {
 namespace {

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <limits>
 
+#include "config/runs/robust.hpp"
 #include "modelling/inspection/inspection.hpp"
-#include "modelling/inspection/robust.hpp"
 
 namespace thermocomp::inspection {
 namespace {

@@ -7,7 +7,6 @@
 
 #include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
-#include "modelling/inspection/robust.hpp"
 
 namespace thermocomp::inspection {
 namespace {

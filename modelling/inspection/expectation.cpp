@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "modelling/inspection/robust.hpp"
+#include "config/runs/robust.hpp"
 
 namespace thermocomp::inspection {
 namespace {
@@ -22,6 +22,12 @@ constexpr double wild_share = 0.3;  // a lone step of 2 K in 1000 rows adds 0.02
 constexpr double offset_prior_share = 1e-8;  // an offset a run costs nothing
 
 }  // namespace
+
+double spread(const Eigen::Ref<const Eigen::VectorXd>& values) {
+  if (values.size() < 2) return 0.0;
+  const double mean = values.mean();
+  return std::sqrt((values.array() - mean).square().sum() / static_cast<double>(values.size() - 1));
+}
 
 Expectation::Expectation(const VectorXd& y, const MatrixXd& x, const VectorXd& prior,
                          const std::vector<Index>& begins)
@@ -70,7 +76,8 @@ void Expectation::solve(const VectorXd& y, const MatrixXd& x, const VectorXd& pr
   innovations_ = white_y - white * solution;
   basis_ = factor.matrixL().solve(white.transpose()).transpose();
   // Wild values make more than the median of them says.
-  sigma_ = std::max({robust_deviation(innovations_), wild_share * spread(innovations_), 1e-9});
+  const std::vector<double> innovations(innovations_.begin(), innovations_.end());
+  sigma_ = std::max({robust_deviation(innovations), wild_share * spread(innovations_), 1e-9});
 }
 
 void Expectation::estimate_rho() {

@@ -8,6 +8,9 @@
 
 namespace thermocomp::inspection {
 
+/// Standard deviation; 0 of fewer than two values.
+[[nodiscard]] double spread(const Eigen::Ref<const Eigen::VectorXd>& values);
+
 /// y = X b + an offset per run + n, n_t = rho n_(t-1) + white, with priors b_i ~ N(0, prior_i^2):
 /// ridge regression on whitened rows, rho from the remainder. A fault's shape f is judged by
 /// f'Mr / (sigma sqrt(f'Mf)) with M the projection that takes out what the regression could take

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
-#include "modelling/inspection/robust.hpp"
 
 namespace thermocomp::inspection {
 namespace {

@@ -2,9 +2,9 @@
 #include <cmath>
 #include <limits>
 
+#include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
 #include "modelling/inspection/checks.hpp"
-#include "modelling/inspection/robust.hpp"
 
 namespace thermocomp::inspection {
 namespace {
@@ -19,13 +19,6 @@ constexpr double coarse_um_min = 1.0;
 constexpr std::size_t stuck_rows_min = 10;
 constexpr double others_moved_K_min = 1.0;
 constexpr std::size_t copy_values_min = 20;  // different ones; fewer agree by chance
-
-double median_around(const std::vector<double>& column, std::size_t row) {
-  // As many on both sides, so that a slope is no leap.
-  const std::size_t half = std::min({half_window, row, column.size() - 1 - row});
-  return median({column.begin() + static_cast<std::ptrdiff_t>(row - half),
-                 column.begin() + static_cast<std::ptrdiff_t>(row + half + 1)});
-}
 
 Suspicion suspicion(const std::string& kind, const std::string& column, std::size_t run,
                     double at_s, double until_s, double size, double score) {
@@ -45,7 +38,7 @@ Suspicion suspicion(const std::string& kind, const std::string& column, std::siz
 bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double leap) {
   for (std::size_t i = 0; i < run.columns.size(); ++i) {
     if (i == column || !is_temperature(run.columns[i])) continue;
-    const double other = run.values[i][row] - median_around(run.values[i], row);
+    const double other = run.values[i][row] - median_around(run.values[i], row, half_window);
     if (other / leap > 0.3) return true;
   }
   return false;
@@ -55,10 +48,10 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
   std::vector<double>& values = run.values[column];
   const bool output = is_output(run.columns[column]);
   std::vector<double> around(values.size());
-  Eigen::VectorXd leaps(static_cast<Eigen::Index>(values.size()));
+  std::vector<double> leaps(values.size());
   for (std::size_t row = 0; row < values.size(); ++row) {
-    around[row] = median_around(values, row);
-    leaps[static_cast<Eigen::Index>(row)] = values[row] - around[row];
+    around[row] = median_around(values, row, half_window);
+    leaps[row] = values[row] - around[row];
   }
   double deviation = robust_deviation(leaps);
   // Where most rows hold still, those that move say how far it moves.
@@ -73,7 +66,7 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
       suspicion(output ? "outliers" : "spikes", run.columns[column], index, 0, 0, 0, 0);
   std::vector<std::size_t> leapt;
   for (std::size_t row = 1; row + 1 < values.size(); ++row) {
-    const double leap = leaps[static_cast<Eigen::Index>(row)];
+    const double leap = leaps[row];
     if (!(std::abs(leap) > least) || others_leap(run, column, row, leap)) continue;
     made.finding.times_s.push_back(run.time_s()[row]);
     if (std::abs(leap) > std::abs(made.finding.size)) made.finding.size = leap;
@@ -87,31 +80,7 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
   found.push_back(made);
 }
 
-/// Rows of one and the same value.
-struct Stretch {
-  std::size_t begin{0};
-  std::size_t end{0};
-  [[nodiscard]] std::size_t rows() const noexcept { return end - begin; }
-};
-
-std::pair<Stretch, std::size_t> longest_still(const std::vector<double>& values) {
-  Stretch longest;
-  std::size_t second = 1;
-  for (std::size_t begin = 0; begin < values.size();) {
-    std::size_t end = begin + 1;
-    while (end < values.size() && values[end] == values[begin]) ++end;
-    if (end - begin > longest.rows()) {
-      second = std::max(second, longest.rows());
-      longest = {begin, end};
-    } else {
-      second = std::max(second, end - begin);
-    }
-    begin = end;
-  }
-  return {longest, second};
-}
-
-double range_of(const std::vector<double>& values, Stretch rows) {
+double range_of(const std::vector<double>& values, StillRows rows) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (std::size_t row = rows.begin; row < rows.end; ++row) {

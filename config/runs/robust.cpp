@@ -1,0 +1,49 @@
+#include "config/runs/robust.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace thermocomp {
+
+double median(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return !std::isfinite(value); });
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double robust_deviation(std::span<const double> values) {
+  constexpr double normal = 1.4826;
+  std::vector<double> all(values.begin(), values.end());
+  const double middle = median(all);
+  for (double& value : all) value = std::abs(value - middle);
+  const double deviation = normal * median(std::move(all));
+  return std::isfinite(deviation) ? deviation : 0.0;
+}
+
+double median_around(const std::vector<double>& values, std::size_t row, std::size_t side) {
+  const std::size_t half = std::min({side, row, values.size() - 1 - row});
+  return median({values.begin() + static_cast<std::ptrdiff_t>(row - half),
+                 values.begin() + static_cast<std::ptrdiff_t>(row + half + 1)});
+}
+
+std::pair<StillRows, std::size_t> longest_still(const std::vector<double>& values) {
+  StillRows longest;
+  std::size_t second = 1;
+  for (std::size_t begin = 0; begin < values.size();) {
+    std::size_t end = begin + 1;
+    while (end < values.size() && values[end] == values[begin]) ++end;
+    if (end - begin > longest.rows()) {
+      second = std::max(second, longest.rows());
+      longest = {begin, end};
+    } else {
+      second = std::max(second, end - begin);
+    }
+    begin = end;
+  }
+  return {longest, second};
+}
+
+}  // namespace thermocomp
