@@ -150,11 +150,12 @@ if(THERMOCOMP_SANITIZE)
 endif()
 
 # thermocomp_test(NAME SOURCES file... LINKS target... [TIMEOUT s] [LABELS label...]
-#                 [ARGUMENTS argument...] [SLOW])
+#                 [ARGUMENTS argument...] [SLOW] [WAITS])
 # One Catch2 program and one ctest entry; ARGUMENTS are Catch2's, to select tests. All but those that
-# are SLOW are a part of ./test.sh --quick.
+# are SLOW are a part of ./test.sh --quick. WAITS: the program waits for nearly all of its time, with
+# sanitizers too, and takes one place.
 function(thermocomp_test name)
-  cmake_parse_arguments(arg "SLOW" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
+  cmake_parse_arguments(arg "SLOW;WAITS" "TIMEOUT" "SOURCES;LINKS;LABELS;ARGUMENTS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE thermocomp_flags thermocomp_catch_main ${arg_LINKS})
   thermocomp_use_precompiled(${name} thermocomp_precompiled_catch)
@@ -169,6 +170,10 @@ function(thermocomp_test name)
     endif()
     add_dependencies(quick_tests ${name})
   endif()
+  set(places ${THERMOCOMP_COMPUTES})
+  if(arg_WAITS)
+    set(places 1)
+  endif()
   set_tests_properties(${name} PROPERTIES
-    TIMEOUT ${arg_TIMEOUT} PROCESSORS ${THERMOCOMP_COMPUTES} LABELS "${arg_LABELS}")
+    TIMEOUT ${arg_TIMEOUT} PROCESSORS ${places} LABELS "${arg_LABELS}")
 endfunction()

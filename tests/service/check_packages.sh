@@ -15,7 +15,7 @@ mkdir -p "$folder"
 packages=$folder/packages
 
 began=$SECONDS
-if ! "$here/build_packages.sh" "$source_tree" "$packages" > "$folder/packages.log" 2>&1; then
+if ! nice -n 10 "$here/build_packages.sh" "$source_tree" "$packages" > "$folder/packages.log" 2>&1; then
   tail -n 60 "$folder/packages.log"
   exit 1
 fi

@@ -59,13 +59,10 @@ double ki_of(const identification::TiedCoefficients& k) {
 }
 
 TEST_CASE("one tie and two are what finite elements of the gate machine say", "[tiebar][fe]") {
-  // Below the work in the heated zone and above it, at the work, and above; then two.
-  const auto ties =
-      GENERATE(std::vector<FiniteTie>{{150, 150}}, std::vector<FiniteTie>{{250, 150}},
-               std::vector<FiniteTie>{{400, 150}}, std::vector<FiniteTie>{{600, 150}},
-               std::vector<FiniteTie>{{600, 600}}, std::vector<FiniteTie>{{750, 150}},
-               std::vector<FiniteTie>{{900, 150}}, std::vector<FiniteTie>{{250, 150}, {750, 150}},
-               std::vector<FiniteTie>{{400, 150}, {900, 300}});
+  // Below the work in the heated zone and above it, at the work, and above; then two of two sizes.
+  const auto ties = GENERATE(std::vector<FiniteTie>{{150, 150}}, std::vector<FiniteTie>{{400, 150}},
+                             std::vector<FiniteTie>{{600, 600}}, std::vector<FiniteTie>{{900, 150}},
+                             std::vector<FiniteTie>{{400, 150}, {900, 300}});
   const TiedStructure gate(ties, step_s, Elements::refined);
   const auto fe = gate.coefficients();
   const auto beams = beams_of(gate.columns());
