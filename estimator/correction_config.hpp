@@ -9,7 +9,18 @@ namespace thermocomp {
 
 inline constexpr std::size_t correction_groups_max = 4;
 
-enum class CorrectionForm { off, two_phase, recursive };
+enum class CorrectionForm {
+  off,
+  two_phase,
+  recursive,
+  constant  ///< Ci of the publication's earlier form, Ki (A - B) - Ci; the gains stay
+};
+/// two_phase, phase 1 (Teratani et al. 1995).
+enum class FirstGain {
+  consistent,  ///< the estimate becomes what was measured
+  eq_34,       ///< measured / predicted: right only while the tie is cold
+  eq_31        ///< measured / the heat source's share: right only while the tie is cold
+};
 /// What an operator's or a probe's `measured` is: what remains at the tool with the offset in
 /// effect, or the displacement as it would be without any.
 enum class MeasuredMeaning { remaining, total };
@@ -19,8 +30,7 @@ struct CorrectionConfig {
   /// Inputs that share a gain. two_phase: two groups, the heat source's and the tie's.
   std::vector<std::vector<std::string>> groups;
   MeasuredMeaning measured{MeasuredMeaning::remaining};
-  bool as_printed{
-      false};  ///< two_phase: R_1 = measured / predicted, right only while the tie is cold
+  FirstGain first_gain{FirstGain::consistent};
   double noise_um{1.0};  ///< standard deviation of a probing
   double turn_um{3.0};   ///< two_phase: phase 2 begins once it has come back by this much
   double contribution_um_min{3.0};  ///< a smaller one cannot tell its gain

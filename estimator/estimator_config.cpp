@@ -26,6 +26,8 @@ void SmoothingConfig::validate() const {
   require(period_s >= 0 && period_s <= 3600, "period_s", period_s, "must be in [0, 3600]");
   require(samples >= 3 && samples <= 32, "samples", static_cast<double>(samples),
           "must be a whole number in [3, 32]");
+  require(blocks >= 1 && blocks <= smoothing_blocks_max, "blocks", static_cast<double>(blocks),
+          "must be a whole number in [1, 6]");
   require(half_width_K > 0 && half_width_K <= 100, "half_width_K", half_width_K,
           "must be in (0, 100]");
   require(outage_s > 0 && outage_s <= 86400, "outage_s", outage_s, "must be in (0, 86400]");

@@ -31,12 +31,15 @@ struct ScreeningConfig {
 enum class SmoothingForm { off, sliding_line, line_of_lines };
 enum class SmoothingHistory { raw, screened };
 
+inline constexpr std::size_t smoothing_blocks_max = 6;
+
 /// JPH0736976B2: sliding_line is claim 1 (form A), line_of_lines is claim 2 (form B).
 struct SmoothingConfig {
   SmoothingForm form{SmoothingForm::sliding_line};
   SmoothingHistory history{SmoothingHistory::screened};
   double period_s{60.0};     ///< one value of the sensor per period; 0: every reading
   std::size_t samples{6};    ///< n, values in a line (3..32)
+  std::size_t blocks{3};     ///< line_of_lines: lines that the expected one follows (1..6)
   double half_width_K{0.3};  ///< w, half the band
   double outage_s{5.0};      ///< a gap longer than this and than two periods restarts the history
   void validate() const;     ///< @throws InvalidValue

@@ -79,6 +79,51 @@ std::vector<std::string> ThermalModel::signal_columns() const {
   return columns;
 }
 
+const DiameterSpec* diameter_of(const ThermalModel& model, std::string_view output) noexcept {
+  for (const DiameterSpec& diameter : model.diameters)
+    if (diameter.output == output) return &diameter;
+  return nullptr;
+}
+
+std::string half_of(const DiameterSpec& diameter) {
+  return std::string(diameter.sign < 0 ? "-half of " : "half of ") + diameter.output;
+}
+
+ThermalModel of_axes(ThermalModel model) {
+  for (const DiameterSpec& diameter : model.diameters) {
+    const double half = 0.5 * diameter.sign;
+    const auto scale = [half](std::vector<double>& values) {
+      for (double& value : values) value *= half;
+    };
+    for (std::size_t o = 0; o < model.outputs.size(); ++o)
+      if (model.outputs[o] == diameter.output) scale(model.matrix_um_per_K[o]);
+    for (GuidewaySpec& guideway : model.guideways)
+      if (const auto rows = guideway.rows_um_per_K.find(diameter.output);
+          rows != guideway.rows_um_per_K.end())
+        for (std::vector<double>& row : rows->second) scale(row);
+    for (TermSpec& term : model.terms) {
+      for (auto& [name, by_output] : term.per_output)
+        if (const auto value = by_output.find(diameter.output); value != by_output.end())
+          value->second *= half;
+      if (const auto rows = term.bank.gain_um_per_unit.find(diameter.output);
+          rows != term.bank.gain_um_per_unit.end())
+        for (std::vector<double>& row : rows->second) scale(row);
+      if (const auto width = term.shared.find("width_um");
+          term.subject == diameter.output && width != term.shared.end())
+        width->second *= 0.5;
+    }
+    if (!model.made_from) continue;
+    const auto found = model.made_from->outputs.find(diameter.output);
+    if (found == model.made_from->outputs.end()) continue;
+    MadeFrom::Output& left = found->second;
+    for (double* const um :
+         {&left.remainder_rms_um, &left.noise_um, &left.left_out_rms_um, &left.no_model_rms_um})
+      *um *= 0.5;
+  }
+  model.diameters.clear();
+  return model;
+}
+
 bool is_compared(const ThermalModel& model) {
   return model.made_from &&
          std::all_of(model.outputs.begin(), model.outputs.end(), [&](const std::string& output) {

@@ -132,6 +132,15 @@ struct RecordedCourse {
   bool operator==(const RecordedCourse& other) const = default;
 };
 
+/// `[[diameter]]`: an output that is a diameter of the work, twice what the axis has to move.
+struct DiameterSpec {
+  std::string output;  ///< "dia_um"
+  std::string axis;    ///< of the daemon's file, "x"
+  double sign{1.0};    ///< -1: the diameter grows as the axis moves in its negative direction
+
+  bool operator==(const DiameterSpec& other) const = default;
+};
+
 /// delta = P (T - T_ref) + guideway rows + terms. Shapes: matrix (outputs, inputs).
 struct ThermalModel {
   std::vector<std::string> inputs;   ///< temperature columns, e.g. "t1_degC"
@@ -146,6 +155,7 @@ struct ThermalModel {
   CovarianceGrowth covariance_growth;
   std::optional<MadeFrom> made_from;
   std::optional<RecordedCourse> course;
+  std::vector<DiameterSpec> diameters;
 
   /// Inputs, then every further temperature that a term names, in order of first use.
   [[nodiscard]] std::vector<std::string> temperature_columns() const;
@@ -157,6 +167,15 @@ struct ThermalModel {
 /// displacement that it was not fitted to (`[made_from]`). Without it, as with an example or a
 /// computed model, nothing tells whether size and sign are those of any machine.
 [[nodiscard]] bool is_compared(const ThermalModel& model);
+
+/// nullptr: the output is none.
+[[nodiscard]] const DiameterSpec* diameter_of(const ThermalModel& model,
+                                              std::string_view output) noexcept;
+/// "half of dia_um", "-half of dia_um": what the axis takes out.
+[[nodiscard]] std::string half_of(const DiameterSpec& diameter);
+/// The same model with its diameters as displacements of their axes: half of them, with their
+/// sign, in matrix, guideways, terms and remainders.
+[[nodiscard]] ThermalModel of_axes(ThermalModel model);
 
 /// What the subject of a kind of term is, and which parameters it takes.
 struct TermParameter {

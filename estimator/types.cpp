@@ -66,6 +66,18 @@ std::string_view to_string(CommandKind kind) noexcept {
   return "unknown";
 }
 
+std::string_view to_string(MeasuredSource source) noexcept {
+  switch (source) {
+    case MeasuredSource::probe:
+      return "probe";
+    case MeasuredSource::part:
+      return "part";
+    case MeasuredSource::wear:
+      return "wear";
+  }
+  return "unknown";
+}
+
 std::string_view to_string(StartEvidence evidence) noexcept {
   switch (evidence) {
     case StartEvidence::unknown:

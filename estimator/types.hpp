@@ -107,11 +107,24 @@ enum class CommandKind : std::uint8_t {
 inline constexpr std::size_t command_kinds_count = 10;
 [[nodiscard]] std::string_view to_string(CommandKind kind) noexcept;
 
+/// Where a `measured` comes from.
+enum class MeasuredSource : std::uint8_t {
+  probe,  ///< a probe or indicator on the machine
+  part,   ///< a part that was measured
+  wear    ///< the same, and the operator has entered its negative at the controller already
+};
+inline constexpr std::size_t measured_sources_count = 3;
+[[nodiscard]] std::string_view to_string(MeasuredSource source) noexcept;
+
 struct Command {
   CommandKind kind{CommandKind::enable};
   std::uint32_t axis{
       0};  ///< `measured`, `prove`, `release`, `saved`: index of the axis; `accept`: of the sensor
   double value_um{0.0};  ///< for `measured`, `prove` and `saved` [um]
+  // Of `measured`:
+  std::uint32_t sd_nm{0};  ///< standard deviation; 0: as configured
+  std::uint32_t ago_s{0};  ///< so long ago the tool was where it was measured
+  MeasuredSource source{MeasuredSource::probe};
 };
 
 /// What an axis' first offset on a link was known by, the best evidence first.

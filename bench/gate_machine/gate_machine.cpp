@@ -153,7 +153,7 @@ Left residual(const Course& course, const Measured& readings, const CorrectionCo
     left.high = std::max(left.high, um);
     if (i > 2 * probing_every_steps) left.later_peak = std::max(left.later_peak, std::abs(um));
     if (probed && i > 0 && i % probing_every_steps == 0) {
-      correction.measured(readings.probed_um[i], model_um);
+      correction.measured({readings.probed_um[i], model_um});
     }
   }
   return left;
@@ -176,7 +176,7 @@ CorrectionConfig two_phase(bool printed_form) {
   CorrectionConfig config;
   config.form = CorrectionForm::two_phase;
   config.groups = {{"a_degC", "b_degC"}, {"c_degC"}};
-  config.as_printed = printed_form;
+  if (printed_form) config.first_gain = FirstGain::eq_34;
   config.noise_um = probing_noise_um;
   config.turn_um = 1.5;
   return config;

@@ -51,11 +51,14 @@ std::string list_names(const Names& items) {
   return result;
 }
 
-/// "x (2 nodes), z"
-std::string list_axes(const std::vector<AxisConfig>& axes) {
+/// "x (half of dia_um), y (2 nodes), z"
+std::string list_axes(const DaemonConfig& config) {
+  const std::vector<AxisConfig>& axes = config.estimator.axes;
   std::string result;
   for (const AxisSpan& span : axis_spans(axes)) {
     result += (result.empty() ? "" : ", ") + axis_name(axes[span.first]);
+    if (const DiameterSpec* diameter = diameter_of(config.model, axes[span.first].output))
+      result += " (" + half_of(*diameter) + ")";
     if (axes[span.first].node) result += " (" + counted(span.count, "node") + ")";
   }
   return result;
@@ -125,7 +128,7 @@ void print_what_was_found(const DaemonConfig& config) {
             << '\n'
             << counted(estimator.blocks.size(), "block") << ": " << list_names(estimator.blocks)
             << '\n'
-            << unused_sensors_text(estimator) << "axes: " << list_axes(estimator.axes) << '\n'
+            << unused_sensors_text(estimator) << "axes: " << list_axes(config) << '\n'
             << "controller " << controller_kind(config) << ", "
             << counted(estimator.signals.size(), "signal") << '\n'
             << "model " << config.model_file.string() << ": "

@@ -340,7 +340,13 @@ struct TableText {
 std::string register_table(const DaemonConfig& config) {
   const std::string name =
       std::visit([](const auto& each) { return each.name; }, config.controller);
-  return "controller " + name + ": " + std::visit(TableText{config}, config.controller) +
+  std::string halves;
+  for (const AxisSpan& span : axis_spans(config.estimator.axes)) {
+    const AxisConfig& axis = config.estimator.axes[span.first];
+    if (const DiameterSpec* diameter = diameter_of(config.model, axis.output))
+      halves += "\naxis " + axis_name(axis) + " takes out " + half_of(*diameter) + ", a diameter\n";
+  }
+  return "controller " + name + ": " + std::visit(TableText{config}, config.controller) + halves +
          (config.dry_run ? "\nDRY RUN: the daemon reads, and writes none of this\n" : "");
 }
 

@@ -61,7 +61,7 @@ class Lesson {
         continue;
       }
       const std::uint64_t before = learning_.report().taken;
-      learning_.measured(measured_um - first_um, values_um_[output_] - model_first_um);
+      learning_.measured({measured_um - first_um, values_um_[output_] - model_first_um});
       if (learning_.report().taken > before) taught.push_back(point());
     }
     return taught;

@@ -3,6 +3,7 @@
 #include <array>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -53,9 +54,20 @@ int run_plain(const GlobalOptions& global, const PlainCommand& command) {
   return exit_success;
 }
 
-int run_measured(const GlobalOptions& global, const AxisValue& given) {
-  const json answer =
-      ask_daemon(global.socket, "measured", {{"axis", given.axis}, {"value_um", given.value_um}});
+struct MeasuredValue : AxisValue {
+  std::optional<double> sd_um;
+  std::string source{"probe"};
+  double ago_min{0.0};
+  bool confirm{false};
+};
+
+int run_measured(const GlobalOptions& global, const MeasuredValue& given) {
+  json params{{"axis", given.axis}, {"value_um", given.value_um}};
+  if (given.sd_um) params["sd_um"] = *given.sd_um;
+  if (given.source != "probe") params["source"] = given.source;
+  if (given.ago_min > 0) params["ago_s"] = 60.0 * given.ago_min;
+  if (given.confirm) params["confirm"] = true;
+  const json answer = ask_daemon(global.socket, "measured", params);
   const bool remains = text_of(answer, "meaning") == "remaining";
   const double predicted_um =
       number_of(answer, remains ? "predicted_remaining_um" : "predicted_um");
@@ -132,6 +144,32 @@ void add_axis_command(CLI::App& app, const GlobalOptions& global, Action& action
   });
 }
 
+void add_measured_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* sub = app.add_subcommand(
+      "measured", "gives the daemon a displacement that was measured at the tool or on a part");
+  const auto given = std::make_shared<MeasuredValue>();
+  sub->add_option("AXIS", given->axis, "name of the axis in the configuration")->required();
+  sub->add_option("UM", given->value_um, "measured displacement in um, positive as the axis counts")
+      ->required();
+  sub->add_option(
+         "--sd", given->sd_um,
+         "its standard deviation in um; else noise_um of [correction], of a part twice that")
+      ->type_name("UM");
+  sub->add_option("--source", given->source,
+                  "probe; part: measured on a part; wear: the same, and its negative has been "
+                  "entered at the controller, so that the compensation must not take it out again")
+      ->check(CLI::IsMember({"probe", "part", "wear"}));
+  sub->add_option("--ago", given->ago_min,
+                  "so many minutes ago the part was cut: what the compensation did since then is "
+                  "taken into account")
+      ->check(CLI::Range(0.0, 120.0))
+      ->type_name("MIN");
+  sub->add_flag("--confirm", given->confirm, "it is right though the model contradicts it");
+  sub->callback([&global, &action, given] {
+    action = [&global, given] { return run_measured(global, *given); };
+  });
+}
+
 }  // namespace
 
 void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& action) {
@@ -142,9 +180,7 @@ void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& ac
       action = [&global, &command] { return run_plain(global, command); };
     });
   }
-  add_axis_command(app, global, action, "measured",
-                   "gives the daemon a displacement that was measured at the tool",
-                   "measured displacement in um, positive as the axis counts", run_measured);
+  add_measured_command(app, global, action);
   add_axis_command(
       app, global, action, "prove",
       "moves one axis a few um and back, to confirm the sign with an indicator; waits, and "

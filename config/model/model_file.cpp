@@ -350,6 +350,24 @@ void read_covariance(const TomlTable& root, ThermalModel& model) {
   growth.scatter_factor = read_factors(table, "scatter_factor", model.inputs.size());
 }
 
+std::vector<DiameterSpec> read_diameters(const TomlTable& root, const ThermalModel& model) {
+  std::vector<DiameterSpec> diameters;
+  for (const TomlTable& table : root.tables("diameter")) {
+    DiameterSpec diameter{table.text("output"), table.text("axis"), 1.0};
+    const auto named = [&](const DiameterSpec& other) { return other.output == diameter.output; };
+    if (std::find(model.outputs.begin(), model.outputs.end(), diameter.output) ==
+        model.outputs.end())
+      table.problem("output", diameter.output, "must be an output of the model");
+    else if (!diameter.output.ends_with("_um"))
+      table.problem("output", diameter.output, "must be a length (*_um)");
+    else if (std::any_of(diameters.begin(), diameters.end(), named))
+      table.problem("output", diameter.output, "is a diameter already");
+    diameter.sign = table.choice<double>("sign", {{"+", 1.0}, {"-", -1.0}}, diameter.sign);
+    diameters.push_back(std::move(diameter));
+  }
+  return diameters;
+}
+
 void check_cost(const TomlTable& root, const ThermalModel& model) {
   if (model.terms.size() > terms_max)
     root.problem("term", std::to_string(model.terms.size()) + " terms",
@@ -387,6 +405,7 @@ bool read_model(const TomlDocument& document, ThermalModel& model) {
   check_cost(root, model);
   read_covariance(root, model);
   if (root.has("made_from")) model.made_from = read_made_from(root.table("made_from"), model);
+  model.diameters = read_diameters(root, model);
   if (root.has("course")) model.course = read_course(root.table("course"), model);
   return true;
 }

@@ -98,6 +98,11 @@ std::string write_model(const ThermalModel& model) {
   text.append("\nmatrix_um_per_K = ").append(toml_rows(model.matrix_um_per_K));
   for (const GuidewaySpec& guideway : model.guideways) text += guideway_text(guideway);
   for (const TermSpec& term : model.terms) text += term_text(term);
+  for (const DiameterSpec& diameter : model.diameters) {
+    text.append("\n[[diameter]]\noutput = ").append(toml_string(diameter.output));
+    text.append("\naxis = ").append(toml_string(diameter.axis)).append("\n");
+    if (diameter.sign < 0) text.append("sign = \"-\"\n");
+  }
   if (!model.covariance_K2.empty()) text.append("\n").append(write_covariance(model));
   if (model.made_from) text.append("\n").append(write_made_from(model));
   if (model.course) text.append("\n").append(write_course(model));

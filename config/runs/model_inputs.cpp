@@ -1,6 +1,7 @@
 #include "config/runs/model_inputs.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "config/text/problems.hpp"
@@ -79,6 +80,14 @@ std::optional<double> first_value(const std::vector<double>& column) {
 
 nanoseconds time_of_row(double time_s) {
   return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
+}
+
+bool is_called_like_a_room(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* word : {"room", "ambient", "air", "raum", "luft", "umgebung", "hall"})
+    if (name.find(word) != std::string::npos) return true;
+  return false;
 }
 
 }  // namespace thermocomp

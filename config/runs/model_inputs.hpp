@@ -30,4 +30,7 @@ struct ModelInputs {
 /// A row's time, for what is stepped from row to row.
 [[nodiscard]] nanoseconds time_of_row(double time_s);
 
+/// Whether a temperature's name is that of the air around the machine.
+[[nodiscard]] bool is_called_like_a_room(std::string name);
+
 }  // namespace thermocomp

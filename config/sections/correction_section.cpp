@@ -25,12 +25,19 @@ CorrectionConfig read_correction(const TomlTable& table) {
   config.form = table.choice<CorrectionForm>("form",
                                              {{"off", CorrectionForm::off},
                                               {"two_phase", CorrectionForm::two_phase},
-                                              {"recursive", CorrectionForm::recursive}},
+                                              {"recursive", CorrectionForm::recursive},
+                                              {"constant", CorrectionForm::constant}},
                                              config.form);
   config.measured = table.choice<MeasuredMeaning>(
       "measured", {{"remaining", MeasuredMeaning::remaining}, {"total", MeasuredMeaning::total}},
       config.measured);
-  config.as_printed = table.flag("as_printed", config.as_printed);
+  config.first_gain = table.choice<FirstGain>("first_gain",
+                                              {{"consistent", FirstGain::consistent},
+                                               {"eq_34", FirstGain::eq_34},
+                                               {"eq_31", FirstGain::eq_31}},
+                                              config.first_gain);
+  // The key before there were three.
+  if (table.flag("as_printed", false)) config.first_gain = FirstGain::eq_34;
   read_fields(table, fields, CorrectionConfig{}, config);
   for (const TomlTable& group : table.tables("group"))
     config.groups.push_back(group.texts("inputs"));
@@ -38,8 +45,10 @@ CorrectionConfig read_correction(const TomlTable& table) {
   if (config.form == CorrectionForm::two_phase && count != 2)
     table.problem("group", std::to_string(count),
                   "must be two for form = \"two_phase\": the heat source's inputs, then the tie's");
-  if (config.form == CorrectionForm::recursive && (count < 1 || count > correction_groups_max))
-    table.problem("group", std::to_string(count), "must be 1 to 4 for form = \"recursive\"");
+  if ((config.form == CorrectionForm::recursive || config.form == CorrectionForm::constant) &&
+      (count < 1 || count > correction_groups_max))
+    table.problem("group", std::to_string(count),
+                  "must be 1 to 4 for form = \"recursive\" and \"constant\"");
   return config;
 }
 

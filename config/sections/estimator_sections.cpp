@@ -42,6 +42,7 @@ SmoothingConfig read_smoothing(const TomlTable& table, const SmoothingConfig& fa
       "history", {{"raw", SmoothingHistory::raw}, {"screened", SmoothingHistory::screened}},
       fallback.history);
   config.samples = table.integer<std::size_t>("samples", 3, 32, fallback.samples);
+  config.blocks = table.integer<std::size_t>("blocks", 1, smoothing_blocks_max, fallback.blocks);
   read_fields(table, fields, fallback, config);
   return config;
 }

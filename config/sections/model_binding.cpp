@@ -72,6 +72,14 @@ void check_travel(const TomlTable& table, const AxisConfig& axis, const ThermalM
                     "is no curve; give the axis an `offset`");
 }
 
+void check_diameter(const TomlTable& table, const AxisConfig& axis, const ThermalModel& model) {
+  const DiameterSpec* diameter = diameter_of(model, axis.output);
+  if (diameter == nullptr || diameter->axis == axis_name(axis)) return;
+  std::string rule("is a diameter that the model gives to axis ");
+  rule.append(diameter->axis);
+  table.problem("output", axis.output, rule);
+}
+
 void check_signals(const TomlTable& root, const EstimatorConfig& config,
                    const ThermalModel& model) {
   const bool has_controller = root.table("controller").text("kind") != "dry_run";
@@ -98,6 +106,7 @@ void check_binding(const BindingTables& tables, const EstimatorConfig& config,
     if (is_output(axis.output) && !contains(model.outputs, axis.output))
       tables.axes[i].problem(
           "output", "must be an output of the model: " + joined(model.outputs) + like_hint);
+    check_diameter(tables.axes[i], axis, model);
     if (axis.node) check_travel(tables.axes[i], axis, model);
   }
 }

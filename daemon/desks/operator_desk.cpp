@@ -1,6 +1,7 @@
 #include "daemon/desks/operator_desk.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fmt/format.h>
 #include <optional>
@@ -13,6 +14,8 @@
 #include "config/text/problems.hpp"
 #include "daemon/desks/reference_rules.hpp"
 #include "estimator/axis_spans.hpp"
+#include "estimator/learning/measured_question.hpp"
+#include "estimator/learning/probings.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp {
@@ -96,16 +99,16 @@ RpcPending then(RpcPending pending, std::function<json()> result) {
   };
 }
 
-bool is_forced(const json& params) {
-  if (!params.contains("force")) return false;
-  if (!params["force"].is_boolean())
-    throw RpcError(rpc::invalid_params, "params.force must be true or false");
-  return params["force"].get<bool>();
+bool flag_in(const json& params, const char* key) {
+  if (!params.contains(key)) return false;
+  if (!params[key].is_boolean())
+    throw RpcError(rpc::invalid_params, fmt::format("params.{} must be true or false", key));
+  return params[key].get<bool>();
 }
 
 RpcPending take_reference(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
-  const bool forced = is_forced(params);
+  const bool forced = flag_in(params, "force");
   const auto columns = view.config.model.temperature_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)
     refuse_unless(view.report.inputs[i].good,
@@ -142,9 +145,67 @@ void require_possible(const StatusView& view, const Command& command, double exp
             command.value_um, from_um, allowed_um));
 }
 
+/// A number of the request; `otherwise` where it is not there.
+double number_in(const json& params, const char* key, double low, double high, double otherwise) {
+  if (!params.contains(key)) return otherwise;
+  const json& value = params[key];
+  if (!value.is_number() || !(value.get<double>() >= low && value.get<double>() <= high))
+    throw RpcError(rpc::invalid_params,
+                   fmt::format("params.{} must be a number in [{:g}, {:g}]", key, low, high));
+  return value.get<double>();
+}
+
+MeasuredSource source_in(const json& params) {
+  if (!params.contains("source")) return MeasuredSource::probe;
+  for (const auto source : {MeasuredSource::probe, MeasuredSource::part, MeasuredSource::wear})
+    if (params["source"] == to_string(source)) return source;
+  throw RpcError(rpc::invalid_params, "params.source must be probe, part or wear");
+}
+
+Command measured_command(const StatusView& view, const json& params) {
+  // A part has its own errors beside the machine's: clamping, the tool's edge, the gauge.
+  constexpr double part_by_probe = 2.0;
+  Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
+  command.source = source_in(params);
+  const CorrectionConfig& correction = view.config.estimator.correction;
+  const bool is_probe = command.source == MeasuredSource::probe;
+  const double sd_um = number_in(params, "sd_um", 0.001, 1000.0,
+                                 is_probe ? 0.0 : part_by_probe * correction.noise_um);
+  command.sd_nm = static_cast<std::uint32_t>(std::lround(1e3 * sd_um));
+  constexpr auto ago_s_max = static_cast<double>(
+      std::chrono::seconds(Probings::past_pitch * (Probings::past_moments - 1)).count());
+  command.ago_s =
+      static_cast<std::uint32_t>(std::lround(number_in(params, "ago_s", 0.0, ago_s_max, 0.0)));
+  refuse_unless(
+      command.source != MeasuredSource::wear || correction.measured == MeasuredMeaning::remaining,
+      "a wear correction is what remained: it needs [correction] measured = "
+      "\"remaining\"");
+  return command;
+}
+
+/// A value that contradicts what the model claims is asked back.
+void ask_back(const StatusView& view, const Command& command, double expected_um,
+              const json& params) {
+  const AxisReport& axis = view.report.axes[command.axis];
+  // What probings on this machine left says more than the model's own claim.
+  const double claimed_um = std::isfinite(axis.probed_rms_um) && std::isfinite(axis.claimed_sd_um)
+                                ? std::max(axis.probed_rms_um, axis.claimed_sd_um)
+                                : axis.claimed_sd_um;
+  const double own_um =
+      command.sd_nm > 0 ? 1e-3 * command.sd_nm : view.config.estimator.correction.noise_um;
+  const double sd_um = std::hypot(claimed_um, own_um);
+  const Slip slip = slip_of(command.value_um, expected_um, sd_um);
+  if (slip == Slip::none || flag_in(params, "confirm")) return;
+  throw RpcError(rpc::refused,
+                 fmt::format("asked back, nothing is taken over: {:+g} um was measured where "
+                             "{:+.1f} um are expected, +-{:.1f} um (1 sd); {}. If it is right, "
+                             "give it again with --confirm",
+                             command.value_um, expected_um, sd_um, text_of(slip)));
+}
+
 RpcPending note_measured(const DeskActions& actions, const json& params) {
   const auto view = actions.view();
-  const Command command{CommandKind::measured, axis_index(view, params), value_um(params)};
+  const Command command = measured_command(view, params);
   const double displacement_um = where_it_stands(
       view, command.axis, [](const AxisReport& axis) { return axis.displacement_um; });
   const bool remains = view.config.estimator.correction.measured == MeasuredMeaning::remaining;
@@ -154,12 +215,16 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
   const double effect_um = view.config.estimator.axes[command.axis].sign * applied_um;
   // What is left at the tool, where the model is right: nothing but what the offset still lacks.
   const double left_um = displacement_um + effect_um;
-  require_possible(view, command, remains ? left_um : displacement_um);
+  const double expected_um = remains ? left_um : displacement_um;
+  require_possible(view, command, expected_um);
+  ask_back(view, command, expected_um, params);
   return then(actions.command(command), [command, displacement_um, remains, left_um] {
     return json{
         {"done", true},
         {"measured_um", command.value_um},
         {"meaning", remains ? "remaining" : "total"},
+        {"source", to_string(command.source)},
+        {"sd_um", command.sd_nm > 0 ? json(1e-3 * command.sd_nm) : json(nullptr)},
         {"predicted_um", std::isfinite(displacement_um) ? json(displacement_um) : json(nullptr)},
         {"predicted_remaining_um", std::isfinite(left_um) ? json(left_um) : json(nullptr)}};
   });

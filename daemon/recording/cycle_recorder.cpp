@@ -51,6 +51,7 @@ void CycleRecorder::command(std::uint64_t cycle, const Command& command) noexcep
   record.cycle = cycle;
   record.value = command.value_um;
   record.index = command.axis;
+  record.time_ns = measured_bits(command);
   record.kind = RecordKind::command;
   record.detail = static_cast<std::uint8_t>(command.kind);
   push(record);

@@ -9,14 +9,15 @@
 namespace thermocomp {
 
 enum class RecordKind : std::uint8_t {
-  reading,       ///< index: sensor; value: temp [degC]; time: taken_at; detail: Fault
-  link,          ///< index: link epoch; time: taken_at; detail: link_bits()
-  applied,       ///< index: axis; value: applied offset [um]
-  signal,        ///< index: signal; value: in its unit
-  command,       ///< index: axis; value [um]; detail: CommandKind. Applied before that cycle's step
-  skipped,       ///< cycle: first cycle that was not stepped; time_ns: the last such cycle
-  offset,        ///< proof, after the step. index: axis; value [um]; time_ns: epoch; detail: valid
-  cycle_done,    ///< everything up to and with this cycle is in the ring
+  reading,     ///< index: sensor; value: temp [degC]; time: taken_at; detail: Fault
+  link,        ///< index: link epoch; time: taken_at; detail: link_bits()
+  applied,     ///< index: axis; value: applied offset [um]
+  signal,      ///< index: signal; value: in its unit
+  command,     ///< index: axis; value [um]; detail: CommandKind; time_ns: measured_bits(). Applied
+               ///< before that cycle's step
+  skipped,     ///< cycle: first cycle that was not stepped; time_ns: the last such cycle
+  offset,      ///< proof, after the step. index: axis; value [um]; time_ns: epoch; detail: valid
+  cycle_done,  ///< everything up to and with this cycle is in the ring
   segment_begin  ///< cycle: first cycle to step from the snapshot; time_ns: the last cycle that was
                  ///< recorded whole before it, or -1; value: unused; index: snapshot;
                  ///< detail: SegmentReason; session: whose snapshot
@@ -53,6 +54,23 @@ static_assert(sizeof(Record) == 32);
 constexpr void set_link_bits(std::uint8_t bits, ControllerState& controller) noexcept {
   controller.online = (bits & 1u) != 0;
   controller.written = (bits & 2u) != 0;
+}
+
+/// What a record of kind `command` says of a `measured` beside its value; 0 in histories from
+/// before there was any. From bit 0: source, 30 bits of sd [nm], 30 bits of age [s].
+inline constexpr std::uint32_t measured_part_max = (1u << 30) - 1u;
+[[nodiscard]] constexpr std::int64_t measured_bits(const Command& command) noexcept {
+  return static_cast<std::int64_t>(command.source) |
+         static_cast<std::int64_t>(command.sd_nm & measured_part_max) << 2 |
+         static_cast<std::int64_t>(command.ago_s & measured_part_max) << 32;
+}
+constexpr void set_measured_bits(std::int64_t bits, Command& command) noexcept {
+  const auto part = [bits](int from) {
+    return static_cast<std::uint32_t>(static_cast<std::uint64_t>(bits) >> from) & measured_part_max;
+  };
+  command.source = static_cast<MeasuredSource>((part(0) & 3u) % measured_sources_count);
+  command.sd_nm = part(2);
+  command.ago_s = part(32);
 }
 
 }  // namespace thermocomp

@@ -1,5 +1,9 @@
 #include "estimator/learning/probings.hpp"
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
 #include "estimator/name_index.hpp"
 
 namespace thermocomp {
@@ -17,8 +21,13 @@ std::vector<std::string> names_of(const std::vector<AxisConfig>& axes) {
 Probings::Probings(const EstimatorConfig& config, const ThermalModel& model,
                    const std::vector<std::size_t>& axis_output)
     : axis_names_(names_of(config.axes)),
+      is_on_(config.correction.form != CorrectionForm::off),
+      meaning_(config.correction.measured),
       errors_(config.axes.size()),
       measured_um_(config.axes.size(), not_a_number),
+      probed_at_um_(config.axes.size(), 0.0),
+      operator_um_(config.axes.size()),
+      past_(is_on_ ? past_moments * config.axes.size() : 0),
       rise_K_(model.temperature_columns().size(), 0.0) {
   for (const std::size_t output : axis_output)
     corrections_.emplace_back(config.correction, model, output);
@@ -29,25 +38,78 @@ void Probings::step(nanoseconds now, const Temperatures& temps, const ReferenceS
   for (std::size_t i = 0; i < rise_K_.size(); ++i)
     rise_K_[i] = temps.estimated_degC[i] - reference.temps_degC[i];
   for (RunningCorrection& correction : corrections_) correction.step(now, rise_K_, may_change);
+  if (!may_change) return;
+  for (OperatorOffset& each : operator_um_) each.absorbed_um = each.learned_um;
 }
 
-void Probings::learn(std::size_t axis, double total_um, double model_um) noexcept {
-  errors_[axis].take(total_um - model_um);
-  corrections_[axis].measured(total_um, model_um);
+void Probings::learn(std::size_t axis, const MeasuredValue& measured,
+                     const PastMoment& moment) noexcept {
+  OperatorOffset& entered = operator_um_[axis];
+  const double total_um = meaning_ == MeasuredMeaning::remaining
+                              ? measured.value_um - moment.compensated_um + moment.entered_um
+                              : measured.value_um;
+  errors_[axis].take(total_um - moment.model_um);
+  const double before_um = corrections_[axis].learned_um();
+  corrections_[axis].measured({total_um, moment.model_um, measured.sd_um, moment.contributions_um});
+  if (measured.source != MeasuredSource::wear || !is_on_ || !std::isfinite(measured.value_um))
+    return;
+  entered.entered_um += measured.value_um;
+  entered.learned_um += corrections_[axis].learned_um() - before_um;
+}
+
+PastMoment Probings::present(std::size_t axis, double compensated_um,
+                             double model_um) const noexcept {
+  return {{},
+          compensated_um,
+          model_um,
+          operator_um_[axis].entered_um,
+          corrections_[axis].contributions_um()};
+}
+
+const PastMoment* Probings::past(std::size_t axis, nanoseconds at) const noexcept {
+  const PastMoment* nearest = nullptr;
+  for (std::size_t i = 0; i < (is_on_ ? past_moments : 0); ++i) {
+    const PastMoment& each = past_[axis * past_moments + i];
+    if (!std::isfinite(each.model_um)) continue;
+    if (nearest == nullptr || std::chrono::abs(each.at - at) < std::chrono::abs(nearest->at - at))
+      nearest = &each;
+  }
+  const bool is_there = nearest != nullptr && std::chrono::abs(nearest->at - at) <= 2 * past_pitch;
+  return is_there ? nearest : nullptr;
+}
+
+void Probings::remember(std::size_t axis, const PastMoment& moment) noexcept {
+  if (moment.at != remembered_at_) next_past_ = (next_past_ + 1) % past_moments;
+  remembered_at_ = moment.at;
+  past_[axis * past_moments + next_past_] = moment;
 }
 
 void Probings::restart() noexcept {
   for (RunningCorrection& correction : corrections_) correction.restart();
+  std::fill(probed_at_um_.begin(), probed_at_um_.end(), 0.0);
+  std::fill(operator_um_.begin(), operator_um_.end(), OperatorOffset{});
+  std::fill(past_.begin(), past_.end(), PastMoment{});
 }
 
 void Probings::restore(const std::map<std::string, double>& corrections) {
-  for (std::size_t i = 0; i < corrections_.size(); ++i)
+  for (std::size_t i = 0; i < corrections_.size(); ++i) {
     corrections_[i].restore(corrections, axis_names_[i]);
+    const auto bounded = [&](const char* key) {
+      double value_um = 0.0;
+      take_if_finite(corrections, axis_names_[i] + key, value_um);
+      return std::abs(value_um) <= offset_um_max_of_any_axis ? value_um : 0.0;
+    };
+    probed_at_um_[i] = bounded(".probed_at_um");
+    operator_um_[i].entered_um = bounded(".entered_um");
+    operator_um_[i].absorbed_um = operator_um_[i].learned_um = bounded(".absorbed_um");
+  }
 }
 
 void Probings::adopt(const Probings& previous, const std::vector<int>& axes) noexcept {
   take_by_plan(axes, previous.measured_um_, measured_um_);
   take_by_plan(axes, previous.errors_, errors_);
+  take_by_plan(axes, previous.probed_at_um_, probed_at_um_);
+  take_by_plan(axes, previous.operator_um_, operator_um_);
   for (std::size_t i = 0; i < axes.size(); ++i)
     if (axes[i] >= 0)
       corrections_[i].adopt(previous.corrections_[static_cast<std::size_t>(axes[i])]);
@@ -56,6 +118,15 @@ void Probings::adopt(const Probings& previous, const std::vector<int>& axes) noe
 void Probings::visit_learned(StateArchive& archive) {
   for (RunningCorrection& correction : corrections_) archive(correction);
   for (ProbedError& error : errors_) archive(error);
+}
+
+void Probings::visit_operators(StateArchive& archive) {
+  archive(probed_at_um_);
+  for (OperatorOffset& each : operator_um_)
+    archive(each.entered_um, each.absorbed_um, each.learned_um);
+  for (PastMoment& each : past_)
+    archive(each.at, each.compensated_um, each.model_um, each.entered_um, each.contributions_um);
+  archive(next_past_, remembered_at_);
 }
 
 }  // namespace thermocomp

@@ -2,6 +2,7 @@
 /// off.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <map>
 #include <span>
@@ -17,8 +18,35 @@
 
 namespace thermocomp {
 
+/// What operators have entered at the controller since the reference, as displacement of the axis.
+/// It stands there: what the correction learns of it must not be taken out a second time.
+struct OperatorOffset {
+  double entered_um{0.0};
+  double absorbed_um{0.0};  ///< by the correction in use
+  double learned_um{0.0};   ///< ... and by what waits for the end of a cut
+};
+
+/// Where the axis was at a time gone by, for what is measured later on a part.
+struct PastMoment {
+  nanoseconds at{};
+  double compensated_um{not_a_number};
+  double model_um{not_a_number};
+  double entered_um{0.0};
+  RunningCorrection::Contributions contributions_um{};
+};
+
+/// A displacement that was measured at the tool.
+struct MeasuredValue {
+  double value_um{0.0};  ///< as [correction] measured says: what remained, or all of it
+  double sd_um{0.0};     ///< 0: as configured
+  MeasuredSource source{MeasuredSource::probe};
+};
+
 class Probings {
  public:
+  static constexpr std::size_t past_moments = 121;
+  static constexpr std::chrono::minutes past_pitch{1};
+
   /// @param axis_output  axis -> output of the model
   /// @throws InvalidValue as RunningCorrection
   Probings(const EstimatorConfig& config, const ThermalModel& model,
@@ -27,25 +55,41 @@ class Probings {
   /// @param may_change  false: what was learned waits for the end of the cut
   void step(nanoseconds now, const Temperatures& temps, const ReferenceState& reference,
             bool may_change) noexcept;
-  /// By how much the axis' displacement differs from the model's [um].
+  /// By how much the axis' displacement differs from the model's, less what stands at the
+  /// controller already [um].
   [[nodiscard]] double correction_um(std::size_t axis) const noexcept {
-    return corrections_[axis].correction_um();
+    return corrections_[axis].correction_um() - operator_um_[axis].absorbed_um;
   }
   /// The same at another state of the machine.
   [[nodiscard]] double correction_um(std::size_t axis,
                                      std::span<const double> rise_K) const noexcept {
-    return corrections_[axis].correction_um(rise_K);
+    return corrections_[axis].correction_um(rise_K) - operator_um_[axis].absorbed_um;
   }
 
   /// A value from an operator or a probe, whether or not anything can be learned from it.
   void note(std::size_t axis, double value_um) noexcept { measured_um_[axis] = value_um; }
-  /// @param total_um  measured, as it would be without any offset
-  /// @param model_um  the model's at the same moment, without correction
-  void learn(std::size_t axis, double total_um, double model_um) noexcept;
+  /// @param now  compensation and model at the moment of the measurement; see `past`
+  void learn(std::size_t axis, const MeasuredValue& measured, const PastMoment& moment) noexcept;
+  /// The present one, whose contributions and entered offset are filled in here.
+  [[nodiscard]] PastMoment present(std::size_t axis, double compensated_um,
+                                   double model_um) const noexcept;
+  /// Nearest to `at`; nullptr: it is not remembered.
+  [[nodiscard]] const PastMoment* past(std::size_t axis, nanoseconds at) const noexcept;
+  [[nodiscard]] bool must_remember(nanoseconds now) const noexcept {
+    return is_on_ && now - remembered_at_ >= past_pitch;
+  }
+  /// Once for each axis, with one time.
+  void remember(std::size_t axis, const PastMoment& moment) noexcept;
+  /// Where the model was when the axis was probed last.
+  void probed_at(std::size_t axis, double model_um) noexcept { probed_at_um_[axis] = model_um; }
   /// A new reference: displacements count from here.
   void restart() noexcept;
 
   [[nodiscard]] double measured_um(std::size_t axis) const noexcept { return measured_um_[axis]; }
+  [[nodiscard]] double probed_at_um(std::size_t axis) const noexcept { return probed_at_um_[axis]; }
+  [[nodiscard]] const OperatorOffset& operator_um(std::size_t axis) const noexcept {
+    return operator_um_[axis];
+  }
   [[nodiscard]] double rms_um(std::size_t axis) const noexcept { return errors_[axis].rms_um(); }
   [[nodiscard]] CorrectionReport report(std::size_t axis) const noexcept {
     return corrections_[axis].report();
@@ -57,13 +101,21 @@ class Probings {
   void adopt(const Probings& previous, const std::vector<int>& axes) noexcept;
   void visit_learned(StateArchive& archive);
   void visit_measured(StateArchive& archive) { archive(measured_um_); }
+  void visit_operators(StateArchive& archive);
 
  private:
   const std::vector<std::string> axis_names_;
+  const bool is_on_;
+  const MeasuredMeaning meaning_;
 
   std::vector<RunningCorrection> corrections_;  ///< one per axis, as are the next two
   std::vector<ProbedError> errors_;
   std::vector<double> measured_um_;
+  std::vector<double> probed_at_um_;
+  std::vector<OperatorOffset> operator_um_;
+  std::vector<PastMoment> past_;  ///< rings of past_moments, one an axis; none where nothing learns
+  std::size_t next_past_{0};
+  nanoseconds remembered_at_{-past_pitch};
   std::vector<double> rise_K_;  ///< scratch, one per column
 };
 

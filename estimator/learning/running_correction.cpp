@@ -64,7 +64,7 @@ RunningCorrection::RunningCorrection(const CorrectionConfig& config, const Therm
           static_cast<double>(config.groups.size()), "must be at most 4 groups");
   require(config.form != CorrectionForm::two_phase || groups_ == 2, "correction.group",
           static_cast<double>(groups_), "must be two groups for form = \"two_phase\"");
-  require(config.form != CorrectionForm::recursive || groups_ >= 1, "correction.group",
+  require(config.form == CorrectionForm::off || groups_ >= 1, "correction.group",
           static_cast<double>(groups_), "must be at least one group");
   std::vector<bool> named(model.inputs.size(), false);
   for (std::size_t g = 0; g < groups_; ++g) {
@@ -169,20 +169,39 @@ double RunningCorrection::correction_of(const Gains& state,
   return sum_um;
 }
 
-void RunningCorrection::measured(double displacement_um, double model_um) noexcept {
+void RunningCorrection::measured(const Measured& measured) noexcept {
   if (groups_ == 0) return;
+  const double displacement_um = measured.displacement_um;
+  const double model_um = measured.model_um;
   if (!std::isfinite(displacement_um) || !std::isfinite(model_um)) {
     ++state_.refused;
     return;
   }
+  const double sd_um = measured.sd_um > 0 ? measured.sd_um : config_.noise_um;
+  const Contributions now_um = state_.contributions_um;
+  if (measured.contributions_um) state_.contributions_um = *measured.contributions_um;
   if (course_) go_on_from_joint();
-  if (config_.form == CorrectionForm::two_phase)
-    learn_two_phases(displacement_um, model_um);
-  else
-    learn_recursively(displacement_um - model_um - correction_of(state_.learned));
+  switch (config_.form) {
+    case CorrectionForm::off:
+      break;
+    case CorrectionForm::two_phase:
+      learn_two_phases(displacement_um, model_um, sd_um);
+      break;
+    case CorrectionForm::recursive:
+      learn_recursively(displacement_um - model_um - correction_of(state_.learned), sd_um);
+      break;
+    case CorrectionForm::constant: {
+      Gains wanted = state_.learned;
+      wanted[groups_] = displacement_um - model_um;
+      move_to(wanted);
+      break;
+    }
+  }
+  state_.contributions_um = now_um;
 }
 
-void RunningCorrection::learn_two_phases(double displacement_um, double model_um) noexcept {
+void RunningCorrection::learn_two_phases(double displacement_um, double model_um,
+                                         double sd_um) noexcept {
   const double p1_um = state_.contributions_um[0];
   const double p2_um = state_.contributions_um[1];
   if (state_.phase == 1) {
@@ -194,7 +213,8 @@ void RunningCorrection::learn_two_phases(double displacement_um, double model_um
   }
   Gains wanted = state_.learned;
   // Without the correction the model is d = rest + p1 + p2.
-  const double denominator_um = state_.phase == 2 ? p2_um : config_.as_printed ? model_um : p1_um;
+  const bool by_model = state_.phase == 1 && config_.first_gain == FirstGain::eq_34;
+  const double denominator_um = state_.phase == 2 ? p2_um : by_model ? model_um : p1_um;
   // A gain must not be told from next to nothing.
   if (!(std::abs(denominator_um) >= config_.contribution_um_min)) {
     ++state_.refused;
@@ -204,8 +224,9 @@ void RunningCorrection::learn_two_phases(double displacement_um, double model_um
   if (state_.phase == 2)
     wanted[1] = 1.0 + (beyond_um - (state_.learned[0] - 1.0) * p1_um) / p2_um;
   else
-    wanted[0] = config_.as_printed ? displacement_um / model_um : 1.0 + beyond_um / p1_um;
-  record_.probed_sd[state_.phase == 2 ? 1 : 0] = config_.noise_um / std::abs(denominator_um);
+    wanted[0] = config_.first_gain == FirstGain::consistent ? 1.0 + beyond_um / p1_um
+                                                            : displacement_um / denominator_um;
+  record_.probed_sd[state_.phase == 2 ? 1 : 0] = sd_um / std::abs(denominator_um);
   move_to(wanted);
 }
 
@@ -244,7 +265,7 @@ double RunningCorrection::sd_um() const noexcept {
   return std::sqrt(std::max(0.0, variance));
 }
 
-void RunningCorrection::learn_recursively(double error_um) noexcept {
+void RunningCorrection::learn_recursively(double error_um, double sd_um) noexcept {
   if (state_.taken > 0) {
     const double hours = hours_since_probing();
     for (std::size_t i = 0; i <= groups_; ++i) {
@@ -259,13 +280,13 @@ void RunningCorrection::learn_recursively(double error_um) noexcept {
   state_.probed_at = state_.now;
   const Gains h = slopes();
   Gains ph{};
-  double variance = config_.noise_um * config_.noise_um;
+  double variance = sd_um * sd_um;
   for (std::size_t i = 0; i <= groups_; ++i)
     for (std::size_t j = 0; j <= groups_; ++j) ph[i] += state_.covariance[i][j] * h[j];
   for (std::size_t i = 0; i <= groups_; ++i) variance += h[i] * ph[i];
   const bool far = !(std::abs(error_um) <= config_.outlier_sigma * std::sqrt(variance));
   const bool agrees = state_.doubted && std::abs(error_um - state_.refused_error_um) <=
-                                            agreeing_sigma * std::sqrt(2.0) * config_.noise_um;
+                                            agreeing_sigma * std::sqrt(2.0) * sd_um;
   if (far && !agrees) {
     state_.doubted = true;
     state_.refused_error_um = error_um;

@@ -40,10 +40,13 @@ struct CorrectionReport {
 /// output d of the estimator: d_corrected = d + sum_g (R_g - 1) p_g + bias.
 ///
 /// two_phase (Teratani et al. 1995; group 1: heat source, group 2: tie):
-///   phase 1   R_1 = (d_ex - d + p_1) / p_1        printed form: R_1 = d_ex / d;   R_2 = 1
+///   phase 1   R_1 = (d_ex - d + p_1) / p_1        R_2 = 1
+///             or as printed: R_1 = d_ex / d (eq. 34), R_1 = d_ex / p_1 (eq. 31)
 ///   phase 2   R_1 stays, R_2 = (d_ex - d + p_2 - (R_1 - 1) p_1) / p_2
 /// Phase 2 begins when the measured displacement has turned by turn_um. A p below
 /// contribution_um_min changes nothing.
+///
+/// constant: the form before that, d = Ki (A - B) - Ci: bias = d_ex - d, the gains stay.
 ///
 /// recursive: a Kalman filter whose state is the gains (and a bias), which wander with
 /// gain_drift_per_sqrt_h; a probing further off than outlier_sigma is refused, unless the next one
@@ -58,6 +61,8 @@ struct CorrectionReport {
 /// nothing that was learned is used before `may_change`.
 class RunningCorrection {
  public:
+  using Contributions = std::array<double, correction_groups_max>;
+
   /// @throws InvalidValue when a group names no input of the model, or one twice
   RunningCorrection(const CorrectionConfig& config, const ThermalModel& model, std::size_t output);
 
@@ -70,9 +75,18 @@ class RunningCorrection {
   [[nodiscard]] double correction_um(std::span<const double> rise_K) const noexcept {
     return correction_of(state_.used, contributions_um(rise_K));
   }
-  /// @param displacement_um  measured, as it would be without any offset
-  /// @param model_um         the model's at the same moment, without correction
-  void measured(double displacement_um, double model_um) noexcept;
+  struct Measured {
+    double displacement_um{0.0};  ///< measured, as it would be without any offset
+    double model_um{0.0};         ///< the model's at the same moment, without correction
+    double sd_um{0.0};            ///< 0: noise_um
+    std::optional<Contributions> contributions_um{};  ///< of that moment; none: this one
+  };
+  void measured(const Measured& measured) noexcept;
+  [[nodiscard]] const Contributions& contributions_um() const noexcept {
+    return state_.contributions_um;
+  }
+  /// The displacement's correction with all that was learned, in use or not yet [um].
+  [[nodiscard]] double learned_um() const noexcept { return correction_of(joint_gains()); }
   /// A new reference: displacements count from here. Gains stay as they are.
   void restart() noexcept;
 
@@ -92,7 +106,6 @@ class RunningCorrection {
  private:
   static constexpr std::size_t states_max = correction_groups_max + 1;
   using Gains = std::array<double, states_max>;  ///< gains, then the bias
-  using Contributions = std::array<double, correction_groups_max>;
   struct State {
     Gains used{};
     Gains learned{};
@@ -144,8 +157,8 @@ class RunningCorrection {
   [[nodiscard]] double sd_um() const noexcept;
   [[nodiscard]] double joint_sd_um() const noexcept;
   [[nodiscard]] double hours_since_probing() const noexcept;
-  void learn_two_phases(double displacement_um, double model_um) noexcept;
-  void learn_recursively(double error_um) noexcept;
+  void learn_two_phases(double displacement_um, double model_um, double sd_um) noexcept;
+  void learn_recursively(double error_um, double sd_um) noexcept;
   void move_to(Gains wanted) noexcept;
 
   const CorrectionConfig config_;

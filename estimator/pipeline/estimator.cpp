@@ -1,6 +1,7 @@
 #include "estimator/pipeline/estimator.hpp"
 
 #include <array>
+#include <chrono>
 #include <span>
 #include <stdexcept>
 
@@ -37,14 +38,34 @@ double compensated_now_um(const Stages& stages, std::size_t axis) noexcept {
 }
 
 /// What was measured where the slide stands teaches all nodes of its travel.
-void take_measured(Stages& stages, std::size_t axis, double value_um) noexcept {
-  const AxisSpan span = stages.axes.span(axis);
-  for (std::size_t i = span.first; i < span.end(); ++i) stages.learned.note(i, value_um);
+void take_measured(Stages& stages, const Command& command) noexcept {
+  Probings& learned = stages.learned;
+  const AxisSpan span = stages.axes.span(command.axis);
+  for (std::size_t i = span.first; i < span.end(); ++i) learned.note(i, command.value_um);
   if (!stages.record.displacement_known) return;  // nothing to compare it with
-  const bool remains = stages.config.correction.measured == MeasuredMeaning::remaining;
-  const double total_um = remains ? value_um - compensated_now_um(stages, axis) : value_um;
-  const double model_um = stages.prediction.output_um(stages.axis_output[axis]);
-  for (std::size_t i = span.first; i < span.end(); ++i) stages.learned.learn(i, total_um, model_um);
+  const double model_um = stages.prediction.output_um(stages.axis_output[command.axis]);
+  const double compensated_um = compensated_now_um(stages, command.axis);
+  const nanoseconds at = stages.record.now - std::chrono::seconds(command.ago_s);
+  const MeasuredValue value{command.value_um, 1e-3 * command.sd_nm, command.source};
+  for (std::size_t i = span.first; i < span.end(); ++i) {
+    const PastMoment present = learned.present(i, compensated_um, model_um);
+    const PastMoment* then = command.ago_s == 0 ? &present : learned.past(i, at);
+    if (then == nullptr) continue;
+    learned.learn(i, value, *then);
+    learned.probed_at(i, stages.prediction.model_um(i));
+  }
+}
+
+/// Where each axis is now, for parts that are measured later.
+void remember(Stages& stages) noexcept {
+  if (!stages.record.displacement_known || !stages.learned.must_remember(stages.record.now)) return;
+  for (std::size_t i = 0; i < stages.axes.size(); ++i) {
+    PastMoment moment =
+        stages.learned.present(i, compensated_now_um(stages, stages.axes.span(i).first),
+                               stages.prediction.output_um(stages.axis_output[i]));
+    moment.at = stages.record.now;
+    stages.learned.remember(i, moment);
+  }
 }
 
 /// What was held between two cycle ends; a temperature that no sensor can show was not.
@@ -74,6 +95,7 @@ Estimator& Estimator::operator=(Estimator&&) noexcept = default;
 void Estimator::step(nanoseconds now, std::span<const Reading> readings,
                      const ControllerState& controller, OffsetCommand& command) noexcept {
   stages_->step(now, readings, controller, command);
+  remember(*stages_);
 }
 
 void Estimator::apply(const Command& command) noexcept {
@@ -93,7 +115,7 @@ void Estimator::apply(const Command& command) noexcept {
     case CommandKind::cycle_end:
       return stages.cycle_update.command();
     case CommandKind::measured:
-      if (has_axis) take_measured(stages, command.axis, command.value_um);
+      if (has_axis) take_measured(stages, command);
       return;
     case CommandKind::prove:
       if (has_axis) stages.axes.prove(command.axis, command.value_um);

@@ -26,8 +26,15 @@ void add_inputs(const std::vector<std::string>& columns, const Report& report,
 void add_axis(const std::string& name, const AxisReport& axis, PersistentState& state) {
   add(state.offset_um, name, axis.offset_um);
   add(state.corridor_um, name, axis.corridor_um);
-  for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
+  const auto add_learned = [&](const std::string& key, double value) {
     state.correction[std::string(name).append(".").append(key)] = value;
+  };
+  for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
+    add_learned(key, value);
+  if (axis.probed_at_um != 0.0) add_learned("probed_at_um", axis.probed_at_um);
+  if (axis.entered_um == 0.0 && axis.absorbed_um == 0.0) return;
+  add_learned("entered_um", axis.entered_um);
+  add_learned("absorbed_um", axis.absorbed_um);
 }
 
 bool nears_an_edge(const PersistentState& now, const PersistentState& saved) {

@@ -35,7 +35,7 @@ std::vector<std::string> axis_names(const EstimatorConfig& config) {
 
 Stages::Stages(const EstimatorConfig& estimator_config, const ThermalModel& thermal_model)
     : config(checked(estimator_config, thermal_model)),
-      model(thermal_model),
+      model(of_axes(thermal_model)),
       axis_output(outputs_of_axes(config, model)),
       signals(config, model),
       sensing(config, model),
@@ -119,6 +119,7 @@ void Stages::visit_state(StateArchive& archive) {
   prediction.visit_certainty(archive);
   archive(cycle_update, displacement_known, mode, reasons);
   cycle_update.visit_cycles(archive);
+  learned.visit_operators(archive);
 }
 
 }  // namespace thermocomp

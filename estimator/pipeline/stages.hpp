@@ -53,7 +53,7 @@ struct Stages {
   void visit_state(StateArchive& archive);
 
   const EstimatorConfig config;
-  const ThermalModel model;
+  const ThermalModel model;  ///< of the axes: a diameter is its axis' displacement
   const std::vector<std::size_t> axis_output;  ///< axis -> output of the model
 
   SignalIntake signals;

@@ -19,18 +19,25 @@ double SampleHistory::spread_K(const Line& line) const noexcept {
   return normal_sigma_per_median * *middle;
 }
 
-LineOfLines::LineOfLines(std::size_t samples) : coming_(samples) {}
+LineOfLines::LineOfLines(std::size_t samples, std::size_t blocks)
+    : coming_(samples), wanted_(blocks) {}
 
 void LineOfLines::keep(const Sample& sample) noexcept {
   coming_.push(sample);
   if (!coming_.full()) return;
   const Line newest = coming_.line();
-  slopes_K_per_s_ = {slopes_K_per_s_[1], slopes_K_per_s_[2], newest.slope_K_per_s};
-  blocks_ = std::min<std::size_t>(blocks_ + 1, 3);
+  std::copy_backward(slopes_K_per_s_.begin(), slopes_K_per_s_.end() - 1, slopes_K_per_s_.end());
+  slopes_K_per_s_[0] = newest.slope_K_per_s;
+  blocks_ = std::min(blocks_ + 1, wanted_);
   newest_spread_K_ = coming_.spread_K(newest);
   const nanoseconds last = coming_.newest().at;
-  const auto& [c, b, a] = slopes_K_per_s_;
-  expected_ = {last, 0.0, newest.at(last), 3 * a - 3 * b + c};
+  double slope_K_per_s = 0.0;
+  double factor = -1.0;  // (-1)^(i+1) binomial(k, i), i from 1
+  for (std::size_t i = 1; i <= wanted_; ++i) {
+    factor *= -static_cast<double>(wanted_ + 1 - i) / static_cast<double>(i);
+    slope_K_per_s += factor * slopes_K_per_s_[i - 1];
+  }
+  expected_ = {last, 0.0, newest.at(last), slope_K_per_s};
   coming_.clear();
 }
 
@@ -47,7 +54,7 @@ Smoother::Smoother(const SmoothingConfig& config)
                        2 * period_)),
       half_width_K_(config.half_width_K),
       sliding_line_(config.samples),
-      line_of_lines_(config.samples) {
+      line_of_lines_(config.samples, config.blocks) {
   config.validate();
   THERMOCOMP_ENSURE(config.samples <= smoothing_samples_max);
 }

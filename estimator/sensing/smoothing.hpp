@@ -60,12 +60,15 @@ class SlidingLine {
   SampleHistory history_;
 };
 
-/// Form B. Three blocks of n values with slopes C (oldest), B, A: the coming block's line starts at
-/// the newest block's fitted value at its last sample and has slope D = 3A - 3B + C.
+/// Form B. Blocks of n values with slopes A_1 (newest), A_2, ..., A_k: the coming block's line
+/// starts at the newest block's fitted value at its last sample; its slope continues the polynomial
+/// of degree k - 1 through theirs,
+///
+///     D = sum_i (-1)^(i+1) binomial(k, i) A_i;   k = 3: D = 3A - 3B + C
 class LineOfLines {
  public:
-  explicit LineOfLines(std::size_t samples);
-  [[nodiscard]] bool ready() const noexcept { return blocks_ == 3; }
+  LineOfLines(std::size_t samples, std::size_t blocks);
+  [[nodiscard]] bool ready() const noexcept { return blocks_ == wanted_; }
   [[nodiscard]] Line expected() const noexcept { return expected_; }
   [[nodiscard]] double spread_K() const noexcept { return newest_spread_K_; }
   void keep(const Sample& sample) noexcept;
@@ -76,8 +79,9 @@ class LineOfLines {
 
  private:
   SampleHistory coming_;
-  std::size_t blocks_{0};                   ///< complete blocks so far, at most 3
-  std::array<double, 3> slopes_K_per_s_{};  ///< C, B, A
+  std::size_t wanted_;
+  std::size_t blocks_{0};  ///< complete blocks so far, at most wanted_
+  std::array<double, smoothing_blocks_max> slopes_K_per_s_{};  ///< the newest first
   double newest_spread_K_{0.0};
   Line expected_;
 };

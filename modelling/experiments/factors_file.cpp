@@ -97,6 +97,16 @@ void read_cutting(const TomlTable& table, const std::vector<Factor>& factors, Te
       table.problem("cutting", level, "the factor cutting has the levels actual and simulated");
 }
 
+/// A factor called rough_cuts decides test by test, [test] rough_cuts for all of them.
+void read_rough_cuts(const TomlTable& table, const std::vector<Factor>& factors, TestSpec& test) {
+  test.rough_cuts = table.integer<int>("rough_cuts", 0, 1000, test.rough_cuts);
+  const auto factor = std::find_if(factors.begin(), factors.end(),
+                                   [](const Factor& each) { return each.name == "rough_cuts"; });
+  if (factor == factors.end()) return;
+  table.refuse("rough_cuts", "must be left out where a factor is called rough_cuts");
+  test.rough_cuts_factor = static_cast<std::size_t>(factor - factors.begin());
+}
+
 void read_test(const TomlTable& table, TestSpec& test) {
   test.hours = table.number("hours", Range::above(0, 1000), test.hours);
   test.row_every_min = table.number("row_every_min", Range::above(0, 1440), test.row_every_min);
@@ -146,6 +156,7 @@ FactorsSpec read(const TomlDocument& document) {
   const TomlTable test = root.table_or_empty("test");
   read_test(test, spec.test);
   read_cutting(test, spec.factors, spec.test);
+  read_rough_cuts(test, spec.factors, spec.test);
   document.finish();
   return spec;
 }

@@ -35,6 +35,8 @@ struct TestSpec {
   std::vector<std::string> temperatures;  ///< columns of the run files
   std::vector<std::string> outputs;
   std::vector<Stop> stops;  ///< in order
+  int rough_cuts{0};        ///< of a cycle, before one finishing cut; 0: not said
+  std::optional<std::size_t> rough_cuts_factor;  ///< the factor that says it test by test
   Cutting cutting{Cutting::actual};
   std::optional<std::size_t> cutting_factor;  ///< the factor that says it test by test
 };

@@ -59,6 +59,17 @@ const char* how_to_cut(Cutting cutting) {
              : "Actual cutting: a workpiece is cut in every cycle.";
 }
 
+/// JP7689460B2: the number of machining passes is that of the rough cuts; the distance is measured
+/// after the finishing cut.
+std::string cycle_of(const TestPlan& plan, std::size_t test) {
+  const TestSpec& spec = plan.spec.test;
+  const std::string cuts = spec.rough_cuts_factor ? level_of(plan, test, *spec.rough_cuts_factor)
+                                                  : std::to_string(spec.rough_cuts);
+  if (cuts == "0") return "";
+  return "Each machining cycle: " + cuts + (cuts == "1" ? " rough cut" : " rough cuts") +
+         ", one finishing cut, tool back at its origin, then measure.\n";
+}
+
 /// Where the machine stands at a minute of the test: running (1) or in a stop (0).
 bool runs_at(const TestSpec& test, double minute) {
   return std::none_of(test.stops.begin(), test.stops.end(), [&](const Stop& stop) {
@@ -153,6 +164,7 @@ std::string test_sheet(const TestPlan& plan) {
           .append(level_of(plan, test, i))
           .append("\n");
     text.append("\n").append(how_to_cut(cutting_in(plan, test))).append("\n");
+    text.append(cycle_of(plan, test));
     text.append("\n| time (h:min) | do | done at, by |\n|---|---|---|\n| 0:00 | start | |\n");
     for (const Stop& stop : test_spec.stops) {
       text.append("| ").append(clock(stop.after_h * 60)).append(" | stop for ");

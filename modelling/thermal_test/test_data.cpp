@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "config/runs/blunders.hpp"
+#include "config/runs/model_inputs.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
 #include "modelling/thermal_test/axis_binding.hpp"
@@ -191,14 +192,6 @@ void read_speed(const RunFile& run, const std::string& column, TestData& data) {
     stands_at = data.speed[i];
     data.breaks_s.push_back(data.speed_time_s[i]);
   }
-}
-
-bool is_called_like_a_room(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* word : {"room", "ambient", "air", "raum", "luft", "umgebung", "hall"})
-    if (name.find(word) != std::string::npos) return true;
-  return false;
 }
 
 std::vector<TestTemperature> temperatures_of(const RunFile& run, const std::string& room) {

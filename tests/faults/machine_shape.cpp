@@ -89,7 +89,7 @@ void draw_correction(Chance& chance, EstimatorConfig& estimator) {
   correction.form = chance.one_in(2) ? CorrectionForm::two_phase : CorrectionForm::recursive;
   correction.groups = {{"t1_degC"}, {"t2_degC", "t3_degC"}};
   correction.measured = chance.one_in(2) ? MeasuredMeaning::remaining : MeasuredMeaning::total;
-  correction.as_printed = chance.one_in(4);
+  if (chance.one_in(4)) correction.first_gain = FirstGain::eq_34;
   correction.noise_um = chance.between(0.2, 2.0);
   correction.step_um_max = chance.between(1.0, 8.0);
   correction.gain_min = chance.between(0.2, 0.8);

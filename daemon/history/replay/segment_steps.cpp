@@ -64,7 +64,9 @@ std::uint64_t SegmentSteps::take_inputs(std::uint64_t cycle) {
       if (record_.detail >= command_kinds_count) {
         throw HistoryError("damaged: unknown command");
       }
-      estimator_.apply({static_cast<CommandKind>(record_.detail), record_.index, record_.value});
+      Command command{static_cast<CommandKind>(record_.detail), record_.index, record_.value};
+      set_measured_bits(record_.time_ns, command);
+      estimator_.apply(command);
     } else {
       inputs_.apply(record_);
     }

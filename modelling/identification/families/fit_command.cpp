@@ -10,6 +10,8 @@
 #include <CLI/CLI.hpp>
 
 #include "config/model/model_file.hpp"
+#include "config/runs/model_inputs.hpp"
+#include "config/text/units.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
 #include "report/output_file.hpp"
@@ -33,6 +35,7 @@ struct Options {
   double sensor_error_K{-1.0};  ///< negative: left out
   std::string family;
   std::string like;
+  std::vector<std::string> diameters;
   std::string model;
   std::string report;
   bool json{false};
@@ -68,8 +71,34 @@ void write(const std::string& destination, const std::string& text) {
   file.commit();
 }
 
+/// "dia_um=x": of the diameter half goes to the axis; "dia_um=-x": the negative half.
+std::vector<DiameterSpec> read_diameters(const Options& options) {
+  std::vector<DiameterSpec> diameters;
+  for (const std::string& text : options.diameters) {
+    const auto equals = text.find('=');
+    const bool is_negative = equals != std::string::npos && text.substr(equals + 1, 1) == "-";
+    DiameterSpec diameter{text.substr(0, equals), "", is_negative ? -1.0 : 1.0};
+    if (equals != std::string::npos) diameter.axis = text.substr(equals + (is_negative ? 2 : 1));
+    const std::vector<std::string>& outputs = options.tests.outputs;
+    if (diameter.axis.empty() ||
+        std::find(outputs.begin(), outputs.end(), diameter.output) == outputs.end())
+      throw std::runtime_error("--diameter " + text + ": must be OUTPUT=AXIS, one of --outputs");
+    std::fprintf(stderr, "%s: a diameter; axis %s takes out %s\n", diameter.output.c_str(),
+                 diameter.axis.c_str(), half_of(diameter).c_str());
+    diameters.push_back(std::move(diameter));
+  }
+  for (const std::string& output : options.tests.outputs)
+    if (output.starts_with("dia") &&
+        std::none_of(diameters.begin(), diameters.end(),
+                     [&](const DiameterSpec& each) { return each.output == output; }))
+      std::fprintf(stderr, "%s: taken as the axis' own displacement; a diameter: --diameter %s=x\n",
+                   output.c_str(), output.c_str());
+  return diameters;
+}
+
 /// In the frame of --like where that was given.
-std::string model_text(const Options& options, const ThermalModel& fitted) {
+std::string model_text(const Options& options, ThermalModel fitted) {
+  fitted.diameters = read_diameters(options);
   if (options.like.empty()) return write_model(fitted);
   std::vector<std::string> notes;
   const ThermalModel model = in_frame(fitted, load_model(options.like), notes);
@@ -103,6 +132,18 @@ int run_families(const Options& options, const MeasuredTests& tests,
   return 0;
 }
 
+/// JP7689460B2 chooses among places of the machine; that of the room is none.
+void leave_out_room(const std::vector<RunFile>& runs, TestOptions& options) {
+  for (const std::string& column : runs.front().columns) {
+    if (!is_temperature(column)) continue;
+    if (!is_called_like_a_room(column))
+      options.places.push_back(column);
+    else
+      std::fprintf(stderr, "%s: not chosen from, called like a room (--free, --places)\n",
+                   column.c_str());
+  }
+}
+
 int run(const Options& options) {
   FitOptions fit_options;
   read_terms(options.terms, fit_options);
@@ -113,6 +154,8 @@ int run(const Options& options) {
   const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
   TestOptions test_options = options.tests;
   const bool few = options.few_asked_for() && options.family.empty();
+  if (few && !options.free_choice && options.tests.places.empty())
+    leave_out_room(runs, test_options);
   if (!few) {
     test_options.signals = true;
     test_options.folds_of_one_run = std::max(test_options.folds_of_one_run, blocks_of_one_run);
@@ -139,6 +182,11 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
          "a model whose inputs and outputs the new one gets, with 0 where the fit uses none: "
          "the daemon's, so that its blocks and axes stay; may be the file of -o")
       ->type_name("MODEL.toml");
+  sub->add_option("--diameter", options->diameters,
+                  "an output that is a diameter, and the axis that takes out half of it: dia_um=x; "
+                  "dia_um=-x where the diameter grows as the axis moves in its negative direction")
+      ->delimiter(',')
+      ->type_name("OUTPUT=AXIS");
   sub->add_option("--family", options->family,
                   "none, static_few, lagged_few, physical or lag_bank; else what leaves least of "
                   "what is left out")

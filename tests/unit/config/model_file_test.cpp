@@ -411,3 +411,21 @@ TEST_CASE("the spindle model and its run load", "[config][model][data]") {
   CHECK(run.rows() == 7705);
   for (const std::string& input : model.inputs) CHECK(run.find(input).has_value());
 }
+
+TEST_CASE("a diameter names one of the outputs once, and survives writing", "[model_file]") {
+  const std::string text =
+      "format = 1\ninputs = [\"t1_degC\"]\noutputs = [\"dia_um\"]\nreference = \"first_sample\"\n"
+      "matrix_um_per_K = [[4.0]]\n";
+  const std::string diameter = "[[diameter]]\noutput = \"dia_um\"\naxis = \"x\"\n";
+  const ThermalModel model = parse_model(text + diameter, "m.toml");
+  CHECK(model.diameters == std::vector<DiameterSpec>{{"dia_um", "x", 1.0}});
+  CHECK(of_axes(model).matrix_um_per_K[0][0] == 2.0);
+  CHECK(parse_model(write_model(model), "m.toml").diameters == model.diameters);
+  const ThermalModel other = parse_model(text + diameter + "sign = \"-\"\n", "m.toml");
+  CHECK(of_axes(other).matrix_um_per_K[0][0] == -2.0);
+  CHECK(parse_model(write_model(other), "m.toml").diameters == other.diameters);
+  CHECK_THROWS_WITH(parse_model(text + diameter + diameter, "m.toml"),
+                    Catch::Contains("is a diameter already"));
+  CHECK_THROWS_WITH(parse_model(text + "[[diameter]]\noutput = \"d_um\"\naxis = \"x\"\n", "m.toml"),
+                    Catch::Contains("must be an output of the model"));
+}

@@ -438,3 +438,30 @@ TEST_CASE("a model of 2000 terms finds each of them again", "[displacement]") {
   REQUIRE(plan.size() == terms);
   for (std::size_t i = 0; i < terms; ++i) CHECK(plan[i] == static_cast<int>(i));
 }
+
+TEST_CASE("a diameter moves its axis by half, with its sign, whatever the model is made of",
+          "[model][property]") {
+  ThermalModel model = two_by_two();
+  model.outputs = {"dia_um", "z_um"};
+  model.matrix_um_per_K = {{4.0, -2.0}, {1.0, 1.0}};
+  model.guideways = {{"x", "x_mm", {0.0, 100.0}, {{"dia_um", {{0.0, 0.0}, {2.0, 0.0}}}}}};
+  model.terms = {
+      {"thermal_lag", "t1_degC", {{"tau_s", 600.0}}, {{"gain_um_per_K", {{"dia_um", 1.5}}}}},
+      {"hysteresis", "dia_um", {{"width_um", 3.0}}, {}}};
+  for (const double sign : {1.0, -1.0}) {
+    model.diameters = {{"dia_um", "x", sign}};
+    DisplacementModel whole(model);
+    DisplacementModel of_axis(of_axes(model));
+    const std::vector<double> reference(model.temperature_columns().size(), 20.0);
+    std::vector<double> dia_um(2);
+    std::vector<double> axis_um(2);
+    for (int i = 0; i < 200; ++i) {
+      const std::vector<double> temps{20.0 + 5.0 * std::sin(0.1 * i), 20.0 + 0.02 * i};
+      const std::vector<double> signals{50.0 + 40.0 * std::cos(0.07 * i)};
+      whole.step(i * 60s, temps, reference, signals, dia_um);
+      of_axis.step(i * 60s, temps, reference, signals, axis_um);
+      CHECK(axis_um[0] == Approx(0.5 * sign * dia_um[0]).margin(1e-12));
+      CHECK(axis_um[1] == dia_um[1]);
+    }
+  }
+}

@@ -107,7 +107,7 @@ TEST_CASE("a probing counts more than the record, and then less and less", "[cou
   heat(correction, 0, 6);
   const double before_um = correction.correction_um();
   // Today A counts 1.1 only: model 30 - 1.2, tool 33 - 1.2.
-  correction.measured(33.0 - 1.2, 30.0 - 1.2);
+  correction.measured({33.0 - 1.2, 30.0 - 1.2});
   correction.step(361s, Vector{3.0, 0.3}, true);
   const double probed_um = correction.correction_um();
   CHECK(probed_um < before_um - 3.0);
@@ -125,7 +125,7 @@ TEST_CASE("a probing moves the estimate by no more than it may, from the record 
   RunningCorrection correction(config, with_course(), 0);
   heat(correction, 0, 6);
   const double before_um = correction.correction_um();
-  correction.measured(60.0, 30.0 - 1.2);
+  correction.measured({60.0, 30.0 - 1.2});
   correction.step(361s, Vector{3.0, 0.3}, true);
   CHECK(std::abs(correction.correction_um() - before_um) <= 1.0 + 0.05);
 }

@@ -36,7 +36,7 @@ void probe(RunningCorrection& correction, nanoseconds now, double t1_K, double t
            const std::array<double, 2>& g, double noise_um = 0.0) {
   const std::vector<double> rise{t1_K, t2_K};
   correction.step(now, rise, true);
-  correction.measured(g[0] * 4.0 * t1_K - g[1] * 2.0 * t2_K + noise_um, model_um(t1_K, t2_K));
+  correction.measured({g[0] * 4.0 * t1_K - g[1] * 2.0 * t2_K + noise_um, model_um(t1_K, t2_K)});
   correction.step(now, rise, true);
 }
 
@@ -52,7 +52,7 @@ TEST_CASE("in phase 1 the consistent gain makes the estimate what was measured",
 
 TEST_CASE("the printed form agrees with it only while the tie is cold", "[correction]") {
   CorrectionConfig config = config_of(CorrectionForm::two_phase);
-  config.as_printed = true;
+  config.first_gain = FirstGain::eq_34;
   RunningCorrection cold(config, tie_model(), 0);
   probe(cold, 60s, 5.0, 0.0, {1.2, 1.0});
   CHECK(cold.report().gain[0] == Approx(1.2));
@@ -148,7 +148,7 @@ TEST_CASE("no probing moves the estimate beyond its step nor a gain out of its r
     correction.step(now, rise, true);
     const double before = correction.correction_um();
     const double values[]{200.0 * any(engine), not_a_number, 1e300, INFINITY};
-    correction.measured(values[i % 7 == 0 ? 1 + i % 3 : 0], model_um(rise[0], rise[1]));
+    correction.measured({values[i % 7 == 0 ? 1 + i % 3 : 0], model_um(rise[0], rise[1])});
     correction.step(now, rise, true);
     CHECK(std::abs(correction.correction_um() - before) <= 2.5 + 1e-9);
     for (std::size_t g = 0; g < 2; ++g) {
@@ -162,7 +162,7 @@ TEST_CASE("what was learned while cutting is used after the cut", "[correction]"
   RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
   const std::vector<double> rise{5.0, 1.0};
   correction.step(1s, rise, false);
-  correction.measured(30.0, 18.0);
+  correction.measured({30.0, 18.0});
   correction.step(2s, rise, false);
   CHECK(correction.correction_um() == 0.0);
   correction.step(3s, rise, true);
@@ -191,7 +191,7 @@ TEST_CASE("a restart in a cut does not bring in what was learned in it", "[corre
   RunningCorrection correction(config, tie_model(), 0);
   const std::vector<double> rise{5.0, 1.0};
   correction.step(60s, rise, true);
-  correction.measured(30.0, model_um(5.0, 1.0));
+  correction.measured({30.0, model_um(5.0, 1.0)});
   correction.step(61s, rise, false);
   CHECK(correction.correction_um() == 0.0);
   std::map<std::string, double> kept;
@@ -282,4 +282,50 @@ TEST_CASE("a reload keeps what probings taught", "[correction][estimator]") {
   machine.steps(20, {24.0, 32.0});
   CHECK(machine.report().axes[0].correction.gain[0] == gain);
   CHECK(machine.offset_um() == Approx(before));
+}
+
+TEST_CASE("Ri by eq. 31 is what was measured by the heat source's share alone", "[correction]") {
+  CorrectionConfig config = config_of(CorrectionForm::two_phase);
+  config.first_gain = FirstGain::eq_31;
+  RunningCorrection correction(config, tie_model(), 0);
+  // By hand: shares 4*5 = 20 and -2*1 = -2, measured 1.2*20 - 2 = 22: R = 22/20, not 22/18.
+  probe(correction, 60s, 5.0, 1.0, {1.2, 1.0});
+  CHECK(correction.report().gain[0] == Approx(1.1));
+}
+
+TEST_CASE("the earlier form Ki (A - B) - Ci keeps its gains and learns Ci", "[correction]") {
+  RunningCorrection correction(config_of(CorrectionForm::constant), tie_model(), 0);
+  // By hand: the model says 20 - 2 = 18, measured are 15: Ci = 3, wherever the machine is later.
+  correction.step(60s, std::vector{5.0, 1.0}, true);
+  correction.measured({15.0, 18.0});
+  correction.step(61s, std::vector{2.0, 0.5}, true);
+  CHECK(correction.correction_um() == Approx(-3.0));
+  CHECK(correction.report().gain[0] == 1.0);
+  CHECK(correction.report().gain[1] == 1.0);
+  correction.measured({7.0, 7.0});
+  correction.step(62s, std::vector{2.0, 0.5}, true);
+  CHECK(correction.correction_um() == Approx(0.0).margin(1e-12));
+}
+
+TEST_CASE("a coarse measurement teaches less than a fine one", "[correction]") {
+  const auto learned = [](double sd_um) {
+    RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
+    correction.step(60s, std::vector{5.0, 0.0}, true);
+    correction.measured({22.0, 20.0, sd_um});
+    return correction.report().gain[0];
+  };
+  // By hand: P h^2 = 0.09 * 400 = 36; share 36 / (36 + sd^2) of 2 um, as a gain 2 / 20.
+  CHECK(learned(1.0) == Approx(1.0 + 0.1 * 36.0 / 37.0));
+  CHECK(learned(6.0) == Approx(1.0 + 0.1 * 36.0 / 72.0));
+  CHECK(learned(0.0) == learned(1.0));  // as configured
+}
+
+TEST_CASE("a part that is measured later teaches by the machine as it was", "[correction]") {
+  RunningCorrection correction(config_of(CorrectionForm::recursive), tie_model(), 0);
+  correction.step(60s, std::vector{5.0, 0.0}, true);
+  const auto then = correction.contributions_um();
+  correction.step(600s, std::vector{0.0, 5.0}, true);
+  correction.measured({22.0, 20.0, 1.0, then});
+  CHECK(correction.report().gain[0] == Approx(1.0 + 0.1 * 36.0 / 37.0));
+  CHECK(correction.report().gain[1] == 1.0);
 }

@@ -298,7 +298,7 @@ TEST_CASE("form B: the coming block is measured at its own times when samples ar
 
 TEST_CASE("form B predicts the slope of a quadratic and of a cubic course exactly", "[smoothing]") {
   for (const double cubic : {0.0, 1e-9}) {
-    LineOfLines lines(6);
+    LineOfLines lines(6, 3);
     const auto course_K = [&](int i) {
       const double time_s = 20.0 * i;
       return 20.0 + 3e-3 * time_s + 2e-6 * time_s * time_s + cubic * time_s * time_s * time_s;
@@ -417,4 +417,26 @@ TEST_CASE("smoothing refuses a configuration that has no meaning", "[smoothing]"
   broken("half_width_K", [](SmoothingConfig& config) { config.half_width_K = not_a_number; });
   broken("period_s", [](SmoothingConfig& config) { config.period_s = -1; });
   broken("outage_s", [](SmoothingConfig& config) { config.outage_s = 0; });
+}
+
+TEST_CASE("form B takes one to six blocks, with the slope of the polynomial through theirs",
+          "[smoothing]") {
+  // By hand, slopes of the blocks in K a value from the oldest on: 1, 2, 4. One block: 4; two:
+  // 2*4 - 2 = 6; three: 3*4 - 3*2 + 1 = 7. The coming block starts from 18: 6 + 6*2 at its end.
+  for (const auto& [blocks, slope] : {std::pair{1u, 4.0}, std::pair{2u, 6.0}, std::pair{3u, 7.0}}) {
+    CAPTURE(blocks);
+    LineOfLines lines(3, blocks);
+    nanoseconds at{};
+    double value_K = 0.0;
+    for (const double step : {1.0, 2.0, 4.0}) {
+      for (int i = 0; i < 3; ++i, at += 1s, value_K += step) lines.keep({at, value_K});
+    }
+    REQUIRE(lines.ready());
+    const double last_K = value_K - 4.0;
+    CHECK(lines.expected().at(at - 1s) == near(last_K));
+    CHECK(lines.expected().at(at) == near(last_K + slope));
+  }
+  LineOfLines four(3, 4);
+  for (int i = 0; i < 9; ++i) four.keep({i * 1s, 0.0});
+  CHECK_FALSE(four.ready());
 }

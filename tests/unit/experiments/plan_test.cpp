@@ -199,4 +199,19 @@ pause_min = 30
 }
 
 }  // namespace
+
+TEST_CASE("the sheet knows rough cuts, one finishing cut, then the measurement", "[plan]") {
+  const std::string each = std::string(two_factors).append("[test]\nrough_cuts = 3\n");
+  CHECK_THAT(
+      test_sheet(make_plan(parse_factors(each, "f"))),
+      Catch::Contains("3 rough cuts, one finishing cut, tool back at its origin, then measure"));
+  const std::string factor =
+      std::string(two_factors).append("[[factor]]\nname = \"rough_cuts\"\nlevels = [1, 5]\n");
+  const std::string sheet = test_sheet(make_plan(parse_factors(factor, "f")));
+  CHECK_THAT(sheet, Catch::Contains("1 rough cut, one finishing") &&
+                        Catch::Contains("5 rough cuts, one finishing"));
+  CHECK_THAT(test_sheet(make_plan(parse_factors(two_factors, "f"))),
+             !Catch::Contains("finishing cut"));
+}
+
 }  // namespace thermocomp::experiments

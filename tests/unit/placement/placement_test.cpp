@@ -193,3 +193,8 @@ TEST_CASE("the report for programs has sensors, errors before and after, and the
   CHECK(text.find("sensors by greedy:") != std::string::npos);
   CHECK(text.find("left out") != std::string::npos);
 }
+
+TEST_CASE("the start at the median is the mean of the two in the middle", "[placement]") {
+  CHECK(median_of({4.0, 1.0, 9.0, 2.0}) == 3.0);  // not 4
+  CHECK(median_of({4.0, 1.0, 9.0}) == 4.0);
+}
