@@ -188,10 +188,10 @@ std::string write_text(const WriteStatus& write) {
   const auto named = [](const char* name, const std::optional<std::uint64_t>& number) {
     return number ? name + std::to_string(*number) : std::string();
   };
-  const std::string how =
-      (write.exception ? "refused" : "unanswered") + named(", function ", write.function) +
-      named(", address ", write.address) +
-      named(write.function ? ", exception " : ", S7 code ", write.exception);
+  const std::string how = (write.exception ? "refused" : "unanswered") +
+                          named(", function ", write.function) +
+                          named(", address ", write.address) +
+                          named(write.function ? ", exception " : ", S7 code ", write.exception);
   return "writes " + how + "; last confirmed " +
          (write.last_confirmed_s >= 0.0 ? duration_text(write.last_confirmed_s) + " ago" : "never");
 }

@@ -153,8 +153,8 @@ class ModbusConnection::Implementation {
   bool serial_;    ///< a serial port: nobody at the other end opens or closes it
   bool rtu_;       ///< serial frames
   bool numbered_;  ///< answers carry the number of their request
-  nanoseconds timeout_;
-  nanoseconds gap_;
+  nanoseconds timeout_{0};
+  nanoseconds gap_{0};
   std::unique_ptr<ModbusPort> port_;
   ModbusFrames frames_;
   bool connected_{false};
