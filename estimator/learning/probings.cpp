@@ -25,7 +25,6 @@ Probings::Probings(const EstimatorConfig& config, const ThermalModel& model,
       meaning_(config.correction.measured),
       errors_(config.axes.size()),
       measured_um_(config.axes.size(), not_a_number),
-      probed_at_um_(config.axes.size(), 0.0),
       operator_um_(config.axes.size()),
       past_(is_on_ ? past_moments * config.axes.size() : 0),
       rise_K_(model.temperature_columns().size(), 0.0) {
@@ -86,7 +85,6 @@ void Probings::remember(std::size_t axis, const PastMoment& moment) noexcept {
 
 void Probings::restart() noexcept {
   for (RunningCorrection& correction : corrections_) correction.restart();
-  std::fill(probed_at_um_.begin(), probed_at_um_.end(), 0.0);
   std::fill(operator_um_.begin(), operator_um_.end(), OperatorOffset{});
   std::fill(past_.begin(), past_.end(), PastMoment{});
 }
@@ -99,7 +97,6 @@ void Probings::restore(const std::map<std::string, double>& corrections) {
       take_if_finite(corrections, axis_names_[i] + key, value_um);
       return std::abs(value_um) <= offset_um_max_of_any_axis ? value_um : 0.0;
     };
-    probed_at_um_[i] = bounded(".probed_at_um");
     operator_um_[i].entered_um = bounded(".entered_um");
     operator_um_[i].absorbed_um = operator_um_[i].learned_um = bounded(".absorbed_um");
   }
@@ -108,7 +105,6 @@ void Probings::restore(const std::map<std::string, double>& corrections) {
 void Probings::adopt(const Probings& previous, const std::vector<int>& axes) noexcept {
   take_by_plan(axes, previous.measured_um_, measured_um_);
   take_by_plan(axes, previous.errors_, errors_);
-  take_by_plan(axes, previous.probed_at_um_, probed_at_um_);
   take_by_plan(axes, previous.operator_um_, operator_um_);
   for (std::size_t i = 0; i < axes.size(); ++i)
     if (axes[i] >= 0)
@@ -121,7 +117,6 @@ void Probings::visit_learned(StateArchive& archive) {
 }
 
 void Probings::visit_operators(StateArchive& archive) {
-  archive(probed_at_um_);
   for (OperatorOffset& each : operator_um_)
     archive(each.entered_um, each.absorbed_um, each.learned_um);
   for (PastMoment& each : past_)

@@ -80,13 +80,10 @@ class Probings {
   }
   /// Once for each axis, with one time.
   void remember(std::size_t axis, const PastMoment& moment) noexcept;
-  /// Where the model was when the axis was probed last.
-  void probed_at(std::size_t axis, double model_um) noexcept { probed_at_um_[axis] = model_um; }
   /// A new reference: displacements count from here.
   void restart() noexcept;
 
   [[nodiscard]] double measured_um(std::size_t axis) const noexcept { return measured_um_[axis]; }
-  [[nodiscard]] double probed_at_um(std::size_t axis) const noexcept { return probed_at_um_[axis]; }
   [[nodiscard]] const OperatorOffset& operator_um(std::size_t axis) const noexcept {
     return operator_um_[axis];
   }
@@ -111,7 +108,6 @@ class Probings {
   std::vector<RunningCorrection> corrections_;  ///< one per axis, as are the next two
   std::vector<ProbedError> errors_;
   std::vector<double> measured_um_;
-  std::vector<double> probed_at_um_;
   std::vector<OperatorOffset> operator_um_;
   std::vector<PastMoment> past_;  ///< rings of past_moments, one an axis; none where nothing learns
   std::size_t next_past_{0};

@@ -52,7 +52,6 @@ void take_measured(Stages& stages, const Command& command) noexcept {
     const PastMoment* then = command.ago_s == 0 ? &present : learned.past(i, at);
     if (then == nullptr) continue;
     learned.learn(i, value, *then);
-    learned.probed_at(i, stages.prediction.model_um(i));
   }
 }
 

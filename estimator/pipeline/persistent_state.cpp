@@ -31,7 +31,6 @@ void add_axis(const std::string& name, const AxisReport& axis, PersistentState& 
   };
   for (const auto& [key, value] : RunningCorrection::persistent(axis.correction))
     add_learned(key, value);
-  if (axis.probed_at_um != 0.0) add_learned("probed_at_um", axis.probed_at_um);
   if (axis.entered_um == 0.0 && axis.absorbed_um == 0.0) return;
   add_learned("entered_um", axis.entered_um);
   add_learned("absorbed_um", axis.absorbed_um);

@@ -29,7 +29,6 @@ void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexce
   out.claimed_sd_um = stages.prediction.claimed_sd_um(axis);
   out.probed_rms_um = stages.learned.rms_um(axis);
   out.model_um = stages.prediction.model_um(axis);
-  out.probed_at_um = stages.learned.probed_at_um(axis);
   out.entered_um = stages.learned.operator_um(axis).entered_um;
   out.absorbed_um = stages.learned.operator_um(axis).learned_um;
   out.correction = stages.learned.report(axis);

@@ -56,7 +56,6 @@ struct AxisReport {
   /// RMS of probed displacement minus the model's, without the running correction; NaN: none yet.
   double probed_rms_um{not_a_number};
   double model_um{not_a_number};  ///< displacement by the model alone
-  double probed_at_um{0.0};       ///< the same at the last probing or reference
   double entered_um{0.0};   ///< by operators at the controller since the reference, as displacement
   double absorbed_um{0.0};  ///< the part of it that the correction has learned
   CorrectionReport correction;
