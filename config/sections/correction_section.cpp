@@ -36,8 +36,6 @@ CorrectionConfig read_correction(const TomlTable& table) {
                                                {"eq_34", FirstGain::eq_34},
                                                {"eq_31", FirstGain::eq_31}},
                                               config.first_gain);
-  // The key before there were three.
-  if (table.flag("as_printed", false)) config.first_gain = FirstGain::eq_34;
   read_fields(table, fields, CorrectionConfig{}, config);
   for (const TomlTable& group : table.tables("group"))
     config.groups.push_back(group.texts("inputs"));

@@ -263,7 +263,7 @@ void ModbusConnection::Implementation::await_answer(nanoseconds deadline, Exchan
   const nanoseconds rest = rtu_ ? block : std::min<nanoseconds>(timeout_, rest_max);
   const nanoseconds end = deadline + rest;
   nanoseconds until = deadline;
-  bool is_over = false;  // while bytes still come
+  bool is_over = false;  // bytes that answer nothing may come without end
   while (true) {
     const ModbusFrames::Found found = frames_.look();
     in_step_ = found != ModbusFrames::Found::no_frame;

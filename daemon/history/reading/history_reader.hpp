@@ -36,8 +36,7 @@ class RecordCursor {
   RecordCursor(const HistoryReader& reader, const SegmentInfo& segment);
   ~RecordCursor();
   RecordCursor(RecordCursor&&) noexcept;
-  /// Nothing is given out of a chunk that is not sound: its checksum must fit and all
-  /// of it must decode.
+  /// Gives records of sound chunks only: the checksum must fit and the whole chunk must decode.
   /// @return false after the last record of the segment's whole cycles
   /// @throws HistoryError when a chunk is damaged or missing, or the segment was deleted meanwhile
   bool next(Record& out);
