@@ -176,18 +176,25 @@ Command measured_command(const StatusView& view, const json& params) {
       std::chrono::seconds(Probings::past_pitch * (Probings::past_moments - 1)).count());
   command.ago_s =
       static_cast<std::uint32_t>(std::lround(number_in(params, "ago_s", 0.0, ago_s_max, 0.0)));
-  refuse_unless(
-      command.source != MeasuredSource::wear || correction.measured == MeasuredMeaning::remaining,
-      "a wear correction is what remained: it needs [correction] measured = "
-      "\"remaining\"");
+  refuse_unless((command.source != MeasuredSource::wear && command.ago_s == 0) ||
+                    correction.measured == MeasuredMeaning::remaining,
+                "what is left on a part, or was left some time ago, is what remained: it needs "
+                "[correction] measured = \"remaining\"");
+  const double known_s = view.report.remembered_s;
+  refuse_unless(command.ago_s <= known_s,
+                fmt::format("where the axis was {:.0f} min ago is not known: the daemon remembers "
+                            "the last {:.0f} min since the start or the reference, and nothing "
+                            "with [correction] form = \"off\"",
+                            command.ago_s / 60.0, known_s / 60.0));
   return command;
 }
 
 /// A value that contradicts what the model claims is asked back.
 void ask_back(const StatusView& view, const Command& command, double expected_um,
               const json& params) {
+  const bool is_confirmed = flag_in(params, "confirm");
   const AxisReport& axis = view.report.axes[command.axis];
-  // What probings on this machine left says more than the model's own claim.
+  // The larger of two errors counts: what the model claims, and what probings here have left of it.
   const double claimed_um = std::isfinite(axis.probed_rms_um) && std::isfinite(axis.claimed_sd_um)
                                 ? std::max(axis.probed_rms_um, axis.claimed_sd_um)
                                 : axis.claimed_sd_um;
@@ -195,7 +202,7 @@ void ask_back(const StatusView& view, const Command& command, double expected_um
       command.sd_nm > 0 ? 1e-3 * command.sd_nm : view.config.estimator.correction.noise_um;
   const double sd_um = std::hypot(claimed_um, own_um);
   const Slip slip = slip_of(command.value_um, expected_um, sd_um);
-  if (slip == Slip::none || flag_in(params, "confirm")) return;
+  if (slip == Slip::none || is_confirmed) return;
   throw RpcError(rpc::refused,
                  fmt::format("asked back, nothing is taken over: {:+g} um was measured where "
                              "{:+.1f} um are expected, +-{:.1f} um (1 sd); {}. If it is right, "

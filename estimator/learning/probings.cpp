@@ -78,7 +78,10 @@ const PastMoment* Probings::past(std::size_t axis, nanoseconds at) const noexcep
 }
 
 void Probings::remember(std::size_t axis, const PastMoment& moment) noexcept {
-  if (moment.at != remembered_at_) next_past_ = (next_past_ + 1) % past_moments;
+  if (moment.at != remembered_at_) {
+    next_past_ = (next_past_ + 1) % past_moments;
+    remembered_ = std::min(remembered_ + 1, past_moments);
+  }
   remembered_at_ = moment.at;
   past_[axis * past_moments + next_past_] = moment;
 }
@@ -87,6 +90,7 @@ void Probings::restart() noexcept {
   for (RunningCorrection& correction : corrections_) correction.restart();
   std::fill(operator_um_.begin(), operator_um_.end(), OperatorOffset{});
   std::fill(past_.begin(), past_.end(), PastMoment{});
+  remembered_ = 0;
 }
 
 void Probings::restore(const std::map<std::string, double>& corrections) {
@@ -121,7 +125,7 @@ void Probings::visit_operators(StateArchive& archive) {
     archive(each.entered_um, each.absorbed_um, each.learned_um);
   for (PastMoment& each : past_)
     archive(each.at, each.compensated_um, each.model_um, each.entered_um, each.contributions_um);
-  archive(next_past_, remembered_at_);
+  archive(next_past_, remembered_, remembered_at_);
 }
 
 }  // namespace thermocomp

@@ -78,8 +78,14 @@ class Probings {
   [[nodiscard]] bool must_remember(nanoseconds now) const noexcept {
     return is_on_ && now - remembered_at_ >= past_pitch;
   }
+  /// How far back `past` reaches, where nothing was unknown in between.
+  [[nodiscard]] std::chrono::minutes remembered() const noexcept {
+    return past_pitch * static_cast<int>(remembered_);
+  }
   /// Once for each axis, with one time.
   void remember(std::size_t axis, const PastMoment& moment) noexcept;
+  /// Counts a value that nothing can be learned from.
+  void refuse(std::size_t axis) noexcept { corrections_[axis].refuse(); }
   /// A new reference: displacements count from here.
   void restart() noexcept;
 
@@ -111,6 +117,7 @@ class Probings {
   std::vector<OperatorOffset> operator_um_;
   std::vector<PastMoment> past_;  ///< rings of past_moments, one an axis; none where nothing learns
   std::size_t next_past_{0};
+  std::size_t remembered_{0};  ///< moments of each axis
   nanoseconds remembered_at_{-past_pitch};
   std::vector<double> rise_K_;  ///< scratch, one per column
 };

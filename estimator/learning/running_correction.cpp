@@ -174,7 +174,7 @@ void RunningCorrection::measured(const Measured& measured) noexcept {
   const double displacement_um = measured.displacement_um;
   const double model_um = measured.model_um;
   if (!std::isfinite(displacement_um) || !std::isfinite(model_um)) {
-    ++state_.refused;
+    refuse();
     return;
   }
   const double sd_um = measured.sd_um > 0 ? measured.sd_um : config_.noise_um;

@@ -82,6 +82,8 @@ class RunningCorrection {
     std::optional<Contributions> contributions_um{};  ///< of that moment; none: this one
   };
   void measured(const Measured& measured) noexcept;
+  /// Counts a probing that could say nothing.
+  void refuse() noexcept { ++state_.refused; }
   [[nodiscard]] const Contributions& contributions_um() const noexcept {
     return state_.contributions_um;
   }

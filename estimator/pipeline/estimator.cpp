@@ -50,8 +50,10 @@ void take_measured(Stages& stages, const Command& command) noexcept {
   for (std::size_t i = span.first; i < span.end(); ++i) {
     const PastMoment present = learned.present(i, compensated_um, model_um);
     const PastMoment* then = command.ago_s == 0 ? &present : learned.past(i, at);
-    if (then == nullptr) continue;
-    learned.learn(i, value, *then);
+    if (then != nullptr)
+      learned.learn(i, value, *then);
+    else
+      learned.refuse(i);
   }
 }
 

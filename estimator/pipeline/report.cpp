@@ -1,5 +1,7 @@
 #include "estimator/pipeline/report.hpp"
 
+#include <chrono>
+
 #include "estimator/pipeline/stages.hpp"
 
 namespace thermocomp {
@@ -28,7 +30,6 @@ void report_axis(const Stages& stages, std::size_t axis, AxisReport& out) noexce
   out.held_um = stages.cycle_update.held_um(axis);
   out.claimed_sd_um = stages.prediction.claimed_sd_um(axis);
   out.probed_rms_um = stages.learned.rms_um(axis);
-  out.model_um = stages.prediction.model_um(axis);
   out.entered_um = stages.learned.operator_um(axis).entered_um;
   out.absorbed_um = stages.learned.operator_um(axis).learned_um;
   out.correction = stages.learned.report(axis);
@@ -66,6 +67,7 @@ void fill_report(const Stages& stages, Report& out) noexcept {
   out.reasons = stages.record.reasons;
   out.enabled = mode.enabled;
   out.cycle_ends = stages.cycle_update.cycle_ends();
+  out.remembered_s = std::chrono::duration<double>(stages.learned.remembered()).count();
   stages.sensing.report(out.sensors);
   const LostBlocks& lost = stages.sensing.lost();
   for (std::size_t i = 0; i < out.inputs.size(); ++i)

@@ -55,7 +55,6 @@ struct AxisReport {
   double claimed_sd_um{not_a_number};
   /// RMS of probed displacement minus the model's, without the running correction; NaN: none yet.
   double probed_rms_um{not_a_number};
-  double model_um{not_a_number};  ///< displacement by the model alone
   double entered_um{0.0};   ///< by operators at the controller since the reference, as displacement
   double absorbed_um{0.0};  ///< the part of it that the correction has learned
   CorrectionReport correction;
@@ -84,6 +83,7 @@ struct Report {
   std::vector<SignalReport> signals;    ///< order of ThermalModel::signal_columns()
   std::vector<double> displacement_um;  ///< order of ThermalModel::outputs, since the reference
   std::vector<AxisReport> axes;
+  double remembered_s{0.0};  ///< how far back the axes are known, for parts measured later
   DomainReport domain;
 };
 

@@ -252,6 +252,19 @@ TEST_CASE("measured and cycle end are remembered for the report and move nothing
   CHECK(machine.offset_um() == 0.0);
 }
 
+TEST_CASE("a part measured later than the past reaches back is counted as refused", "[estimator]") {
+  Machine machine;
+  machine.steps(3, {20.0, 30.0});
+  Command part{CommandKind::measured, 0, 3.5};
+  part.ago_s = 600;
+  part.source = MeasuredSource::part;
+  machine.estimator.apply(part);
+  machine.step({20.0, 30.0});
+  CHECK(machine.report().remembered_s == 0.0);
+  CHECK(machine.report().axes[0].correction.refused == 1);
+  CHECK(machine.report().axes[0].correction.taken == 0);
+}
+
 TEST_CASE("a kept reference that no sensor could show is refused with its key", "[estimator]") {
   for (const double reference_degC : {1e300, -300.0, 200.1, -30.1}) {
     PersistentState state;

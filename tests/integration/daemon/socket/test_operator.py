@@ -209,6 +209,16 @@ def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_u
     recorded(machine, lab)
 
 
+def test_a_part_from_before_the_start_is_refused(machine, lab):
+    daemon = machine.start()
+    status, _, said = daemon.cli("measured", "z", "1.5", "--source", "part", "--ago", "100")
+    assert status == 1 and "where the axis was 100 min ago is not known" in said, said
+    assert daemon.axis()["measured"] is None
+    with pytest.raises(Refused, match="params.confirm must be true or false"):
+        daemon.call("measured", axis="z", value_um=1.5, confirm=1)
+    recorded(machine, lab)
+
+
 def test_a_second_daemon_on_the_same_socket_is_refused(machine, lab):
     daemon = machine.start()
     second = lab.daemon(machine.config, "second")
