@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <string_view>
 
 #include "config/text/problems.hpp"
 
@@ -85,8 +86,12 @@ nanoseconds time_of_row(double time_s) {
 bool is_called_like_a_room(std::string name) {
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* word : {"room", "ambient", "air", "raum", "luft", "umgebung", "hall"})
-    if (name.find(word) != std::string::npos) return true;
+  const auto is_letter = [&](std::size_t i) {
+    return std::isalpha(static_cast<unsigned char>(name[i])) != 0;
+  };
+  for (const std::string_view word : {"room", "ambient", "air", "raum", "luft", "umgebung", "hall"})
+    for (std::size_t at = name.find(word); at != std::string::npos; at = name.find(word, at + 1))
+      if (at == 0 || !is_letter(at - 1)) return true;  // not "pair", "shallow"
   return false;
 }
 

@@ -30,7 +30,8 @@ struct ModelInputs {
 /// A row's time, for what is stepped from row to row.
 [[nodiscard]] nanoseconds time_of_row(double time_s);
 
-/// Whether a temperature's name is that of the air around the machine.
+/// Whether a temperature has the name of the air around the machine: a word of it begins as one of
+/// room, ambient, air, Raum, Luft, Umgebung, hall.
 [[nodiscard]] bool is_called_like_a_room(std::string name);
 
 }  // namespace thermocomp

@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <iterator>
 
+#include "config/runs/model_inputs.hpp"
+
 namespace thermocomp::diagnosis {
-namespace {
-
-bool named_room(const std::string& column) {
-  return column.find("room") != std::string::npos || column.find("ambient") != std::string::npos ||
-         column.find("air") != std::string::npos;
-}
-
-}  // namespace
 
 std::string room_among(const std::vector<std::string>& columns) {
-  const auto room = std::find_if(columns.begin(), columns.end(), named_room);
+  const auto room = std::find_if(columns.begin(), columns.end(), is_called_like_a_room);
   return room == columns.end() ? std::string() : *room;
 }
 

@@ -8,7 +8,7 @@
 
 namespace thermocomp::diagnosis {
 
-/// The first of the columns that is named room, ambient or air; empty: there is none.
+/// The first of the columns that is called like a room; empty: there is none.
 [[nodiscard]] std::string room_among(const std::vector<std::string>& columns);
 
 /// The room's temperature in a run: one that the model does not use, else one of its inputs; null:

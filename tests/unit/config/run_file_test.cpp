@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <random>
 
+#include "config/runs/model_inputs.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;
@@ -34,6 +35,14 @@ struct BadRun {
 };
 
 }  // namespace
+
+TEST_CASE("a room is known by the beginning of a word", "[runs]") {
+  for (const char* name :
+       {"room_degC", "t_room_degC", "Raumluft_degC", "ambient2_degC", "roomtemp"})
+    CHECK(is_called_like_a_room(name));
+  for (const char* name : {"spindle_pair_degC", "shallow_bore_degC", "column_degC"})
+    CHECK_FALSE(is_called_like_a_room(name));
+}
 
 TEST_CASE("a run file is read column by column", "[config][run]") {
   const RunFile run = parse(good);
