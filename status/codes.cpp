@@ -39,7 +39,8 @@ constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
     {Reason::no_reference, fault, "there is no reference state yet",
      "wait until every sensor has had a value, or: thermocomp reference"},
     {Reason::controller_offline, fault, "the controller cannot be read",
-     "check its power, cable and address; the offset it applied last may stay in effect"},
+     "silent: power, cable, address; refused: table and address, thermocomp scan names the place; "
+     "the offset it applied last may stay in effect"},
     {Reason::not_synced, fault, "what the controller applies is not known yet",
      "wait a moment; if it stays, check the read-back (`applied`) of every axis"},
     {Reason::mismatch, warning, "the controller applies another offset than the one sent",

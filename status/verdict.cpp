@@ -17,7 +17,13 @@ constexpr std::string_view bus_off_remedy =
     "cable, termination, bit rate; then ip link set IF type can restart, or let restart-ms do it";
 constexpr std::string_view can_remedy = "cable, termination, bit rate";
 
+constexpr std::string_view unit_remedy = "thermocomp scan shows what came and tries what may help";
+
 using AddTrouble = std::function<void(const std::string& what, std::string_view remedy)>;
+
+bool is_network(std::string_view kind) {
+  return kind.starts_with("modbus") && kind != "modbus_rtu";
+}
 
 std::vector<std::string> axes_not_driven(const Status& status) {
   std::vector<std::string> names;
@@ -39,12 +45,14 @@ void add_bus_troubles(const Status& status, const AddTrouble& add) {
     const std::string name = "bus " + bus.name;
     for (const UnitStatus& unit : bus.units)
       if (unit.answering && !unit.last_error.empty() && !status.sensors_bad.empty()) {
-        add(name + ": " + unit.name + ": " + unit.last_error, "");
+        add(name + ": " + unit.name + ": " + unit.last_error, unit_remedy);
       } else if (!unit.answering && bus.connected) {
         const bool is_silent = unit.timeouts >= unit.bad_frames;
         add(name + ": " + unit.name + (is_silent ? " does not answer (" : " answers wrongly (") +
                 unit.last_error + ")",
-            code_text(is_silent ? Fault::no_answer : Fault::bad_frame).remedy);
+            is_network(bus.kind) && !is_silent
+                ? unit_remedy
+                : code_text(is_silent ? Fault::no_answer : Fault::bad_frame).remedy);
       }
     add_can_trouble(name, bus.state, bus.state_s, add);
     if (!bus.connected && bus.state != "bus_off")
@@ -197,8 +205,7 @@ std::string write_text(const WriteStatus& write) {
 }
 
 std::string_view bus_remedy(std::string_view kind) {
-  if (kind.starts_with("modbus") && kind != "modbus_rtu")
-    return "check the module's power, cable, address and port";
+  if (is_network(kind)) return "check the module's power, cable, address and port";
   if (kind == "modbus_rtu") return "check that the adapter is plugged in and is the `device` named";
   return "check the interface (ip -details link show) and its cable";
 }

@@ -122,24 +122,4 @@ std::string line_name(const ModbusLine& line) {
   return text;
 }
 
-std::string exception_name(int code) {
-  constexpr std::array names{"",
-                             "illegal function",
-                             "illegal data address",
-                             "illegal data value",
-                             "device failure",
-                             "acknowledge",
-                             "busy",
-                             "",
-                             "memory parity",
-                             "",
-                             "gateway has no path",
-                             "gateway has no answer of the unit"};
-  std::string text = "exception " + std::to_string(code);
-  if (code > 0 && static_cast<std::size_t>(code) < names.size()) {
-    text.append(" (").append(names[static_cast<std::size_t>(code)]).append(")");
-  }
-  return text;
-}
-
 }  // namespace thermocomp::cli

@@ -28,7 +28,5 @@ struct TravelValueText {
                                                 std::size_t index);
 /// "127.0.0.1:502", or "/dev/ttyUSB0, 19200 baud, 8N1"
 [[nodiscard]] std::string line_name(const ModbusLine& line);
-/// "exception 2 (illegal data address)"
-[[nodiscard]] std::string exception_name(int code);
 
 }  // namespace thermocomp::cli

@@ -20,7 +20,7 @@ namespace {
 
 /// What came while the bus was listened to.
 struct Heard {
-  std::map<CanId, std::size_t> frames;             ///< how many of each identifier
+  FrameCounts frames;
   std::vector<std::optional<CanFrame>> of_signal;  ///< newest that carries the signal
 };
 
@@ -59,17 +59,6 @@ Heard listen(CanSocket& socket, const std::vector<const CanSignal*>& signals, do
     }
   }
   return heard;
-}
-
-std::string heard_text(const Heard& heard) {
-  constexpr std::size_t shown_max = 16;
-  std::string text;
-  for (const auto& [id, count] : heard.frames) {
-    if (text.empty()) text = "identifiers on the bus:";
-    text.append(" ").append(id_name(id)).append(" (").append(std::to_string(count)).append(")");
-    if (text.size() > 12 * shown_max) return text + " ...";
-  }
-  return text;
 }
 
 void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange& range,
@@ -119,10 +108,13 @@ void judge(const CanSignal& signal, const CanFrame& frame, const PlausibleRange&
   }
 }
 
-/// A J1939 group that comes from another address than the signal has.
-void add_group_hint(const CanSignal& signal, const Heard& heard, ScanChannel& result) {
+/// The same number in the other format, or a J1939 group that comes from another address.
+void add_id_hint(const CanSignal& signal, const Heard& heard, ScanChannel& result) {
   constexpr std::uint32_t group = 0x03FFFF00;
   for (const auto& [id, count] : heard.frames) {
+    if (id.id == signal.id && id.extended != signal.extended_id)
+      result.hints.push_back(id_name(id) +
+                             " came: extended_id = " + (id.extended ? "true" : "false"));
     if (!signal.extended_id || !id.extended || ((id.id ^ signal.id) & group) != 0) continue;
     if (id.id == signal.id) continue;
     result.hints.push_back(
@@ -142,7 +134,7 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& h
       ScanChannel& result = shown.channels.emplace_back();
       result.sensor = sensors.names.at(channel.sensor);
       result.place = place_name(channel.signal);
-      result.fault = Fault::no_answer;
+      result.fault = Fault::never_read;
       const auto& frame = heard.of_signal[index++];
       if (frame) {
         shown.answers = true;
@@ -151,7 +143,7 @@ void fill(const CanBusConfig& config, const ScanSensors& sensors, const Heard& h
       } else if (bus.error.empty()) {
         result.why = "no frame with identifier " +
                      id_name({channel.signal.id, channel.signal.extended_id}) + " carried it";
-        add_group_hint(channel.signal, heard, result);
+        add_id_hint(channel.signal, heard, result);
       }
     }
   }
@@ -176,6 +168,18 @@ void take(const CanSignal& signal, const Heard& heard, std::size_t index, ScanVa
 }
 
 }  // namespace
+
+std::string heard_text(const FrameCounts& frames) {
+  constexpr std::size_t text_max = 200;
+  if (frames.empty())
+    return "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
+  std::string text = "identifiers on the bus:";
+  for (const auto& [id, count] : frames) {
+    text.append(" ").append(id_name(id)).append(" (").append(std::to_string(count)).append(")");
+    if (text.size() > text_max) return text + " ...";
+  }
+  return text;
+}
 
 std::string id_name(const CanId& id) {
   char text[16];
@@ -216,7 +220,7 @@ ScanBus scan_bus(const CanBusConfig& config, const ScanSensors& sensors, const S
     }
     heard = listen(socket, signals, task.listen_s, stale_after_s);
     if (!socket.error().empty()) bus.error = socket.error();
-    bus.note = heard_text(heard);
+    bus.note = heard_text(heard.frames);
     if (heard.frames.empty() && bus.error.empty()) {
       bus.note = "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
     }

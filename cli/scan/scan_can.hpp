@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 
 #include "cli/scan/scan_report.hpp"
@@ -11,6 +12,10 @@
 
 namespace thermocomp::cli {
 
+/// How many frames of each identifier came.
+using FrameCounts = std::map<CanId, std::size_t>;
+/// "identifiers on the bus: 0x281 (5) ..."
+[[nodiscard]] std::string heard_text(const FrameCounts& frames);
 /// "0x281"
 [[nodiscard]] std::string id_name(const CanId& id);
 /// "0x281 bit 7 length 16 big_endian x 0.01"

@@ -46,10 +46,11 @@ CanFrame device_type_request(int node) {
   return frame;
 }
 
+constexpr std::uint32_t heartbeat_base = 0x700;
+
 /// Notes who answers or shows itself by a heartbeat, until `end`.
 void collect_nodes(CanSocket& socket, nanoseconds end, std::set<int>& nodes) {
   constexpr std::uint32_t answer_base = 0x580;
-  constexpr std::uint32_t heartbeat_base = 0x700;
   do {
     pollfd wait{socket.descriptor(), POLLIN, 0};
     static_cast<void>(::poll(&wait, 1, 2));
@@ -86,6 +87,22 @@ void find_canopen_nodes(const CanopenBusConfig& config, CanSocket& socket, ScanB
   if (!unknown.empty()) bus.found += "; not in the configuration: " + unknown;
 }
 
+/// Nodes that are there by their heartbeats, but not in the configuration.
+std::string strangers_text(const CanopenBusConfig& config, const FrameCounts& frames) {
+  std::string text;
+  for (const auto& [id, count] : frames) {
+    const auto node = static_cast<int>(id.id) - static_cast<int>(heartbeat_base);
+    const bool is_configured =
+        std::any_of(config.nodes.begin(), config.nodes.end(),
+                    [&](const CanopenNodeConfig& each) { return each.node == node; });
+    if (id.extended || node < 1 || node > nodes_max || is_configured) continue;
+    text.append(text.empty() ? "; not in the configuration, but there by its heartbeats: node "
+                             : ", node ");
+    text.append(std::to_string(node));
+  }
+  return text;
+}
+
 std::string place_of(const CanopenChannel& channel) {
   if (channel.way == CanopenWay::pdo_bits) {
     return hexadecimal("TPDO ", channel.signal.id, 3) + " bit " +
@@ -109,9 +126,12 @@ ScanBus scan_bus(const CanopenBusConfig& config, const ScanSensors& sensors, con
     bus.devices.push_back({node.name, "node " + std::to_string(node.node), false, "", {}});
   }
   CanopenLine line(config);
-  return scan_protocol(std::move(bus), line, sensors, task, [&](CanSocket& socket, ScanBus& shown) {
-    if (task.search.wanted) find_canopen_nodes(config, socket, shown, task.progress);
-  });
+  return scan_protocol(std::move(bus), line, sensors, task,
+                       [&](CanSocket& socket, const FrameCounts& frames, ScanBus& shown) {
+                         shown.note += strangers_text(config, frames);
+                         if (task.search.wanted)
+                           find_canopen_nodes(config, socket, shown, task.progress);
+                       });
 }
 
 }  // namespace thermocomp::cli

@@ -265,7 +265,9 @@ class ControllerScan {
       result.refused = write_error(config_, request, exchange);
       return;
     }
-    result.writes = "writes are taken: what stands in the registers was written once more";
+    result.writes =
+        "writes are answered: what stands in the registers was written once more (whether a new "
+        "offset is taken, thermocomp status shows)";
   }
 
   void ask_alone(Place& place) {
@@ -273,7 +275,23 @@ class ControllerScan {
     if (exchange.ok())
       take(exchange, place);
     else
-      place.shown.why = why_not(exchange);
+      place.shown.why = why_not(exchange) + elsewhere(place, exchange);
+  }
+
+  /// Which other table answers where this one is refused.
+  std::string elsewhere(const Place& place, const Exchange& refused) {
+    const ModbusTable table = place.value.table;
+    const bool may_move =
+        table == ModbusTable::input || (table == ModbusTable::holding && !place.shown.is_written);
+    if (refused.outcome != ExchangeOutcome::exception || s7_of(config_.line) != nullptr ||
+        !may_move)
+      return "";
+    const ModbusTable other =
+        table == ModbusTable::input ? ModbusTable::holding : ModbusTable::input;
+    std::vector<std::uint16_t> words(place.words.size());
+    return ask(other, place.value.address, words).ok()
+               ? "; table = \"" + table_name(other) + "\" has a value there"
+               : "";
   }
 
   static void take(const Exchange& exchange, Place& place) {
@@ -291,12 +309,9 @@ class ControllerScan {
   }
 
   [[nodiscard]] std::string why_not(const Exchange& exchange) const {
-    const bool is_s7 = s7_of(config_.line) != nullptr;
-    if (is_s7 && exchange.outcome == ExchangeOutcome::exception)
-      return "the controller answers with " + exchange.detail;
     if (exchange.outcome == ExchangeOutcome::exception)
-      return "the controller answers with " + exception_name(exchange.exception_code);
-    if (!is_s7 && exchange.outcome == ExchangeOutcome::timeout)
+      return "the controller answers with " + exchange.detail;
+    if (s7_of(config_.line) == nullptr && exchange.outcome == ExchangeOutcome::timeout)
       return "unit " + std::to_string(config_.unit) + ": " + exchange.detail;
     if (exchange.outcome == ExchangeOutcome::disconnected && !connection_.last_error().empty())
       return connection_.last_error();

@@ -11,9 +11,6 @@
 namespace thermocomp::cli {
 namespace {
 
-/// No thermometer resolves less; a denormal or a tiny float is made of another number's bytes.
-constexpr double float_degC_min = 1e-6;
-
 std::string temperature_text(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.2f degC", value);
@@ -44,6 +41,22 @@ void hint_orders(const ModbusChannel& channel, std::span<const std::uint16_t> wo
     hints.push_back("word_order = \"" + order_name(order) + "\" would make it " +
                     temperature_text(decoded.value));
   }
+}
+
+/// Some modules put two probes into one register, a byte each.
+void hint_halves(const ModbusChannel& channel, std::span<const std::uint16_t> words,
+                 const PlausibleRange& range, std::vector<std::string>& hints) {
+  constexpr double apart_K_max = 20.0;  // two probes of one module; most other numbers are not so
+  if (channel.encoding != Encoding::int16 && channel.encoding != Encoding::uint16) return;
+  NumberFormat half = format_of(channel);
+  half.mask = 0xFF00;
+  const Decoded high = decode(words, half, {});
+  half.mask = 0x00FF;
+  const Decoded low = decode(words, half, {});
+  if (!fits(channel, high, range) || !fits(channel, low, range)) return;
+  if (std::abs(high.value - low.value) > apart_K_max || low.value == channel.offset_degC) return;
+  hints.push_back("two probes in one register? mask = 0xFF00 would make it " +
+                  temperature_text(high.value) + ", mask = 0x00FF " + temperature_text(low.value));
 }
 
 void hint_scales(const ModbusChannel& channel, std::span<const std::uint16_t> words,
@@ -88,10 +101,8 @@ std::optional<std::int64_t> likely_open_code(const ModbusChannel& channel,
 }
 
 bool is_plausible(const ModbusChannel& channel, double temp_degC, const PlausibleRange& range) {
-  if (!(temp_degC >= range.min_degC && temp_degC <= range.max_degC)) return false;
-  if (channel.encoding != Encoding::float32 && channel.encoding != Encoding::float64) return true;
-  const double raw = std::abs((temp_degC - channel.offset_degC) / channel.scale);
-  return raw == 0.0 || raw >= float_degC_min;
+  return temp_degC >= range.min_degC && temp_degC <= range.max_degC &&
+         may_be_measured(channel, temp_degC);
 }
 
 std::vector<std::string> hints_for_words(const ModbusChannel& channel,
@@ -101,7 +112,9 @@ std::vector<std::string> hints_for_words(const ModbusChannel& channel,
   hint_codes(channel, words, hints);
   if (!hints.empty()) return hints;
   hint_orders(channel, words, range, hints);
-  if (hints.empty()) hint_scales(channel, words, range, hints);
+  if (!hints.empty()) return hints;
+  hint_halves(channel, words, range, hints);
+  hint_scales(channel, words, range, hints);
   return hints;
 }
 

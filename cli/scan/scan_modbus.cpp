@@ -21,6 +21,7 @@ namespace thermocomp::cli {
 namespace {
 
 constexpr int tries_max = 2;
+constexpr double busy_s_max = 5.0;  ///< as stale_after_s is without the key
 
 std::string place_of(const ModbusChannel& channel) {
   std::string text = table_name(channel.table);
@@ -96,15 +97,16 @@ class ModbusScan {
   ScanChannel evaluate(const ModbusDeviceConfig& device, std::size_t index);
   void judge_value(const ModbusDeviceConfig& device, const ModbusChannel& channel,
                    std::span<const std::uint16_t> words, ScanChannel& result);
-  void hint_refused(const ModbusDeviceConfig& device, const ModbusChannel& channel,
+  void hint_refused(const ModbusDeviceConfig& device, const ModbusChannel& channel, int code,
                     ScanChannel& result);
   std::optional<double> look_at(const ModbusDeviceConfig& device, const ModbusChannel& channel,
                                 int address, ModbusTable table);
   void hint_neighbours(const ModbusDeviceConfig& device, const ModbusChannel& channel,
                        ScanChannel& result);
-  void judge_silence(ScanBus& bus) const;
+  void judge_silence(ScanBus& bus);
   [[nodiscard]] bool would_answer(const ModbusLine& line) const;
-  [[nodiscard]] std::string working_line() const;
+  bool answers_within(double timeout_ms);
+  std::string working_line();
   [[nodiscard]] std::string describe(const ModbusDeviceConfig& device,
                                      const Exchange& exchange) const;
   [[nodiscard]] const PlausibleRange& range_of(const ModbusChannel& channel) const {
@@ -122,16 +124,16 @@ class ModbusScan {
 };
 
 std::string ModbusScan::describe(const ModbusDeviceConfig& device, const Exchange& exchange) const {
-  if (exchange.outcome == ExchangeOutcome::exception) {
-    return "the device answers with " + exception_name(exchange.exception_code);
-  }
+  if (exchange.outcome == ExchangeOutcome::exception)
+    return "the device answers with " + exchange.detail;
   if (exchange.outcome == ExchangeOutcome::timeout) {
     return "unit " + std::to_string(device.unit) + ": " + exchange.detail;
   }
   return exchange.detail;
 }
 
-/// Until every device was asked for everything, and again where the daemon tries again.
+/// Until every device was asked for everything, and again where the daemon tries again: a device
+/// that is busy has as long as a reading may be old.
 void ModbusScan::ask_as_the_daemon() {
   progress_("bus " + config_.name + ": asking its devices as the daemon does");
   const std::size_t count = config_.devices.size();
@@ -142,6 +144,14 @@ void ModbusScan::ask_as_the_daemon() {
   std::vector<std::size_t> all(count);
   std::iota(all.begin(), all.end(), std::size_t{0});
   while (!std::all_of(all.begin(), all.end(), has_asked) && connection_.now() < give_up_at)
+    poller_->act();
+  const auto is_busy = [this](std::size_t device) {
+    for (std::size_t i = 0; i < config_.devices[device].channels.size(); ++i)
+      if (poller_->value_of(device, i).exchange.fault() == Fault::device_busy) return true;
+    return false;
+  };
+  const nanoseconds busy_until = connection_.now() + from_seconds(busy_s_max);
+  while (std::any_of(all.begin(), all.end(), is_busy) && connection_.now() < busy_until)
     poller_->act();
 }
 
@@ -183,7 +193,8 @@ ScanChannel ModbusScan::evaluate(const ModbusDeviceConfig& device, std::size_t i
   if (!value.exchange.ok()) {
     result.fault = value.exchange.fault();
     result.why = describe(device, value.exchange);
-    if (value.exchange.unit_answered()) hint_refused(device, channel, result);
+    const bool is_refused = result.fault != Fault::device_busy && value.exchange.unit_answered();
+    if (is_refused) hint_refused(device, channel, value.exchange.exception_code, result);
     return result;
   }
   const auto seconds = [](nanoseconds time) { return static_cast<double>(time.count()) * 1e-9; };
@@ -272,7 +283,7 @@ void ModbusScan::hint_neighbours(const ModbusDeviceConfig& device, const ModbusC
 }
 
 void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChannel& channel,
-                              ScanChannel& result) {
+                              int code, ScanChannel& result) {
   result.hints = hints_for_address(channel);
   if (!result.hints.empty()) return;
   hint_neighbours(device, channel, result);
@@ -282,10 +293,14 @@ void ModbusScan::hint_refused(const ModbusDeviceConfig& device, const ModbusChan
     result.hints.push_back("table = \"" + table_name(other) + "\" would make it " +
                            short_number(*value) + " degC");
   }
-  if (result.hints.empty()) {
+  if (!result.hints.empty()) return;
+  if (code == illegal_function)
+    result.hints.emplace_back("compare table with the manual: another function reads it there");
+  else if (code == illegal_address || code == illegal_value)
     result.hints.emplace_back(
         "this register is not there: compare table and address with the manual");
-  }
+  else
+    result.hints.emplace_back("look this exception up in the device's manual");
 }
 
 /// Whether the first request of the first device is answered on a line like this.
@@ -299,10 +314,27 @@ bool ModbusScan::would_answer(const ModbusLine& line) const {
              .unit_answered();
 }
 
+/// On a serial line, which is open already.
+bool ModbusScan::answers_within(double timeout_ms) {
+  ModbusLine patient = config_.line;
+  patient.timeout_ms = timeout_ms;
+  connection_.time_as(patient);
+  const ModbusDeviceConfig& device = config_.devices.front();
+  const ModbusChannel& channel = device.channels.front();
+  const bool answers =
+      ask(device.unit, channel.table, channel.address, words_of(channel.table, channel.encoding))
+          .exchange.unit_answered();
+  connection_.time_as(config_.line);
+  return answers;
+}
+
 /// The first of these changes with which a unit answers; empty: none answers with any.
-std::string ModbusScan::working_line() const {
+std::string ModbusScan::working_line() {
+  constexpr double patient_ms = 3000.0;
+  const bool may_wait = config_.line.timeout_ms < patient_ms;
+  const std::string patience = "timeout_ms = " + short_number(patient_ms);
   const auto* tcp = std::get_if<ModbusTcp>(&config_.line.link);
-  if (tcp == nullptr) return "";
+  if (tcp == nullptr) return may_wait && answers_within(patient_ms) ? patience : "";
   const auto with = [&](auto change) {
     ModbusLine line = config_.line;
     change(line, std::get<ModbusTcp>(line.link));
@@ -315,15 +347,12 @@ std::string ModbusScan::working_line() const {
     return "kind = \"modbus_rtu_over_tcp\"";
   if (tcp->rtu_frames && with([](auto&, auto& link) { link.rtu_frames = false; }))
     return "kind = \"modbus_tcp\"";
-  constexpr double patient_ms = 3000.0;
-  if (config_.line.timeout_ms < patient_ms &&
-      with([](auto& line, auto&) { line.timeout_ms = patient_ms; }))
-    return "timeout_ms = " + short_number(patient_ms);
-  return "";
+  const bool waits = may_wait && with([](auto& line, auto&) { line.timeout_ms = patient_ms; });
+  return waits ? patience : "";
 }
 
 /// One unit that is silent has a fault of its own; all of them rather a common one.
-void ModbusScan::judge_silence(ScanBus& bus) const {
+void ModbusScan::judge_silence(ScanBus& bus) {
   const auto silent = static_cast<std::size_t>(std::count_if(
       bus.devices.begin(), bus.devices.end(), [](const auto& device) { return !device.answers; }));
   if (silent == 0) return;

@@ -14,7 +14,7 @@ struct Worked {
   std::vector<Reading> readings;
   std::vector<RawReading> raw;
   std::vector<UnitHealth> units;
-  std::map<CanId, std::size_t> frames;
+  FrameCounts frames;
   nanoseconds ended_at{};
 };
 
@@ -52,20 +52,6 @@ Worked work(CanProtocol& protocol, CanSocket& socket, double listen_s, const Sca
   worked.raw = protocol.raw();
   worked.units = protocol.health(worked.ended_at);
   return worked;
-}
-
-std::string heard_text(const Worked& worked) {
-  constexpr std::size_t text_max = 200;
-  std::string text = "identifiers on the bus:";
-  for (const auto& [id, count] : worked.frames) {
-    text.append(hexadecimal(" ", id.id, id.extended ? 8 : 3)).append(" (");
-    text.append(std::to_string(count)).append(")");
-    if (text.size() > text_max) return text + " ...";
-  }
-  if (worked.frames.empty()) {
-    text = "not a single frame came: bit rate, termination (two of 120 Ohm), or nobody sends";
-  }
-  return text;
 }
 
 std::string raw_text(const RawReading& raw) {
@@ -123,8 +109,8 @@ ScanBus scan_protocol(ProtocolBus what, CanProtocol& protocol, const ScanSensors
                   short_number(task.listen_s) + " s");
     worked = work(protocol, socket, task.listen_s, sensors);
     bus.error = socket.error();
-    bus.note = heard_text(worked);
-    if (afterwards) afterwards(socket, bus);
+    bus.note = heard_text(worked.frames);
+    if (afterwards) afterwards(socket, worked.frames, bus);
   } else {
     bus.error = "cannot be opened: " + socket.error();
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/scan/scan_bus.hpp"
+#include "cli/scan/scan_can.hpp"
 #include "drivers/can/can_protocol.hpp"
 #include "drivers/can/can_socket.hpp"
 
@@ -31,8 +32,8 @@ struct ProtocolBus {
   std::vector<Place> places;
 };
 
-/// What else is done with the open bus.
-using Afterwards = std::function<void(CanSocket&, ScanBus&)>;
+/// What else is done with the open bus, after so many frames of each identifier.
+using Afterwards = std::function<void(CanSocket&, const FrameCounts&, ScanBus&)>;
 
 /// Works the protocol for `task.listen_s` as the daemon would, sends what it wants to send, and
 /// shows what each place became.

@@ -75,13 +75,24 @@ ModbusQuestion question_of(const Pdu& request, std::size_t answer_bytes) noexcep
   return {request.bytes[0], word_at(request.view(), 1), answer_bytes};
 }
 
-/// Static text. Beyond the protocol's own codes libmodbus would name errors of its own, or hand out
-/// a buffer that its next call overwrites.
-const char* exception_text(int code) noexcept {
-  constexpr int not_defined = 9;
-  const bool is_known = code >= 1 && code <= MODBUS_EXCEPTION_GATEWAY_TARGET && code != not_defined;
-  return is_known ? modbus_strerror(MODBUS_ENOBASE + code)
-                  : "an exception that the protocol does not know";
+/// "exception 2 (illegal data address)"
+std::string exception_text(int code) {
+  constexpr std::array names{"",
+                             "illegal function",
+                             "illegal data address",
+                             "illegal data value",
+                             "device failure",
+                             "acknowledge",
+                             "busy",
+                             "",
+                             "memory parity",
+                             "",
+                             "gateway has no path",
+                             "gateway has no answer of the unit"};
+  const bool is_known = code > 0 && static_cast<std::size_t>(code) < names.size();
+  const std::string_view name = is_known ? names[static_cast<std::size_t>(code)] : "";
+  return "exception " + std::to_string(code) + " (" +
+         (name.empty() ? "the protocol does not know it" : std::string(name)) + ")";
 }
 
 }  // namespace
@@ -539,7 +550,8 @@ Exchange ModbusConnection::read(int unit, ModbusTable table, std::uint16_t addre
   const std::size_t data_bytes = answer_bytes - 2;
   // Some gateways fill their frames up.
   if (answer.size() < answer_bytes || answer[1] != data_bytes) {
-    const std::size_t came = answer.size() < 2 ? 0 : answer[1];
+    const std::size_t said = answer.size() < 2 ? 0 : answer[1];
+    const std::size_t came = said == data_bytes ? answer.size() - 2 : said;
     implementation_->reject(unit, exchange,
                             "expected " + std::to_string(data_bytes) + " bytes of data, got " +
                                 std::to_string(came) +

@@ -21,6 +21,11 @@ enum class ExchangeOutcome : std::uint8_t {
   cancelled      ///< cancel() was called
 };
 
+/// Exceptions with a remedy of their own.
+inline constexpr int illegal_function = 1;
+inline constexpr int illegal_address = 2;
+inline constexpr int illegal_value = 3;
+
 /// How one exchange ended.
 struct Exchange {
   ExchangeOutcome outcome{ExchangeOutcome::disconnected};

@@ -130,6 +130,13 @@ Decoded decode(std::span<const std::uint16_t> registers, const NumberFormat& for
   return {value, Fault::none};
 }
 
+bool may_be_measured(const ModbusChannel& channel, double temp_degC) noexcept {
+  constexpr double resolved_min = 1e-6;
+  if (channel.encoding != Encoding::float32 && channel.encoding != Encoding::float64) return true;
+  const double raw = std::abs((temp_degC - channel.offset_degC) / channel.scale);
+  return raw == 0.0 || raw >= resolved_min;
+}
+
 Fault decode_status(const ModbusStatus& status, std::uint16_t word) noexcept {
   const std::uint16_t mask = is_bit_table(status.table) ? std::uint16_t{1} : status.mask;
   const auto masked = static_cast<std::uint16_t>(word & mask);

@@ -60,6 +60,10 @@ struct Decoded {
 [[nodiscard]] Decoded decode(std::span<const std::uint16_t> registers, const NumberFormat& format,
                              std::span<const Sentinel> sentinels) noexcept;
 
+/// Whether a thermometer can have sent it. A float nearer to 0 than any of them resolves is made of
+/// another number's bytes (word_order, address); 0 itself is not.
+[[nodiscard]] bool may_be_measured(const ModbusChannel& channel, double temp_degC) noexcept;
+
 /// What a status word says: the fault (or none) listed for its masked value. 0 is good where no
 /// good code is listed; anything else is device_error. A bit (coil, discrete input) is not masked.
 [[nodiscard]] Fault decode_status(const ModbusStatus& status, std::uint16_t word) noexcept;

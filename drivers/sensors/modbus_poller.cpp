@@ -276,8 +276,6 @@ void ModbusPoller::poll(Device& device) {
 
 /// Asks for fewer values at once. @return false: that cannot be
 bool ModbusPoller::split(Device& device, std::size_t index) const {
-  constexpr int illegal_address = 2;
-  constexpr int illegal_value = 3;
   const Request& request = device.requests[index];
   const int code = request.newest.exception_code;
   const bool is_refused = code == illegal_address || code == illegal_value;
@@ -391,6 +389,8 @@ Reading ModbusPoller::evaluate(const Device& device, std::size_t channel, const 
   const auto words = std::span(request.words).subspan(place.value.offset);
   const Decoded decoded = decode(words, format_of(config), config.sentinels);
   if (decoded.fault != Fault::none) return {not_a_number, before.taken_at, decoded.fault};
+  if (!may_be_measured(config, decoded.value))
+    return {not_a_number, before.taken_at, Fault::out_of_range};
   const bool stamp = renewed_now || before.taken_at == nanoseconds{0};
   return {decoded.value, stamp ? arrived_at : before.taken_at, Fault::none};
 }

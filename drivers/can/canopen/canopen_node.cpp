@@ -117,6 +117,7 @@ void CanopenNode::begin_setup(nanoseconds now) {
   client_.cancel();
   forget_poll();
   poll_error_.clear();
+  refused_.clear();
   told_.clear();
   lost_ = false;
   heard_at_ = now;
@@ -165,9 +166,15 @@ void CanopenNode::take_job(const SdoResult& result, nanoseconds now) {
   if (result.outcome == SdoOutcome::timed_out) {
     return setup_failed(to_string(result), Fault::no_answer, now);
   }
+  if (result.outcome == SdoOutcome::aborted && jobs_.front().work == Work::write) {
+    refused_ = to_string(result);  // it may have the value already: it is read back next
+    jobs_.pop_front();
+    return next_job(now);
+  }
   if (result.outcome != SdoOutcome::done) {
-    const char* what = jobs_.front().work == Work::write ? "setting " : "reading ";
-    return setup_failed(what + to_string(result), Fault::device_error, now);
+    const std::string why =
+        refused_.empty() ? "reading " + to_string(result) : "setting " + refused_;
+    return setup_failed(why, Fault::device_error, now);
   }
   const Job job = jobs_.front();
   jobs_.pop_front();
@@ -187,10 +194,14 @@ void CanopenNode::take_answer(const Job& job, std::span<const std::uint8_t> byte
   // A node that does not tell how long the value is pads it.
   const bool same = bytes.size() >= write.bytes.size() &&
                     std::equal(write.bytes.begin(), write.bytes.end(), bytes.begin());
+  const std::string what = refused_.empty() ? to_string(write.object) + ":" : refused_ + ", and";
+  refused_.clear();
   if (same) return;
-  setup_failed("setting " + to_string(write.object) + ": reads back " +
-                   std::to_string(little_endian(bytes, 0, 8)) + " instead of " +
-                   std::to_string(little_endian(write.bytes, 0, 8)),
+  setup_failed("setting " + what + " reads back " + std::to_string(little_endian(bytes, 0, 8)) +
+                   " instead of " + std::to_string(little_endian(write.bytes, 0, 8)) +
+                   (write.object.index == heartbeat_object
+                        ? " ms: heartbeat_timeout_s without heartbeat_s sets nothing"
+                        : ""),
                Fault::device_error, now);
 }
 
@@ -479,10 +490,9 @@ void CanopenNode::take_result(nanoseconds now) {
   if (!result) return;
   if (result->outcome == SdoOutcome::timed_out) {
     ++counters_.timeouts;
-  } else if (result->outcome == SdoOutcome::done) {
-    good_at_ = now;
   } else {
-    ++counters_.exceptions;
+    good_at_ = now;
+    if (result->outcome != SdoOutcome::done) ++counters_.exceptions;
   }
   if (polled_) {
     take_poll(*result, now);
@@ -575,7 +585,7 @@ std::string CanopenNode::trouble(nanoseconds now) const {
 
 UnitHealth CanopenNode::health(nanoseconds now) const {
   UnitHealth health = counters_;
-  health.answering = running() && good_at_ != nanoseconds{0} && now - good_at_ < silent_after;
+  health.answering = good_at_ != nanoseconds{0} && now - good_at_ < silent_after;
   health.last_error = trouble(now);
   return health;
 }

@@ -128,6 +128,7 @@ class CanopenNode {
   std::uint64_t second_answers_seen_{0};
   nanoseconds second_answer_until_{};  ///< a second node is taken to be there until then
   std::string conflict_;
+  std::string refused_;  ///< the setting that the node refused and that is read back now
   std::string setup_error_;
   std::string poll_error_;
   std::string emergency_text_;  ///< of the last one, until the errors are reset

@@ -88,6 +88,12 @@ std::string_view sdo_abort_name(std::uint32_t code) noexcept {
   return found == abort_names.end() ? "unknown abort code" : found->name;
 }
 
+std::string seconds_text(nanoseconds time) {
+  std::array<char, 24> text{};
+  std::snprintf(text.data(), text.size(), "%g", static_cast<double>(time.count()) * 1e-9);
+  return text.data();
+}
+
 std::string to_string(const ObjectAddress& object) {
   std::array<char, 12> text{};
   std::snprintf(text.data(), text.size(), "%04X:%02X", static_cast<unsigned>(object.index),
@@ -101,7 +107,7 @@ std::string to_string(const SdoResult& result) {
     case SdoOutcome::done:
       return text.append(": done");
     case SdoOutcome::timed_out:
-      return text.append(": no answer");
+      return text + ": no answer within sdo_timeout_s = " + seconds_text(result.timeout);
     case SdoOutcome::aborted:
       text.append(": aborted by the node: ");
       break;
@@ -159,7 +165,7 @@ void SdoClient::end(SdoOutcome outcome, std::uint32_t abort_code) {
   state_ = State::idle;
   answered_ = outcome == SdoOutcome::done || outcome == SdoOutcome::aborted;
   if (outcome != SdoOutcome::done) bytes_.clear();
-  result_ = SdoResult{object_, outcome, abort_code, std::move(bytes_)};
+  result_ = SdoResult{object_, outcome, abort_code, std::move(bytes_), timeout_};
   bytes_.clear();
 }
 

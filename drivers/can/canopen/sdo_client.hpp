@@ -33,6 +33,7 @@ struct SdoResult {
   SdoOutcome outcome{SdoOutcome::done};
   std::uint32_t abort_code{0};
   std::vector<std::uint8_t> bytes;  ///< what was read; empty after a write
+  nanoseconds timeout{};
 };
 
 /// "2040:01: aborted by the node: 0x06020000 object does not exist"

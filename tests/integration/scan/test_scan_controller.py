@@ -127,7 +127,8 @@ def test_every_register_is_read_and_none_is_changed(simulate, relay, tmp_path):
     assert "controller cnc (modbus_tcp, 127.0.0.1:" in done.stdout
     assert "-> 250.00 mm" in done.stdout
     assert done.stdout.endswith(
-        "    writes are taken: what stands in the registers was written once more\n"
+        "    writes are answered: what stands in the registers was written once more (whether a new "
+        "offset is taken, thermocomp status shows)\n"
         "1 of 1 channels give a temperature\n7 of 7 places of the controller are there\n")
     assert 16 in between.functions
     assert written(simulator) == before

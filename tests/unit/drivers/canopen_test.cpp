@@ -260,8 +260,18 @@ TEST_CASE("a refused setting is told by the name of its abort code", "[canopen][
   Bus bus(bus_of({node}));
   CHECK(bus.sent().at(1).bytes == Bytes{0x2B, 0x17, 0x10, 0x00, 0xE8, 0x03, 0, 0});
   bus.put(0x585, {0x80, 0x17, 0x10, 0x00, 0x02, 0x00, 0x01, 0x06});
+  CHECK(bus.sent() == std::vector<Sent>{{0x605, {0x40, 0x17, 0x10, 0x00, 0, 0, 0, 0}}});
+  SECTION("no fault where the node has that value already") {
+    bus.put(0x585, {0x4B, 0x17, 0x10, 0x00, 0xE8, 0x03, 0, 0});
+    CHECK(bus.sent() == std::vector<Sent>{start_5});
+    CHECK(bus.error().empty());
+    return;
+  }
+  bus.put(0x585, {0x4B, 0x17, 0x10, 0x00, 0xF4, 0x01, 0, 0});
   CHECK(bus.fault() == Fault::device_error);
-  CHECK(bus.error() == "setting 1017:00: aborted by the node: 0x06010002 object is read only");
+  CHECK(bus.error() ==
+        "setting 1017:00: aborted by the node: 0x06010002 object is read only, and reads back 500 "
+        "instead of 1000 ms: heartbeat_timeout_s without heartbeat_s sets nothing");
   bus.wait(600ms);
   CHECK(bus.sent().empty());
   SECTION("a reboot is a reason to try at once") {
@@ -283,7 +293,7 @@ TEST_CASE("a node that is not there is asked again with growing pauses", "[canop
   }
   CHECK(tries > 8);
   CHECK(tries < 20);
-  CHECK(bus.error() == "1017:00: no answer");
+  CHECK(bus.error() == "1017:00: no answer within sdo_timeout_s = 0.5");
 }
 
 TEST_CASE("mappings are asked for and objects found in them", "[canopen][node]") {

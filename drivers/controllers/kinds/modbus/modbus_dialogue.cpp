@@ -445,7 +445,7 @@ bool ModbusDialogue::note_unread(const ReadRequest& request, const Exchange& exc
   }
   health_.last_error =
       "reading " + std::to_string(request.address) +
-      (request.count > 1 ? ".." + std::to_string(last) : "") + ": " + describe(exchange) +
+      (request.count > 1 ? ".." + std::to_string(last) : "") + ": " + exchange.detail +
       (is_block ? "; gap_registers_max = 0 in [controller] reads none between the values" : "");
   return false;
 }

@@ -9,7 +9,6 @@ namespace thermocomp {
 namespace {
 
 constexpr std::size_t bits_a_read_max = 2000;
-constexpr int illegal_function = 1;
 
 }  // namespace
 
@@ -73,11 +72,6 @@ bool is_refused(const Exchange& exchange) noexcept {
   return exchange.outcome == ExchangeOutcome::exception && exchange.unit_answered();
 }
 
-std::string describe(const Exchange& exchange) {
-  if (exchange.outcome != ExchangeOutcome::exception) return exchange.detail;
-  return "exception " + std::to_string(exchange.exception_code) + " (" + exchange.detail + ")";
-}
-
 std::string s7_place(const S7Block& s7, std::size_t address, std::size_t count) {
   return "DB" + std::to_string(s7.db) + ", bytes " + std::to_string(2 * address) + ".." +
          std::to_string(2 * (address + count) - 1);
@@ -93,7 +87,7 @@ std::string write_error(const ModbusControllerConfig& config, const WriteField& 
   const bool may_take_one = config.write_function != ModbusControllerConfig::one_register &&
                             exchange.exception_code == illegal_function;
   return begins + " (function " + std::to_string(config.write_function) + ", register " +
-         std::to_string(request.address) + "): " + describe(exchange) +
+         std::to_string(request.address) + "): " + exchange.detail +
          (may_take_one ? "; if it takes single registers only, write_function = 6" : "");
 }
 

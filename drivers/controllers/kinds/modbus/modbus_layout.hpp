@@ -58,8 +58,6 @@ Exchange write_field(ModbusConnection& connection, const ModbusControllerConfig&
 /// Whether the controller itself refused, and not a gateway because the controller behind it may be
 /// off.
 [[nodiscard]] bool is_refused(const Exchange& exchange) noexcept;
-/// "exception 1 (Illegal function)", or what came.
-[[nodiscard]] std::string describe(const Exchange& exchange);
 /// "DB100, bytes 0..9"
 [[nodiscard]] std::string s7_place(const S7Block& s7, std::size_t address, std::size_t count);
 /// "the controller refuses writes (function 16, register 200): exception 1 (Illegal function)", and
