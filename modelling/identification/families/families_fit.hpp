@@ -36,7 +36,6 @@ struct FamilyResult {
 struct FamiliesFit {
   std::vector<FamilyResult> results;  ///< order of all_families
   Family chosen{Family::none};
-  bool chosen_by_stretches{false};    ///< of two or three runs; `results` are of whole runs
   std::vector<double> other_half_um;  ///< of an only run: what the chosen one leaves of each half
                                       ///< by a model of the other, one an output
   std::string chosen_because;         ///< one line, with the figures that decided

@@ -55,7 +55,7 @@ StructureSpec clamped_column(double depth_mm, double poisson_ratio) {
 
 TEST_CASE("a foot that is held crosswise is what finite elements of a clamped column say",
           "[tiebar][fe][foot]") {
-  const double poisson_ratio = GENERATE(0.0, 0.1, 0.3);
+  const double poisson_ratio = GENERATE(0.0, 0.3);
   const double depth_mm = GENERATE(20.0, 60.0, 160.0);
   const StructureSpec spec = clamped_column(depth_mm, poisson_ratio);
   const Structure structure = build_structure(spec, [](std::string_view) {});
