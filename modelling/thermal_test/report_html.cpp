@@ -40,16 +40,6 @@ std::string percent(double share) {
   return text;
 }
 
-std::string percent_words(const Figure& ratio) {
-  const std::string words = percent(ratio.value) + " %";
-  // From a fraction of the figure to many times the other side: no figure at all.
-  const bool is_wide = !(ratio.high <= 1.5);
-  if (is_wide && !(ratio.low > 0.2 * ratio.value)) return words + " (noise alone may have made it)";
-  if (std::isfinite(ratio.high))
-    return words + " (" + percent(ratio.low) + " to " + percent(ratio.high) + ")";
-  return words + " (at least " + percent(ratio.low) + ")";
-}
-
 /// In a column, what stands in brackets stays in one line.
 std::string cell_of(std::string words) {
   const std::size_t bracket = words.find('(');
@@ -288,6 +278,16 @@ std::string method_part(const TestAnswer& answer) {
 }
 
 }  // namespace
+
+std::string percent_words(const Figure& ratio) {
+  const std::string words = percent(ratio.value) + " %";
+  // From a fraction of the figure to many times the other side: no figure at all.
+  const bool is_wide = !(ratio.high <= 1.5);
+  if (is_wide && !(ratio.low > 0.2 * ratio.value)) return words + " (noise alone may have made it)";
+  if (std::isfinite(ratio.high))
+    return words + " (" + percent(ratio.low) + " to " + percent(ratio.high) + ")";
+  return words + " (at least " + percent(ratio.low) + ")";
+}
 
 std::string figure_words(const Figure& figure, const std::string& unit) {
   if (!figure.is_there()) return "-";

@@ -39,6 +39,8 @@ struct TestAnswer {
 
 /// "31.2 um (30.8 to 31.4)"
 [[nodiscard]] std::string figure_words(const Figure& figure, const std::string& unit);
+/// "15 % (11 to 19)"
+[[nodiscard]] std::string percent_words(const Figure& ratio);
 /// A sentence or two on an axis, for a person.
 [[nodiscard]] std::string axis_sentence(const AxisFigures& axis, const TestPhases& phases);
 

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/history/replay/record_loader.hpp"
+#include "modelling/thermal_test/part_test.hpp"
 #include "modelling/thermal_test/test_data.hpp"
 #include "modelling/thermal_test/test_report.hpp"
 #include "modelling/thermal_test/test_sheet.hpp"
@@ -29,11 +30,14 @@ void write(const std::string& destination, const std::string& text) {
   file.commit();
 }
 
+constexpr const char* part = "part";
+
 CLI::Option* add_kind(CLI::App& sub, std::string& kind) {
   return sub
       .add_option("--test", kind,
-                  "what warms the machine: environment (only its surroundings), spindle, axis")
-      ->check(CLI::IsMember({"environment", "spindle", "axis"}))
+                  "what warms the machine: environment (only its surroundings), spindle, axis; or "
+                  "part: features of a test part, cold and warm")
+      ->check(CLI::IsMember({"environment", "spindle", "axis", part}))
       ->type_name("TEST")
       ->required();
 }
@@ -56,7 +60,19 @@ std::string sentences(const TestFigures& figures) {
   return text;
 }
 
+int run_part_report(const ReportOptions& options) {
+  const PartFigures before = part_figures(options.before);
+  std::optional<PartFigures> after;
+  if (!options.after.empty()) after = part_figures(options.after);
+  write(options.output, part_html(before, after));
+  if (!options.json.empty()) write(options.json, part_json(before, after));
+  if (options.output != "-" && options.json != "-")
+    for (const std::string& sentence : part_sentences(before, after)) std::puts(sentence.c_str());
+  return cli::exit_success;
+}
+
 int run_report(ReportOptions options) {
+  if (options.kind == part) return run_part_report(options);
   options.test.kind = kinds.at(options.kind);
   cli::RunLoader loader(options.columns);
   TestData before = test_data(cli::load_record(options.before, loader), options.test);
@@ -77,6 +93,7 @@ int run_report(ReportOptions options) {
 struct PlanOptions {
   std::string kind;
   SheetOptions sheet;
+  PartSheet part;
   std::string moving{"x"};
   std::string speed{"constant"};
   std::string output;
@@ -84,6 +101,14 @@ struct PlanOptions {
 };
 
 int run_plan(PlanOptions options) {
+  const bool page = options.output.ends_with(".html");
+  if (!page && !options.output.ends_with(".csv") && options.output != "-")
+    throw cli::Failure(options.output + ": must end with .csv or .html, which says what is made");
+  if (options.kind == part) {
+    if (options.hours > 0.0) options.part.hours = options.hours;
+    write(options.output, part_sheet(options.part, page));
+    return cli::exit_success;
+  }
   options.sheet.kind = kinds.at(options.kind);
   options.sheet.steps = options.speed == "steps";
   options.sheet.moving = options.moving.front();
@@ -91,9 +116,6 @@ int run_plan(PlanOptions options) {
   options.sheet.hours = options.hours > 0.0 ? options.hours : surroundings ? 24.0 : 4.0;
   if (surroundings && options.sheet.every_min == SheetOptions{}.every_min)
     options.sheet.every_min = 15.0;
-  const bool page = options.output.ends_with(".html");
-  if (!page && !options.output.ends_with(".csv") && options.output != "-")
-    throw cli::Failure(options.output + ": must end with .csv or .html, which says what is made");
   write(options.output, page ? sheet_html(options.sheet) : sheet_csv(options.sheet));
   return cli::exit_success;
 }
@@ -142,7 +164,7 @@ void add_plan(CLI::App& group, std::function<int()>& action) {
       "plan", "a sheet of a test: what to do, and a row for each reading, to be filled in");
   add_kind(*sub, options->kind);
   sub->add_option("--hours", options->hours,
-                  "of running, default 4; of the whole environment's test, default 24")
+                  "of running, default 4 (part: 2); of the whole environment's test, default 24")
       ->check(CLI::PositiveNumber)
       ->type_name("H");
   sub->add_option("--cooling-hours", options->sheet.cooling_h, "recorded after running, default 2")
@@ -152,6 +174,12 @@ void add_plan(CLI::App& group, std::function<int()>& action) {
                   "minutes between two readings, default 5 (environment: 15)")
       ->check(CLI::PositiveNumber)
       ->type_name("MIN");
+  sub->add_option("--features", options->part.features, "of the part, default 6")
+      ->check(CLI::Range(1, 100))
+      ->type_name("N");
+  sub->add_option("--repeats", options->part.repeats, "of cold and warm with the part, default 3")
+      ->check(CLI::Range(2, 100))
+      ->type_name("N");
   sub->add_option("--rpm-max", options->sheet.rpm_max, "largest speed of the spindle")
       ->check(CLI::PositiveNumber)
       ->type_name("RPM");

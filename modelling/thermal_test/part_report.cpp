@@ -1,0 +1,216 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "config/text/problems.hpp"
+#include "modelling/thermal_test/part_test.hpp"
+#include "modelling/thermal_test/test_report.hpp"
+#include "report/html_page.hpp"
+#include "report/svg_plot.hpp"
+#include "report/xml_text.hpp"
+
+namespace thermocomp::thermal_test {
+namespace {
+
+constexpr const char* without_colour = "#c05621";
+constexpr const char* with_colour = "#2b6cb0";
+
+const PartShift* find(const PartFigures& figures, const PartShift& like) {
+  const auto found =
+      std::find_if(figures.shifts.begin(), figures.shifts.end(), [&](const PartShift& each) {
+        return each.feature == like.feature && each.axis == like.axis;
+      });
+  return found == figures.shifts.end() ? nullptr : &*found;
+}
+
+const PartAxis* find(const PartFigures& figures, const std::string& axis) {
+  const auto found = std::find_if(figures.axes.begin(), figures.axes.end(),
+                                  [&](const PartAxis& each) { return each.axis == axis; });
+  return found == figures.axes.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> instructions(const PartSheet& sheet) {
+  return {
+      "The part: features of one kind (bores, pads, spheres) spread over the working volume, P1 to "
+      "P" +
+          std::to_string(sheet.features) +
+          ". Either an artefact that stays clamped and is probed, or a part on which each feature "
+          "has "
+          "a cold and a warm one side by side, cut by this machine: rough cuts, one finishing cut, "
+          "then measured at 20 degC.",
+      "Cold: the machine has stood still for a night. Probe or finish every feature once, in the "
+      "order of the rows.",
+      "Warm: the shop's own load for " + figure_text(sheet.hours) +
+          " h, then the same at once, in the same order.",
+      "A repeat is a whole day: cold and warm once. " + std::to_string(sheet.repeats) +
+          " repeats, with the part clamped anew only between them.",
+      "One sheet with the compensation switched off (thermocomp disable), one with it on.",
+      "Values are deviations from the nominal size or place in um, with their sign. What is not "
+      "measured stays empty."};
+}
+
+/// Each feature's shift as a line from its lower to its upper bound, without and with compensation.
+std::string picture(const PartFigures& before, const std::optional<PartFigures>& after) {
+  constexpr double left = 90.0;
+  constexpr double width = 720.0;
+  constexpr double row = 24.0;
+  double reach = 1.0;
+  for (const PartFigures* figures : {&before, after ? &*after : nullptr})
+    if (figures != nullptr)
+      for (const PartShift& each : figures->shifts)
+        reach = std::max({reach, std::abs(each.shift_um.low), std::abs(each.shift_um.high)});
+  const double middle = (left + width) / 2.0;
+  const double scale = (width - left - 20.0) / 2.0 / reach;
+  const double height = 44.0 + row * static_cast<double>(before.shifts.size());
+  Drawing drawing{width, height, ""};
+  const auto number = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1f", value);
+    return std::string(text);
+  };
+  const auto text = [&](double x, double y, const std::string& words, const char* anchor) {
+    drawing.body += "<text x=\"" + number(x) + "\" y=\"" + number(y) + "\" text-anchor=\"" +
+                    anchor + "\">" + words + "</text>";
+  };
+  const auto line = [&](double x1, double y1, double x2, double y2, const std::string& style) {
+    drawing.body += "<path d=\"M" + number(x1) + " " + number(y1) + "L" + number(x2) + " " +
+                    number(y2) + "\" style=\"fill:none;" + style + "\"/>";
+  };
+  for (const double tick : round_ticks(-reach, reach, 7)) {
+    const double x = middle + scale * tick;
+    line(x, 20.0, x, height - 22.0, tick == 0.0 ? "stroke:#4a5568" : "stroke:#cbd5e0");
+    text(x, height - 6.0, figure_text(tick) + (tick == 0.0 ? " µm" : ""), "middle");
+  }
+  const auto mark = [&](const Figure& shift, double y, const std::string& colour) {
+    const double from = middle + scale * shift.low;
+    const double to = middle + scale * shift.high;
+    line(from, y, to, y, "stroke-width:2;stroke:" + colour);
+    const double at = middle + scale * shift.value;
+    line(at, y - 5.0, at, y + 5.0, "stroke-width:4;stroke:" + colour);
+  };
+  double y = 30.0;
+  for (const PartShift& each : before.shifts) {
+    text(left - 8.0, y + 5.0, xml_text(each.feature) + " " + each.axis, "end");
+    mark(each.shift_um, y - 4.0, without_colour);
+    const PartShift* compensated = after ? find(*after, each) : nullptr;
+    if (compensated != nullptr) mark(compensated->shift_um, y + 5.0, with_colour);
+    y += row;
+  }
+  return drawing.svg();
+}
+
+std::string signature_table() {
+  const std::string blank = "\u00a0";
+  return html_table({{"machine and number", "part", "dates", "room, from to °C", "measured by",
+                      "signed for the maker", "signed for the user"},
+                     {blank, "", "", "", "", "", ""}});
+}
+
+nlohmann::json figure_json(const Figure& figure) {
+  return {{"value", figure.value}, {"ci95", {figure.low, figure.high}}};
+}
+
+nlohmann::json figures_json(const PartFigures& figures) {
+  nlohmann::json result{{"file", figures.file},
+                        {"axes", nlohmann::json::array()},
+                        {"features", nlohmann::json::array()}};
+  for (const PartAxis& axis : figures.axes)
+    result["axes"].push_back({{"axis", axis.axis},
+                              {"repeats", axis.repeats},
+                              {"repeat_sd_um", axis.repeat_sd_um},
+                              {"rms_um", figure_json(axis.rms_um)}});
+  for (const PartShift& each : figures.shifts)
+    result["features"].push_back(
+        {{"feature", each.feature}, {"axis", each.axis}, {"shift_um", figure_json(each.shift_um)}});
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> part_sentences(const PartFigures& before,
+                                        const std::optional<PartFigures>& after) {
+  std::vector<std::string> sentences;
+  for (const PartAxis& axis : before.axes) {
+    const PartAxis* compensated = after ? find(*after, axis.axis) : nullptr;
+    std::string text =
+        axis.axis + ": heat moves the features by " + figure_words(axis.rms_um, "um") + " RMS";
+    if (compensated != nullptr)
+      text += ", with compensation by " + figure_words(compensated->rms_um, "um") + ": " +
+              percent_words(ratio_of(compensated->rms_um, axis.rms_um)) + " remain";
+    sentences.push_back(text + ".");
+  }
+  return sentences;
+}
+
+std::string part_html(const PartFigures& before, const std::optional<PartFigures>& after) {
+  std::string html = html_begin("Test part: how far heat moves its features");
+  html += html_list(part_sentences(before, after));
+  html += html_figure(picture(before, after),
+                      after ? "Shift of each feature from cold to warm with its 95 % interval: "
+                              "brown without, blue with compensation."
+                            : "Shift of each feature from cold to warm with its 95 % interval.");
+  std::vector<std::vector<std::string>> rows{{"feature", "axis", "shift, µm"}};
+  if (after) rows.front().insert(rows.front().end(), {"with compensation, µm", "remains"});
+  for (const PartShift& each : before.shifts) {
+    rows.push_back({each.feature, each.axis, figure_words(each.shift_um, "")});
+    if (!after) continue;
+    const PartShift* compensated = find(*after, each);
+    const bool is_there = compensated != nullptr && each.shift_um.value != 0.0;
+    rows.back().push_back(is_there ? figure_words(compensated->shift_um, "") : "-");
+    rows.back().push_back(
+        is_there ? figure_text(100.0 * compensated->shift_um.value / each.shift_um.value) + " %"
+                 : "-");
+  }
+  html += html_table(rows) + html_heading("Signed") + signature_table();
+  std::vector<std::string> method{
+      "A shift is the mean over the repeats of the deviation warm less the deviation cold, so that "
+      "the feature's own error, its clamping and the probe's calibration go out.",
+      "In brackets: 95 % by Student's t from the scatter of the repeats, with as many degrees of "
+      "freedom as there are repeats less one, since the features of one repeat share its warmth."};
+  for (const PartFigures* figures : {&before, after ? &*after : nullptr})
+    if (figures != nullptr)
+      for (const PartAxis& axis : figures->axes)
+        method.push_back(figures->file + ", " + axis.axis + ": " + std::to_string(axis.repeats) +
+                         " repeats, one of them scatters by " + figure_text(axis.repeat_sd_um) +
+                         " µm (standard deviation).");
+  return html + html_heading("How these figures were made") + html_list(method) + html_end();
+}
+
+std::string part_json(const PartFigures& before, const std::optional<PartFigures>& after) {
+  nlohmann::json result{{"test", "part"}, {"before", figures_json(before)}};
+  if (after) {
+    result["after"] = figures_json(*after);
+    for (const PartAxis& axis : before.axes)
+      if (const PartAxis* compensated = find(*after, axis.axis)) {
+        const Figure ratio = ratio_of(compensated->rms_um, axis.rms_um);
+        result["remains"][axis.axis] =
+            std::isfinite(ratio.high) ? figure_json(ratio) : nlohmann::json(ratio.value);
+      }
+  }
+  return result.dump(1) + "\n";
+}
+
+std::string part_sheet(const PartSheet& sheet, bool as_page) {
+  const std::vector<std::string> columns{"repeat", "state", "feature", "x_um", "y_um", "z_um"};
+  const std::string then =
+      "Filled in: thermocomp thermal-test report OFF.csv ON.csv --test part -o REPORT.html";
+  std::vector<std::vector<std::string>> rows{columns};
+  for (int repeat = 1; repeat <= sheet.repeats; ++repeat)
+    for (const char* state : {"cold", "warm"})
+      for (int feature = 1; feature <= sheet.features; ++feature)
+        rows.push_back({std::to_string(repeat), state,
+                        std::string("P").append(std::to_string(feature)), "", "", ""});
+  if (as_page)
+    return html_begin("Test part, cold and warm") + html_list(instructions(sheet)) +
+           html_table(rows) + signature_table() + html_paragraph(then, "small") + html_end();
+  std::string text = "# Test part, cold and warm\n";
+  for (const std::string& line : instructions(sheet)) text += "# " + line + "\n";
+  text += "# " + then + "\n";
+  for (const auto& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) text += row[i] + (i + 1 < row.size() ? "," : "\n");
+  return text;
+}
+
+}  // namespace thermocomp::thermal_test
