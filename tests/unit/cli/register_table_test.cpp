@@ -43,6 +43,14 @@ TEST_CASE("the table names every register, its unit and who writes it", "[cli][r
   CHECK_THAT(text, !Contains("DRY RUN"));
 }
 
+TEST_CASE("the table says which output is a diameter", "[cli][registers]") {
+  DaemonConfig config = example("small_machine.toml");
+  config.model.diameters = {{config.estimator.axes.front().output, "x", -1.0}};
+  CHECK_THAT(register_table(config),
+             Contains("axis x takes out " + half_of(config.model.diameters.front()) + ", a diameter"));
+  CHECK_THAT(half_of(config.model.diameters.front()), Contains("half"));
+}
+
 TEST_CASE("the table of CAN goes by frames and bits", "[cli][registers]") {
   DaemonConfig config = example("can.toml");
   const std::string text = register_table(config);

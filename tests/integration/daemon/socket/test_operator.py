@@ -8,6 +8,28 @@ from lab import Refused, assert_replays_exactly, eventually
 from plain_devices import MODEL, RATE_UM_PER_S, Machine, assert_slewed
 
 
+CLAIMS = """[made_from]
+runs = ["monday.csv", "tuesday.csv"]
+within_one_run = false
+rows = 1000.0
+hours = 10.0
+columns = ["column_degC", "spindle_degC"]
+low = [10.0, 10.0]
+high = [30.0, 30.0]
+tau_s = [0.0]
+mean = [20.0, 20.0, 0.0, 0.0]
+covariance = [[99.0, 0.0, 0.0, 0.0], [0.0, 99.0, 0.0, 0.0], [0.0, 0.0, 99.0, 0.0], [0.0, 0.0, 0.0, 99.0]]
+distance_max = 3.0
+[made_from.output.z_um]
+remainder_rms_um = 1.0
+noise_um = 0.3
+noise_time_s = 600.0
+left_out_rms_um = 1.5
+no_model_rms_um = 10.0
+freedom = 30.0
+"""
+
+
 @pytest.fixture
 def machine(lab):
     return Machine(lab)
@@ -206,6 +228,21 @@ def test_a_measured_displacement_that_cannot_be_is_refused(machine, lab, value_u
     assert daemon.axis()["measured"] is None
     daemon.call("measured", axis="z", value_um=-59.0)
     assert daemon.axis()["measured"] == -59.0
+    recorded(machine, lab)
+
+
+def test_a_value_beyond_the_claimed_error_is_asked_back(machine, lab):
+    """The model claims 1.5 um: 12 um left at the tool are a slip of ten, 2 um are its error."""
+    machine.model.write_text(MODEL + CLAIMS)
+    daemon = machine.start()
+    status, _, said = daemon.cli("measured", "z", "12", "--source", "part")
+    assert status == 1 and "asked back, nothing is taken over: +12 um" in said, said
+    assert "a tenth of it would fit" in said and "--confirm" in said, said
+    assert daemon.axis()["measured"] is None
+    assert daemon.cli("measured", "z", "2", "--source", "part")[0] == 0
+    assert daemon.axis()["measured"] == 2.0
+    assert daemon.cli("measured", "z", "12", "--source", "part", "--confirm")[0] == 0
+    assert daemon.axis()["measured"] == 12.0
     recorded(machine, lab)
 
 
