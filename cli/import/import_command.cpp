@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/import/corrections.hpp"
 #include "cli/import/joined_runs.hpp"
 #include "config/runs/run_file.hpp"
 #include "report/output_file.hpp"
@@ -27,6 +28,7 @@ struct ImportOptions {
   std::string output;
   std::vector<std::string> names;
   std::optional<double> period_s;
+  std::string corrections;
 };
 
 void tell(const std::string& name, const std::vector<std::string>& lines) {
@@ -74,6 +76,12 @@ int run_import(const ImportOptions& options) {
   if (options.shift_s && options.join.empty())
     throw Failure("--shift-s is the shift of the file of --join, which is missing");
   RunFile run = read_log(options.log, map);
+  if (!options.corrections.empty()) {
+    run.understood.clear();
+    run = displacements_of(std::move(run), options.corrections == "steps" ? CorrectionEntry::step
+                                                                          : CorrectionEntry::total);
+    tell(options.output, run.understood);
+  }
   if (!options.join.empty()) {
     ColumnMap of_second = map;
     of_second.names.clear();
@@ -111,6 +119,12 @@ void add_import_command(CLI::App& app, Action& action) {
          "a second log of the same machine, by its own clock: temperatures there, probings "
          "here")
       ->type_name("FILE");
+  sub->add_option(
+         "--corrections", options->corrections,
+         "the log is of corrections that operators entered: steps (each is added) or totals "
+         "(each replaces the one before); they become displacements of the other sign")
+      ->check(CLI::IsMember({"steps", "totals"}))
+      ->type_name("HOW");
   sub->add_option("--shift-s", options->shift_s,
                   "what makes the second's time_s that of the first, where neither dates nor "
                   "columns that change "

@@ -5,6 +5,10 @@
 #include <map>
 #include <set>
 
+#include "config/run_forms/axis_letters.hpp"
+#include "config/run_forms/spelled_unit.hpp"
+#include "config/text/units.hpp"
+
 namespace thermocomp {
 namespace {
 
@@ -42,6 +46,12 @@ ColumnContent content(const TextTable& table, std::size_t column) {
   content.numbers = 2 * numbers > filled;
   content.distinct = distinct.size();
   return content;
+}
+
+bool holds_axes(const TextTable& table, std::size_t column) {
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    if (!is_axis_letter(table.field(row, column))) return false;
+  return true;
 }
 
 std::string series_of(const TextTable& table, std::size_t row, const LongForm& form) {
@@ -138,6 +148,17 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
     }
     while (form.names.size() > 1) form.names.pop_back();
   }
+  // A row per axis, as in a log of corrections.
+  if (numbers.size() == 1)
+    for (std::size_t i = 0; i < table.columns(); ++i) {
+      if (time.has(i) || !holds_axes(table, i)) continue;
+      std::vector<std::size_t> names{i};
+      for (const std::size_t word : form.names)  // tools: the corrections of each are its own
+        if (word != i) names.push_back(word);
+      form.names = std::move(names);
+      form.value = numbers[0];
+      return form;
+    }
   if (form.names.empty()) return std::nullopt;
   if (values.size() == 1)
     form.value = values[0];
@@ -158,6 +179,10 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     row = times.size();
     times.push_back(at);
   }
+  // The name of the value's column says its unit, unless a column of units does.
+  const std::string& value_name = table.header[form.value];
+  std::string value_unit = spelled_name(value_name).unit;
+  if (value_unit.empty()) value_unit = unit_of(value_name).symbol;
   std::map<std::string, std::size_t> column_of;
   TextTable wide;
   std::vector<std::vector<std::string_view>> columns;
@@ -168,7 +193,8 @@ std::string pivot(TextTable& table, std::vector<double>& time_s, const LongForm&
     if (is_new && columns.size() < series_max) {
       columns.emplace_back(times.size());
       wide.header.push_back(series);
-      wide.units.emplace_back(form.unit ? table.field(row, *form.unit) : std::string_view());
+      wide.units.emplace_back(form.unit ? table.field(row, *form.unit)
+                                        : std::string_view(value_unit));
     } else if (is_new) {
       problems.add(table.lines[row], table.header[form.names[0]], series,
                    "must be one of at most " + std::to_string(series_max) + " series");

@@ -17,7 +17,8 @@ struct LongForm {
 };
 
 /// What `pivot` of the map says; else a column of numbers called value, or one whose times repeat
-/// or go back, beside columns of words that recur.
+/// or go back, beside columns of words that recur; else a single column of numbers beside one of
+/// nothing but axes.
 /// @param time_s  of each row
 /// @return nullopt when the table is a wide one
 [[nodiscard]] std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& time,

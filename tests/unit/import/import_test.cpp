@@ -23,6 +23,7 @@
 #include <catch2/catch.hpp>
 
 #include "cli/import/clock_shift.hpp"
+#include "cli/import/corrections.hpp"
 #include "cli/import/joined_runs.hpp"
 #include "config/run_forms/column_map.hpp"
 #include "config/runs/run_file.hpp"
@@ -296,4 +297,38 @@ TEST_CASE("a workbook is read by xlsx2csv, or the error says how", "[import]") {
 TEST_CASE("options that a log has no use for are refused", "[import]") {
   CHECK_THROWS_WITH(imported("kw_watcher.csv", {{"a"}, {}}), Contains("names"));
   CHECK_THROWS_WITH(imported("kw_watcher.csv", {{}, 2.0}), Contains("period_s"));
+}
+
+TEST_CASE("corrections that operators entered are displacements of the other sign", "[import]") {
+  const std::string log =
+      "date;time;tool;axis;correction [mm]\n20.11.2026;10:12:03;T5;Z;-0,012\n"
+      "20.11.2026;11:02:44;T5;Z;-0,006\n20.11.2026;11:02:50;T5;X;0,004\n"
+      "20.11.2026;13:40:11;T5;Z;0,005\n";
+  // By hand: Z -12, -18, -13 um entered in all; X +4.
+  const RunFile steps = displacements_of(import_text(log), CorrectionEntry::step);
+  CHECK(steps.columns == std::vector<std::string>{"time_s", "z_um", "x_um"});
+  const std::vector<double>& z = steps.column("z_um");
+  CHECK(z[0] == Approx(12.0));
+  CHECK(z[1] == Approx(18.0));
+  CHECK(std::isnan(z[2]));
+  CHECK(z[3] == Approx(13.0));
+  CHECK(steps.column("x_um")[2] == Approx(-4.0));
+  const RunFile totals = displacements_of(import_text(log), CorrectionEntry::total);
+  CHECK(totals.column("z_um")[3] == Approx(-5.0));
+  SECTION("two tools are two logs") {
+    std::string two = log;
+    two.replace(two.find("T5;Z;0,005"), 2, "T7");
+    CHECK_THROWS_WITH(displacements_of(import_text(two), CorrectionEntry::step),
+                      Contains("of several tools or places each needs a log of its own"));
+  }
+  SECTION("a number without a unit is no displacement") {
+    ColumnMap signals;
+    signals.takes_signals = true;
+    const RunFile run = parse_run(
+        "time,axis,value\n2026-11-20 10:12:03,Z,-12\n"
+        "2026-11-20 11:02:44,Z,-6\n2026-11-20 11:02:44,X,1\n",
+        "log", {}, &signals);
+    CHECK_THROWS_WITH(displacements_of(run, CorrectionEntry::step),
+                      Contains("has no unit of a correction"));
+  }
 }
