@@ -173,6 +173,7 @@ function(thermocomp_test name)
   set(places ${THERMOCOMP_COMPUTES})
   if(arg_WAITS)
     set(places 1)
+    set_tests_properties(${name} PROPERTIES COST 300)
   endif()
   set_tests_properties(${name} PROPERTIES
     TIMEOUT ${arg_TIMEOUT} PROCESSORS ${places} LABELS "${arg_LABELS}")
