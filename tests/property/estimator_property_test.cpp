@@ -108,13 +108,6 @@ TEST_CASE("a stale or impossible reading never moves the axis", "[property][esti
   CHECK_FALSE(useless_readings_matter(seed, Planted::nothing));
 }
 
-TEST_CASE("equal seeds give equal bits, and another seed others", "[property][estimator]") {
-  const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
-  CAPTURE(seed);
-  CHECK(live(seed, {}).trace == live(seed, {}).trace);
-  CHECK(live(seed, {}).trace != live(seed + 1, {}).trace);
-}
-
 TEST_CASE("a state saved and loaded in the middle of a life changes no bit",
           "[property][estimator]") {
   const auto seed = GENERATE(range<std::uint64_t>(0, seeds));
@@ -123,7 +116,6 @@ TEST_CASE("a state saved and loaded in the middle of a life changes no bit",
 }
 
 TEST_CASE("planted bugs break the rules", "[property][estimator]") {
-  CHECK(noticed(Planted::nothing) == 0);
   CHECK(noticed(Planted::double_rate) > seeds / 2);
   CHECK(noticed(Planted::larger_bound) > seeds / 20);
   CHECK(noticed(Planted::domain_ignored) > seeds / 20);
