@@ -160,6 +160,7 @@ class ForeignReader {
       turn_rows(time_s);
       return;
     }
+    if (goes_on_an_hour_back(time_s)) return;
     const auto at = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
     const auto row = static_cast<std::size_t>(at - time_s.begin()) + 1;
     const std::size_t column = time.columns.empty() ? 0 : time.columns.back();
@@ -168,6 +169,26 @@ class ForeignReader {
                       shortened(table_.field(row - 1, column)) +
                       "); of a row per value write pivot = \"the column that names the series\" in "
                       "the file of --columns");
+  }
+
+  /// In autumn the clock of the wall is set back by an hour, once, and the rows go on as before.
+  bool goes_on_an_hour_back(std::vector<double>& time_s) {
+    constexpr double hour_s = 3600.0;
+    constexpr double steps_max = 3.0;
+    if (!run_.wall_zero || run_.wall_zero->is_utc) return false;
+    const auto is_not_later = [](double a, double b) { return !(b > a); };
+    const auto last = std::adjacent_find(time_s.begin(), time_s.end(), is_not_later);
+    if (last == time_s.begin() ||
+        std::adjacent_find(last + 1, time_s.end(), is_not_later) != time_s.end())
+      return false;
+    const double step_s = *(last + 1) + hour_s - *last;
+    if (!(step_s > 0.0 && step_s <= steps_max * (*last - *(last - 1)))) return false;
+    const auto row = static_cast<std::size_t>(last + 1 - time_s.begin());
+    for (std::size_t i = row; i < time_s.size(); ++i) time_s[i] += hour_s;
+    run_.understood.push_back("the clock was set back by an hour before line " +
+                              std::to_string(table_.lines[row]) +
+                              ": an hour is added from there on");
+    return true;
   }
 
   void turn_rows(std::vector<double>& time_s) {

@@ -13,7 +13,7 @@ namespace thermocomp {
 namespace {
 
 constexpr auto value_names = std::to_array<std::string_view>(
-    {"value", "_value", "state", "val", "wert", "reading", "mean", "messwert"});
+    {"value", "_value", "varvalue", "state", "val", "wert", "reading", "mean", "messwert"});
 constexpr auto unit_names =
     std::to_array<std::string_view>({"unit", "units", "einheit", "unit_of_measurement", "uom"});
 constexpr std::size_t series_max = 1024;

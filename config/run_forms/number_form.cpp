@@ -43,10 +43,14 @@ struct Seen {
   explicit operator bool() const noexcept { return line > 0; }
 };
 
-std::array<Seen, 6> seen_in(const TextTable& table) {
+std::array<Seen, 6> seen_in(const TextTable& table, bool& has_apostrophes) {
   std::array<Seen, 6> seen;
   for (std::size_t i = 0; i < table.fields.size(); ++i) {
-    const std::string_view digits = number_text_of(table.fields[i]).digits;
+    std::string_view digits = number_text_of(table.fields[i]).digits;
+    if (const auto group = digits.rfind('\''); group != std::string_view::npos) {  // 12'000.5
+      if (looks_like_number(digits)) has_apostrophes = true;
+      digits.remove_prefix(group + 1);
+    }
     Seen& first = seen[static_cast<std::size_t>(shown_by(digits))];
     if (!first) first = {table.lines[i / table.columns()], table.fields[i]};
   }
@@ -63,7 +67,9 @@ NumberForm number_form(const TextTable& table, const ColumnMap* map, ProblemList
   }
   if (map != nullptr && map->decimal) form.decimal = *map->decimal;
   if (map != nullptr && (map->decimal || map->thousands)) return form;
-  const auto seen = seen_in(table);
+  bool has_apostrophes = false;
+  const auto seen = seen_in(table, has_apostrophes);
+  if (has_apostrophes) form.thousands = '\'';
   const auto of = [&](Shows what) { return seen[static_cast<std::size_t>(what)]; };
   const auto ask = [&](Seen where, const std::string& rule) {
     problems.add(where.line, "", where.field, rule);
@@ -74,9 +80,14 @@ NumberForm number_form(const TextTable& table, const ColumnMap* map, ProblemList
       of(Shows::point) || table.separator != ',' ? of(Shows::point) : of(Shows::point_or_group);
   const Seen unclear_comma = of(Shows::comma_or_group);
   const Seen unclear_point = table.separator == ',' ? Seen{} : of(Shows::point_or_group);
-  if (of(Shows::groups)) {
-    ask(of(Shows::groups),
-        "has groups of thousands: write thousands = \",\" (or \".\") in the file of --columns");
+  if (const Seen& groups = of(Shows::groups)) {
+    // Of two signs the last is the decimal one: 1.234,5.
+    const char first = groups.field[groups.field.find_first_of(".,")];
+    form.thousands = first;
+    form.decimal = first == '.' ? ',' : '.';
+    if (const Seen& other = form.decimal == ',' ? of(Shows::point) : of(Shows::comma))
+      ask(groups, "has groups of thousands, and line " + std::to_string(other.line) + " has " +
+                      shortened(other.field) + ": there must be one decimal sign in a file");
   } else if (comma && point) {
     ask(comma, "has a decimal comma, and line " + std::to_string(point.line) + " has " +
                    shortened(point.field) + ": there must be one decimal sign in a file");

@@ -1,5 +1,6 @@
 #include "config/run_forms/run_text.hpp"
 
+#include <algorithm>
 #include <cstdint>
 
 #include "config/text/problems.hpp"
@@ -53,6 +54,12 @@ std::string utf8_of_utf16(std::string_view bytes, bool low_first) {
   return text;
 }
 
+/// Lines of an old Macintosh end with a carriage return alone.
+std::string with_line_ends(std::string text) {
+  if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');
+  return text;
+}
+
 struct Binary {
   std::string_view begin;
   const char* rule;
@@ -80,9 +87,11 @@ RunText run_text(std::string_view bytes, const std::string& name) {
   if (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF"))
     return {utf8_of_utf16(bytes.substr(2), bytes.front() == '\xFF'), false};
   if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
+  // A logger that lost its supply leaves what it had reserved.
+  while (!bytes.empty() && bytes.back() == '\0') bytes.remove_suffix(1);
   if (bytes.substr(0, 4096).find('\0') != std::string_view::npos)
     refuse("is no text and no form that is known here; docs/run_files.md lists them");
-  if (is_utf8(bytes)) return {std::string(bytes), false};
+  if (is_utf8(bytes)) return {with_line_ends(std::string(bytes)), false};
   RunText converted{{}, true};
   converted.text.reserve(bytes.size() + bytes.size() / 8);
   for (const char c : bytes) append_letter(converted.text, static_cast<unsigned char>(c));

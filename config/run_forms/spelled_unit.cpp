@@ -150,6 +150,7 @@ bool split_brackets(std::string_view header, SpelledName& name) {
     if (!header.ends_with(close)) continue;
     const auto begin = header.rfind(open);
     if (begin == std::string_view::npos) continue;
+    if (header.find('=', begin) != std::string_view::npos) continue;  // labels: {place="bed"}
     if (open == '(' && is_index(header.substr(begin + 1, header.size() - begin - 2))) continue;
     const std::string_view base = trimmed(header.substr(0, begin));
     name.base = base;

@@ -56,6 +56,43 @@ bool split(std::string_view line, char separator, std::vector<std::string_view>&
   return true;
 }
 
+/// With doubled quotes as one.
+std::string unquoted(std::string_view field) {
+  std::string text(field);
+  for (auto at = text.find("\"\""); at != std::string::npos; at = text.find("\"\"", at + 1))
+    text.erase(at, 1);
+  return text;
+}
+
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+/// In front of a digit: a minus for a typeset one, nothing for a blank that groups digits.
+std::string with_plain_letters(std::string_view all) {
+  constexpr std::string_view minus = "\u2212";
+  std::string text;
+  text.reserve(all.size() + 64);
+  while (!all.empty()) {
+    const auto is_next = [&](std::string_view letter) {
+      return all.starts_with(letter) && letter.size() < all.size() && is_digit(all[letter.size()]);
+    };
+    const bool groups = !text.empty() && is_digit(text.back());
+    std::size_t used = 0;
+    for (const std::string_view blank : {"\u00a0", "\u202f", "\u2009"})
+      if (groups && is_next(blank)) used = blank.size();
+    if (is_next(minus)) {
+      text += '-';
+      used = minus.size();
+    } else if (used == 0) {
+      text += all.front();
+      used = 1;
+    }
+    all.remove_prefix(used);
+  }
+  return text;
+}
+
 enum class Shows { text, nothing, number, time };
 
 Shows shown_by(std::string_view field) {
@@ -71,13 +108,16 @@ class TableReader {
 
   TextTable read(std::string text) {
     table_.text = std::move(text);
+    spell_numbers_plainly();
     table_.text.reserve(64);  // on the heap, where it stays when the table is moved
     find_lines();
     if (lines_.empty()) {
       problems_.add(0, "", "", "has no header row");
       return std::move(table_);
     }
-    if (choose_separator() && find_header()) read_rows();
+    if (!choose_separator()) return std::move(table_);
+    widen_to_header();
+    if (find_header()) read_rows();
     return std::move(table_);
   }
 
@@ -96,6 +136,23 @@ class TableReader {
     double score{0.0};
     double values{0.0};  ///< share of fields that are numbers or times
   };
+
+  /// "+    20.0" becomes "    +20.0", as loggers align their numbers; a typeset minus a minus;
+  /// narrow and unbreakable blanks between groups of digits go.
+  void spell_numbers_plainly() {
+    std::string& all = table_.text;
+    if (all.find_first_of("\xC2\xE2") != std::string::npos) all = with_plain_letters(all);
+    for (auto at = all.find_first_of("+-"); at != std::string::npos;
+         at = all.find_first_of("+-", at + 1)) {
+      const bool begins =
+          at == 0 || std::string_view(";\t,|\"\n").find(all[at - 1]) != std::string_view::npos;
+      const auto digit = all.find_first_not_of(' ', at + 1);
+      if (!begins || digit == std::string::npos || digit == at + 1 || !is_digit(all[digit]))
+        continue;
+      std::swap(all[at], all[digit - 1]);
+      at = digit;
+    }
+  }
 
   void find_lines() {
     std::string_view rest = table_.text;
@@ -174,7 +231,38 @@ class TableReader {
   Fields fields_of(std::size_t line) {
     Fields fields;
     if (!split(lines_[line].text, table_.separator, fields)) fields.clear();
+    fill_up(fields);
     return fields;
+  }
+
+  /// A row that ends before its last columns has nothing in them.
+  void fill_up(Fields& fields) const {
+    if (narrowest_ > 0 && fields.size() >= narrowest_ && fields.size() < cut_.fields)
+      fields.resize(cut_.fields);
+  }
+
+  /// Most rows leave out the last columns of the header: a serial number in the first row, say.
+  void widen_to_header() {
+    constexpr std::size_t left_out_max = 3;
+    const std::size_t usual = cut_.fields;
+    for (std::size_t i = 0; i < cut_.begin; ++i) {
+      const std::size_t names = fields_of(i).size();
+      if (names <= usual || names > usual + left_out_max || !is_all_words(i)) continue;
+      const bool has_full_row = fields_of(i + 1).size() == names && i + 1 < cut_.begin;
+      if (!has_full_row || is_all_words(i + 1)) continue;
+      narrowest_ = usual;
+      cut_.fields = names;
+      cut_.begin = i;
+      return;
+    }
+  }
+
+  bool is_all_words(std::size_t line) {
+    const Fields fields = fields_of(line);
+    return std::none_of(fields.begin(), fields.end(), [](std::string_view field) {
+      const Shows shown = shown_by(field);
+      return shown == Shows::number || shown == Shows::time;
+    });
   }
 
   /// What the columns show in the lower half of the lines judged.
@@ -219,13 +307,23 @@ class TableReader {
     return std::min(cut_.begin + 1, lines_.size());
   }
 
+  /// Above columns that are no quantity: time stamp, number of the record.
+  static bool is_word_of_logger(std::string_view field) {
+    return field == "TS" || field == "RN" || field == "NO." || field == "Time";
+  }
+
+  void take_units(const Fields& fields) {
+    for (const std::string_view field : fields)
+      table_.units.emplace_back(is_word_of_logger(field) ? "" : without_brackets(field));
+  }
+
   /// A row of units has more of them than of anything else.
   static bool is_row_of_units(const Fields& fields) {
     std::size_t known = 0;
     std::size_t other = 0;
     for (const std::string_view field : fields) {
       if (field.empty() || field == "-") continue;
-      const bool of_logger = field == "TS" || field == "RN";
+      const bool of_logger = is_word_of_logger(field);
       ++(of_logger || spelled_unit(without_brackets(field)) != nullptr ? known : other);
     }
     return known > other;
@@ -247,8 +345,7 @@ class TableReader {
       const Fields fields = fields_of(i);
       if (told ? i == 0 : fields.size() == cut_.fields) {
         if (fields.size() == cut_.fields && is_row_of_units(fields) && i > 0) {
-          for (const std::string_view field : fields)
-            table_.units.emplace_back(without_brackets(field));
+          take_units(fields);
           continue;
         }
         std::set<std::string_view> distinct(fields.begin(), fields.end());
@@ -258,8 +355,7 @@ class TableReader {
           names = i;
         }
       } else if (told && fields.size() == cut_.fields && is_row_of_units(fields)) {
-        for (const std::string_view field : fields)
-          table_.units.emplace_back(without_brackets(field));
+        take_units(fields);
       } else if (!told) {
         break;
       }
@@ -274,18 +370,19 @@ class TableReader {
       take_names(*names);
     } else if (!take_commented_names() && !take_told_names()) {
       return false;
+    } else if (row_begin_ > 0 && !is_all_words(row_begin_ - 1)) {
+      problems_.add(lines_[row_begin_ - 1].number, "",
+                    std::to_string(fields_of(row_begin_ - 1).size()) + " fields",
+                    "must have " + std::to_string(cut_.fields) + ", as the rows below");
+      return false;
     }
     return names_are_clear();
   }
 
   /// Names of columns that the rows do not have at their end, or names for all but the first.
   bool fits_another_count(std::size_t line) {
-    const Fields fields = fields_of(line);
-    if (fields.size() < 2 || fields.size() + 1 < cut_.fields) return false;
-    return std::none_of(fields.begin(), fields.end(), [](std::string_view field) {
-      const Shows shown = shown_by(field);
-      return shown == Shows::number || shown == Shows::time;
-    });
+    const std::size_t count = fields_of(line).size();
+    return count >= 2 && count + 1 >= cut_.fields && is_all_words(line);
   }
 
   void take_names(std::size_t line) {
@@ -300,7 +397,7 @@ class TableReader {
         fields.insert(fields.begin(), std::string_view());
     }
     fields.resize(cut_.fields);
-    for (const std::string_view field : fields) table_.header.emplace_back(field);
+    for (const std::string_view field : fields) table_.header.push_back(unquoted(field));
     header_text_ = lines_[line].text;
     if (line > 0)
       table_.said.push_back("above the header in line " + std::to_string(table_.header_line) +
@@ -366,6 +463,13 @@ class TableReader {
         continue;
       }
       while (fields.size() > table_.columns() && fields.back().empty()) fields.pop_back();
+      fill_up(fields);
+      const bool is_cut_off = i + 1 == lines_.size() && table_.text.back() != '\n';
+      if (is_cut_off && fields.size() < table_.columns() && table_.rows() > 0) {
+        table_.said.push_back("the last line, " + std::to_string(line.number) +
+                              ", is cut off: left out");
+        continue;
+      }
       if (fields.size() != table_.columns()) {
         problems_.add(line.number, "", std::to_string(fields.size()) + " fields",
                       "must have " + std::to_string(table_.columns()) + ", as the header");
@@ -385,6 +489,7 @@ class TableReader {
   Line last_comment_{0, {}};
   std::optional<char> told_separator_;
   Cut cut_;
+  std::size_t narrowest_{0};  ///< fields that a row needs; 0: all
   std::size_t row_begin_{0};
   std::string_view header_text_;
 };

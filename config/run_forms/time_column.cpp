@@ -435,6 +435,16 @@ void keep_moving_dates(const TextTable& table, std::vector<std::size_t>& dates) 
   if (named_count == 1) dates = {*named};
 }
 
+bool numbers_increase(const TextTable& table, std::size_t column, const NumberForm& form) {
+  double last = -INFINITY;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto at = number_of(table.field(row, column), form);
+    if (!at || !(*at > last)) return false;
+    last = *at;
+  }
+  return true;
+}
+
 bool increases(const TextTable& table, std::size_t column) {
   double last = -INFINITY;
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -500,7 +510,9 @@ std::optional<TimeColumns> find_time(const TextTable& table, const ColumnMap* ma
   const std::size_t dates = found.dates.size();
   if (dates == 1 && found.clocks.size() == 1 && content(table, found.dates[0]) == Holds::date)
     return TimeColumns{{found.dates[0], found.clocks[0]}, {}};
-  if (dates == 1 && found.counting.size() == 1 && !increases(table, found.dates[0]))
+  const bool is_finer =
+      found.counting.size() == 1 && numbers_increase(table, found.counting[0], form);
+  if (dates == 1 && is_finer && !increases(table, found.dates[0]))
     return TimeColumns{{found.counting[0]}, found.dates[0]};
   for (const auto* kind : {&found.dates, &found.epochs, &found.clocks, &found.counting}) {
     if (kind->size() == 1) return TimeColumns{{kind->front()}, {}};

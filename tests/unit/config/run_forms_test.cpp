@@ -182,7 +182,7 @@ TEST_CASE("what may mean two things is asked for, with the line to write", "[con
       {"decimal or thousands", "time_s;z [um]\n0;1,234\n", 2,
        "decimal = \",\" or thousands = \",\""},
       {"point or thousands", "time_s;z [um]\n0;1.234\n", 2, "decimal = \".\" or thousands = \".\""},
-      {"thousands", "time_s;z [um]\n0;1.234,5\n", 2, "thousands ="},
+      {"thousands", "time_s;z [um];T [C]\n0;1.234,5;20.5\n", 2, "one decimal sign"},
       {"both signs", "time_s;z [um]\n0;1,25\n1;1.5\n", 2, "one decimal sign"},
       {"a group among commas", "time_s;z [um]\n0;1,25\n1;1.500\n", 3, "thousands = \".\""},
       {"day or month", "Time;z [um]\n03/04/2026 08:00:00;1\n04/05/2026 08:00:00;2\n", 2,
