@@ -13,6 +13,7 @@ struct Entry {
   Severity severity;
   std::string_view meaning;
   std::string_view remedy;
+  std::string_view command{};
 };
 
 using enum Severity;
@@ -29,18 +30,19 @@ constexpr CodeText dry_run_text{"dry_run", "dry run: nothing is written to the c
 
 constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
     {Reason::operator_disabled, intended, "switched off: by an operator, or never switched on yet",
-     "thermocomp enable"},
+     "switch it on", "thermocomp enable"},
     {Reason::controller_disabled, intended, "switched off at the controller",
      "release the switch that the configuration names as disable_signal"},
     {Reason::block_lost, fault, "an input of the model has no good sensor left",
-     "thermocomp sensors says which and why; mend the sensor or its bus"},
+     "mend the sensor or its bus", "thermocomp sensors"},
     {Reason::signal_lost, fault, "a position or operating signal that the model needs is missing",
      "look at what the controller reports; check its [[controller.signal]] entries"},
     {Reason::no_reference, fault, "there is no reference state yet",
-     "wait until every sensor has had a value, or: thermocomp reference"},
+     "wait until every sensor has had a value, or take the reference", "thermocomp reference"},
     {Reason::controller_offline, fault, "the controller cannot be read",
-     "silent: power, cable, address; refused: table and address, thermocomp scan names the place; "
-     "the offset it applied last may stay in effect"},
+     "silent: power, cable, address; refused: table and address; the offset it applied last may "
+     "stay in effect",
+     "thermocomp scan"},
     {Reason::not_synced, fault, "what the controller applies is not known yet",
      "wait a moment; if it stays, check the read-back (`applied`) of every axis"},
     {Reason::mismatch, warning, "the controller applies another offset than the one sent",
@@ -54,12 +56,12 @@ constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
      "that axis is not driven; set the offset at the controller to zero and look for who set it"},
     {Reason::block_estimated, warning,
      "an input of the model has no good sensor left and is estimated",
-     "compensation goes on; thermocomp sensors says which and why; mend the sensor"},
+     "compensation goes on; mend the sensor", "thermocomp sensors"},
     {Reason::mismatch_latched, fault,
      "what is read back cannot come from what is sent: that axis is not driven",
-     "see below what was sent and read; mend it, then: thermocomp release AXIS"},
+     "see below what was sent and read; mend it, then release the axis", "thermocomp release AXIS"},
     {Reason::no_target, fault, "the model gives no finite displacement",
-     "check the reference (thermocomp reference) and the model file"},
+     "check the reference and the model file", "thermocomp reference"},
     {Reason::outside_domain, warning, "the machine is outside of what its model was made from",
      "the offset may be wrong: measure, and make the model anew with a run of such a day"},
     {Reason::sensor_suspected, warning, "a sensor shows what its neighbours contradict",
@@ -67,10 +69,12 @@ constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
     {Reason::not_written, fault, "the controller answers, but takes no offset",
      "see below which write failed and how; check the function, the addresses and who may write"},
     {Reason::sensor_unconfirmed, fault, "a reading jumped and nothing confirms the new value",
-     "compare it with a hand-held thermometer; where it is right: thermocomp accept SENSOR"},
+     "compare it with a hand-held thermometer; where it is right, accept it",
+     "thermocomp accept SENSOR"},
     {Reason::start_unknown, fault,
      "nothing tells which offset the controller was sent last: not driven",
-     "give the axis a read-back (`applied`), or set the offset at the controller to zero, then: "
+     "give the axis a read-back (`applied`), or set the offset at the controller to zero, then "
+     "release the axis",
      "thermocomp release AXIS"},
 }};
 
@@ -93,13 +97,15 @@ constexpr std::array<Entry<Fault>, faults_count> fault_table{{
     {Fault::device_error, fault, "the device reports an error",
      "see its status register and manual"},
     {Fault::unconfirmed, fault, "too new, or contradicts its past, and nothing confirms it yet",
-     "compare it with a hand-held thermometer; where it is right: thermocomp accept SENSOR"},
+     "compare it with a hand-held thermometer; where it is right, accept it",
+     "thermocomp accept SENSOR"},
 }};
 
 template <class Table, class Code>
 CodeText text_in(const Table& table, Code code) noexcept {
   for (const auto& entry : table)
-    if (entry.code == code) return {to_string(code), entry.meaning, entry.remedy, entry.severity};
+    if (entry.code == code)
+      return {to_string(code), entry.meaning, entry.remedy, entry.severity, entry.command};
   return {to_string(code), to_string(code), "", fault};
 }
 
@@ -125,6 +131,10 @@ CodeText code_text(Mode mode, bool dry_run) noexcept {
 CodeText nan_text() noexcept {
   return {to_string(Fault::out_of_range), "NaN, no number",
           "many modules send NaN for a broken wire: look at the terminals", fault};
+}
+
+std::string with_command(std::string_view remedy, std::string_view command) {
+  return std::string(remedy) + (command.empty() ? "" : ": ") + std::string(command);
 }
 
 std::optional<Reason> reason_named(std::string_view name) noexcept {

@@ -24,6 +24,7 @@ struct CodeText {
   std::string_view meaning;  ///< what it is
   std::string_view remedy;   ///< what to do; empty: nothing
   Severity severity{Severity::fault};
+  std::string_view command{};  ///< that does or shows it, for a terminal; empty: none
 };
 
 [[nodiscard]] CodeText code_text(Reason reason) noexcept;
@@ -32,6 +33,9 @@ struct CodeText {
 [[nodiscard]] CodeText code_text(Mode mode, bool dry_run) noexcept;
 /// The fault `out_of_range` where the value is NaN.
 [[nodiscard]] CodeText nan_text() noexcept;
+
+/// "mend the sensor or its bus: thermocomp sensors"
+[[nodiscard]] std::string with_command(std::string_view remedy, std::string_view command);
 
 /// The codes with these names; nullopt: no code has that name.
 [[nodiscard]] std::optional<Reason> reason_named(std::string_view name) noexcept;

@@ -81,9 +81,10 @@ struct AxisStatus {
   std::string unit{"um"};
   double displacement{not_a_number};
   double target{not_a_number};
-  double offset{not_a_number};    ///< sent
-  double applied{not_a_number};   ///< read back
-  double measured{not_a_number};  ///< by the last command `measured`
+  double offset{not_a_number};      ///< sent
+  double offset_max{not_a_number};  ///< bound of its size
+  double applied{not_a_number};     ///< read back
+  double measured{not_a_number};    ///< by the last command `measured`
   bool synced{false};
   bool driven{false};
   bool disagrees{false};  ///< the read-back differs from what is sent
@@ -107,6 +108,7 @@ struct AxisStatus {
     visit("displacement", self.displacement);
     visit("target", self.target);
     visit("offset", self.offset);
+    visit("offset_max", self.offset_max);
     visit("applied", self.applied);
     visit("measured", self.measured);
     visit("synced", self.synced);
@@ -236,6 +238,9 @@ struct UnitStatus {
   std::uint64_t bad_frames{0};
   double round_trip_ms{not_a_number};
   std::string last_error{};
+  std::vector<std::string> sensors{};  ///< that it reads
+  std::vector<std::string> blocks{};   ///< that these belong to
+  double silent_s{not_a_number};       ///< age of its newest reading
 
   template <class Self, class Visitor>
   static void fields(Self& self, Visitor& visit) {
@@ -248,6 +253,9 @@ struct UnitStatus {
     visit("bad_frames", self.bad_frames);
     visit("round_trip_ms", self.round_trip_ms);
     visit("last_error", self.last_error);
+    visit("sensors", self.sensors);
+    visit("blocks", self.blocks);
+    visit("silent_s", self.silent_s);
   }
 };
 

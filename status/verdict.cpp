@@ -1,7 +1,10 @@
 #include "status/verdict.hpp"
 
 #include <algorithm>
-#include <functional>
+#include <cmath>
+#include <iterator>
+#include <set>
+#include <utility>
 
 #include "status/codes.hpp"
 #include "status/figures.hpp"
@@ -12,14 +15,8 @@ namespace {
 
 /// The operator's switch outlives the dry run: left on, the first offsets go out unwatched.
 constexpr std::string_view dry_run_remedy =
-    "thermocomp enable shows the offsets; thermocomp disable before the dry run ends";
-constexpr std::string_view bus_off_remedy =
-    "cable, termination, bit rate; then ip link set IF type can restart, or let restart-ms do it";
-constexpr std::string_view can_remedy = "cable, termination, bit rate";
-
-constexpr std::string_view unit_remedy = "thermocomp scan shows what came and tries what may help";
-
-using AddTrouble = std::function<void(const std::string& what, std::string_view remedy)>;
+    "switched on, the offsets are shown; switch it off before the dry run ends";
+constexpr std::string_view can_remedy = "check cable, termination, bit rate";
 
 bool is_network(std::string_view kind) {
   return kind.starts_with("modbus") && kind != "modbus_rtu";
@@ -32,48 +29,211 @@ std::vector<std::string> axes_not_driven(const Status& status) {
   return names;
 }
 
-/// @param state_s  how long the CAN interface has been in `state`
-void add_can_trouble(const std::string& name, const std::optional<std::string>& state,
-                     std::optional<double> state_s, const AddTrouble& add) {
-  const std::string lasts = " for " + duration_text(state_s.value_or(not_a_number));
-  if (state == "bus_off") add(name + ": bus-off" + lasts, bus_off_remedy);
-  if (state == "passive" || state == "warning") add(name + ": error " + *state + lasts, can_remedy);
-}
+/// Collects what is wrong, one entry a cause.
+class Causes {
+ public:
+  Causes(const Status& status, const SensorsAnswer* sensors)
+      : status_(status), sensors_(sensors), unexplained_(status.sensors_bad) {}
 
-void add_bus_troubles(const Status& status, const AddTrouble& add) {
-  for (const BusStatus& bus : status.buses) {
-    const std::string name = "bus " + bus.name;
-    for (const UnitStatus& unit : bus.units)
-      if (unit.answering && !unit.last_error.empty() && !status.sensors_bad.empty()) {
-        add(name + ": " + unit.name + ": " + unit.last_error, unit_remedy);
-      } else if (!unit.answering && bus.connected) {
-        const bool is_silent = unit.timeouts >= unit.bad_frames;
-        add(name + ": " + unit.name + (is_silent ? " does not answer (" : " answers wrongly (") +
-                unit.last_error + ")",
-            is_network(bus.kind) && !is_silent
-                ? unit_remedy
-                : code_text(is_silent ? Fault::no_answer : Fault::bad_frame).remedy);
+  std::vector<Trouble> all() {
+    for (const BusStatus& bus : status_.buses) add_bus(bus);
+    add_bad_sensors();
+    std::vector<Trouble> sensors = std::exchange(list_, {});
+    add_reasons(Severity::fault);
+    std::move(sensors.begin(), sensors.end(), std::back_inserter(list_));
+    for (const std::string& estimate : estimate_lines(status_.inputs, status_.axes)) add(estimate);
+    add_doubtful_sensors();
+    add_axes();
+    add_can("controller " + status_.controller.name, status_.controller.state,
+            status_.controller.state_s, {SubjectKind::controller, status_.controller.name});
+    for (const Severity severity : {Severity::warning, Severity::intended, Severity::normal})
+      add_reasons(severity);
+    for (const std::string& warning : status_.warnings) add(warning);
+    return std::move(list_);
+  }
+
+ private:
+  void add(const std::string& what, std::string_view remedy = "", std::string_view command = "",
+           const Subject& subject = {}) {
+    list_.push_back({what, std::string(remedy), std::string(command), subject});
+  }
+
+  /// Whether entries of sensors, modules or axes say more than the reason does.
+  [[nodiscard]] bool is_told_by_its_cause(Reason reason) const {
+    const auto any_axis = [this](const auto& is_so) {
+      return std::any_of(status_.axes.begin(), status_.axes.end(), is_so);
+    };
+    switch (reason) {
+      case Reason::block_lost:
+      case Reason::block_estimated:
+        return !named_inputs_.empty();
+      case Reason::signal_lost:  // signals come from the controller
+        return has_reason(status_.reasons, Reason::controller_offline);
+      case Reason::sensor_suspected:
+        return !status_.sensors_suspected.empty();
+      case Reason::sensor_unconfirmed:
+        return !status_.sensors_jumped.empty();
+      case Reason::at_bound:
+        return any_axis([](const AxisStatus& axis) { return axis.at_bound; });
+      case Reason::mismatch:
+        return any_axis([](const AxisStatus& axis) { return axis.disagrees; });
+      case Reason::mismatch_latched:
+        return any_axis([](const AxisStatus& axis) { return axis.latched.has_value(); });
+      default:
+        return false;
+    }
+  }
+
+  void add_reasons(Severity severity) {
+    for (const Reason reason : members_of(status_.reasons)) {
+      const CodeText text = code_text(reason);
+      if (text.severity != severity || is_told_by_its_cause(reason)) continue;
+      const std::string& error = status_.controller.last_error;
+      const bool is_of_link = reason == Reason::not_written || reason == Reason::controller_offline;
+      const bool switched_off = reason == Reason::operator_disabled && status_.dry_run;
+      add(std::string(text.meaning) + (is_of_link && !error.empty() ? ": " + error : ""),
+          switched_off ? dry_run_remedy : text.remedy, text.command,
+          is_of_link ? Subject(SubjectKind::controller, status_.controller.name) : Subject());
+    }
+  }
+
+  /// ": 4 sensors, inputs bed, table": what is lost with these sensors, which it explains.
+  std::string lost_with(const std::vector<std::string>& sensors,
+                        const std::vector<std::string>& blocks) {
+    if (sensors.empty()) return {};
+    for (const std::string& sensor : sensors) std::erase(unexplained_, sensor);
+    return ": " + std::to_string(sensors.size()) + (sensors.size() == 1 ? " sensor" : " sensors") +
+           input_text(lost_inputs(blocks));
+  }
+
+  /// Each is named by one cause.
+  std::vector<std::string> lost_inputs(const std::vector<std::string>& blocks) {
+    std::vector<std::string> lost;
+    for (const InputStatus& input : status_.inputs)
+      if (!input.good && std::find(blocks.begin(), blocks.end(), input.block) != blocks.end() &&
+          named_inputs_.insert(input.block).second)
+        lost.push_back(input.block);
+    return lost;
+  }
+
+  static std::string input_text(const std::vector<std::string>& inputs) {
+    return (inputs.empty() ? "" : inputs.size() == 1 ? ", input " : ", inputs ") + joined(inputs);
+  }
+
+  void add_bus(const BusStatus& bus) {
+    const Subject subject{SubjectKind::bus, bus.name};
+    add_can("bus " + bus.name, bus.state, bus.state_s, subject);
+    if (!bus.connected && bus.state != "bus_off") {
+      std::vector<std::string> sensors;
+      std::vector<std::string> blocks;
+      for (const UnitStatus& unit : bus.units) {
+        sensors.insert(sensors.end(), unit.sensors.begin(), unit.sensors.end());
+        blocks.insert(blocks.end(), unit.blocks.begin(), unit.blocks.end());
       }
-    add_can_trouble(name, bus.state, bus.state_s, add);
-    if (!bus.connected && bus.state != "bus_off")
-      add(name + " is not connected (" + bus.last_error + ")", bus_remedy(bus.kind));
+      add("bus " + bus.name + " is not connected (" + bus.last_error + ")" +
+              lost_with(sensors, blocks),
+          bus_remedy(bus.kind), bus.kind == "can" ? "ip -details link show" : "", subject);
+    }
+    for (const UnitStatus& unit : bus.units)
+      if (unit.answering && !unit.last_error.empty() && !status_.sensors_bad.empty())
+        add("bus " + bus.name + ": " + unit.name + ": " + unit.last_error,
+            "look at what came, and at what may help", "thermocomp scan", subject);
+      else if (!unit.answering && bus.connected)
+        add_silent(unit, is_network(bus.kind), subject);
   }
-}
 
-void add_reasons(const Status& status, const AddTrouble& add) {
-  for (const Reason reason : by_severity(status.reasons)) {
-    // Signals come from the controller: where that is offline, it is the cause.
-    if (reason == Reason::signal_lost && has_reason(status.reasons, Reason::controller_offline))
-      continue;
-    const CodeText text = code_text(reason);
-    const std::string& error = status.controller.last_error;
-    const bool is_of_link = reason == Reason::not_written || reason == Reason::controller_offline;
-    const bool has_error = is_of_link && !error.empty();
-    const bool switched_off = reason == Reason::operator_disabled && status.dry_run;
-    add(std::string(text.meaning) + (has_error ? ": " + error : ""),
-        switched_off ? dry_run_remedy : text.remedy);
+  void add_silent(const UnitStatus& unit, bool is_on_network, const Subject& subject) {
+    const bool is_silent = unit.timeouts >= unit.bad_frames;
+    const bool was_heard = unit.silent_s >= 0.0;
+    add(unit.name +
+            (!is_silent  ? " answers wrongly (" + unit.last_error + ")"
+             : was_heard ? " silent for " + duration_text(unit.silent_s)
+                         : " does not answer (" + unit.last_error + ")") +
+            lost_with(unit.sensors, unit.blocks),
+        is_on_network && !is_silent
+            ? "look at what came, and at what may help"
+            : code_text(is_silent ? Fault::no_answer : Fault::bad_frame).remedy,
+        "thermocomp scan", subject);
   }
-}
+
+  /// @param state_s  how long the CAN interface has been in `state`
+  void add_can(const std::string& name, const std::optional<std::string>& state,
+               std::optional<double> state_s, const Subject& subject) {
+    const std::string lasts = " for " + duration_text(state_s.value_or(not_a_number));
+    if (state == "bus_off")
+      add(name + ": bus-off" + lasts, "check cable, termination, bit rate; then restart it",
+          "ip link set IF type can restart, or let restart-ms do it", subject);
+    if (state == "passive" || state == "warning")
+      add(name + ": error " + *state + lasts, can_remedy, "", subject);
+  }
+
+  /// Those that no silent module explains.
+  void add_bad_sensors() {
+    if (sensors_ == nullptr) {
+      std::vector<std::string> blocks;
+      for (const InputStatus& input : status_.inputs) blocks.push_back(input.block);
+      if (!unexplained_.empty())
+        add("bad sensors: " + joined(unexplained_) + input_text(lost_inputs(blocks)),
+            "mend the sensor or its bus", "thermocomp sensors");
+      return;
+    }
+    for (const SensorStatus& sensor : sensors_->sensors) {
+      if (std::erase(unexplained_, sensor.name) == 0 || sensor.fault == Fault::none) continue;
+      const CodeText fault = code_text(sensor.fault);
+      add("sensor " + sensor.name +
+              (sensor.jump ? jump_text(*sensor.jump) : ": " + std::string(fault.meaning)) +
+              input_text(lost_inputs(sensor.blocks)),
+          fault.remedy, fault.command, {SubjectKind::sensor, sensor.name});
+    }
+  }
+
+  static std::string jump_text(const Jump& jump) {
+    return " jumped by " + fixed_signed(jump.size_K, 1) + " K";
+  }
+
+  void add_doubtful_sensors() {
+    const CodeText unconfirmed = code_text(Reason::sensor_unconfirmed);
+    if (sensors_ == nullptr)
+      for (const JumpedSensor& sensor : status_.sensors_jumped)
+        add("sensor " + sensor.name + jump_text(sensor.jump), unconfirmed.remedy,
+            "thermocomp accept " + sensor.name);
+    for (const SuspectedSensor& sensor : status_.sensors_suspected)
+      add("sensor " + sensor.name + " is " + suspicion_text(sensor.suspicion),
+          code_text(Reason::sensor_suspected).remedy, "", {SubjectKind::sensor, sensor.name});
+  }
+
+  void add_axes() {
+    for (const AxisStatus& axis : status_.axes) {
+      const std::string name = "axis " + axis.name;
+      const Subject subject{SubjectKind::axis, axis.name};
+      if (axis.latched)
+        add(name + " is not driven: " + fixed(axis.latched->sent_um, 1) + " um was sent, " +
+                fixed(axis.latched->read_um, 1) + " um is read back (" + axis.latched->likely + ")",
+            "mend it, then release the axis", "thermocomp release " + axis.name, subject);
+      else if (axis.disagrees)
+        add(name + ": the controller applies " + fixed(axis.applied, 1) + " " + axis.unit + ", " +
+                fixed(axis.offset, 1) + " was sent",
+            code_text(Reason::mismatch).remedy, "", subject);
+      if (axis.at_bound)
+        add(name + " at its bound" + remaining_text(axis), code_text(Reason::at_bound).remedy, "",
+            subject);
+    }
+  }
+
+  /// ": 7.0 of 19.0 um remain"
+  static std::string remaining_text(const AxisStatus& axis) {
+    const double remains = std::abs(axis.target - axis.offset);
+    if (!std::isfinite(remains)) return {};
+    return ": " + fixed(remains, 1) + " of " + fixed(std::abs(axis.target), 1) + " " + axis.unit +
+           " remain";
+  }
+
+  const Status& status_;
+  const SensorsAnswer* sensors_;
+  std::vector<std::string> unexplained_;  ///< bad sensors that have no entry yet
+  std::set<std::string> named_inputs_;    ///< lost ones that an entry names
+  std::vector<Trouble> list_;
+};
 
 /// What is wrong while the machine is compensated all the same.
 void add_degradations(const Status& status, std::vector<std::string>& why) {
@@ -143,25 +303,8 @@ std::vector<std::string> why_not(const Status& status, bool strict) {
   return why;
 }
 
-std::vector<Trouble> troubles(const Status& status) {
-  std::vector<Trouble> list;
-  const auto add = [&list](const std::string& what, std::string_view remedy) {
-    list.push_back({what, std::string(remedy)});
-  };
-  add_reasons(status, add);
-  for (const std::string& estimate : estimate_lines(status.inputs, status.axes)) add(estimate, "");
-  if (!status.sensors_bad.empty())
-    add("bad sensors: " + joined(status.sensors_bad), "thermocomp sensors says why");
-  for (const JumpedSensor& sensor : status.sensors_jumped)
-    add("sensor " + sensor.name + " jumped by " + fixed_signed(sensor.jump.size_K, 1) + " K",
-        "where that is right: thermocomp accept " + sensor.name);
-  for (const SuspectedSensor& sensor : status.sensors_suspected)
-    add("sensor " + sensor.name + " is " + suspicion_text(sensor.suspicion), "");
-  add_bus_troubles(status, add);
-  add_can_trouble("controller " + status.controller.name, status.controller.state,
-                  status.controller.state_s, add);
-  for (const std::string& warning : status.warnings) add(warning, "");
-  return list;
+std::vector<Trouble> troubles(const Status& status, const SensorsAnswer* sensors) {
+  return Causes(status, sensors).all();
 }
 
 std::vector<std::string> estimate_lines(const std::vector<InputStatus>& inputs,
@@ -207,7 +350,7 @@ std::string write_text(const WriteStatus& write) {
 std::string_view bus_remedy(std::string_view kind) {
   if (is_network(kind)) return "check the module's power, cable, address and port";
   if (kind == "modbus_rtu") return "check that the adapter is plugged in and is the `device` named";
-  return "check the interface (ip -details link show) and its cable";
+  return "check the interface and its cable";
 }
 
 }  // namespace thermocomp

@@ -30,10 +30,15 @@ struct Verdict {
 
 struct Trouble {
   std::string what;
-  std::string remedy;  ///< empty: none that is known
+  std::string remedy;   ///< empty: none that is known
+  std::string command;  ///< for a terminal; empty: none
+  Subject subject{};    ///< where a view shows more of it
 };
-/// Everything that is wrong, worst first.
-[[nodiscard]] std::vector<Trouble> troubles(const Status& status);
+/// Everything that is wrong, one entry a cause, worst first: a module that is silent stands for its
+/// sensors, and these for the inputs of the model that they make.
+/// @param sensors  whose faults are then named; nullptr: their names alone
+[[nodiscard]] std::vector<Trouble> troubles(const Status& status,
+                                            const SensorsAnswer* sensors = nullptr);
 
 /// "block head is estimated from 5 others, +-0.40 K (1 sd)", one line a block, then the offsets.
 [[nodiscard]] std::vector<std::string> estimate_lines(const std::vector<InputStatus>& inputs,

@@ -94,9 +94,10 @@ std::string inputs_lines(const Status& status) {
 std::string trouble_lines(const Status& status, bool colours) {
   std::string result;
   for (const Trouble& trouble : troubles(status))
-    result += line(result.empty() ? "Problems" : "",
-                   coloured(trouble.what, Colour::yellow, colours) +
-                       (trouble.remedy.empty() ? "" : " -> " + trouble.remedy));
+    result += line(
+        result.empty() ? "Problems" : "",
+        coloured(trouble.what, Colour::yellow, colours) +
+            (trouble.remedy.empty() ? "" : " -> " + with_command(trouble.remedy, trouble.command)));
   return result.empty() ? line("Problems", "none") : result;
 }
 
@@ -240,7 +241,7 @@ std::string sensor_state(const SensorStatus& sensor, bool colours) {
   if (sensor.jump)
     state += " (jumped by " + fixed_signed(sensor.jump->size_K, 1) + " K at " +
              local_time(sensor.jump->since) + ")";
-  if (!text.remedy.empty()) state += " -> " + std::string(text.remedy);
+  if (!text.remedy.empty()) state += " -> " + with_command(text.remedy, text.command);
   return state;
 }
 

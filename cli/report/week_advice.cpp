@@ -54,7 +54,7 @@ std::string as_a_sentence(std::string text) {
 }
 
 std::string what_to_do(const CodeText& text) {
-  return text.remedy.empty() ? "" : " Do: " + std::string(text.remedy) + ".";
+  return text.remedy.empty() ? "" : " Do: " + with_command(text.remedy, text.command) + ".";
 }
 
 void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {

@@ -60,6 +60,7 @@ AxisStatus axis_of(const StatusView& view, const AxisConfig& config, const AxisR
                   .displacement = report.displacement_um,
                   .target = report.target_um,
                   .offset = report.offset_um,
+                  .offset_max = config.limiter.offset_um_max,
                   .applied = report.applied_um,
                   .measured = report.measured_um,
                   .synced = report.synced,
@@ -160,9 +161,27 @@ SensorStatus sensor_of(const StatusView& view, std::size_t index) {
           .jump = jump_of(view, sensor)};
 }
 
-UnitStatus unit_of(const UnitHealth& unit) {
-  return {unit.name,       unit.answering,  unit.requests,      unit.answers,   unit.timeouts,
-          unit.exceptions, unit.bad_frames, unit.round_trip_ms, unit.last_error};
+UnitStatus unit_of(const StatusView& view, const UnitHealth& unit) {
+  UnitStatus status{.name = unit.name,
+                    .answering = unit.answering,
+                    .requests = unit.requests,
+                    .answers = unit.answers,
+                    .timeouts = unit.timeouts,
+                    .exceptions = unit.exceptions,
+                    .bad_frames = unit.bad_frames,
+                    .round_trip_ms = unit.round_trip_ms,
+                    .last_error = unit.last_error};
+  nanoseconds newest{};
+  for (std::size_t i = 0; i < view.config.estimator.sensors.size(); ++i) {
+    if (view.config.estimator.sensors[i].module != unit.name) continue;
+    status.sensors.push_back(view.config.estimator.sensors[i].name);
+    newest = std::max(newest, view.report.sensors[i].taken_at);
+    for (std::string& block : blocks_of(view, i))
+      if (std::find(status.blocks.begin(), status.blocks.end(), block) == status.blocks.end())
+        status.blocks.push_back(std::move(block));
+  }
+  if (newest != nanoseconds{}) status.silent_s = age_s(view, newest);
+  return status;
 }
 
 BusStatus bus_of(const StatusView& view, const BusHealth& bus) {
@@ -171,7 +190,7 @@ BusStatus bus_of(const StatusView& view, const BusHealth& bus) {
                    .connected = bus.connected,
                    .connects = bus.connects,
                    .last_error = bus.last_error};
-  for (const UnitHealth& unit : bus.units) status.units.push_back(unit_of(unit));
+  for (const UnitHealth& unit : bus.units) status.units.push_back(unit_of(view, unit));
   if (bus.state.empty()) return status;
   status.state = bus.state;
   status.state_s = age_s(view, bus.state_since);

@@ -74,9 +74,8 @@ struct DaemonFeed::Parts {
   std::mutex stop_mutex;
   std::condition_variable stop_changed;
 
-  mutable std::mutex mutex;  ///< of newest and displacement
+  mutable std::mutex mutex;  ///< of newest
   SnapshotPointer newest{std::make_shared<Snapshot>()};
-  DisplacementMemory displacement;
 
   // Only of the feed's thread.
   Snapshot next;
@@ -162,7 +161,6 @@ void DaemonFeed::Parts::publish() {
   {
     const std::lock_guard lock(mutex);
     newest = made;
-    if (made->is_here) displacement.add(made->wall_s, made->status.axes);
   }
   for (const Listener& listener : listeners) listener(made);
 }
@@ -209,17 +207,6 @@ void DaemonFeed::stop() noexcept {
 SnapshotPointer DaemonFeed::newest() const {
   const std::lock_guard lock(parts_->mutex);
   return parts_->newest;
-}
-
-std::vector<std::pair<std::string, std::vector<double>>> DaemonFeed::displacement(
-    const std::vector<double>& times_s, double span_s) const {
-  const std::lock_guard lock(parts_->mutex);
-  std::vector<std::pair<std::string, std::vector<double>>> columns;
-  const std::vector<std::string>& axes = parts_->displacement.axes();
-  for (std::size_t i = 0; i < axes.size(); ++i)
-    columns.emplace_back(axes[i] + "_displacement_um",
-                         parts_->displacement.over(i, times_s, span_s));
-  return columns;
 }
 
 std::filesystem::path DaemonFeed::history_file() const {

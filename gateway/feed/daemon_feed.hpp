@@ -4,11 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "gateway/feed/displacement_memory.hpp"
 #include "gateway/feed/snapshot.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 
@@ -31,9 +27,6 @@ class DaemonFeed {
   void stop() noexcept;
 
   [[nodiscard]] SnapshotPointer newest() const;
-  /// Columns `<axis>_displacement_um` for these times.
-  [[nodiscard]] std::vector<std::pair<std::string, std::vector<double>>> displacement(
-      const std::vector<double>& times_s, double span_s) const;
   /// The history file: the one that is configured, or that the daemon names; empty: not known.
   [[nodiscard]] std::filesystem::path history_file() const;
 

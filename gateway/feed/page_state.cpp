@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "status/codes.hpp"
+#include "status/figures.hpp"
 #include "status/status_json.hpp"
 #include "status/verdict.hpp"
 
@@ -31,17 +32,62 @@ json verdict_of(const Snapshot& snapshot, const json& problems) {
           {"level", level}};
 }
 
+/// "; the last offsets stay at the controller: X +5.5 um, Z -3.0 um"
+std::string last_offsets(const Status& status) {
+  std::vector<std::string> list;
+  for (const AxisStatus& axis : status.axes)
+    if (std::isfinite(axis.offset))
+      list.push_back(axis.name + " " + fixed_signed(axis.offset, 1) + " " + axis.unit);
+  return list.empty() ? "" : "; the last offsets stay at the controller: " + joined(list);
+}
+
+/// What happens again and again is one entry.
+struct EventGroup {
+  const Event* newest{nullptr};
+  std::size_t times{0};
+  double lasted_s{0.0};
+};
+
+/// Sensors of a silent module, inputs and reasons: what a link's event near in time explains.
+bool is_consequence(const Event& event, const std::vector<Event>& all) {
+  constexpr double near_s = 5.0;
+  const bool may_be =
+      event.subject.kind == SubjectKind::sensor || event.subject.kind == SubjectKind::input ||
+      event.subject.kind == SubjectKind::estimate || event.code == to_string(Reason::block_lost) ||
+      event.code == to_string(Reason::block_estimated);
+  return may_be && std::any_of(all.begin(), all.end(), [&](const Event& other) {
+           const bool is_link =
+               other.subject.kind == SubjectKind::device || other.subject.kind == SubjectKind::bus;
+           return is_link && other.kind == event.kind &&
+                  std::abs(other.wall_s - event.wall_s) < near_s;
+         });
+}
+
+std::string group_text(const EventGroup& group) {
+  std::string text = event_text(*group.newest);
+  if (group.times < 2) return text;
+  if (group.newest->kind == EventKind::recovery) text.erase(text.rfind(": over"));
+  text += ": " + std::to_string(group.times) + " times";
+  if (group.lasted_s > 0.0) text += ", " + duration_text(group.lasted_s) + " in all";
+  return text + (group.newest->kind == EventKind::fault ? ", and still" : "");
+}
+
 }  // namespace
 
 json problems_json(const Snapshot& snapshot) {
   json list = json::array();
   if (!snapshot.is_here) {
-    list.push_back({{"what", snapshot.why},
-                    {"remedy", "systemctl status thermocompd; journalctl -u thermocompd"}});
+    list.push_back({{"what", "the program thermocompd does not run, or does not answer"},
+                    {"remedy", "start it" + last_offsets(snapshot.status)},
+                    {"detail", snapshot.why}});
     return list;
   }
-  for (const Trouble& trouble : troubles(snapshot.status))
-    list.push_back({{"what", trouble.what}, {"remedy", trouble.remedy}});
+  for (const Trouble& trouble : troubles(snapshot.status, &snapshot.sensors)) {
+    json entry = {{"what", trouble.what}, {"remedy", trouble.remedy}};
+    if (trouble.subject.kind != SubjectKind::nothing)
+      entry["about"] = std::string(to_string(trouble.subject.kind)) + "-" + trouble.subject.name;
+    list.push_back(std::move(entry));
+  }
   return list;
 }
 
@@ -62,8 +108,8 @@ json page_state(const Snapshot& snapshot, const std::string& machine) {
                 {"since_s", snapshot.since_s}, {"why", snapshot.why},
                 {"machine", machine},          {"verdict", verdict_of(snapshot, problems)}};
   state["problems"] = std::move(problems);
-  if (!snapshot.is_here) return state;
   const Status& status = snapshot.status;
+  if (status.axes.empty()) return state;  // the daemon has not answered yet
   json sensors = json::array();
   for (const SensorStatus& sensor : snapshot.sensors.sensors)
     sensors.push_back(sensor_json(sensor, snapshot));
@@ -78,13 +124,32 @@ json page_state(const Snapshot& snapshot, const std::string& machine) {
 }
 
 json page_events(const Snapshot& snapshot, std::size_t most) {
-  json list = json::array();
   const std::vector<Event>& events = *snapshot.events;
-  for (auto event = events.rbegin(); event != events.rend() && list.size() < most; ++event)
-    list.push_back({{"number", event->number},
-                    {"wall_s", event->wall_s},
-                    {"kind", to_string(event->kind)},
-                    {"text", event_text(*event)}});
+  std::vector<EventGroup> groups;
+  const auto is_same = [](const Event& a, const Event& b) {
+    const bool is_outage = a.kind == EventKind::fault || a.kind == EventKind::recovery;
+    const bool was_outage = b.kind == EventKind::fault || b.kind == EventKind::recovery;
+    return (is_outage ? was_outage : a.kind == EventKind::mode && b.kind == a.kind) &&
+           a.subject == b.subject && a.code == b.code;
+  };
+  for (auto event = events.rbegin(); event != events.rend(); ++event) {
+    if (is_consequence(*event, events)) continue;
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const EventGroup& known) {
+      return is_same(*known.newest, *event);
+    });
+    if (group == groups.end()) group = groups.insert(group, {&*event});
+    // An outage has two events: it counts by its beginning, which may be older than the list.
+    if (event->kind != EventKind::recovery) ++group->times;
+    if (event->kind == EventKind::recovery) group->lasted_s += event->duration_s;
+  }
+  json list = json::array();
+  for (const EventGroup& group : groups) {
+    if (list.size() == most) break;
+    list.push_back({{"number", group.newest->number},
+                    {"wall_s", group.newest->wall_s},
+                    {"kind", to_string(group.newest->kind)},
+                    {"text", group_text(group)}});
+  }
   return list;
 }
 

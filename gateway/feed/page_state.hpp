@@ -11,15 +11,16 @@ namespace thermocomp::gateway {
 
 /// The answer of `status` and {"time_s", "here", "since_s", "why", "machine", "verdict":
 /// {"compensating", "intended", "answer", "detail", "level"}, "problems": [{"what", "remedy"}],
-/// "sensors", "lately"}. `level` is "good", "warning" or "bad". While the daemon is away only these
-/// first five keys, verdict and problems.
+/// "sensors", "lately"}. `level` is "good", "warning" or "bad". While the daemon is away the rest
+/// is what it said last; before its first answer only the first five keys, verdict and problems.
 [[nodiscard]] nlohmann::json page_state(const Snapshot& snapshot, const std::string& machine);
 
-/// The newest `most` events with their words, newest first:
-/// [{"number", "wall_s", "kind", "text"}].
+/// The newest `most` happenings with their words, newest first: what happened several times is one,
+/// and what a silent module explains is left out. [{"number", "wall_s", "kind", "text"}].
 [[nodiscard]] nlohmann::json page_events(const Snapshot& snapshot, std::size_t most);
 
-/// Everything that is wrong: [{"what", "remedy"}].
+/// Everything that is wrong: [{"what", "remedy", "about", "detail"}]; the last two where known,
+/// `about` as "axis-z".
 [[nodiscard]] nlohmann::json problems_json(const Snapshot& snapshot);
 
 /// One sensor with blocks, values, fault in words, trend and suspicion.

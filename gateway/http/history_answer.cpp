@@ -11,6 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/history/replay/thinned_history.hpp"
+#include "estimator/pipeline/mode.hpp"
+#include "status/event.hpp"
 
 namespace thermocomp::gateway {
 namespace {
@@ -48,6 +50,59 @@ void append_column(std::string& text, const std::string& name, const std::vector
   text += ']';
 }
 
+json number(double value) {
+  return std::isfinite(value) ? json(value) : json();
+}
+
+json probings_json(const std::vector<Probing>& probings) {
+  json list = json::array();
+  for (const Probing& probing : probings)
+    list.push_back({{"axis", probing.axis},
+                    {"time_s", probing.time_s},
+                    {"left_um", number(probing.left_um)},
+                    {"needed_um", number(probing.needed_um)}});
+  return list;
+}
+
+/// When nothing was compensated though a daemon ran.
+json modes_json(const std::vector<RecordedEvent>& events, const HistoryRequest& request) {
+  json list = json::array();
+  std::string mode;  // empty: not known, or none
+  double since_s = 0.0;
+  const auto end_at = [&](double wall_s) {
+    if (!mode.empty() && mode != to_string(Mode::compensating) && wall_s > request.from_s)
+      list.push_back({{"mode", mode}, {"from_s", since_s}, {"to_s", wall_s}});
+    mode.clear();
+  };
+  for (const RecordedEvent& event : events) {
+    const bool ends = event.kind == EventKind::mode ||
+                      (event.kind == EventKind::daemon && event.code != "history");
+    if (!ends) continue;
+    // A run that was killed has no end; what it did after its last event is not known.
+    if (event.code != "started") end_at(event.wall_s);
+    mode = event.kind == EventKind::mode ? event.code : "";
+    since_s = event.wall_s;
+  }
+  end_at(request.to_s);
+  return list;
+}
+
+/// What a chart marks: starts, commands, and faults of modules and links; not what comes of these.
+json events_json(const std::vector<RecordedEvent>& events, const HistoryRequest& request) {
+  constexpr std::size_t most = 200;
+  json list = json::array();
+  for (auto event = events.rbegin(); event != events.rend() && list.size() < most; ++event) {
+    const bool is_link = event->subject.kind == SubjectKind::bus ||
+                         event->subject.kind == SubjectKind::device ||
+                         event->subject.kind == SubjectKind::controller;
+    const bool counts = event->kind == EventKind::command || event->kind == EventKind::daemon ||
+                        (event->kind == EventKind::fault && is_link);
+    if (counts && event->wall_s >= request.from_s)
+      list.push_back({{"time_s", event->wall_s}, {"text", event_text(*event)}});
+  }
+  return list;
+}
+
 }  // namespace
 
 JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request) {
@@ -62,11 +117,12 @@ JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request)
     text += "\"time_s\":" + dumped(history.time_s);
     for (const ThinnedColumn& column : history.columns)
       append_column(text, column.name, column.values);
-    for (const auto& [name, values] : feed.displacement(history.time_s, span_s))
-      append_column(text, name, values);
     json rest = {{"from_s", request.from_s},
                  {"to_s", request.to_s},
                  {"span_s", span_s},
+                 {"probings", probings_json(history.probings)},
+                 {"modes", modes_json(history.events, request)},
+                 {"events", events_json(history.events, request)},
                  {"chunks", history.chunks},
                  {"chunks_read", history.chunks_read},
                  {"damage", std::move(damage)}};

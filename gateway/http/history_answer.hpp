@@ -8,7 +8,9 @@
 namespace thermocomp::gateway {
 
 /// {"from_s", "to_s", "span_s", "columns": {"time_s": [...], "bed_degC": [...], "z_offset_um":
-/// [...], "z_displacement_um": [...]}, "chunks", "chunks_read", "damage": [...]}; null: not known.
+/// [...]}, "probings": [{"axis", "time_s", "left_um", "needed_um"}], "modes": [{"mode", "from_s",
+/// "to_s"}], "events": [{"time_s", "text"}], "chunks", "chunks_read", "damage": [...]}; null: not
+/// known. The modes are those in which nothing is compensated.
 [[nodiscard]] JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request);
 
 }  // namespace thermocomp::gateway

@@ -42,7 +42,8 @@ constexpr const char* json_type = "application/json";
 constexpr std::array<std::array<const char*, 2>, 6> headers_of_all{
     {{"Content-Security-Policy",
       "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
-      "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+      "data:; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
+      "frame-ancestors 'none'"},
      {"X-Content-Type-Options", "nosniff"},
      {"X-Frame-Options", "DENY"},
      {"Referrer-Policy", "no-referrer"},

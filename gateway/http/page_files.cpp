@@ -18,9 +18,11 @@ struct Place {
   const char* type;
 };
 
-constexpr std::array<Place, 4> page_places{
+constexpr std::array<Place, 6> page_places{
     {{"/", "index.html", "text/html; charset=utf-8"},
      {"/page.js", "page.js", "text/javascript; charset=utf-8"},
+     {"/charts.js", "charts.js", "text/javascript; charset=utf-8"},
+     {"/manifest.json", "manifest.json", "application/manifest+json"},
      {"/page.css", "page.css", "text/css; charset=utf-8"},
      {"/icon.svg", "icon.svg", "image/svg+xml"}}};
 constexpr std::array<Place, 2> chart_places{

@@ -3,14 +3,8 @@
 'use strict';
 
 const silentAfterMs = 2500;      // without a state for so long the gateway counts as gone
-const drawEveryMs = 2000;
-const keepLiveRows = 4000;
 const clockTolerance_s = 30;
-const ranges = [
-  {name: '1 h', seconds: 3600}, {name: 'shift', seconds: 8 * 3600}, {name: 'day', seconds: 86400},
-  {name: 'week', seconds: 7 * 86400}, {name: 'month', seconds: 30 * 86400}];
-const colours = ['#4e9bd4', '#e07b39', '#54a864', '#c9514a', '#9a74c2', '#8c6d5a', '#d57ab8',
-                 '#8a8f95', '#b0a72f', '#35b0bd', '#6f87e0', '#d79a2b'];
+const historyCommit_ms = 12000;   // the daemon writes its history at least every 10 s
 
 const place = id => document.getElementById(id);
 const make = (tag, text, className) => {
@@ -26,6 +20,7 @@ const isNumber = value => typeof value === 'number' && isFinite(value);
 const fixed = (value, digits) => isNumber(value) ? value.toFixed(digits).replace('-', '\u2212') : '\u2013';
 const signed = (value, digits) => isNumber(value) && value >= 0 ? '+' + fixed(value, digits) : fixed(value, digits);
 const unitText = unit => unit === 'urad' ? '\u00b5rad' : '\u00b5m';
+const withUnits = text => text.replace(/ u(m|rad)\b/g, ' \u00b5$1').replace(/ degC\b/g, ' \u00b0C');
 
 function duration(seconds) {
   if (!isNumber(seconds)) return '\u2013';
@@ -77,11 +72,12 @@ function show(now) {
   setText(place('clock'), clockText(now.time_s));
   document.body.classList.toggle('stale', !now.here);
   let detail = now.verdict.detail;
-  if (!now.here) detail += ' for ' + duration(now.time_s - now.since_s) + '; the values below are old';
+  if (!now.here) detail += ' for ' + duration(now.time_s - now.since_s) + (now.axes ? '; the values below are the last known' : '');
   showVerdict({level: now.verdict.level, answer: now.verdict.answer, detail: detail});
   showProblems(now);
-  if (!now.here) return;
+  if (!now.axes) return;
   showAxes(now.axes);
+  showHottest(now.sensors);
   showSensors(now.sensors);
   showBuses(now);
   showModel(now);
@@ -89,7 +85,8 @@ function show(now) {
   setText(place('foot'), 'thermocompd ' + now.version + ', running for ' + duration(now.uptime_s) + ', ' +
           fixed(now.cycle.rate_hz, 0) + ' Hz, ' + (now.cycle.missed || 0) + ' cycles missed' +
           (now.history.enabled ? ', history ' + fixed(now.history.size_MB, 1) + ' MB' : ', no history'));
-  addLiveRow(now);
+  if (now.here) addLiveRow(now);
+  followProbings(now.events);
 }
 
 function showVerdict(verdict) {
@@ -113,8 +110,10 @@ function showProblems(now) {
   list.dataset.key = key;
   list.replaceChildren(...problems.map(problem => {
     const item = make('li');
-    item.append(make('div', problem.what, 'what'));
-    if (problem.remedy) item.append(make('div', problem.remedy, 'remedy'));
+    const what = make(problem.about ? 'a' : 'div', withUnits(problem.what), 'what');
+    if (problem.about) what.href = '#' + encodeURIComponent(problem.about);
+    item.append(what);
+    if (problem.remedy) item.append(make('div', withUnits(problem.remedy), 'remedy'));
     return item;
   }));
 }
@@ -124,15 +123,16 @@ const axisParts = new Map();
 function axisCard(name) {
   if (axisParts.has(name)) return axisParts.get(name);
   const card = make('div', null, 'axis');
+  card.id = 'axis-' + name;
   const head = make('div', null, 'head');
-  const figures = make('div', null, 'figures');
-  const part = {card: card, offset: make('span', '', 'offset'),
-                displacement: make('span', '', 'displacement'), applied: make('span', ''),
-                marks: make('div', '', 'marks'), chart: make('div', null, 'chart'), graph: null};
-  figures.append(make('span', 'offset'), part.offset, make('span', 'displacement'),
-                 part.displacement, make('span', 'applied'), part.applied);
-  head.append(make('span', name.toUpperCase(), 'name'), figures);
-  card.append(head, part.marks, part.chart);
+  const part = {card: card, unit: '\u00b5m', offset: make('span', '', 'offset'), bar: make('div', null, 'meter'),
+                filled: make('div'), sentence: make('p', '', 'sentence'), marks: make('p', '', 'marks'),
+                then: make('span', '', 'then'), chart: make('div', null, 'chart')};
+  head.append(make('span', name.toUpperCase(), 'name'), part.then, part.offset);
+  part.bar.setAttribute('role', 'meter');
+  part.bar.setAttribute('aria-label', 'share of the bound of axis ' + name.toUpperCase());
+  part.bar.append(part.filled);
+  card.append(head, part.bar, part.sentence, part.marks, part.chart);
   axisParts.set(name, part);
   return part;
 }
@@ -141,10 +141,21 @@ function axisMarks(axis) {
   const marks = [];
   if (!axis.driven) marks.push('not driven');
   if (axis.mismatch) marks.push('mismatch: ' + axis.mismatch.likely);
-  else if (axis.disagrees) marks.push('the read-back disagrees');
+  else if (axis.disagrees)
+    marks.push('the controller applies ' + signed(axis.applied, 1) + ' ' + unitText(axis.unit));
   if (axis.at_bound) marks.push('at its bound');
   if (axis.proving) marks.push('proving its sign');
   return marks.join(', ');
+}
+
+// "taken out 21 of at most 150 um; 1.2 um left at the last probing, 40 min ago"
+function axisSentence(axis, now_s) {
+  const unit = '\u00a0' + unitText(axis.unit);
+  const taken = 'taken out ' + fixed(Math.abs(axis.offset), 1) +
+    (isNumber(axis.offset_max) ? ' of at most ' + axis.offset_max : '') + unit;
+  const last = probings.filter(each => each.axis === axis.name && isNumber(each.left_um)).pop();
+  return taken + '; ' + (last ? fixed(Math.abs(last.left_um), 1) + unit + ' left at the last probing, ' +
+    duration(now_s - last.time_s) + ' ago' : 'not probed in the last 30 days');
 }
 
 function showAxes(axes) {
@@ -154,12 +165,35 @@ function showAxes(axes) {
     holder.replaceChildren(...cards);
   for (const axis of axes) {
     const part = axisCard(axis.name);
-    const unit = ' ' + unitText(axis.unit);
-    setText(part.offset, signed(axis.offset, 1) + unit);
-    setText(part.displacement, signed(axis.displacement, 1) + unit);
-    setText(part.applied, signed(axis.applied, 1) + unit);
+    const share = Math.min(1, Math.abs(axis.offset) / axis.offset_max) || 0;
+    part.unit = unitText(axis.unit);
+    setText(part.offset, signed(axis.offset, 1) + ' ' + part.unit);
+    setText(part.sentence, axisSentence(axis, state.time_s));
     setText(part.marks, axisMarks(axis));
+    part.filled.style.width = (100 * share).toFixed(1) + '%';
+    part.bar.setAttribute('aria-valuenow', (100 * share).toFixed(0));
+    part.bar.classList.toggle('full', axis.at_bound);
   }
+}
+
+// A new probing is in the history once that is committed.
+let newestProbing = null;
+function followProbings(events) {
+  const found = events.find(event => event.kind === 'command' && event.text.startsWith('measured'));
+  const number = found ? found.number : 0;
+  if (newestProbing !== null && number !== newestProbing) setTimeout(loadHistory, historyCommit_ms);
+  newestProbing = number;
+}
+
+const temperatureOf = sensor => isNumber(sensor.smoothed_degC) ? sensor.smoothed_degC : sensor.raw_degC;
+
+function showHottest(sensors) {
+  const list = place('hottest');
+  const top = sensors.filter(sensor => sensor.fault === 'none').sort((a, b) => temperatureOf(b) - temperatureOf(a)).slice(0, 3);
+  while (list.children.length < top.length) list.append(make('li'));
+  while (list.children.length > top.length) list.lastChild.remove();
+  top.forEach((sensor, i) => setText(list.children[i],
+    sensor.name + ' ' + fixed(temperatureOf(sensor), 1) + ' \u00b0C ' + arrow(sensor.trend_K_per_h)));
 }
 
 function arrow(rate) {
@@ -175,7 +209,8 @@ function arrow(rate) {
 function rows(holder, count) {
   while (holder.children.length > count) holder.lastChild.remove();
   while (holder.children.length < count) {
-    const row = make('div', null, 'row');
+    const row = make(holder.id === 'sensors' ? 'button' : 'div', null, 'row');
+    if (holder.id === 'sensors') row.addEventListener('click', () => showOnly(row.children[0].textContent));
     row.append(make('span', '', 'name'), make('span', '', 'value'), make('span', '', 'small fault'),
                make('span', '', 'small right'));
     holder.append(row);
@@ -197,8 +232,10 @@ function showSensors(sensors) {
                     : 'block ' + (sensor.blocks || []).join(', ');
     if (!bad && sensor.suspected)
       words = 'suspected: off by ' + signed(sensor.suspected.size_K, 1) + ' K against its neighbours';
+    row.id = 'sensor-' + sensor.name;
+    row.title = 'show its history';
     fillRow(row, 'row' + (bad ? ' wrong' : sensor.suspected ? ' suspect' : ''), [
-      sensor.name, fixed(isNumber(sensor.smoothed_degC) ? sensor.smoothed_degC : sensor.raw_degC, 2) +
+      sensor.name, fixed(temperatureOf(sensor), 2) +
         ' \u00b0C ' + arrow(rate), words,
       bad ? 'age ' + duration(sensor.age_s) : isNumber(rate) ? signed(rate, 1) + ' K/h' : '']);
   });
@@ -207,18 +244,20 @@ function showSensors(sensors) {
 function showBuses(now) {
   const list = now.buses.map(bus => {
     const silent = bus.units.filter(unit => !unit.answering).map(unit => unit.name);
-    return {name: bus.name + ' (' + bus.kind + ')', wrong: !bus.connected || silent.length > 0,
+    return {id: 'bus-' + bus.name, name: bus.name + ' (' + bus.kind + ')', wrong: !bus.connected || silent.length > 0,
             value: bus.connected ? 'connected' : 'away',
             words: silent.length ? 'silent: ' + silent.join(', ') : bus.connected ? bus.units.length + ' units answer' : bus.last_error};
   });
   const controller = now.controller;
   const signals = Object.entries(controller.signals || {})
     .map(([name, value]) => name + ' ' + fixed(value, 1)).join(', ');
-  list.push({name: controller.name + ' (' + controller.kind + ')', wrong: !controller.online,
+  list.push({id: 'controller-' + controller.name, name: controller.name + ' (' + controller.kind + ')', wrong: !controller.online,
              value: controller.online ? 'online' : 'offline',
              words: controller.online ? signals : controller.last_error || ''});
-  rows(place('buses'), list.length).forEach((row, i) =>
-    fillRow(row, 'row' + (list[i].wrong ? ' wrong' : ''), [list[i].name, list[i].value, list[i].words, '']));
+  rows(place('buses'), list.length).forEach((row, i) => {
+    row.id = list[i].id;
+    fillRow(row, 'row' + (list[i].wrong ? ' wrong' : ''), [list[i].name, list[i].value, list[i].words, '']);
+  });
 }
 
 function showModel(now) {
@@ -250,124 +289,15 @@ function showModel(now) {
 
 function showEvents(events) {
   const list = place('events');
-  const key = events.length ? String(events[0].number) + ':' + events[0].wall_s : 'none';
+  const key = JSON.stringify(events);
   if (list.dataset.key === key) return;
   list.dataset.key = key;
   list.replaceChildren(...events.map(event => {
     const item = make('li');
-    item.append(make('time', clockText(event.wall_s)), make('span', event.text));
+    item.append(make('time', clockText(event.wall_s)), make('span', withUnits(event.text)));
     return item;
   }));
   if (events.length === 0) list.append(make('li', 'nothing has happened'));
-}
-
-// ------------------------------------------------------------------ charts
-
-let range = ranges[1];
-let columns = [];        // names, time first
-let table = [];          // rows: Date, then values by column
-let temperatures = null; // the chart
-let drawnAt = 0;
-let liveFrom = 0;
-
-const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
-function chartOptions(labels, more) {
-  return Object.assign({
-    labels: labels, legend: 'never', connectSeparatedPoints: true, strokeWidth: 1.6,
-    gridLineColor: css('--line'), axisLineColor: css('--line'), axisLabelFontSize: 11,
-    highlightCircleSize: 3, animatedZooms: false, includeZero: false, rightGap: 8,
-    axes: {y: {axisLabelWidth: 34, pixelsPerLabel: 22}}}, more);
-}
-
-// A chart of some columns of the table. Where nothing is known at all there is nothing to draw.
-function draw(chart, element, names, more) {
-  const picks = names.map(name => columns.indexOf(name)).filter(index => index > 0);
-  if (typeof Dygraph === 'undefined' || picks.length === 0 || table.length < 2) return chart;
-  const data = table.map(row => [row[0], ...picks.map(index => row[index])]);
-  const labels = ['time', ...picks.map(index => columns[index])];
-  const end = Date.now();
-  const window_ms = [end - range.seconds * 1000, end];
-  if (chart && chart.labelKey === labels.join()) {
-    chart.updateOptions({file: data, dateWindow: window_ms});
-    return chart;
-  }
-  if (chart) chart.destroy();
-  const made = new Dygraph(element, data, chartOptions(labels, Object.assign({dateWindow: window_ms}, more)));
-  made.labelKey = labels.join();
-  return made;
-}
-
-function drawAll() {
-  drawnAt = performance.now();
-  for (const [name, part] of axisParts)
-    part.graph = draw(part.graph, part.chart, [name + '_offset_um', name + '_displacement_um'],
-                      {colors: [css('--offset'), css('--displacement')]});
-  if (document.body.classList.contains('wall')) return;
-  temperatures = draw(temperatures, place('temperature-chart'),
-    columns.filter(name => name.endsWith('_degC')),
-    {colors: colours, labelsDiv: place('temperature-legend'), legend: 'always',
-     legendFormatter: temperatureLegend, highlightSeriesOpts: {strokeWidth: 2.6}});
-}
-
-// dygraphs takes HTML here; names are made harmless.
-function temperatureLegend(data) {
-  const escaped = text => text.replace(/[&<>"]/g, c => '&#' + c.charCodeAt(0) + ';');
-  return data.series.filter(series => series.isVisible).map(series =>
-    '<span style="color:' + series.color + '">\u25cf</span>\u00a0' +
-    escaped(series.label.replace(/_degC$/, '')) + (isNumber(series.y) ? '\u00a0' + fixed(series.y, 1) : '')).join('&ensp;');
-}
-
-let asked = 0;
-async function loadHistory() {
-  const mine = ++asked;
-  try {
-    const points = Math.max(200, Math.min(900, Math.round(window.innerWidth)));
-    const answer = await fetch('/api/history?from=-' + range.seconds + '&points=' + points);
-    const told = await answer.json();
-    if (mine !== asked) return;
-    if (!answer.ok) throw new Error(told.error);
-    const names = Object.keys(told.columns);
-    columns = names;
-    table = told.columns.time_s.map((time_s, i) =>
-      names.map((name, c) => c === 0 ? new Date(time_s * 1000) : told.columns[name][i]));
-    while (table.length > 2 && table[table.length - 1].every((value, c) => c === 0 || value === null)) table.pop();
-    liveFrom = told.span_s;
-    setText(place('history-note'), '');
-    drawAll();
-  } catch (error) {
-    setText(place('history-note'), 'no history: ' + error.message);
-  }
-}
-
-// Between two loads of the history the newest values come from the states.
-function addLiveRow(now) {
-  const spacing_ms = Math.max(1000, Math.min(10000, liveFrom * 1000));
-  const last = table.length ? table[table.length - 1][0].getTime() : 0;
-  const at = now.time_s * 1000;
-  const values = {};
-  for (const axis of now.axes) {
-    values[axis.name + '_offset_um'] = axis.offset;
-    values[axis.name + '_displacement_um'] = axis.displacement;
-  }
-  for (const sensor of now.sensors) values[sensor.name + '_degC'] = sensor.fault === 'none' ? sensor.raw_degC : null;
-  if (columns.length === 0) columns = ['time_s'];
-  for (const name of Object.keys(values))
-    if (!columns.includes(name)) {
-      columns.push(name);
-      table.forEach(row => row.push(null));
-    }
-  if (at - last < spacing_ms) return;
-  table.push(columns.map((name, c) => c === 0 ? new Date(at) : isNumber(values[name]) ? values[name] : null));
-  if (table.length > keepLiveRows) table.splice(0, table.length - keepLiveRows);
-  if (performance.now() - drawnAt > drawEveryMs && !document.hidden) drawAll();
-}
-
-function chooseRange(chosen) {
-  range = chosen;
-  for (const button of place('ranges').children)
-    button.setAttribute('aria-pressed', String(button.textContent === range.name));
-  loadHistory();
 }
 
 // ------------------------------------------------------------------ commands
@@ -398,7 +328,7 @@ async function command(request) {
     if (!await confirmed(asked.text)) return;
     setText(answer, 'sent');
     await post({token: asked.token});
-    setText(answer, request.method + ': done');
+    setText(answer, commandNames[request.method] + ': done');
   } catch (error) {
     setText(answer, request.method + ': ' + error.message);
   }
@@ -411,12 +341,15 @@ function proveRequest() {
   return isNumber(value_um) ? {method: 'prove', axis: axis, value_um: value_um} : null;
 }
 
+const commandNames = {enable: 'Switch on', disable: 'Switch off', reference: 'Take the reference',
+                      prove: 'Prove an axis'};
+
 async function offerCommands() {
   try {
     const told = await (await fetch('/api/commands')).json();
     place('commands').hidden = told.commands.length === 0;
     place('command-buttons').replaceChildren(...told.commands.map(method => {
-      const button = make('button', method);
+      const button = make('button', commandNames[method]);
       button.addEventListener('click', () => {
         const request = method === 'prove' ? proveRequest() : {method: method};
         if (request) command(request);
@@ -436,15 +369,10 @@ place('ranges').append(...ranges.map(each => {
   button.addEventListener('click', () => chooseRange(each));
   return button;
 }));
-matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
-  for (const part of axisParts.values()) {
-    if (part.graph) part.graph.destroy();
-    part.graph = null;
-  }
-  if (temperatures) temperatures.destroy();
-  temperatures = null;
-  drawAll();
-});
+place('zoom-in').addEventListener('click', () => zoomBy(0.5));
+place('zoom-out').addEventListener('click', () => zoomBy(2));
+place('zoom-back').addEventListener('click', zoomBack);
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
 listen();
 setInterval(watchGateway, 500);
 chooseRange(ranges[1]);

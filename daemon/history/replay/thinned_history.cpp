@@ -9,6 +9,8 @@
 
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/format/database.hpp"
+#include "daemon/history/format/history_time.hpp"
+#include "daemon/history/format/recorded_event.hpp"
 #include "daemon/history/format/row_checksum.hpp"
 #include "daemon/history/reading/sound_segments.hpp"
 #include "daemon/history/replay/replay.hpp"
@@ -56,6 +58,7 @@ class Thinning {
   Thinning(const std::filesystem::path& file, double from_s, double to_s, std::size_t points,
            const SetupParser& parser)
       : reader_(file),
+        file_(file),
         database_(file, DatabaseMode::read_only),
         setups_(reader_, parser),
         from_s_(from_s),
@@ -78,6 +81,7 @@ class Thinning {
       result_.time_s.push_back(from_s_ + (static_cast<double>(i) + 0.5) * span_s_);
     for (std::size_t i = 0; i < means_.size(); ++i)
       result_.columns.push_back({columns_.names()[i], means_[i].values()});
+    add_events();
     return std::move(result_);
   }
 
@@ -88,6 +92,52 @@ class Thinning {
     const double since_s = wall_s - 1e-9 * static_cast<double>(segment.wall_ns);
     return static_cast<double>(segment.first_cycle) +
            since_s * 1e9 / static_cast<double>(segment.grid.period.count());
+  }
+
+  void add_events() {
+    constexpr double probings_back_s = 30.0 * 86400.0;
+    constexpr double modes_back_s = 86400.0;
+    const auto time_of = [](double wall_s) {
+      return HistoryTime{.seconds = {}, .wall_ns = std::llround(1e9 * wall_s)};
+    };
+    const double to_s = from_s_ + span_s_ * static_cast<double>(points_);
+    for (RecordedEvent& event :
+         read_events(file_, time_of(from_s_ - probings_back_s), time_of(to_s))) {
+      if (event.kind == EventKind::command && event.code == to_string(CommandKind::measured))
+        add_probing(event);
+      if (event.wall_s >= from_s_ - modes_back_s) result_.events.push_back(std::move(event));
+    }
+  }
+
+  void add_probing(const Event& event) {
+    const bool is_of_stretch = event.wall_s >= from_s_;
+    const auto is_older = [&](const Probing& other) {
+      return other.axis == event.subject.name && other.time_s < from_s_;
+    };
+    std::erase_if(result_.probings, is_older);
+    Probing probing{event.subject.name, event.wall_s, event.value, not_a_number};
+    const SegmentInfo* segment = nullptr;
+    for (const SegmentInfo& each : reader_.segments())
+      if (1e-9 * static_cast<double>(each.wall_ns) <= event.wall_s) segment = &each;
+    if (segment == nullptr || !open_setup(*segment)) return;
+    const EstimatorConfig& config = setups_.of(*segment).estimator;
+    for (const AxisConfig& axis : config.axes) {
+      if (axis.name != event.subject.name) continue;
+      const double offset_um = is_of_stretch ? offset_at(axis.name, event.wall_s) : not_a_number;
+      const bool remains = config.correction.measured == MeasuredMeaning::remaining;
+      probing.left_um = remains ? event.value : event.value + axis.sign * offset_um;
+      probing.needed_um = remains ? offset_um - axis.sign * event.value : -axis.sign * event.value;
+      result_.probings.push_back(std::move(probing));
+      return;
+    }
+  }
+
+  [[nodiscard]] double offset_at(const std::string& axis, double wall_s) const {
+    const auto point = static_cast<std::size_t>((wall_s - from_s_) / span_s_);
+    for (const ThinnedColumn& column : result_.columns)
+      if (column.name == axis + "_offset_um" && point < column.values.size())
+        return column.values[point];
+    return not_a_number;
   }
 
   [[nodiscard]] std::vector<ChunkRange> chunk_ranges() {
@@ -207,6 +257,7 @@ class Thinning {
   }
 
   HistoryReader reader_;
+  std::filesystem::path file_;
   Database database_;
   ParsedSetups setups_;
   double from_s_;

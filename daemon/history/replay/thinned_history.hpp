@@ -9,6 +9,8 @@
 
 #include "daemon/history/reading/history_reader.hpp"
 #include "daemon/history/replay/replay_setup.hpp"
+#include "estimator/types.hpp"
+#include "status/event.hpp"
 
 namespace thermocomp {
 
@@ -17,11 +19,21 @@ struct ThinnedColumn {
   std::vector<double> values;  ///< one per point; NaN: nothing good was recorded there
 };
 
+/// A displacement that was measured at the tool.
+struct Probing {
+  std::string axis;
+  double time_s{not_a_number};
+  double left_um{not_a_number};    ///< what the offset in effect left of it; NaN: not known
+  double needed_um{not_a_number};  ///< the offset that would have left nothing; NaN: not known
+};
+
 struct ThinnedHistory {
   std::vector<double> time_s;  ///< middle of each point's span, wall clock since 1970
   std::vector<ThinnedColumn> columns;
-  std::uint64_t chunks{0};       ///< that the history has of this stretch
-  std::uint64_t chunks_read{0};  ///< fewer: what lasted shorter than a point may be left out
+  std::vector<Probing> probings;      ///< of the stretch, and of each axis the last one before it
+  std::vector<RecordedEvent> events;  ///< of the stretch and the day before, oldest first
+  std::uint64_t chunks{0};            ///< that the history has of this stretch
+  std::uint64_t chunks_read{0};       ///< fewer: what lasted shorter than a point may be left out
   std::vector<HistoryDamage> damage;
 };
 

@@ -264,7 +264,7 @@ def test_a_dry_run_from_the_first_start_on(foreign, folder):
     with running(config):
         shown = run("--socket", config.parent / "status.sock", "status")
         assert shown.returncode == 1 and "DRY RUN" in shown.stdout
-        assert "disable before the dry run ends" in shown.stdout
+        assert "switch it off before the dry run ends" in shown.stdout
         enabled = run("--socket", config.parent / "status.sock", "enable")
         assert enabled.returncode == 0 and "thermocomp disable before" in enabled.stdout
     run(*arguments, "--force")

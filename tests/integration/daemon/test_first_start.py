@@ -72,7 +72,7 @@ def test_nothing_moves_before_an_operator_enables_it_and_what_was_said_survives(
     assert told["axes"][0]["offset"] == 0.0 and told["axes"][0]["applied"] == 0.0
     assert not told["model"]["compared"]
     status, out, _ = daemon.cli("status")
-    assert status == 1 and "never switched on yet -> thermocomp enable" in out
+    assert status == 1 and "never switched on yet -> switch it on: thermocomp enable" in out
     assert "NEVER COMPARED with measured displacement" in out
     daemon.end()
     daemon.start().wait_for_mode("disabled")  # a restart is no answer

@@ -80,8 +80,7 @@ def test_history_is_that_of_the_export(machine, gateway, lab):
     columns = told["columns"]
     assert told["chunks"] == told["chunks_read"] > 0 and told["damage"] == []
     assert all(len(values) == 120 for values in columns.values())
-    assert {"time_s", "column_degC", "spindle_degC", "z_offset_um",
-            "z_displacement_um"} <= set(columns)
+    assert {"time_s", "column_degC", "spindle_degC", "z_offset_um"} <= set(columns)
     offsets = [v for v in columns["z_offset_um"] if v is not None]
     # Every mean lies within what the export has of its half second.
     assert run_tool("export", machine.daemon.history, "-o", lab.folder / "run.csv")[0] == 0
@@ -89,6 +88,23 @@ def test_history_is_that_of_the_export(machine, gateway, lab):
         rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
     exported = [float(row["z_offset_um"]) for row in rows if row["z_offset_um"]]
     assert min(exported) - 1e-6 <= min(offsets) and max(offsets) <= max(exported) + 1e-6
+
+
+def test_history_has_probings_and_when_nothing_was_compensated(machine, gateway):
+    machine.warm_by(6.0)
+    machine.daemon.wait_for_offset(6.0)
+    machine.daemon.call("measured", axis="z", value_um=1.5, confirm=True)
+    settled = eventually(lambda: next((t for t in [gateway.json("/api/history?from=-60&points=5000")]
+                                       if t["probings"] and t["probings"][0]["needed_um"]), None),
+                         "it is committed, with the offset of its time")
+    assert abs(settled["probings"][0]["needed_um"] - 4.5) < 0.2  # 6 um left 1.5 um
+    machine.daemon.call("disable")
+    told = eventually(lambda: next((t for t in [gateway.json("/api/history?from=-60&points=60")]
+                                    if t["modes"]), None), "the mode is committed")
+    probing, = told["probings"]
+    assert probing["axis"] == "z" and probing["left_um"] == 1.5
+    assert told["modes"][-1]["mode"] == "disabled"
+    assert any(event["text"].startswith("measured z 1.5 um") for event in told["events"])
 
 
 def test_history_questions_that_cannot_be_are_refused(gateway):

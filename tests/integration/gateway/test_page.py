@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import re
 import shutil
 import time
 
@@ -10,6 +11,10 @@ import pytest
 from chromium import headless
 from gateway_lab import Broker, Gateway
 from lab import eventually
+
+class Keys:  # of selenium, which may be missing
+    ARROW_LEFT = "\ue012"
+
 
 pytestmark = [
     pytest.mark.skipif(not importlib.util.find_spec("selenium"), reason="python3-selenium is not installed"),
@@ -58,6 +63,12 @@ def show(browser, gateway, size, query=""):
     eventually(lambda: text(browser, "answer") == "yes", "it says that it compensates")
 
 
+def is_on_first_screen(browser, selector):
+    return browser.execute_script(
+        "const box = document.querySelector(arguments[0]).getBoundingClientRect();"
+        "return box.top >= 0 && box.bottom <= window.innerHeight", selector)
+
+
 def no_wider_than_the_screen(browser):
     return browser.execute_script(
         "return document.documentElement.scrollWidth <= window.innerWidth")
@@ -94,8 +105,14 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     show(browser, gateway, PHONE)
     machine.module.stop()
     took = {"sensors lost": within_s(lambda: text(browser, "answer") == "no", "it says no")}
-    eventually(lambda: "no good sensor left" in text(browser, "problem-list"), "and why")
-    assert "mend the sensor or its bus" in text(browser, "problem-list")
+    eventually(lambda: "bus cabinet is not connected" in text(browser, "problem-list"), "and why")
+    entry, = browser.find_elements("css selector", "#problem-list li")  # one, not four
+    assert "2 sensors, inputs column, spindle" in entry.text
+    assert not re.search("thermocomp |systemctl", entry.text), "a command on the page"
+    assert is_on_first_screen(browser, "#problem-list li")
+    entry.find_element("css selector", "a").click()
+    assert browser.execute_script("return document.querySelector('.row:target .name').textContent"
+                                  ) == "cabinet (modbus_tcp)"
     picture(browser, "holding")
     machine.module.start()
     machine.module.show(20.0, 20.0)
@@ -103,6 +120,11 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     machine.daemon.kill()
     took["daemon gone"] = within_s(lambda: "daemon does not answer" in text(browser, "detail"),
                                    "the daemon is away")
+    assert "the last offsets stay at the controller: z " in text(browser, "problem-list")
+    assert "systemctl" not in text(browser, "problem-list")
+    assert "taken out" in text(browser, "axes"), "the last known values"
+    assert "grayscale" in browser.execute_script(
+        "return getComputedStyle(document.getElementById('axes-section')).filter")
     machine.daemon.start()
     eventually(lambda: text(browser, "answer") == "yes", "the daemon is back")
     gateway.end()
@@ -116,6 +138,125 @@ def test_it_says_what_is_wrong_and_recovers(machine, gateway, browser):
     refused = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED", "ERR_EMPTY_RESPONSE",
                "503", "ERR_CONNECTION_RESET")
     assert console(browser, but=refused) == []
+
+
+def drawn(browser):
+    eventually(lambda: browser.execute_script(
+        "return document.querySelectorAll('.axis canvas').length") > 0, "a chart")
+
+
+def test_the_axis_card_says_what_is_taken_out_and_what_was_left(machine, gateway, browser):
+    machine.warm_by(9.0)
+    machine.daemon.wait_for_offset(9.0)
+    show(browser, gateway, PHONE)
+    eventually(lambda: "taken out 9.0 of at most 60 µm" in text(browser, "axes"), "what is taken out")
+    assert "not probed" in text(browser, "axes")
+    machine.daemon.call("measured", axis="z", value_um=1.2, confirm=True)
+    eventually(lambda: "1.2 µm left at the last probing, " in text(browser, "axes"), "what was left")
+    assert browser.execute_script(
+        "return document.querySelector('.meter').getAttribute('aria-valuenow')") == "15"
+    machine.warm_by(75.0)
+    eventually(lambda: "axis z at its bound: 15.0 of 75.0 µm remain" in text(browser, "problem-list"),
+               "the bound, with what remains")
+    assert "at its bound" in text(browser, "axes")
+    picture(browser, "bound")
+
+
+def test_one_cursor_and_one_zoom_for_all_charts(machine, gateway, browser):
+    show(browser, gateway, WALL)
+    machine.warm_by(9.0)
+    machine.daemon.wait_for_offset(9.0)
+    browser.execute_script("chooseRange(ranges[0])")
+    drawn(browser)
+    eventually(lambda: browser.execute_script("return table.length > 10"), "some rows")
+    chart = browser.find_element("css selector", ".axis .chart")
+    chart.send_keys(Keys.ARROW_LEFT)
+    chart.send_keys(Keys.ARROW_LEFT)
+    assert re.match(r"at \d\d:\d\d:\d\d", text(browser, "cursor"))
+    assert "then" in text(browser, "axes") and "°C" in text(browser, "temperature-legend")
+    lines = "return [...document.querySelectorAll('.cursor-line')].filter(e => !e.hidden).length"
+    assert browser.execute_script(lines) == 2  # axis and temperatures
+    before = browser.execute_script("return timeWindow()")
+    assert not browser.find_element("id", "zoom-back").is_displayed()
+    chart.send_keys("+")
+    windows = browser.execute_script("return [...charts.values()].map(each => each.graph.xAxisRange())")
+    assert windows[0] == windows[1] and windows[0][1] - windows[0][0] < before[1] - before[0]
+    picture(browser, "zoomed")
+    browser.find_element("id", "zoom-back").click()
+    assert not browser.find_element("id", "zoom-back").is_displayed()
+    assert browser.execute_script("return zoomed") is None
+    first = browser.find_element("css selector", "#temperature-legend button")
+    first.click()
+    assert first.get_attribute("aria-pressed") == "false"
+    assert browser.execute_script(
+        "return charts.get('temperatures').graph.visibility()") == [False, True]
+    labels = browser.execute_script(
+        "return [...document.querySelectorAll('.dygraph-axis-label-y')].map(e => e.textContent)")
+    assert any("µm" in label for label in labels) and any("°C" in label for label in labels)
+
+
+def test_a_gap_stays_open(machine, gateway, browser):
+    show(browser, gateway, PHONE)
+    values = browser.execute_script(
+        "spacing_s = 10; columns = ['time_s', 'a_degC'];"
+        "table = [0, 10, 20, 30, 200, 210].map(s => [new Date(1000 * s), s === 10 ? null : 1]);"
+        "table.splice(4, 0, [new Date(100000), null]); return withGaps(1).map(String)")
+    assert values == ["1", "null", "1", "1", "NaN", "1", "1"]
+
+
+@pytest.mark.parametrize("size", [PHONE, WALL])
+def test_on_the_wall_a_cause_is_whole_and_the_charts_fill_the_rest(machine, gateway, browser, size):
+    show(browser, gateway, size, "?wall")
+    drawn(browser)
+    assert "spindle 20.0 °C" in text(browser, "hottest")
+    machine.module.stop()
+    eventually(lambda: "not connected" in text(browser, "problem-list"), "the cause")
+    whole = browser.execute_script(
+        "const list = document.getElementById('problems');"
+        "return list.scrollHeight <= list.clientHeight + 1 && list.getBoundingClientRect().bottom <= innerHeight")
+    assert whole
+    if size == WALL:
+        bottom = browser.execute_script(
+            "return document.getElementById('axes-section').getBoundingClientRect().bottom")
+        assert 1040 <= bottom <= 1080
+        ticks_px = browser.execute_script(
+            "return parseFloat(getComputedStyle(document.querySelector('.dygraph-axis-label')).fontSize)")
+        assert ticks_px >= 22
+    picture(browser, f"wall_{size[0]}")
+
+
+CONTRAST = """
+const parse = text => (text.match(/[\\d.]+/g) || []).map(Number);
+const light = rgb => rgb.slice(0, 3).map(c => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
+  .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
+const under = e => { for (; e; e = e.parentElement) {
+  const c = parse(getComputedStyle(e).backgroundColor); if (c.length === 3 || c[3] === 1) return c; } return [255, 255, 255]; };
+return [...document.querySelectorAll('body *')].filter(e => e.offsetParent &&
+    [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim() && n.textContent !== '\u25cf'))
+  .map(e => { const a = light(parse(getComputedStyle(e).color)), b = light(under(e));
+    return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.textContent.slice(0, 40)]; })
+  .filter(([ratio]) => ratio < 4.5);
+"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_everything_can_be_read_and_touched(machine, gateway, browser, scheme):
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {
+        "features": [{"name": "prefers-color-scheme", "value": scheme}]})
+    show(browser, gateway, PHONE)
+    drawn(browser)
+    assert browser.execute_script(CONTRAST) == []
+    small = browser.execute_script(
+        "return [...document.querySelectorAll('button')].filter(e => e.offsetParent).map(e =>"
+        "[e.textContent, e.getBoundingClientRect()]).filter(([, b]) => b.width < 44 || b.height < 44)"
+        ".map(([text]) => text)")
+    assert small == []
+    assert browser.execute_script(
+        "return [...document.querySelectorAll('.chart')].every(e => e.getAttribute('aria-label'))")
+    picture(browser, "phone_" + scheme)
+    machine.daemon.kill()
+    eventually(lambda: "does not answer" in text(browser, "detail"), "the daemon is away")
+    assert browser.execute_script(CONTRAST) == []
 
 
 def test_a_broker_that_is_gone_is_told_and_found_again(lab, machine, browser):

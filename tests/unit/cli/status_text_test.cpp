@@ -135,7 +135,8 @@ TEST_CASE("a dry run is never said to compensate", "[cli][status]") {
     CHECK_THAT(watch_screen(status, nullptr, false), Contains("DRY RUN"));
   }
   status.reasons = only(Reason::operator_disabled);
-  CHECK_THAT(status_text(status, false), Contains("disable before the dry run ends"));
+  CHECK_THAT(status_text(status, false),
+             Contains("switch it off before the dry run ends: thermocomp enable"));
   status.controller.shown = {{"z", 3.0}};
   CHECK_THAT(status_text(status, false), Contains("online; applies by itself z +3.00 um"));
 }
@@ -152,11 +153,54 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
                    .units = {{.name = "bed_module"}}}};
   const std::string text = status_text(status, false);
   CHECK_THAT(text, Contains("no (data lost: holding the last offsets"));
-  CHECK_THAT(text, Contains("no good sensor left -> thermocomp sensors"));
+  CHECK_THAT(text,
+             Contains("no good sensor left -> mend the sensor or its bus: thermocomp sensors"));
   CHECK_THAT(text, Contains("bad sensors: table"));
-  CHECK_THAT(text, Contains("sensor table jumped by +48.0 K -> where that is right: "
-                            "thermocomp accept table"));
+  CHECK_THAT(text, Contains("sensor table jumped by +48.0 K -> compare it with a hand-held "
+                            "thermometer; where it is right, accept it: thermocomp accept table"));
   CHECK_THAT(text, Contains("bus cabinet is not connected (refused) -> check the module's power"));
+}
+
+TEST_CASE("a silent module is one problem, and names what is lost with it", "[cli][status]") {
+  Status status = good_status();
+  status.mode = Mode::holding;
+  status.reasons = only(Reason::block_lost);
+  status.sensors_bad = {"bed_front", "bed_rear", "table", "head"};
+  status.inputs = {{.name = "bed_degC", .block = "bed"},
+                   {.name = "table_degC", .block = "table"},
+                   {.name = "head_degC", .good = true, .block = "head"}};
+  status.buses = {{.name = "cabinet",
+                   .kind = "modbus_tcp",
+                   .connected = true,
+                   .units = {{.name = "bed_module",
+                              .timeouts = 3,
+                              .last_error = "no answer",
+                              .sensors = {"bed_front", "bed_rear", "table"},
+                              .blocks = {"bed", "table"},
+                              .silent_s = 16.0}}}};
+  std::vector<Trouble> list = troubles(status);
+  REQUIRE(list.size() == 2);
+  CHECK(list[0].what == "bed_module silent for 16 s: 3 sensors, inputs bed, table");
+  CHECK(list[0].subject == Subject{SubjectKind::bus, "cabinet"});
+  CHECK(list[1].what == "bad sensors: head");
+  const SensorsAnswer answer{
+      .sensors = {{.name = "head", .blocks = {"head"}, .fault = Fault::open_circuit}}};
+  list = troubles(status, &answer);
+  REQUIRE(list.size() == 2);
+  CHECK(list[1].what == "sensor head: thermocouple broken");
+  CHECK_THAT(list[1].remedy, !Contains("thermocomp "));
+}
+
+TEST_CASE("an axis at its bound is named with what remains of its displacement", "[cli][status]") {
+  Status status = good_status();
+  status.reasons = only(Reason::at_bound);
+  status.axes[0].at_bound = true;
+  status.axes[0].target = -19.0;
+  status.axes[0].offset = -12.0;
+  const std::vector<Trouble> list = troubles(status);
+  REQUIRE(list.size() == 1);
+  CHECK(list[0].what == "axis z at its bound: 7.0 of 19.0 um remain");
+  CHECK(list[0].subject == Subject{SubjectKind::axis, "z"});
 }
 
 TEST_CASE("an estimated block is told with how sure it is", "[cli][status]") {
@@ -198,9 +242,10 @@ TEST_CASE("the error state of a CAN interface is told with its age and a remedy"
   status.controller.state = "warning";
   status.controller.state_s = 0.5;
   const std::string text = status_text(status, false);
-  CHECK_THAT(text, Contains("bus body: bus-off for 3 s -> cable, termination, bit rate; then"));
-  CHECK_THAT(text, Contains("bus table: error passive for 1 min 1 s -> cable"));
-  CHECK_THAT(text, Contains(": error warning for 0 s -> cable"));
+  CHECK_THAT(text,
+             Contains("bus body: bus-off for 3 s -> check cable, termination, bit rate; then"));
+  CHECK_THAT(text, Contains("bus table: error passive for 1 min 1 s -> check cable"));
+  CHECK_THAT(text, Contains(": error warning for 0 s -> check cable"));
   CHECK_THAT(text, !Contains("not connected"));
   status.buses[0].state = "active";
   status.buses[0].connected = true;

@@ -8,7 +8,6 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include "gateway/feed/displacement_memory.hpp"
 #include "gateway/feed/page_state.hpp"
 #include "gateway/feed/trend_watch.hpp"
 #include "gateway/texts/metrics_text.hpp"
@@ -176,22 +175,6 @@ TEST_CASE("a trend is the slope of the last minutes, once there are some", "[gat
   CHECK(std::isnan(trends.per_hour("b")));
 }
 
-TEST_CASE("displacement is remembered by time, and not for other axes", "[gateway][memory]") {
-  DisplacementMemory memory;
-  const auto axes = [](const char* name, double um) {
-    return std::vector<AxisStatus>{{.name = name, .displacement = um}};
-  };
-  for (int s = 0; s < 100; ++s) memory.add(1000.0 + s, axes("z", s));
-  REQUIRE(memory.axes() == std::vector<std::string>{"z"});
-  const auto values = memory.over(0, {985.0, 995.0, 1005.0, 1015.0}, 10.0);
-  CHECK(std::isnan(values[0]));
-  CHECK(std::isnan(values[1]));
-  CHECK(values[2] == Approx(0.0));
-  CHECK(values[3] == Approx(10.0));
-  memory.add(1100.0, axes("y", 1.0));
-  CHECK(memory.axes() == std::vector<std::string>{"y"});
-}
-
 TEST_CASE("the page is told in the words of thermocomp status", "[gateway][page]") {
   Snapshot snapshot = snapshot_of_two_axes();
   json state = page_state(snapshot, "mill");
@@ -206,6 +189,36 @@ TEST_CASE("the page is told in the words of thermocomp status", "[gateway][page]
   CHECK_FALSE(state["problems"][0]["remedy"].get<std::string>().empty());
   snapshot.is_here = false;
   state = page_state(snapshot, "mill");
-  CHECK_FALSE(state.contains("axes"));
   CHECK(state["verdict"]["answer"] == "not known");
+  CHECK(state["axes"].size() == 2);  // the last known
+  CHECK_THAT(state["problems"][0]["remedy"].get<std::string>(),
+             Catch::Contains("the last offsets stay at the controller: "));
+  CHECK_FALSE(page_state(Snapshot(), "mill").contains("axes"));
+}
+
+TEST_CASE("what happens again and again is one line, without what it explains", "[gateway][page]") {
+  const auto event = [](double wall_s, EventKind kind, Subject subject, const char* code) {
+    Event made;
+    made.wall_s = wall_s;
+    made.kind = kind;
+    made.subject = std::move(subject);
+    made.code = code;
+    if (kind == EventKind::recovery) made.duration_s = 2.0;
+    return made;
+  };
+  std::vector<Event> events;
+  for (int i = 0; i < 3; ++i) {
+    const Subject module{SubjectKind::device, "bed_module"};
+    events.push_back(event(100.0 * i, EventKind::fault, module, "not_connected"));
+    events.push_back(event(100.0 * i, EventKind::fault, {SubjectKind::sensor, "bed"}, "no_answer"));
+    events.push_back(event(100.0 * i + 2.0, EventKind::recovery, module, "not_connected"));
+  }
+  events.push_back(event(500.0, EventKind::fault, {SubjectKind::sensor, "head"}, "open_circuit"));
+  Snapshot snapshot;
+  snapshot.events = std::make_shared<const std::vector<Event>>(events);
+  const json list = page_events(snapshot, 10);
+  REQUIRE(list.size() == 2);
+  CHECK(list[0]["text"] == "sensor head: thermocouple broken");
+  CHECK(list[1]["text"] == "device bed_module: not_connected: 3 times, 6 s in all");
+  CHECK(list[1]["wall_s"] == 202.0);
 }

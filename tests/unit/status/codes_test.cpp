@@ -12,6 +12,7 @@ TEST_CASE("every reason has a meaning, a remedy and a name that leads back to it
     INFO(text.name);
     CHECK(text.meaning != text.name);
     CHECK_FALSE(text.remedy.empty());
+    CHECK(text.remedy.find("thermocomp ") == std::string_view::npos);  // a page has no terminal
     CHECK(reason_named(text.name) == reason);
   }
   CHECK_FALSE(reason_named("no such reason"));
@@ -24,6 +25,7 @@ TEST_CASE("every fault has a meaning and a name that leads back to it", "[status
     INFO(text.name);
     CHECK(text.meaning != text.name);
     CHECK(fault_named(text.name) == fault);
+    CHECK(text.remedy.find("thermocomp ") == std::string_view::npos);
     CHECK((text.severity == Severity::normal) == (fault == Fault::none));
   }
 }
