@@ -6,8 +6,9 @@ what `thermocomp diagnose` makes of a ridge model.
 The last lines: each split's RMS by method (mean over its outputs); what `fit` stated of its model
 beside what it left of the test rows (the median over outputs of their ratio; `told_as_range` where
 it states no figure); how many rows were said to be outside, the error inside and outside, and of
-95 % intervals the share that holds there and their mean width over that of split-conformal ones
-about ridge regression with lags. Then ours over the best peer of the split: the median, the
+95 % intervals the share that holds there, their mean width over that of split-conformal ones about
+ridge regression with lags, what share of those holds, and the interval score (width, and 40 times
+what is missed) of ours over theirs. Then ours over the best peer of the split: the median, the
 largest; over no model; rows that are worse than no model without being called outside; and how many
 stated figures are right within 0.7 to 1.5.
 """
@@ -120,11 +121,19 @@ def share_covered(left, sd, rows):
     return float(np.mean([np.mean(np.abs(e[rows]) <= 1.96 * s[rows]) for e, s in zip(left, sd)]))
 
 
+def interval_score_um(left, half_um):
+    """Mean over outputs; lower is better, least for intervals that hold on 95 %."""
+    return float(np.mean([np.nanmean(2 * h + 40 * np.maximum(0.0, np.abs(e) - h))
+                          for e, h in zip(left, half_um)]))
+
+
 def judge(program, split, names, folder):
     """RMS of each method, mean over outputs; and of ours where it is not called outside."""
     figures = {}
+    left_by_peer = {}
     for name in names:
-        figures[name] = float(np.mean([rms(left) for left in peers.PEERS[name](split)]))
+        left_by_peer[name] = peers.PEERS[name](split)
+        figures[name] = float(np.mean([rms(left) for left in left_by_peer[name]]))
         print(f"{split.name} {name} {figures[name]:.3f}", file=sys.stderr, flush=True)
     folder.mkdir()
     train, test = arguments(split.train, folder, "train"), arguments(split.test, folder, "test")
@@ -137,8 +146,14 @@ def judge(program, split, names, folder):
                                          for name, e in zip(split.outputs, left)]))
     figures["covered_inside"] = share_covered(left, sd, ~outside)
     figures["covered_outside"] = share_covered(left, sd, outside)
-    figures["width"] = float(np.mean([np.mean(1.96 * s) / w for s, w in
-                                      zip(sd, peers.conformal_lags_um(split))]))
+    if "ridge_lags" in names:
+        widths_um = peers.conformal_lags_um(split)
+        of_ridge = left_by_peer["ridge_lags"]
+        figures["width"] = float(np.mean([np.mean(1.96 * s) / w for s, w in zip(sd, widths_um)]))
+        figures["conformal"] = float(np.mean([np.mean(np.abs(e) <= w)
+                                              for e, w in zip(of_ridge, widths_um)]))
+        figures["score"] = (interval_score_um(left, [1.96 * s for s in sd]) /
+                            interval_score_um(of_ridge, widths_um))
     figures["fit"] = float(np.mean([rms(each) for each in left]))
     left_diagnosed, figures["diagnose_seconds"] = diagnosed(program, split, train, test, folder)
     figures["diagnose"] = float(np.mean([rms(each) for each in left_diagnosed]))
@@ -165,15 +180,18 @@ def main():
         return 77
     names = options.peers.split(",")
     ratios, lines, worse, stated = {"fit": [], "diagnose": []}, [], 0, []
-    covered, widths, over_none = {"inside": [], "outside": []}, [], []
+    covered, over_none = {"inside": [], "outside": []}, []
+    intervals = {"width": [], "conformal": [], "score": []}
+    over_best = {name: [] for name in names if name != "none"}
     with tempfile.TemporaryDirectory() as folder:
         for split in data.all_splits(options.data):
             if options.splits not in split.name:
                 continue
             figures = judge(options.program, split, names, pathlib.Path(folder) / split.name)
             best = min(figures[name] for name in names)
-            for name, of_splits in ratios.items():
-                of_splits.append(figures[name] / best)
+            for of in (ratios, over_best):
+                for name, of_splits in of.items():
+                    of_splits.append(figures[name] / best)
             worse += figures["inside"] > figures["none_inside"]
             for name in [*names, "fit", "diagnose"]:
                 lines.append(f"{split.name}_{name} {figures[name]:.3f} um")
@@ -188,9 +206,12 @@ def main():
             for where in ("inside", "outside"):
                 covered[where].append(figures[f"covered_{where}"])
                 lines.append(f"{split.name}_covered_{where} {covered[where][-1]:.3f} share")
-            widths.append(figures["width"])
+            for name, of_splits in intervals.items():
+                of_splits.append(figures.get(name, float("nan")))
             over_none.append(figures["fit"] / figures["none"])
-            lines.append(f"{split.name}_width_over_conformal {widths[-1]:.2f} ratio")
+            lines.append(f"{split.name}_width_over_conformal {intervals['width'][-1]:.2f} ratio")
+            lines.append(f"{split.name}_interval_score_over_conformal "
+                         f"{intervals['score'][-1]:.2f} ratio")
             if figures["runs"] >= 3:  # fewer: `fit` tells a range in words
                 stated.append(figures["stated"])
             lines.append(f"{split.name}_outside {figures['outside_share']:.3f} share")
@@ -199,13 +220,15 @@ def main():
             lines.append(f"{split.name}_fit_seconds {figures['seconds']:.1f} s")
             lines.append(f"{split.name}_diagnose_seconds {figures['diagnose_seconds']:.1f} s")
     print("\n".join(lines))
-    for name, of_splits in ratios.items():
+    for name, of_splits in {**over_best, **ratios}.items():
         print(f"{name}_over_best_peer_median {np.median(of_splits):.3f} ratio")
         print(f"{name}_over_best_peer_largest {max(of_splits):.3f} ratio")
     print(f"fit_over_none_largest {max(over_none):.3f} ratio")
     for where, of_splits in covered.items():
         print(f"covered_{where}_mean {np.nanmean(of_splits):.3f} share")
-    print(f"width_over_conformal_median {np.median(widths):.2f} ratio")
+    print(f"width_over_conformal_median {np.nanmedian(intervals['width']):.2f} ratio")
+    print(f"conformal_covered_mean {np.nanmean(intervals['conformal']):.3f} share")
+    print(f"interval_score_over_conformal_median {np.nanmedian(intervals['score']):.2f} ratio")
     print(f"splits_worse_than_none_inside {worse} splits")
     right = sum(0.7 <= ratio <= 1.5 for ratio in stated)
     print(f"stated_figures_right {right} of_{len(stated)}")

@@ -20,6 +20,8 @@ constexpr std::size_t rows_min = 3;  // of a test; fewer say nothing of a course
 constexpr double share_present_min = 0.5;
 /// A signal that stays so close to a level within each run, as a share of it, has not moved.
 constexpr double still_share = 0.03;
+/// Of a signal's range: what goes back by less goes on.
+constexpr double way_share = 0.1;
 
 [[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& rule) {
   throw ConfigurationError({Problem{file, 0, key, "", rule}});
@@ -236,6 +238,42 @@ bool stands_still(const MeasuredTests& tests, std::size_t signal) {
   return !(within > still_share * still_share * size);
 }
 
+/// Whether all runs together have it go up or down once at most: what it does then cannot be told
+/// from what the time since then does.
+bool goes_one_way(const MeasuredTests& tests, std::size_t signal) {
+  const auto column = static_cast<Eigen::Index>(signal);
+  const auto selected = [column](const TestRun& run) {
+    return run.signals.col(column).tail(run.time_s.size() - run.begin);
+  };
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (const TestRun& run : tests.runs) {
+    least = std::min(least, selected(run).minCoeff());
+    most = std::max(most, selected(run).maxCoeff());
+  }
+  const double turn = way_share * (most - least);
+  int ways = 0;
+  for (const TestRun& run : tests.runs) {
+    int way = 0;  // up: 1, down: -1
+    double low = selected(run)[0];
+    double high = low;
+    for (const double value : selected(run)) {
+      low = std::min(low, value);
+      high = std::max(high, value);
+      if (way != 1 && value > low + turn) {
+        way = 1;
+        high = value;
+        ++ways;
+      } else if (way != -1 && value < high - turn) {
+        way = -1;
+        low = value;
+        ++ways;
+      }
+    }
+  }
+  return ways < 2;
+}
+
 std::vector<Fold> make_folds(const std::vector<TestRun>& runs, std::size_t stretches) {
   std::vector<Fold> folds;
   if (runs.size() > 1) {
@@ -306,7 +344,7 @@ MeasuredTests measured_tests(const std::vector<RunFile>& given, const TestOption
   for (const RunFile& run : runs)
     tests.runs.push_back(make_run(run, tests.places, tests.outputs, tests.signals));
   for (std::size_t i = 0; i < tests.signals.size(); ++i)
-    if (stands_still(tests, i)) tests.unmoved.push_back(tests.signals[i]);
+    if (stands_still(tests, i) || goes_one_way(tests, i)) tests.unmoved.push_back(tests.signals[i]);
   leave_out_still_places(tests);
   if (tests.places.empty()) refuse(runs.front().name, "", "has no temperature that can be used");
   tests.folds = make_folds(tests.runs, options.folds_of_one_run);

@@ -41,8 +41,8 @@ struct MeasuredTests {
   std::vector<std::string> places;
   std::vector<std::string> outputs;
   std::vector<std::string> signals;  ///< that all runs have and that vary
-  /// Those that stay at a level within each run: they get no gain, and what they do elsewhere is
-  /// another state of the machine.
+  /// Those that stay at a level within each run, or go up or down once in all: they get no gain,
+  /// and what they do elsewhere is another state of the machine.
   std::vector<std::string> unmoved;
   std::vector<TestRun> runs;
   std::vector<Fold> folds;

@@ -360,8 +360,9 @@ void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
   const FamilyResult& none = fit.results[index_of_family(Family::none)];
   for (const std::string& signal : tests.unmoved)
     fit.warnings.push_back(signal +
-                           " stayed at a level within each run: what it does when it moves is not "
-                           "known, it gets no gain");
+                           " stayed at a level within each run or went one way once: what it does "
+                           "cannot be told from what time does, it gets no gain. Next: a run in "
+                           "which it goes up and down");
   if (fit.chosen == Family::none) {
     fit.warnings.emplace_back("no model is better than none on what was left out: its matrix is 0");
     return;

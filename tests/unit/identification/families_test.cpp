@@ -374,6 +374,25 @@ TEST_CASE("a signal that stays at a level within each run gets no gain", "[famil
       for (const double gain : bank.gain_um_per_unit.at("z_um")[i]) CHECK(gain == 0.0);
 }
 
+TEST_CASE("a signal that goes one way once in all runs gets no gain", "[families]") {
+  const auto unmoved = [](std::initializer_list<double> levels) {
+    RunFile run = machine_run("run", 1, [](double quick, double, double, double) { return quick; });
+    run.columns[3] = "heater";
+    const std::size_t rows = run.rows() / levels.size() + 1;
+    for (std::size_t row = 0; row < run.rows(); ++row)
+      run.values[3][row] = std::data(levels)[row / rows];
+    TestOptions options;
+    options.outputs = {"z_um"};
+    options.signals = true;
+    return !measured_tests({run}, options).moved("heater");
+  };
+  CHECK(unmoved({0.0, 60.0}));
+  CHECK(unmoved({60.0, 30.0, 0.0}));
+  CHECK(unmoved({0.0, 60.0, 57.0}));  // back by less than a tenth of its range
+  CHECK_FALSE(unmoved({0.0, 60.0, 50.0}));
+  CHECK_FALSE(unmoved({0.0, 60.0, 0.0, 60.0}));
+}
+
 TEST_CASE("a family that is worse than no model on a run left out is not chosen", "[families]") {
   // The third run moves against the others: whatever two of them show is wrong on the other.
   std::vector<RunFile> files;
