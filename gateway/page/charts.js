@@ -59,7 +59,7 @@ function chartOptions(labels, unit, more) {
     highlightCallback: (event, x) => showCursor(x),
     unhighlightCallback: () => showCursor(null),
     zoomCallback: (from, to) => zoomTo([from, to]),
-    axes: {x: {pixelsPerLabel: 64 * scale},
+    axes: {x: {pixelsPerLabel: 64 * scale, axisLabelWidth: 56 * scale},
            y: {axisLabelWidth: 58 * scale, pixelsPerLabel: 26 * scale,
                axisLabelFormatter: value => String(+value.toFixed(2)).replace('-', '\u2212') + '\u00a0' + unit}},
     underlayCallback: drawUnder}, more);
@@ -152,8 +152,6 @@ function draw(name, element, names, unit, window_ms, more) {
   if (!element.hasAttribute('tabindex')) makeReachable(element);
   element.setAttribute('aria-label', more.label + ', ' + (zoomed ? 'part of ' : '') + range.name +
                        '; arrow keys move the time cursor, + and \u2212 zoom, Escape shows all again');
-  if (chart.height !== element.clientHeight) chart.graph.resize();
-  chart.height = element.clientHeight;
   charts.set(name, chart);
   placeCursors();
 }
@@ -161,6 +159,8 @@ function draw(name, element, names, unit, window_ms, more) {
 // By key and by finger what the mouse does.
 function makeReachable(element) {
   element.tabIndex = 0;
+  new ResizeObserver(() => charts.forEach(({graph}) => element.contains(graph.graphDiv) && graph.resize()))
+    .observe(element);
   element.setAttribute('role', 'application');
   element.addEventListener('keydown', event => {
     const step = {ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20}[event.key];

@@ -132,11 +132,13 @@ class Thinning {
     }
   }
 
+  /// The last one recorded: a span may be shorter than the time between two records.
   [[nodiscard]] double offset_at(const std::string& axis, double wall_s) const {
-    const auto point = static_cast<std::size_t>((wall_s - from_s_) / span_s_);
-    for (const ThinnedColumn& column : result_.columns)
-      if (column.name == axis + "_offset_um" && point < column.values.size())
-        return column.values[point];
+    for (const ThinnedColumn& column : result_.columns) {
+      if (column.name != axis + "_offset_um") continue;
+      for (auto point = static_cast<std::size_t>((wall_s - from_s_) / span_s_) + 1; point-- > 0;)
+        if (point < points_ && std::isfinite(column.values[point])) return column.values[point];
+    }
     return not_a_number;
   }
 

@@ -222,6 +222,11 @@ def test_on_the_wall_a_cause_is_whole_and_the_charts_fill_the_rest(machine, gate
         ticks_px = browser.execute_script(
             "return parseFloat(getComputedStyle(document.querySelector('.dygraph-axis-label')).fontSize)")
         assert ticks_px >= 22
+        eventually(lambda: browser.execute_script(
+            "return [...document.querySelectorAll('.axis .dygraph-axis-label-x')].every(e =>"
+            "e.getBoundingClientRect().bottom <="
+            " document.getElementById('axes-section').getBoundingClientRect().bottom)"),
+            "the times stand inside the card")
     picture(browser, f"wall_{size[0]}")
 
 
