@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
+#include "config/runs/robust.hpp"
 #include "report/xml_text.hpp"
 
 namespace thermocomp {
@@ -154,10 +156,8 @@ double gap_max(const Range& x, Values time, Values values) {
     last = time[row];
   }
   if (steps.empty()) return x.high - x.low;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
   constexpr double seen_share = 0.01;
-  return std::max(10.0 * *middle, seen_share * (x.high - x.low));
+  return std::max(10.0 * median(std::move(steps)), seen_share * (x.high - x.low));
 }
 
 /// The rows of the lowest and the highest finite value from `begin` to `end`, in their order.

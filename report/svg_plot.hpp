@@ -83,7 +83,6 @@ struct PlotDots {
   std::span<const double> x;
   std::string x_unit;
   std::span<const double> y;
-  std::string y_unit;
 };
 [[nodiscard]] std::string scatter_plot(const PlotDots& dots);
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "cli/import/clock_shift.hpp"
+#include "config/runs/robust.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
@@ -69,10 +70,7 @@ Shift shift_of(const RunFile& first, const RunFile& second, std::optional<double
 double usual_step_s(const std::vector<double>& time_s) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
-  if (steps.empty()) return 0.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps.empty() ? 0.0 : median(std::move(steps));
 }
 
 bool is_steady(const std::string& column) {

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "config/model/model_file.hpp"
+#include "config/runs/robust.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/problems.hpp"
 
@@ -57,10 +58,7 @@ std::vector<const std::vector<double>*> columns_of(const RunFile& run,
 double median_pitch_s(const std::vector<double>& times_s, std::size_t begin, std::size_t end) {
   std::vector<double> steps;
   for (std::size_t i = begin + 1; i < end; ++i) steps.push_back(times_s[i] - times_s[i - 1]);
-  if (steps.empty()) return 1.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps.empty() ? 1.0 : median(std::move(steps));
 }
 
 /// The selected rows as means over cells of equal length; a cell with a missing input is left out.

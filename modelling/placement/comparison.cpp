@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "estimator/checks.hpp"
+#include "modelling/placement/tendency_patterns.hpp"
 
 namespace thermocomp::placement {
 namespace {
@@ -31,12 +32,6 @@ MethodResult judge_sensors(const PlacementProblem& problem, std::string name,
   });
 }
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
-}
-
 /// The median, figure by figure, of many random placements.
 MethodResult random_median(const PlacementProblem& problem) {
   std::vector<MethodResult> draws;
@@ -51,7 +46,7 @@ MethodResult random_median(const PlacementProblem& problem) {
       rms_um.push_back(figure_of(draw).rms_um);
       peak_um.push_back(figure_of(draw).peak_um);
     }
-    return ErrorFigures{median(std::move(rms_um)), median(std::move(peak_um))};
+    return ErrorFigures{median_of(std::move(rms_um)), median_of(std::move(peak_um))};
   };
   MethodResult result{"random", {}, {}, {}, {}};
   result.used = over_draws([](const MethodResult& draw) { return draw.used; });

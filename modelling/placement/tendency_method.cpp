@@ -18,16 +18,6 @@ constexpr double improves_by = 1e-3;  ///< a round that gains less is none
 constexpr double same_share = 0.05;   ///< coefficients that differ by less count as equal
 constexpr double far = std::numeric_limits<double>::infinity();
 
-}  // namespace
-
-double median_of(Numbers values) {
-  const std::size_t half = values.size() / 2;
-  std::sort(values.begin(), values.end());
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
-}
-
-namespace {
-
 Numbers start_of(const PlacementProblem& problem, const Field& field, Start start) {
   if (start == Start::mean) return block_means_K(problem, field.rise_K);
   Numbers blocks_K;

@@ -23,8 +23,6 @@ inline constexpr std::array<Way, 3> all_ways{Way::coefficients, Way::ratios, Way
 
 /// With which temperatures the iteration begins.
 enum class Start { mean, median, centroid };
-/// Of an even number the mean of the two in the middle. @pre not empty
-[[nodiscard]] double median_of(Numbers values);
 
 struct TendencyOptions {
   Start start{Start::mean};

@@ -7,15 +7,20 @@
 #include <utility>
 
 namespace thermocomp::placement {
+
+double median_of(Numbers values) {
+  const std::size_t half = values.size() / 2;
+  std::sort(values.begin(), values.end());
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
 namespace {
 
 constexpr double per_cent = 0.01;
 
 void add_halves(const Numbers& values, const std::string& low, const std::string& high,
                 std::vector<Pattern>& patterns) {
-  Numbers sorted = values;
-  std::sort(sorted.begin(), sorted.end());
-  const double middle = 0.5 * (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]);
+  const double middle = median_of(values);
   Pattern below{low, {}, structure::usual_percents, false};
   Pattern above{high, {}, structure::usual_percents, false};
   for (const double value : values) {

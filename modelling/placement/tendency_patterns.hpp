@@ -9,6 +9,9 @@
 
 namespace thermocomp::placement {
 
+/// Of an even number the mean of the two in the middle. @pre not empty
+[[nodiscard]] double median_of(Numbers values);
+
 /// What a sensor in each block can read in one field (step 3); shape (blocks).
 struct BlockBounds {
   Numbers low_K, high_K;

@@ -5,6 +5,8 @@
 
 #include <Eigen/Dense>
 
+#include "config/runs/robust.hpp"
+
 namespace thermocomp::thermal_test {
 namespace {
 
@@ -15,13 +17,6 @@ constexpr double bins_max = 6000.0;
 constexpr std::size_t window_values_min = 5;
 constexpr double normal_of_median = 1.4826;
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Of a robust spread the half is 0 where values are coarse: then the plain one counts.
 double spread_of(const std::vector<double>& values) {
   std::vector<double> sizes;
@@ -31,7 +26,7 @@ double spread_of(const std::vector<double>& values) {
     squares += value * value;
   }
   if (values.empty()) return 0.0;
-  const double robust = normal_of_median * median_of(std::move(sizes));
+  const double robust = normal_of_median * median(std::move(sizes));
   return robust > 0.0 ? robust : std::sqrt(squares / static_cast<double>(values.size()));
 }
 

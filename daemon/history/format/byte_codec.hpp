@@ -19,6 +19,14 @@ namespace thermocomp {
   return static_cast<std::int64_t>((value >> 1) ^ (~(value & 1) + 1));
 }
 
+/// FNV-1a, 64 bits, going on from `hash`. Source: draft-eastlake-fnv, section 2.
+[[nodiscard]] constexpr std::uint64_t fnv_1a(std::span<const std::byte> bytes,
+                                             std::uint64_t hash = 0xcbf29ce484222325u) noexcept {
+  for (const std::byte byte : bytes)
+    hash = (hash ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3u;
+  return hash;
+}
+
 class ByteWriter {
  public:
   void u8(std::uint8_t value) { bytes_.push_back(static_cast<std::byte>(value)); }

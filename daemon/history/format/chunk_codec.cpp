@@ -6,6 +6,8 @@
 namespace thermocomp {
 namespace {
 
+constexpr std::size_t seal_bytes = 8;
+
 void write_value(ByteWriter& writer, std::uint64_t difference) {
   if (difference == 0) {
     writer.u8(0);
@@ -111,23 +113,8 @@ bool ChunkDecoder::next(Record& out) {
   return true;
 }
 
-namespace {
-
-constexpr std::size_t seal_bytes = 8;
-
-/// FNV-1a, 64 bits. Source: draft-eastlake-fnv, section 2.
-std::uint64_t hash_of(std::span<const std::byte> bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const std::byte byte : bytes) {
-    hash = (hash ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3u;
-  }
-  return hash;
-}
-
-}  // namespace
-
 void add_seal(std::vector<std::byte>& bytes) {
-  const std::uint64_t hash = hash_of(bytes);
+  const std::uint64_t hash = fnv_1a(bytes);
   for (std::size_t i = 0; i < seal_bytes; ++i) {
     bytes.push_back(static_cast<std::byte>(hash >> (8 * i)));
   }

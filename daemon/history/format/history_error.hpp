@@ -2,6 +2,7 @@
 #pragma once
 
 #include <stdexcept>
+#include <string>
 
 namespace thermocomp {
 
@@ -9,5 +10,10 @@ class HistoryError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+
+/// @throws HistoryError "damaged: ..." unless it holds
+inline void require_sound(bool holds, const char* damage) {
+  if (!holds) throw HistoryError(std::string("damaged: ") + damage);
+}
 
 }  // namespace thermocomp

@@ -14,6 +14,12 @@ struct HistoryTime {
   std::optional<std::int64_t> wall_ns;
 };
 
+/// Whether a moment lies before a bound. @param seconds  since the history's first cycle
+[[nodiscard]] inline bool is_before(double seconds, std::int64_t wall_ns,
+                                    const HistoryTime& bound) {
+  return bound.seconds ? seconds < *bound.seconds : wall_ns < *bound.wall_ns;
+}
+
 /// "12.5": seconds since the history's start. "2026-03-01T08:30:00", "2026-03-01 08:30",
 /// "2026-03-01" (midnight): local unless it ends with Z or +hh:mm. "now", "8 hours ago", "90 min
 /// ago", "-8h", "-1.5d": before `now`; units s, m or min, h, d, w, and their English words.

@@ -30,11 +30,6 @@ RecordedEvent event_from(const Statement& row) {
   return event;
 }
 
-bool is_before(std::int64_t wall_ns, std::int64_t first_ns, const HistoryTime& bound) {
-  return bound.seconds ? 1e-9 * static_cast<double>(wall_ns - first_ns) < *bound.seconds
-                       : wall_ns < *bound.wall_ns;
-}
-
 }  // namespace
 
 bool has_event_records(Database& database) {
@@ -57,8 +52,9 @@ std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
   while (rows.step()) {
     const std::int64_t wall_ns = rows.number(2);
     if (!first_ns) first_ns = wall_ns;
-    if (from && is_before(wall_ns, *first_ns, *from)) continue;
-    if (to && !is_before(wall_ns, *first_ns, *to)) continue;
+    const double since_first_s = 1e-9 * static_cast<double>(wall_ns - *first_ns);
+    if (from && is_before(since_first_s, wall_ns, *from)) continue;
+    if (to && !is_before(since_first_s, wall_ns, *to)) continue;
     events.push_back(event_from(rows));
   }
   return events;

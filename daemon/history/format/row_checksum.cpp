@@ -3,6 +3,8 @@
 #include <bit>
 #include <string>
 
+#include "daemon/history/format/byte_codec.hpp"
+
 namespace thermocomp {
 
 RowChecksum& RowChecksum::add(std::int64_t value) noexcept {
@@ -13,9 +15,7 @@ RowChecksum& RowChecksum::add(std::int64_t value) noexcept {
 
 RowChecksum& RowChecksum::add(std::span<const std::byte> bytes) noexcept {
   add(static_cast<std::int64_t>(bytes.size()));
-  for (const std::byte byte : bytes) {
-    hash_ = (hash_ ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3u;
-  }
+  hash_ = fnv_1a(bytes, hash_);
   return *this;
 }
 

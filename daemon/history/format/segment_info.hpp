@@ -9,6 +9,13 @@
 
 namespace thermocomp {
 
+/// What a replay needs besides the records.
+struct SegmentSetup {
+  std::string config_text;
+  std::string model_text;
+  std::string model_checksum;
+};
+
 struct SegmentInfo {
   std::int64_t id{0};
   std::int64_t run{0};    ///< one number for each start of the daemon

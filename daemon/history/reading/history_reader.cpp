@@ -16,14 +16,9 @@ namespace thermocomp {
 namespace {
 
 SegmentReason reason_from(std::int64_t code) {
-  if (code < 0 || code > static_cast<std::int64_t>(SegmentReason::gap)) {
-    throw HistoryError("damaged: unknown reason of a segment");
-  }
+  require_sound(code >= 0 && code <= static_cast<std::int64_t>(SegmentReason::gap),
+                "unknown reason of a segment");
   return static_cast<SegmentReason>(code);
-}
-
-void require(bool holds, const char* damage) {
-  if (!holds) throw HistoryError(std::string("damaged: ") + damage);
 }
 
 SegmentInfo segment_from(const Statement& row) {
@@ -212,7 +207,7 @@ void RecordCursor::Parts::decode(std::vector<std::byte> bytes, std::uint64_t cou
   ChunkDecoder chunk(std::move(bytes), count);
   RecordOrder order_then = order;
   for (Record record; chunk.next(record); decoded.push_back(record))
-    require(order_then.admits(record), "records are out of order");
+    require_sound(order_then.admits(record), "records are out of order");
   order = order_then;
   records = std::move(decoded);
   given = 0;

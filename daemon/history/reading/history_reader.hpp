@@ -15,12 +15,6 @@
 
 namespace thermocomp {
 
-struct SegmentSetup {
-  std::string config_text;
-  std::string model_text;
-  std::string model_checksum;
-};
-
 /// What was in force right before the first cycle of a segment.
 struct SegmentStart {
   std::vector<std::byte> estimator_state;

@@ -11,10 +11,6 @@ namespace {
 constexpr std::int64_t period_ns_min = 100'000;
 constexpr std::int64_t period_ns_max = 3'600'000'000'000;
 
-void require(bool holds, const char* damage) {
-  if (!holds) throw HistoryError(std::string("damaged: ") + damage);
-}
-
 std::int64_t begin_ns(const SegmentInfo& segment) {
   return segment.grid.time_of(segment.first_cycle).count();
 }
@@ -71,11 +67,14 @@ void check_times(const SegmentInfo& segment) {
   const std::int64_t period_ns = segment.grid.period.count();
   const std::int64_t start_ns = segment.grid.start.count();
   const auto first = static_cast<std::int64_t>(segment.first_cycle);
-  require(period_ns >= period_ns_min && period_ns <= period_ns_max, "a period that cannot be");
-  require(start_ns >= 0 && start_ns <= grid_ns_max, "the start of a grid that cannot be");
-  require(first >= 0 && first <= (grid_ns_max - start_ns) / period_ns, "a cycle that cannot be");
-  require(segment.last_cycle >= first - 1 && segment.last_cycle - first < span_ns_max / period_ns,
-          "a last cycle that cannot be");
+  require_sound(period_ns >= period_ns_min && period_ns <= period_ns_max,
+                "a period that cannot be");
+  require_sound(start_ns >= 0 && start_ns <= grid_ns_max, "the start of a grid that cannot be");
+  require_sound(first >= 0 && first <= (grid_ns_max - start_ns) / period_ns,
+                "a cycle that cannot be");
+  require_sound(
+      segment.last_cycle >= first - 1 && segment.last_cycle - first < span_ns_max / period_ns,
+      "a last cycle that cannot be");
 }
 
 std::string HistoryPlaces::add(const SegmentInfo& segment) {

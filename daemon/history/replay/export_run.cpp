@@ -40,10 +40,6 @@ bool is_beside(const HistoryClock& clock, const SegmentInfo& segment,
          (to && to->seconds && clock.seconds_at(segment, segment.first_cycle) >= *to->seconds);
 }
 
-bool is_before(double time_s, std::int64_t wall_ns, const HistoryTime& bound) {
-  return bound.seconds ? time_s < *bound.seconds : wall_ns < *bound.wall_ns;
-}
-
 /// "# 12.500 s: what\n"
 std::string comment_at(double time_s, const std::string& what) {
   std::array<char, 40> time{};

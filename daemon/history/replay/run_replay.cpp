@@ -7,6 +7,7 @@
 #include <ostream>
 #include <utility>
 
+#include "config/runs/robust.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/problems.hpp"
 #include "daemon/history/replay/replay.hpp"
@@ -43,10 +44,7 @@ double median_distance_s(const std::vector<double>& times_s, const std::vector<d
     if (last) distances.push_back(times_s[row] - *last);
     last = times_s[row];
   }
-  if (distances.empty()) return 0.0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return distances.empty() ? 0.0 : median(std::move(distances));
 }
 
 nanoseconds step_period(double rate_hz, const std::vector<double>& times_s) {

@@ -98,11 +98,7 @@ SegmentExport::SegmentExport(const HistoryReader& reader, const SegmentInfo& seg
       damage_(damage),
       cursor_(reader.records(segment)),
       faults_told_(config_.sensors.size(), Fault::never_read) {
-  SegmentStart start = reader.start(segment);
-  if (start.readings.size() != config_.sensors.size())
-    throw HistoryError("damaged: the inputs at its start do not fit its configuration");
-  inputs_.readings = std::move(start.readings);
-  inputs_.controller = start.controller;
+  inputs_ = inputs_at(reader.start(segment), config_);
   measured_um_.fill(not_a_number);
   displacement_um_.fill(not_a_number);
   offset_um_.fill(not_a_number);

@@ -10,18 +10,13 @@ SegmentSteps::SegmentSteps(const HistoryReader& reader, const SegmentInfo& segme
       estimator_(setup.estimator, setup.model),
       cursor_(reader.records(segment)),
       next_cycle_(segment.first_cycle) {
-  SegmentStart start = reader.start(segment);
+  const SegmentStart start = reader.start(segment);
   estimator_.load_state(start.estimator_state);
   Report report = estimator_.make_report();
   estimator_.report(report);
-  if (segment.grid.time_of(segment.first_cycle) < report.now) {
-    throw HistoryError("damaged: the state at its start is of a later time");
-  }
-  if (start.readings.size() != estimator_.config().sensors.size()) {
-    throw HistoryError("damaged: the inputs at its start do not fit its configuration");
-  }
-  inputs_.readings = std::move(start.readings);
-  inputs_.controller = start.controller;
+  require_sound(segment.grid.time_of(segment.first_cycle) >= report.now,
+                "the state at its start is of a later time");
+  inputs_ = inputs_at(start, estimator_.config());
   next();
 }
 
@@ -48,22 +43,17 @@ bool SegmentSteps::step() {
 /// @return `cycle`, or the first cycle after those that were skipped
 std::uint64_t SegmentSteps::take_inputs(std::uint64_t cycle) {
   while (has_record_ && record_.cycle <= cycle && record_.kind != RecordKind::offset) {
-    if (record_.cycle < cycle) throw HistoryError("damaged: records are out of order");
+    require_sound(record_.cycle >= cycle, "records are out of order");
     if (record_.kind == RecordKind::skipped) {
-      if (record_.time_ns < static_cast<std::int64_t>(cycle)) {
-        throw HistoryError("damaged: skipped cycles end before they begin");
-      }
+      require_sound(record_.time_ns >= static_cast<std::int64_t>(cycle),
+                    "skipped cycles end before they begin");
+      require_sound(record_.time_ns <= segment_.last_cycle, "skipped cycles end after the segment");
       const auto after = static_cast<std::uint64_t>(record_.time_ns) + 1;
-      if (record_.time_ns > segment_.last_cycle) {
-        throw HistoryError("damaged: skipped cycles end after the segment");
-      }
       next();
       return after;
     }
     if (record_.kind == RecordKind::command) {
-      if (record_.detail >= command_kinds_count) {
-        throw HistoryError("damaged: unknown command");
-      }
+      require_sound(record_.detail < command_kinds_count, "unknown command");
       Command command{static_cast<CommandKind>(record_.detail), record_.index, record_.value};
       set_measured_bits(record_.time_ns, command);
       estimator_.apply(command);

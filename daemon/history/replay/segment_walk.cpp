@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "config/daemon/daemon_config.hpp"
 #include "config/text/number_text.hpp"
 #include "config/text/printable_text.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
@@ -47,6 +49,12 @@ void InputsInForce::forget() {
   controller.signals.fill(not_a_number);
 }
 
+InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config) {
+  require_sound(start.readings.size() == config.sensors.size(),
+                "the inputs at its start do not fit its configuration");
+  return {start.readings, start.controller};
+}
+
 HistoryClock::HistoryClock(const HistoryReader& reader) {
   for (const SegmentInfo& segment : reader.segments()) {
     const std::string why = places_.add(segment);
@@ -58,6 +66,12 @@ double HistoryClock::seconds_at(const SegmentInfo& segment, std::uint64_t cycle)
   const std::int64_t time_ns =
       segment.grid.time_of(cycle).count() + places_.grid_to_history_ns(segment.run);
   return static_cast<double>(time_ns) * 1e-9;
+}
+
+ReplaySetup parse_setup(const SegmentSetup& setup) {
+  DaemonConfig config = parse_daemon_config(setup.config_text, "configuration of the segment",
+                                            setup.model_text, "model of the segment");
+  return {std::move(config.estimator), std::move(config.model), config.dry_run};
 }
 
 ParsedSetups::ParsedSetups(const HistoryReader& reader, const SetupParser& parser) {

@@ -24,6 +24,9 @@ struct InputsInForce {
   void forget();
 };
 
+/// @throws HistoryError when there are not as many readings as sensors
+[[nodiscard]] InputsInForce inputs_at(const SegmentStart& start, const EstimatorConfig& config);
+
 /// Seconds since the history's first cycle. Within a start of the daemon the grid counts; between
 /// two of them the wall clock does, but time never runs backwards.
 class HistoryClock {

@@ -331,7 +331,7 @@ void HistoryStore::read_back(const PendingRows& pending) {
   }
 }
 
-std::int64_t HistoryStore::setup_id(const HistorySetup& setup) {
+std::int64_t HistoryStore::setup_id(const SegmentSetup& setup) {
   Statement known(*database_,
                   "SELECT id FROM setup WHERE config_text = ? AND model_text = ?"
                   " AND model_checksum = ?");

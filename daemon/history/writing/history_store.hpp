@@ -16,6 +16,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -28,7 +29,7 @@
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
 #include "daemon/history/format/database.hpp"
-#include "daemon/history/writing/writer_inputs.hpp"
+#include "daemon/history/format/segment_info.hpp"
 #include "daemon/locks/file_lock.hpp"
 #include "daemon/recording/grid.hpp"
 #include "daemon/recording/record.hpp"
@@ -38,7 +39,7 @@ namespace thermocomp {
 
 struct SegmentRow {
   std::int64_t token{0};  ///< the writer's own number; the file has another
-  std::shared_ptr<const HistorySetup> setup;
+  std::shared_ptr<const SegmentSetup> setup;
   SegmentReason reason{SegmentReason::start};
   Grid grid;
   std::uint64_t first_cycle{0};
@@ -79,8 +80,9 @@ class PendingRows {
 
 class HistoryStore {
  public:
-  HistoryStore(const HistoryConfig& config, WriterClocks clocks)
-      : config_(config), clocks_(std::move(clocks)) {}
+  /// @param wall_clock  since 1970, may be stepped
+  HistoryStore(const HistoryConfig& config, std::function<nanoseconds()> wall_clock)
+      : config_(config), wall_clock_(std::move(wall_clock)) {}
 
   /// The database, its -wal and its -shm are watched together: where one of them was removed,
   /// replaced or cut by another program, what is committed is brought into the database, which is
@@ -139,9 +141,9 @@ class HistoryStore {
   void insert(const Event& row);
   void forget_old_events();
   [[nodiscard]] bool is_known(std::int64_t segment, const ChunkRow& row);
-  [[nodiscard]] std::int64_t setup_id(const HistorySetup& setup);
+  [[nodiscard]] std::int64_t setup_id(const SegmentSetup& setup);
   void delete_segment(std::int64_t id);
-  [[nodiscard]] std::int64_t wall_now_ns() const { return clocks_.wall().count(); }
+  [[nodiscard]] std::int64_t wall_now_ns() const { return wall_clock_().count(); }
   struct OldSegment {
     std::int64_t id{0};  ///< 0: there is none
     std::int64_t records{0};
@@ -151,7 +153,7 @@ class HistoryStore {
   void say_deleted(std::int64_t count, std::int64_t records, const std::string& why);
 
   HistoryConfig config_;
-  WriterClocks clocks_;
+  std::function<nanoseconds()> wall_clock_;
   std::unique_ptr<FileLock> lock_;
   std::unique_ptr<Database> database_;
   Files files_{};                  ///< as this left them

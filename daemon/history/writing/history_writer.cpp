@@ -59,7 +59,7 @@ struct OpenSegment {
 
 struct KnownSession {
   std::shared_ptr<RecordingSession> session;
-  std::shared_ptr<const HistorySetup> setup;
+  std::shared_ptr<const SegmentSetup> setup;
 };
 
 }  // namespace
@@ -104,7 +104,7 @@ struct HistoryWriter::Parts {
         program_version(std::move(version)),
         clocks(std::move(clocks_in)),
         ring(ring_records),
-        store(config_in, clocks) {}
+        store(config_in, clocks.wall) {}
 
   void run();
   void work();
@@ -362,13 +362,13 @@ HistoryWriter::~HistoryWriter() {
   stop();
 }
 
-std::unique_ptr<CycleRecorder> HistoryWriter::make_recorder(const HistorySetup& setup,
+std::unique_ptr<CycleRecorder> HistoryWriter::make_recorder(const SegmentSetup& setup,
                                                             const Estimator& estimator) {
   auto session = std::make_shared<RecordingSession>();
   {
     const std::lock_guard lock(parts_->mutex);
     session->id = parts_->next_session++;
-    parts_->sessions.push_back({session, std::make_shared<const HistorySetup>(setup)});
+    parts_->sessions.push_back({session, std::make_shared<const SegmentSetup>(setup)});
   }
   return std::make_unique<CycleRecorder>(parts_->ring, std::move(session), parts_->grid,
                                          as_duration(parts_->config.offsets_period_s), estimator);

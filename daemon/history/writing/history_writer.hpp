@@ -4,17 +4,25 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "config/daemon/daemon_config.hpp"
-#include "daemon/history/writing/writer_inputs.hpp"
+#include "daemon/history/format/segment_info.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
 #include "daemon/recording/grid.hpp"
 #include "status/event.hpp"
 
 namespace thermocomp {
+
+/// Where the writer gets its times from.
+struct WriterClocks {
+  std::function<nanoseconds()> monotonic;  ///< the grid's
+  std::function<nanoseconds()> wall;       ///< since 1970, may be stepped
+};
+[[nodiscard]] WriterClocks system_clocks();
 
 /// For the operator.
 struct HistoryStatistics {
@@ -54,7 +62,7 @@ class HistoryWriter {
 
   /// A recorder for one configuration; again after a reload. Any ordinary thread. The recorder must
   /// not outlive the writer.
-  [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const HistorySetup& setup,
+  [[nodiscard]] std::unique_ptr<CycleRecorder> make_recorder(const SegmentSetup& setup,
                                                              const Estimator& estimator);
   /// Something has happened; it is on disk with the next commit. Any ordinary thread.
   void note(Event event);

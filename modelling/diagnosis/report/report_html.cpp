@@ -321,7 +321,7 @@ std::string run_html(const ReportRun& run, const Diagnosis& diagnosis, const Rep
     html += zoomed(course_picture(run, report, output, unit), group);
     checks += "<p>Error of " + xml_text(name_of_column(report.outputs[output])) + ", " + unit +
               ", over the temperatures that it goes with most:</p>" +
-              scatter_pictures(run, report, output, unit);
+              scatter_pictures(run, report, output);
   }
   return html + "<details><summary>Figures for a closer look</summary>" + checks +
          phases_table(run, report) + whiteness_table(run, report) + "</details>\n";

@@ -82,8 +82,7 @@ std::string course_picture(const ReportRun& run, const ReportData& report, std::
   return panels_plot(all_of(run.time_s), panels);
 }
 
-std::string scatter_pictures(const ReportRun& run, const ReportData& report, std::size_t output,
-                             const std::string& unit) {
+std::string scatter_pictures(const ReportRun& run, const ReportData& report, std::size_t output) {
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t input = 0; input < report.inputs.size(); ++input)
     order.emplace_back(-std::abs(correlation(run.inputs_K[input], run.before_um[output])), input);
@@ -95,7 +94,7 @@ std::string scatter_pictures(const ReportRun& run, const ReportData& report, std
     std::snprintf(title, sizeof title, "%.40s, correlation %.2f",
                   name_of_column(report.inputs[input]).c_str(), -order[i].first);
     html += scatter_plot(
-        {title, all_of(run.inputs_K[input]), "rise, K", all_of(run.before_um[output]), unit});
+        {title, all_of(run.inputs_K[input]), "rise, K", all_of(run.before_um[output])});
   }
   return html + "</div>\n";
 }

@@ -13,7 +13,7 @@ namespace thermocomp::diagnosis {
                                          std::size_t output, const std::string& unit);
 /// What the model leaves over the temperatures that it goes with most.
 [[nodiscard]] std::string scatter_pictures(const ReportRun& run, const ReportData& report,
-                                           std::size_t output, const std::string& unit);
+                                           std::size_t output);
 /// A bar an output: what the model's error is made of. Empty where that is not known.
 [[nodiscard]] std::string headroom_picture(const Diagnosis& diagnosis);
 

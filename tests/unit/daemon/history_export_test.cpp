@@ -101,11 +101,7 @@ TEST_CASE("an export tells faults, commands, wall time and reloads by comments, 
 TEST_CASE("with sensors an export has every sensor as read, and no input beside it",
           "[history][export]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 12);
-  machine.start();
-  machine.run(1000);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 1000, 0, 12);
   std::ostringstream out;
   export_run(config.file, {}, {}, out, {}, parse_test_setup, ExportContent::sensors);
   const RunFile run = parse_run(out.str(), "export");
@@ -116,11 +112,7 @@ TEST_CASE("with sensors an export has every sensor as read, and no input beside 
 TEST_CASE("what was probed is exported as displacement, without the offset in effect",
           "[history][export]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 12);
-  machine.start();
-  machine.run(20000);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 20000, 0, 12);
   std::ostringstream out;
   export_run(config.file, {}, {}, out, {}, parse_test_setup);
   const RunFile run = parse_run(out.str(), "export");
@@ -189,11 +181,7 @@ TEST_CASE("times are seconds or wall times, and anything else is refused", "[his
 TEST_CASE("what a damaged history says in its texts does not come as lines into an export",
           "[history][export][damage]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 12);
-  machine.start();
-  machine.run(500);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 500, 0, 12);
   sqlite3* handle = nullptr;
   REQUIRE(sqlite3_open(config.file.c_str(), &handle) == SQLITE_OK);
   REQUIRE(sqlite3_exec(handle,

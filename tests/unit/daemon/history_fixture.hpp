@@ -176,4 +176,19 @@ inline HistoryConfig history_config(const std::filesystem::path& file) {
   return config;
 }
 
+/// Records some cycles, and after a reload others.
+inline HistoryConfig recorded_history(const std::filesystem::path& file, std::uint64_t cycles,
+                                      std::uint64_t after_reload = 0, unsigned seed = 3) {
+  const HistoryConfig config = history_config(file);
+  RecordedMachine machine(config, seed);
+  machine.start();
+  machine.run(cycles);
+  if (after_reload > 0) {
+    machine.reload(3.0);
+    machine.run(after_reload);
+  }
+  machine.stop();
+  return config;
+}
+
 }  // namespace thermocomp::testing

@@ -59,11 +59,7 @@ TEST_CASE("a stop in the cycle in which a segment begins leaves a segment that i
 
 TEST_CASE("replay notices a history that was changed", "[history][replay]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 3);
-  machine.start();
-  machine.run(3000);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 3000);
   run_sql(config.file,
           "UPDATE setup SET config_text = '2.000001'; UPDATE segment SET checksum = NULL");
   const ReplaySummary summary = replay_quietly(config.file);
@@ -91,11 +87,7 @@ TEST_CASE(
       // an input of a cycle after the offset that came out of its step
       "UPDATE chunk SET records = x'060100000200' || x'020000000000', count = 2");
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 3);
-  machine.start();
-  machine.run(500);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 500);
   run_sql(config.file, damage.c_str());
   // Without checksums what a row says is looked at itself.
   const bool has_checksums = GENERATE(false, true);
@@ -153,13 +145,7 @@ TEST_CASE("one flipped bit costs one chunk, before and behind it all is exported
 TEST_CASE("a clock that was set beyond the year 2116 costs nothing but the wall time",
           "[history][damage]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 3);
-  machine.start();
-  machine.run(500);
-  machine.reload(3.0);
-  machine.run(500);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
   std::ostringstream whole;
   const ExportSummary before = export_run(config.file, {}, {}, whole, {}, parse_test_setup);
   run_sql(config.file,
@@ -174,11 +160,7 @@ TEST_CASE("a clock that was set beyond the year 2116 costs nothing but the wall 
 TEST_CASE("of a segment that claims more cycles than its chunks hold those there are are replayed",
           "[history][damage]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 3);
-  machine.start();
-  machine.run(500);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 500);
   run_sql(config.file, "UPDATE segment SET last_cycle = last_cycle + 1");
   const ReplaySummary summary = replay_quietly(config.file);
   CHECK_THAT(told(summary.damage), Catch::Contains("end before its last cycle"));
@@ -188,13 +170,7 @@ TEST_CASE("of a segment that claims more cycles than its chunks hold those there
 
 TEST_CASE("a state of a later time than its first cycle is refused", "[history][damage]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 3);
-  machine.start();
-  machine.run(500);
-  machine.reload(3.0);
-  machine.run(500);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
   run_sql(config.file,
           "UPDATE segment SET grid_start_ns = grid_start_ns - 3600000000000,"
           " checksum = NULL");
@@ -203,13 +179,7 @@ TEST_CASE("a state of a later time than its first cycle is refused", "[history][
 
 TEST_CASE("segments that overlap in time are no history", "[history][damage]") {
   const TempFolder folder;
-  const HistoryConfig config = history_config(folder / "h.db");
-  RecordedMachine machine(config, 3);
-  machine.start();
-  machine.run(500);
-  machine.reload(3.0);
-  machine.run(500);
-  machine.stop();
+  const HistoryConfig config = recorded_history(folder / "h.db", 500, 500);
   run_sql(config.file, "UPDATE segment SET first_cycle = 0 WHERE id = 2");
   const ReplaySummary summary = replay_quietly(config.file);
   CHECK_THAT(told(summary.damage), Catch::Contains("segment 2: begins before the one in front"));

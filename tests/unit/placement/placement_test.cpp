@@ -7,6 +7,7 @@
 
 #include "machines.hpp"
 #include "modelling/placement/quadratic_fit.hpp"
+#include "modelling/placement/tendency_patterns.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::test;
