@@ -18,6 +18,8 @@ SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"))
 PROGRAM = pathlib.Path(os.environ["THERMOCOMP_BENCH_BUILD"]) / "bin" / "thermocomp-modelling"
 KINDS = ("sensor_step", "sensor_drift", "sensor_loose", "spikes", "stuck", "displacement_step")
+FACTS = ("gap", "clock", "coarse", "copy")
+SEEDS = 25
 CASES = 2  # of each kind on each recording
 MINUTE_S = 60.0
 
@@ -115,16 +117,38 @@ def inspect(run, folder):
     return json.loads(done.stdout)["findings"]
 
 
+def simulated(folder):
+    """Runs of the example and of the demonstration, in which nothing is wrong."""
+    path = folder / "simulated.csv"
+    for machine in ("examples", "demo"):
+        for seed in range(1, SEEDS + 1):
+            subprocess.run([PROGRAM.with_name("thermocomp"), "simulate",
+                            SOURCE / "config" / machine / "machine.toml", "--seed", str(seed),
+                            "-o", path], check=True)
+            yield read(path)
+
+
+def count_clean(machine, run, findings, sensor_days, named):
+    """Findings from 0.8 on, but for facts of the file."""
+    days = (run["time_s"][-1] - run["time_s"][0]) / 86400
+    columns = sum(n.endswith(("_degC", "_K", "_um")) for n in run)
+    sensor_days[machine] = sensor_days.get(machine, 0.0) + days * columns
+    named[machine] = named.get(machine, 0) + sum(
+        f["probability"] >= 0.8 and f["kind"] not in FACTS for f in findings)
+
+
 def main():
     scores = []
     table = {}
     false_named, untouched_named, untouched_columns = 0, 0, 0
+    sensor_days, clean_named = {}, {}
     cases = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
         chance = random.Random(14)
         for machine, name, run in recordings():
             before = inspect(run, folder)
+            count_clean(machine, run, before, sensor_days, clean_named)
             told = {(f["kind"], f["column"]) for f in before if f["probability"] >= 0.5}
             judged = [key for key in told if key[0] in KINDS]
             untouched_named += len(judged)
@@ -151,6 +175,8 @@ def main():
                         cell[i] += value
                     cases += 1
                     false_named += wrong
+        for run in simulated(folder):
+            count_clean("simulated", run, inspect(run, folder), sensor_days, clean_named)
         whole = read(DATA / "spindle_46h" / "hours_00_32.csv")
         start = time.monotonic()
         inspect(whole, folder)
@@ -167,6 +193,8 @@ def main():
     print(f"cases {cases} count")
     print(f"named_besides_per_case {false_named / cases:.2f} ratio")
     print(f"named_on_untouched_columns {100 * untouched_named / untouched_columns:.1f} %")
+    for machine, days in sensor_days.items():
+        print(f"clean_{machine}_named {clean_named[machine]} in_{days:.0f}_sensor_days")
     print(f"inspect_spindle_32h_22_columns {seconds:.2f} s")
 
 

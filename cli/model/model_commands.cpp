@@ -50,6 +50,8 @@ int run_predict(const PredictOptions& options) {
                    "%s: %s has no measured value of it, so there is nothing to compare with\n",
                    output.name.c_str(), run.name.c_str());
   }
+  const std::string furthest = furthest_text(prediction);
+  if (!furthest.empty()) std::fprintf(stderr, "%s\n", furthest.c_str());
   if (model.made_from) std::fprintf(stderr, "outside %.3f\n", outside_share(prediction));
   return exit_success;
 }

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <optional>
+#include <sstream>
 #include <string_view>
 
 #include "config/runs/model_inputs.hpp"
@@ -23,10 +25,19 @@ struct ModelRows {
   std::vector<Column> displacement_um;  ///< shape (outputs, rows)
   std::vector<Column> sd_um;            ///< the same; empty without [made_from]
   Column outside;                       ///< one a row
+  FurthestRow furthest;
 };
 
 void take(const Columns& columns, std::size_t row, Column& out) {
   for (std::size_t i = 0; i < columns.size(); ++i) out[i] = (*columns[i])[row];
+}
+
+FurthestRow furthest_row(const ThermalModel& model, const RunFile& run, std::size_t row,
+                         double distance, std::size_t column) {
+  const MadeFrom& made_from = *model.made_from;
+  const std::string& name = made_from.columns[column];
+  return {run.time_s()[row],     distance, name, run.column(name)[row], made_from.low[column],
+          made_from.high[column]};
 }
 
 ModelRows model_rows(const ThermalModel& model, const RunFile& run) {
@@ -39,7 +50,7 @@ ModelRows model_rows(const ThermalModel& model, const RunFile& run) {
   std::optional<ModelDomain> domain;
   if (model.made_from) domain.emplace(model);
   const std::vector<Column> empty(model.outputs.size(), Column(run.rows(), not_a_number));
-  ModelRows rows{empty, domain ? empty : std::vector<Column>{}, {}};
+  ModelRows rows{empty, domain ? empty : std::vector<Column>{}, {}, {}};
   if (domain) rows.outside.assign(run.rows(), not_a_number);
   for (const std::size_t row : inputs.rows) {
     take(inputs.temperatures, row, temps_degC);
@@ -52,6 +63,9 @@ ModelRows model_rows(const ThermalModel& model, const RunFile& run) {
     domain->step(now, temps_degC, inputs.reference_degC, signal_values);
     rows.outside[row] = domain->outside() ? 1.0 : 0.0;
     for (std::size_t i = 0; i < rows.sd_um.size(); ++i) rows.sd_um[i][row] = domain->sd_um(i);
+    const double distance = domain->distance() / model.made_from->distance_max;
+    if (row >= run.selected_begin && row < run.selected_end && distance > rows.furthest.distance)
+      rows.furthest = furthest_row(model, run, row, distance, domain->furthest_column());
   }
   return rows;
 }
@@ -118,6 +132,7 @@ Prediction predict(const ThermalModel& model, const RunFile& run) {
   }
 
   Prediction result;
+  result.furthest = all.furthest;
   std::vector<std::size_t> rows;
   for (std::size_t row = run.selected_begin; row < run.selected_end; ++row) {
     if (row_counts(predicted, measured, row)) rows.push_back(row);
@@ -150,6 +165,19 @@ double outside_share(const Prediction& prediction) {
   double sum = 0.0;
   for (const double each : prediction.outside) sum += each;
   return prediction.outside.empty() ? 0.0 : sum / static_cast<double>(prediction.outside.size());
+}
+
+std::string furthest_text(const Prediction& prediction) {
+  const FurthestRow& row = prediction.furthest;
+  if (!(row.distance > 1.0)) return "";
+  std::ostringstream text;
+  text << std::setprecision(4) << "at " << std::lround(row.time_s) << " s the machine was "
+       << std::setprecision(2) << row.distance << " times as far from what the model was made from "
+       << "as counts as known, mostly by " << std::setprecision(4) << row.column << ": "
+       << row.value << " (recorded " << row.low << " to " << row.high << ")";
+  if (row.value >= row.low && row.value <= row.high)
+    text << ", which is new with such other values or such a past";
+  return text.str();
 }
 
 RunFile as_run_file(const Prediction& prediction) {

@@ -20,12 +20,23 @@ struct PredictedOutput {
   std::vector<double> sd_um;         ///< of predicted_um, as the model claims; empty: it does not
 };
 
+/// The selected row that is furthest from what the model was made from.
+struct FurthestRow {
+  double time_s{0.0};
+  double distance{0.0};  ///< over that up to which the model counts as known; 0: no row
+  std::string column;    ///< that most of it is of
+  double value{0.0};     ///< there
+  double low{0.0};       ///< that the model was made from
+  double high{0.0};
+};
+
 /// Rows of the selection that have a prediction: those in which no input of the model is missing
 /// and, where the run file has any measured output, not all of them are.
 struct Prediction {
   std::vector<double> time_s;
   std::vector<double>
       outside;  ///< 1 where the machine is not as the model was made; empty: unknown
+  FurthestRow furthest;
   std::vector<PredictedOutput> outputs;  ///< order of the model
 };
 
@@ -37,6 +48,10 @@ struct Prediction {
 
 /// Share of the rows that are outside of the model's domain.
 [[nodiscard]] double outside_share(const Prediction& prediction);
+
+/// How far from known ground, and in which quantity: one sentence; of a prediction that stays
+/// inside nothing.
+[[nodiscard]] std::string furthest_text(const Prediction& prediction);
 
 /// The columns of the answer: time_s and, for each output, predicted, measured and residual; where
 /// the model says what it was made from, `outside` and the standard deviation of each output.

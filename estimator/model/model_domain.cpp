@@ -172,6 +172,29 @@ bool ModelDomain::outside() const noexcept {
   return !(metric_->state.distance <= metric_->distance_max);
 }
 
+std::size_t ModelDomain::furthest_column() const {
+  const Metric& metric = *metric_;
+  const auto count = static_cast<Eigen::Index>(metric.feature.size());
+  Eigen::VectorXd off(count);
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Zero(count, count);  // L^-1
+  const double* value = metric.lower.data();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    off[i] = metric.feature[at] - metric.mean[at];
+    for (Eigen::Index j = 0; j <= i; ++j) inverse(i, j) = *value++;
+  }
+  // d^2 is the sum of these.
+  const Eigen::VectorXd parts = off.cwiseProduct(inverse.transpose() * (inverse * off));
+  std::vector<double> of_column(metric.columns.size(), 0.0);
+  Eigen::Index at = 0;
+  for (std::size_t i = 0; i < of_column.size(); ++i)
+    if (metric.columns[i].temperature) of_column[i] += parts[at++];
+  while (at < count)
+    for (double& each : of_column) each += parts[at++];
+  return static_cast<std::size_t>(std::max_element(of_column.begin(), of_column.end()) -
+                                  of_column.begin());
+}
+
 double ModelDomain::believed_share() const noexcept {
   if (!outside()) return 1.0;
   const double share = metric_->distance_max / metric_->state.distance;

@@ -41,6 +41,8 @@ class ModelDomain {
 
   [[nodiscard]] double distance() const noexcept;  ///< d; 0 before the first step
   [[nodiscard]] bool outside() const noexcept;     ///< d > distance_max
+  /// Which of `made_from.columns` most of d^2 is of, its level and its past together; O(n^2).
+  [[nodiscard]] std::size_t furthest_column() const;
   /// The share of the model's displacement that is still believed: 1 inside, (distance_max / d)^2
   /// outside.
   [[nodiscard]] double believed_share() const noexcept;

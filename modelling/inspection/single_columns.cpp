@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "config/runs/robust.hpp"
 #include "config/text/units.hpp"
@@ -14,6 +15,7 @@ constexpr std::size_t half_window = 3;
 constexpr double leap_K_min = 0.5;
 constexpr double leap_um_min = 1.0;
 constexpr double leap_deviations_min = 8.0;
+constexpr std::size_t nearby = 15;    // rows on each side that show how wild it is just then
 constexpr double coarse_K_min = 0.2;  // half of it is 0.1 K, about 1 um on a machine
 constexpr double coarse_um_min = 1.0;
 constexpr std::size_t stuck_rows_min = 10;
@@ -44,6 +46,21 @@ bool others_leap(const RunFile& run, std::size_t column, std::size_t row, double
   return false;
 }
 
+/// Whether the column comes back to where it was: by more than what it goes on by.
+bool comes_back(const std::vector<double>& values, std::size_t row, double leap) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(row);
+  const auto before = static_cast<std::ptrdiff_t>(std::min(half_window, row));
+  const auto after = static_cast<std::ptrdiff_t>(std::min(half_window, values.size() - 1 - row));
+  return std::abs(median({at + 1, at + 1 + after}) - median({at - before, at})) < std::abs(leap);
+}
+
+/// Deviation of the leaps of the rows beside it.
+double deviation_nearby(const std::vector<double>& leaps, std::size_t row) {
+  const std::size_t begin = row - std::min(nearby, row);
+  const std::size_t end = std::min(leaps.size(), row + nearby + 1);
+  return robust_deviation(std::span(leaps).subspan(begin, end - begin));
+}
+
 void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   std::vector<double>& values = run.values[column];
   const bool output = is_output(run.columns[column]);
@@ -67,7 +84,10 @@ void check_leaps(RunFile& run, std::size_t index, std::size_t column, Suspicions
   std::vector<std::size_t> leapt;
   for (std::size_t row = 1; row + 1 < values.size(); ++row) {
     const double leap = leaps[row];
-    if (!(std::abs(leap) > least) || others_leap(run, column, row, leap)) continue;
+    if (!(std::abs(leap) > least) || !comes_back(values, row, leap) ||
+        !(std::abs(leap) > leap_deviations_min * deviation_nearby(leaps, row)) ||
+        others_leap(run, column, row, leap))
+      continue;
     made.finding.times_s.push_back(run.time_s()[row]);
     if (std::abs(leap) > std::abs(made.finding.size)) made.finding.size = leap;
     leapt.push_back(row);

@@ -79,4 +79,29 @@ TEST_CASE("the unit stays last in the names of the predicted columns", "[cli][pr
         std::vector<std::string>{"time_s", "z_predicted_um", "z_measured_um", "z_residual_um"});
 }
 
+TEST_CASE("the furthest row and the quantity that takes it there are said", "[cli][predict]") {
+  ThermalModel model = two_temperatures();
+  thermocomp::MadeFrom made_from;
+  made_from.runs = {"a.csv"};
+  made_from.columns = {"t1_degC", "t2_degC"};
+  made_from.low = {19.0, 19.0};
+  made_from.high = {22.0, 22.0};
+  made_from.taus_s = {0.0};
+  made_from.mean = {20.0, 20.0, 0.0, 0.0};
+  made_from.covariance = {{1, 0, 0.5, 0}, {0, 1, 0, 0.5}, {0.5, 0, 1, 0}, {0, 0.5, 0, 1}};
+  made_from.distance_max = 2.0;
+  made_from.outputs["z_um"] = {1.0, 0.1, 600.0, 1.5, 10.0, 8.0};
+  model.made_from = made_from;
+  const std::string header = "time_s,t1_degC,t2_degC,z_um\n0,20,20,0\n10,21,20,2\n";
+  const Prediction inside = predict(model, parse_run(header, "run.csv"));
+  CHECK(inside.furthest.distance < 1.0);
+  CHECK(furthest_text(inside).empty());
+  const Prediction outside = predict(model, parse_run(header + "20,18,30,-14\n", "run.csv"));
+  // With S = [1 1/2; 1/2 1] of level and rise, both 10 K: 10^2 2 / (1 + 1/2); of t1 2^2 2 / (3/2).
+  CHECK(outside.furthest.distance == Approx(std::sqrt((400.0 + 16.0) / 3.0 / 4.0) / 2.0));
+  CHECK(furthest_text(outside) ==
+        "at 20 s the machine was 2.9 times as far from what the model was made from as counts as "
+        "known, mostly by t2_degC: 30 (recorded 19 to 22)");
+}
+
 }  // namespace

@@ -140,6 +140,22 @@ TEST_CASE("spikes are found one by one, and replaced", "[inspection]") {
         Approx(run.column("t2_degC")[299]).margin(0.3));
 }
 
+TEST_CASE("a value amid a jump, or where a column is wild for a while, is no spike",
+          "[inspection]") {
+  RunFile run = recording();
+  std::mt19937 random(5);
+  std::normal_distribution<double> gust(0.0, 0.5);
+  for (std::size_t row = 100; row < 300; ++row)
+    column(run, "t5_degC")[row] +=
+        std::sin(M_PI * static_cast<double>(row - 100) / 200.0) * gust(random);
+  for (std::size_t row = 300; row < rows; ++row)
+    column(run, "z_um")[row] -= row < 302 ? 85.0 : 68.0;
+  const Inspection inspection = inspect({run});
+  INFO(inspection_text(inspection));
+  CHECK(find(inspection, "spikes") == nullptr);
+  CHECK(find(inspection, "outliers") == nullptr);
+}
+
 TEST_CASE("what stands still, is coarse or is another's reading is said", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 330; row < 430; ++row)
