@@ -175,6 +175,10 @@ def main():
                         cell[i] += value
                     cases += 1
                     false_named += wrong
+        for machine in ("probe_drift", "printer_other"):
+            for path in sorted((DATA / machine).glob("*.csv")):
+                run = read(path)
+                count_clean(machine, run, inspect(run, folder), sensor_days, clean_named)
         for run in simulated(folder):
             count_clean("simulated", run, inspect(run, folder), sensor_days, clean_named)
         whole = read(DATA / "spindle_46h" / "hours_00_32.csv")

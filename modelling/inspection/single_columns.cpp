@@ -111,9 +111,19 @@ double range_of(const std::vector<double>& values, StillRows rows) {
   return high > low ? high - low : 0.0;
 }
 
+/// Whether a signal has the same value throughout: what is controlled to a set value stays there. 0
+/// is that of too many.
+bool is_held(const RunFile& run, std::size_t column, StillRows rows) {
+  const double value = run.values[column][rows.begin];
+  return value != 0 && std::any_of(run.columns.begin(), run.columns.end(), [&](const auto& name) {
+           const std::vector<double>& other = run.column(name);
+           return is_operating(name) && other[rows.begin] == value && other[rows.end - 1] == value;
+         });
+}
+
 void check_stuck(const RunFile& run, std::size_t index, std::size_t column, Suspicions& found) {
   const auto [longest, second] = longest_still(run.values[column]);
-  if (longest.rows() < stuck_rows_min) return;
+  if (longest.rows() < stuck_rows_min || is_held(run, column, longest)) return;
   std::vector<double> others;
   for (std::size_t i = 0; i < run.columns.size(); ++i)
     if (i != column && is_temperature(run.columns[i]))

@@ -156,6 +156,15 @@ TEST_CASE("a value amid a jump, or where a column is wild for a while, is no spi
   CHECK(find(inspection, "outliers") == nullptr);
 }
 
+TEST_CASE("a reading that is held at a set value is not stuck", "[inspection]") {
+  RunFile run = recording();
+  for (std::size_t row = 330; row < 430; ++row) column(run, "t1_degC")[row] = 40.0;
+  REQUIRE(find(inspect({run}), "stuck") != nullptr);
+  run.columns.emplace_back("heater_target");
+  run.values.emplace_back(rows, 40.0);
+  CHECK(find(inspect({run}), "stuck") == nullptr);
+}
+
 TEST_CASE("what stands still, is coarse or is another's reading is said", "[inspection]") {
   RunFile run = recording();
   for (std::size_t row = 330; row < 430; ++row)
