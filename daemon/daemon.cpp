@@ -189,6 +189,7 @@ std::unique_ptr<CycleBrain> Daemon::Parts::first_brain() const {
   auto brain = make_brain(config, history.get());
   // What cannot be has been taken out by find_start_state().
   THERMOCOMP_ENSURE(brain->estimator.restore(start_state.state).empty());
+  if (brain->candidate) brain->candidate->restore(start_state.state);
   return brain;
 }
 

@@ -65,6 +65,24 @@ void add_recorder(CycleBrain& brain, const DaemonConfig& config, HistoryWriter* 
                                             brain.estimator);
 }
 
+/// Beginnings of both checksums in a number that a state file holds exactly.
+double pair_of(const DaemonConfig& config) {
+  constexpr std::size_t digits = 6;
+  return static_cast<double>(std::stoull(
+      config.model_checksum.substr(0, digits) + config.candidate->checksum.substr(0, digits),
+      nullptr, 16));
+}
+
+std::unique_ptr<CycleBrain> brain_of(const DaemonConfig& config) {
+  auto brain = std::make_unique<CycleBrain>(Estimator(config.estimator, config.model));
+  const std::optional<CandidateModel>& candidate = config.candidate;
+  // Once promoted it is the model itself.
+  if (candidate && candidate->problem.empty() && candidate->checksum != config.model_checksum)
+    brain->candidate =
+        std::make_unique<Candidate>(candidate->estimator, candidate->model, pair_of(config));
+  return brain;
+}
+
 bool is_reference_whole(const Report& report) {
   return std::all_of(report.inputs.begin(), report.inputs.end(), [](const InputReport& input) {
     return input.good && std::isfinite(input.reference_degC);
@@ -74,7 +92,7 @@ bool is_reference_whole(const Report& report) {
 }  // namespace
 
 std::unique_ptr<CycleBrain> make_brain(const DaemonConfig& config, HistoryWriter* history) {
-  auto brain = std::make_unique<CycleBrain>(Estimator(config.estimator, config.model));
+  auto brain = brain_of(config);
   add_recorder(*brain, config, history);
   return brain;
 }
@@ -89,7 +107,7 @@ struct Operations::Loaded {
   void load(const std::filesystem::path& file) noexcept {
     try {
       config = load_daemon_config(file);
-      brain = std::make_unique<CycleBrain>(Estimator(config.estimator, config.model));
+      brain = brain_of(config);
     } catch (...) {
       error = std::current_exception();
     }
@@ -191,6 +209,7 @@ void Operations::finish_loading() {
                                  fmt::join(fixed, ", ")));
     add_recorder(*loaded->brain, loaded->config, parts_.history);
     loaded->brain->estimator.plan_adoption(cycle_.estimator());
+    if (loaded->brain->candidate) loaded->brain->candidate->plan_adoption(cycle_.estimator());
     reload_->next = std::move(loaded->config);
     reload_->answer->outcome = cycle_.replace(std::move(loaded->brain), Clock::now());
   } catch (const std::exception& error) {
@@ -298,6 +317,7 @@ std::int64_t Operations::take_asking(const Command& done) {
 void Operations::save_state(bool at_once) {
   PersistentState state = cycle_.estimator().persistent_state(cycle_.report());
   note_reference(state, ReferenceOrigin::first_values);
+  if (Candidate* candidate = cycle_.candidate()) candidate->add_to(state.correction);
   state.controller = controller_identity(parts_.config.controller);
   if (parts_.config.dry_run) {
     // It sends nothing: what was sent before stays.

@@ -194,7 +194,7 @@ StatusView Supervisor::view() {
   const HistoryStatistics statistics =
       parts_.history != nullptr ? parts_.history->statistics() : HistoryStatistics{};
   if (!statistics.last_error.empty()) all.push_back(statistics.last_error);
-  return {
+  StatusView view{
       parts_.config,
       cycle().report(),
       cycle().controller(),
@@ -212,6 +212,8 @@ StatusView Supervisor::view() {
       parts_.keeper.is_reference_lost(),
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(),
       std::chrono::duration<double>(Clock::now() - idle_until_).count()};
+  if (Candidate* candidate = cycle().candidate()) view.contest = &candidate->score();
+  return view;
 }
 
 }  // namespace thermocomp

@@ -458,6 +458,38 @@ struct ModelStatus {
   }
 };
 
+/// Of the probings, what each model alone left.
+struct ContestRms {
+  double model{not_a_number};
+  double candidate{not_a_number};
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("model", self.model);
+    visit("candidate", self.candidate);
+  }
+};
+
+/// The model that runs beside the one in use.
+struct CandidateStatus {
+  std::string file{};
+  std::string problem{};  ///< why it does not run; empty: it does
+  std::uint64_t probings{0};
+  std::map<std::string, ContestRms> rms_um{};  ///< by axis
+  double better_probability{not_a_number};
+  double worse_probability{not_a_number};
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("file", self.file);
+    visit("problem", self.problem);
+    visit("probings", self.probings);
+    visit("rms_um", self.rms_um);
+    visit("better_probability", self.better_probability);
+    visit("worse_probability", self.worse_probability);
+  }
+};
+
 struct ReferenceStatus {
   std::optional<std::string> by{};  ///< "model_file", "operator", "first_values", "reload"
   double wall_s{not_a_number};      ///< when it was taken, s since 1970
@@ -486,6 +518,7 @@ struct Status {
   double uptime_s{not_a_number};
   CycleStatus cycle{};
   ModelStatus model{};
+  std::optional<CandidateStatus> candidate{};
   std::vector<AxisStatus> axes{};
   std::vector<InputStatus> inputs{};
   ReferenceStatus reference{};
@@ -513,6 +546,7 @@ struct Status {
     visit("uptime_s", self.uptime_s);
     visit("cycle", self.cycle);
     visit("model", self.model);
+    visit.if_any("candidate", self.candidate);
     visit("axes", self.axes);
     visit("inputs", self.inputs);
     visit("reference", self.reference);

@@ -3,20 +3,23 @@
 ///
 /// `step` prints the ratio of the two times, measured alternately in one run.
 /// `step --count N` makes N steps and nothing else, for an instruction counter; `--count-all-due N`
-/// the same with every value due for smoothing.
-/// All readings are new at every step. step_over_gemv: with the default smoothing, whose values are
-/// due once a minute; step_all_due_over_gemv: every value is due at every step, 64 line fits.
+/// the same with every value due for smoothing, `--count-beside N` with a candidate of the same
+/// size beside the model. All readings are new at every step. step_over_gemv: with the default
+/// smoothing, whose values are due once a minute; step_all_due_over_gemv: every value is due at
+/// every step, 64 line fits.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "daemon/cycle/candidate.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 namespace thermocomp {
@@ -130,12 +133,17 @@ class Machine {
       controller_.signals[i] = 375.0 + 370.0 * std::sin(0.7 * time_s + static_cast<double>(i));
     }
   }
-  [[gnu::noinline]] void step() { estimator_.step(now_, readings_, controller_, command_); }
+  [[gnu::noinline]] void step() {
+    estimator_.step(now_, readings_, controller_, command_);
+    if (candidate_) candidate_->step(now_, readings_, controller_);
+  }
+  void let_run_beside() { candidate_.emplace(estimator_.config(), estimator_.model(), 1.0); }
   [[nodiscard]] Mode mode() const { return estimator_.make_report().mode; }
   [[nodiscard]] double offset_um() const { return command_.offset_um[0]; }
 
  private:
   Estimator estimator_;
+  std::optional<Candidate> candidate_;
   std::vector<Reading> readings_;
   ControllerState controller_;
   OffsetCommand command_;
@@ -252,8 +260,9 @@ Judging measure_judging() {
   return {median(steps_ns), 1e-3 * (median(minutes_ns) - median(looks_ns))};
 }
 
-int count_steps(int steps, double period_s) {
+int count_steps(int steps, double period_s, bool beside = false) {
   Machine machine(period_s);
+  if (beside) machine.let_run_beside();
   for (int i = 0; i < steps; ++i) {
     machine.prepare();
     machine.step();
@@ -305,7 +314,10 @@ int main(int argc, char** argv) {
     return thermocomp::count_steps(std::atoi(argv[2]), thermocomp::SmoothingConfig{}.period_s);
   if (argc == 3 && std::string_view(argv[1]) == "--count-all-due")
     return thermocomp::count_steps(std::atoi(argv[2]), 0.0);
+  if (argc == 3 && std::string_view(argv[1]) == "--count-beside")
+    return thermocomp::count_steps(std::atoi(argv[2]), thermocomp::SmoothingConfig{}.period_s,
+                                   true);
   if (argc == 1) return thermocomp::run();
-  std::fprintf(stderr, "usage: step [--count N | --count-all-due N]\n");
+  std::fprintf(stderr, "usage: step [--count N | --count-all-due N | --count-beside N]\n");
   return 2;
 }

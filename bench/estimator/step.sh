@@ -24,3 +24,6 @@ echo "instructions_per_step_all_due $(( (many - few) / 1000 )) instructions"
 few=$(count --count 200)
 many=$(count --count 1200)
 echo "instructions_per_step $(( (many - few) / 1000 )) instructions"
+few=$(count --count-beside 200)
+many=$(count --count-beside 1200)
+echo "instructions_per_step_beside $(( (many - few) / 1000 )) instructions"

@@ -209,6 +209,24 @@ std::string model_lines(const ModelStatus& model) {
                             fixed(100.0 * model.outside_share_24h, 0) + " % of the last 24 h");
 }
 
+std::string candidate_line(const std::optional<CandidateStatus>& candidate) {
+  if (!candidate) return "";
+  if (!candidate->problem.empty())
+    return line("Candidate", candidate->file + " does not run: " + candidate->problem);
+  if (candidate->probings == 0) return line("Candidate", candidate->file + ", not probed yet");
+  std::string text = candidate->file;
+  for (const auto& [axis, rms] : candidate->rms_um)
+    text +=
+        ", " + axis + " leaves " + fixed(rms.candidate, 1) + " of " + fixed(rms.model, 1) + " um";
+  const bool is_worse = candidate->worse_probability > candidate->better_probability;
+  return line(
+      "Candidate",
+      text + " over " + std::to_string(candidate->probings) + " probings, " +
+          (is_worse ? "worse" : "better") + " with " +
+          fixed(100.0 * std::max(candidate->better_probability, candidate->worse_probability), 0) +
+          " %");
+}
+
 std::string cycle_line(const CycleStatus& cycle) {
   return line("Cycle", fixed(cycle.rate_hz, 0) + " Hz, " + std::to_string(cycle.count) +
                            " cycles, " + std::to_string(cycle.missed) + " missed, lateness p50 " +
@@ -255,7 +273,8 @@ std::string status_text(const Status& status, bool colours) {
   return headline(status, colours) + trouble_lines(status, colours) + ended_lines(status) +
          axes_lines(status) + inputs_lines(status) + reference_line(status.reference) +
          controller_lines(status.controller) + signals_line(status) + buses_line(status) +
-         model_lines(status.model) + cycle_line(status.cycle) + history_line(status.history) +
+         model_lines(status.model) + candidate_line(status.candidate) + cycle_line(status.cycle) +
+         history_line(status.history) +
          line("Daemon", "version " + status.version + ", up " + duration_text(status.uptime_s));
 }
 

@@ -11,6 +11,7 @@
 
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
+#include "cli/operate/promote_command.hpp"
 #include "cli/operate/prove_command.hpp"
 #include "cli/operate/release_command.hpp"
 #include "status/figures.hpp"
@@ -181,6 +182,7 @@ void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& ac
     });
   }
   add_measured_command(app, global, action);
+  add_promote_command(app, global, action);
   add_axis_command(
       app, global, action, "prove",
       "moves one axis a few um and back, to confirm the sign with an indicator; waits, and "

@@ -14,6 +14,7 @@
 #include "config/sections/model_binding.hpp"
 #include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
+#include "estimator/pipeline/estimator.hpp"
 #include "estimator/temperature_range.hpp"
 
 namespace thermocomp {
@@ -187,6 +188,37 @@ std::vector<std::string> remarks_of(const sections::BusFiles& files, const std::
   return lines;
 }
 
+/// With the blocks that the candidate has a use for, and a correction that is never taught: it
+/// only remembers, for parts that are measured later.
+EstimatorConfig beside(EstimatorConfig config, const ThermalModel& model) {
+  const std::vector<std::string> columns = model.temperature_columns();
+  std::erase_if(config.blocks, [&](const BlockConfig& block) {
+    return std::find(columns.begin(), columns.end(), block.input) == columns.end();
+  });
+  if (config.correction.form == CorrectionForm::off) return config;
+  config.correction.form = CorrectionForm::recursive;
+  config.correction.groups = {{model.inputs.front()}};
+  return config;
+}
+
+CandidateModel read_candidate(const fs::path& file, const EstimatorConfig& estimator) {
+  CandidateModel candidate;
+  candidate.file = file;
+  try {
+    const std::string text = read_text_file(file, model_bytes_max);
+    ModelReading reading = read_model_text(text, file.string());
+    if (!reading.problems.empty()) throw ConfigurationError(std::move(reading.problems));
+    candidate.checksum = sha256_hex(text);
+    candidate.model = std::move(reading.model);
+    candidate.model.course.reset();
+    candidate.estimator = beside(estimator, candidate.model);
+    static_cast<void>(Estimator(candidate.estimator, candidate.model));
+  } catch (const std::exception& error) {
+    candidate.problem = error.what();
+  }
+  return candidate;
+}
+
 template <class FindModel>
 DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files files,
                    sections::Presets presets, sections::DbcFiles dbc_files,
@@ -221,6 +253,8 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
       add_reference_problems(source, config, model_problems);
     }
   }
+  const fs::path candidate =
+      model_table.has("candidate") ? read_path(model_table, "candidate", "", folder) : fs::path();
   std::vector<Problem> problems = document.all_problems();
   const auto add = [&problems](const std::vector<Problem>& more) {
     problems.insert(problems.end(), more.begin(), more.end());
@@ -231,6 +265,11 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
   add(model_problems);
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
   config.remarks = remarks_of(bus_files, document.name());
+  if (candidate.empty() || files != Files::opened) return config;
+  config.candidate = read_candidate(candidate, config.estimator);
+  if (!config.candidate->problem.empty())
+    config.remarks.push_back("the candidate " + candidate.string() +
+                             " does not run: " + config.candidate->problem);
   return config;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,16 @@ struct SocketConfig {
   bool operator==(const SocketConfig&) const = default;
 };
 
+/// `[model] candidate`: runs beside the model, is scored and never sent. One that cannot run keeps
+/// nothing from working.
+struct CandidateModel {
+  std::filesystem::path file;
+  std::string problem;  ///< why it does not run; empty: it does, and the rest is there
+  std::string checksum;
+  EstimatorConfig estimator;
+  ThermalModel model;
+};
+
 struct DaemonConfig {
   std::filesystem::path file;        ///< where it was read from
   std::filesystem::path model_file;  ///< resolved against the configuration's folder
@@ -61,6 +72,7 @@ struct DaemonConfig {
   /// What is odd but forbids nothing, a line each: flaws of bus files that nothing here stands on.
   std::vector<std::string> remarks;
   ThermalModel model;
+  std::optional<CandidateModel> candidate;
 };
 
 /// Reads the daemon's file and the model file that it names. Paths in it may be relative to the

@@ -84,6 +84,7 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   CycleBrain& brain = *brain_;
   bool commanded = false;
   for (Command command; commands_.try_pop(command); commanded = true) {
+    if (brain.candidate) brain.candidate->command(command, brain.estimator);
     brain.estimator.apply(command);
     if (brain.recorder) brain.recorder->command(cycle, command);
   }
@@ -96,6 +97,7 @@ void Cycle::step(std::uint64_t cycle) noexcept {
   link_.offer(offsets_);
   if (brain.recorder)
     brain.recorder->record(cycle, readings_, controller_, offsets_, brain.estimator);
+  if (brain.candidate) brain.candidate->step(grid_.time_of(cycle), readings_, controller_);
   publish(commanded);
   // Given back only now, when the new one has something to report.
   if (retiring_ != nullptr)
@@ -129,6 +131,7 @@ void Cycle::take_over(std::uint64_t cycle) noexcept {
   if (next == nullptr) return;
   retiring_ = brain_.release();
   next->estimator.adopt(retiring_->estimator);
+  if (next->candidate) next->candidate->adopt(retiring_->estimator, retiring_->candidate.get());
   if (next->recorder)
     next->recorder->begin(cycle, next->estimator, SegmentReason::reload, retiring_->recorder.get());
   brain_.reset(next);

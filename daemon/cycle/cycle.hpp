@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/cycle/candidate.hpp"
 #include "daemon/cycle/command_queue.hpp"
 #include "daemon/cycle/duration_histogram.hpp"
 #include "daemon/recording/cycle_recorder.hpp"
@@ -25,6 +26,7 @@ struct CycleBrain {
   explicit CycleBrain(Estimator made)
       : estimator(std::move(made)), reports(estimator.make_report()) {}
   Estimator estimator;
+  std::unique_ptr<Candidate> candidate;     ///< none: no model runs beside
   std::unique_ptr<CycleRecorder> recorder;  ///< none: no history
   WaitFreeSlot<Report> reports;             ///< cycle -> main
 };

@@ -56,6 +56,7 @@ class CycleHandle {
   /// The report of the newest brain whose change-over is done.
   [[nodiscard]] const Report& report() { return cycle_.report(); }
   [[nodiscard]] const Estimator& estimator() { return cycle_.brain().estimator; }
+  [[nodiscard]] Candidate* candidate() { return cycle_.brain().candidate.get(); }
   [[nodiscard]] const ControllerState& controller() { return cycle_.controller(); }
   [[nodiscard]] const CycleTiming& timing() const { return cycle_.timing(); }
 

@@ -41,6 +41,7 @@ struct StatusView {
   double wall_s{not_a_number};  ///< now, since 1970
   /// For so long every axis has been driven in mode `compensating`.
   double compensating_s{not_a_number};
+  const ModelContest::Score* contest{nullptr};  ///< nullptr: no candidate runs beside
 };
 
 [[nodiscard]] Status status_of(const StatusView& view);

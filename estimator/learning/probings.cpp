@@ -44,9 +44,7 @@ void Probings::step(nanoseconds now, const Temperatures& temps, const ReferenceS
 void Probings::learn(std::size_t axis, const MeasuredValue& measured,
                      const PastMoment& moment) noexcept {
   OperatorOffset& entered = operator_um_[axis];
-  const double total_um = meaning_ == MeasuredMeaning::remaining
-                              ? measured.value_um - moment.compensated_um + moment.entered_um
-                              : measured.value_um;
+  const double total_um = without_offset_um(measured.value_um, moment);
   errors_[axis].take(total_um - moment.model_um);
   const double before_um = corrections_[axis].learned_um();
   corrections_[axis].measured({total_um, moment.model_um, measured.sd_um, moment.contributions_um});

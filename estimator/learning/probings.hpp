@@ -66,6 +66,13 @@ class Probings {
     return corrections_[axis].correction_um(rise_K) - operator_um_[axis].absorbed_um;
   }
 
+  /// Of a measured value: the displacement as it would have been without any offset [um].
+  [[nodiscard]] double without_offset_um(double value_um, const PastMoment& moment) const noexcept {
+    return meaning_ == MeasuredMeaning::remaining
+               ? value_um - moment.compensated_um + moment.entered_um
+               : value_um;
+  }
+
   /// A value from an operator or a probe, whether or not anything can be learned from it.
   void note(std::size_t axis, double value_um) noexcept { measured_um_[axis] = value_um; }
   /// @param now  compensation and model at the moment of the measurement; see `past`

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <chrono>
+#include <optional>
 #include <span>
 #include <stdexcept>
 
@@ -37,20 +38,29 @@ double compensated_now_um(const Stages& stages, std::size_t axis) noexcept {
                          position_mm);
 }
 
+PastMoment present(const Stages& stages, std::size_t axis) noexcept {
+  return stages.learned.present(axis, compensated_now_um(stages, axis),
+                                stages.prediction.output_um(stages.axis_output[axis]));
+}
+
+/// The moment of which a `measured` command speaks; none: it is not remembered.
+std::optional<PastMoment> moment_of(const Stages& stages, const Command& command,
+                                    std::size_t axis) noexcept {
+  if (command.ago_s == 0) return present(stages, axis);
+  const PastMoment* then =
+      stages.learned.past(axis, stages.record.now - std::chrono::seconds(command.ago_s));
+  return then != nullptr ? std::optional(*then) : std::nullopt;
+}
+
 /// What was measured where the slide stands teaches all nodes of its travel.
 void take_measured(Stages& stages, const Command& command) noexcept {
   Probings& learned = stages.learned;
   const AxisSpan span = stages.axes.span(command.axis);
   for (std::size_t i = span.first; i < span.end(); ++i) learned.note(i, command.value_um);
   if (!stages.record.displacement_known) return;  // nothing to compare it with
-  const double model_um = stages.prediction.output_um(stages.axis_output[command.axis]);
-  const double compensated_um = compensated_now_um(stages, command.axis);
-  const nanoseconds at = stages.record.now - std::chrono::seconds(command.ago_s);
   const MeasuredValue value{command.value_um, 1e-3 * command.sd_nm, command.source};
   for (std::size_t i = span.first; i < span.end(); ++i) {
-    const PastMoment present = learned.present(i, compensated_um, model_um);
-    const PastMoment* then = command.ago_s == 0 ? &present : learned.past(i, at);
-    if (then != nullptr)
+    if (const std::optional<PastMoment> then = moment_of(stages, command, i))
       learned.learn(i, value, *then);
     else
       learned.refuse(i);
@@ -61,9 +71,7 @@ void take_measured(Stages& stages, const Command& command) noexcept {
 void remember(Stages& stages) noexcept {
   if (!stages.record.displacement_known || !stages.learned.must_remember(stages.record.now)) return;
   for (std::size_t i = 0; i < stages.axes.size(); ++i) {
-    PastMoment moment =
-        stages.learned.present(i, compensated_now_um(stages, stages.axes.span(i).first),
-                               stages.prediction.output_um(stages.axis_output[i]));
+    PastMoment moment = present(stages, i);
     moment.at = stages.record.now;
     stages.learned.remember(i, moment);
   }
@@ -131,6 +139,14 @@ void Estimator::apply(const Command& command) noexcept {
       if (command.axis < stages.config.sensors.size()) stages.sensing.accept(command.axis);
       return;
   }
+}
+
+Estimator::Probed Estimator::probed(const Command& measured) const noexcept {
+  const Stages& stages = *stages_;
+  if (measured.axis >= stages.axes.size() || !stages.record.displacement_known) return {};
+  const std::optional<PastMoment> then = moment_of(stages, measured, measured.axis);
+  if (!then) return {};
+  return {stages.learned.without_offset_um(measured.value_um, *then), then->model_um};
 }
 
 Report Estimator::make_report() const {

@@ -34,6 +34,13 @@ class Estimator {
   /// An operator's command, taken between two steps. Never throws, never allocates.
   void apply(const Command& command) noexcept;
 
+  /// Of a `measured` command before apply(), at the moment of which it speaks; NaN: not known.
+  struct Probed {
+    double displacement_um{not_a_number};  ///< as it would be without any offset
+    double model_um{not_a_number};         ///< by the model alone
+  };
+  [[nodiscard]] Probed probed(const Command& measured) const noexcept;
+
   /// By bits, one an axis: nothing is known of what was sent last. No allocation.
   [[nodiscard]] std::uint32_t forgotten_axes() const noexcept;
 

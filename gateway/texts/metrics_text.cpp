@@ -236,6 +236,13 @@ void write_rest(MetricsWriter& out, const Status& status) {
     write_gauge(out, "thermocomp_model_outside_domain_ratio", "Share of the last 24 h outside.",
                 status.model.outside_share_24h);
   }
+  if (status.candidate && status.candidate->problem.empty()) {
+    write_gauge(out, "thermocomp_candidate_better_ratio",
+                "Probability that the candidate is the better model.",
+                status.candidate->better_probability);
+    out.gauge("thermocomp_candidate_probings", "Probings that scored the candidate.");
+    out.count(status.candidate->probings);
+  }
   const HistoryStatus& history = status.history;
   if (!history.enabled) return;
   write_gauge(out, "thermocomp_history_working", "1: the history is written.", history.working);

@@ -49,6 +49,27 @@ bool loaded_state_matters(std::uint64_t seed, Planted planted) {
 
 }  // namespace
 
+TEST_CASE("a promotion that adopts nothing is noticed", "[property][estimator]") {
+  WorldOptions options;
+  options.planted = Planted::reload_from_nothing;
+  options.promotion_every = 40;
+  std::size_t count = 0;
+  for (std::uint64_t seed = 0; seed < 100; ++seed)
+    if (live(seed, options).violation) ++count;
+  CHECK(count > 50);
+}
+
+TEST_CASE("a promoted model and the way back keep the offsets' bound and slew",
+          "[property][estimator]") {
+  const auto seed = GENERATE(range<std::uint64_t>(0, 100));
+  CAPTURE(seed);
+  WorldOptions options;
+  options.promotion_every = 40;
+  const Outcome outcome = live(seed, options);
+  INFO(text_of(outcome));
+  CHECK_FALSE(outcome.violation.has_value());
+}
+
 TEST_CASE("whatever happens, offsets keep their bound and slew and are sent only where known",
           "[property][estimator]") {
   const auto seed = GENERATE(range<std::uint64_t>(0, seeds));

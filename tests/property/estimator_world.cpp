@@ -92,6 +92,7 @@ class World {
   void change_estimator() {
     if (options_.reload_state_at && *options_.reload_state_at == step_) load_saved_state();
     if (shape_.one_in(60)) reload();
+    if (options_.promotion_every > 0 && step_ % options_.promotion_every == 0) promote();
     const bool restart_now = shape_.one_in(150);
     if (restart_now && !options_.lost_from) restart();
   }
@@ -111,6 +112,11 @@ class World {
     if (options_.lost_from) config_.compensation.on_loss = LossPolicy::hold;
     if (shape_.one_in(2)) model_ = random_model(shape_);
     if (options_.travel) lay_out_travel(shape_, config_, model_);
+    is_promoted_ = false;
+    go_over();
+  }
+
+  void go_over() {
     auto next = std::make_unique<Estimator>(planted(config_), model_);
     if (options_.planted != Planted::reload_from_nothing) {
       next->plan_adoption(*estimator_);
@@ -118,6 +124,16 @@ class World {
     }
     estimator_ = std::move(next);
     report_ = estimator_->make_report();
+  }
+
+  /// And the next time back. The offset's bound and slew are those of the same configuration.
+  void promote() {
+    ThermalModel next_model = model_;
+    for (auto& row : next_model.matrix_um_per_K)
+      for (double& gain : row) gain *= is_promoted_ ? -1.0 / 3.0 : -3.0;
+    is_promoted_ = !is_promoted_;
+    model_ = next_model;
+    go_over();
   }
 
   /// The daemon comes back with what its state file held, perhaps of a while ago; its link is new.
@@ -471,6 +487,7 @@ class World {
   Chance operator_;
   EstimatorConfig config_;
   ThermalModel model_;
+  bool is_promoted_{false};
   std::unique_ptr<Estimator> estimator_;
   bool estimator_stepped_{false};
   Report report_;

@@ -46,6 +46,8 @@ struct WorldOptions {
   /// From this step on all readings are faulty, stale or impossible - or withheld altogether.
   std::optional<std::size_t> lost_from;
   bool lost_are_withheld{false};
+  /// Every so many steps another model is promoted, or the one before comes back; 0: never.
+  std::size_t promotion_every{0};
   /// At this step the estimator is replaced by a new one that loads its state.
   std::optional<std::size_t> reload_state_at;
 };

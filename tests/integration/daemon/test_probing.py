@@ -86,6 +86,53 @@ def test_without_a_correction_a_probing_is_only_noted(machine):
     assert "correction" not in daemon.axis()
 
 
+def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
+    candidate = lab.folder / "new.toml"
+    old = machine.model.read_text()
+    candidate.write_text(old.replace("[[3.0, -1.5]]", "[[2.0, -1.5]]"))
+    kept = lab.folder / "model.toml.before"
+    with_config(machine, lambda text: text.replace('file = "model.toml"',
+                                                   'file = "model.toml"\ncandidate = "new.toml"'))
+    daemon = machine.start()
+
+    def rms():
+        return daemon.status()["candidate"]["rms_um"].get("z")
+
+    machine.warm_by(12.0)  # 4 K colder: -12 um by the model, -8 by the candidate
+    daemon.wait_for_offset(12.0, 0.05)
+    assert daemon.cli("measured", "z", "4.0")[0] == 0
+    eventually(rms, "the probing is scored")
+    assert rms() == {"model": pytest.approx(4.0, abs=0.1), "candidate": pytest.approx(0, abs=0.1)}
+    assert "new.toml, z leaves 0.0 of 4.0 um over 1 probings" in daemon.cli("status")[1]
+    before = daemon.status()["candidate"]
+    daemon.end()
+    daemon.start().wait_for_mode("compensating")
+    assert daemon.status()["candidate"] == before
+
+    assert daemon.cli("promote")[0] == 0
+    daemon.wait_for_offset(8.0, 0.05)
+    assert machine.model.read_text() == candidate.read_text() and kept.read_text() == old
+    assert "candidate" not in daemon.status()
+    assert daemon.cli("promote", "--back")[0] == 0
+    daemon.wait_for_offset(12.0, 0.05)
+    assert machine.model.read_text() == old and kept.read_text() == candidate.read_text()
+
+    kept.write_text("nonsense")
+    assert daemon.cli("promote", "--back")[0] != 0
+    assert machine.model.read_text() == old
+    candidate.write_text("nonsense")
+    assert daemon.cli("reload")[0] == 0
+    assert "new.toml" in daemon.status()["candidate"]["problem"]
+    status, _, said = daemon.cli("promote")
+    assert status != 0 and "does not run" in said
+    daemon.end()
+    daemon.start().wait_for_mode("compensating")
+    assert abs(daemon.axis()["offset"] - 12.0) < 0.05
+    assert_slewed(machine.controller.orders())
+    daemon.end()
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+
+
 def test_by_cycles_the_offset_changes_at_their_ends_only(machine, lab):
     def by_cycles(text):
         text = text.replace("[[axis]]", CYCLE_SIGNAL + "[[axis]]")

@@ -472,6 +472,31 @@ TEST_CASE("a reload takes over model, blocks, screening, smoothing, limits and p
   }
 }
 
+TEST_CASE("a candidate that cannot run keeps nothing from working and says why",
+          "[config][candidate]") {
+  const ExampleFolder folder({"small_machine.toml", "small_machine_model.toml"});
+  folder.edit("small_machine.toml", "file = \"small_machine_model.toml\"",
+              "file = \"small_machine_model.toml\"\ncandidate = \"new.toml\"");
+  const DaemonConfig missing = folder.load();
+  REQUIRE(missing.candidate);
+  CHECK_THAT(missing.candidate->problem, Catch::Contains("new.toml"));
+  CHECK(missing.remarks.size() == 1);
+
+  const std::string model = example("small_machine_model.toml");
+  const auto problem_of = [&](const std::string& text) {
+    folder.write("new.toml", text);
+    return folder.load().candidate->problem;
+  };
+  CHECK(problem_of(model).empty());
+  CHECK(folder.load().remarks.empty());
+  CHECK_THAT(problem_of("nonsense"), Catch::Contains("new.toml"));
+  CHECK_THAT(problem_of(edited(model, missing.model.outputs.front(), "other_um")),
+             Catch::Contains("other_um") || Catch::Contains("output"));
+  // A temperature that no sensor of the machine measures.
+  CHECK_THAT(problem_of(edited(model, missing.model.inputs.front(), "other_degC")),
+             Catch::Contains("other_degC"));
+}
+
 TEST_CASE("what a reload cannot take over is named", "[config]") {
   const DaemonConfig running = parse(example("small_machine.toml"));
   const std::vector<std::vector<std::string>> edits = {

@@ -74,6 +74,9 @@ class ExampleFolder {
   void edit(const std::string& file, const std::string& from, const std::string& to) const {
     write(file, edited(text_of(path_ / file), from, to));
   }
+  void write(const std::string& file, const std::string& text) const {
+    std::ofstream(path_ / file, std::ios::binary) << text;
+  }
   /// Puts these paths where the configuration names its history and its state, and beside them
   /// links of all kinds.
   void name_files(const std::string& history, const std::string& state) const {
@@ -99,9 +102,6 @@ class ExampleFolder {
   }
 
  private:
-  void write(const std::string& file, const std::string& text) const {
-    std::ofstream(path_ / file, std::ios::binary) << text;
-  }
   std::string config_;
   std::filesystem::path path_;
 };

@@ -208,6 +208,124 @@ TEST_CASE("a handed over brain takes the place of the old one at once and bumple
   CHECK(running.cycle.report().inputs[0].reference_degC == 20.0);
 }
 
+namespace {
+
+/// A machine that warms up with every step, stepped by the test.
+struct WarmingMachine {
+  class Source final : public SensorSource {
+   public:
+    void start() override {}
+    void stop() noexcept override {}
+    [[nodiscard]] BusHealth health() const override { return {}; }
+    void newest(std::span<Reading> all) noexcept override {
+      all[0] = {temp_degC += rise_K, now, Fault::none};
+    }
+    double rise_K{0.0};
+    double temp_degC{20.0};
+    nanoseconds now{};
+  };
+  explicit WarmingMachine(std::unique_ptr<CycleBrain> made, nanoseconds pitch = 2h,
+                          double rise_K = 0.125)
+      : grid{1h, pitch}, cycle(grid, {&source}, controller, 1, std::move(made)) {
+    source.rise_K = rise_K;
+    controller.start();
+    next = cycle.begin(grid.start);
+  }
+  /// @return the offset [um]
+  double step(int count = 1) {
+    for (; count > 0; --count) {
+      source.now = grid.time_of(next);
+      cycle.step(next++);
+    }
+    return cycle.report().axes[0].offset_um;
+  }
+  /// A probing of the total displacement: 2 um/K.
+  void probe() {
+    REQUIRE(cycle.send({CommandKind::measured, 0, 2.0 * (source.temp_degC - 20.125)}));
+    step();
+  }
+  Source source;
+  DryRunController controller{{"none", 1}};
+  Grid grid;
+  Cycle cycle;
+  std::uint64_t next{0};
+};
+
+std::unique_ptr<CycleBrain> contested(double gain, double candidate_gain, double pair = 1.0) {
+  EstimatorConfig config = one_sensor();
+  config.correction.measured = MeasuredMeaning::total;
+  config.sensors[0].smoothing.form = SmoothingForm::off;
+  auto made = std::make_unique<CycleBrain>(Estimator(config, one_input(gain)));
+  made->candidate = std::make_unique<Candidate>(config, one_input(candidate_gain), pair);
+  return made;
+}
+
+double better(CycleBrain& brain) {
+  return ModelContest::chances(brain.candidate->score()).better;
+}
+
+}  // namespace
+
+TEST_CASE("a candidate changes no bit of what is sent", "[cycle][candidate]") {
+  auto without = contested(1.0, 2.0);
+  without->candidate.reset();
+  WarmingMachine alone(std::move(without), 100ms, 0.001);
+  WarmingMachine beside(contested(1.0, 2.0), 100ms, 0.001);
+  for (int i = 0; i < 4000; ++i) {
+    const double expected_um = alone.step();
+    REQUIRE(beside.step() == expected_um);
+    if (i % 100 != 99) continue;
+    alone.probe();
+    beside.probe();
+  }
+  CHECK(alone.step() < -3.0);
+  CHECK(beside.cycle.brain().candidate->score()[0].probings == 40.0);
+}
+
+TEST_CASE("each probing scores the model and the candidate", "[cycle][candidate]") {
+  WarmingMachine machine(contested(1.0, 1.9));
+  for (int i = 0; i < 20; ++i) {
+    machine.step(2);
+    machine.probe();
+  }
+  const ModelContest::AxisScore score = machine.cycle.brain().candidate->score()[0];
+  CHECK(score.probings == 20.0);
+  // Off by 1 and by 0.1 um/K, at the same temperatures.
+  CHECK(score.model_um2 == Approx(100.0 * score.candidate_um2));
+  CHECK(better(machine.cycle.brain()) > 0.99);
+}
+
+TEST_CASE("a score outlives restart and reload, and counts for its two models only",
+          "[cycle][candidate]") {
+  WarmingMachine machine(contested(1.0, 2.0));
+  for (int i = 0; i < 8; ++i) {
+    machine.step(2);
+    machine.probe();
+  }
+  CycleBrain& first = machine.cycle.brain();
+  const double said = better(first);
+  REQUIRE(said > 0.5);
+  PersistentState state = first.estimator.persistent_state(machine.cycle.report());
+  first.candidate->add_to(state.correction);
+
+  const double pair = GENERATE(1.0, 2.0);
+  const double expected = pair == 1.0 ? said : 0.25;
+  const auto restarted = contested(1.0, 2.0, pair);
+  restarted->candidate->restore(state);
+  CHECK(better(*restarted) == Approx(expected));
+
+  auto reloaded = contested(1.0, 2.0, pair);
+  reloaded->estimator.plan_adoption(first.estimator);
+  reloaded->candidate->plan_adoption(first.estimator);
+  machine.cycle.hand_over(std::move(reloaded));
+  machine.step();
+  REQUIRE(machine.cycle.take_retired() != nullptr);
+  CHECK(better(machine.cycle.brain()) == Approx(expected));
+  // It knows the machine's reference: its errors go on to be none.
+  machine.probe();
+  CHECK(machine.cycle.brain().candidate->score()[0].candidate_um2 == Approx(0.0).margin(1e-9));
+}
+
 TEST_CASE("a system that refuses to sleep is counted, and no cycle runs ahead of time", "[cycle]") {
   RunningCycle running;
   REQUIRE(running.eventually([&] { return running.source.seen > 3; }));
