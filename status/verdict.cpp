@@ -138,8 +138,17 @@ class Causes {
       if (unit.answering && !unit.last_error.empty() && !status_.sensors_bad.empty())
         add("bus " + bus.name + ": " + unit.name + ": " + unit.last_error,
             "look at what came, and at what may help", "thermocomp scan", subject);
-      else if (!unit.answering && bus.connected)
+      else if (!unit.answering && bus.connected && !is_good_still(unit))
         add_silent(unit, is_network(bus.kind), subject);
+  }
+
+  /// Its readings all count: it has just fallen silent, or its first answer is not counted yet.
+  [[nodiscard]] bool is_good_still(const UnitStatus& unit) const {
+    const auto is_good = [this](const std::string& sensor) {
+      const std::vector<std::string>& bad = status_.sensors_bad;
+      return std::find(bad.begin(), bad.end(), sensor) == bad.end();
+    };
+    return !unit.sensors.empty() && std::all_of(unit.sensors.begin(), unit.sensors.end(), is_good);
   }
 
   void add_silent(const UnitStatus& unit, bool is_on_network, const Subject& subject) {

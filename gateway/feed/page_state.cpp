@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -72,7 +74,75 @@ std::string group_text(const EventGroup& group) {
   return text + (group.newest->kind == EventKind::fault ? ", and still" : "");
 }
 
+void keep(json& object, std::initializer_list<const char*> keys) {
+  json kept = json::object();
+  for (const char* key : keys)
+    if (object.contains(key)) kept[key] = std::move(object[key]);
+  object = std::move(kept);
+}
+
+void round_numbers(json& value, double steps_per_unit) {
+  if (value.is_number_float())
+    value = std::round(value.get<double>() * steps_per_unit) / steps_per_unit;
+  if (value.is_structured())
+    for (json& part : value) round_numbers(part, steps_per_unit);
+}
+
+/// Counters and digits that nobody sees would be sent again and again.
+void keep_what_is_shown(json& state) {
+  keep(state, {"time_s", "here", "since_s", "why", "machine", "verdict", "problems", "mode", "axes",
+               "sensors", "buses", "controller", "model", "reference", "version", "uptime_s",
+               "cycle", "history"});
+  for (json& axis : state["axes"])
+    keep(axis, {"name", "unit", "offset", "offset_max", "offset_sd", "applied", "driven",
+                "disagrees", "mismatch", "at_bound", "proving"});
+  for (json& sensor : state["sensors"]) {
+    keep(sensor, {"name", "blocks", "raw_degC", "smoothed_degC", "fault", "fault_text",
+                  "fault_remedy", "suspected", "trend_K_per_h", "age_s"});
+    if (sensor["smoothed_degC"].is_number()) sensor["raw_degC"] = nullptr;
+    if (sensor["fault"] == to_string(Fault::none)) sensor["age_s"] = nullptr;
+    round_numbers(sensor["age_s"], 1.0);
+    round_numbers(sensor["trend_K_per_h"], 10.0);
+  }
+  for (json& bus : state["buses"]) {
+    keep(bus, {"name", "kind", "connected", "last_error", "units"});
+    for (json& unit : bus["units"]) keep(unit, {"name", "answering"});
+  }
+  keep(state["controller"], {"name", "kind", "online", "last_error", "signals"});
+  keep(state["cycle"], {"rate_hz", "missed"});
+  keep(state["history"], {"enabled", "size_MB"});
+  round_numbers(state["history"], 10.0);
+  round_numbers(state["uptime_s"], 1.0 / 60.0);
+  round_numbers(state["time_s"], 10.0);
+  round_numbers(state, 100.0);
+}
+
+bool add_changes(const json& before, const json& after, json& changes) {
+  if (before.size() != after.size()) return false;
+  for (const auto& [key, value] : after.items()) {
+    const bool is_known = before.is_array() || before.contains(key);
+    if (!is_known) return false;
+    const json& old = before.is_array() ? before[std::stoul(key)] : before[key];
+    if (old == value) continue;
+    json part = json::object();
+    const bool is_alike = value.is_structured() && old.type() == value.type();
+    if (is_alike && add_changes(old, value, part))
+      changes[key] = std::move(part);
+    else if (value.is_object() && is_alike)
+      return false;  // an object that replaces one would be taken for its changes
+    else
+      changes[key] = value;
+  }
+  return true;
+}
+
 }  // namespace
+
+std::optional<json> state_change(const json& before, const json& after) {
+  json changes = json::object();
+  if (!before.is_object() || !add_changes(before, after, changes)) return std::nullopt;
+  return changes;
+}
 
 json problems_json(const Snapshot& snapshot) {
   json list = json::array();
@@ -113,13 +183,11 @@ json page_state(const Snapshot& snapshot, const std::string& machine) {
   json sensors = json::array();
   for (const SensorStatus& sensor : snapshot.sensors.sensors)
     sensors.push_back(sensor_json(sensor, snapshot));
-  json lately = json::array();
-  for (const Event& event : status.ended) lately.push_back(event_text(event));
   state.update(json_of(status));
   state["sensors"] = std::move(sensors);
-  state["lately"] = std::move(lately);
   const json& model = *snapshot.model;
   state["model"]["made_from"] = model.is_object() ? model.value("made_from", json()) : json();
+  keep_what_is_shown(state);
   return state;
 }
 

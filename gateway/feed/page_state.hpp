@@ -1,6 +1,7 @@
 /// What the page and MQTT show of a snapshot: the daemon's answers, and their words.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
@@ -9,11 +10,18 @@
 
 namespace thermocomp::gateway {
 
-/// The answer of `status` and {"time_s", "here", "since_s", "why", "machine", "verdict":
+/// Of the answer of `status` what the page shows, as fine as it shows it, and {"time_s", "here",
+/// "since_s", "why", "machine", "verdict":
 /// {"compensating", "intended", "answer", "detail", "level"}, "problems": [{"what", "remedy"}],
-/// "sensors", "lately"}. `level` is "good", "warning" or "bad". While the daemon is away the rest
+/// "sensors"}. `level` is "good", "warning" or "bad". While the daemon is away the rest
 /// is what it said last; before its first answer only the first five keys, verdict and problems.
 [[nodiscard]] nlohmann::json page_state(const Snapshot& snapshot, const std::string& machine);
+
+/// What `after` has otherwise than `before`, for a receiver that has `before`: objects hold the
+/// keys (of an array: the places) that changed, all other values replace. nullopt: it needs the
+/// whole.
+[[nodiscard]] std::optional<nlohmann::json> state_change(const nlohmann::json& before,
+                                                         const nlohmann::json& after);
 
 /// The newest `most` happenings with their words, newest first: what happened several times is one,
 /// and what a silent module explains is left out. [{"number", "wall_s", "kind", "text"}].

@@ -13,7 +13,8 @@ struct EventStreams::Parts {
   struct Stream {
     Parts* parts{nullptr};
     MHD_Connection* connection{nullptr};
-    StreamFramePointer frame;  ///< being sent; nullptr: none yet
+    StreamFramePointer frame;          ///< being sent; nullptr: none yet
+    const std::string* text{nullptr};  ///< of it: whole, or its change
     std::size_t sent{0};
   };
 
@@ -31,6 +32,8 @@ struct EventStreams::Parts {
 
 bool EventStreams::Parts::take_newer(Stream& stream) const {
   if (!newest || (stream.frame && stream.frame->number == newest->number)) return false;
+  const bool follows = stream.frame && stream.frame->number + 1 == newest->number;
+  stream.text = follows && !newest->change.empty() ? &newest->change : &newest->text;
   stream.frame = newest;
   stream.sent = 0;
   return true;
@@ -43,14 +46,14 @@ ssize_t EventStreams::Parts::read(void* cls, std::uint64_t /*position*/, char* o
   Stream& stream = *static_cast<Stream*>(cls);
   const std::lock_guard lock(stream.parts->mutex);
   if (stream.parts->stops) return MHD_CONTENT_READER_END_OF_STREAM;
-  const bool is_done = !stream.frame || stream.sent == stream.frame->text.size();
+  const bool is_done = !stream.frame || stream.sent == stream.text->size();
   if (is_done && !stream.parts->take_newer(stream)) {
     stream.parts->sleeping.insert(stream.connection);
     MHD_suspend_connection(stream.connection);
     return 0;
   }
-  const std::size_t count = std::min(size, stream.frame->text.size() - stream.sent);
-  stream.frame->text.copy(out, count, stream.sent);
+  const std::size_t count = std::min(size, stream.text->size() - stream.sent);
+  stream.text->copy(out, count, stream.sent);
   stream.sent += count;
   return static_cast<ssize_t>(count);
 }

@@ -15,7 +15,8 @@ namespace thermocomp::gateway {
 /// What all pages are told at one time.
 struct StreamFrame {
   std::uint64_t number{0};  ///< rises with each
-  std::string text;         ///< one event, in the form of the protocol
+  std::string text;         ///< one event, in the form of the protocol: the whole state
+  std::string change;       ///< to whom has had the frame before; empty: the whole state to all
 };
 using StreamFramePointer = std::shared_ptr<const StreamFrame>;
 

@@ -184,6 +184,7 @@ struct HttpServer::Parts {
   WorkDesk history_desk;
   WorkDesk command_desk;  ///< of its own: nobody's charts are in the way of a command
   EventStreams streams;
+  json shown;  ///< the newest state; only of the feed's thread
   SlowConnections connections;
   std::atomic<std::uint64_t> requests{0};
   std::atomic<std::uint64_t> refused{0};
@@ -476,6 +477,9 @@ void HttpServer::show(const SnapshotPointer& snapshot) {
   auto frame = std::make_shared<StreamFrame>();
   frame->number = snapshot->number;
   frame->text = "event: state\ndata: " + dumped(state) + "\n\n";
+  if (const std::optional<json> change = state_change(parts_->shown, state))
+    frame->change = "event: change\ndata: " + dumped(*change) + "\n\n";
+  parts_->shown = std::move(state);
   parts_->streams.show(std::move(frame));
 }
 

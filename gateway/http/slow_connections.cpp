@@ -7,6 +7,9 @@
 namespace thermocomp::gateway {
 namespace {
 
+/// Of a stream that is read, so much may be on its way: some seconds of changes.
+constexpr std::size_t under_way_bytes_max = 512;
+
 /// Bytes that were sent and that the other side has not taken.
 std::size_t untaken_bytes(int fd) {
   int bytes = 0;
@@ -34,11 +37,13 @@ void SlowConnections::end_slow(Clock::time_point now) {
   const bool is_full = places_.size() >= places_max_;
   const auto request_lasts_max = is_full ? request_max_when_full : request_max;
   const auto answer_lasts_max = is_full ? answer_max_when_full : answer_max;
-  for (const auto& [fd, place] : places_) {
+  for (auto& [fd, place] : places_) {
+    const bool is_stream = place.stage == Stage::stream;
+    if (is_stream && untaken_bytes(fd) <= under_way_bytes_max) place.since = now;
     const auto lasts = now - place.since;
     const bool is_slow = (place.stage == Stage::request && lasts > request_lasts_max) ||
-                         (place.stage == Stage::answer && lasts > answer_lasts_max) ||
-                         (place.stage == Stage::stream && untaken_bytes(fd) > untaken_bytes_max);
+                         (place.stage != Stage::request && lasts > answer_lasts_max) ||
+                         (is_stream && untaken_bytes(fd) > untaken_bytes_max);
     if (is_slow) shutdown(fd, SHUT_RDWR);
   }
 }

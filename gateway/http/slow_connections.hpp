@@ -17,7 +17,8 @@ class SlowConnections {
   /// The same while every place is taken: others wait for one.
   static constexpr std::chrono::seconds request_max_when_full{3};
   static constexpr std::chrono::seconds answer_max_when_full{10};
-  /// Of a stream: what lies in the kernel because nobody takes it.
+  /// Of a stream: what lies in the kernel because nobody takes it. Less, but more than what may be
+  /// under way, has the time of an answer.
   static constexpr std::size_t untaken_bytes_max = std::size_t{64} * 1024;
 
   enum class Stage { request, answer, stream };

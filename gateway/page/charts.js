@@ -324,7 +324,7 @@ function addLiveRow(now) {
   const at = now.time_s * 1000;
   const values = {};
   for (const axis of now.axes) values[axis.name + '_offset_um'] = axis.offset;
-  for (const sensor of now.sensors) values[sensor.name + '_degC'] = sensor.fault === 'none' ? sensor.raw_degC : null;
+  for (const sensor of now.sensors) values[sensor.name + '_degC'] = sensor.fault === 'none' ? temperatureOf(sensor) : null;
   if (columns.length === 0) columns = ['time_s'];
   for (const name of Object.keys(values))
     if (!columns.includes(name)) {

@@ -53,6 +53,21 @@ function listen() {
     state = JSON.parse(event.data);
     show(state);
   });
+  source.addEventListener('change', event => {
+    heardAt = performance.now();
+    change(state, JSON.parse(event.data));
+    show(state);
+  });
+}
+
+// Objects change what they name, everything else replaces.
+function change(target, changes) {
+  for (const [key, value] of Object.entries(changes)) {
+    const old = target[key];
+    if (value && typeof value === 'object' && !Array.isArray(value) && old && typeof old === 'object')
+      change(old, value);
+    else target[key] = value;
+  }
 }
 
 function watchGateway() {

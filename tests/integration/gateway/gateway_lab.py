@@ -11,6 +11,17 @@ import subprocess
 from lab import BIN, PATIENCE_S, eventually, free_port
 
 
+def change(state, changes):
+    """As the page does it: objects change what they name, everything else replaces."""
+    for key, value in changes.items():
+        place = int(key) if isinstance(state, list) else key
+        old = state.get(key) if isinstance(state, dict) else state[place]
+        if isinstance(value, dict) and isinstance(old, (dict, list)):
+            change(old, value)
+        else:
+            state[place] = value
+
+
 class Gateway:
     """A running thermocomp-gateway."""
 
@@ -80,12 +91,17 @@ class Gateway:
             assert answer.status == 200
             assert answer.headers["Content-Type"] == "text/event-stream"
 
+            state = {}
+
             def next_state():
                 while True:
                     line = answer.readline()
                     assert line, "the stream ended"
+                    if line.startswith(b"event: state"):
+                        state.clear()
                     if line.startswith(b"data: "):
-                        return json.loads(line[6:])
+                        change(state, json.loads(line[6:]))
+                        return state
 
             yield next_state
 

@@ -1,5 +1,6 @@
 """What the gateway answers is what the daemon says, by socket and by history."""
 
+import contextlib
 import csv
 import json
 import subprocess
@@ -34,7 +35,7 @@ def test_status_and_sensors_are_the_sockets_answers(machine, gateway):
 def test_the_stream_follows_the_machine_and_says_what_to_do(machine, gateway):
     first = gateway.wait_for(lambda s: s["here"], "a state")
     assert first["machine"] == "mill_3"
-    assert first["verdict"]["compensating"] and first["verdict"]["level"] == "good"
+    assert first["verdict"]["compensating"] and first["verdict"]["level"] == "good", first["problems"]
     machine.warm_by(9.0)
     gateway.wait_for(lambda s: abs(s["axes"][0]["offset"] - 9.0) < 0.05, "the offset is shown")
     machine.module.stop()
@@ -105,6 +106,18 @@ def test_history_has_probings_and_when_nothing_was_compensated(machine, gateway)
     assert probing["axis"] == "z" and probing["left_um"] == 1.5
     assert told["modes"][-1]["mode"] == "disabled"
     assert any(event["text"].startswith("measured z 1.5 um") for event in told["events"])
+
+
+def test_a_machine_at_rest_costs_little_to_watch(machine, gateway):
+    gateway.wait_for(lambda s: s["verdict"]["level"] == "good", "a state")
+    with contextlib.closing(gateway.connect()) as link:
+        link.request("GET", "/api/events")
+        answer = link.getresponse()
+        lines = [answer.readline() for _ in range(3 * 40)]
+    whole = [line for line in lines if line == b"event: state\n"]
+    later = sum(map(len, lines[3:])) / 39
+    print(f"a state {len(lines[1])} B, a change {later:.0f} B: {later * 7200 / 1e6:.2f} MB an hour")
+    assert len(whole) == 1 and later * 7200 < 2e6
 
 
 def test_history_questions_that_cannot_be_are_refused(gateway):

@@ -188,6 +188,9 @@ TEST_CASE("a silent module is one problem, and names what is lost with it", "[cl
   list = troubles(status, &answer);
   REQUIRE(list.size() == 2);
   CHECK(list[1].what == "sensor head: thermocouple broken");
+  status.sensors_bad = {"head"};                 // those of the module are good still
+  CHECK(troubles(status, &answer).size() == 2);  // a lost input that nothing explains, and head
+  CHECK_THAT(troubles(status, &answer)[0].what, !Contains("silent"));
   CHECK_THAT(list[1].remedy, !Contains("thermocomp "));
 }
 

@@ -196,6 +196,20 @@ TEST_CASE("the page is told in the words of thermocomp status", "[gateway][page]
   CHECK_FALSE(page_state(Snapshot(), "mill").contains("axes"));
 }
 
+TEST_CASE("a change holds what a receiver of the state before lacks", "[gateway][page]") {
+  const json before = {
+      {"time_s", 1.0}, {"axes", {{{"name", "z"}, {"offset", 1.0}}}}, {"why", json()}};
+  json after = before;
+  after["axes"][0]["offset"] = 2.0;
+  CHECK(state_change(before, after).value() == json{{"axes", {{"0", {{"offset", 2.0}}}}}});
+  CHECK(state_change(before, before).value() == json::object());
+  after["axes"].push_back({{"name", "x"}});  // another length: the array anew
+  CHECK(state_change(before, after).value()["axes"] == after["axes"]);
+  after["sensors"] = json::array();
+  CHECK_FALSE(state_change(before, after));
+  CHECK_FALSE(state_change(json(), after));
+}
+
 TEST_CASE("what happens again and again is one line, without what it explains", "[gateway][page]") {
   const auto event = [](double wall_s, EventKind kind, Subject subject, const char* code) {
     Event made;

@@ -123,3 +123,15 @@ TEST_CASE("a stream that nobody reads is ended, one that is read lasts for ever"
   }
   CHECK(link.is_ended());
 }
+
+TEST_CASE("a stream of little that nobody reads is ended after the time of an answer",
+          "[gateway][slow]") {
+  const Link link;
+  SlowConnections connections(10);
+  connections.is_at(link.ours, Stage::stream, begin);
+  link.send_bytes(16000);  // more than the other side's window, less than ends it at once
+  connections.end_slow(begin + seconds(60));
+  CHECK_FALSE(link.is_ended());
+  connections.end_slow(begin + seconds(61));
+  CHECK(link.is_ended());
+}
