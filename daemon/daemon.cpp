@@ -12,10 +12,10 @@
 #include "daemon/controller_lock.hpp"
 #include "daemon/cycle/cycle.hpp"
 #include "daemon/cycle/real_time_thread.hpp"
-#include "daemon/desks/bridge_desk.hpp"
-#include "daemon/desks/operator_desk.hpp"
 #include "daemon/history/format/database.hpp"
 #include "daemon/locks/file_lock.hpp"
+#include "daemon/methods/bridge_methods.hpp"
+#include "daemon/methods/operator_methods.hpp"
 #include "daemon/operations.hpp"
 #include "daemon/start_state.hpp"
 #include "daemon/supervisor.hpp"
@@ -152,8 +152,8 @@ struct Daemon::Parts {
   RealTimeThread thread;
 
  private:
-  [[nodiscard]] std::unique_ptr<CycleBrain> first_brain() const;
-  [[nodiscard]] DeskActions actions();
+  [[nodiscard]] std::unique_ptr<CycleParts> first_parts() const;
+  [[nodiscard]] DaemonActions actions();
   void warn(const std::string& warning);
 };
 
@@ -169,7 +169,7 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
       link(make_controller(config.controller, config.dry_run)),
       grid(make_grid(config.loop)),
       history(make_history(config.history, grid)),
-      cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_brain(),
+      cycle(grid, pointers(sources), *link, config.estimator.sensors.size(), first_parts(),
             last_sent.get()),
       operations({config, cycle, keeper, service, history.get(),
                   [this] { return status_line(supervisor.view()); }, &journal,
@@ -185,16 +185,16 @@ Daemon::Parts::Parts(const std::filesystem::path& config_file)
   add_operator_methods(server, actions());
 }
 
-std::unique_ptr<CycleBrain> Daemon::Parts::first_brain() const {
-  auto brain = make_brain(config, history.get());
+std::unique_ptr<CycleParts> Daemon::Parts::first_parts() const {
+  auto parts = make_cycle_parts(config, history.get());
   // What cannot be has been taken out by find_start_state().
-  THERMOCOMP_ENSURE(brain->estimator.restore(start_state.state).empty());
-  if (brain->candidate) brain->candidate->restore(start_state.state);
-  return brain;
+  THERMOCOMP_ENSURE(parts->estimator.restore(start_state.state).empty());
+  if (parts->candidate) parts->candidate->restore(start_state.state);
+  return parts;
 }
 
-DeskActions Daemon::Parts::actions() {
-  DeskActions all{
+DaemonActions Daemon::Parts::actions() {
+  DaemonActions all{
       [this] { return supervisor.view(); },
       [this](const Command& asked) { return operations.command(asked); },
       [this] { return operations.reload(); },

@@ -59,10 +59,10 @@ Event command_event(std::string_view code, std::int64_t user) {
   return event;
 }
 
-void add_recorder(CycleBrain& brain, const DaemonConfig& config, HistoryWriter* history) {
+void add_recorder(CycleParts& parts, const DaemonConfig& config, HistoryWriter* history) {
   if (history != nullptr)
-    brain.recorder = history->make_recorder({config.text, config.model_text, config.model_checksum},
-                                            brain.estimator);
+    parts.recorder = history->make_recorder({config.text, config.model_text, config.model_checksum},
+                                            parts.estimator);
 }
 
 /// Beginnings of both checksums in a number that a state file holds exactly.
@@ -73,14 +73,14 @@ double pair_of(const DaemonConfig& config) {
       nullptr, 16));
 }
 
-std::unique_ptr<CycleBrain> brain_of(const DaemonConfig& config) {
-  auto brain = std::make_unique<CycleBrain>(Estimator(config.estimator, config.model));
+std::unique_ptr<CycleParts> parts_of(const DaemonConfig& config) {
+  auto parts = std::make_unique<CycleParts>(Estimator(config.estimator, config.model));
   const std::optional<CandidateModel>& candidate = config.candidate;
   // Once promoted it is the model itself.
   if (candidate && candidate->problem.empty() && candidate->checksum != config.model_checksum)
-    brain->candidate =
+    parts->candidate =
         std::make_unique<Candidate>(candidate->estimator, candidate->model, pair_of(config));
-  return brain;
+  return parts;
 }
 
 bool is_reference_whole(const Report& report) {
@@ -91,23 +91,23 @@ bool is_reference_whole(const Report& report) {
 
 }  // namespace
 
-std::unique_ptr<CycleBrain> make_brain(const DaemonConfig& config, HistoryWriter* history) {
-  auto brain = brain_of(config);
-  add_recorder(*brain, config, history);
-  return brain;
+std::unique_ptr<CycleParts> make_cycle_parts(const DaemonConfig& config, HistoryWriter* history) {
+  auto parts = parts_of(config);
+  add_recorder(*parts, config, history);
+  return parts;
 }
 
 /// What the files give, made beside main: a file may be on a disk that does not answer, and an
 /// estimator takes its time.
 struct Operations::Loaded {
   DaemonConfig config;
-  std::unique_ptr<CycleBrain> brain;
+  std::unique_ptr<CycleParts> parts;
   std::exception_ptr error;  ///< instead of the others
 
   void load(const std::filesystem::path& file) noexcept {
     try {
       config = load_daemon_config(file);
-      brain = brain_of(config);
+      parts = parts_of(config);
     } catch (...) {
       error = std::current_exception();
     }
@@ -194,7 +194,7 @@ void Operations::begin_reload() {
   parts_.service.reloading();
 }
 
-/// Once the files are read: hands the new brain to the cycle.
+/// Once the files are read: hands the new parts to the cycle.
 void Operations::finish_loading() {
   if (!reload_ || reload_->answer->outcome || reload_->thread->is_busy()) return;
   const std::shared_ptr<Loaded> loaded = std::exchange(reload_->loaded, nullptr);
@@ -207,11 +207,11 @@ void Operations::finish_loading() {
                      fmt::format("nothing was taken, the running configuration stays: a "
                                  "restart is needed for a change of {}",
                                  fmt::join(fixed, ", ")));
-    add_recorder(*loaded->brain, loaded->config, parts_.history);
-    loaded->brain->estimator.plan_adoption(cycle_.estimator());
-    if (loaded->brain->candidate) loaded->brain->candidate->plan_adoption(cycle_.estimator());
+    add_recorder(*loaded->parts, loaded->config, parts_.history);
+    loaded->parts->estimator.plan_adoption(cycle_.estimator());
+    if (loaded->parts->candidate) loaded->parts->candidate->plan_adoption(cycle_.estimator());
     reload_->next = std::move(loaded->config);
-    reload_->answer->outcome = cycle_.replace(std::move(loaded->brain), Clock::now());
+    reload_->answer->outcome = cycle_.replace(std::move(loaded->parts), Clock::now());
   } catch (const std::exception& error) {
     if (!reload_->is_asked)
       spdlog::error("reload refused, the running configuration stays:\n{}", error.what());

@@ -25,7 +25,7 @@ namespace thermocomp {
 /// called done only when it is on disk (where that takes longer than a client waits, the answer
 /// says so), and one that the cycle did not take in time never happens.
 /// Configuration, reports and state change together, in poll(), when the cycle has gone over to a
-/// new brain.
+/// new parts.
 class Operations {
  public:
   /// All of them outlive this.
@@ -118,9 +118,9 @@ class Operations {
   std::vector<Asked> asked_;  ///< commands on their way, in order
 };
 
-/// A brain for the configuration, with a recorder where there is a history.
+/// Parts for the configuration, with a recorder where there is a history.
 /// @throws InvalidValue
-[[nodiscard]] std::unique_ptr<CycleBrain> make_brain(const DaemonConfig& config,
-                                                     HistoryWriter* history);
+[[nodiscard]] std::unique_ptr<CycleParts> make_cycle_parts(const DaemonConfig& config,
+                                                           HistoryWriter* history);
 
 }  // namespace thermocomp

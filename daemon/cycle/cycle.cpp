@@ -39,13 +39,13 @@ bool sleep_until(nanoseconds wake) noexcept {
 }  // namespace
 
 Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
-             std::size_t sensors, std::unique_ptr<CycleBrain> brain, LastSent* last_sent)
+             std::size_t sensors, std::unique_ptr<CycleParts> parts, LastSent* last_sent)
     : grid_(grid),
       sources_(std::move(sources)),
       link_(link),
       last_sent_(last_sent),
-      brain_(std::move(brain)),
-      observed_(brain_.get()),
+      parts_(std::move(parts)),
+      observed_(parts_.get()),
       readings_(sensors) {
   constexpr nanoseconds report_period = std::chrono::milliseconds(100);
   report_every_ =
@@ -54,7 +54,7 @@ Cycle::Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLin
 
 std::uint64_t Cycle::begin(nanoseconds now) noexcept {
   expected_ = newest_due(now);
-  if (brain_->recorder) brain_->recorder->begin(expected_, brain_->estimator, SegmentReason::start);
+  if (parts_->recorder) parts_->recorder->begin(expected_, parts_->estimator, SegmentReason::start);
   return expected_;
 }
 
@@ -76,28 +76,28 @@ void Cycle::run() noexcept {
 
 void Cycle::step(std::uint64_t cycle) noexcept {
   // Only now: at the end the last step's offsets are still recorded, and they come before these.
-  if (cycle > expected_ && brain_->recorder) brain_->recorder->skipped(expected_, cycle - 1);
+  if (cycle > expected_ && parts_->recorder) parts_->recorder->skipped(expected_, cycle - 1);
   cycle_ = cycle;
   expected_ = cycle + 1;
   has_stepped_ = true;
   take_over(cycle);
-  CycleBrain& brain = *brain_;
+  CycleParts& parts = *parts_;
   bool commanded = false;
   for (Command command; commands_.try_pop(command); commanded = true) {
-    if (brain.candidate) brain.candidate->command(command, brain.estimator);
-    brain.estimator.apply(command);
-    if (brain.recorder) brain.recorder->command(cycle, command);
+    if (parts.candidate) parts.candidate->command(command, parts.estimator);
+    parts.estimator.apply(command);
+    if (parts.recorder) parts.recorder->command(cycle, command);
   }
   for (SensorSource* source : sources_) source->newest(readings_);
   link_.newest(controller_);
   // The grid's time, not the clock's: the same steps can be taken again from the history.
-  brain.estimator.step(grid_.time_of(cycle), readings_, controller_, offsets_);
+  parts.estimator.step(grid_.time_of(cycle), readings_, controller_, offsets_);
   // Before it can be sent, so that what was sent is never farther than what is recorded.
-  if (last_sent_ != nullptr) last_sent_->note(offsets_, brain.estimator.forgotten_axes());
+  if (last_sent_ != nullptr) last_sent_->note(offsets_, parts.estimator.forgotten_axes());
   link_.offer(offsets_);
-  if (brain.recorder)
-    brain.recorder->record(cycle, readings_, controller_, offsets_, brain.estimator);
-  if (brain.candidate) brain.candidate->step(grid_.time_of(cycle), readings_, controller_);
+  if (parts.recorder)
+    parts.recorder->record(cycle, readings_, controller_, offsets_, parts.estimator);
+  if (parts.candidate) parts.candidate->step(grid_.time_of(cycle), readings_, controller_);
   publish(commanded);
   // Given back only now, when the new one has something to report.
   if (retiring_ != nullptr)
@@ -108,7 +108,7 @@ void Cycle::step(std::uint64_t cycle) noexcept {
 
 std::optional<std::uint64_t> Cycle::finish_recording() noexcept {
   if (!has_stepped_) return std::nullopt;
-  if (brain_->recorder) brain_->recorder->finish(cycle_, offsets_);
+  if (parts_->recorder) parts_->recorder->finish(cycle_, offsets_);
   return cycle_;
 }
 
@@ -127,40 +127,40 @@ std::uint64_t Cycle::next_after(std::uint64_t cycle, nanoseconds now) noexcept {
 }
 
 void Cycle::take_over(std::uint64_t cycle) noexcept {
-  CycleBrain* next = incoming_.exchange(nullptr, std::memory_order_acquire);
+  CycleParts* next = incoming_.exchange(nullptr, std::memory_order_acquire);
   if (next == nullptr) return;
-  retiring_ = brain_.release();
+  retiring_ = parts_.release();
   next->estimator.adopt(retiring_->estimator);
   if (next->candidate) next->candidate->adopt(retiring_->estimator, retiring_->candidate.get());
   if (next->recorder)
     next->recorder->begin(cycle, next->estimator, SegmentReason::reload, retiring_->recorder.get());
-  brain_.reset(next);
+  parts_.reset(next);
   next_report_ = cycle;
 }
 
 void Cycle::publish(bool at_once) noexcept {
   if (!at_once && cycle_ < next_report_) return;
   next_report_ = cycle_ + report_every_;
-  brain_->estimator.report(brain_->reports.back());
-  brain_->reports.publish();
+  parts_->estimator.report(parts_->reports.back());
+  parts_->reports.publish();
   controller_slot_.back() = controller_;
   controller_slot_.publish();
 }
 
-void Cycle::hand_over(std::unique_ptr<CycleBrain> next) noexcept {
+void Cycle::hand_over(std::unique_ptr<CycleParts> next) noexcept {
   THERMOCOMP_ENSURE(incoming_.load() == nullptr && retired_.load() == nullptr);
   handed_over_ = next.release();
   incoming_.store(handed_over_, std::memory_order_release);
 }
 
-std::unique_ptr<CycleBrain> Cycle::take_retired() noexcept {
-  std::unique_ptr<CycleBrain> retired(retired_.exchange(nullptr, std::memory_order_acquire));
+std::unique_ptr<CycleParts> Cycle::take_retired() noexcept {
+  std::unique_ptr<CycleParts> retired(retired_.exchange(nullptr, std::memory_order_acquire));
   if (retired) observed_ = handed_over_;
   return retired;
 }
 
-std::unique_ptr<CycleBrain> Cycle::withdraw_brain() noexcept {
-  return std::unique_ptr<CycleBrain>(incoming_.exchange(nullptr, std::memory_order_acquire));
+std::unique_ptr<CycleParts> Cycle::withdraw_parts() noexcept {
+  return std::unique_ptr<CycleParts>(incoming_.exchange(nullptr, std::memory_order_acquire));
 }
 
 const Report& Cycle::report() noexcept {

@@ -22,8 +22,8 @@
 namespace thermocomp {
 
 /// What a configuration gives the cycle and a reload replaces as a whole.
-struct CycleBrain {
-  explicit CycleBrain(Estimator made)
+struct CycleParts {
+  explicit CycleParts(Estimator made)
       : estimator(std::move(made)), reports(estimator.make_report()) {}
   Estimator estimator;
   std::unique_ptr<Candidate> candidate;     ///< none: no model runs beside
@@ -48,7 +48,7 @@ class Cycle {
   /// @param sensors    number of configured sensors
   /// @param last_sent  none: what is sent is not recorded
   Cycle(const Grid& grid, std::vector<SensorSource*> sources, ControllerLink& link,
-        std::size_t sensors, std::unique_ptr<CycleBrain> brain, LastSent* last_sent = nullptr);
+        std::size_t sensors, std::unique_ptr<CycleParts> parts, LastSent* last_sent = nullptr);
 
   /// Until stop(); the first cycle is the grid's newest.
   void run() noexcept;
@@ -71,17 +71,17 @@ class Cycle {
   /// @return whether the command with this number never reaches the cycle
   [[nodiscard]] bool withdraw(std::uint64_t number) noexcept { return commands_.withdraw(number); }
   /// All commands before this number were carried out (or withdrawn), and report() says what they
-  /// did; when a brain was handed over in the same step, once it has been taken back.
+  /// did; when new parts were handed over in the same step, once these have been taken back.
   [[nodiscard]] std::uint64_t commands_done() const noexcept {
     return commands_done_.load(std::memory_order_acquire);
   }
-  /// The cycle goes over to `next` at its next step. take_retired() then gives the brain it had
+  /// The cycle goes over to `next` at its next step. take_retired() then gives the parts it had
   /// until then. @pre the last one handed over has been taken back or withdrawn
-  void hand_over(std::unique_ptr<CycleBrain> next) noexcept;
-  [[nodiscard]] std::unique_ptr<CycleBrain> take_retired() noexcept;
-  /// The brain that was handed over, which the cycle then never sees; none: it has it already.
-  [[nodiscard]] std::unique_ptr<CycleBrain> withdraw_brain() noexcept;
-  /// The newest report of the brain in use, as of take_retired().
+  void hand_over(std::unique_ptr<CycleParts> next) noexcept;
+  [[nodiscard]] std::unique_ptr<CycleParts> take_retired() noexcept;
+  /// The parts that were handed over, which the cycle then never sees; none: it has them already.
+  [[nodiscard]] std::unique_ptr<CycleParts> withdraw_parts() noexcept;
+  /// The newest report of the parts in use, as of take_retired().
   [[nodiscard]] const Report& report() noexcept;
   /// Newest controller state seen by the cycle.
   [[nodiscard]] const ControllerState& controller() noexcept;
@@ -92,8 +92,8 @@ class Cycle {
   /// After run() has returned: records where it ended, with the offsets of the last step.
   /// @return the cycle of that step; none: there was none
   std::optional<std::uint64_t> finish_recording() noexcept;
-  /// Main's side: the brain in use, as of take_retired().
-  [[nodiscard]] CycleBrain& brain() noexcept { return *observed_; }
+  /// Main's side: the parts in use, as of take_retired().
+  [[nodiscard]] CycleParts& parts() noexcept { return *observed_; }
 
  private:
   void take_over(std::uint64_t cycle) noexcept;
@@ -104,14 +104,14 @@ class Cycle {
   std::vector<SensorSource*> sources_;
   ControllerLink& link_;
   LastSent* last_sent_;
-  std::unique_ptr<CycleBrain> brain_;  ///< the cycle's
-  CycleBrain* retiring_{nullptr};      ///< the cycle's: to be given back after this step
-  CycleBrain* observed_;               ///< main's: whose reports it reads
-  CycleBrain* handed_over_{nullptr};   ///< main's: whose they will be
+  std::unique_ptr<CycleParts> parts_;  ///< the cycle's
+  CycleParts* retiring_{nullptr};      ///< the cycle's: to be given back after this step
+  CycleParts* observed_;               ///< main's: whose reports it reads
+  CycleParts* handed_over_{nullptr};   ///< main's: whose they will be
   CommandQueue commands_;
   std::atomic<std::uint64_t> commands_done_{0};
-  std::atomic<CycleBrain*> incoming_{nullptr};
-  std::atomic<CycleBrain*> retired_{nullptr};
+  std::atomic<CycleParts*> incoming_{nullptr};
+  std::atomic<CycleParts*> retired_{nullptr};
   std::atomic<bool> stop_{false};
   CycleTiming timing_;
   WaitFreeSlot<ControllerState> controller_slot_;

@@ -18,7 +18,7 @@ CycleHandle::Tracked CycleHandle::send(const Command& command, Clock::time_point
   return commands_.back().outcome;
 }
 
-CycleHandle::Tracked CycleHandle::replace(std::unique_ptr<CycleBrain> next, Clock::time_point now) {
+CycleHandle::Tracked CycleHandle::replace(std::unique_ptr<CycleParts> next, Clock::time_point now) {
   THERMOCOMP_ENSURE(!replacing());
   replacement_ = {std::move(next), now + patience, std::make_shared<Outcome>(Outcome::waiting)};
   hand_over_staged();
@@ -56,7 +56,7 @@ void CycleHandle::settle() {
 }
 
 void CycleHandle::finish_commands() {
-  // In this order: a command of the step in which the brain changed is reported by the new one.
+  // In this order: a command of the step in which the parts changed is reported by the new one.
   const std::uint64_t done = cycle_.commands_done();
   finish_replacement();
   std::vector<SentCommand> finished;
@@ -72,13 +72,13 @@ void CycleHandle::finish_commands() {
 }
 
 void CycleHandle::finish_replacement() {
-  // The old brain is freed here, not in the cycle.
+  // The old parts are freed here, not in the cycle.
   if (replacing() && cycle_.take_retired() != nullptr) end_replacement(Outcome::done);
 }
 
 bool CycleHandle::withdraw_replacement() {
   return std::exchange(replacement_.staged, nullptr) != nullptr ||
-         cycle_.withdraw_brain() != nullptr;
+         cycle_.withdraw_parts() != nullptr;
 }
 
 void CycleHandle::end_replacement(Outcome outcome) {

@@ -11,7 +11,7 @@
 
 namespace thermocomp {
 
-/// What came of a command or a new brain on its way to the cycle.
+/// What came of a command or of new parts on their way to the cycle.
 enum class Outcome {
   waiting,
   done,       ///< the newest report says what it did
@@ -21,8 +21,8 @@ enum class Outcome {
 
 /// Nothing here waits: poll() moves everything on. Main's thread only; time is an argument.
 ///
-/// A change-over is whole or not at all: until poll() has finished it, brain() and report() are
-/// those of the old brain, and what the cycle does not take within its patience is withdrawn in one
+/// A change-over is whole or not at all: until poll() has finished it, parts() and report() are
+/// those of the old parts, and what the cycle does not take within its patience is withdrawn in one
 /// atomic step. So nothing is ever done that main believes refused, nor the other way round.
 class CycleHandle {
  public:
@@ -38,12 +38,13 @@ class CycleHandle {
       : cycle_(cycle), command_done_(std::move(command_done)) {}
 
   /// @return none: too many are under way
-  /// @pre replacing() is false for a command that names an axis: the new brain may number them
+  /// @pre replacing() is false for a command that names an axis: the new parts may number them
   ///      otherwise
   [[nodiscard]] Tracked send(const Command& command, Clock::time_point now);
   /// @pre !replacing()
-  Tracked replace(std::unique_ptr<CycleBrain> next, Clock::time_point now);
-  /// Whether a brain is on its way: no other can be handed over until it is done or withdrawn.
+  Tracked replace(std::unique_ptr<CycleParts> next, Clock::time_point now);
+  /// Whether new parts are on their way: no others can be handed over until that is done or
+  /// withdrawn.
   [[nodiscard]] bool replacing() const noexcept { return replacement_.outcome != nullptr; }
   /// Whether poll() has anything to do.
   [[nodiscard]] bool is_busy() const noexcept { return replacing() || !commands_.empty(); }
@@ -53,10 +54,10 @@ class CycleHandle {
   /// After the cycle has ended: what it did is done, the rest is withdrawn.
   void settle();
 
-  /// The report of the newest brain whose change-over is done.
+  /// The report of the newest parts whose change-over is done.
   [[nodiscard]] const Report& report() { return cycle_.report(); }
-  [[nodiscard]] const Estimator& estimator() { return cycle_.brain().estimator; }
-  [[nodiscard]] Candidate* candidate() { return cycle_.brain().candidate.get(); }
+  [[nodiscard]] const Estimator& estimator() { return cycle_.parts().estimator; }
+  [[nodiscard]] Candidate* candidate() { return cycle_.parts().candidate.get(); }
   [[nodiscard]] const ControllerState& controller() { return cycle_.controller(); }
   [[nodiscard]] const CycleTiming& timing() const { return cycle_.timing(); }
 
@@ -68,9 +69,9 @@ class CycleHandle {
     std::shared_ptr<Outcome> outcome;
   };
   struct Replacement {
-    std::unique_ptr<CycleBrain> staged;  ///< waits until no command that names an axis is under way
+    std::unique_ptr<CycleParts> staged;  ///< waits until no command that names an axis is under way
     Clock::time_point deadline;
-    std::shared_ptr<Outcome> outcome;  ///< none: no brain is on its way
+    std::shared_ptr<Outcome> outcome;  ///< none: no parts is on its way
   };
 
   void finish_replacement();

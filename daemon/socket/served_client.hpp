@@ -10,7 +10,7 @@
 #include <string>
 
 #include "daemon/socket/line_buffer.hpp"
-#include "daemon/socket/request_desk.hpp"
+#include "daemon/socket/rpc_dispatcher.hpp"
 #include "daemon/socket/token_bucket.hpp"
 
 namespace thermocomp {

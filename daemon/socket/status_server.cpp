@@ -16,7 +16,7 @@
 
 #include "daemon/socket/listening_socket.hpp"
 #include "daemon/socket/peer_access.hpp"
-#include "daemon/socket/request_desk.hpp"
+#include "daemon/socket/rpc_dispatcher.hpp"
 #include "daemon/socket/served_client.hpp"
 #include "daemon/threads/side_thread.hpp"
 
@@ -51,7 +51,7 @@ struct StatusServer::Parts {
   SocketConfig config;
   SocketLimits limits;
   ListeningSocket listener;
-  RequestDesk desk;
+  RpcDispatcher dispatcher;
   std::int64_t caller{-1};  ///< of the request in hand
   int epoll_fd{-1};
   int timer_fd{-1};
@@ -110,7 +110,7 @@ StatusServer::Parts::Parts(const SocketConfig& config_in, const SocketLimits& li
     : config(config_in),
       limits(limits_in),
       listener(config_in.path),
-      desk(config_in),
+      dispatcher(config_in),
       all_tokens(limits.all_requests_per_s, limits.all_requests_burst) {
   limits.clients_max = places_for_descriptors(limits.clients_max);
   limits.operator_places = std::min(limits.operator_places, limits.clients_max / 4);
@@ -297,7 +297,7 @@ void StatusServer::Parts::answer_one(ClientId id, ServedClient& client) {
   if (client.input.take(line) && !line.empty()) {
     ++statistics.requests;
     caller = client.user;
-    Answer answer = desk.answer(client.access, line);
+    Answer answer = dispatcher.answer(client.access, line);
     caller = -1;
     const auto later = std::move(answer.later);
     if (later && !later(answer)) {
@@ -374,7 +374,7 @@ void StatusServer::Parts::tell(ServedClient& client, std::map<std::string, std::
   if (client.missed > 0) text = missed_line(std::exchange(client.missed, 0));
   for (const std::string& name : client.subscription->methods) {
     auto line = lines.find(name);
-    if (line == lines.end()) line = lines.emplace(name, desk.notification(name)).first;
+    if (line == lines.end()) line = lines.emplace(name, dispatcher.notification(name)).first;
     text += line->second;
   }
   client.send(text, now);
@@ -466,7 +466,7 @@ StatusServer::StatusServer(const SocketConfig& config, const SocketLimits& limit
 StatusServer::~StatusServer() = default;
 
 void StatusServer::add_method(const std::string& name, AccessClass access, RpcHandler handler) {
-  parts_->desk.add_method(name, access, std::move(handler));
+  parts_->dispatcher.add_method(name, access, std::move(handler));
 }
 
 std::int64_t StatusServer::caller() const noexcept {
@@ -475,7 +475,7 @@ std::int64_t StatusServer::caller() const noexcept {
 
 void StatusServer::add_slow_method(const std::string& name, AccessClass access,
                                    RpcSlowHandler handler) {
-  parts_->desk.add_slow_method(name, access, std::move(handler));
+  parts_->dispatcher.add_slow_method(name, access, std::move(handler));
 }
 
 int StatusServer::fd() const noexcept {

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "gateway/feed/daemon_feed.hpp"
+#include "gateway/http/answer_thread.hpp"
 #include "gateway/http/request_rules.hpp"
-#include "gateway/http/work_desk.hpp"
 
 namespace thermocomp::gateway {
 

@@ -18,13 +18,13 @@
 
 #include "config/toml/toml_reader.hpp"
 #include "gateway/feed/page_state.hpp"
-#include "gateway/http/command_desk.hpp"
+#include "gateway/http/answer_thread.hpp"
 #include "gateway/http/event_streams.hpp"
 #include "gateway/http/history_answer.hpp"
+#include "gateway/http/page_commands.hpp"
 #include "gateway/http/password_file.hpp"
 #include "gateway/http/request_rules.hpp"
 #include "gateway/http/slow_connections.hpp"
-#include "gateway/http/work_desk.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp::gateway {
@@ -169,8 +169,8 @@ struct HttpServer::Parts {
                    MHD_Response* response);
   MHD_Result of_daemon(MHD_Connection* connection, json (*part)(const Snapshot&));
   MHD_Result history(MHD_Connection* connection, Request& request);
-  MHD_Result later(MHD_Connection* connection, Request& request, WorkDesk& desk,
-                   WorkDesk::Work work);
+  MHD_Result later(MHD_Connection* connection, Request& request, AnswerThread& answers,
+                   AnswerThread::Work work);
   MHD_Result stream(MHD_Connection* connection);
   [[nodiscard]] GatewayFigures figures() const;
 
@@ -179,10 +179,10 @@ struct HttpServer::Parts {
   const PageFiles& files;
   HostRules hosts;
   std::optional<PasswordFile> passwords;
-  CommandDesk commands;
+  PageCommands commands;
   AddFigures add_figures;
-  WorkDesk history_desk;
-  WorkDesk command_desk;  ///< of its own: nobody's charts are in the way of a command
+  AnswerThread history_answers;
+  AnswerThread page_commands;  ///< of its own: nobody's charts are in the way of a command
   EventStreams streams;
   json shown;  ///< the newest state; only of the feed's thread
   SlowConnections connections;
@@ -212,8 +212,8 @@ HttpServer::Parts::Parts(const GatewaySettings& settings_in, DaemonFeed& feed_in
 }
 
 HttpServer::Parts::~Parts() {
-  history_desk.stop();
-  command_desk.stop();
+  history_answers.stop();
+  page_commands.stop();
   streams.stop();
   if (daemon != nullptr) MHD_stop_daemon(daemon);
 }
@@ -343,11 +343,12 @@ MHD_Result HttpServer::Parts::post(MHD_Connection* connection, std::string_view 
   if (header(connection, MHD_HTTP_HEADER_CONTENT_TYPE) != json_type)
     return answer(connection, MHD_HTTP_UNSUPPORTED_MEDIA_TYPE, json_type,
                   error_text("the body must be application/json"));
-  return later(connection, request, command_desk, [this, user = request.user, body = request.body] {
-    JsonAnswer done = commands.take(user, body, *feed.newest());
-    if (done.status != MHD_HTTP_OK) ++refused;
-    return done;
-  });
+  return later(connection, request, page_commands,
+               [this, user = request.user, body = request.body] {
+                 JsonAnswer done = commands.take(user, body, *feed.newest());
+                 if (done.status != MHD_HTTP_OK) ++refused;
+                 return done;
+               });
 }
 
 MHD_Result HttpServer::Parts::of_daemon(MHD_Connection* connection, json (*part)(const Snapshot&)) {
@@ -366,19 +367,19 @@ MHD_Result HttpServer::Parts::history(MHD_Connection* connection, Request& reque
       parse_history_request(argument(connection, "from"), argument(connection, "to"),
                             argument(connection, "points"), static_cast<double>(now.tv_sec), why);
   if (!asked) return answer(connection, MHD_HTTP_BAD_REQUEST, json_type, error_text(why));
-  return later(connection, request, history_desk,
+  return later(connection, request, history_answers,
                [this, asked = *asked] { return history_answer(feed, asked); });
 }
 
-/// Called again with the answer, when the desk has it; before that nothing ends the connection.
-MHD_Result HttpServer::Parts::later(MHD_Connection* connection, Request& request, WorkDesk& desk,
-                                    WorkDesk::Work work) {
+/// Called again with the answer, when the answers has it; before that nothing ends the connection.
+MHD_Result HttpServer::Parts::later(MHD_Connection* connection, Request& request,
+                                    AnswerThread& answers, AnswerThread::Work work) {
   MHD_suspend_connection(connection);
   const auto done = [&request, connection](JsonAnswer made) {
     request.answer = std::move(made);
     MHD_resume_connection(connection);
   };
-  if (!desk.ask(std::move(work), done))
+  if (!answers.ask(std::move(work), done))
     done({MHD_HTTP_SERVICE_UNAVAILABLE, error_text("too many requests wait")});
   return MHD_YES;
 }

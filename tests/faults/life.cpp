@@ -69,7 +69,7 @@ class Life {
     for (nanoseconds& clock : world_.clocks) clock = std::max(clock, world_.now);
     twin_ = disk_ ? nullptr : std::make_unique<RecordedTwin>(grid_);
     if (disk_) disk_->boot(grid_, world_.now);
-    auto brain = make_brain();
+    auto parts = make_cycle_parts();
     world_.controller.daemon_starts();
     double leap_um = 0.0;
     if (kept_ && restarted_) {
@@ -79,15 +79,15 @@ class Life {
     } else if (kept_) {
       static_cast<void>(kept_->boot(shape_));
     }
-    const auto refused = brain->estimator.restore(saved_);
+    const auto refused = parts->estimator.restore(saved_);
     judge_.demand(refused.empty(), "state_survives_restart", world_.now, "a reference was refused");
-    report_ = brain->estimator.make_report();
+    report_ = parts->estimator.make_report();
     judge_.booted(world_.now, leap_um);
     // The very first value becomes the reference; a later start has one already.
     if (!restarted_) world_.thermocouples.no_spikes_before(world_.now + std::chrono::seconds(15));
     if (restarted_)
       judge_.restored(saved_, report_, shape_.model.temperature_columns(), world_.now);
-    SimulatedDaemon daemon(shape_, world_, grid_, std::move(brain),
+    SimulatedDaemon daemon(shape_, world_, grid_, std::move(parts),
                            kept_ ? kept_->record() : nullptr);
     daemon_ = &daemon;
     std::uint64_t cycle = daemon.cycle().begin(world_.now);
@@ -104,11 +104,11 @@ class Life {
     wait_for_restart();
   }
 
-  std::unique_ptr<CycleBrain> make_brain() {
-    auto brain = std::make_unique<CycleBrain>(Estimator(shape_.estimator, shape_.model));
-    brain->recorder =
-        disk_ ? disk_->make_recorder(brain->estimator) : twin_->make_recorder(brain->estimator);
-    return brain;
+  std::unique_ptr<CycleParts> make_cycle_parts() {
+    auto parts = std::make_unique<CycleParts>(Estimator(shape_.estimator, shape_.model));
+    parts->recorder =
+        disk_ ? disk_->make_recorder(parts->estimator) : twin_->make_recorder(parts->estimator);
+    return parts;
   }
 
   void step(std::uint64_t cycle) {
@@ -117,7 +117,7 @@ class Life {
     if (main_works) serve();
     daemon_->cycle().step(cycle);
     if (main_works) static_cast<void>(daemon_->cycle().take_retired());
-    daemon_->cycle().brain().estimator.report(report_);
+    daemon_->cycle().parts().estimator.report(report_);
     world_.controller.advance(world_.now);
     const CycleSeen seen{world_.now,
                          daemon_->readings(),
@@ -202,7 +202,7 @@ class Life {
   }
 
   void end_kept(bool in_order) {
-    const PersistentState then = daemon_->cycle().brain().estimator.persistent_state(report_);
+    const PersistentState then = daemon_->cycle().parts().estimator.persistent_state(report_);
     if (in_order) return kept_->end(then);
     if (!power_was_cut_) return kept_->kill();
     kept_->cut_power();
@@ -340,9 +340,9 @@ class Life {
     refuse_broken_model();
     shape_.change_for_reload(chance_);
     judge_.reloaded(shape_);
-    auto brain = make_brain();
-    brain->estimator.plan_adoption(daemon_->cycle().brain().estimator);
-    daemon_->cycle().hand_over(std::move(brain));
+    auto parts = make_cycle_parts();
+    parts->estimator.plan_adoption(daemon_->cycle().parts().estimator);
+    daemon_->cycle().hand_over(std::move(parts));
   }
 
   void refuse_broken_model() {
@@ -368,7 +368,7 @@ class Life {
 
   /// As the daemon does: switches and references at once, offsets every 10 s.
   void save_state() {
-    const PersistentState state = daemon_->cycle().brain().estimator.persistent_state(report_);
+    const PersistentState state = daemon_->cycle().parts().estimator.persistent_state(report_);
     if (kept_) {
       const bool waits = std::any_of(report_.axes.begin(), report_.axes.end(),
                                      [](const AxisReport& axis) { return axis.waits_for_disk; });

@@ -50,13 +50,13 @@ void SteppedLink::newest(ControllerState& state) noexcept {
 }
 
 SimulatedDaemon::SimulatedDaemon(const MachineShape& shape, World& world, const Grid& grid,
-                                 std::unique_ptr<CycleBrain> brain, LastSent* last_sent)
+                                 std::unique_ptr<CycleParts> parts, LastSent* last_sent)
     : readings_(sensors_count),
       sources_{std::make_unique<SteppedSource>(shape.buses[0], 0, world),
                std::make_unique<SteppedSource>(shape.buses[1], 1, world)},
       tap_(readings_),
       link_(shape.controller, world),
       cycle_(grid, {sources_[0].get(), sources_[1].get(), &tap_}, link_, sensors_count,
-             std::move(brain), last_sent) {}
+             std::move(parts), last_sent) {}
 
 }  // namespace thermocomp::faults

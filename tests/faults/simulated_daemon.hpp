@@ -99,7 +99,7 @@ class ReadingsTap final : public SensorSource {
 class SimulatedDaemon {
  public:
   SimulatedDaemon(const MachineShape& shape, World& world, const Grid& grid,
-                  std::unique_ptr<CycleBrain> brain, LastSent* last_sent);
+                  std::unique_ptr<CycleParts> parts, LastSent* last_sent);
 
   [[nodiscard]] Cycle& cycle() noexcept { return cycle_; }
   [[nodiscard]] SteppedLink& link() noexcept { return link_; }

@@ -9,8 +9,8 @@
 
 #include "common/fuzz.hpp"
 #include "common/recorded_history.hpp"
-#include "daemon/desks/bridge_desk.hpp"
-#include "daemon/socket/request_desk.hpp"
+#include "daemon/methods/bridge_methods.hpp"
+#include "daemon/socket/rpc_dispatcher.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
 using namespace thermocomp;
@@ -47,13 +47,13 @@ class Daemon {
       : config_(config),
         places_(std::get<BridgeControllerConfig>(config.controller)),
         bridge_(places_, []() noexcept { return clock_now; }),
-        desk_(config.socket),
+        dispatcher_(config.socket),
         estimator_(config.estimator, config.model),
         readings_(config.estimator.sensors.size()),
         report_(estimator_.make_report()) {
     clock_now = 1h;
     bridge_.start();
-    desk_.add_method("controller_state", AccessClass::bridge, [this](const json& params) {
+    dispatcher_.add_method("controller_state", AccessClass::bridge, [this](const json& params) {
       json result = answer_bridge(bridge_, places_, to_string(report_.mode), params);
       check_taken(params, result);
       return result;
@@ -64,7 +64,7 @@ class Daemon {
   void take(std::string_view line) {
     const ControllerState before = state();
     results_ = 0;
-    const Answer answer = desk_.answer({true, true, true}, line);
+    const Answer answer = dispatcher_.answer({true, true, true}, line);
     check_line(answer);
     // What is refused has changed nothing.
     if (results_ == 0) {
@@ -152,7 +152,7 @@ class Daemon {
   const DaemonConfig& config_;
   const BridgeControllerConfig places_;
   BridgeController bridge_;
-  RequestDesk desk_;
+  RpcDispatcher dispatcher_;
   Estimator estimator_;
   std::vector<Reading> readings_;
   Report report_;

@@ -448,11 +448,11 @@ def dictionaries(folder):
                             "45992.5", "sep=;", '"', "NA", " PM", "\xef\xbb\xbf"})
     dictionary(folder, "socket_request", {'{"jsonrpc":"2.0","id":1,"method":"', '"params":{', "}\n", "\xff",
                                   "\r\n", "1e999", "null", '\\ud800'} |
-               literals("daemon/desks/operator_desk.cpp", "daemon/socket/*.cpp"))
+               literals("daemon/methods/operator_methods.cpp", "daemon/socket/*.cpp"))
     dictionary(folder, "controller_state", {'{"jsonrpc":"2.0","id":1,"method":"controller_state",',
                                     '"params":{', "}}\n", "\xff", "1e9", "null", "true",
                                     '"z_mm"', '"cutting_on"', '"z"'} |
-               literals("daemon/desks/bridge_desk.cpp"))
+               literals("daemon/methods/bridge_methods.cpp"))
     dictionary(folder, "bridge_answer", {"1e308", "null", "true", '"x"'} |
                literals("linuxcnc/messages.cpp"))
     dictionary(folder, "daemon_answer", {"1e308", "null", "true", "_0x20", "\\u202e"} |

@@ -15,7 +15,7 @@
 
 #include "common/fuzz.hpp"
 #include "common/recorded_history.hpp"
-#include "daemon/desks/operator_desk.hpp"
+#include "daemon/methods/operator_methods.hpp"
 #include "daemon/socket/status_server.hpp"
 #include "estimator/pipeline/estimator.hpp"
 
@@ -31,9 +31,9 @@ constexpr std::uint8_t waits = 0xFF;  ///< is no part of UTF-8: here the client 
 
 /// A daemon without threads: commands are checked and reach an estimator that corrects itself by
 /// probings and follows cycle ends.
-class Desk {
+class Rig {
  public:
-  Desk()
+  Rig()
       : file_("status.sock"),
         config_(with_socket(file_.path())),
         estimator_(config_.estimator, config_.model),
@@ -145,22 +145,22 @@ class Client {
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  void send(std::span<const std::uint8_t> bytes, Desk& desk) {
+  void send(std::span<const std::uint8_t> bytes, Rig& rig) {
     while (!bytes.empty()) {
       const ssize_t count = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
       if (count < 0 && errno != EAGAIN) return;  // the daemon has cut us off
       if (count > 0) bytes = bytes.subspan(static_cast<std::size_t>(count));
-      desk.server().handle(milliseconds(0));
+      rig.server().handle(milliseconds(0));
       receive();
     }
-    desk.server().handle(milliseconds(0));
+    rig.server().handle(milliseconds(0));
     receive();
   }
   /// The server then answers what is left, a request a round, and closes unless we subscribed.
-  void end_input(Desk& desk, std::size_t rounds) {
+  void end_input(Rig& rig, std::size_t rounds) {
     shutdown(fd_, SHUT_WR);
     for (std::size_t i = 0; i < rounds && !closed_; ++i) {
-      desk.server().handle(milliseconds(0));
+      rig.server().handle(milliseconds(0));
       receive();
     }
   }
@@ -207,35 +207,35 @@ void check_answers(const std::string& text) {
   FUZZ_PROMISE(begin == text.size());
 }
 
-void check_next_client(Desk& desk) {
-  Client client(desk.path());
-  desk.server().handle(milliseconds(0));
+void check_next_client(Rig& rig) {
+  Client client(rig.path());
+  rig.server().handle(milliseconds(0));
   const std::string ask = "{\"jsonrpc\":\"2.0\",\"id\":7,\"method\":\"offsets\"}\n";
-  client.send({reinterpret_cast<const std::uint8_t*>(ask.data()), ask.size()}, desk);
+  client.send({reinterpret_cast<const std::uint8_t*>(ask.data()), ask.size()}, rig);
   FUZZ_PROMISE(client.received().find("\"result\"") != std::string::npos);
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static Desk desk;
+  static Rig rig;
   static unsigned inputs = 0;
   std::span<const std::uint8_t> bytes(data, size);
   {
-    Client client(desk.path());
-    desk.server().handle(milliseconds(0));
+    Client client(rig.path());
+    rig.server().handle(milliseconds(0));
     while (!bytes.empty()) {
       const auto end = std::find(bytes.begin(), bytes.end(), waits);
       const auto length = static_cast<std::size_t>(end - bytes.begin());
-      client.send(bytes.first(length), desk);
+      client.send(bytes.first(length), rig);
       bytes = bytes.subspan(std::min(length + 1, bytes.size()));
     }
     const auto lines = std::count(data, data + size, std::uint8_t{'\n'});
-    client.end_input(desk, 8 + 2 * static_cast<std::size_t>(lines));
+    client.end_input(rig, 8 + 2 * static_cast<std::size_t>(lines));
     check_answers(client.received());
   }
-  for (int i = 0; i < 8; ++i) desk.server().handle(milliseconds(0));
-  FUZZ_PROMISE(desk.server().statistics().clients == 0);
-  if (++inputs % 16 == 0) check_next_client(desk);
+  for (int i = 0; i < 8; ++i) rig.server().handle(milliseconds(0));
+  FUZZ_PROMISE(rig.server().statistics().clients == 0);
+  if (++inputs % 16 == 0) check_next_client(rig);
   return 0;
 }

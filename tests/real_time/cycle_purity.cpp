@@ -227,15 +227,15 @@ int main(int argc, char** argv) {
   history_config.file = std::filesystem::path(folder) / "history.db";
   history_config.commit_s = 0.5;
   HistoryWriter history(history_config, grid, "test");
-  const auto make_brain = [&](double gain_um_per_K) {
-    auto brain = std::make_unique<CycleBrain>(Estimator(make_config(), make_model(gain_um_per_K)));
-    brain->recorder = history.make_recorder({"", "", ""}, brain->estimator);
-    return brain;
+  const auto make_cycle_parts = [&](double gain_um_per_K) {
+    auto parts = std::make_unique<CycleParts>(Estimator(make_config(), make_model(gain_um_per_K)));
+    parts->recorder = history.make_recorder({"", "", ""}, parts->estimator);
+    return parts;
   };
   // In memory, as /run is.
   const std::string record = "/dev/shm/cycle_purity_" + std::to_string(getpid());
   LastSent last_sent(record, "none", make_config().axes);
-  Cycle cycle(grid, {&probe, &line}, controller, sensors, make_brain(2.0), &last_sent);
+  Cycle cycle(grid, {&probe, &line}, controller, sensors, make_cycle_parts(2.0), &last_sent);
   history.start();
   line.start();
   controller.start();
@@ -248,8 +248,8 @@ int main(int argc, char** argv) {
   // Main does its part meanwhile: commands, a reload, reading reports.
   std::this_thread::sleep_for(2s);
   bool sent = cycle.send({CommandKind::disable, 0, 0.0}).has_value();
-  auto next = make_brain(3.0);
-  next->estimator.plan_adoption(cycle.brain().estimator);
+  auto next = make_cycle_parts(3.0);
+  next->estimator.plan_adoption(cycle.parts().estimator);
   cycle.hand_over(std::move(next));
   std::this_thread::sleep_for(1s);
   const bool reloaded = cycle.take_retired() != nullptr;

@@ -46,16 +46,16 @@ ThermalModel model(const std::vector<std::string>& axes, double gain_um_per_K) {
 struct SteppedCycle {
   explicit SteppedCycle(const std::vector<std::string>& axes = {"z"})
       : controller({"none", axes.size()}),
-        cycle(grid, {&source}, controller, 1, brain(1.0, axes)),
+        cycle(grid, {&source}, controller, 1, parts(1.0, axes)),
         next(cycle.begin(grid.start)) {
     step();
   }
-  static std::unique_ptr<CycleBrain> brain(double gain, const std::vector<std::string>& axes) {
-    return std::make_unique<CycleBrain>(Estimator(machine(axes), model(axes, gain)));
+  static std::unique_ptr<CycleParts> parts(double gain, const std::vector<std::string>& axes) {
+    return std::make_unique<CycleParts>(Estimator(machine(axes), model(axes, gain)));
   }
-  std::unique_ptr<CycleBrain> next_brain(double gain,
+  std::unique_ptr<CycleParts> next_parts(double gain,
                                          const std::vector<std::string>& axes = {"z"}) {
-    auto made = brain(gain, axes);
+    auto made = parts(gain, axes);
     made->estimator.plan_adoption(handle.estimator());
     return made;
   }
@@ -128,21 +128,22 @@ TEST_CASE("a command that is not taken in time is withdrawn for good", "[cycle]"
   CHECK(stepped.done.empty());
 }
 
-TEST_CASE("a brain that is not taken in time is withdrawn, and the next one is taken", "[cycle]") {
+TEST_CASE("new parts that is not taken in time is withdrawn, and the next one is taken",
+          "[cycle]") {
   SteppedCycle stepped;
-  auto late = stepped.handle.replace(stepped.next_brain(2.0), stepped.now);
+  auto late = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);
   CHECK(stepped.handle.replacing());
   stepped.handle.poll(stepped.now + CycleHandle::patience);
   CHECK(*late == Outcome::withdrawn);
   CHECK_FALSE(stepped.handle.replacing());
   for (int i = 0; i < 20; ++i) stepped.step();
   CHECK(stepped.gain() == 1.0);
-  // What follows is told by, and done to, the brain that runs.
+  // What follows is told by, and done to, the parts that runs.
   REQUIRE(stepped.handle.send(disable, stepped.now));
   stepped.step();
   stepped.handle.poll(stepped.now);
   CHECK_FALSE(stepped.handle.report().enabled);
-  auto again = stepped.handle.replace(stepped.next_brain(3.0), stepped.now);
+  auto again = stepped.handle.replace(stepped.next_parts(3.0), stepped.now);
   stepped.step();
   stepped.handle.poll(stepped.now);
   CHECK(*again == Outcome::done);
@@ -152,31 +153,32 @@ TEST_CASE("a brain that is not taken in time is withdrawn, and the next one is t
 
 TEST_CASE("a change-over that main sees late is finished late, not left half done", "[cycle]") {
   SteppedCycle stepped;
-  auto outcome = stepped.handle.replace(stepped.next_brain(2.0), stepped.now);
+  auto outcome = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);
   stepped.step();
-  // Until main looks, configuration and reports are those of the old brain.
+  // Until main looks, configuration and reports are those of the old parts.
   CHECK(stepped.gain() == 1.0);
   stepped.handle.poll(stepped.now + 10 * CycleHandle::patience);
   CHECK(*outcome == Outcome::done);
   CHECK(stepped.gain() == 2.0);
 }
 
-TEST_CASE("a command of the step in which the brain changes is reported by the new one",
+TEST_CASE("a command of the step in which the parts changes is reported by the new one",
           "[cycle]") {
   SteppedCycle stepped;
-  auto brain = stepped.handle.replace(stepped.next_brain(2.0), stepped.now);
+  auto parts = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);
   auto command = stepped.handle.send(disable, stepped.now);
   stepped.step();
   stepped.handle.poll(stepped.now);
-  CHECK(*brain == Outcome::done);
+  CHECK(*parts == Outcome::done);
   CHECK(*command == Outcome::done);
   CHECK_FALSE(stepped.handle.estimator().persistent_state(stepped.handle.report()).enabled);
 }
 
-TEST_CASE("a brain waits for commands that name an axis: it may number them otherwise", "[cycle]") {
+TEST_CASE("new parts waits for commands that name an axis: it may number them otherwise",
+          "[cycle]") {
   SteppedCycle stepped({"y", "z"});
   const auto command = stepped.handle.send(measured, stepped.now);  // of y
-  auto brain = stepped.handle.replace(stepped.next_brain(2.0, {"z", "y"}), stepped.now);
+  auto parts = stepped.handle.replace(stepped.next_parts(2.0, {"z", "y"}), stepped.now);
   stepped.step();
   CHECK(stepped.gain() == 1.0);
   stepped.handle.poll(stepped.now);
@@ -184,7 +186,7 @@ TEST_CASE("a brain waits for commands that name an axis: it may number them othe
   CHECK(stepped.handle.report().axes[0].measured_um == 3.0);
   stepped.step();
   stepped.handle.poll(stepped.now);
-  CHECK(*brain == Outcome::done);
+  CHECK(*parts == Outcome::done);
   CHECK(stepped.handle.report().axes[1].measured_um == 3.0);
 }
 
@@ -208,15 +210,15 @@ TEST_CASE("more commands than the queue has places are refused, not lost", "[cyc
 TEST_CASE("after the cycle's end all that it did is done, and nothing else", "[cycle]") {
   SteppedCycle stepped;
   const auto taken = stepped.handle.send(disable, stepped.now);
-  auto brain = stepped.handle.replace(stepped.next_brain(2.0), stepped.now);
+  auto parts = stepped.handle.replace(stepped.next_parts(2.0), stepped.now);
   stepped.step();
   const auto left = stepped.handle.send({CommandKind::enable, 0, 0.0}, stepped.now);
   stepped.handle.settle();
   CHECK(*taken == Outcome::done);
-  CHECK(*brain == Outcome::done);
+  CHECK(*parts == Outcome::done);
   CHECK(*left == Outcome::withdrawn);
   CHECK_FALSE(stepped.handle.report().enabled);
-  auto unused = stepped.handle.replace(stepped.next_brain(3.0), stepped.now);
+  auto unused = stepped.handle.replace(stepped.next_parts(3.0), stepped.now);
   stepped.handle.settle();
   CHECK(*unused == Outcome::withdrawn);
   CHECK(stepped.gain() == 2.0);

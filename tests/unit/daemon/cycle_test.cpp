@@ -69,8 +69,8 @@ ThermalModel one_input(double gain_um_per_K) {
   return model;
 }
 
-std::unique_ptr<CycleBrain> brain(double gain_um_per_K) {
-  return std::make_unique<CycleBrain>(Estimator(one_sensor(), one_input(gain_um_per_K)));
+std::unique_ptr<CycleParts> parts(double gain_um_per_K) {
+  return std::make_unique<CycleParts>(Estimator(one_sensor(), one_input(gain_um_per_K)));
 }
 
 /// A cycle of 10 ms on a thread of its own, ended with the scope.
@@ -78,7 +78,7 @@ struct RunningCycle {
   SlowSource source;
   DryRunController controller{{"none", 1}};
   Grid grid{std::chrono::steady_clock::now().time_since_epoch(), 10ms};
-  Cycle cycle{grid, {&source}, controller, 1, brain(1.0)};
+  Cycle cycle{grid, {&source}, controller, 1, parts(1.0)};
   std::thread thread;
 
   RunningCycle() {
@@ -165,7 +165,7 @@ TEST_CASE("what is noted at the end stands before the cycles that were skipped b
   DryRunController controller{{"none", 1}};
   const Grid grid{1h, 10ms};
   RecordRing ring{256};
-  auto recorded = brain(1.0);
+  auto recorded = parts(1.0);
   recorded->recorder = std::make_unique<CycleRecorder>(ring, std::make_shared<RecordingSession>(),
                                                        grid, 1s, recorded->estimator);
   Cycle cycle{grid, {}, controller, 1, std::move(recorded)};
@@ -191,18 +191,18 @@ TEST_CASE("what is noted at the end stands before the cycles that were skipped b
   CHECK(skipped == (goes_on ? std::vector<std::uint64_t>{2} : std::vector<std::uint64_t>{}));
 }
 
-TEST_CASE("a handed over brain takes the place of the old one at once and bumpless", "[cycle]") {
+TEST_CASE("a handed over parts takes the place of the old one at once and bumpless", "[cycle]") {
   RunningCycle running;
   REQUIRE(running.eventually([&] { return running.cycle.report().cycle > 0; }));
   REQUIRE(running.cycle.send({CommandKind::disable, 0, 0.0}));
   REQUIRE(running.eventually([&] { return running.cycle.report().mode == Mode::disabled; }));
-  auto next = brain(2.0);
-  next->estimator.plan_adoption(running.cycle.brain().estimator);
+  auto next = parts(2.0);
+  next->estimator.plan_adoption(running.cycle.parts().estimator);
   running.cycle.hand_over(std::move(next));
-  std::unique_ptr<CycleBrain> retired;
+  std::unique_ptr<CycleParts> retired;
   REQUIRE(running.eventually([&] { return (retired = running.cycle.take_retired()) != nullptr; }));
   CHECK(retired->estimator.model().matrix_um_per_K[0][0] == 1.0);
-  CHECK(running.cycle.brain().estimator.model().matrix_um_per_K[0][0] == 2.0);
+  CHECK(running.cycle.parts().estimator.model().matrix_um_per_K[0][0] == 2.0);
   // The operator's switch and the reference are the machine's, not the configuration's.
   CHECK(running.cycle.report().mode == Mode::disabled);
   CHECK(running.cycle.report().inputs[0].reference_degC == 20.0);
@@ -224,7 +224,7 @@ struct WarmingMachine {
     double temp_degC{20.0};
     nanoseconds now{};
   };
-  explicit WarmingMachine(std::unique_ptr<CycleBrain> made, nanoseconds pitch = 2h,
+  explicit WarmingMachine(std::unique_ptr<CycleParts> made, nanoseconds pitch = 2h,
                           double rise_K = 0.125)
       : grid{1h, pitch}, cycle(grid, {&source}, controller, 1, std::move(made)) {
     source.rise_K = rise_K;
@@ -251,17 +251,17 @@ struct WarmingMachine {
   std::uint64_t next{0};
 };
 
-std::unique_ptr<CycleBrain> contested(double gain, double candidate_gain, double pair = 1.0) {
+std::unique_ptr<CycleParts> contested(double gain, double candidate_gain, double pair = 1.0) {
   EstimatorConfig config = one_sensor();
   config.correction.measured = MeasuredMeaning::total;
   config.sensors[0].smoothing.form = SmoothingForm::off;
-  auto made = std::make_unique<CycleBrain>(Estimator(config, one_input(gain)));
+  auto made = std::make_unique<CycleParts>(Estimator(config, one_input(gain)));
   made->candidate = std::make_unique<Candidate>(config, one_input(candidate_gain), pair);
   return made;
 }
 
-double better(CycleBrain& brain) {
-  return ModelContest::chances(brain.candidate->score()).better;
+double better(CycleParts& parts) {
+  return ModelContest::chances(parts.candidate->score()).better;
 }
 
 }  // namespace
@@ -279,7 +279,7 @@ TEST_CASE("a candidate changes no bit of what is sent", "[cycle][candidate]") {
     beside.probe();
   }
   CHECK(alone.step() < -3.0);
-  CHECK(beside.cycle.brain().candidate->score()[0].probings == 40.0);
+  CHECK(beside.cycle.parts().candidate->score()[0].probings == 40.0);
 }
 
 TEST_CASE("each probing scores the model and the candidate", "[cycle][candidate]") {
@@ -288,11 +288,11 @@ TEST_CASE("each probing scores the model and the candidate", "[cycle][candidate]
     machine.step(2);
     machine.probe();
   }
-  const ModelContest::AxisScore score = machine.cycle.brain().candidate->score()[0];
+  const ModelContest::AxisScore score = machine.cycle.parts().candidate->score()[0];
   CHECK(score.probings == 20.0);
   // Off by 1 and by 0.1 um/K, at the same temperatures.
   CHECK(score.model_um2 == Approx(100.0 * score.candidate_um2));
-  CHECK(better(machine.cycle.brain()) > 0.99);
+  CHECK(better(machine.cycle.parts()) > 0.99);
 }
 
 TEST_CASE("a score outlives restart and reload, and counts for its two models only",
@@ -302,7 +302,7 @@ TEST_CASE("a score outlives restart and reload, and counts for its two models on
     machine.step(2);
     machine.probe();
   }
-  CycleBrain& first = machine.cycle.brain();
+  CycleParts& first = machine.cycle.parts();
   const double said = better(first);
   REQUIRE(said > 0.5);
   PersistentState state = first.estimator.persistent_state(machine.cycle.report());
@@ -320,10 +320,10 @@ TEST_CASE("a score outlives restart and reload, and counts for its two models on
   machine.cycle.hand_over(std::move(reloaded));
   machine.step();
   REQUIRE(machine.cycle.take_retired() != nullptr);
-  CHECK(better(machine.cycle.brain()) == Approx(expected));
+  CHECK(better(machine.cycle.parts()) == Approx(expected));
   // It knows the machine's reference: its errors go on to be none.
   machine.probe();
-  CHECK(machine.cycle.brain().candidate->score()[0].candidate_um2 == Approx(0.0).margin(1e-9));
+  CHECK(machine.cycle.parts().candidate->score()[0].candidate_um2 == Approx(0.0).margin(1e-9));
 }
 
 TEST_CASE("a system that refuses to sleep is counted, and no cycle runs ahead of time", "[cycle]") {

@@ -40,8 +40,8 @@ DaemonConfig machine_config(const std::filesystem::path& folder) {
 }
 
 /// A daemon whose cycle steps when the test says so.
-struct Desk {
-  explicit Desk(bool reference_lost = false)
+struct Rig {
+  explicit Rig(bool reference_lost = false)
       : keeper(config.state_file, {}, true, reference_lost), next(cycle.begin(grid.start)) {
     step();
   }
@@ -71,7 +71,7 @@ struct Desk {
   Grid grid{1h, 10ms};
   StateKeeper keeper;
   ServiceManager service;
-  Cycle cycle{grid, {&source}, controller, 3, make_brain(config, nullptr)};
+  Cycle cycle{grid, {&source}, controller, 3, make_cycle_parts(config, nullptr)};
   std::uint64_t next;
   Operations operations{{config, cycle, keeper, service, nullptr, [] { return std::string(); }}};
 };
@@ -79,59 +79,59 @@ struct Desk {
 }  // namespace
 
 TEST_CASE("done means on disk", "[daemon]") {
-  Desk desk;
-  CHECK(desk.give(CommandKind::disable) == nlohmann::json{{"done", true}});
-  CHECK(desk.on_disk().found);
-  CHECK_FALSE(desk.on_disk().state.enabled);
-  CHECK(desk.give(CommandKind::enable) == nlohmann::json{{"done", true}});
-  CHECK(desk.on_disk().state.enabled);
+  Rig rig;
+  CHECK(rig.give(CommandKind::disable) == nlohmann::json{{"done", true}});
+  CHECK(rig.on_disk().found);
+  CHECK_FALSE(rig.on_disk().state.enabled);
+  CHECK(rig.give(CommandKind::enable) == nlohmann::json{{"done", true}});
+  CHECK(rig.on_disk().state.enabled);
 }
 
 TEST_CASE("a command that cannot be saved is not called done", "[daemon]") {
-  Desk desk;
-  std::filesystem::create_directory(desk.config.state_file.string() + ".new");
-  CHECK_THROWS_WITH(desk.give(CommandKind::disable), Catch::Contains("carried out, but not saved"));
+  Rig rig;
+  std::filesystem::create_directory(rig.config.state_file.string() + ".new");
+  CHECK_THROWS_WITH(rig.give(CommandKind::disable), Catch::Contains("carried out, but not saved"));
 }
 
 TEST_CASE("while the reference is lost nothing is switched on before one is taken", "[daemon]") {
-  Desk desk(true);
-  CHECK_THROWS_WITH(desk.operations.command({CommandKind::enable, 0, 0.0}),
+  Rig rig(true);
+  CHECK_THROWS_WITH(rig.operations.command({CommandKind::enable, 0, 0.0}),
                     Catch::Contains("thermocomp reference"));
-  CHECK(desk.give(CommandKind::reference) == nlohmann::json{{"done", true}});
-  CHECK_FALSE(desk.on_disk().reference_lost);
-  CHECK(desk.give(CommandKind::enable) == nlohmann::json{{"done", true}});
+  CHECK(rig.give(CommandKind::reference) == nlohmann::json{{"done", true}});
+  CHECK_FALSE(rig.on_disk().reference_lost);
+  CHECK(rig.give(CommandKind::enable) == nlohmann::json{{"done", true}});
 }
 
 TEST_CASE("a reload that cannot be read leaves everything as it is", "[daemon]") {
-  Desk desk;
-  CHECK_THROWS_AS(Desk::answer(desk.operations.reload()), ConfigurationError);
-  desk.operations.hang_up();  // the same, for the log
-  CHECK_FALSE(desk.operations.is_busy());
-  CHECK(desk.give(CommandKind::disable) == nlohmann::json{{"done", true}});
+  Rig rig;
+  CHECK_THROWS_AS(Rig::answer(rig.operations.reload()), ConfigurationError);
+  rig.operations.hang_up();  // the same, for the log
+  CHECK_FALSE(rig.operations.is_busy());
+  CHECK(rig.give(CommandKind::disable) == nlohmann::json{{"done", true}});
 }
 
 TEST_CASE("nobody has to ask for what was commanded to be saved", "[daemon]") {
-  Desk desk;
-  static_cast<void>(desk.operations.command({CommandKind::disable, 0, 0.0}));
-  desk.step();
-  desk.operations.poll();
-  REQUIRE(desk.keeper.wait(20s));
-  CHECK_FALSE(desk.on_disk().state.enabled);
+  Rig rig;
+  static_cast<void>(rig.operations.command({CommandKind::disable, 0, 0.0}));
+  rig.step();
+  rig.operations.poll();
+  REQUIRE(rig.keeper.wait(20s));
+  CHECK_FALSE(rig.on_disk().state.enabled);
 }
 
 TEST_CASE("when and by whom the reference was taken is on disk with it", "[daemon]") {
-  Desk desk;
-  desk.operations.save_state(false);
-  REQUIRE(desk.keeper.wait(20s));
-  const ReferenceRecord first = desk.on_disk().reference;
+  Rig rig;
+  rig.operations.save_state(false);
+  REQUIRE(rig.keeper.wait(20s));
+  const ReferenceRecord first = rig.on_disk().reference;
   CHECK(first.origin == ReferenceOrigin::first_values);
   CHECK(first.is_known());
   // At the very same temperatures it is a reference of another moment all the same.
-  desk.give(CommandKind::reference);
-  const ReferenceRecord second = desk.on_disk().reference;
+  rig.give(CommandKind::reference);
+  const ReferenceRecord second = rig.on_disk().reference;
   CHECK(second.origin == ReferenceOrigin::command);
   CHECK(second.wall_s >= first.wall_s);
-  desk.operations.save_state(true);
-  REQUIRE(desk.keeper.wait(20s));
-  CHECK(desk.on_disk().reference.wall_s == second.wall_s);
+  rig.operations.save_state(true);
+  REQUIRE(rig.keeper.wait(20s));
+  CHECK(rig.on_disk().reference.wall_s == second.wall_s);
 }

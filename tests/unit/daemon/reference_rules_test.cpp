@@ -1,5 +1,5 @@
 // When a reference may be taken.
-#include "daemon/desks/reference_rules.hpp"
+#include "daemon/methods/reference_rules.hpp"
 
 #include <catch2/catch.hpp>
 

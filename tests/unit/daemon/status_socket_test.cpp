@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 
 #include "daemon/socket/peer_access.hpp"
-#include "daemon/socket/request_desk.hpp"
+#include "daemon/socket/rpc_dispatcher.hpp"
 #include "daemon/socket/status_client.hpp"
 #include "socket_fixture.hpp"
 
@@ -281,18 +281,18 @@ TEST_CASE("of daemons started at once exactly one has the socket", "[socket]") {
   CHECK(listening == 1);
 }
 
-TEST_CASE("a request desk answers bytes without any socket", "[socket]") {
-  RequestDesk desk(SocketConfig{});
-  desk.add_method("status", AccessClass::read, [](const json&) { return json("good"); });
+TEST_CASE("a request rig answers bytes without any socket", "[socket]") {
+  RpcDispatcher rig(SocketConfig{});
+  rig.add_method("status", AccessClass::read, [](const json&) { return json("good"); });
   const PeerAccess reader{true, false, false};
   const auto answered = [&](const char* line) {
-    return json::parse(desk.answer(reader, line).text, nullptr, false);
+    return json::parse(rig.answer(reader, line).text, nullptr, false);
   };
   CHECK(answered(R"({"jsonrpc":"2.0","id":"a","method":"status"})")["result"] == "good");
   CHECK(answered(R"({"jsonrpc":"2.0","id":-1.5,"method":"status"})")["id"] == -1.5);
   CHECK(answered(R"({"jsonrpc":"2.0","id":null,"method":"status"})")["result"] == "good");
-  CHECK(desk.answer(reader, R"({"jsonrpc":"2.0","method":"status"})").text.empty());
-  CHECK(desk.answer(reader, R"({"jsonrpc":"2.0","method":"nothing"})").text.empty());
-  CHECK_FALSE(desk.answer(reader, R"({"jsonrpc":"2.0"})").text.empty());
-  CHECK(desk.answer({}, R"({"jsonrpc":"2.0","id":1,"method":"status"})").is_error);
+  CHECK(rig.answer(reader, R"({"jsonrpc":"2.0","method":"status"})").text.empty());
+  CHECK(rig.answer(reader, R"({"jsonrpc":"2.0","method":"nothing"})").text.empty());
+  CHECK_FALSE(rig.answer(reader, R"({"jsonrpc":"2.0"})").text.empty());
+  CHECK(rig.answer({}, R"({"jsonrpc":"2.0","id":1,"method":"status"})").is_error);
 }

@@ -10,7 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "gateway/feed/snapshot.hpp"
-#include "gateway/http/work_desk.hpp"
+#include "gateway/http/answer_thread.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 
 namespace thermocomp::gateway {
@@ -22,13 +22,13 @@ struct CommandRequest {
   double value_um{not_a_number};
 };
 
-class CommandDesk {
+class PageCommands {
  public:
   static constexpr std::chrono::seconds confirmation_max{60};
   /// Of one user; beyond them the oldest of the same user counts no more.
   static constexpr std::size_t confirmations_max = 4;
 
-  explicit CommandDesk(const GatewaySettings& settings);
+  explicit PageCommands(const GatewaySettings& settings);
 
   /// {"user", "commands": ["enable", ...]}: what this user may ask for.
   [[nodiscard]] nlohmann::json offered(const std::string& user) const;

@@ -1,4 +1,4 @@
-#include "gateway/http/work_desk.hpp"
+#include "gateway/http/answer_thread.hpp"
 
 #include <condition_variable>
 #include <deque>
@@ -8,7 +8,7 @@
 
 namespace thermocomp::gateway {
 
-struct WorkDesk::Parts {
+struct AnswerThread::Parts {
   struct Job {
     Work work;
     Done done;
@@ -22,7 +22,7 @@ struct WorkDesk::Parts {
   std::thread thread;
 };
 
-void WorkDesk::Parts::run() {
+void AnswerThread::Parts::run() {
   for (;;) {
     std::unique_lock lock(mutex);
     changed.wait(lock, [this] { return stops || !jobs.empty(); });
@@ -36,15 +36,15 @@ void WorkDesk::Parts::run() {
   }
 }
 
-WorkDesk::WorkDesk() : parts_(std::make_unique<Parts>()) {
+AnswerThread::AnswerThread() : parts_(std::make_unique<Parts>()) {
   parts_->thread = std::thread([this] { parts_->run(); });
 }
 
-WorkDesk::~WorkDesk() {
+AnswerThread::~AnswerThread() {
   stop();
 }
 
-bool WorkDesk::ask(Work work, Done done) {
+bool AnswerThread::ask(Work work, Done done) {
   const std::lock_guard lock(parts_->mutex);
   if (parts_->stops || parts_->jobs.size() >= waiting_max) return false;
   parts_->jobs.push_back({std::move(work), std::move(done)});
@@ -52,7 +52,7 @@ bool WorkDesk::ask(Work work, Done done) {
   return true;
 }
 
-void WorkDesk::stop() noexcept {
+void AnswerThread::stop() noexcept {
   {
     const std::lock_guard lock(parts_->mutex);
     parts_->stops = true;

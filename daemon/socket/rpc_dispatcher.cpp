@@ -1,4 +1,4 @@
-#include "daemon/socket/request_desk.hpp"
+#include "daemon/socket/rpc_dispatcher.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -51,9 +51,9 @@ void take_id(const json& id, Request& out) {
     throw RpcError(rpc::invalid_request, "id must be a string, a number or null");
   }
   // It comes back in the answer, and must not be a way to make answers large.
-  if (is_text && id.get_ref<const std::string&>().size() > RequestDesk::id_bytes_max) {
+  if (is_text && id.get_ref<const std::string&>().size() > RpcDispatcher::id_bytes_max) {
     throw RpcError(rpc::invalid_request,
-                   "id has at most " + std::to_string(RequestDesk::id_bytes_max) + " bytes");
+                   "id has at most " + std::to_string(RpcDispatcher::id_bytes_max) + " bytes");
   }
   out.id = id;
 }
@@ -111,16 +111,16 @@ bool reply(const Request& request, const RpcPending& result, Answer& answer) {
 
 }  // namespace
 
-void RequestDesk::add_method(const std::string& name, AccessClass access, RpcHandler handler) {
+void RpcDispatcher::add_method(const std::string& name, AccessClass access, RpcHandler handler) {
   methods_[name] = {access, std::move(handler), {}};
 }
 
-void RequestDesk::add_slow_method(const std::string& name, AccessClass access,
-                                  RpcSlowHandler handler) {
+void RpcDispatcher::add_slow_method(const std::string& name, AccessClass access,
+                                    RpcSlowHandler handler) {
   methods_[name] = {access, {}, std::move(handler)};
 }
 
-Answer RequestDesk::answer(const PeerAccess& access, std::string_view line) const {
+Answer RpcDispatcher::answer(const PeerAccess& access, std::string_view line) const {
   Answer answer;
   Request request;
   const auto result = [&]() -> std::optional<json> {
@@ -141,8 +141,8 @@ Answer RequestDesk::answer(const PeerAccess& access, std::string_view line) cons
   return answer;
 }
 
-const RequestDesk::Method& RequestDesk::find(const PeerAccess& access,
-                                             const std::string& name) const {
+const RpcDispatcher::Method& RpcDispatcher::find(const PeerAccess& access,
+                                                 const std::string& name) const {
   const auto method = methods_.find(name);
   if (method == methods_.end()) {
     // Whoever may do nothing is not told what there is.
@@ -159,7 +159,7 @@ const RequestDesk::Method& RequestDesk::find(const PeerAccess& access,
   return method->second;
 }
 
-Subscription RequestDesk::subscribe(const PeerAccess& access, const json& params) const {
+Subscription RpcDispatcher::subscribe(const PeerAccess& access, const json& params) const {
   if (!access.read) {
     throw RpcError(rpc::not_permitted,
                    "subscribe: only for root and members of " + config_.read_group);
@@ -194,7 +194,7 @@ Subscription RequestDesk::subscribe(const PeerAccess& access, const json& params
   return wanted;
 }
 
-std::string RequestDesk::notification(const std::string& method) const {
+std::string RpcDispatcher::notification(const std::string& method) const {
   json message = {{"jsonrpc", "2.0"}, {"method", method}};
   try {
     message["params"] = methods_.at(method).handler(json::object());

@@ -12,8 +12,8 @@
 
 namespace thermocomp {
 
-/// What the desk needs of the daemon behind it.
-struct DeskActions {
+/// What the methods need of the daemon behind it.
+struct DaemonActions {
   std::function<StatusView()> view;
   /// Gives the command to the cycle; the result is there once it is carried out and would survive a
   /// restart. @throws RpcError
@@ -28,6 +28,6 @@ struct DeskActions {
 };
 
 /// Adds every method of CONTRACTS to `server`. @param actions  copied; must stay callable
-void add_operator_methods(StatusServer& server, const DeskActions& actions);
+void add_operator_methods(StatusServer& server, const DaemonActions& actions);
 
 }  // namespace thermocomp

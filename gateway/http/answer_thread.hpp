@@ -14,18 +14,18 @@ struct JsonAnswer {
   std::string text;
 };
 
-class WorkDesk {
+class AnswerThread {
  public:
   using Work = std::function<JsonAnswer()>;  ///< must not throw
   using Done = std::function<void(JsonAnswer)>;
   static constexpr std::size_t waiting_max = 16;
 
-  WorkDesk();
-  ~WorkDesk();  ///< those that wait are answered 503
-  WorkDesk(const WorkDesk&) = delete;
-  WorkDesk& operator=(const WorkDesk&) = delete;
+  AnswerThread();
+  ~AnswerThread();  ///< those that wait are answered 503
+  AnswerThread(const AnswerThread&) = delete;
+  AnswerThread& operator=(const AnswerThread&) = delete;
 
-  /// `done` is called on the desk's thread. @return false: too many wait; nothing is called
+  /// `done` is called on a thread of its own. @return false: too many wait; nothing is called
   [[nodiscard]] bool ask(Work work, Done done);
   void stop() noexcept;
 

@@ -1,5 +1,5 @@
 // The method `controller_state`: what it takes, what it refuses, what it answers.
-#include "daemon/desks/bridge_desk.hpp"
+#include "daemon/methods/bridge_methods.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
@@ -11,8 +11,8 @@ using nlohmann::json;
 
 namespace {
 
-struct Desk {
-  Desk() : bridge(config) { bridge.start(); }
+struct Rig {
+  Rig() : bridge(config) { bridge.start(); }
   json answer(const json& params) { return answer_bridge(bridge, config, "compensating", params); }
 
   BridgeControllerConfig config{"mill", 1.0, {"x"}, {"x_mm", "cutting_on"}};
@@ -29,14 +29,14 @@ json report() {
 }  // namespace
 
 TEST_CASE("a report becomes the controller's state and is answered", "[daemon][bridge]") {
-  Desk desk;
-  const json answer = desk.answer(report());
+  Rig rig;
+  const json answer = rig.answer(report());
   CHECK(answer["anew"] == true);
   CHECK(answer["epoch"] == 1);
   CHECK(answer["mode"] == "compensating");
   CHECK(answer["offsets_um"] == json{{"x", nullptr}});
   ControllerState state;
-  desk.bridge.newest(state);
+  rig.bridge.newest(state);
   CHECK(state.applied_um[0] == 2.5);
   CHECK(state.signals[1] == 1.0);
   OffsetCommand command;
@@ -44,17 +44,17 @@ TEST_CASE("a report becomes the controller's state and is answered", "[daemon][b
   command.look = 1;
   command.valid[0] = true;
   command.offset_um[0] = 2.75;
-  desk.bridge.offer(command);
-  CHECK(desk.answer(report())["offsets_um"]["x"] == 2.75);
+  rig.bridge.offer(command);
+  CHECK(rig.answer(report())["offsets_um"]["x"] == 2.75);
 }
 
 TEST_CASE("null is not known", "[daemon][bridge]") {
-  Desk desk;
+  Rig rig;
   json told = report();
   told["signals"]["x_mm"] = nullptr;
-  desk.answer(told);
+  rig.answer(told);
   ControllerState state;
-  desk.bridge.newest(state);
+  rig.bridge.newest(state);
   CHECK(std::isnan(state.signals[0]));
   CHECK(state.signals[1] == 1.0);
 }
@@ -66,7 +66,7 @@ TEST_CASE("a report that cannot be understood is refused, counted and changes no
     told[json::json_pointer(pointer)] = value;
     return told;
   };
-  Desk desk;
+  Rig rig;
   std::vector<json> bad = {
       json::object(),
       broken("/session", 0),
@@ -87,19 +87,19 @@ TEST_CASE("a report that cannot be understood is refused, counted and changes no
   };
   for (const json& told : bad) {
     INFO(told.dump());
-    CHECK_THROWS_AS(desk.answer(told), RpcError);
+    CHECK_THROWS_AS(rig.answer(told), RpcError);
   }
-  CHECK(desk.bridge.health().read_errors == bad.size());
-  CHECK(desk.bridge.health().reads == 0);
+  CHECK(rig.bridge.health().read_errors == bad.size());
+  CHECK(rig.bridge.health().reads == 0);
   ControllerState state;
-  desk.bridge.newest(state);
+  rig.bridge.newest(state);
   CHECK_FALSE(state.online);
 }
 
 TEST_CASE("a second bridge is told so", "[daemon][bridge]") {
-  Desk desk;
-  desk.answer(report());
+  Rig rig;
+  rig.answer(report());
   json other = report();
   other["session"] = 6;
-  CHECK_THROWS_WITH(desk.answer(other), "another bridge is reporting");
+  CHECK_THROWS_WITH(rig.answer(other), "another bridge is reporting");
 }

@@ -1,4 +1,4 @@
-#include "daemon/desks/bridge_desk.hpp"
+#include "daemon/methods/bridge_methods.hpp"
 
 #include <cmath>
 

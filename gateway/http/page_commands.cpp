@@ -1,4 +1,4 @@
-#include "gateway/http/command_desk.hpp"
+#include "gateway/http/page_commands.hpp"
 
 #include <algorithm>
 #include <array>
@@ -88,9 +88,9 @@ std::string confirmation_text(const CommandRequest& asked, const Status& status)
          " and back, to show its sign. Nobody must be in the machine.";
 }
 
-CommandDesk::CommandDesk(const GatewaySettings& settings) : settings_(settings) {}
+PageCommands::PageCommands(const GatewaySettings& settings) : settings_(settings) {}
 
-bool CommandDesk::may(const std::string& user, const std::string& method) const {
+bool PageCommands::may(const std::string& user, const std::string& method) const {
   const CommandSettings& commands = settings_.commands;
   const auto has = [](const std::vector<std::string>& list, const std::string& word) {
     return std::find(list.begin(), list.end(), word) != list.end();
@@ -98,15 +98,15 @@ bool CommandDesk::may(const std::string& user, const std::string& method) const 
   return !user.empty() && has(commands.users, user) && has(commands.methods, method);
 }
 
-json CommandDesk::offered(const std::string& user) const {
+json PageCommands::offered(const std::string& user) const {
   json methods = json::array();
   for (const std::string& method : settings_.commands.methods)
     if (may(user, method)) methods.push_back(method);
   return {{"user", user}, {"commands", std::move(methods)}};
 }
 
-JsonAnswer CommandDesk::take(const std::string& user, const std::string& body,
-                             const Snapshot& snapshot) {
+JsonAnswer PageCommands::take(const std::string& user, const std::string& body,
+                              const Snapshot& snapshot) {
   try {
     const json asked = parse_outer_json(body);
     if (!asked.is_object()) return error(400, "the body must be a JSON object");
@@ -121,8 +121,8 @@ JsonAnswer CommandDesk::take(const std::string& user, const std::string& body,
   }
 }
 
-JsonAnswer CommandDesk::confirm(const std::string& user, const CommandRequest& asked,
-                                const Snapshot& snapshot) {
+JsonAnswer PageCommands::confirm(const std::string& user, const CommandRequest& asked,
+                                 const Snapshot& snapshot) {
   const std::string& method = asked.method;
   if (!may(user, method)) return error(403, "this command is not for this user");
   if (!snapshot.is_here) return error(503, "the daemon does not answer");
@@ -139,7 +139,7 @@ JsonAnswer CommandDesk::confirm(const std::string& user, const CommandRequest& a
 }
 
 /// Only in the places of this user: nobody's unconfirmed commands are in another's way.
-void CommandDesk::make_room(const std::string& user) {
+void PageCommands::make_room(const std::string& user) {
   std::size_t count = 0;
   auto oldest = waiting_.end();
   for (auto each = waiting_.begin(); each != waiting_.end(); ++each) {
@@ -150,7 +150,7 @@ void CommandDesk::make_room(const std::string& user) {
   if (count >= confirmations_max) waiting_.erase(oldest);
 }
 
-JsonAnswer CommandDesk::carry_out(const std::string& user, const std::string& token) {
+JsonAnswer PageCommands::carry_out(const std::string& user, const std::string& token) {
   Asked asked;
   {
     const std::lock_guard lock(mutex_);

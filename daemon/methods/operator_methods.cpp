@@ -1,4 +1,4 @@
-#include "daemon/desks/operator_desk.hpp"
+#include "daemon/methods/operator_methods.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/text/problems.hpp"
-#include "daemon/desks/reference_rules.hpp"
+#include "daemon/methods/reference_rules.hpp"
 #include "estimator/axis_spans.hpp"
 #include "estimator/learning/measured_question.hpp"
 #include "estimator/learning/probings.hpp"
@@ -76,7 +76,7 @@ void refuse_unless(bool holds, const std::string& why) {
   if (!holds) throw RpcError(rpc::refused, why);
 }
 
-void add_reads(StatusServer& server, const DeskActions& actions) {
+void add_reads(StatusServer& server, const DaemonActions& actions) {
   const auto add = [&](const char* name, auto answer) {
     server.add_method(name, AccessClass::read,
                       [actions, answer](const json&) { return answer(actions.view()); });
@@ -106,7 +106,7 @@ bool flag_in(const json& params, const char* key) {
   return params[key].get<bool>();
 }
 
-RpcPending take_reference(const DeskActions& actions, const json& params) {
+RpcPending take_reference(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   const bool forced = flag_in(params, "force");
   const auto columns = view.config.model.temperature_columns();
@@ -210,7 +210,7 @@ void ask_back(const StatusView& view, const Command& command, double expected_um
                              command.value_um, expected_um, sd_um, text_of(slip)));
 }
 
-RpcPending note_measured(const DeskActions& actions, const json& params) {
+RpcPending note_measured(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command = measured_command(view, params);
   const double displacement_um = where_it_stands(
@@ -237,7 +237,7 @@ RpcPending note_measured(const DeskActions& actions, const json& params) {
   });
 }
 
-RpcPending prove(const DeskActions& actions, const json& params) {
+RpcPending prove(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::prove, axis_index(view, params), value_um(params)};
   refuse_unless(!view.config.dry_run,
@@ -261,7 +261,7 @@ RpcPending prove(const DeskActions& actions, const json& params) {
   });
 }
 
-RpcPending release(const DeskActions& actions, const json& params) {
+RpcPending release(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   const Command command{CommandKind::release, axis_index(view, params), 0.0};
   refuse_unless(any_node(view, command.axis, &AxisReport::latched) ||
@@ -271,7 +271,7 @@ RpcPending release(const DeskActions& actions, const json& params) {
 }
 
 /// An operator vouches for a value that nothing else confirms.
-RpcPending accept(const DeskActions& actions, const json& params) {
+RpcPending accept(const DaemonActions& actions, const json& params) {
   const auto view = actions.view();
   if (!params.contains("sensor") || !params["sensor"].is_string())
     throw RpcError(rpc::invalid_params, "params.sensor must be the name of a sensor");
@@ -292,7 +292,7 @@ RpcPending accept(const DeskActions& actions, const json& params) {
               });
 }
 
-RpcPending reload(const DeskActions& actions) {
+RpcPending reload(const DaemonActions& actions) {
   return [actions, pending = actions.reload()]() -> std::optional<json> {
     try {
       if (!pending()) return std::nullopt;
@@ -307,7 +307,7 @@ RpcPending reload(const DeskActions& actions) {
 
 }  // namespace
 
-void add_operator_methods(StatusServer& server, const DeskActions& actions) {
+void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
   add_reads(server, actions);
   const auto add = [&](const char* name, RpcSlowHandler handler) {
     server.add_slow_method(name, AccessClass::operate, std::move(handler));

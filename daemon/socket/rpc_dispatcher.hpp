@@ -33,13 +33,13 @@ struct Answer {
 /// Not supported on purpose, and refused in words: batches (an array of requests; several lines do
 /// the same) and parameters by position. Members of a request that JSON-RPC does not know are
 /// ignored, as it asks.
-class RequestDesk {
+class RpcDispatcher {
  public:
   static constexpr std::size_t id_bytes_max = 256;
   static constexpr double period_s_min = 0.1;
   static constexpr double period_s_max = 60.0;
 
-  explicit RequestDesk(const SocketConfig& config) : config_(config) {}
+  explicit RpcDispatcher(const SocketConfig& config) : config_(config) {}
 
   void add_method(const std::string& name, AccessClass access, RpcHandler handler);
   void add_slow_method(const std::string& name, AccessClass access, RpcSlowHandler handler);

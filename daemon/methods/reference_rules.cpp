@@ -1,4 +1,4 @@
-#include "daemon/desks/reference_rules.hpp"
+#include "daemon/methods/reference_rules.hpp"
 
 #include <algorithm>
 #include <cmath>
