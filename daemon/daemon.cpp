@@ -197,7 +197,7 @@ DaemonActions Daemon::Parts::actions() {
   DaemonActions all{
       [this] { return supervisor.view(); },
       [this](const Command& asked) { return operations.command(asked); },
-      [this] { return operations.reload(); },
+      [this](const auto& candidate) { return operations.reload(candidate); },
       {},
       [this] {
         return json_of(EventsAnswer{{journal.events().begin(), journal.events().end()}});

@@ -104,9 +104,11 @@ struct Operations::Loaded {
   std::unique_ptr<CycleParts> parts;
   std::exception_ptr error;  ///< instead of the others
 
-  void load(const std::filesystem::path& file) noexcept {
+  void load(const std::filesystem::path& file,
+            const std::optional<std::filesystem::path>& candidate) noexcept {
     try {
       config = load_daemon_config(file);
+      if (candidate) set_candidate(config, *candidate);
       parts = parts_of(config);
     } catch (...) {
       error = std::current_exception();
@@ -153,8 +155,8 @@ bool Operations::is_settled(const Save& save, CommandKind kind) const {
                           : parts_.keeper.error()));
 }
 
-RpcPending Operations::reload() {
-  begin_reload();
+RpcPending Operations::reload(const std::optional<std::filesystem::path>& candidate) {
+  begin_reload(candidate);
   reload_->user = asking_user();
   reload_->is_asked = true;
   return [this, answer = reload_->answer,
@@ -177,19 +179,21 @@ void Operations::hang_up() {
   reload_again_ = reload_.has_value();
   if (reload_again_) return;
   try {
-    begin_reload();
+    begin_reload(std::nullopt);
   } catch (const std::exception& error) {
     spdlog::error("reload: {}", error.what());
   }
 }
 
-void Operations::begin_reload() {
+void Operations::begin_reload(const std::optional<std::filesystem::path>& candidate) {
   if (reload_) throw RpcError(rpc::refused, "a reload is under way: ask again when it is done");
   Reload reload;
   reload.answer = std::make_shared<ReloadAnswer>();
   reload.loaded = std::make_shared<Loaded>();
   reload.thread = std::make_unique<SideThread>("reload");
-  reload.thread->start([loaded = reload.loaded, file = parts_.config.file] { loaded->load(file); });
+  reload.candidate = candidate ? candidate : candidate_;
+  reload.thread->start([loaded = reload.loaded, file = parts_.config.file,
+                        named = reload.candidate] { loaded->load(file, named); });
   reload_ = std::move(reload);
   parts_.service.reloading();
 }
@@ -253,6 +257,7 @@ void Operations::finish_reload() {
   }
   if (outcome == Outcome::done) {
     parts_.config = std::move(reload_->next);
+    candidate_ = reload_->candidate;
     set_log_level(parts_.config.log_level);
     note_reference(cycle_.estimator().persistent_state(cycle_.report()), ReferenceOrigin::reload);
     if (parts_.journal != nullptr) parts_.journal->command(command_event("reload", reload_->user));

@@ -50,7 +50,8 @@ class Operations {
   [[nodiscard]] RpcPending command(const Command& asked);
   /// Its result throws ConfigurationError, or RpcError: a restart is needed.
   /// @throws RpcError: a reload is under way
-  [[nodiscard]] RpcPending reload();
+  [[nodiscard]] RpcPending reload(
+      const std::optional<std::filesystem::path>& candidate = std::nullopt);
   /// The same for SIGHUP. However many arrive while one is under way, one more follows it.
   void hang_up();
 
@@ -79,6 +80,7 @@ class Operations {
     std::unique_ptr<SideThread> thread;  ///< none: the files are read
     DaemonConfig next;
     bool is_overdue_told{false};
+    std::optional<std::filesystem::path> candidate;
     bool is_asked{false};  ///< by a client, who is told what comes of it
     std::int64_t user{-1};
   };
@@ -90,7 +92,7 @@ class Operations {
   };
 
   [[nodiscard]] bool is_settled(const Save& save, CommandKind kind) const;
-  void begin_reload();
+  void begin_reload(const std::optional<std::filesystem::path>& candidate);
   void finish_loading();
   void finish_reload();
   void end_reload();
@@ -111,6 +113,7 @@ class Operations {
   Parts parts_;
   CycleHandle cycle_;
   std::optional<Reload> reload_;
+  std::optional<std::filesystem::path> candidate_;  ///< that an operator named, empty: none
   bool reload_again_{false};
   std::string save_error_told_;
   std::uint64_t told_serial_{0};  ///< of the state that the estimator knows to be on disk

@@ -182,6 +182,7 @@ void add_operate_commands(CLI::App& app, const GlobalOptions& global, Action& ac
     });
   }
   add_measured_command(app, global, action);
+  add_candidate_command(app, global, action);
   add_promote_command(app, global, action);
   add_axis_command(
       app, global, action, "prove",

@@ -33,8 +33,9 @@ void write_file(const fs::path& path, const std::string& text) {
 fs::path candidate_in(const json& status) {
   if (!status.contains("candidate"))
     throw Failure(
-        "no candidate runs beside the model: [model] candidate = \"FILE\" in the "
-        "configuration, then thermocomp reload");
+        "no candidate runs beside the model: thermocomp candidate FILE, or [model] candidate in "
+        "the "
+        "configuration and thermocomp reload");
   const json& candidate = status["candidate"];
   const std::string problem = text_of(candidate, "problem");
   if (!problem.empty()) throw Failure("the candidate does not run: " + problem);
@@ -64,7 +65,33 @@ int run_promote(const GlobalOptions& global, bool back) {
   return exit_success;
 }
 
+int run_candidate(const GlobalOptions& global, const std::string& file) {
+  const bool is_none = file == "none";
+  static_cast<void>(ask_daemon(global.socket, "candidate",
+                               {{"file", is_none ? "" : fs::absolute(file).string()}}));
+  if (is_none) {
+    std::cout << "no candidate runs beside the model\n";
+    return exit_success;
+  }
+  const json status = ask_daemon(global.socket, "status", json::object());
+  if (!status.contains("candidate")) throw Failure(file + ": is the model in use itself");
+  std::cout << candidate_in(status).string()
+            << ": runs beside the model, and thermocomp status says how it does. To keep it over a "
+               "restart: [model] candidate in the configuration\n";
+  return exit_success;
+}
+
 }  // namespace
+
+void add_candidate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* candidate = app.add_subcommand(
+      "candidate", "a second model runs beside the one in use and is never sent");
+  const auto file = std::make_shared<std::string>();
+  candidate->add_option("FILE", *file, "model file that the daemon can read, or none")->required();
+  candidate->callback([&global, &action, file] {
+    action = [&global, file] { return run_candidate(global, *file); };
+  });
+}
 
 void add_promote_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* promote = app.add_subcommand(

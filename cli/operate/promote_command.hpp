@@ -7,6 +7,7 @@
 
 namespace thermocomp::cli {
 
+void add_candidate_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_promote_command(CLI::App& app, const GlobalOptions& global, Action& action);
 
 }  // namespace thermocomp::cli

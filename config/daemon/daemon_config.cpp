@@ -265,11 +265,7 @@ DaemonConfig build(const TomlDocument& document, const fs::path& folder, Files f
   add(model_problems);
   if (!problems.empty()) throw ConfigurationError(std::move(problems));
   config.remarks = remarks_of(bus_files, document.name());
-  if (candidate.empty() || files != Files::opened) return config;
-  config.candidate = read_candidate(candidate, config.estimator);
-  if (!config.candidate->problem.empty())
-    config.remarks.push_back("the candidate " + candidate.string() +
-                             " does not run: " + config.candidate->problem);
+  if (files == Files::opened) set_candidate(config, candidate);
   return config;
 }
 
@@ -302,6 +298,15 @@ DaemonConfig parse_daemon_config(const std::string& config_text, const std::stri
                [&](const TomlTable&, const fs::path&) {
                  return ModelSource{model_name, model_text};
                });
+}
+
+void set_candidate(DaemonConfig& config, const std::filesystem::path& file) {
+  config.candidate.reset();
+  if (file.empty()) return;
+  config.candidate = read_candidate(file, config.estimator);
+  if (!config.candidate->problem.empty())
+    config.remarks.push_back("the candidate " + file.string() +
+                             " does not run: " + config.candidate->problem);
 }
 
 }  // namespace thermocomp

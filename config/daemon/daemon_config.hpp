@@ -94,4 +94,8 @@ struct DaemonConfig {
 [[nodiscard]] std::vector<std::string> restart_needed(const DaemonConfig& running,
                                                       const DaemonConfig& next);
 
+/// The model that runs beside in place of the one named; an empty path: none. What is wrong with it
+/// is its `problem`.
+void set_candidate(DaemonConfig& config, const std::filesystem::path& file);
+
 }  // namespace thermocomp

@@ -292,8 +292,9 @@ RpcPending accept(const DaemonActions& actions, const json& params) {
               });
 }
 
-RpcPending reload(const DaemonActions& actions) {
-  return [actions, pending = actions.reload()]() -> std::optional<json> {
+RpcPending reload(const DaemonActions& actions,
+                  const std::optional<std::filesystem::path>& candidate = std::nullopt) {
+  return [actions, pending = actions.reload(candidate)]() -> std::optional<json> {
     try {
       if (!pending()) return std::nullopt;
     } catch (const ConfigurationError& error) {
@@ -303,6 +304,13 @@ RpcPending reload(const DaemonActions& actions) {
     }
     return json{{"done", true}, {"checksum", actions.view().config.model_checksum}};
   };
+}
+
+RpcPending candidate(const DaemonActions& actions, const json& params) {
+  const auto file = params.find("file");
+  if (file == params.end() || !file->is_string())
+    throw RpcError(rpc::invalid_params, "params.file must be given: a path, or empty for none");
+  return reload(actions, std::filesystem::path(file->get<std::string>()));
 }
 
 }  // namespace
@@ -328,6 +336,7 @@ void add_operator_methods(StatusServer& server, const DaemonActions& actions) {
   add("release", [actions](const json& params) { return release(actions, params); });
   add("accept", [actions](const json& params) { return accept(actions, params); });
   add("reload", [actions](const json&) { return reload(actions); });
+  add("candidate", [actions](const json& params) { return candidate(actions, params); });
   server.add_method("controller_state", AccessClass::bridge, [actions](const json& params) {
     refuse_unless(bool(actions.controller_state), "this configuration's controller is no bridge");
     return actions.controller_state(params);

@@ -18,9 +18,10 @@ struct DaemonActions {
   /// Gives the command to the cycle; the result is there once it is carried out and would survive a
   /// restart. @throws RpcError
   std::function<RpcPending(const Command&)> command;
-  /// The result is there once the cycle runs with the new configuration.
+  /// The result is there once the cycle runs with the new configuration, and with this candidate
+  /// from then on where one is given (an empty path: none).
   /// @throws ConfigurationError or RpcError with what is wrong; the running one then stays
-  std::function<RpcPending()> reload;
+  std::function<RpcPending(const std::optional<std::filesystem::path>& candidate)> reload;
   /// A bridge's report and its answer; empty where the controller is not a bridge. @throws RpcError
   std::function<nlohmann::json(const nlohmann::json&)> controller_state{};
   /// What happened in this run, for `events`.

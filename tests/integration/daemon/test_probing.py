@@ -133,6 +133,30 @@ def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
 
 
+def test_a_candidate_is_named_while_the_daemon_runs(machine, lab):
+    new = lab.folder / "new.toml"
+    new.write_text(machine.model.read_text().replace("[[3.0, -1.5]]", "[[2.0, -1.5]]"))
+    daemon = machine.start()
+    assert "candidate" not in daemon.status()
+    status, out, said = daemon.cli("candidate", new)
+    assert status == 0 and "runs beside the model" in out, said
+    assert daemon.status()["candidate"]["file"] == str(new)
+    machine.warm_by(12.0)
+    daemon.wait_for_offset(12.0, 0.05)
+    assert daemon.cli("reload")[0] == 0
+    assert daemon.status()["candidate"]["file"] == str(new)  # a reload keeps it
+    status, _, said = daemon.cli("candidate", machine.model)
+    assert status != 0 and "is the model in use itself" in said, said
+    status, _, said = daemon.cli("candidate", lab.folder / "nothing.toml")
+    assert status != 0 and "does not run" in said and "nothing.toml" in said, said
+    assert daemon.cli("candidate", "none")[0] == 0
+    assert "candidate" not in daemon.status()
+    assert abs(daemon.axis()["offset"] - 12.0) < 0.05
+    assert_slewed(machine.controller.orders())
+    daemon.end()
+    assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+
+
 def test_by_cycles_the_offset_changes_at_their_ends_only(machine, lab):
     def by_cycles(text):
         text = text.replace("[[axis]]", CYCLE_SIGNAL + "[[axis]]")

@@ -63,7 +63,7 @@ Figures contests(const Errors& errors, nanoseconds pitch = 1h) {
                 << errors.has_outliers << ": better after " << figures.probings
                 << " probings (median), in " << 100.0 * figures.better_share
                 << " %, worse first in " << 100.0 * figures.worse_share << " %");
-  CHECK(true);
+  SUCCEED("printed with -s");
   return figures;
 }
 

@@ -104,7 +104,7 @@ def test_signals_show_their_bytes_and_a_wrong_byte_order_is_recognised(frames, t
     assert seen["open"]["fault"] == "open_circuit"
     assert seen["order"]["hints"] == [
         'byte_order = "big_endian" with start_bit = 39 would make it 25 degC']
-    assert seen["absent"]["fault"] == "no_answer" and "0x182" in seen["absent"]["why"]
+    assert seen["absent"]["fault"] == "never_read" and "0x182" in seen["absent"]["why"]
 
 
 def test_a_j1939_preset_gives_temperatures_and_the_standards_codes_their_faults(frames, tmp_path):
