@@ -46,8 +46,9 @@ TEST_CASE("the table names every register, its unit and who writes it", "[cli][r
 TEST_CASE("the table says which output is a diameter", "[cli][registers]") {
   DaemonConfig config = example("small_machine.toml");
   config.model.diameters = {{config.estimator.axes.front().output, "x", -1.0}};
-  CHECK_THAT(register_table(config),
-             Contains("axis x takes out " + half_of(config.model.diameters.front()) + ", a diameter"));
+  CHECK_THAT(
+      register_table(config),
+      Contains("axis x takes out " + half_of(config.model.diameters.front()) + ", a diameter"));
   CHECK_THAT(half_of(config.model.diameters.front()), Contains("half"));
 }
 
