@@ -3,7 +3,7 @@
 #include <cctype>
 #include <cmath>
 
-#include "config/run_forms/axis_letters.hpp"
+#include "config/run_forms/long_table.hpp"
 #include "config/text/units.hpp"
 
 namespace thermocomp::cli {
@@ -23,7 +23,11 @@ RunFile displacements_of(RunFile corrections, CorrectionEntry entry) {
                    "[mm]\"), or write it under [columns] in the file of --columns"}});
     axis[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(axis[0])));
     const std::string was = name;
-    name = axis + (is_mm ? "_um" : std::string(unit.suffix));
+    const std::string displacement = axis + (is_mm ? "_um" : std::string(unit.suffix));
+    if (displacement != was && corrections.find(displacement))
+      throw ConfigurationError({Problem{corrections.name, 0, was, "",
+                                        "is a second column of corrections of axis " + axis}});
+    name = displacement;
     double sum = 0.0;
     for (double& value : corrections.values[i]) {
       if (std::isnan(value)) continue;

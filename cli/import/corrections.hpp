@@ -1,4 +1,5 @@
-/// What operators entered as corrections is a measurement of what was left, with its sign turned.
+/// A log of operators' corrections as displacements: each correction is a measured remainder with
+/// its sign turned.
 #pragma once
 
 #include <string>

@@ -34,8 +34,7 @@ fs::path candidate_in(const json& status) {
   if (!status.contains("candidate"))
     throw Failure(
         "no candidate runs beside the model: thermocomp candidate FILE, or [model] candidate in "
-        "the "
-        "configuration and thermocomp reload");
+        "the configuration and thermocomp reload");
   const json& candidate = status["candidate"];
   const std::string problem = text_of(candidate, "problem");
   if (!problem.empty()) throw Failure("the candidate does not run: " + problem);

@@ -32,7 +32,7 @@ struct ProtocolBus {
   std::vector<Place> places;
 };
 
-/// What else is done with the open bus, after so many frames of each identifier.
+/// A further search on the open bus; it is given the number of frames of each identifier heard.
 using Afterwards = std::function<void(CanSocket&, const FrameCounts&, ScanBus&)>;
 
 /// Works the protocol for `task.listen_s` as the daemon would, sends what it wants to send, and

@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 
-#include "config/run_forms/axis_letters.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/text/units.hpp"
 

@@ -4,11 +4,18 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/run_forms/time_column.hpp"
 
 namespace thermocomp {
+
+/// "x", "Z", "c": one letter of a linear or a rotary axis.
+[[nodiscard]] constexpr bool is_axis_letter(std::string_view name) noexcept {
+  constexpr std::string_view letters = "xyzabcXYZABC";
+  return name.size() == 1 && letters.find(name.front()) != std::string_view::npos;
+}
 
 struct LongForm {
   std::vector<std::size_t> names;  ///< columns whose words together name the series

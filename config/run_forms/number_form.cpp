@@ -81,7 +81,7 @@ NumberForm number_form(const TextTable& table, const ColumnMap* map, ProblemList
   const Seen unclear_comma = of(Shows::comma_or_group);
   const Seen unclear_point = table.separator == ',' ? Seen{} : of(Shows::point_or_group);
   if (const Seen& groups = of(Shows::groups)) {
-    // Of two signs the last is the decimal one: 1.234,5.
+    // The last of two signs is the decimal one: 1.234,5.
     const char first = groups.field[groups.field.find_first_of(".,")];
     form.thousands = first;
     form.decimal = first == '.' ? ',' : '.';

@@ -11,7 +11,7 @@
 
 namespace thermocomp {
 
-/// What came of a command or of new parts on their way to the cycle.
+/// The state of a command, or of new parts, on the way to the cycle.
 enum class Outcome {
   waiting,
   done,       ///< the newest report says what it did

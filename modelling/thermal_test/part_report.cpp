@@ -33,13 +33,11 @@ const PartAxis* find(const PartFigures& figures, const std::string& axis) {
 
 std::vector<std::string> instructions(const PartSheet& sheet) {
   return {
-      "The part: features of one kind (bores, pads, spheres) spread over the working volume, P1 to "
-      "P" +
-          std::to_string(sheet.features) +
-          ". Either an artefact that stays clamped and is probed, or a part on which each feature "
-          "has "
-          "a cold and a warm one side by side, cut by this machine: rough cuts, one finishing cut, "
-          "then measured at 20 degC.",
+      "The part: " + std::to_string(sheet.features) +
+          " features of one kind (bores, pads, spheres) spread over the working volume. Either an "
+          "artefact that stays clamped and is probed, or a part on which each feature has a cold "
+          "and a warm one side by side, cut by this machine: rough cuts, one finishing cut, then "
+          "measured at 20 degC.",
       "Cold: the machine has stood still for a night. Probe or finish every feature once, in the "
       "order of the rows.",
       "Warm: the shop's own load for " + figure_text(sheet.hours) +

@@ -321,6 +321,11 @@ TEST_CASE("corrections that operators entered are displacements of the other sig
     CHECK_THROWS_WITH(displacements_of(import_text(two), CorrectionEntry::step),
                       Contains("of several tools or places each needs a log of its own"));
   }
+  SECTION("an axis has one column") {
+    CHECK_THROWS_WITH(displacements_of(import_text("time_s,z_um,Z_mm\n0,1,0.001\n1,2,0.002\n"),
+                                       CorrectionEntry::step),
+                      Contains("Z_mm: is a second column of corrections of axis z"));
+  }
   SECTION("a number without a unit is no displacement") {
     ColumnMap signals;
     signals.takes_signals = true;
