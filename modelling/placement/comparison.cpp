@@ -1,11 +1,16 @@
 #include "modelling/placement/comparison.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
 
 #include "estimator/checks.hpp"
-#include "modelling/placement/tendency_patterns.hpp"
+#include "modelling/placement/tendency_method.hpp"
 
 namespace thermocomp::placement {
+
 namespace {
 
 using Estimator = std::function<std::vector<Numbers>(const std::vector<Field>&)>;
@@ -107,6 +112,150 @@ Comparison compare_placements(const PlacementProblem& problem, const TendencyOpt
       [&](const std::vector<Field>& fields) { return estimates_um(problem, fields, rebuilt); }));
   comparison.methods.push_back(random_median(problem));
   return comparison;
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// printf into a string.
+template <class... Values>
+std::string line(const char* format, Values... values) {
+  char text[512];
+  // The formats are literals of this file.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+  std::snprintf(text, sizeof text, format, values...);
+#pragma GCC diagnostic pop
+  return text;
+}
+
+/// To a micrometre; what lies below is rounding of the mesh.
+double mm_of(double value_m) {
+  return std::round(value_m * 1e6) / 1e3;
+}
+
+std::string table_row(const MethodResult& result, bool left_out) {
+  std::string text =
+      line("%-24s %10.3f %10.3f", result.name.c_str(), result.used.rms_um, result.used.peak_um);
+  if (left_out) text += line(" %12.3f %12.3f", result.left_out.rms_um, result.left_out.peak_um);
+  return text + "\n";
+}
+
+std::string run_text(const PlacementProblem& problem, const Field& field, const TendencyRun& run) {
+  std::string text =
+      line("  %s at %g s: %.3f um at the start", problem.load_cases[field.load_case].name.c_str(),
+           field.time_s, run.error_um_at_start);
+  for (std::size_t i = 0; i < run.rounds.size(); ++i) {
+    const TendencyRound& round = run.rounds[i];
+    text += line("\n    %2zu: %s (nearest %d), rho %.3g: %.3f um", i + 1, round.pattern.c_str(),
+                 round.rank, round.rho, round.error_um);
+  }
+  return text + "\n    ended: " + run.ended + "\n";
+}
+
+std::string sensors_text(const PlacementProblem& problem, const MethodResult& result) {
+  std::string text = line("sensors by %s:\n", result.name.c_str());
+  for (std::size_t b = 0; b < result.sensors.size(); ++b) {
+    const Vec3& at = problem.nodes_m[result.sensors[b]];
+    text += line("  %-24s node %u at [%g, %g, %g] mm\n", problem.blocks[b].name.c_str(),
+                 result.sensors[b], mm_of(at[0]), mm_of(at[1]), mm_of(at[2]));
+  }
+  return text;
+}
+
+Json figures_json(const ErrorFigures& figures) {
+  return {{"rms_um", figures.rms_um}, {"peak_um", figures.peak_um}};
+}
+
+Json method_json(const PlacementProblem& problem, const MethodResult& result) {
+  Json json{{"used", figures_json(result.used)}};
+  json["left_out"] = problem.left_out.empty() ? Json(nullptr) : figures_json(result.left_out);
+  for (std::size_t i = 0; i < result.by_case.size(); ++i) {
+    json["load_cases"][problem.load_cases[i].name] = figures_json(result.by_case[i]);
+  }
+  json["sensors"] = Json::array();
+  for (std::size_t b = 0; b < result.sensors.size(); ++b) {
+    const Vec3& at = problem.nodes_m[result.sensors[b]];
+    json["sensors"].push_back({{"block", problem.blocks[b].name},
+                               {"node", result.sensors[b]},
+                               {"at_mm", {mm_of(at[0]), mm_of(at[1]), mm_of(at[2])}}});
+  }
+  return json;
+}
+
+Json run_json(const PlacementProblem& problem, const Field& field, const TendencyRun& run,
+              const std::vector<Index>& sensors) {
+  Json json{{"load_case", problem.load_cases[field.load_case].name},
+            {"time_s", field.time_s},
+            {"error_um_at_start", run.error_um_at_start},
+            {"rounds", Json::array()},
+            {"ended", run.ended}};
+  for (const TendencyRound& round : run.rounds) {
+    json["rounds"].push_back({{"pattern", round.pattern},
+                              {"rank", round.rank},
+                              {"rho", round.rho},
+                              {"error_um", round.error_um}});
+  }
+  const Numbers means_K = block_means_K(problem, field.rise_K);
+  for (std::size_t b = 0; b < problem.blocks.size(); ++b) {
+    json["blocks"][problem.blocks[b].name] = {{"mean_K", means_K[b]},
+                                              {"wanted_K", run.blocks_K[b]},
+                                              {"sensor_K", field.rise_K[sensors[b]]}};
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string comparison_text(const PlacementProblem& problem, const Comparison& comparison) {
+  const bool left_out = !problem.left_out.empty();
+  std::string text;
+  for (const TendencyPlacement& placement : comparison.ways) {
+    text += line("tendency patterns chosen by %s:\n", name_of(placement.way).data());
+    for (std::size_t f = 0; f < problem.used.size(); ++f) {
+      text += run_text(problem, problem.used[f], placement.runs[f]);
+    }
+  }
+  const TendencyPlacement& best = comparison.ways[comparison.best_way];
+  text +=
+      sensors_text(problem, comparison.method(std::string("tendency_").append(name_of(best.way))));
+  text += sensors_text(problem, comparison.method("greedy"));
+  text += "greedy, sensor by sensor:";
+  for (const GreedyStep& step : comparison.greedy.steps) {
+    text += line(" %s %.3f um;", step.block.c_str(), step.error_um);
+  }
+  text += "\n\nerror of the estimated displacement [um], RMS and greatest, over the load cases";
+  text += line("\n%-24s %10s %10s", "", "used", "");
+  if (left_out) text += line(" %12s", "left out");
+  text.append("\n").append(table_row(comparison.uncompensated, left_out));
+  for (const MethodResult& result : comparison.methods) text += table_row(result, left_out);
+  return text;
+}
+
+std::string comparison_json(const PlacementProblem& problem, const Comparison& comparison) {
+  Json json;
+  for (const LoadCase& load : problem.load_cases) {
+    json["load_cases"].push_back({{"name", load.name}, {"left_out", load.left_out}});
+  }
+  json["uncompensated"] = method_json(problem, comparison.uncompensated);
+  json["uncompensated"].erase("sensors");
+  for (const MethodResult& result : comparison.methods) {
+    json["methods"][result.name] = method_json(problem, result);
+  }
+  const std::string best(name_of(comparison.ways[comparison.best_way].way));
+  json["tendency"]["best_way"] = best;
+  for (const TendencyPlacement& placement : comparison.ways) {
+    Json& runs = json["tendency"]["history"][std::string(name_of(placement.way))];
+    for (std::size_t f = 0; f < problem.used.size(); ++f) {
+      runs.push_back(run_json(problem, problem.used[f], placement.runs[f], placement.sensors));
+    }
+  }
+  for (const GreedyStep& step : comparison.greedy.steps) {
+    json["greedy"].push_back(
+        {{"block", step.block}, {"node", step.node}, {"error_um", step.error_um}});
+  }
+  return json.dump(2).append("\n");
 }
 
 }  // namespace thermocomp::placement

@@ -1,10 +1,10 @@
-#include "modelling/placement/tendency_patterns.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <utility>
+
+#include "modelling/placement/tendency_method.hpp"
 
 namespace thermocomp::placement {
 

@@ -1,5 +1,3 @@
-#include "modelling/structure/body_reduction.hpp"
-
 #include <array>
 #include <cmath>
 
@@ -7,6 +5,7 @@
 
 #include "config/text/problems.hpp"
 #include "estimator/checks.hpp"
+#include "modelling/structure/heat_model.hpp"
 #include "modelling/structure/solve/locate.hpp"
 
 namespace thermocomp::structure {

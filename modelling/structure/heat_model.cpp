@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "modelling/structure/joints.hpp"
+#include "modelling/structure/regions.hpp"
 
 namespace thermocomp::structure {
 namespace {

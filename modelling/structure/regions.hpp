@@ -1,11 +1,12 @@
-/// Regions of the structure file on a mesh: nodes, faces, and couplings over faces.
+/// Regions of the structure file on a mesh: nodes, faces, couplings over faces, faces that meet.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "modelling/structure/elements/matrices.hpp"
-#include "modelling/structure/files/structure_file.hpp"
+#include "modelling/structure/files/structure_spec.hpp"
+#include "modelling/structure/solve/reduction.hpp"
 
 namespace thermocomp::structure {
 
@@ -65,5 +66,14 @@ template <class Complete>
                                                         const std::vector<Face>& faces) {
   return couplings_on(mesh, faces, [](const Vec3&, Coupling&) { return true; });
 }
+
+/// Every node of the faces `from` follows the face of `to` that it lies on. Faces that come nowhere
+/// nearer than gap_m are a problem, told by the finder.
+void tie_faces(RegionFinder& finder, const Mesh& mesh, const JointSpec& joint,
+               Reduction& reduction);
+
+/// Couplings between the faces, each as strong as its area [m^2]; problems as above.
+[[nodiscard]] std::vector<Coupling> couplings_between(RegionFinder& finder, const Mesh& mesh,
+                                                      const JointSpec& joint);
 
 }  // namespace thermocomp::structure

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "config/text/number_text.hpp"
-#include "modelling/structure/joints.hpp"
 #include "modelling/structure/mesh/file_mesh.hpp"
+#include "modelling/structure/regions.hpp"
 #include "modelling/structure/solve/locate.hpp"
 
 namespace thermocomp::structure {

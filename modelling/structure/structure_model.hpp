@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimator/thermal_model.hpp"
-#include "modelling/structure/files/structure_file.hpp"
+#include "modelling/structure/files/structure_spec.hpp"
 #include "modelling/structure/solve/reduction.hpp"
 #include "modelling/structure/solve/statics.hpp"
 

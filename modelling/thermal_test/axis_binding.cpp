@@ -1,5 +1,3 @@
-#include "modelling/thermal_test/axis_binding.hpp"
-
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -10,6 +8,7 @@
 
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
+#include "modelling/thermal_test/test_data.hpp"
 
 namespace thermocomp::thermal_test {
 namespace {

@@ -10,7 +10,6 @@
 #include "config/runs/model_inputs.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
-#include "modelling/thermal_test/axis_binding.hpp"
 
 namespace thermocomp::thermal_test {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modelling/thermal_test/axis_binding.hpp"
+#include "modelling/thermal_test/test_data.hpp"
 
 namespace thermocomp::thermal_test {
 

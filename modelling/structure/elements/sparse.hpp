@@ -39,7 +39,7 @@ class FactorisationError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A factor as the library that made it holds it (cholmod_module.hpp).
+/// A factor as the library that made it holds it.
 class CholeskyFactor {
  public:
   CholeskyFactor() = default;
@@ -70,4 +70,17 @@ class Cholesky {
   std::unique_ptr<CholeskyFactor> factor_;  ///< of no matrix without rows
 };
 
+/// What thermocomp-cholmod.so offers to the program that loads it. Only that module is linked with
+/// CHOLMOD: it brings a BLAS and eight further libraries, which take more of the time of a start
+/// than all else, and few commands have a matrix to factorise.
+/// Program and module come from one build; what is thrown on one side is caught on the other.
+struct CholmodFunctions {
+  /// @pre the matrix has a row
+  /// @throws FactorisationError as the constructor of Cholesky
+  std::unique_ptr<CholeskyFactor> (*factorise)(const SparseSymmetric& matrix);
+};
+
 }  // namespace thermocomp::structure
+
+/// The one name that is looked up.
+extern "C" const thermocomp::structure::CholmodFunctions thermocomp_cholmod_functions;

@@ -1,5 +1,3 @@
-#include "modelling/structure/files/structure_file.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +6,7 @@
 #include "config/text/number_text.hpp"
 #include "config/text/units.hpp"
 #include "modelling/structure/files/structure_reading.hpp"
+#include "modelling/structure/files/structure_spec.hpp"
 
 namespace thermocomp::structure {
 namespace {

@@ -1,5 +1,5 @@
-/// What a user writes about a machine's structure: plain structures, filled by structure_file.hpp
-/// or by a test.
+/// The structure file, what a user writes about a machine's structure, as plain structures. Only
+/// what can be judged without the meshes is judged here; structure_model.hpp does the rest.
 #pragma once
 
 #include <array>
@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "config/text/problems.hpp"
 #include "modelling/structure/elements/matrices.hpp"
-#include "modelling/structure/mesh/box_mesh.hpp"
+#include "modelling/structure/mesh/mesh.hpp"
 
 namespace thermocomp::structure {
 
@@ -161,5 +162,11 @@ struct StructureSpec {
   bool sensors_on_surface{true};      ///< a sensor is screwed on, not cast in
   std::vector<PatternSpec> patterns;  ///< none: derived from the structure
 };
+
+/// @throws ConfigurationError with every problem of the file
+[[nodiscard]] StructureSpec load_structure(const std::filesystem::path& path);
+/// @param path  stands for the file in problems; mesh files are sought beside it
+[[nodiscard]] StructureSpec parse_structure(const std::string& text,
+                                            const std::filesystem::path& path);
 
 }  // namespace thermocomp::structure

@@ -1,8 +1,8 @@
-#include "modelling/structure/mesh/box_mesh.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
+
+#include "modelling/structure/mesh/mesh.hpp"
 
 namespace thermocomp::structure {
 namespace {

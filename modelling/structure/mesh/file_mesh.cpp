@@ -1,7 +1,24 @@
 #include "modelling/structure/mesh/file_mesh.hpp"
 
+#include "modelling/structure/modules/module_loader.hpp"
+
 namespace thermocomp::structure {
 namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Module module{"thermocomp-gmsh.so", "reads .msh and STEP files",
+                        "thermocomp_gmsh_functions", "Gmsh's library (Debian 12: libgmsh4.8)"};
+
+const GmshFunctions& gmsh() {
+  // One that failed is tried again.
+  static const auto& functions = *static_cast<const GmshFunctions*>(functions_of(module));
+  return functions;
+}
+
+void expect_file(const fs::path& path) {
+  if (!fs::is_regular_file(path)) throw MeshError(path.string() + ": no such file");
+}
 
 std::string listed(const std::map<std::string, std::vector<Index>>& groups) {
   std::string text;
@@ -10,6 +27,16 @@ std::string listed(const std::map<std::string, std::vector<Index>>& groups) {
 }
 
 }  // namespace
+
+FileMesh read_msh(const fs::path& path) {
+  expect_file(path);
+  return gmsh().read_msh(path);
+}
+
+FileMesh mesh_step(const fs::path& path, double size_m, Shape shape) {
+  expect_file(path);
+  return gmsh().mesh_step(path, size_m, shape);
+}
 
 Index add_nodes(Mesh& mesh, const FileMesh& file, double unit_m) {
   const auto first = static_cast<Index>(mesh.nodes_m.size());

@@ -51,4 +51,16 @@ void add_part(Mesh& mesh, Index part, const FileMesh& file, const std::optional<
 /// Appends the file's nodes. @return the index of the first
 Index add_nodes(Mesh& mesh, const FileMesh& file, double unit_m);
 
+/// What thermocomp-gmsh.so offers to the program that loads it: the functions above, for a file
+/// that is there. Only that module is linked with Gmsh: its eighty libraries cost more than all
+/// else at a start, and few commands read a mesh. Program and module come from one build; what is
+/// thrown on one side is caught on the other.
+struct GmshFunctions {
+  FileMesh (*read_msh)(const std::filesystem::path& path);
+  FileMesh (*mesh_step)(const std::filesystem::path& path, double size_m, Shape shape);
+};
+
 }  // namespace thermocomp::structure
+
+/// The one name that is looked up.
+extern "C" const thermocomp::structure::GmshFunctions thermocomp_gmsh_functions;

@@ -1,12 +1,12 @@
 // thermocomp-gmsh.so: meshes by Gmsh. Uses nothing of the program that loads it but headers.
-#include "modelling/structure/mesh/gmsh_module.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <gmsh.h>
 #include <iostream>
 #include <unistd.h>
 #include <unordered_map>
+
+#include "modelling/structure/mesh/file_mesh.hpp"
 
 namespace thermocomp::structure {
 namespace {

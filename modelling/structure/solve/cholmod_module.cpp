@@ -1,13 +1,13 @@
 // thermocomp-cholmod.so: Cholesky factors by CHOLMOD. Uses nothing of the program that loads it but
 // headers.
-#include "modelling/structure/solve/cholmod_module.hpp"
-
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
 #include <string>
 #include <suitesparse/cholmod.h>
 #include <unistd.h>
+
+#include "modelling/structure/elements/sparse.hpp"
 
 namespace thermocomp::structure {
 namespace {

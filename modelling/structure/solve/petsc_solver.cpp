@@ -1,5 +1,3 @@
-#include "modelling/structure/solve/petsc_solver.hpp"
-
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +11,7 @@
 #include <system_error>
 
 #include "estimator/checks.hpp"
+#include "modelling/structure/solve/linear_solver.hpp"
 #include "modelling/structure/solve/petsc_file.hpp"
 
 namespace thermocomp::structure {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "modelling/structure/solve/petsc_solver.hpp"
+#include "modelling/structure/solve/linear_solver.hpp"
 
 namespace thermocomp::structure {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "config/model/model_file.hpp"
 #include "machines.hpp"
-#include "modelling/structure/body_reduction.hpp"
+#include "modelling/structure/heat_model.hpp"
 #include "simulator/plant/plant.hpp"
 
 using namespace thermocomp;

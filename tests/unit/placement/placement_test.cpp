@@ -6,8 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "machines.hpp"
-#include "modelling/placement/quadratic_fit.hpp"
-#include "modelling/placement/tendency_patterns.hpp"
+#include "modelling/placement/tendency_method.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::test;

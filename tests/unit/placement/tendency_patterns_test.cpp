@@ -1,6 +1,4 @@
 // Patterns of the structure file: which blocks, by how much, and how r is made smaller.
-#include "modelling/placement/tendency_patterns.hpp"
-
 #include "machines.hpp"
 #include "modelling/placement/tendency_method.hpp"
 

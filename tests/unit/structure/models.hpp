@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "modelling/structure/mesh/box_mesh.hpp"
+#include "modelling/structure/mesh/mesh.hpp"
 #include "modelling/structure/solve/conduction.hpp"
 #include "modelling/structure/solve/statics.hpp"
 
