@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "modelling/diagnosis/command/diagnose_command.hpp"
+#include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/experiments/plan_command.hpp"
 #include "modelling/identification/equation/group_command.hpp"
 #include "modelling/identification/families/fit_command.hpp"

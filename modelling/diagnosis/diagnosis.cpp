@@ -4,14 +4,12 @@
 #include <cmath>
 #include <utility>
 
-#include "modelling/diagnosis/answer/extended_model.hpp"
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
 #include "modelling/diagnosis/answer/named_finding.hpp"
 #include "modelling/diagnosis/answer/remainder_bank.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/rank/search.hpp"
-#include "modelling/diagnosis/report/report_data.hpp"
-#include "modelling/diagnosis/report/report_texts.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -174,7 +172,8 @@ Headroom headroom(double noise, double unexplained, double predictable) {
 
 Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
                    const std::vector<std::string>& train_names, std::vector<RunFile> test,
-                   const std::vector<std::string>& test_names, ReportData* report) {
+                   const std::vector<std::string>& test_names, ReportData* report,
+                   const std::function<void()>& progress) {
   const SharedColumns columns = shared_columns(model, train, test);
   const MeasuredData train_data = training_data(model, train, train_names, columns);
   const MeasuredData test_data = measured_data(model, test, test_names, columns);
@@ -182,7 +181,7 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   test.clear();
   const StackedRows rows = stacked_rows(train_data);
   const std::vector<Hypothesis> all = hypotheses(train_data, rows);
-  const SearchResult result = search(train_data, rows, all, Rules{});
+  const SearchResult result = search(train_data, rows, all, Rules{}, nullptr, progress);
 
   Diagnosis diagnosis;
   diagnosis.verdict = verdict_of(result);

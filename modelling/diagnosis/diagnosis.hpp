@@ -1,11 +1,16 @@
-/// From measured runs to an answer.
+/// From measured runs to an answer; `thermocomp diagnose`.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "config/runs/run_file.hpp"
 #include "modelling/diagnosis/answer/answer.hpp"
+
+namespace CLI {  // NOLINT(readability-identifier-naming): the name is that of CLI11
+class App;
+}
 
 namespace thermocomp::diagnosis {
 
@@ -13,12 +18,17 @@ struct ReportData;
 
 /// @param train, test  taken: their memory is free for the search
 /// @param train_names, test_names  the runs' arguments as given
-/// @param report  if given, receives what the report shows
+/// @param report    if given, receives what the report shows
+/// @param progress  if given, called while the search goes on
 /// @throws ConfigurationError when a run lacks a column of the model or any measured value
 [[nodiscard]] Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
                                  const std::vector<std::string>& train_names,
                                  std::vector<RunFile> test,
                                  const std::vector<std::string>& test_names,
-                                 ReportData* report = nullptr);
+                                 ReportData* report = nullptr,
+                                 const std::function<void()>& progress = nullptr);
+
+/// @param action  set when the command line asks for this command; returns the exit status
+void add_diagnose_command(CLI::App& app, std::function<int()>& action);
 
 }  // namespace thermocomp::diagnosis

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "estimator/thermal_model.hpp"
-#include "modelling/diagnosis/hypothesis/parameter.hpp"
+#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 
 namespace thermocomp::diagnosis {
 

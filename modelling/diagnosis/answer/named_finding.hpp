@@ -1,5 +1,8 @@
-/// A finding as it is told: names, alternatives, evidence.
+/// A finding as it is told: names, parameters with intervals, alternatives, evidence; as a term of
+/// the model file.
 #pragma once
+
+#include <optional>
 
 #include "modelling/diagnosis/answer/answer.hpp"
 #include "modelling/diagnosis/rank/search.hpp"
@@ -16,5 +19,11 @@ namespace thermocomp::diagnosis {
 
 /// "effect", "none" or "unexplained".
 [[nodiscard]] std::string verdict_of(const SearchResult& result);
+
+[[nodiscard]] std::vector<Parameter> parameters_of(const Finding& finding,
+                                                   const MeasuredData& data);
+/// @return the term that the daemon evaluates; nullopt for what it cannot: faults of one run, a
+///         shift in time, a disturbance without an input
+[[nodiscard]] std::optional<TermSpec> term_of(const Finding& finding, const MeasuredData& data);
 
 }  // namespace thermocomp::diagnosis

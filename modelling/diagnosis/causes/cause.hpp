@@ -1,7 +1,8 @@
-/// What may be wrong. All that is known of a cause stands in one file, causes/NAME.cpp; it is
-/// listed once, in cause_registry.cpp.
+/// What may be wrong. All that is known of a cause stands in one function, in the file of its
+/// family, which ends with the list of its causes.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -10,11 +11,45 @@
 
 #include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 #include "modelling/diagnosis/hypothesis/material.hpp"
-#include "modelling/diagnosis/hypothesis/network_hypothesis.hpp"
-#include "modelling/diagnosis/hypothesis/parameter.hpp"
+#include "modelling/diagnosis/network/heat_network.hpp"
 #include "modelling/diagnosis/network/machine_file.hpp"
+#include "modelling/diagnosis/network/network_simulation.hpp"
 
 namespace thermocomp::diagnosis {
+
+/// What causes of a network are made of; all three outlive the hypotheses.
+struct NetworkMaterial {
+  const ThermalPlant& plant;
+  const ThermalRuns& runs;
+  const StackedRows& rows;
+};
+
+enum class NetworkSubjectKind {
+  part,             ///< of ThermalPlant::parts
+  source,           ///< of the network's
+  signal_at_place,  ///< a place, and a signal as `second`
+  room,
+  air_of_part,    ///< the air around a part that has a film
+  sensor,         ///< of the network's
+  sensor_in_run,  ///< and the run as `second`
+};
+
+/// One thing of a network that a cause may act on.
+struct NetworkSubject {
+  NetworkSubjectKind kind{NetworkSubjectKind::part};
+  std::size_t index{0};
+  std::size_t second{0};
+};
+
+struct NetworkHypothesis {
+  Hypothesis hypothesis{};  ///< without columns: they depend on what else was found
+  /// Changes the network; a gain of 0 changes nothing. Empty: a fault of a reading.
+  std::function<void(HeatNetwork&, const Shape&, double gain)> apply{};
+  std::function<Column(const Shape&)> fault{};  ///< its column, where nothing is simulated
+  double value{0.0};                            ///< of the file, that a factor multiplies
+  std::string key{};                            ///< of the file, for this value
+  double at{0.0};                               ///< signal at which a missing source has its heat
+};
 
 /// A parameter as the answer names it.
 struct CauseParameter {
@@ -58,7 +93,8 @@ struct Correction {
 };
 
 struct Cause {
-  std::string name;    ///< fixed: in answers and, as `kind`, in model files
+  /// Fixed: in answers, and in model files where the estimator has a term of this kind.
+  std::string name;
   std::string family;  ///< what belongs together for a person: structure, heat, datum, sensor
   std::vector<CauseParameter> parameters{};  ///< in the order of the answer
   CauseTexts texts{};
@@ -67,7 +103,6 @@ struct Cause {
   /// Where the subject is a signal without a unit; none: the same.
   std::optional<CauseTexts> texts_without_unit{};
   Experiment experiment{Experiment::other_duty};
-  std::string term{};  ///< kind of the `[[term]]` that carries it; empty: none does
   /// What it would do to the displacement, if the subject is one that it can have. Null: it is a
   /// cause of the thermal layer alone.
   std::vector<Hypothesis> (*hypotheses)(const Material& material, const Subject& subject){nullptr};
@@ -99,29 +134,12 @@ struct Cause {
 
 namespace causes {
 
-Cause wrong_coefficient();
-Cause thermal_lag();
-Cause missing_temperature();
-Cause nonlinear_expansion();
-Cause position_dependence();
-Cause slow_sensor();
-Cause hysteresis();
-Cause sensor_swap();
-Cause missing_heat_source();
-Cause speed_growth();
-Cause time_shift();
-Cause periodic_disturbance();
-Cause displacement_step();
-Cause displacement_drift();
-Cause sensor_step();
-Cause sensor_drift();
-Cause sensor_loose();
-// Of the thermal layer alone: network/.
-Cause wrong_heat_source();
-Cause wrong_film_coefficient();
-Cause wrong_conductance();
-Cause wrong_heat_capacity();
-Cause wrong_ambient();
+std::vector<Cause> of_structure();
+std::vector<Cause> of_heat();
+std::vector<Cause> of_datum();
+std::vector<Cause> of_sensor();
+std::vector<Cause> of_network();  ///< of the thermal layer alone
 
 }  // namespace causes
+
 }  // namespace thermocomp::diagnosis

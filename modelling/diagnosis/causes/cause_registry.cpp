@@ -8,6 +8,9 @@
 namespace thermocomp::diagnosis {
 namespace {
 
+/// Of a run in which a fault of this run alone is sought.
+constexpr Eigen::Index fault_rows_min = 24;
+
 /// Writes every cause with every subject of one set of data.
 class Catalogue {
  public:
@@ -26,7 +29,7 @@ class Catalogue {
     for (std::size_t i = 0; i < data.model.outputs.size(); ++i) add({SubjectKind::output, i});
     for (std::size_t run = 0; run < data.runs.size(); ++run) {
       const Block& rows = material_.rows().runs[run];
-      if (static_cast<double>(rows.end - rows.begin) < 2 * block_rows_min) continue;
+      if (rows.end - rows.begin < fault_rows_min) continue;
       for (std::size_t i = 0; i < data.model.outputs.size(); ++i)
         add({SubjectKind::output_in_run, i, run});
       for (std::size_t i = 0; i < data.model.inputs.size(); ++i)
@@ -40,6 +43,7 @@ class Catalogue {
     for (const Cause& cause : all_causes()) {
       if (cause.hypotheses == nullptr) continue;
       for (Hypothesis& each : cause.hypotheses(material_, subject)) {
+        each.cause = cause.name;
         found_.push_back(std::move(each));
       }
     }
@@ -56,30 +60,13 @@ class Catalogue {
 }  // namespace
 
 const std::vector<Cause>& all_causes() {
-  static const std::vector<Cause> all = {
-      causes::wrong_coefficient(),
-      causes::thermal_lag(),
-      causes::missing_temperature(),
-      causes::nonlinear_expansion(),
-      causes::position_dependence(),
-      causes::slow_sensor(),
-      causes::hysteresis(),
-      causes::sensor_swap(),
-      causes::missing_heat_source(),
-      causes::speed_growth(),
-      causes::time_shift(),
-      causes::periodic_disturbance(),
-      causes::displacement_step(),
-      causes::displacement_drift(),
-      causes::sensor_step(),
-      causes::sensor_drift(),
-      causes::sensor_loose(),
-      causes::wrong_heat_source(),
-      causes::wrong_film_coefficient(),
-      causes::wrong_conductance(),
-      causes::wrong_heat_capacity(),
-      causes::wrong_ambient(),
-  };
+  static const std::vector<Cause> all = [] {
+    std::vector<Cause> joined;
+    for (const auto family : {causes::of_structure, causes::of_heat, causes::of_datum,
+                              causes::of_sensor, causes::of_network})
+      for (Cause& each : family()) joined.push_back(std::move(each));
+    return joined;
+  }();
   return all;
 }
 

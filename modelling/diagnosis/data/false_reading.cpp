@@ -1,10 +1,10 @@
-#include "modelling/diagnosis/data/false_reading.hpp"
-
 #include <algorithm>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

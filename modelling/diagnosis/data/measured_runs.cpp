@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "config/runs/model_inputs.hpp"
 #include "config/text/units.hpp"
@@ -9,6 +10,7 @@
 #include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis {
+
 namespace {
 
 constexpr double missing_share_max = 0.2;
@@ -198,6 +200,35 @@ MeasuredData training_data(const ThermalModel& model, const std::vector<RunFile>
     for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));
   }
   return data;
+}
+
+std::string room_among(const std::vector<std::string>& columns) {
+  const auto room = std::find_if(columns.begin(), columns.end(), is_called_like_a_room);
+  return room == columns.end() ? std::string() : *room;
+}
+
+const Column* room_degC(const MeasuredData& data, const MeasuredRun& run) {
+  const auto find = [](const auto& names, const auto& columns) -> const Column* {
+    const auto at = std::find(names.begin(), names.end(), room_among(names)) - names.begin();
+    return at == std::ssize(names) ? nullptr : &columns[static_cast<std::size_t>(at)];
+  };
+  const Column* const other = find(data.others, run.others_degC);
+  return other != nullptr ? other : find(data.model.inputs, run.inputs_degC);
+}
+
+StackedRows stacked_rows(const MeasuredData& data) {
+  StackedRows rows;
+  Eigen::Index total = 0;
+  for (const MeasuredRun& run : data.runs) {
+    const Eigen::Index count = run.rows() - run.begin;
+    rows.runs.push_back({total, total + count});
+    total += count;
+  }
+  rows.time_s.resize(total);
+  for (std::size_t i = 0; i < data.runs.size(); ++i)
+    rows.time_s.segment(rows.runs[i].begin, rows.runs[i].end - rows.runs[i].begin) =
+        data.runs[i].time_s.tail(rows.runs[i].end - rows.runs[i].begin);
+  return rows;
 }
 
 }  // namespace thermocomp::diagnosis

@@ -1,6 +1,7 @@
 /// Measured runs beside what the model says of them: the material of a diagnosis.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -8,9 +9,15 @@
 
 #include "config/runs/run_file.hpp"
 #include "estimator/thermal_model.hpp"
-#include "modelling/diagnosis/data/panel.hpp"
+#include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis {
+
+/// Rows [begin, end) that are correlated with each other and with no other rows.
+struct Block {
+  Eigen::Index begin{0};
+  Eigen::Index end{0};
+};
 
 /// One run: its rows in which no input of the model is missing, from the file's first such row to
 /// the end of the selection. Missing values of other columns are held at the last one.
@@ -74,5 +81,47 @@ struct SharedColumns {
                                          const std::vector<RunFile>& runs,
                                          const std::vector<std::string>& names,
                                          const SharedColumns& columns);
+
+/// The first of the columns that is called like a room; empty: there is none.
+[[nodiscard]] std::string room_among(const std::vector<std::string>& columns);
+
+/// The room's temperature in a run: one that the model does not use, else one of its inputs; null:
+/// none is named so.
+[[nodiscard]] const Column* room_degC(const MeasuredData& data, const MeasuredRun& run);
+
+/// A place of the rows of all selected runs, one below the other.
+struct StackedRows {
+  std::vector<Block> runs;  ///< rows of each run
+  Column time_s;
+};
+[[nodiscard]] StackedRows stacked_rows(const MeasuredData& data);
+
+/// Temperatures whose rises over the selected rows correlate above 0.98, by name; every temperature
+/// is in its own group.
+using PlaceGroups = std::map<std::string, std::vector<std::string>>;
+[[nodiscard]] PlaceGroups place_groups(const MeasuredData& data);
+/// Whether two subjects are the same but for places of one group.
+[[nodiscard]] bool same_places(const PlaceGroups& groups, const std::string& subject,
+                               const std::string& other);
+/// The group of every place of a subject, without repetition, the subject's own places first; then
+/// the places of other subjects.
+[[nodiscard]] std::vector<std::string> group_of(const PlaceGroups& groups,
+                                                const std::string& subject,
+                                                const std::vector<std::string>& others = {});
+
+/// The displacement that the model predicts too much of an output because an input reads too high,
+/// f(T + e) - f(T) for each column e of errors [K] over all rows of the run, f being the
+/// estimator's own arithmetic with the terms that name the input: matrix, guideways, lags, banks of
+/// lags. A play of the whole output is left out. Where a term is not linear in the reading (its
+/// square, a play), the answer to a multiple of e is only nearly that multiple.
+/// @param errors_K  shape (rows, m)
+/// @return displacement [um], the same shape
+[[nodiscard]] Panel answer_to_errors(const MeasuredData& data, const MeasuredRun& run,
+                                     std::size_t output, std::size_t input, Panel errors_K);
+
+/// The same of an input that has read 1 K too high since long before the first run [um/K].
+/// @pre the model has no guideways
+[[nodiscard]] double settled_um_per_K(const MeasuredData& data, std::size_t output,
+                                      std::size_t input);
 
 }  // namespace thermocomp::diagnosis

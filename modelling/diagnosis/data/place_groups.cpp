@@ -1,10 +1,9 @@
-#include "modelling/diagnosis/data/place_groups.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "estimator/thermal_model.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -1,11 +1,16 @@
-/// Columns of a run through filters, shifted, and their slopes.
+/// Columns, alone and side by side, through filters, shifted, and their slopes.
 #pragma once
 
 #include <vector>
 
-#include "modelling/diagnosis/data/panel.hpp"
+#include <Eigen/Core>
 
 namespace thermocomp::diagnosis {
+
+using Column = Eigen::VectorXd;
+
+/// The values of a row lie next to each other: what goes from row to row does all columns at once.
+using Panel = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// The series through the estimator's LowPass of each tau_s, shape (rows, taus).
 [[nodiscard]] Panel lagged(const Column& time_s, const Column& values,

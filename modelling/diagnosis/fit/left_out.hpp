@@ -5,8 +5,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "modelling/diagnosis/data/panel.hpp"
-#include "modelling/diagnosis/hypothesis/parameter.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+#include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 
 namespace thermocomp::diagnosis {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "estimator/checks.hpp"
-#include "modelling/diagnosis/data/false_reading.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -9,10 +9,7 @@
 #include <Eigen/Core>
 
 #include "modelling/diagnosis/data/measured_runs.hpp"
-#include "modelling/diagnosis/data/panel.hpp"
-#include "modelling/diagnosis/data/place_groups.hpp"
 #include "modelling/diagnosis/data/series.hpp"
-#include "modelling/diagnosis/data/stacked_rows.hpp"
 
 namespace thermocomp::diagnosis {
 

@@ -7,7 +7,7 @@
 
 #include <Eigen/QR>
 
-#include "modelling/diagnosis/data/false_reading.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 #include "modelling/diagnosis/data/series.hpp"
 #include "modelling/diagnosis/rank/posterior.hpp"
 

@@ -9,7 +9,7 @@
 #include "modelling/diagnosis/data/measured_runs.hpp"
 #include "modelling/diagnosis/fit/left_out.hpp"
 #include "modelling/diagnosis/fit/output_fit.hpp"
-#include "modelling/diagnosis/rank/explanation.hpp"
+#include "modelling/diagnosis/rank/posterior.hpp"
 
 namespace thermocomp::diagnosis {
 

@@ -34,9 +34,11 @@ struct SearchResult {
 };
 
 /// @param accepted  told what is accepted before the columns of any hypothesis are asked for again
+/// @param progress  called at each hypothesis
 [[nodiscard]] SearchResult search(
     const MeasuredData& data, const StackedRows& rows, const std::vector<Hypothesis>& hypotheses,
     const Rules& rules,
-    const std::function<void(const std::vector<Explanation>&)>& accepted = nullptr);
+    const std::function<void(const std::vector<Explanation>&)>& accepted = nullptr,
+    const std::function<void()>& progress = nullptr);
 
 }  // namespace thermocomp::diagnosis

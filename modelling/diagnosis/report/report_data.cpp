@@ -1,10 +1,9 @@
-#include "modelling/diagnosis/report/report_data.hpp"
-
 #include <algorithm>
 #include <cmath>
 
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/data/series.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -1,14 +1,10 @@
-#include "modelling/diagnosis/report/report_html.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <string_view>
 
-#include "modelling/diagnosis/report/report_pictures.hpp"
-#include "modelling/diagnosis/report/report_texts.hpp"
-#include "modelling/diagnosis/report/report_words.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "report/xml_text.hpp"
 
 namespace thermocomp::diagnosis {

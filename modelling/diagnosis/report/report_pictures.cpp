@@ -1,12 +1,10 @@
-#include "modelling/diagnosis/report/report_pictures.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <span>
 
-#include "modelling/diagnosis/report/report_words.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "report/svg_plot.hpp"
 
 namespace thermocomp::diagnosis {

@@ -1,14 +1,99 @@
-#include "modelling/diagnosis/report/report_texts.hpp"
-
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <string_view>
 
 #include "config/text/units.hpp"
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
-#include "modelling/diagnosis/report/report_words.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 namespace thermocomp::diagnosis {
+
+namespace {
+
+constexpr std::string_view thousand_of = "rpm";
+
+std::string words_of(double value, double scale, bool is_duration) {
+  return is_duration ? duration(value) : figure(scale * value);
+}
+
+/// " (47 min to 59 min)"; empty where the ends are the value, as far as it is told.
+std::string interval_words(const Interval& interval, double value, double scale, bool is_duration) {
+  const std::string low = words_of(interval.low, scale, is_duration);
+  const std::string high = words_of(interval.high, scale, is_duration);
+  const std::string told = words_of(value, scale, is_duration);
+  if (low == told && high == told) return "";
+  return " (" + low + " to " + high + ")";
+}
+
+/// As a divisor; a signal without unit stands for itself.
+std::string unit_of_column(const std::string& column) {
+  const std::string_view suffix = unit_of(column).suffix;
+  if (suffix == "_mm_per_min") return "(mm/min)";
+  return suffix.empty() ? column : std::string(suffix.substr(1));
+}
+
+}  // namespace
+
+std::string figure(double value) {
+  if (!std::isfinite(value)) return "-";
+  if (value == 0.0) return "0";
+  const int power = static_cast<int>(std::floor(std::log10(std::abs(value)) + 1e-9));
+  const bool begins_with_1 = std::abs(value) < 2.0 * std::pow(10.0, power);
+  const int digits = begins_with_1 ? 3 : 2;
+  const double unit = std::pow(10.0, power - digits + 1);
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*f", std::max(0, digits - 1 - power),
+                std::round(value / unit) * unit);
+  return text;
+}
+
+std::string duration(double seconds) {
+  const double size = std::abs(seconds);
+  if (!(size >= 120.0)) return figure(seconds) + " s";
+  if (size < 7200.0) return figure(seconds / 60.0) + " min";
+  return figure(seconds / 3600.0) + " h";
+}
+
+std::string name_of_column(const std::string& column) {
+  const std::size_t last = column.rfind('_');
+  return last == std::string::npos || last == 0 ? column : column.substr(0, last);
+}
+
+std::string parameter_words(const std::string& cause, const Parameter& parameter,
+                            const std::string& subject) {
+  if (parameter.name == "power") {
+    const bool square = parameter.values.contains("") && parameter.values.at("") > 1.5;
+    return square ? "with the square of the signal" : "in proportion to the signal";
+  }
+  const Cause* const of = find_cause(cause);
+  const CauseParameter* const known = of == nullptr ? nullptr : find_parameter(*of, parameter.name);
+  const std::string says(known == nullptr ? std::string_view(parameter.name) : known->says);
+  std::string unit(known == nullptr || known->unit == "1" ? std::string_view() : known->unit);
+  double scale = 1.0;
+  if (const std::size_t at = unit.find('?'); at != std::string::npos) {
+    const std::string of_subject = unit_of_column(subject);
+    const bool squared = unit.ends_with("^2");
+    const bool thousand = of_subject == thousand_of;
+    unit.replace(at, 1, thousand ? "(1000 " + of_subject + ")" : of_subject);
+    if (thousand) scale = squared ? 1e6 : 1e3;
+  }
+  const bool is_duration = unit == "s";
+  std::string text = says;
+  bool first = true;
+  for (const auto& [output, value] : parameter.values) {
+    text += first ? " " : ", ";
+    first = false;
+    text += words_of(value, scale, is_duration);
+    const auto ci = parameter.ci95.find(output);
+    if (ci != parameter.ci95.end()) text += interval_words(ci->second, value, scale, is_duration);
+    if (!is_duration && !unit.empty()) text.append(" ").append(unit);
+    if (!output.empty()) text.append(" in ").append(name_of_column(output));
+  }
+  return text;
+}
+
 namespace {
 
 /// Null: there is no such cause.

@@ -60,8 +60,10 @@ NetworkHypotheses::NetworkHypotheses(const ThermalPlant& plant, const ThermalRun
 void NetworkHypotheses::add(const NetworkSubject& subject) {
   for (const Cause& cause : all_causes()) {
     if (cause.in_network == nullptr) continue;
-    for (NetworkHypothesis& each : cause.in_network(material_, subject))
+    for (NetworkHypothesis& each : cause.in_network(material_, subject)) {
+      each.hypothesis.cause = cause.name;
       causes_.push_back(std::move(each));
+    }
   }
 }
 

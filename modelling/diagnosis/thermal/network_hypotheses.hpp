@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "modelling/diagnosis/answer/answer.hpp"
-#include "modelling/diagnosis/hypothesis/network_hypothesis.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/rank/search.hpp"
 
 namespace thermocomp::diagnosis {

@@ -7,11 +7,13 @@
 
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
 #include "modelling/diagnosis/answer/named_finding.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/network/network_simulation.hpp"
-#include "modelling/diagnosis/report/report_data.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "modelling/diagnosis/thermal/network_hypotheses.hpp"
 
 namespace thermocomp::diagnosis {
+
 namespace {
 
 constexpr double least_step_K = 1e-9;
@@ -111,7 +113,8 @@ void add_to_report(ReportData& report, const HeatNetwork& before, const HeatNetw
 Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>& train,
                            const std::vector<std::string>& train_names,
                            const std::vector<RunFile>& test,
-                           const std::vector<std::string>& test_names, ReportData* report) {
+                           const std::vector<std::string>& test_names, ReportData* report,
+                           const std::function<void()>& progress) {
   std::vector<RunFile> all = train;
   all.insert(all.end(), test.begin(), test.end());
   const std::vector<std::string> signals = shared_signals(all);
@@ -123,9 +126,9 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   Rules rules;
   rules.motion_share_min = motion_share_min;
   const std::vector<Hypothesis> hypotheses = NetworkHypotheses::all(catalogue);
-  const SearchResult result =
-      search(train_data, rows, hypotheses, rules,
-             [&](const std::vector<Explanation>& found) { catalogue->accept(found); });
+  const SearchResult result = search(
+      train_data, rows, hypotheses, rules,
+      [&](const std::vector<Explanation>& found) { catalogue->accept(found); }, progress);
 
   Diagnosis diagnosis;
   diagnosis.unit = "K";
@@ -164,6 +167,20 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
     add_to_report(*report, plant.network, network, test_runs, data_of(plant, test_runs), true);
   }
   return diagnosis;
+}
+
+std::optional<std::string> corrected_machine(const std::filesystem::path& path,
+                                             const std::vector<NamedFinding>& findings) {
+  MachineFile machine(path);
+  if (machine.is_body()) return std::nullopt;
+  std::string text = "# Written by thermocomp diagnose: values as the training runs have them.\n";
+  for (const NamedFinding& finding : findings) {
+    const Cause* const cause = find_cause(finding.cause);
+    if (cause == nullptr || cause->into_machine == nullptr ||
+        !cause->into_machine(machine, finding.subject, finding.parameters))
+      text.append("# No key carries " + finding.cause + " of " + finding.subject + ".\n");
+  }
+  return text + machine.text() + "\n";
 }
 
 }  // namespace thermocomp::diagnosis

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,16 @@ struct ReportData;
                                          const std::vector<std::string>& train_names,
                                          const std::vector<RunFile>& test,
                                          const std::vector<std::string>& test_names,
-                                         ReportData* report = nullptr);
+                                         ReportData* report = nullptr,
+                                         const std::function<void()>& progress = nullptr);
+
+/// Films, conductances, capacities and heats are multiplied by their factor, missing sources and
+/// lags of thermocouples are added; what no key carries stands in comments at the top. Comments of
+/// the file are not kept. A signal that only a missing source needs is added, constantly 0.
+/// @param path  a machine file that load_thermal_plant() accepts
+/// @return the file's text; nothing where the machine is a body, whose matrices are not edited
+/// @throws toml::parse_error when the file has become unreadable since
+[[nodiscard]] std::optional<std::string> corrected_machine(
+    const std::filesystem::path& path, const std::vector<NamedFinding>& findings);
 
 }  // namespace thermocomp::diagnosis

@@ -13,7 +13,7 @@
 #include "config/model/model_file.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/text/problems.hpp"
-#include "modelling/diagnosis/report/report_data.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

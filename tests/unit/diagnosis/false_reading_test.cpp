@@ -1,6 +1,4 @@
 // What a model makes of readings that are wrong.
-#include "modelling/diagnosis/data/false_reading.hpp"
-
 #include <cmath>
 #include <random>
 #include <string>

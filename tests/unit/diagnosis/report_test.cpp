@@ -6,9 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "modelling/diagnosis/report/report_html.hpp"
-#include "modelling/diagnosis/report/report_texts.hpp"
-#include "modelling/diagnosis/report/report_words.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "report/svg_plot.hpp"
 #include "report/xml_text.hpp"
 

@@ -10,7 +10,6 @@
 
 #include "estimator/model/terms/low_pass.hpp"
 #include "estimator/model/terms/play.hpp"
-#include "modelling/diagnosis/data/panel.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -9,8 +9,7 @@
 
 #include "config/text/problems.hpp"
 #include "modelling/diagnosis/network/network_simulation.hpp"
-#include "modelling/diagnosis/report/report_html.hpp"
-#include "modelling/diagnosis/thermal/corrected_machine.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 
 using namespace thermocomp;

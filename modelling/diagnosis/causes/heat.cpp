@@ -1,19 +1,20 @@
+/// Heat, or growth, that goes with an operating signal and not with a temperature.
 #include <algorithm>
 
+#include "config/text/units.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/data/series.hpp"
 
 namespace thermocomp::diagnosis::causes {
 namespace {
 
-constexpr const char* name = "missing_heat_source";
 constexpr CauseParameter tau{"tau_s", "s", 120.0, 6 * 3600.0, "time constant"};
 constexpr CauseParameter power{"power", "1", 1.0, 2.0, "power of the signal"};
 
-std::vector<Hypothesis> of(const Material& material, const Subject& subject) {
+std::vector<Hypothesis> missing_heat_source_hypotheses(const Material& material,
+                                                       const Subject& subject) {
   if (subject.kind != SubjectKind::signal) return {};
-  Hypothesis heat{name,
-                  material.name_of(subject),
+  Hypothesis heat{material.name_of(subject),
                   Form::own_gains,
                   {{std::string(tau.name), material.lag_times_s(tau.low, tau.high, 22), true},
                    {std::string(power.name), {power.low, power.high}, false, true}},
@@ -47,8 +48,8 @@ double largest(const ThermalRuns& runs, std::size_t signal) {
 }
 
 /// A heat at a place that goes with a signal, and that the network does not have.
-std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
-                                          const NetworkSubject& subject) {
+std::vector<NetworkHypothesis> missing_heat_source_in_network(const NetworkMaterial& material,
+                                                              const NetworkSubject& subject) {
   if (subject.kind != NetworkSubjectKind::signal_at_place) return {};
   const std::size_t signal = subject.second;
   const NetworkPlace& place = material.plant.places[subject.index];
@@ -59,7 +60,6 @@ std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
     return run.signals[signal].maxCoeff() > run.signals[signal].minCoeff();
   });
   NetworkHypothesis heat;
-  heat.hypothesis.cause = name;
   heat.hypothesis.subject = column + "|" + place.name;
   if (!moves || std::find(known.begin(), known.end(), heat.hypothesis.subject) != known.end())
     return {};
@@ -75,18 +75,16 @@ std::vector<NetworkHypothesis> in_network(const NetworkMaterial& material,
   return {std::move(heat)};
 }
 
-bool into_machine(MachineFile& machine, const std::string& subject,
-                  const std::vector<Parameter>& parameters) {
+bool missing_heat_source_into_machine(MachineFile& machine, const std::string& subject,
+                                      const std::vector<Parameter>& parameters) {
   machine.add_source(two_names(subject), shared_value(parameters, "heat_W"),
                      shared_value(parameters, "at"), shared_value(parameters, "power"));
   return true;
 }
 
-}  // namespace
-
 /// c LP(u^power): heat that no sensor sees.
 Cause missing_heat_source() {
-  Cause cause{name, "heat"};
+  Cause cause{"missing_heat_source", "heat"};
   cause.parameters = {
       tau,
       power,
@@ -103,12 +101,44 @@ Cause missing_heat_source() {
       "this place warms with this signal: heat that the thermal model does not have",
       "Add a [[source]] with these figures, then look which motor, bearing or pump it is."};
   cause.experiment = Experiment::standstill;
-  cause.term = name;
-  cause.hypotheses = of;
+  cause.hypotheses = missing_heat_source_hypotheses;
   cause.gains = gain_of_each_output;
-  cause.in_network = in_network;
-  cause.into_machine = into_machine;
+  cause.in_network = missing_heat_source_in_network;
+  cause.into_machine = missing_heat_source_into_machine;
   return cause;
+}
+
+std::vector<Hypothesis> speed_growth_hypotheses(const Material& material, const Subject& subject) {
+  if (subject.kind != SubjectKind::signal) return {};
+  const auto unit = unit_of(material.name_of(subject)).suffix;
+  if (unit != "_rpm" && unit != "_mm_per_min" && !unit.empty()) return {};
+  Hypothesis growth{material.name_of(subject), Form::own_gains, {}, {"gain_um_per_unit2"}};
+  growth.columns = [&material, values = material.values_of(subject)](const Shapes&, std::size_t) {
+    return material.stacked(
+        [&](const MeasuredRun& run) -> Column { return values(run).array().square(); });
+  };
+  return {std::move(growth)};
+}
+
+/// c u^2 at once: centrifugal, or the seat of a bearing.
+Cause speed_growth() {
+  Cause cause{"speed_growth", "heat"};
+  cause.parameters = {{.name = "gain_um_per_unit2", .unit = "um/?^2", .says = "effect"}};
+  cause.texts = {"Growth with speed, not with heat",
+                 "the displacement jumps with the square of this signal",
+                 "Use the extended model; this part is not thermal and no sensor will show it."};
+  cause.texts_without_unit = cause.texts;
+  cause.texts_without_unit->title = "Growth with the square of a signal, not with heat";
+  cause.experiment = Experiment::standstill;
+  cause.hypotheses = speed_growth_hypotheses;
+  cause.gains = gain_of_each_output;
+  return cause;
+}
+
+}  // namespace
+
+std::vector<Cause> of_heat() {
+  return {missing_heat_source(), speed_growth()};
 }
 
 }  // namespace thermocomp::diagnosis::causes

@@ -1,5 +1,3 @@
-#include "modelling/diagnosis/command/diagnose_command.hpp"
-
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -16,13 +14,12 @@
 #include "config/runs/run_file.hpp"
 #include "config/runs/run_overlap.hpp"
 #include "modelling/diagnosis/answer/gain_on_test.hpp"
-#include "modelling/diagnosis/command/still_searching.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
-#include "modelling/diagnosis/report/report_html.hpp"
-#include "modelling/diagnosis/thermal/corrected_machine.hpp"
+#include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {
@@ -124,16 +121,18 @@ Diagnosis diagnosis_of(const Options& options, ReportData* report) {
   std::vector<RunFile> train = loader.load(options.train);
   std::vector<RunFile> test = loader.load(options.test);
   refuse_overlap(train, test);
-  const StillSearching still_searching;
+  cli::Progress line("searching what the model gets wrong");
+  const auto progress = [&line] { line.update(-1.0); };
   if (!options.thermal.empty())
     return diagnose_thermal(load_thermal_plant(options.thermal), train, options.train, test,
-                            options.test, report);
+                            options.test, report, progress);
   const ThermalModel model = load_model(options.model);
   for (std::vector<RunFile>* runs : {&train, &test})
     for (RunFile& run : *runs)
       for (const Blunders& each : leave_out_blunders(run, model.outputs))
         std::fprintf(stderr, "%s: %s\n", run.name.c_str(), each.text().c_str());
-  return diagnose(model, std::move(train), options.train, std::move(test), options.test, report);
+  return diagnose(model, std::move(train), options.train, std::move(test), options.test, report,
+                  progress);
 }
 
 /// What the test runs do not speak against.

@@ -1,0 +1,200 @@
+/// What is wrong with the measured displacement, or acts on it from outside.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+
+namespace thermocomp::diagnosis::causes {
+namespace {
+
+constexpr CauseParameter shift{"shift_s", "s", -3600.0, 3600.0, "shifted by"};
+
+std::vector<Hypothesis> time_shift_hypotheses(const Material& material, const Subject& subject) {
+  if (subject.kind != SubjectKind::output) return {};
+  const ColumnOf model_um = [output = subject.index](const MeasuredRun& run) -> const Column& {
+    return run.model_um[output];
+  };
+  if (!(material.range(model_um) > 0)) return {};
+  std::vector<double> shifts =
+      logarithmic_grid(std::max(5.0, 0.2 * material.step_s()), shift.high, 14);
+  for (std::size_t i = 0, count = shifts.size(); i < count; ++i)
+    shifts.insert(shifts.begin(), -shifts[2 * i]);
+  Hypothesis late{material.name_of(subject), Form::no_gain, {{std::string(shift.name), shifts}}};
+  late.output = subject.index;
+  late.columns = [&material, model_um](const Shapes& shapes, std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
+      // Interpolation averages two rows; both sides are smoothed, so that less noise is no gain.
+      const Column smooth_um = smoothed(run.time_s, model_um(run), 2.0 * material.step_s());
+      Panel all(run.rows(), std::ssize(shapes));
+      for (std::size_t i = 0; i < shapes.size(); ++i)
+        all.col(static_cast<Eigen::Index>(i)) =
+            shifted(run.time_s, smooth_um, shapes[i][0]) - smooth_um;
+      return all;
+    });
+  };
+  return {std::move(late)};
+}
+
+/// The displacement is logged late (shift > 0) or early.
+Cause time_shift() {
+  Cause cause{"time_shift", "datum"};
+  cause.parameters = {shift};
+  cause.texts = {
+      "The recorders' clocks differ",
+      "the displacement is logged at other times than the temperatures",
+      "Set the clocks of both recorders, or correct the time column before anything is fitted."};
+  cause.experiment = Experiment::up_and_down;
+  cause.hypotheses = time_shift_hypotheses;
+  cause.correction = [](const std::vector<Parameter>& parameters) {
+    return Correction{0, shared_value(parameters, "shift_s"), 0.0, 0.0};
+  };
+  return cause;
+}
+
+constexpr std::size_t periods_max = 400;
+
+/// At least five whole periods in the longest run; fine enough that a neighbour of the true period
+/// is at most a fifth of a turn off at the run's end.
+std::vector<double> periods_of(const Material& material) {
+  const double length_s = material.length_s();
+  const double longest_s = length_s / 5.0;
+  const double shortest_s = 5.0 * material.step_s();
+  std::vector<double> periods;
+  if (!(longest_s > 2.0 * shortest_s)) return periods;
+  for (double frequency = 1.0 / longest_s;
+       frequency <= 1.0 / shortest_s && periods.size() < periods_max;
+       frequency += std::max(0.4 / length_s, 0.004 * frequency))
+    periods.push_back(1.0 / frequency);
+  std::reverse(periods.begin(), periods.end());
+  return periods;
+}
+
+/// A sine and a cosine for each run, those of one period after those of another.
+Panel waves(const Material& material, const Shapes& shapes) {
+  const StackedRows& rows = material.rows();
+  const Eigen::Index width = 2 * std::ssize(rows.runs);
+  Panel all = Panel::Zero(rows.time_s.size(), width * std::ssize(shapes));
+  for (std::size_t i = 0; i < shapes.size(); ++i)
+    for (std::size_t run = 0; run < rows.runs.size(); ++run) {
+      const Block& block = rows.runs[run];
+      const Eigen::Index count = block.end - block.begin;
+      const Eigen::ArrayXd angle =
+          2.0 * std::numbers::pi / shapes[i][0] * rows.time_s.segment(block.begin, count).array();
+      const auto first = width * static_cast<Eigen::Index>(i) + 2 * static_cast<Eigen::Index>(run);
+      all.col(first).segment(block.begin, count) = angle.sin();
+      all.col(first + 1).segment(block.begin, count) = angle.cos();
+    }
+  return all;
+}
+
+std::vector<Hypothesis> periodic_disturbance_hypotheses(const Material& material,
+                                                        const Subject& subject) {
+  if (subject.kind != SubjectKind::output) return {};
+  const std::vector<double> periods = periods_of(material);
+  if (periods.empty()) return {};
+  std::vector<std::string> gains;
+  for (std::size_t run = 0; run < material.data().runs.size(); ++run)
+    gains.insert(gains.end(), {"sine_um", "cosine_um"});
+  Hypothesis period{
+      material.name_of(subject), Form::own_gains, {{"period_s", periods, true, false}}, gains};
+  period.output = subject.index;
+  period.columns = [&material](const Shapes& shapes, std::size_t) {
+    return waves(material, shapes);
+  };
+  return {std::move(period)};
+}
+
+/// Mean over the runs.
+std::vector<Parameter> amplitude(const FoundGains& found) {
+  const Eigen::VectorXd& waves = found.gains[first_output(found)];
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i + 1 < waves.size(); i += 2) sum += std::hypot(waves[i], waves[i + 1]);
+  return {{"amplitude_um", {{"", 2.0 * sum / static_cast<double>(waves.size())}}, {}}};
+}
+
+/// A sine unrelated to any input, its phase another one in every run: a cooler's or a room's cycle.
+Cause periodic_disturbance() {
+  Cause cause{"periodic_disturbance", "datum"};
+  cause.parameters = {{.name = "period_s", .unit = "s", .low = 0.0, .says = "period"},
+                      {.name = "amplitude_um", .unit = "um", .low = 0.0, .says = "amplitude"}};
+  cause.texts = {"A cycle of its own", "a cycle of its own, which no temperature here explains",
+                 "Look for what switches with this period: a cooler, a pump, the room's "
+                 "ventilation."};
+  cause.hypotheses = periodic_disturbance_hypotheses;
+  cause.gains = amplitude;
+  cause.correction = [](const std::vector<Parameter>& parameters) {
+    return Correction{0, 0.0, shared_value(parameters, "period_s"),
+                      shared_value(parameters, "amplitude_um")};
+  };
+  return cause;
+}
+
+std::vector<Hypothesis> displacement_step_hypotheses(const Material& material,
+                                                     const Subject& subject) {
+  if (subject.kind != SubjectKind::output_in_run) return {};
+  const std::size_t run = subject.run;
+  Hypothesis step{
+      material.name_of(subject),
+      Form::own_gains,
+      {{"at_s", material.onsets_s(run, 0.02, 0.98, 52,
+                                  material.data().runs[run].measured_um[subject.index])}},
+      {"step_um"},
+      subject.index,
+      run};
+  step.columns = [&material, run](const Shapes& shapes, std::size_t) {
+    return material.in_run(run, since(material.data().runs[run].time_s, firsts_of(shapes)));
+  };
+  return {std::move(step)};
+}
+
+/// The datum jumps once in a run.
+Cause displacement_step() {
+  Cause cause{"displacement_step", "datum"};
+  cause.parameters = {{.name = "at_s",
+                       .unit = "s",
+                       .says = "from the start of the recording on",
+                       .of_a_jump = true},
+                      {.name = "step_um", .unit = "um", .says = "jump", .of_a_jump = true}};
+  cause.texts = {
+      "The datum jumped", "the datum of the displacement jumped once",
+      "Do not fit to this run across the jump; look whether the probe was touched or set again."};
+  cause.experiment = Experiment::another_run;
+  cause.hypotheses = displacement_step_hypotheses;
+  cause.gains = single_gain;
+  return cause;
+}
+
+std::vector<Hypothesis> displacement_drift_hypotheses(const Material& material,
+                                                      const Subject& subject) {
+  if (subject.kind != SubjectKind::output_in_run) return {};
+  Hypothesis drift{material.name_of(subject), Form::own_gains, {},
+                   {"rate_um_per_h"},         subject.index,   subject.run};
+  drift.columns = [&material, run = subject.run](const Shapes&, std::size_t) {
+    const MeasuredRun& of = material.data().runs[run];
+    return material.in_run(run, (of.time_s.array() - of.time_s[of.begin]) / 3600.0);
+  };
+  return {std::move(drift)};
+}
+
+/// The datum creeps through a whole run.
+Cause displacement_drift() {
+  Cause cause{"displacement_drift", "datum"};
+  cause.parameters = {{.name = "rate_um_per_h", .unit = "um/h", .says = "creep"}};
+  cause.texts = {"The datum creeps", "the datum of the displacement creeps through the whole run",
+                 "Do not fit to this run; look at the probe, its holder and its amplifier's "
+                 "warm-up."};
+  cause.experiment = Experiment::another_run;
+  cause.hypotheses = displacement_drift_hypotheses;
+  cause.gains = single_gain;
+  return cause;
+}
+
+}  // namespace
+
+std::vector<Cause> of_datum() {
+  return {time_shift(), periodic_disturbance(), displacement_step(), displacement_drift()};
+}
+
+}  // namespace thermocomp::diagnosis::causes

@@ -1,0 +1,331 @@
+/// What a model of the machine's structure may lack: how it follows its temperatures.
+#include <algorithm>
+
+#include "config/text/units.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
+#include "modelling/diagnosis/data/series.hpp"
+
+namespace thermocomp::diagnosis::causes {
+namespace {
+
+std::vector<Hypothesis> wrong_coefficient_hypotheses(const Material& material,
+                                                     const Subject& subject) {
+  if (subject.kind != SubjectKind::input) return {};
+  Hypothesis wrong{material.name_of(subject), Form::own_gains, {}, {"delta_um_per_K"}};
+  wrong.columns = [&material, rise_K = material.values_of(subject)](const Shapes&, std::size_t) {
+    return material.stacked(rise_K);
+  };
+  return {std::move(wrong)};
+}
+
+/// dK T: the coefficient of a place is off by dK.
+Cause wrong_coefficient() {
+  Cause cause{"wrong_coefficient", "structure"};
+  cause.parameters = {{.name = "delta_um_per_K", .unit = "um/K", .says = "the coefficient lacks"}};
+  cause.texts = {
+      "The effect of a place has another size",
+      "the model moves by the wrong amount for each kelvin of this place",
+      "Use the extended model; look at the support or material that the coefficient came from."};
+  cause.experiment = Experiment::steady_levels;
+  cause.hypotheses = wrong_coefficient_hypotheses;
+  cause.gains = gain_of_each_output;
+  return cause;
+}
+
+constexpr CauseParameter lag_tau{"tau_s", "s", 60.0, 4 * 3600.0, "time constant"};
+/// The share of a place's effect that may be late: a fit settles it hardly better than this.
+constexpr double share_max = 1.1;
+
+/// Of gains, as a share of what the input or its whole group does in the end.
+std::function<Interval(std::size_t output)> lag_shares_of(const Material& material,
+                                                          std::size_t input) {
+  return [&material, input](std::size_t output) {
+    const auto row = static_cast<Eigen::Index>(output);
+    const auto column = static_cast<Eigen::Index>(input);
+    const double own = share_max * material.settled_um_per_K()(row, column);
+    const double of_group = share_max * material.settled_of_group_um_per_K()(row, column);
+    return Interval{std::min({0.0, own, of_group}), std::max({0.0, own, of_group})};
+  };
+}
+
+std::vector<Hypothesis> thermal_lag_hypotheses(const Material& material, const Subject& subject) {
+  if (subject.kind != SubjectKind::input) return {};
+  Hypothesis lag{
+      material.name_of(subject),
+      Form::own_gains,
+      {{std::string(lag_tau.name), material.lag_times_s(lag_tau.low, lag_tau.high, 20), true}},
+      {"gain_um_per_K"}};
+  lag.columns = [&material, rise_K = material.values_of(subject)](const Shapes& shapes,
+                                                                  std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) -> Panel {
+      return lagged(run.time_s, rise_K(run), firsts_of(shapes)).colwise() - rise_K(run);
+    });
+  };
+  if (material.data().model.guideways.empty()) lag.bounds = lag_shares_of(material, subject.index);
+  return {std::move(lag)};
+}
+
+/// g (LP(T) - T), 0 < g / K <= 1: a share of the structure follows late.
+Cause thermal_lag() {
+  Cause cause{"thermal_lag", "structure"};
+  cause.parameters = {lag_tau, {.name = "gain_um_per_K", .unit = "um/K", .says = "effect"}};
+  cause.texts = {
+      "Part of the structure follows late", "a part of the structure follows this temperature late",
+      "Use the extended model; a sensor deeper in the slow part would make it unnecessary."};
+  cause.experiment = Experiment::up_and_down;
+  cause.hypotheses = thermal_lag_hypotheses;
+  cause.gains = gain_of_each_output;
+  return cause;
+}
+
+constexpr CauseParameter missing_tau{"tau_s", "s", 0.0, 6 * 3600.0, "time constant"};
+constexpr double shortest_lag_s = 60.0;
+
+std::vector<Hypothesis> missing_temperature_hypotheses(const Material& material,
+                                                       const Subject& subject) {
+  if (subject.kind != SubjectKind::other_temperature) return {};
+  std::vector<double> taus_s = material.lag_times_s(shortest_lag_s, missing_tau.high, 20);
+  taus_s.insert(taus_s.begin(), missing_tau.low);
+  Hypothesis missing{material.name_of(subject),
+                     Form::own_gains,
+                     {{std::string(missing_tau.name), taus_s, true}},
+                     {"gain_um_per_K"}};
+  missing.columns = [&material, rise_K = material.values_of(subject)](const Shapes& shapes,
+                                                                      std::size_t) {
+    return material.stacked(
+        [&](const MeasuredRun& run) { return lagged(run.time_s, rise_K(run), firsts_of(shapes)); });
+  };
+  return {std::move(missing)};
+}
+
+/// K LP(T) of a place that the model does not use; missing_tau = 0: K T.
+Cause missing_temperature() {
+  Cause cause{"missing_temperature", "structure"};
+  cause.parameters = {missing_tau, {.name = "gain_um_per_K", .unit = "um/K", .says = "effect"}};
+  cause.texts = {
+      "A measured place that the model leaves out",
+      "a measured place that the model ignores moves the machine",
+      "Use the extended model, or take this place into the model when it is fitted again."};
+  cause.hypotheses = missing_temperature_hypotheses;
+  cause.gains = gain_of_each_output;
+  return cause;
+}
+
+std::vector<Hypothesis> nonlinear_expansion_hypotheses(const Material& material,
+                                                       const Subject& subject) {
+  if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::other_temperature)
+    return {};
+  Hypothesis square{material.name_of(subject), Form::own_gains, {}, {"gain_um_per_K2"}};
+  square.columns = [&material, rise_K = material.values_of(subject)](const Shapes&, std::size_t) {
+    return material.stacked(
+        [&](const MeasuredRun& run) -> Column { return rise_K(run).array().square(); });
+  };
+  return {std::move(square)};
+}
+
+/// c T^2.
+Cause nonlinear_expansion() {
+  Cause cause{"nonlinear_expansion", "structure"};
+  cause.parameters = {{.name = "gain_um_per_K2", .unit = "um/K^2", .says = "curvature"}};
+  cause.texts = {
+      "The effect of a temperature is curved", "the effect of this temperature is curved",
+      "Use the extended model; beyond the temperatures seen here the curve is not known."};
+  cause.experiment = Experiment::steady_levels;
+  cause.hypotheses = nonlinear_expansion_hypotheses;
+  cause.gains = gain_of_each_output;
+  return cause;
+}
+
+Hypothesis along_axis(const Material& material, const Subject& place, const Subject& position) {
+  const std::string& temperature = material.name_of(place);
+  const std::string& axis = material.name_of(position);
+  const std::string subject = std::min(temperature, axis) + "|" + std::max(temperature, axis);
+  Hypothesis along{subject, Form::own_gains, {}, {"gain_um_per_K_mm", "p0_mm"}};
+  along.simpler_cause =
+      place.kind == SubjectKind::input ? "wrong_coefficient" : "missing_temperature";
+  along.simpler_subject = temperature;  // without the position
+  along.columns = [&material, rise_K = material.values_of(place),
+                   position_mm = material.values_of(position)](const Shapes&, std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
+      Panel both(run.rows(), 2);
+      both << position_mm(run).cwiseProduct(rise_K(run)), rise_K(run);
+      return both;
+    });
+  };
+  return along;
+}
+
+/// With every position that the machine went to.
+std::vector<Hypothesis> position_dependence_hypotheses(const Material& material,
+                                                       const Subject& subject) {
+  if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::other_temperature)
+    return {};
+  std::vector<Hypothesis> all;
+  const auto& signals = material.data().signals;
+  for (std::size_t signal = 0; signal < signals.size(); ++signal) {
+    const Subject position{SubjectKind::signal, signal};
+    if (kind_of(signals[signal]) != QuantityKind::position) continue;
+    if (!material.moves_anywhere(material.values_of(position))) continue;
+    all.push_back(along_axis(material, subject, position));
+  }
+  return all;
+}
+
+/// p0 = -b / c of c p T + b T; over several outputs weighted by c^2.
+Parameter pivot(const FoundGains& found) {
+  double above = 0.0;
+  double below = 0.0;
+  for (const Eigen::VectorXd& gains : found.gains) {
+    if (gains.size() == 0) continue;
+    above -= gains[0] * gains[1];
+    below += gains[0] * gains[0];
+  }
+  return {"p0_mm", {{"", below > 0 ? above / below : 0.0}}, {}};
+}
+
+std::vector<Parameter> gains_along(const FoundGains& found) {
+  return {gain_table(found, 0), pivot(found)};
+}
+
+/// c (p - p0) T: the effect of a temperature grows along an axis.
+Cause position_dependence() {
+  Cause cause{"position_dependence", "structure"};
+  cause.parameters = {
+      {.name = "gain_um_per_K_mm", .unit = "um/(K mm)", .says = "effect along the axis"},
+      {.name = "p0_mm", .unit = "mm", .says = "none at"}};
+  cause.texts = {"The effect grows along the axis",
+                 "the effect of this temperature grows along the axis",
+                 "Use the extended model, or give the model a guideway along this axis."};
+  cause.experiment = Experiment::along_the_axis;
+  cause.hypotheses = position_dependence_hypotheses;
+  cause.gains = gains_along;
+  return cause;
+}
+
+constexpr CauseParameter sensor_tau{"tau_s", "s", 20.0, 3600.0, "time constant"};
+/// A derivative is taken of readings smoothed with this share of the time constant that it is for.
+constexpr double slope_smoothing = 0.25;
+
+std::vector<Hypothesis> slow_sensor_hypotheses(const Material& material, const Subject& subject) {
+  if (subject.kind != SubjectKind::input) return {};
+  Hypothesis slow{material.name_of(subject),
+                  Form::no_gain,
+                  {{std::string(sensor_tau.name),
+                    material.lag_times_s(sensor_tau.low, sensor_tau.high, 16), true}}};
+  slow.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
+    return material.stacked([&](const MeasuredRun& run) {
+      // A reading that is late misses sensor_tau times its slope.
+      Panel missed_K(run.rows(), std::ssize(shapes));
+      for (std::size_t i = 0; i < shapes.size(); ++i)
+        missed_K.col(static_cast<Eigen::Index>(i)) =
+            shapes[i][0] * slope(run.time_s, run.inputs_K[input], slope_smoothing * shapes[i][0]);
+      return answer_to_errors(material.data(), run, output, input, missed_K);
+    });
+  };
+  return {std::move(slow)};
+}
+
+constexpr double shortest_in_network_s = 30.0;
+
+std::vector<NetworkHypothesis> slow_sensor_in_network(const NetworkMaterial& material,
+                                                      const NetworkSubject& subject) {
+  if (subject.kind != NetworkSubjectKind::sensor) return {};
+  NetworkHypothesis slow;
+  slow.hypothesis.subject = material.plant.network.sensors[subject.index].column;
+  slow.hypothesis.form = Form::no_gain;
+  slow.hypothesis.shape = {{std::string(sensor_tau.name),
+                            logarithmic_grid(shortest_in_network_s, sensor_tau.high, 12), true,
+                            false}};
+  slow.hypothesis.output = subject.index;
+  slow.apply = [sensor = subject.index](HeatNetwork& network, const Shape& shape, double gain) {
+    network.sensors[sensor].lag_s += gain * shape[0];
+  };
+  return {std::move(slow)};
+}
+
+bool slow_sensor_into_machine(MachineFile& machine, const std::string& subject,
+                              const std::vector<Parameter>& parameters) {
+  return machine.add_to_thermocouple(subject.substr(0, subject.rfind("_degC")), "lag_s",
+                                     shared_value(parameters, "tau_s"));
+}
+
+/// The reading is LP(T): the displacement leads it.
+Cause slow_sensor() {
+  Cause cause{"slow_sensor", "structure"};
+  cause.parameters = {sensor_tau};
+  cause.texts = {
+      "A sensor follows its place late",
+      "the displacement leads the reading: the sensor follows its place late",
+      "Look at how the sensor is mounted (paste, clamp, tape); until then use the extended model."};
+  cause.experiment = Experiment::up_and_down;
+  cause.hypotheses = slow_sensor_hypotheses;
+  cause.in_network = slow_sensor_in_network;
+  cause.into_machine = slow_sensor_into_machine;
+  return cause;
+}
+
+std::vector<Hypothesis> play_of_input(const Material& material, const Subject& subject) {
+  const double range_K =
+      material.range([input = subject.index](const MeasuredRun& run) -> const Column& {
+        return run.inputs_K[input];
+      });
+  Hypothesis play{material.name_of(subject),
+                  Form::no_gain,
+                  {{"width_K", linear_grid(0.04 * range_K, 0.8 * range_K, 16)}}};
+  play.columns = [&material, input = subject.index](const Shapes& shapes, std::size_t output) {
+    return material.stacked([&](const MeasuredRun& run) {
+      return answer_to_errors(material.data(), run, output, input,
+                              played_less_values(run.calm_inputs_K[input], firsts_of(shapes)));
+    });
+  };
+  return {std::move(play)};
+}
+
+std::vector<Hypothesis> play_of_output(const Material& material, const Subject& subject) {
+  const ColumnOf model_um = [output = subject.index](const MeasuredRun& run) -> const Column& {
+    return run.model_um[output];
+  };
+  const double range_um = material.range(model_um);
+  if (!(range_um > 0)) return {};
+  Hypothesis play{material.name_of(subject),
+                  Form::no_gain,
+                  {{"width_um", linear_grid(0.03 * range_um, 0.7 * range_um, 20)}}};
+  play.output = subject.index;
+  play.columns = [&material, model_um](const Shapes& shapes, std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
+      return played_less_values(calm(run.time_s, model_um(run)), firsts_of(shapes));
+    });
+  };
+  return {std::move(play)};
+}
+
+std::vector<Hypothesis> hysteresis_hypotheses(const Material& material, const Subject& subject) {
+  if (subject.kind == SubjectKind::input) return play_of_input(material, subject);
+  if (subject.kind == SubjectKind::output) return play_of_output(material, subject);
+  return {};
+}
+
+/// Play of a joint, of one temperature's effect or of the whole output: a loop that does not depend
+/// on speed.
+Cause hysteresis() {
+  Cause cause{"hysteresis", "structure"};
+  cause.parameters = {{.name = "width_K", .unit = "K", .low = 0.0, .says = "dead band"},
+                      {.name = "width_um", .unit = "um", .low = 0.0, .says = "dead band"}};
+  cause.texts = {
+      "Something sticks before it follows",
+      "what moves sticks before it follows: a loop that does not depend on speed",
+      "Look for a joint or a clamp that slips; the extended model carries it until then."};
+  cause.experiment = Experiment::twice_as_slow;
+  cause.hypotheses = hysteresis_hypotheses;
+  return cause;
+}
+
+}  // namespace
+
+std::vector<Cause> of_structure() {
+  return {wrong_coefficient(),   thermal_lag(), missing_temperature(), nonlinear_expansion(),
+          position_dependence(), slow_sensor(), hysteresis()};
+}
+
+}  // namespace thermocomp::diagnosis::causes
