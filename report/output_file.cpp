@@ -125,4 +125,10 @@ void OutputFile::commit() {
   interrupts_as_usual();
 }
 
+void write_file(const std::string& destination, const std::string& text) {
+  OutputFile file(destination);
+  file.stream() << text;
+  file.commit();
+}
+
 }  // namespace thermocomp::cli

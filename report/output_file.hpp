@@ -34,4 +34,7 @@ class OutputFile {
   std::ostream* stream_;
 };
 
+/// @throws Failure
+void write_file(const std::string& destination, const std::string& text);
+
 }  // namespace thermocomp::cli

@@ -186,12 +186,6 @@ void keep_old(const fs::path& path) {
   std::cout << path.string() << ": the one before is " << old.filename().string() << " now\n";
 }
 
-void write_file(const std::string& path, const std::string& text) {
-  OutputFile file(path);
-  file.stream() << text;
-  file.commit();
-}
-
 void tell_next(const InitDraft& draft, const std::string& file) {
   const bool is_own = !draft.own_folder.empty();
   const std::string tool =
@@ -265,10 +259,10 @@ int run_init(const InitOptions& options) {
   const bool is_all_there = options.no_scan || look(draft, folder);
   if (draft.model_inputs.empty()) {
     keep_old(model);
-    write_file(model.string(), first_model_text(draft));
+    cli::write_file(model.string(), first_model_text(draft));
   }
   keep_old(options.file);
-  write_file(options.file, configuration_text(draft));
+  cli::write_file(options.file, configuration_text(draft));
   const DaemonConfig written = load_daemon_config(options.file);  // what check says, now
   std::cout << options.file << ": written, OK; " << written.estimator.sensors.size() << " sensors";
   if (questions.count() > 0) std::cout << ", " << questions.count() << " questions";

@@ -40,9 +40,7 @@ int run_predict(const PredictOptions& options) {
   if (prediction.time_s.empty()) {
     throw Failure(options.run + ": no row has all inputs of the model and a measured output");
   }
-  OutputFile file(options.output);
-  file.stream() << write_run(as_run_file(prediction));
-  file.commit();
+  cli::write_file(options.output, write_run(as_run_file(prediction)));
   for (const PredictedOutput& output : prediction.outputs) {
     std::fprintf(stderr, "%s %.3f %.3f\n", output.name.c_str(), output.rms_um, output.peak_um);
     if (!output.measured_there)
@@ -69,9 +67,7 @@ int run_simulate(const SimulateOptions& options) {
     throw Failure(options.machine + ": duration_s must be above 0 to make a run file");
   }
   const RunFile run = simulate(machine, machine.duration_s, options.seed.value_or(machine.seed));
-  OutputFile file(options.output);
-  file.stream() << write_run(run);
-  file.commit();
+  cli::write_file(options.output, write_run(run));
   return exit_success;
 }
 
@@ -95,9 +91,7 @@ int run_covariance(const CovarianceOptions& options) {
   const CovarianceFit fit = fit_covariance(runs, model.inputs);
   model.covariance_K2 = fit.matrix_K2;
   model.covariance_growth = fit.growth;
-  OutputFile file(options.output);
-  file.stream() << with_covariance(text, model);
-  file.commit();
+  cli::write_file(options.output, with_covariance(text, model));
   std::fprintf(stderr, "%zu rows, %.1f h; an input lost alone, after an hour (1 sd):\n", fit.rows,
                fit.hours);
   for (std::size_t i = 0; i < model.inputs.size(); ++i) {
@@ -131,9 +125,7 @@ int run_correction(const CourseOptions& options) {
   }
   const CourseFit fit = fit_course(runs, model, correction, options.every_s);
   model.course = fit.course;
-  OutputFile file(options.output);
-  file.stream() << write_model(model);
-  file.commit();
+  cli::write_file(options.output, write_model(model));
   for (const auto& [name, points] : fit.course.outputs) {
     std::fprintf(stderr, "%s: %zu probings taught gains, %zu kept", name.c_str(),
                  fit.probings.at(name), points.size());

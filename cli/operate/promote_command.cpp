@@ -23,12 +23,6 @@ std::string text_of_model(const fs::path& path) {
   return read_text_file(path, model_bytes_max);
 }
 
-void write_file(const fs::path& path, const std::string& text) {
-  OutputFile file(path.string());
-  file.stream() << text;
-  file.commit();
-}
-
 /// @return the candidate's file. @throws Failure: none runs
 fs::path candidate_in(const json& status) {
   if (!status.contains("candidate"))
@@ -49,15 +43,15 @@ int run_promote(const GlobalOptions& global, bool back) {
   const std::string next = text_of_model(back ? before : candidate_in(status));
   const std::string now = text_of_model(model);
   // In this order the model that was in use first is in one of the files at any moment.
-  if (!back) write_file(before, now);
-  write_file(model, next);
+  if (!back) cli::write_file(before, now);
+  cli::write_file(model, next);
   try {
     static_cast<void>(ask_daemon(global.socket, "reload", json::object()));
   } catch (...) {
-    write_file(model, now);
+    cli::write_file(model, now);
     throw;
   }
-  if (back) write_file(before, now);
+  if (back) cli::write_file(before, now);
   std::cout << model.string() << (back ? ": the model before runs again" : ": the candidate runs")
             << "; the other is kept as " << before.string()
             << ", and thermocomp promote --back exchanges them\n";

@@ -51,9 +51,7 @@ int run_report(const ReportOptions& options) {
   if (!(span.within(recorded).length_s() > 0.0))
     throw Failure(options.history + ": nothing was recorded in that time");
   const MachineWeek week = machine_week(options.history, span);
-  OutputFile file(options.output);
-  file.stream() << week_html(week);
-  file.commit();
+  cli::write_file(options.output, week_html(week));
   for (const HistoryDamage& damage : week.damage)
     std::fprintf(stderr, "%s: %s\n", options.history.c_str(), to_string(damage).c_str());
   return exit_success;

@@ -37,12 +37,6 @@ struct Options {
   bool weighed{false};
 };
 
-void write(const std::string& destination, const std::string& text) {
-  cli::OutputFile file(destination);
-  file.stream() << text;
-  file.commit();
-}
-
 void print_test_gain(const std::string& output, const TestGain& gain) {
   std::printf("  %s, test rows: RMS %.3f -> %.3f (%.0f %%, 95 %%: %.0f to %.0f)\n", output.c_str(),
               gain.before_um, gain.after_um, 100 * gain.reduction, 100 * gain.ci95.low,
@@ -147,10 +141,10 @@ void write_folder(const Options& options, const Diagnosis& diagnosis, const Repo
   const std::filesystem::path folder(options.folder);
   std::filesystem::create_directories(folder);
   if (options.thermal.empty())
-    write((folder / "model.toml").string(), write_model(diagnosis.extended));
+    cli::write_file((folder / "model.toml").string(), write_model(diagnosis.extended));
   else if (const auto text = corrected_machine(options.thermal, confirmed(diagnosis)))
-    write((folder / "machine.toml").string(), *text);
-  write((folder / "report.html").string(), report_html(diagnosis, report));
+    cli::write_file((folder / "machine.toml").string(), *text);
+  cli::write_file((folder / "report.html").string(), report_html(diagnosis, report));
 }
 
 int run(const Options& options) {
@@ -164,7 +158,8 @@ int run(const Options& options) {
   ReportData report;
   const Diagnosis diagnosis = diagnosis_of(options, options.folder.empty() ? nullptr : &report);
   if (!options.folder.empty()) write_folder(options, diagnosis, report);
-  if (!options.json.empty()) write(options.json, diagnosis_json(diagnosis, options.weighed));
+  if (!options.json.empty())
+    cli::write_file(options.json, diagnosis_json(diagnosis, options.weighed));
   if (options.json != "-") print(diagnosis);
   if (options.json != "-" && options.weighed) print_weighed(diagnosis);
   return 0;

@@ -19,12 +19,6 @@ struct Options {
   bool json{false};
 };
 
-void write(const std::filesystem::path& destination, const std::string& text) {
-  cli::OutputFile file(destination.string());
-  file.stream() << text;
-  file.commit();
-}
-
 int run(const Options& options) {
   const TestPlan plan = make_plan(load_factors(options.factors));
   if (!options.folder.empty()) {
@@ -41,12 +35,12 @@ int run(const Options& options) {
     for (std::size_t test = 0; test < plan.design.rows.size(); ++test) {
       char name[32];
       std::snprintf(name, sizeof name, "test_%02zu.csv", test + 1);
-      write(folder / name, run_file_skeleton(plan, test));
+      cli::write_file(folder / name, run_file_skeleton(plan, test));
     }
-    write(folder / "plan.csv", plan_csv(plan));
-    write(folder / "sheet.md", test_sheet(plan));
+    cli::write_file(folder / "plan.csv", plan_csv(plan));
+    cli::write_file(folder / "sheet.md", test_sheet(plan));
   }
-  write("-", options.json ? plan_json(plan) : plan_text(plan));
+  cli::write_file("-", options.json ? plan_json(plan) : plan_text(plan));
   return plan.pairs.covered == plan.pairs.possible ? 0 : 1;
 }
 

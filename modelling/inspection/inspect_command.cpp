@@ -24,12 +24,6 @@ struct Options {
   bool all{false};
 };
 
-void write(const std::string& destination, const std::string& text) {
-  cli::OutputFile file(destination);
-  file.stream() << text;
-  file.commit();
-}
-
 int run(const Options& options) {
   const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
   Inspection inspection;
@@ -38,9 +32,10 @@ int run(const Options& options) {
     inspection = inspect(runs, options.all ? 0.0 : likelier_than_not,
                          [&progress](double fraction) { progress.update(fraction); });
   }
-  if (!options.json.empty()) write(options.json, inspection_json(inspection));
-  if (!options.report.empty()) write(options.report, inspection_html(runs, inspection));
-  if (options.json != "-" && options.report != "-") write("-", inspection_text(inspection));
+  if (!options.json.empty()) cli::write_file(options.json, inspection_json(inspection));
+  if (!options.report.empty()) cli::write_file(options.report, inspection_html(runs, inspection));
+  if (options.json != "-" && options.report != "-")
+    cli::write_file("-", inspection_text(inspection));
   for (const Finding& finding : inspection.findings)
     if (finding.probability >= likelier_than_not) return 1;
   return 0;

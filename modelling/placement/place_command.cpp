@@ -33,10 +33,8 @@ int run(const Options& options) {
   const PlacementProblem problem = make_problem(spec, structure, statics, std::move(fields));
   progress("placements");
   const Comparison comparison = compare_placements(problem, options.tendency);
-  cli::OutputFile out("-");
-  out.stream() << (options.json ? comparison_json(problem, comparison)
-                                : comparison_text(problem, comparison));
-  out.commit();
+  cli::write_file("-", (options.json ? comparison_json(problem, comparison)
+                                     : comparison_text(problem, comparison)));
   return 0;
 }
 

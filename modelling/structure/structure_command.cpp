@@ -54,12 +54,6 @@ double peak_memory_MB() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-void write(const std::string& destination, const std::string& text) {
-  cli::OutputFile file(destination);
-  file.stream() << text;
-  file.commit();
-}
-
 /// The displacements of each block 1 K warm and all else as it was.
 std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& statics,
                                      const ProgressLines& progress) {
@@ -97,17 +91,17 @@ int run(const Options& options) {
   const ThermalModel model = block_model(spec, structure, statics.sensitivities(structure.rows));
   if (!options.vtu.empty() || !options.picture.empty()) {
     const auto shapes = block_shapes(structure, statics, progress);
-    if (!options.vtu.empty()) write(options.vtu, vtu_file(structure, shapes));
-    if (!options.picture.empty()) write(options.picture, svg_picture(structure, shapes));
+    if (!options.vtu.empty()) cli::write_file(options.vtu, vtu_file(structure, shapes));
+    if (!options.picture.empty()) cli::write_file(options.picture, svg_picture(structure, shapes));
   }
   if (!options.plant.empty()) {
     progress.say("a small state space for the simulator");
     const HeatModel heat = build_heat_model(spec, structure);
-    write(options.plant,
-          body_text(options, structure,
-                    reduce_body(spec, structure, heat, statics, options.plant_parts)));
+    cli::write_file(options.plant,
+                    body_text(options, structure,
+                              reduce_body(spec, structure, heat, statics, options.plant_parts)));
   }
-  write(options.model, write_model(model));
+  cli::write_file(options.model, write_model(model));
   progress.say("done");
   const std::string report = structure_report(structure, statics, model);
   std::fprintf(options.model == "-" ? stderr : stdout, "%speak memory %.0f MB\n", report.c_str(),

@@ -24,12 +24,6 @@ const std::map<std::string, TestKind> kinds{{"spindle", TestKind::spindle},
                                             {"environment", TestKind::environment},
                                             {"axis", TestKind::axis}};
 
-void write(const std::string& destination, const std::string& text) {
-  cli::OutputFile file(destination);
-  file.stream() << text;
-  file.commit();
-}
-
 constexpr const char* part = "part";
 
 CLI::Option* add_kind(CLI::App& sub, std::string& kind) {
@@ -64,8 +58,8 @@ int run_part_report(const ReportOptions& options) {
   const PartFigures before = part_figures(options.before);
   std::optional<PartFigures> after;
   if (!options.after.empty()) after = part_figures(options.after);
-  write(options.output, part_html(before, after));
-  if (!options.json.empty()) write(options.json, part_json(before, after));
+  cli::write_file(options.output, part_html(before, after));
+  if (!options.json.empty()) cli::write_file(options.json, part_json(before, after));
   if (options.output != "-" && options.json != "-")
     for (const std::string& sentence : part_sentences(before, after)) std::puts(sentence.c_str());
   return cli::exit_success;
@@ -80,8 +74,8 @@ int run_report(ReportOptions options) {
   if (!options.after.empty())
     after = test_data(cli::load_record(options.after, loader), options.test);
   const TestAnswer answer = answer_of(std::move(before), std::move(after));
-  write(options.output, report_html(answer));
-  if (!options.json.empty()) write(options.json, report_json(answer));
+  cli::write_file(options.output, report_html(answer));
+  if (!options.json.empty()) cli::write_file(options.json, report_json(answer));
   if (options.output != "-" && options.json != "-") {
     std::string text = sentences(answer.before_figures);
     if (answer.after_figures) text += sentences(*answer.after_figures);
@@ -106,7 +100,7 @@ int run_plan(PlanOptions options) {
     throw cli::Failure(options.output + ": must end with .csv or .html, which says what is made");
   if (options.kind == part) {
     if (options.hours > 0.0) options.part.hours = options.hours;
-    write(options.output, part_sheet(options.part, page));
+    cli::write_file(options.output, part_sheet(options.part, page));
     return cli::exit_success;
   }
   options.sheet.kind = kinds.at(options.kind);
@@ -116,7 +110,7 @@ int run_plan(PlanOptions options) {
   options.sheet.hours = options.hours > 0.0 ? options.hours : surroundings ? 24.0 : 4.0;
   if (surroundings && options.sheet.every_min == SheetOptions{}.every_min)
     options.sheet.every_min = 15.0;
-  write(options.output, page ? sheet_html(options.sheet) : sheet_csv(options.sheet));
+  cli::write_file(options.output, page ? sheet_html(options.sheet) : sheet_csv(options.sheet));
   return cli::exit_success;
 }
 

@@ -123,15 +123,12 @@ int run(const Options& options) {
     grouping = group_places(s, noise_floor(tests));
   }
   if (!options.picture.empty()) {
-    cli::OutputFile picture(options.picture);
-    picture.stream() << svg_file({groups_drawing(
-        "similarity S of places, light: alike; frames: groups", tests.places, s, grouping)});
-    picture.commit();
+    cli::write_file(options.picture,
+                    svg_file({groups_drawing("similarity S of places, light: alike; frames: groups",
+                                             tests.places, s, grouping)}));
   }
   for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
-  cli::OutputFile out("-");
-  out.stream() << (options.json ? json_of(tests, s, grouping) : text_of(tests, s, grouping));
-  out.commit();
+  cli::write_file("-", options.json ? json_of(tests, s, grouping) : text_of(tests, s, grouping));
   return 0;
 }
 

@@ -65,12 +65,6 @@ void read_terms(const std::string& text, FitOptions& fit) {
   throw std::runtime_error("--terms " + text + ": must be a number or a range, like 3..5, in 1..8");
 }
 
-void write(const std::string& destination, const std::string& text) {
-  cli::OutputFile file(destination);
-  file.stream() << text;
-  file.commit();
-}
-
 /// "dia_um=x": of the diameter half goes to the axis; "dia_um=-x": the negative half.
 std::vector<DiameterSpec> read_diameters(const Options& options) {
   std::vector<DiameterSpec> diameters;
@@ -109,11 +103,11 @@ std::string model_text(const Options& options, ThermalModel fitted) {
 /// One equation of few sensors, as JP7689460B2 has it.
 int run_few(const Options& options, const MeasuredTests& tests, const FitOptions& fit_options) {
   const Fit fit = fit_equation(tests, fit_options);
-  write(options.model, model_text(options, model_of(tests, fit)));
-  if (!options.report.empty()) write(options.report, fit_html(tests, fit));
+  cli::write_file(options.model, model_text(options, model_of(tests, fit)));
+  if (!options.report.empty()) cli::write_file(options.report, fit_html(tests, fit));
   // A model on the output is not to be mixed with anything.
   if (options.model == "-") return 0;
-  write("-", options.json ? fit_json(tests, fit) : fit_text(tests, fit));
+  cli::write_file("-", options.json ? fit_json(tests, fit) : fit_text(tests, fit));
   return 0;
 }
 
@@ -125,10 +119,10 @@ int run_families(const Options& options, const MeasuredTests& tests,
   const FamiliesFit fit =
       fit_families(tests, fit_options, forced, [&](double share) { progress->update(share); });
   progress.reset();
-  write(options.model, model_text(options, fit.model));
-  if (!options.report.empty()) write(options.report, families_html(tests, fit));
+  cli::write_file(options.model, model_text(options, fit.model));
+  if (!options.report.empty()) cli::write_file(options.report, families_html(tests, fit));
   if (options.model == "-") return 0;
-  write("-", options.json ? families_json(tests, fit) : families_text(tests, fit));
+  cli::write_file("-", options.json ? families_json(tests, fit) : families_text(tests, fit));
   return 0;
 }
 

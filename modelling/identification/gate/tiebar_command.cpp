@@ -41,16 +41,10 @@ struct Answer {
   std::string text;
 };
 
-void write(const std::string& destination, const std::string& text) {
-  cli::OutputFile file(destination);
-  file.stream() << text;
-  file.commit();
-}
-
 void say_one_tie(const Options& options, const TiedColumns& columns, Answer& answer) {
   const TiedCoefficients k = tied_coefficients(columns);
   const GateMachine machine = machine_of(columns);
-  if (!options.curves.empty()) write(options.curves, design_curves_svg(columns));
+  if (!options.curves.empty()) cli::write_file(options.curves, design_curves_svg(columns));
   answer.json = {{"Ki_um_per_K", k.ki_um_per_K}, {"Kc_um_per_K", k.kc_um_per_K.front()}};
   answer.text = printed("Ki = %.6g um/K\nKc = %.6g um/K\n", k.ki_um_per_K, k.kc_um_per_K.front());
   answer.text +=
@@ -113,7 +107,7 @@ void say_courses(const Options& options, const GateFile& file, Answer& answer) {
     answer.text += "\nbest ties, if each keeps its temperatures wherever it is:\n" + said.text;
   }
   if (!options.picture.empty())
-    write(options.picture, tie_picture(file, courses, best ? &*best : nullptr));
+    cli::write_file(options.picture, tie_picture(file, courses, best ? &*best : nullptr));
 }
 
 int run(const Options& options) {
@@ -128,8 +122,9 @@ int run(const Options& options) {
     answer = ties_said(file.columns);
   }
   if (!options.course.empty()) say_courses(options, file, answer);
-  write("-", options.json ? answer.json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
-                          : answer.text);
+  cli::write_file("-", options.json
+                           ? answer.json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
+                           : answer.text);
   return 0;
 }
 
