@@ -35,4 +35,13 @@ class Progress {
   bool visible_{false};
 };
 
+/// For long work in steps: what begins, with the time since the start, a line each on stderr.
+class ProgressLines {
+ public:
+  void say(std::string_view what) const;
+
+ private:
+  std::chrono::steady_clock::time_point began_{std::chrono::steady_clock::now()};
+};
+
 }  // namespace thermocomp::cli

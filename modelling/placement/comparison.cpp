@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
@@ -84,7 +85,17 @@ const MethodResult& Comparison::method(std::string_view name) const {
   return *found;
 }
 
-Comparison compare_placements(const PlacementProblem& problem, const TendencyOptions& options) {
+const MethodResult& Comparison::best(const PlacementProblem& problem) const {
+  const auto rms_um = [&](const MethodResult& result) {
+    if (result.sensors.empty()) return std::numeric_limits<double>::infinity();
+    return problem.left_out.empty() ? result.used.rms_um : result.left_out.rms_um;
+  };
+  return *std::min_element(methods.begin(), methods.end(),
+                           [&](const auto& a, const auto& b) { return rms_um(a) < rms_um(b); });
+}
+
+Comparison compare_placements(const PlacementProblem& problem, const TendencyOptions& options,
+                              const structure::Progress& progress) {
   Comparison comparison;
   comparison.uncompensated =
       judge(problem, "uncompensated", {},
@@ -95,6 +106,7 @@ Comparison compare_placements(const PlacementProblem& problem, const TendencyOpt
             [&](const std::vector<Field>& fields) { return from_means(problem, fields); }));
   std::vector<MethodResult> by_way;
   for (const Way way : all_ways) {
+    progress(std::string("sensors by tendency patterns, chosen by ").append(name_of(way)));
     comparison.ways.push_back(place_by_tendencies(problem, way, options));
     by_way.push_back(judge_sensors(problem, std::string("tendency_").append(name_of(way)),
                                    comparison.ways.back().sensors));
@@ -103,13 +115,16 @@ Comparison compare_placements(const PlacementProblem& problem, const TendencyOpt
     }
   }
   comparison.methods.insert(comparison.methods.end(), by_way.begin(), by_way.end());
+  progress("sensors one by one (greedy)");
   comparison.greedy = place_greedily(problem);
   comparison.methods.push_back(judge_sensors(problem, "greedy", comparison.greedy.sensors));
+  progress("sensors by QR pivoting");
   comparison.methods.push_back(judge_sensors(problem, "qr_pivoting", place_by_qr(problem)));
   const Reconstruction rebuilt = reconstruct_by_qr(problem);
   comparison.methods.push_back(judge(
       problem, "qr_reconstruction", {},
       [&](const std::vector<Field>& fields) { return estimates_um(problem, fields, rebuilt); }));
+  progress("sensors at random, " + std::to_string(random_draws) + " times");
   comparison.methods.push_back(random_median(problem));
   return comparison;
 }
@@ -207,6 +222,24 @@ Json run_json(const PlacementProblem& problem, const Field& field, const Tendenc
 }
 
 }  // namespace
+
+std::string recommendation_text(const PlacementProblem& problem, const Comparison& comparison) {
+  const MethodResult& best = comparison.best(problem);
+  const bool left_out = !problem.left_out.empty();
+  const auto figures = [&](const MethodResult& result) {
+    return left_out ? result.left_out : result.used;
+  };
+  std::string text = sensors_text(problem, best);
+  text +=
+      line("They leave %.2f um RMS (%.2f um at most) of %.2f um, over the load cases that",
+           figures(best).rms_um, figures(best).peak_um, figures(comparison.uncompensated).rms_um);
+  text += left_out ? " took no part in the choice.\n" : " they were chosen for.\n";
+  text += "Others:";
+  for (const MethodResult& result : comparison.methods)
+    if (&result != &best) text += line(" %s %.2f um;", result.name.c_str(), figures(result).rms_um);
+  text.back() = '.';
+  return text + "\n`thermocomp place --all` tells how each went.\n";
+}
 
 std::string comparison_text(const PlacementProblem& problem, const Comparison& comparison) {
   const bool left_out = !problem.left_out.empty();

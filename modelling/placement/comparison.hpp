@@ -25,15 +25,23 @@ struct Comparison {
   GreedyPlacement greedy;
 
   [[nodiscard]] const MethodResult& method(std::string_view name) const;
+  /// Of the methods with one sensor in each block the one with the least RMS over the load cases
+  /// that are left out, or over those used where none is.
+  [[nodiscard]] const MethodResult& best(const PlacementProblem& problem) const;
 };
 
 inline constexpr int random_draws = 100;
 
 /// @param options  for the method of tendency patterns
+/// @param progress  told which method begins
 [[nodiscard]] Comparison compare_placements(const PlacementProblem& problem,
-                                            const TendencyOptions& options);
+                                            const TendencyOptions& options,
+                                            const structure::Progress& progress);
 
-/// For a person.
+/// For a person: the best sensors, and what they leave.
+[[nodiscard]] std::string recommendation_text(const PlacementProblem& problem,
+                                              const Comparison& comparison);
+/// For a person: every method, and how the patterns went.
 [[nodiscard]] std::string comparison_text(const PlacementProblem& problem,
                                           const Comparison& comparison);
 /// For a program; docs/placement.md describes it.

@@ -227,7 +227,16 @@ std::string cells(const Mesh& mesh, Appended& appended) {
 
 }  // namespace
 
-std::string vtu_file(const Structure& structure, const std::vector<BlockShape>& shapes) {
+std::vector<NodeValues> values_of(const std::vector<BlockShape>& shapes) {
+  std::vector<NodeValues> list;
+  for (const BlockShape& shape : shapes) {
+    NodeValues& added = list.emplace_back(NodeValues{shape.block + "_um_per_K", 3, {}});
+    for (const double value_m : shape.displacement_m) added.values.push_back(1e6 * value_m);
+  }
+  return list;
+}
+
+std::string vtu_file(const Structure& structure, const std::vector<NodeValues>& data) {
   const Mesh& mesh = structure.mesh;
   Appended appended;
   std::vector<double> points;
@@ -243,17 +252,67 @@ std::string vtu_file(const Structure& structure, const std::vector<BlockShape>& 
   text.append(appended.array("Float64", "points_m", 3, points)).append("</Points>\n");
   text.append(cells(mesh, appended)).append("<PointData>\n");
   text += appended.array("Int32", "block", 1, blocks);
-  for (const BlockShape& shape : shapes) {
-    std::vector<float> displacement_um;
-    displacement_um.reserve(shape.displacement_m.size());
-    for (const double value : shape.displacement_m) {
-      displacement_um.push_back(static_cast<float>(1e6 * value));
-    }
-    text += appended.array("Float32", shape.block + "_um_per_K", 3, displacement_um);
+  for (const NodeValues& each : data) {
+    const std::vector<float> values(each.values.begin(), each.values.end());
+    text += appended.array("Float32", each.name, each.components, values);
   }
   text += "</PointData>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
   text += appended.bytes();
   return text + "\n</AppendedData>\n</VTKFile>\n";
+}
+
+SurfacePicture::SurfacePicture(const StructureSpec& spec, const Structure& structure) {
+  picture_.title = spec.file.stem().string();
+  std::map<Index, std::uint32_t> number_of;
+  for (const Face& face : surface_of(structure.mesh)) {
+    const std::size_t corners = shape_info(face.shape).corners;
+    std::array<std::uint32_t, 4> numbers{};
+    for (std::size_t i = 0; i < corners; ++i) {
+      const Index node = face.nodes[i];
+      const auto next = static_cast<std::uint32_t>(nodes_.size());
+      const auto [found, is_new] = number_of.try_emplace(node, next);
+      if (is_new) nodes_.push_back(node);
+      numbers[i] = found->second;
+    }
+    for (std::size_t i = 2; i < corners; ++i)
+      picture_.triangles.insert(picture_.triangles.end(), {numbers[0], numbers[i - 1], numbers[i]});
+  }
+  for (const Index node : nodes_)
+    for (const double value_m : structure.mesh.nodes_m[node])
+      picture_.nodes_mm.push_back(1e3 * value_m);
+  for (const OutputSpec& output : spec.outputs)
+    for (const PlaceSpec& place : output.places)
+      for (const Vec3& at_m : place.at_m) add_point(output.name, false, at_m);
+  for (const SensorSpec& sensor : spec.sensors) add_sensor(sensor.name, sensor.place.at_m.front());
+}
+
+void SurfacePicture::add_state(BodyState state, std::span<const double> rise_K,
+                               std::span<const double> displacement_m) {
+  for (const Index node : nodes_) {
+    state.rise_K.push_back(rise_K[node]);
+    for (std::size_t c = 0; c < 3; ++c)
+      state.moved_um.push_back(1e6 * displacement_m[3 * std::size_t{node} + c]);
+  }
+  picture_.states.push_back(std::move(state));
+}
+
+void SurfacePicture::add_sensor(const std::string& name, const Vec3& at_m) {
+  add_point(name, true, at_m);
+}
+
+void SurfacePicture::leave_out_sensors() {
+  std::erase_if(picture_.points, [](const BodyPoint& point) { return point.is_sensor; });
+}
+
+/// Outputs that are taken at one point are one point.
+void SurfacePicture::add_point(const std::string& name, bool is_sensor, const Vec3& at_m) {
+  const BodyPoint point{name, is_sensor, {1e3 * at_m[0], 1e3 * at_m[1], 1e3 * at_m[2]}};
+  for (BodyPoint& known : picture_.points) {
+    if (is_sensor || known.is_sensor || known.at_mm != point.at_mm) continue;
+    if (known.name != name) known.name += ", " + name;
+    return;
+  }
+  picture_.points.push_back(point);
 }
 
 }  // namespace thermocomp::structure

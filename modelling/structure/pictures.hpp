@@ -1,11 +1,12 @@
-/// Mesh, blocks and deformed shapes: as a VTK XML file, for ParaView and its like, and as a picture
-/// that needs no other program (SVG).
+/// Mesh, blocks, temperatures and displacements: as a VTK XML file, for ParaView and its like, as a
+/// picture that needs no other program (SVG), and in three dimensions for a browser.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "modelling/structure/structure_model.hpp"
+#include "report/body_page.hpp"
 
 namespace thermocomp::structure {
 
@@ -15,13 +16,42 @@ struct BlockShape {
   std::vector<double> displacement_m;  ///< shape (3 nodes)
 };
 
-/// Point data: `block` (counted from 0) and `NAME_um_per_K` for each shape; cell data: `part`.
-[[nodiscard]] std::string vtu_file(const Structure& structure,
-                                   const std::vector<BlockShape>& shapes);
+/// A quantity at every node.
+struct NodeValues {
+  std::string name;            ///< with its unit
+  int components{1};           ///< of the value at a node
+  std::vector<double> values;  ///< shape (nodes)(components)
+};
+
+/// Point data: `block` (counted from 0) and what is given; cell data: `part`.
+[[nodiscard]] std::string vtu_file(const Structure& structure, const std::vector<NodeValues>& data);
+/// The names are BLOCK_um_per_K.
+[[nodiscard]] std::vector<NodeValues> values_of(const std::vector<BlockShape>& shapes);
 
 /// One panel with the structure as it is, its blocks in colours, and one for each block: the shape
 /// with that block 1 K warm, enlarged so that it shows. The factor stands below each panel.
 [[nodiscard]] std::string svg_picture(const Structure& structure,
                                       const std::vector<BlockShape>& shapes);
+
+/// A page of the structure's surface, with the sensors of its file and the points of its outputs.
+class SurfacePicture {
+ public:
+  SurfacePicture(const StructureSpec& spec, const Structure& structure);
+
+  /// @param state  its values are filled in
+  /// @param rise_K  shape (nodes)
+  /// @param displacement_m  shape (3 nodes)
+  void add_state(BodyState state, std::span<const double> rise_K,
+                 std::span<const double> displacement_m);
+  void add_sensor(const std::string& name, const Vec3& at_m);
+  void leave_out_sensors();
+  [[nodiscard]] std::string page() const { return body_page(picture_); }
+
+ private:
+  void add_point(const std::string& name, bool is_sensor, const Vec3& at_m);
+
+  BodyPicture picture_;
+  std::vector<Index> nodes_;  ///< of the mesh, in the picture's order
+};
 
 }  // namespace thermocomp::structure

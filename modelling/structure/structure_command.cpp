@@ -1,9 +1,9 @@
 #include "modelling/structure/structure_command.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -20,6 +20,7 @@
 #include "modelling/structure/pictures.hpp"
 #include "modelling/structure/structure_model.hpp"
 #include "report/output_file.hpp"
+#include "report/terminal.hpp"
 
 namespace thermocomp::structure {
 
@@ -30,22 +31,10 @@ struct Options {
   std::string model;
   std::string vtu;
   std::string picture;
+  std::string page;
   std::string plant;
   bool plant_parts{false};
   SolverChoice solver;
-};
-
-/// What begins, with the time since the start, on stderr.
-class ProgressLines {
- public:
-  void say(std::string_view what) const {
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
-    std::fprintf(stderr, "%7.1f s  %.*s\n", seconds, static_cast<int>(what.size()), what.data());
-  }
-
- private:
-  std::chrono::steady_clock::time_point began_{std::chrono::steady_clock::now()};
 };
 
 double peak_memory_MB() {
@@ -54,19 +43,38 @@ double peak_memory_MB() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
+/// 1 K at the block's nodes, 0 elsewhere.
+std::vector<double> one_warm(const Structure& structure, Index block) {
+  std::vector<double> rise_K(structure.mesh.nodes_m.size(), 0.0);
+  for (std::size_t node = 0; node < rise_K.size(); ++node) {
+    if (structure.block_of_node[node] == block) rise_K[node] = 1.0;
+  }
+  return rise_K;
+}
+
 /// The displacements of each block 1 K warm and all else as it was.
 std::vector<BlockShape> block_shapes(const Structure& structure, const Statics& statics,
-                                     const ProgressLines& progress) {
+                                     const cli::ProgressLines& progress) {
   std::vector<BlockShape> shapes;
   for (Index block = 0; block < structure.block_names.size(); ++block) {
     progress.say("shape with block " + structure.block_names[block] + " warm");
-    std::vector<double> rise_K(structure.mesh.nodes_m.size(), 0.0);
-    for (std::size_t node = 0; node < rise_K.size(); ++node) {
-      if (structure.block_of_node[node] == block) rise_K[node] = 1.0;
-    }
-    shapes.push_back({structure.block_names[block], statics.displacement_m(rise_K)});
+    shapes.push_back(
+        {structure.block_names[block], statics.displacement_m(one_warm(structure, block))});
   }
   return shapes;
+}
+
+std::string page_of(const StructureSpec& spec, const Structure& structure,
+                    const std::vector<BlockShape>& shapes) {
+  SurfacePicture picture(spec, structure);
+  for (Index block = 0; block < shapes.size(); ++block) {
+    BodyState state;
+    state.group = state.name = shapes[block].block + " 1 K warm";
+    state.input = shapes[block].block;
+    state.time_s = std::numeric_limits<double>::quiet_NaN();
+    picture.add_state(std::move(state), one_warm(structure, block), shapes[block].displacement_m);
+  }
+  return picture.page();
 }
 
 std::string body_text(const Options& options, const Structure& structure, const ReducedBody& body) {
@@ -79,7 +87,7 @@ std::string body_text(const Options& options, const Structure& structure, const 
 }
 
 int run(const Options& options) {
-  const ProgressLines progress;
+  const cli::ProgressLines progress;
   const StructureSpec spec = load_structure(options.structure);
   const Structure structure =
       build_structure(spec, [&](std::string_view what) { progress.say(what); });
@@ -89,9 +97,10 @@ int run(const Options& options) {
                         structure.springs, options.solver);
   progress.say(std::to_string(structure.rows.size()) + " rows, one solve each");
   const ThermalModel model = block_model(spec, structure, statics.sensitivities(structure.rows));
-  if (!options.vtu.empty() || !options.picture.empty()) {
+  if (!options.vtu.empty() || !options.picture.empty() || !options.page.empty()) {
     const auto shapes = block_shapes(structure, statics, progress);
-    if (!options.vtu.empty()) cli::write_file(options.vtu, vtu_file(structure, shapes));
+    if (!options.page.empty()) cli::write_file(options.page, page_of(spec, structure, shapes));
+    if (!options.vtu.empty()) cli::write_file(options.vtu, vtu_file(structure, values_of(shapes)));
     if (!options.picture.empty()) cli::write_file(options.picture, svg_picture(structure, shapes));
   }
   if (!options.plant.empty()) {
@@ -121,6 +130,8 @@ void add_structure_command(CLI::App& app, std::function<int()>& action) {
       ->required();
   sub->add_option("--vtu", options->vtu, "mesh, blocks and deformed shapes, for ParaView");
   sub->add_option("--picture", options->picture, "the same as a picture (SVG)");
+  sub->add_option("--page", options->page,
+                  "the same in three dimensions, for a browser and the gateway (HTML)");
   sub->add_option(
       "--plant", options->plant,
       "the machine's body for thermocomp-sim: a reduced model of heat and displacement");

@@ -109,7 +109,7 @@ TEST_CASE("placements beat the mean of the block where they were made for it", "
       problem_of(machine_of(column + cooled + heater + cases + left_out));
   REQUIRE(problem.used.size() == 4);
   REQUIRE(problem.left_out.size() == 1);
-  const Comparison comparison = compare_placements(problem, {});
+  const Comparison comparison = compare_placements(problem, {}, [](std::string_view) {});
   const double mean_um = comparison.method("mean_of_block").used.rms_um;
   const double random_um = comparison.method("random").used.rms_um;
   for (const Way way : all_ways) {
@@ -138,8 +138,8 @@ TEST_CASE("a load case that is left out has no say in where sensors go", "[place
   };
   const PlacementProblem problem = problem_of(machine_of(text("-2")));
   const PlacementProblem other = problem_of(machine_of(text("+9")));
-  const Comparison a = compare_placements(problem, {});
-  const Comparison b = compare_placements(other, {});
+  const Comparison a = compare_placements(problem, {}, [](std::string_view) {});
+  const Comparison b = compare_placements(other, {}, [](std::string_view) {});
   for (std::size_t i = 0; i < a.methods.size(); ++i) {
     CHECK(a.methods[i].sensors == b.methods[i].sensors);
     CHECK(a.methods[i].used.rms_um == b.methods[i].used.rms_um);
@@ -178,7 +178,7 @@ TEST_CASE("the report for programs has sensors, errors before and after, and the
           "[placement]") {
   const PlacementProblem problem =
       problem_of(machine_of(column + cooled + heater + cases + left_out));
-  const Comparison comparison = compare_placements(problem, {});
+  const Comparison comparison = compare_placements(problem, {}, [](std::string_view) {});
   const auto json = nlohmann::json::parse(comparison_json(problem, comparison));
   CHECK(json.at("load_cases").at(2).at("left_out") == true);
   const auto& greedy = json.at("methods").at("greedy");

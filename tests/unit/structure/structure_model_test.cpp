@@ -272,7 +272,7 @@ TEST_CASE("the picture has a panel for the blocks and one a shape, the VTU file 
   CHECK(svg.find("1 blocks") != std::string::npos);
   CHECK(svg.find("a&lt;b_degC") != std::string::npos);
   CHECK(svg.find("nan") == std::string::npos);
-  const std::string vtu = vtu_file(s, shapes);
+  const std::string vtu = vtu_file(s, values_of(shapes));
   CHECK(vtu.find("NumberOfPoints=\"" + std::to_string(s.mesh.nodes_m.size()) + "\"") !=
         std::string::npos);
   CHECK(vtu.find("a&lt;b_degC_um_per_K") != std::string::npos);
