@@ -54,7 +54,7 @@ class Gateway {
     if (settings.shdr.enabled) shdr_.emplace(settings.shdr);
     if (!settings.alarm.command.empty()) hooks_.emplace(settings);
     if (settings.http.enabled) {
-      files_.emplace(page_folder(), charts_folder());
+      files_.emplace(page_folder(), charts_folder(), settings.http.body);
       http_.emplace(settings, feed_, *files_, [this](GatewayFigures& figures) {
         if (mqtt_) mqtt_->add_figures(figures);
       });

@@ -7,14 +7,15 @@ packages_build=(
   libeigen3-dev libmodbus-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
   libsqlite3-dev libsystemd-dev libssl-dev libcli11-dev
   # Of thermocomp-gateway; its page takes its charts from the last.
-  libmicrohttpd-dev libmosquitto-dev libcrypt-dev libjs-dygraphs
+  libmicrohttpd-dev libmosquitto-dev libcrypt-dev zlib1g-dev libjs-dygraphs
   # Configuring the tree looks for it, also where only the programs are built.
   catch2
 )
 
 # Besides, for thermocomp-modelling. OpenBLAS: with the reference BLAS a factorisation takes
 # several times as long.
-packages_modelling=("${packages_build[@]}" libsuitesparse-dev libopenblas-dev libgmsh-dev)
+packages_modelling=("${packages_build[@]}" libsuitesparse-dev libopenblas-dev libgmsh-dev
+  libjs-three)
 
 # Besides, for meshes past the memory of a factorisation: thermocomp-petsc. Not part of the tests,
 # being large; they include it where it is there.
@@ -29,7 +30,7 @@ packages_test=(
   # The finite elements are compared with it; test plans with the other.
   calculix-ccx python3-allpairspy
   mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-canmatrix
-  python3-numpy python3-pytest
+  python3-numpy python3-pytest python3-meshio
   # What the gateway is read by: its page, metrics and messages.
   chromium chromium-driver python3-selenium prometheus mosquitto mosquitto-clients openssl
   sqlite3 socat rt-tests user-mode-linux kmod iproute2 procps valgrind

@@ -39,12 +39,17 @@ constexpr std::size_t page_events_max = 12;
 constexpr const char* json_type = "application/json";
 
 /// Nothing but what this gateway serves itself, in nobody's frame, and told to nobody.
-constexpr std::array<std::array<const char*, 2>, 6> headers_of_all{
-    {{"Content-Security-Policy",
-      "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
-      "data:; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
-      "frame-ancestors 'none'"},
-     {"X-Content-Type-Options", "nosniff"},
+constexpr const char* own_files_only =
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
+    "data:; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'";
+/// For a page with its scripts inside, from a file that the administrator named.
+constexpr const char* own_scripts =
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src "
+    "'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+constexpr std::size_t gzip_bytes_min = 1400;  // a packet
+constexpr std::array<std::array<const char*, 2>, 5> headers_of_all{
+    {{"X-Content-Type-Options", "nosniff"},
      {"X-Frame-Options", "DENY"},
      {"Referrer-Policy", "no-referrer"},
      {"Cross-Origin-Resource-Policy", "same-origin"},
@@ -61,6 +66,16 @@ std::string error_text(const std::string& text) {
 std::string_view header(MHD_Connection* connection, const char* name) {
   const char* value = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
   return value != nullptr ? value : "";
+}
+
+bool takes_gzip(MHD_Connection* connection) {
+  return header(connection, MHD_HTTP_HEADER_ACCEPT_ENCODING).find("gzip") != std::string_view::npos;
+}
+
+void tell_gzip(MHD_Response* response) {
+  if (response == nullptr) return;
+  MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_ENCODING, "gzip");
+  MHD_add_response_header(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
 }
 
 std::string_view argument(MHD_Connection* connection, const char* name) {
@@ -166,7 +181,8 @@ struct HttpServer::Parts {
   MHD_Result answer(MHD_Connection* connection, unsigned status, const char* type,
                     std::string text);
   MHD_Result queue(MHD_Connection* connection, unsigned status, const char* type,
-                   MHD_Response* response);
+                   MHD_Response* response, const char* policy = own_files_only);
+  MHD_Result send(MHD_Connection* connection, const PageFile& file);
   MHD_Result of_daemon(MHD_Connection* connection, json (*part)(const Snapshot&));
   MHD_Result history(MHD_Connection* connection, Request& request);
   MHD_Result later(MHD_Connection* connection, Request& request, AnswerThread& answers,
@@ -219,8 +235,9 @@ HttpServer::Parts::~Parts() {
 }
 
 MHD_Result HttpServer::Parts::queue(MHD_Connection* connection, unsigned status, const char* type,
-                                    MHD_Response* response) {
+                                    MHD_Response* response, const char* policy) {
   if (response == nullptr) return MHD_NO;
+  MHD_add_response_header(response, "Content-Security-Policy", policy);
   for (const auto& [name, value] : headers_of_all) MHD_add_response_header(response, name, value);
   MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type);
   if (status >= MHD_HTTP_BAD_REQUEST) end_with(response);
@@ -236,8 +253,25 @@ MHD_Result HttpServer::Parts::answer(MHD_Connection* connection, unsigned status
                                      std::string text) {
   connections.is_at(socket_of(connection), SlowConnections::Stage::answer,
                     SlowConnections::Clock::now());
-  return queue(connection, status, type,
-               MHD_create_response_from_buffer(text.size(), text.data(), MHD_RESPMEM_MUST_COPY));
+  std::string gzip;
+  if (text.size() >= gzip_bytes_min && takes_gzip(connection)) gzip = gzipped(text);
+  const std::string& sent = gzip.empty() ? text : gzip;
+  MHD_Response* response = MHD_create_response_from_buffer(
+      sent.size(), const_cast<char*>(sent.data()), MHD_RESPMEM_MUST_COPY);
+  if (!gzip.empty()) tell_gzip(response);
+  return queue(connection, status, type, response);
+}
+
+MHD_Result HttpServer::Parts::send(MHD_Connection* connection, const PageFile& file) {
+  connections.is_at(socket_of(connection), SlowConnections::Stage::answer,
+                    SlowConnections::Clock::now());
+  const bool is_gzip = !file.gzip.empty() && takes_gzip(connection);
+  const std::string& sent = is_gzip ? file.gzip : file.bytes;
+  MHD_Response* response = MHD_create_response_from_buffer(
+      sent.size(), const_cast<char*>(sent.data()), MHD_RESPMEM_PERSISTENT);
+  if (is_gzip) tell_gzip(response);
+  return queue(connection, MHD_HTTP_OK, file.type.c_str(), response,
+               file.has_own_scripts ? own_scripts : own_files_only);
 }
 
 std::optional<Refusal> HttpServer::Parts::judge(MHD_Connection* connection, const char* path,
@@ -319,16 +353,18 @@ MHD_Result HttpServer::Parts::serve(MHD_Connection* connection, const char* path
 
 MHD_Result HttpServer::Parts::route(MHD_Connection* connection, std::string_view path,
                                     Request& request) {
-  if (const PageFile* file = files.find(path))
-    return answer(connection, MHD_HTTP_OK, file->type.c_str(), file->bytes);
+  if (const PageFile* file = files.find(path)) return send(connection, *file);
   if (path == "/api/status")
     return of_daemon(connection, [](const Snapshot& all) { return json_of(all.status); });
   if (path == "/api/sensors")
     return of_daemon(connection, [](const Snapshot& all) { return json_of(all.sensors); });
   if (path == "/api/events") return stream(connection);
   if (path == "/api/history") return history(connection, request);
-  if (path == "/api/commands")
-    return answer(connection, MHD_HTTP_OK, json_type, dumped(commands.offered(request.user)));
+  if (path == "/api/commands") {
+    json offered = commands.offered(request.user);
+    offered["body"] = !settings.http.body.empty();
+    return answer(connection, MHD_HTTP_OK, json_type, dumped(offered));
+  }
   if (path == "/metrics")
     return answer(connection, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8",
                   metrics_text(*feed.newest(), figures()));

@@ -2,12 +2,14 @@
 
 #include <array>
 #include <stdexcept>
+#include <system_error>
+#include <utility>
 
 #include <spdlog/spdlog.h>
-#include <system_error>
+#include <zlib.h>
 
 #include "config/text/problems.hpp"
-#include "config/toml/toml_reader.hpp"
+#include "config/toml/file_limits.hpp"
 
 namespace thermocomp::gateway {
 namespace {
@@ -31,21 +33,51 @@ constexpr std::array<Place, 2> chart_places{
 
 }  // namespace
 
-PageFiles::PageFiles(const std::filesystem::path& folder, const std::filesystem::path& charts) {
-  for (const Place& place : page_places) {
-    try {
-      files_[place.path] = {place.type, read_text_file(folder / place.file)};
-    } catch (const ConfigurationError& error) {
-      throw std::runtime_error(std::string("the page cannot be read: ") + error.what());
+std::string gzipped(std::string_view bytes) {
+  z_stream stream{};
+  constexpr int window_bits_gzip = 15 + 16;
+  constexpr int memory_level = 8;
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, window_bits_gzip, memory_level,
+                   Z_DEFAULT_STRATEGY) != Z_OK)
+    return "";
+  std::string text(deflateBound(&stream, bytes.size()), '\0');
+  // The library does not write into what it reads.
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(text.data());
+  stream.avail_out = static_cast<uInt>(text.size());
+  const int ended = deflate(&stream, Z_FINISH);
+  text.resize(ended == Z_STREAM_END ? stream.total_out : 0);
+  deflateEnd(&stream);
+  return text;
+}
+
+PageFiles::PageFiles(const std::filesystem::path& folder, const std::filesystem::path& charts,
+                     const std::filesystem::path& body) {
+  try {
+    for (const Place& place : page_places) add(place.path, place.type, folder / place.file);
+    if (!body.empty()) {
+      add("/body", "text/html; charset=utf-8", body);
+      files_["/body"].has_own_scripts = true;
     }
+  } catch (const ConfigurationError& error) {
+    throw std::runtime_error(std::string("the page cannot be read: ") + error.what());
   }
   for (const Place& place : chart_places) {
     try {
-      files_[place.path] = {place.type, read_text_file(charts / place.file)};
+      add(place.path, place.type, charts / place.file);
     } catch (const ConfigurationError& error) {
       spdlog::warn("no charts (package libjs-dygraphs): {}", error.what());
     }
   }
+}
+
+void PageFiles::add(const std::string& path, const std::string& type,
+                    const std::filesystem::path& file) {
+  constexpr std::uintmax_t bytes_max = 64 * bytes_per_MB;  // a body of many faces
+  std::string bytes = read_text_file(file, bytes_max);
+  std::string gzip = gzipped(bytes);
+  files_[path] = {type, std::move(bytes), std::move(gzip)};
 }
 
 const PageFile* PageFiles::find(std::string_view path) const {

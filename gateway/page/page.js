@@ -363,6 +363,7 @@ async function offerCommands() {
   try {
     const told = await (await fetch('/api/commands')).json();
     place('commands').hidden = told.commands.length === 0;
+    place('body').hidden = !told.body;
     place('command-buttons').replaceChildren(...told.commands.map(method => {
       const button = make('button', commandNames[method]);
       button.addEventListener('click', () => {

@@ -96,6 +96,7 @@ class SettingsReader {
     http.certificate = existing(table, "certificate");
     http.key = existing(table, "key");
     http.passwords = existing(table, "passwords");
+    http.body = existing(table, "body");
     http.connections_max =
         table.integer<unsigned>("connections_max", 4, 2000, http.connections_max);
     if (http.certificate.empty() != http.key.empty())

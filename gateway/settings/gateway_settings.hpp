@@ -19,6 +19,7 @@ struct HttpSettings {
   std::filesystem::path certificate;  ///< PEM; empty: no TLS
   std::filesystem::path key;          ///< PEM
   std::filesystem::path passwords;    ///< lines `user:hash`; empty: everybody may read
+  std::filesystem::path body;         ///< page of `structure --page`; empty: none
   unsigned connections_max{100};
   bool operator==(const HttpSettings&) const = default;
   [[nodiscard]] bool has_tls() const { return !certificate.empty(); }

@@ -210,3 +210,25 @@ def test_bad_use_and_bad_input_are_refused(tmp_path, arguments, names):
     answer = run(*(places.get(word, word) for word in arguments))
     assert answer.returncode == 2 and names in answer.stderr, answer.stderr
     assert not (tmp_path / "model.toml").exists()
+
+
+def test_place_recommends_and_writes_what_others_read(tmp_path):
+    meshio = pytest.importorskip("meshio", reason="python3-meshio is not installed")
+    said = run("place", SOURCE / "config/demo/structure.toml", "--vtu", tmp_path / "fields.vtu",
+               "--page", tmp_path / "place.html")
+    assert said.returncode == 0, said.stderr
+    assert len(said.stdout.splitlines()) <= 15, said.stdout
+    assert "sensors one by one" in said.stderr
+    full = json.loads(run("place", SOURCE / "config/demo/structure.toml", "--json").stdout)
+    best = min((each for each in full["methods"].values() if each["sensors"]),
+               key=lambda each: each["left_out"]["rms_um"])
+    assert f"They leave {best['left_out']['rms_um']:.2f} um RMS" in said.stdout
+    mesh = meshio.read(tmp_path / "fields.vtu")
+    rise_K, moved_um = mesh.point_data["wet_shift_14400s_K"], mesh.point_data["wet_shift_14400s_um"]
+    assert moved_um.shape == (len(mesh.points), 3)
+    body = json.loads((tmp_path / "place.html").read_text().split('<script id="body" type="application/json">')[1]
+                      .split("</script>")[0])
+    shown = next(state for state in body["states"] if state["group"] == "wet_shift" and state["time_s"] == 14400)
+    assert max(shown["rise_K"]) == pytest.approx(rise_K.max(), rel=1e-3)
+    assert [point["name"] for point in body["points"] if point["is_sensor"]] == [
+        sensor["block"] for sensor in best["sensors"]]
