@@ -2,11 +2,11 @@
 
 #include <array>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
+#include <zlib.h>
 
 #include <spdlog/spdlog.h>
-#include <zlib.h>
+#include <system_error>
 
 #include "config/text/problems.hpp"
 #include "config/toml/file_limits.hpp"

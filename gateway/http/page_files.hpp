@@ -11,7 +11,7 @@ namespace thermocomp::gateway {
 struct PageFile {
   std::string type;  ///< of its content
   std::string bytes;
-  std::string gzip;            ///< the same, compressed
+  std::string gzip;             ///< the same, compressed
   bool has_own_scripts{false};  ///< scripts stand in the page itself
 };
 
