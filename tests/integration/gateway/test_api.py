@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import gzip
 import json
 import subprocess
 import time
@@ -30,6 +31,17 @@ def test_status_and_sensors_are_the_sockets_answers(machine, gateway):
         eventually(lambda: without_times(gateway.json(path)) ==
                    without_times(machine.daemon.call(method)), path)
     assert gateway.json("/api/sensors")["sensors"][0]["blocks"] == ["column"]
+
+
+def test_a_browser_that_takes_gzip_gets_the_same_bytes_in_fewer(gateway):
+    for path in ("/", "/page.js", "/metrics"):
+        _, headers, short = gateway.ask(path, headers={"Accept-Encoding": "gzip"})
+        assert headers["Content-Encoding"] == "gzip", path
+        _, plain_headers, plain = gateway.ask(path)
+        assert "Content-Encoding" not in plain_headers and len(short) < 0.6 * len(plain), path
+        if path != "/metrics":  # its counters go on
+            assert gzip.decompress(short) == plain
+    assert "Content-Encoding" not in gateway.ask("/api/commands", headers={"Accept-Encoding": "gzip"})[1]
 
 
 def test_the_stream_follows_the_machine_and_says_what_to_do(machine, gateway):
