@@ -124,7 +124,7 @@ Comparison compare_placements(const PlacementProblem& problem, const TendencyOpt
   comparison.methods.push_back(judge(
       problem, "qr_reconstruction", {},
       [&](const std::vector<Field>& fields) { return estimates_um(problem, fields, rebuilt); }));
-  progress("sensors at random, " + std::to_string(random_draws) + " times");
+  progress("sensors at random");
   comparison.methods.push_back(random_median(problem));
   return comparison;
 }

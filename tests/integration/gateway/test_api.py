@@ -34,6 +34,7 @@ def test_status_and_sensors_are_the_sockets_answers(machine, gateway):
 
 
 def test_a_browser_that_takes_gzip_gets_the_same_bytes_in_fewer(gateway):
+    gateway.wait_for(lambda s: s["here"], "a state")
     for path in ("/", "/page.js", "/metrics"):
         _, headers, short = gateway.ask(path, headers={"Accept-Encoding": "gzip"})
         assert headers["Content-Encoding"] == "gzip", path
