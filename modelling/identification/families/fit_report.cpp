@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/text/number_text.hpp"
+#include "estimator/model/model_domain.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
 #include "modelling/identification/printed.hpp"
@@ -86,13 +87,38 @@ std::string groups_map(const MeasuredTests& tests, const Fit& fit) {
   return html_figure(groups_drawing(title, names, similarity(tests, true), fit.grouping).svg(), "");
 }
 
-/// The text, the curves of each output and the map of the places.
-std::string page(const MeasuredTests& tests, const Fit& fit, const std::string& said) {
-  std::string text = html_begin("Sensors and equation");
-  text.append("<pre style=\"white-space:pre-wrap\">").append(xml_text(said)).append("</pre>\n");
+/// What an output is left with where the model had no part in it.
+struct LeftOut {
+  double with_um{0.0};       ///< the model
+  double without_um{0.0};    ///< any
+  double other_day_um{0.0};  ///< to be expected, where only one day was seen; 0: not estimated
+};
+
+/// The verdict, curves of measured and left-out prediction, what to do, and how it was chosen.
+/// @param left_out  one an output
+/// @param said      as the command prints it
+std::string page(const MeasuredTests& tests, const Fit& fit, const std::vector<LeftOut>& left_out,
+                 const std::vector<std::string>& warnings, const std::string& said) {
+  std::string text = html_begin("Model of the thermal displacement");
+  const char* judged_on = tests.runs.size() < 2 ? "stretches of the run" : "runs";
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o) {
+    std::string verdict = tests.outputs[o] + ": on " + judged_on + " that it was not fitted to, ";
+    verdict += left_out[o].with_um < left_out[o].without_um
+                   ? "the model leaves " + figure_text(left_out[o].with_um) + " µm RMS of " +
+                         figure_text(left_out[o].without_um) + " µm."
+                   : "no model does better than none, which leaves " +
+                         figure_text(left_out[o].without_um) + " µm RMS.";
+    if (left_out[o].other_day_um > 0.0)
+      verdict += " Another day is not known: expect about " +
+                 figure_text(left_out[o].other_day_um) + " µm.";
+    text += html_paragraph(verdict);
+  }
   for (std::size_t o = 0; o < tests.outputs.size(); ++o)
     text += curves(tests, fit, static_cast<Eigen::Index>(o));
-  return text + groups_map(tests, fit) + html_end();
+  if (!warnings.empty()) text += html_heading("What to know, and what to do") + html_list(warnings);
+  text += "<details><summary>How it was chosen</summary>\n<pre style=\"white-space:pre-wrap\">";
+  text.append(xml_text(said)).append("</pre>\n").append(groups_map(tests, fit));
+  return text.append("</details>\n").append(html_end());
 }
 
 }  // namespace
@@ -181,15 +207,26 @@ std::string fit_json(const MeasuredTests& tests, const Fit& fit) {
 }
 
 std::string fit_html(const MeasuredTests& tests, const Fit& fit) {
-  return page(tests, fit, fit_text(tests, fit));
+  std::vector<LeftOut> left_out;
+  for (const OutputFit& output : fit.outputs)
+    left_out.push_back({output.left_out_rms_um, output.no_model_rms_um});
+  return page(tests, fit, left_out, fit.warnings, fit_text(tests, fit));
 }
 
 std::string families_html(const MeasuredTests& tests, const FamiliesFit& fit) {
   Fit shown = fit.few.value_or(Fit{});
-  shown.left_out_um = fit.chosen_result().left_out_um;
+  const FamilyResult& chosen = fit.chosen_result();
+  shown.left_out_um = chosen.left_out_um;
   if (shown.grouping.groups.empty())
     shown.grouping = group_places(similarity(tests, true), noise_floor(tests));
-  return page(tests, shown, families_text(tests, fit));
+  std::vector<LeftOut> left_out;
+  for (std::size_t o = 0; o < tests.outputs.size(); ++o)
+    left_out.push_back({chosen.left_out_rms_um[o], fit.results.front().left_out_rms_um[o]});
+  const bool has_claim = tests.runs.size() == 1 && fit.chosen != Family::none;
+  for (std::size_t o = 0; o < tests.outputs.size() && has_claim; ++o)
+    left_out[o].other_day_um =
+        spread_um(*fit.model.made_from, fit.model.made_from->outputs.at(tests.outputs[o]));
+  return page(tests, shown, left_out, fit.warnings, families_text(tests, fit));
 }
 
 }  // namespace thermocomp::identification

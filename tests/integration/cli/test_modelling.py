@@ -93,7 +93,9 @@ def test_fit_finds_the_equation_and_its_model_predicts(tmp_path):
     coefficients = {term["place"]: term["um_per_K"] for term in said["terms"]["z_um"]}
     assert coefficients["t1_degC"] == pytest.approx(5, abs=0.1)
     assert coefficients["t3_degC"] == pytest.approx(-2, abs=0.1)
-    assert "<svg" in (tmp_path / "fit.html").read_text()
+    page = (tmp_path / "fit.html").read_text()
+    left_um, none_um = said["left_out_rms_um"]["z_um"], said["no_model_rms_um"]["z_um"]
+    assert f"the model leaves {left_um:.2f} µm RMS of {none_um:.1f} µm." in page and "<svg" in page
     predicted = run("predict", "--model", model, files[0], "-o", tmp_path / "out.csv")
     assert predicted.returncode == 0 and float(predicted.stderr.split()[1]) < 0.6
 
