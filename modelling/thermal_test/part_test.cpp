@@ -202,15 +202,15 @@ std::vector<std::string> instructions(const PartSheet& sheet) {
           "artefact that stays clamped and is probed, or a part on which each feature has a cold "
           "and a warm one side by side, cut by this machine: rough cuts, one finishing cut, then "
           "measured at 20 degC.",
-      "Cold: the machine has stood still for a night. Probe or finish every feature once, in the "
-      "order of the rows.",
+      ("Cold: the machine has stood still for a night. Probe or finish every feature once, in the "
+       "order of the rows."),
       "Warm: the shop's own load for " + figure_text(sheet.hours) +
           " h, then the same at once, in the same order.",
       "A repeat is a whole day: cold and warm once. " + std::to_string(sheet.repeats) +
           " repeats, with the part clamped anew only between them.",
       "One sheet with the compensation switched off (thermocomp disable), one with it on.",
-      "Values are deviations from the nominal size or place in um, with their sign. What is not "
-      "measured stays empty."};
+      ("Values are deviations from the nominal size or place in um, with their sign. What is not "
+       "measured stays empty.")};
 }
 
 /// Each feature's shift as a line from its lower to its upper bound, without and with compensation.

@@ -94,14 +94,11 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
   return run;
 }
 
-const Column* temperature_of(const MeasuredData& data, const MeasuredRun& run,
-                             const std::string& name) {
-  const auto find = [&name](const auto& names, const auto& columns) -> const Column* {
-    const auto at = std::find(names.begin(), names.end(), name);
-    return at == names.end() ? nullptr : &columns[static_cast<std::size_t>(at - names.begin())];
-  };
-  const Column* input = find(data.model.inputs, run.inputs_K);
-  return input != nullptr ? input : find(data.others, run.others_K);
+/// Null: there is none of this name.
+const Column* find_column(const std::vector<std::string>& names, const std::vector<Column>& columns,
+                          const std::string& name) {
+  const auto at = std::find(names.begin(), names.end(), name);
+  return at == names.end() ? nullptr : &columns[static_cast<std::size_t>(at - names.begin())];
 }
 
 }  // namespace
@@ -109,11 +106,8 @@ const Column* temperature_of(const MeasuredData& data, const MeasuredRun& run,
 SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFile>& runs,
                              const std::vector<RunFile>& further) {
   SharedColumns columns;
-  const std::vector<std::string> always = [&] {
-    std::vector<std::string> names = model.temperature_columns();
-    for (const std::string& name : model.signal_columns()) names.push_back(name);
-    return names;
-  }();
+  std::vector<std::string> always = model.temperature_columns();
+  for (const std::string& name : model.signal_columns()) always.push_back(name);
   for (const std::string& name : runs.front().columns) {
     if (name == "time_s" || contains(model.inputs, name) || is_output(name)) continue;
     const auto has = [&name](const RunFile& run) {
@@ -130,15 +124,13 @@ SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFil
 std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
                                const MeasuredData& data) {
   std::vector<const Column*> temperatures;
-  for (const std::string& name : model.temperature_columns())
-    temperatures.push_back(temperature_of(data, run, name));
-  std::vector<const Column*> signals;
-  for (const std::string& name : model.signal_columns()) {
-    const auto at = std::find(data.signals.begin(), data.signals.end(), name);
-    signals.push_back(at == data.signals.end()
-                          ? nullptr
-                          : &run.signals[static_cast<std::size_t>(at - data.signals.begin())]);
+  for (const std::string& name : model.temperature_columns()) {
+    const Column* input = find_column(data.model.inputs, run.inputs_K, name);
+    temperatures.push_back(input != nullptr ? input : find_column(data.others, run.others_K, name));
   }
+  std::vector<const Column*> signals;
+  for (const std::string& name : model.signal_columns())
+    signals.push_back(find_column(data.signals, run.signals, name));
   const auto missing = [](const Column* column) { return column == nullptr; };
   if (std::any_of(temperatures.begin(), temperatures.end(), missing) ||
       std::any_of(signals.begin(), signals.end(), missing)) {
@@ -208,12 +200,9 @@ std::string room_among(const std::vector<std::string>& columns) {
 }
 
 const Column* room_degC(const MeasuredData& data, const MeasuredRun& run) {
-  const auto find = [](const auto& names, const auto& columns) -> const Column* {
-    const auto at = std::find(names.begin(), names.end(), room_among(names)) - names.begin();
-    return at == std::ssize(names) ? nullptr : &columns[static_cast<std::size_t>(at)];
-  };
-  const Column* const other = find(data.others, run.others_degC);
-  return other != nullptr ? other : find(data.model.inputs, run.inputs_degC);
+  const Column* const other = find_column(data.others, run.others_degC, room_among(data.others));
+  const std::vector<std::string>& inputs = data.model.inputs;
+  return other != nullptr ? other : find_column(inputs, run.inputs_degC, room_among(inputs));
 }
 
 StackedRows stacked_rows(const MeasuredData& data) {

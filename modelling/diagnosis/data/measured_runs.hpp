@@ -96,6 +96,22 @@ struct StackedRows {
 };
 [[nodiscard]] StackedRows stacked_rows(const MeasuredData& data);
 
+/// Columns over the stacked rows.
+/// @param make  of a run: all its rows, a column or shape (rows, m)
+/// @return shape (stacked rows, m)
+template <class Make>
+[[nodiscard]] Panel stacked(const MeasuredData& data, const StackedRows& rows, Make make) {
+  Panel all;
+  for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    const Panel whole = make(data.runs[i]);
+    const Block& block = rows.runs[i];
+    if (all.size() == 0) all.resize(rows.time_s.size(), whole.cols());
+    all.middleRows(block.begin, block.end - block.begin) =
+        whole.bottomRows(block.end - block.begin);
+  }
+  return all;
+}
+
 /// Temperatures whose rises over the selected rows correlate above 0.98, by name; every temperature
 /// is in its own group.
 using PlaceGroups = std::map<std::string, std::vector<std::string>>;

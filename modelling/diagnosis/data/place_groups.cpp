@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "estimator/thermal_model.hpp"
 #include "modelling/diagnosis/data/measured_runs.hpp"
@@ -9,31 +8,6 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double alike_min = 0.98;
-
-struct Rises {
-  std::vector<std::string> names;
-  Eigen::MatrixXd columns;  ///< over the selected rows of all runs, the mean taken off
-};
-
-Rises rises_of(const MeasuredData& data) {
-  Rises rises{data.model.inputs, {}};
-  rises.names.insert(rises.names.end(), data.others.begin(), data.others.end());
-  Eigen::Index rows = 0;
-  for (const MeasuredRun& run : data.runs) rows += run.rows() - run.begin;
-  rises.columns.resize(rows, std::ssize(rises.names));
-  Eigen::Index at = 0;
-  for (const MeasuredRun& run : data.runs) {
-    const Eigen::Index count = run.rows() - run.begin;
-    Eigen::Index column = 0;
-    for (const auto* of : {&run.inputs_K, &run.others_K})
-      for (const Column& rise_K : *of)
-        rises.columns.col(column++).segment(at, count) = rise_K.tail(count);
-    at += count;
-  }
-  const Eigen::RowVectorXd mean = rises.columns.colwise().mean();
-  rises.columns.rowwise() -= mean;
-  return rises;
-}
 
 bool alike(const PlaceGroups& groups, const std::string& one, const std::string& other) {
   if (one == other) return true;
@@ -45,14 +19,23 @@ bool alike(const PlaceGroups& groups, const std::string& one, const std::string&
 }  // namespace
 
 PlaceGroups place_groups(const MeasuredData& data) {
-  const Rises rises = rises_of(data);
-  const Eigen::MatrixXd products = rises.columns.transpose() * rises.columns;
+  std::vector<std::string> names = data.model.inputs;
+  names.insert(names.end(), data.others.begin(), data.others.end());
+  Panel rises_K = stacked(data, stacked_rows(data), [&](const MeasuredRun& run) {
+    Panel columns(run.rows(), std::ssize(names));
+    Eigen::Index column = 0;
+    for (const auto* of : {&run.inputs_K, &run.others_K})
+      for (const Column& rise_K : *of) columns.col(column++) = rise_K;
+    return columns;
+  });
+  rises_K.rowwise() -= rises_K.colwise().mean().eval();
+  const Eigen::MatrixXd products = rises_K.transpose() * rises_K;
   PlaceGroups groups;
   for (Eigen::Index i = 0; i < products.rows(); ++i) {
-    std::vector<std::string>& group = groups[rises.names[static_cast<std::size_t>(i)]];
+    std::vector<std::string>& group = groups[names[static_cast<std::size_t>(i)]];
     for (Eigen::Index j = 0; j < products.rows(); ++j)
       if (i == j || products(i, j) > alike_min * std::sqrt(products(i, i) * products(j, j)))
-        group.push_back(rises.names[static_cast<std::size_t>(j)]);
+        group.push_back(names[static_cast<std::size_t>(j)]);
   }
   return groups;
 }

@@ -6,6 +6,14 @@
 
 namespace thermocomp::diagnosis {
 
+Panel centred_in(const std::vector<Block>& runs, Panel columns) {
+  for (const Block& run : runs) {
+    auto part = columns.middleRows(run.begin, run.end - run.begin);
+    if (part.rows() > 0) part.rowwise() -= part.colwise().mean().eval();
+  }
+  return columns;
+}
+
 const std::vector<Background>& backgrounds() {
   static const std::vector<Background> all = [] {
     std::vector<Background> made = {{0.0, 1.0}};
@@ -155,11 +163,7 @@ Equations OutputFit::equations(const Panel& columns, Eigen::Index width) const {
     const auto group = of.middleCols(width * shape, width);
     return group.transpose() * group;
   };
-  Panel centred = columns;
-  for (const Block& run : rows_.runs()) {
-    auto part = centred.middleRows(run.begin, run.end - run.begin);
-    if (part.rows() > 0) part.rowwise() -= part.colwise().mean().eval();
-  }
+  const Panel centred = centred_in(rows_.runs(), columns);
   for (Eigen::Index shape = 0; shape < shapes; ++shape)
     all.size.col(shape) =
         products_within(centred, shape).reshaped() / static_cast<double>(rows_.size());

@@ -20,6 +20,9 @@ struct Background {
   double tau_s{1.0};
 };
 
+/// The columns with the mean of each run taken off.
+[[nodiscard]] Panel centred_in(const std::vector<Block>& runs, Panel columns);
+
 /// Those that are reckoned with; each as likely as another beforehand.
 [[nodiscard]] const std::vector<Background>& backgrounds();
 

@@ -67,19 +67,10 @@ class Material {
   [[nodiscard]] std::vector<double> onsets_s(std::size_t run, double first, double last,
                                              std::size_t count, const Column& values) const;
 
-  /// @param make  of a run: all its rows, shape (rows, m)
-  /// @return the selected rows of all runs
+  /// As stacked() of all runs.
   template <class Make>
   [[nodiscard]] Panel stacked(Make make) const {
-    Panel all;
-    for (std::size_t i = 0; i < data_.runs.size(); ++i) {
-      const Panel whole = make(data_.runs[i]);
-      const Block& block = rows_.runs[i];
-      if (all.size() == 0) all.resize(rows_.time_s.size(), whole.cols());
-      all.middleRows(block.begin, block.end - block.begin) =
-          whole.bottomRows(block.end - block.begin);
-    }
-    return all;
+    return diagnosis::stacked(data_, rows_, make);
   }
 
   /// @param whole  of one run: all its rows

@@ -42,36 +42,10 @@ Panel offsets_of(const OutputRows& rows) {
   return offsets;
 }
 
-/// The selected rows of all runs, one below the other.
-template <class Of>
-Column stacked(const MeasuredData& data, const StackedRows& rows, Of of) {
-  Column all(rows.time_s.size());
-  for (std::size_t i = 0; i < data.runs.size(); ++i) {
-    const Eigen::Index count = rows.runs[i].end - rows.runs[i].begin;
-    all.segment(rows.runs[i].begin, count) = Column(of(data.runs[i])).tail(count);
-  }
-  return all;
-}
-
 Panel joined(const Panel& left, const Panel& right) {
   Panel both(left.rows(), left.cols() + right.cols());
   both << left, right;
   return both;
-}
-
-void centre(const std::vector<Block>& runs, Column& values) {
-  for (const Block& run : runs) {
-    auto part = values.segment(run.begin, run.end - run.begin);
-    if (part.size() > 0) part.array() -= part.mean();
-  }
-}
-
-Panel centred_in(const std::vector<Block>& runs, Panel columns) {
-  for (const Block& run : runs) {
-    auto part = columns.middleRows(run.begin, run.end - run.begin);
-    if (part.rows() > 0) part.rowwise() -= part.colwise().mean().eval();
-  }
-  return columns;
 }
 
 Column left_by(const Column& values, const Panel& columns) {
@@ -155,17 +129,15 @@ const OutputFit& Readings::of(std::size_t input) {
     return [i](const MeasuredRun& run) -> const Column& { return run.inputs_K[i]; };
   };
   const Column own = mean(stacked(data_, rows_, input_K(input)));
+  const Column centred_own = centred_in(rows.runs(), own).col(0);
   std::vector<std::pair<double, Panel>> others;  // how closely it goes with the reading
   const auto add = [&](const auto& of) {
     Panel both(rows.size(), 2);
     both.col(0) = mean(stacked(data_, rows_, of));
     both.col(1) = mean(stacked(
         data_, rows_, [&](const MeasuredRun& run) { return lagged(run.time_s, of(run), 1800.0); }));
-    Column a = own;
-    Column b = both.col(0);
-    centre(rows.runs(), a);
-    centre(rows.runs(), b);
-    others.emplace_back(-std::abs(a.dot(b)) / (b.norm() + 1e-12), both);
+    const Column centred = centred_in(rows.runs(), both.col(0)).col(0);
+    others.emplace_back(-std::abs(centred_own.dot(centred)) / (centred.norm() + 1e-12), both);
   };
   for (std::size_t i = 0; i < data_.model.inputs.size(); ++i)
     if (i != input) add(input_K(i));
@@ -192,7 +164,7 @@ const OutputFit& Readings::of(std::size_t input) {
 
 Fits::Fits(const MeasuredData& data, const StackedRows& rows, Readings& readings,
            const std::vector<Explanation>& accepted)
-    : data_(data), rows_(rows), readings_(readings), outputs_(data.model.outputs.size()) {
+    : data_(data), readings_(readings), outputs_(data.model.outputs.size()) {
   for (std::size_t output = 0; output < outputs_.size(); ++output) {
     Column left = stacked(data, rows, [output](const MeasuredRun& run) -> Column {
       return run.measured_um[output] - run.model_um[output];
@@ -237,12 +209,9 @@ bool Fits::concerns(const Hypothesis& hypothesis, std::size_t output) const {
   return outputs_[output] && (!hypothesis.output || *hypothesis.output == output);
 }
 
-Fits::Trial Fits::with_own_gains(const Hypothesis& hypothesis,
-                                 const std::vector<Equations>& equations,
-                                 Eigen::Index shape) const {
-  Trial trial;
-  trial.gains.resize(outputs_.size());
-  trial.gain_sd.resize(outputs_.size());
+void Fits::fit_own_gains(const std::vector<Equations>& equations, Eigen::Index shape,
+                         Explanation& trial) const {
+  const Hypothesis& hypothesis = *trial.hypothesis;
   const auto measured = std::count_if(outputs_.begin(), outputs_.end(),
                                       [](const auto& each) { return each.has_value(); });
   const bool may_spare = !hypothesis.output && measured > 1;
@@ -296,13 +265,11 @@ Fits::Trial Fits::with_own_gains(const Hypothesis& hypothesis,
   // It acts somewhere.
   trial.gains[most_of] = all_gains[most_of];
   trial.gain_sd[most_of] = all_sd[most_of];
-  return trial;
 }
 
-Fits::Trial Fits::with_shared_gain(const Hypothesis& hypothesis,
-                                   const std::vector<Equations>& equations,
-                                   const Equations* of_reading, double shrunk_rows,
-                                   Eigen::Index shape) const {
+void Fits::fit_shared_gain(const std::vector<Equations>& equations, const Equations* of_reading,
+                           double shrunk_rows, Eigen::Index shape, Explanation& trial) const {
+  const Hypothesis& hypothesis = *trial.hypothesis;
   struct Part {
     const OutputFit* fit;
     const Equations* equations;
@@ -336,9 +303,6 @@ Fits::Trial Fits::with_shared_gain(const Hypothesis& hypothesis,
     gain[0] = std::clamp(right / square, bounds.low, bounds.high);
     gain_sd[0] = 1.0 / std::sqrt(square);
   }
-  Trial trial;
-  trial.gains.resize(outputs_.size());
-  trial.gain_sd.resize(outputs_.size());
   for (std::size_t output = 0; output < outputs_.size(); ++output)
     if (concerns(hypothesis, output)) {
       trial.gains[output] = gain;
@@ -357,10 +321,9 @@ Fits::Trial Fits::with_shared_gain(const Hypothesis& hypothesis,
     trial.witness += grown;
   }
   if (hypothesis.form == Form::shared_gain) trial.score -= 0.5 * std::log(std::max(2.0, rows));
-  return trial;
 }
 
-std::vector<Fits::Trial> Fits::trials(const Hypothesis& hypothesis, const Shapes& shapes) const {
+std::vector<Explanation> Fits::trials(const Hypothesis& hypothesis, const Shapes& shapes) const {
   std::vector<Equations> equations(outputs_.size());
   std::vector<Panel> columns(outputs_.size());
   for (std::size_t output = 0; output < outputs_.size(); ++output)
@@ -378,12 +341,17 @@ std::vector<Fits::Trial> Fits::trials(const Hypothesis& hypothesis, const Shapes
     if (hypothesis.shrinks_reading)
       shrunk = (errors_K.array() != 0.0).cast<double>().colwise().sum().transpose();
   }
-  std::vector<Trial> all;
-  for (Eigen::Index shape = 0; shape < std::ssize(shapes); ++shape)
-    all.push_back(hypothesis.form == Form::own_gains
-                      ? with_own_gains(hypothesis, equations, shape)
-                      : with_shared_gain(hypothesis, equations, of_reading ? &*of_reading : nullptr,
-                                         shrunk[shape], shape));
+  std::vector<Explanation> all;
+  for (Eigen::Index shape = 0; shape < std::ssize(shapes); ++shape) {
+    all.push_back({&hypothesis, shapes[static_cast<std::size_t>(shape)]});
+    Explanation& trial = all.back();
+    trial.gains.resize(outputs_.size());
+    trial.gain_sd.resize(outputs_.size());
+    if (hypothesis.form == Form::own_gains)
+      fit_own_gains(equations, shape, trial);
+    else
+      fit_shared_gain(equations, of_reading ? &*of_reading : nullptr, shrunk[shape], shape, trial);
+  }
   for (std::size_t output = 0; output < outputs_.size(); ++output)
     if (concerns(hypothesis, output)) judge_left_out(hypothesis, output, columns[output], all);
   return all;
@@ -392,16 +360,10 @@ std::vector<Fits::Trial> Fits::trials(const Hypothesis& hypothesis, const Shapes
 namespace {
 
 /// The likeliest of the trials that are worth about the most.
-std::size_t best_of(const Hypothesis& hypothesis, const std::vector<Fits::Trial>& trials) {
+std::size_t best_of(const std::vector<Explanation>& trials) {
   std::vector<double> worth;
-  for (const Fits::Trial& trial : trials)
-    worth.push_back(utility({&hypothesis,
-                             {},
-                             trial.gains,
-                             trial.score,
-                             trial.witness,
-                             trial.left_out,
-                             trial.left_out_of_best}));
+  worth.reserve(trials.size());
+  for (const Explanation& trial : trials) worth.push_back(utility(trial));
   const double most = *std::max_element(worth.begin(), worth.end());
   std::size_t best = trials.size();
   for (std::size_t i = 0; i < trials.size(); ++i)
@@ -413,9 +375,9 @@ std::size_t best_of(const Hypothesis& hypothesis, const std::vector<Fits::Trial>
 
 /// Of those that are about as likely as the likeliest, as an effect that is only nearly of its form
 /// makes them, the one that leaves least.
-std::size_t likeliest_of(const std::vector<Fits::Trial>& trials) {
+std::size_t likeliest_of(const std::vector<Explanation>& trials) {
   double most = -unknown;
-  for (const Fits::Trial& trial : trials) most = std::max(most, trial.score);
+  for (const Explanation& trial : trials) most = std::max(most, trial.score);
   std::size_t best = trials.size();
   for (std::size_t i = 0; i < trials.size(); ++i)
     if (trials[i].score >= most - as_much &&
@@ -424,24 +386,11 @@ std::size_t likeliest_of(const std::vector<Fits::Trial>& trials) {
   return best;
 }
 
-void take(const Fits::Trial& trial, const Shape& shape, Explanation& explanation) {
-  explanation.shape = shape;
-  explanation.gains = trial.gains;
-  explanation.score = trial.score;
-  explanation.witness = trial.witness;
-  explanation.left_out = trial.left_out;
-  explanation.left_out_of_best = trial.left_out_of_best;
-}
-
 }  // namespace
 
 Explanation Fits::weigh(const Hypothesis& hypothesis) const {
-  const Shapes grid = grid_of(hypothesis);
-  const std::vector<Trial> all = trials(hypothesis, grid);
-  const std::size_t best = best_of(hypothesis, all);
-  Explanation explanation{&hypothesis};
-  take(all[best], grid[best], explanation);
-  return explanation;
+  const std::vector<Explanation> all = trials(hypothesis, grid_of(hypothesis));
+  return all[best_of(all)];
 }
 
 void Fits::refine(Explanation& explanation, By by) const {
@@ -463,9 +412,11 @@ void Fits::refine(Explanation& explanation, By by) const {
         shapes.push_back(explanation.shape);
         shapes.back()[parameter] = value;
       }
-      const std::vector<Trial> all = trials(hypothesis, shapes);
-      const std::size_t best = by == By::worth ? best_of(hypothesis, all) : likeliest_of(all);
-      take(all[best], shapes[best], explanation);
+      const std::vector<Explanation> all = trials(hypothesis, shapes);
+      const std::size_t best = by == By::worth ? best_of(all) : likeliest_of(all);
+      const double probability = explanation.probability;
+      explanation = all[best];
+      explanation.probability = probability;
       low = shapes[best == 0 ? 0 : best - 1][parameter];
       high = shapes[std::min(best + 1, shapes.size() - 1)][parameter];
     }
@@ -473,7 +424,7 @@ void Fits::refine(Explanation& explanation, By by) const {
 }
 
 void Fits::judge_left_out(const Hypothesis& hypothesis, std::size_t output, const Panel& columns,
-                          std::vector<Trial>& trials) const {
+                          std::vector<Explanation>& trials) const {
   const LeftOut& left_out = outputs_[output]->left_out;
   const std::vector<Block>& runs = outputs_[output]->fit.rows().runs();
   const Panel centred = centred_in(runs, columns);
@@ -488,7 +439,7 @@ void Fits::judge_left_out(const Hypothesis& hypothesis, std::size_t output, cons
   std::vector<double> left;
   if (!as_fitted) left = left_out.after(centred, width, bounds_of(hypothesis, output));
   for (std::size_t i = 0; i < trials.size(); ++i) {
-    Trial& trial = trials[i];
+    Explanation& trial = trials[i];
     if (trial.gains[output].size() == 0) continue;
     const Column after =
         before - own.middleCols(width * static_cast<Eigen::Index>(i), width) * trial.gains[output];
@@ -512,10 +463,8 @@ Eigen::VectorXd Fits::coefficient_errors(std::size_t output) const {
 
 Column Fits::effect_of(const Explanation& explanation, std::size_t output) const {
   const OutputRows& rows = outputs_[output]->fit.rows();
-  Column effect = rows.means_of(explanation.hypothesis->columns({explanation.shape}, output)) *
-                  explanation.gains[output];
-  centre(rows.runs(), effect);
-  return effect;
+  const Panel columns = explanation.hypothesis->columns({explanation.shape}, output);
+  return centred_in(rows.runs(), rows.means_of(columns) * explanation.gains[output]).col(0);
 }
 
 double Fits::rms_left(std::size_t output) const {

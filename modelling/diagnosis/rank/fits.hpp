@@ -35,16 +35,9 @@ class Fits {
   Fits(const MeasuredData& data, const StackedRows& rows, Readings& readings,
        const std::vector<Explanation>& accepted);
 
-  /// A hypothesis at one shape.
-  struct Trial {
-    std::vector<Eigen::VectorXd> gains;
-    std::vector<Eigen::VectorXd> gain_sd;  ///< standard deviations of the gains
-    double score{0.0};
-    double witness{0.0};
-    double left_out{0.0};
-    double left_out_of_best{0.0};
-  };
-  [[nodiscard]] std::vector<Trial> trials(const Hypothesis& hypothesis, const Shapes& shapes) const;
+  /// The hypothesis at each of the shapes.
+  [[nodiscard]] std::vector<Explanation> trials(const Hypothesis& hypothesis,
+                                                const Shapes& shapes) const;
   /// At the best point of its grid.
   [[nodiscard]] Explanation weigh(const Hypothesis& hypothesis) const;
   /// What the choice between values of a shape parameter goes by.
@@ -71,19 +64,16 @@ class Fits {
     LeftOut left_out;  ///< of the remainder, each run's mean off
   };
   [[nodiscard]] bool concerns(const Hypothesis& hypothesis, std::size_t output) const;
-  [[nodiscard]] Trial with_own_gains(const Hypothesis& hypothesis,
-                                     const std::vector<Equations>& equations,
-                                     Eigen::Index shape) const;
-  [[nodiscard]] Trial with_shared_gain(const Hypothesis& hypothesis,
-                                       const std::vector<Equations>& equations,
-                                       const Equations* of_reading, double shrunk_rows,
-                                       Eigen::Index shape) const;
+  /// Set gains and score of a trial, shape number `shape`.
+  void fit_own_gains(const std::vector<Equations>& equations, Eigen::Index shape,
+                     Explanation& trial) const;
+  void fit_shared_gain(const std::vector<Equations>& equations, const Equations* of_reading,
+                       double shrunk_rows, Eigen::Index shape, Explanation& trial) const;
   /// Adds to each trial what its columns take of an output's left-out rows.
   void judge_left_out(const Hypothesis& hypothesis, std::size_t output, const Panel& columns,
-                      std::vector<Trial>& trials) const;
+                      std::vector<Explanation>& trials) const;
 
   const MeasuredData& data_;
-  const StackedRows& rows_;
   Readings& readings_;
   std::vector<std::optional<Output>> outputs_;
   bool fitted_{false};

@@ -16,7 +16,8 @@ namespace thermocomp::diagnosis {
 struct Explanation {
   const Hypothesis* hypothesis{nullptr};
   Shape shape{};
-  std::vector<Eigen::VectorXd> gains{};  ///< one an output; empty: it does not act on it
+  std::vector<Eigen::VectorXd> gains{};    ///< one an output; empty: it does not act on it
+  std::vector<Eigen::VectorXd> gain_sd{};  ///< their standard deviations
   double score{0.0};  ///< ln L over that of nothing, its grid and gains paid for, with the witness
   double witness{0.0};  ///< the part of it that the reading itself adds, for a fault of a reading
   /// ln of the RMS before over after, of rows that it was not fitted to: the sum over the outputs,

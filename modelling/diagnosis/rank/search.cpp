@@ -74,9 +74,9 @@ std::vector<double> values_of(const ShapeParameter& of, double found) {
 void set_spread(const Fits& fits, Finding& finding) {
   Explanation& found = finding.explanation;
   const Hypothesis& hypothesis = *found.hypothesis;
-  const Fits::Trial best = fits.trials(hypothesis, {found.shape}).front();
+  const Explanation best = fits.trials(hypothesis, {found.shape}).front();
   found.gains = best.gains;
-  const auto gains_reach = [&](const Fits::Trial& trial, std::size_t output, Eigen::Index i) {
+  const auto gains_reach = [&](const Explanation& trial, std::size_t output, Eigen::Index i) {
     const double reach = normal_95 * trial.gain_sd[output][i] *
                          wider(hypothesis, hypothesis.gains[static_cast<std::size_t>(i)]);
     return std::pair(trial.gains[output][i] - reach, trial.gains[output][i] + reach);
@@ -99,7 +99,7 @@ void set_spread(const Fits& fits, Finding& finding) {
       shapes.push_back(found.shape);
       shapes.back()[parameter] = value;
     }
-    const std::vector<Fits::Trial> trials = fits.trials(hypothesis, shapes);
+    const std::vector<Explanation> trials = fits.trials(hypothesis, shapes);
     const double limit = best.score - 0.5 * std::pow(normal_95 * wider(hypothesis, of.name), 2);
     for (std::size_t i = 0; i < trials.size(); ++i) {
       if (trials[i].score < limit) continue;
@@ -166,6 +166,7 @@ class Search {
  private:
   static std::vector<Explanation> explanations_of(const std::vector<Finding>& findings) {
     std::vector<Explanation> all;
+    all.reserve(findings.size());
     for (const Finding& each : findings) all.push_back(each.explanation);
     return all;
   }
