@@ -26,7 +26,7 @@ import numpy as np
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(SOURCE / "tests" / "diagnosis"))
-import campaign
+import cases
 import hidden_effects as hidden
 
 try:
@@ -188,7 +188,7 @@ def table_of_cases(options):
         for i in range(options.cases):
             cause = hidden.ALWAYS[i % len(hidden.ALWAYS)]
             task = (options.program, options.keep, "single", level, 3000 + i, [cause])
-            _, truth, answer = campaign.examine(task)
+            _, truth, answer = cases.examined(task, hidden.make)
             folder = pathlib.Path(options.keep) / f"{level}_{3000 + i}_{cause}"
             model = tomllib.loads((folder / "model.toml").read_text())
             train = [Run(read(folder / n), model) for n in ("train_a.csv", "train_b.csv")]

@@ -3,31 +3,18 @@
 must be named all the same, what it put into the coefficients taken out again, and nothing be named
 with confidence where nothing was hidden. Exit status 1 when more than WRONG_MAX are not.
 
-fitted_model_test.py PROGRAM [--few | --count N [--seed S]]
-
---few: a handful of cases, for sanitizer builds. --count: no test; counts what is said of N machines
-with an effect and N untouched ones at each of the levels 1 and 2.
+fitted_model_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer builds
 """
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-# ruff: noqa: E402
-import argparse
-import collections
 import json
-import multiprocessing
 import pathlib
 import sys
 import tempfile
 import tomllib
 
-import numpy as np
-
-import campaign
+import cases  # first: it settles the number of threads
 import hidden_effects as hidden
-import measured_campaign
+import numpy as np
 
 # (level, seed, cause, ridge of the fit, whether an offset of each run was free)
 CASES = ((1, 136, "thermal_lag", 0.0, False), (1, 140, "speed_growth", 0.0, True),
@@ -37,7 +24,6 @@ SILENT = ((2, 50100, 0.0, False), (2, 50102, 1e-3, False), (1, 50120, 0.0, True)
 WRONG_MAX = 1  # of 6: a heat that the base model itself lacks is named before a lag
 STATED = 0.8  # a name with more than this probability on untouched data is an invention
 GAIN_MIN = 0.3  # of the test RMS, in one output at least
-WAYS_TO_FIT = ((0.0, False), (1e-3, False), (0.0, True))  # ridge, offset of each run
 
 
 def columns(path):
@@ -71,14 +57,14 @@ def fit(folder, ridge, offset):
 
 def rms_of_written_um(program, folder):
     """Of the extended model as its file says, on the test run."""
-    again = campaign.diagnose(program, folder, ("--model", "out/model.toml"))
+    again = cases.diagnose(program, folder, ("--model", "out/model.toml"))
     return {output: said["test_rms_um"] for output, said in again["baseline"].items()}
 
 
 def examined(program, folder, level, seed, causes, ridge, offset):
     hidden.make(folder, seed, level, causes)
     fit(folder, ridge, offset)
-    answer = campaign.diagnose(program, folder, ("--model", "model.toml", "--out", "out"))
+    answer = cases.diagnose(program, folder, ("--model", "model.toml", "--out", "out"))
     return json.loads((folder / "truth.json").read_text()), answer
 
 
@@ -86,8 +72,8 @@ def named_and_gained(program, folder, case):
     level, seed, cause, ridge, offset = case
     truth, answer = examined(program, folder, level, seed, [cause], ridge, offset)
     findings = answer["findings"]
-    if not findings or not campaign.same(findings[0], truth["hidden"][0]):
-        return "said: " + campaign.said(answer)
+    if not findings or not cases.same(findings[0], truth["hidden"][0]):
+        return "said: " + cases.said(answer)
     rms_um = rms_of_written_um(program, folder)
     for output, said in answer["extended"].items():
         if abs(rms_um[output] - said["test_rms_um"]) > 1e-4 * (1.0 + said["test_rms_um"]):
@@ -95,36 +81,6 @@ def named_and_gained(program, folder, case):
                                                                  said["test_rms_um"])
     gains = [1.0 - rms_um[o] / answer["baseline"][o]["test_rms_um"] for o in rms_um]
     return "" if max(gains) > GAIN_MIN else "gains %s only" % gains
-
-
-def counted(task):
-    """@return what was hidden or None, what is named first or None"""
-    program, level, seed, causes, way = task
-    with tempfile.TemporaryDirectory() as temporary:
-        truth, answer = examined(program, pathlib.Path(temporary), level, seed, causes, *way)
-    return (truth["hidden"] or [None])[0], (answer["findings"] or [None])[0]
-
-
-def count(program, machines, seed):
-    tasks = [(program, level, seed + 100000 * level + 10000 * planted + i,
-              [hidden.CAUSES[i % len(hidden.CAUSES)]] if planted else [],
-              WAYS_TO_FIT[i % len(WAYS_TO_FIT)])
-             for level in (1, 2) for planted in (True, False) for i in range(machines)]
-    total, stated = collections.Counter(), []
-    with multiprocessing.Pool(2) as pool:
-        for done, (planted, first) in enumerate(pool.imap(counted, tasks), 1):
-            campaign.progress(done, len(tasks))
-            kind = "planted" if planted else "untouched"
-            right = bool(planted and first and campaign.same(first, planted))
-            total[kind] += 1
-            total[kind, "named"] += first is not None
-            total[kind, "right"] += right
-            if first:
-                stated.append((first["probability"], right))
-    print("planted: %d of %d named, %d right; untouched: %d of %d named" % (
-        total["planted", "named"], total["planted"], total["planted", "right"],
-        total["untouched", "named"], total["untouched"]))
-    measured_campaign.print_reliability("names", stated)
 
 
 def main(program, few):
@@ -139,19 +95,9 @@ def main(program, few):
             folder = pathlib.Path(temporary) / ("silent%d" % number)
             _, answer = examined(program, folder, level, seed, [], ridge, offset)
             failed += any(f["probability"] > STATED for f in answer["findings"])
-            print("%s: nothing hidden, said: %s" % (case, campaign.said(answer)))
+            print("%s: nothing hidden, said: %s" % (case, cases.said(answer)))
     return 1 if failed >= 1 else 0
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("program")
-    parser.add_argument("--few", action="store_true")
-    parser.add_argument("--count", type=int, default=0)
-    parser.add_argument("--seed", type=int, default=909192)
-    given = parser.parse_args()
-    PROGRAM = str(pathlib.Path(given.program).resolve())
-    if given.count:
-        count(PROGRAM, given.count, given.seed)
-        sys.exit(0)
-    sys.exit(main(PROGRAM, given.few))
+    sys.exit(main(str(pathlib.Path(sys.argv[1]).resolve()), "--few" in sys.argv[2:]))

@@ -9,7 +9,7 @@ hidden_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanitiz
 import pathlib
 import sys
 
-import campaign
+import cases  # first: it settles the number of threads
 import hidden_effects as hidden
 
 LEVEL = 2
@@ -20,17 +20,21 @@ QUICK_PEAK = 1, 120003, "missing_heat_source"
 FEW = ("missing_heat_source", "sensor_swap", "displacement_step")
 
 
+def examine(task):
+    return cases.examined(task, hidden.make)
+
+
 def named_beside_quick_peak(program):
     level, seed, cause = QUICK_PEAK
-    task = (program, None, "single", level, seed, [cause])
-    return campaign.counted([task], campaign.examine, [level], True, "um")[level].right["single"] == 1
+    _, truth, answer = examine((program, None, "single", level, seed, [cause]))
+    return cases.is_right(truth, answer)
 
 
 def main(program, few):
     if not few and not named_beside_quick_peak(program):
         return 1
-    return campaign.short_campaign(program, campaign.examine, LEVEL, FEW if few else hidden.CAUSES,
-                                   1 if few else NULLS, 0 if few else WRONG_MAX)
+    return cases.short_campaign(program, examine, LEVEL, FEW if few else hidden.CAUSES,
+                                1 if few else NULLS, 0 if few else WRONG_MAX)
 
 
 if __name__ == "__main__":

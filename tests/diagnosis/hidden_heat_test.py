@@ -8,8 +8,8 @@ hidden_heat_test.py PROGRAM [--few]    --few: a handful of cases, for sanitizer 
 import pathlib
 import sys
 
-import thermal_campaign as thermal  # first: it settles the number of threads
-import campaign
+import cases  # first: it settles the number of threads
+import hidden_heat as hidden
 
 LEVEL = 2
 WRONG_MAX = 1  # of 9
@@ -17,9 +17,14 @@ NULLS = 3
 FEW = ("wrong_heat_source", "wrong_conductance")
 
 
+def examine(task):
+    return cases.examined(task, hidden.make, ("--thermal", "machine.toml"))
+
+
 def main(program, few):
-    return campaign.short_campaign(program, thermal.examine, LEVEL, FEW if few else thermal.CAUSES,
-                                   1 if few else NULLS, 0 if few else WRONG_MAX, "K")
+    causes = FEW if few else hidden.CAUSES + hidden.FAULTS
+    return cases.short_campaign(program, examine, LEVEL, causes, 1 if few else NULLS,
+                                0 if few else WRONG_MAX)
 
 
 if __name__ == "__main__":

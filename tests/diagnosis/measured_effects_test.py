@@ -8,7 +8,7 @@ measured_effects_test.py PROGRAM
 import pathlib
 import sys
 
-import measured_campaign as measured
+import measured_cases as measured
 import measured_machines
 
 CAUSES = ("displacement_step", "speed_growth", "nonlinear_expansion", "periodic_disturbance",

@@ -9,8 +9,8 @@ physical_effects_test.py PROGRAM [--few]    --few: a handful of cases, for sanit
 import pathlib
 import sys
 
-import measured_campaign as measured
-import physical_campaign
+import measured_cases as measured
+import physical_cases
 import physical_effects as physical
 
 LEVEL, SEED = 2, 4300
@@ -23,7 +23,7 @@ def main(program, few):
     right = wrong = 0
     kinds = physical.KINDS[:3] if few else physical.KINDS
     for i, kind in enumerate(kinds):
-        _, truths, answer = physical_campaign.examine(
+        _, truths, answer = physical_cases.examine(
             ([program], SEED + i, LEVEL, kind, SIZES[i % len(SIZES)]))
         if answer is None:
             print("%s: no machine carries it" % kind)

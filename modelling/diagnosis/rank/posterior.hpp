@@ -57,7 +57,7 @@ enum class Round { first, later, beside_fit };
 ///
 /// The weights are those under which effects planted in simulated machines, made by physics, and
 /// planted in measured ones are likeliest, one answer in a hundred being allowed to be beyond them
-/// (tests/diagnosis/calibrate_posterior.py). No cause is likelier than another by itself.
+/// (research/calibrate_posterior.py). No cause is likelier than another by itself.
 [[nodiscard]] double utility(const Explanation& explanation);
 
 /// Sets the probability of each (0 where a simpler one that it contains is as likely): that there

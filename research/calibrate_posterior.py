@@ -3,7 +3,7 @@
 how they do on machines that were left out.
 
 calibrate_posterior.py ANSWERS.json...    as physical_campaign.py, measured_campaign.py (--weighed
-                                          --json) and campaign.py (--answers) keep them
+                                          --json) and simulated_campaign.py (--answers) keep them
 
 Within a case exp(utility) of all hypotheses compete; whether there is anything at all is a
 logistic of what the likeliest one takes. One answer in a hundred may be beyond the weights: without
@@ -14,11 +14,12 @@ import json
 import pathlib
 import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
+# ruff: noqa: E402
 import numpy as np
-from scipy.optimize import minimize
-
-from measured_campaign import subject_right
+from measured_cases import subject_right
 from measured_plants import FAMILIES
+from scipy.optimize import minimize
 
 BEYOND = 0.01
 PENALTY = 1e-2

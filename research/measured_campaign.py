@@ -13,143 +13,21 @@ own. --show prints every answer that was not right; --json keeps all of them, wi
 for calibrate_posterior.py.
 """
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the jobs are the threads
-
-# ruff: noqa: E402
 import argparse
 import collections
 import json
 import multiprocessing
 import pathlib
-import subprocess
 import sys
-import tempfile
 
-import numpy as np
-
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
+# ruff: noqa: E402
+from measured_cases import STATED, examine, right, said  # first: it settles the threads
 import measured_machines
-from measured_plants import CAUSES, FAMILIES, OUTSIDE, Impossible, Planted
+import numpy as np
+from measured_plants import CAUSES, FAMILIES, OUTSIDE
 
-ATTEMPTS = 12
 KINDS = ("single", "pair", "outside", "sparse", "outputs")
-PROBED_EACH_S = 1800.0
-STATED = 0.8  # a name with more than this probability on untouched data is an invention
-
-
-def machine_of(name, random):
-    return measured_machines.MACHINES[name](random)
-
-
-def spared(machine, cause, random):
-    """A place that the model may not have."""
-    if cause != "missing_temperature" and random.uniform() < 0.7:
-        return ()
-    if len(machine.temperatures) < 2:
-        return ()
-    return (str(random.choice(machine.temperatures)),)
-
-
-def second_cause(first, random):
-    """Of another family."""
-    family = lambda cause: FAMILIES["hysteresis" if cause.startswith("hysteresis") else cause]
-    return str(random.choice([c for c in CAUSES if family(c) != family(first)]))
-
-
-def planted_case(seed, machines, base, cause, times, kind):
-    """A machine that cannot carry the cause gives way to another one.
-    @return the machine with the effects in it, its model, and the truths
-    @throws Impossible when no attempt can carry it"""
-    for attempt in range(ATTEMPTS):
-        random = np.random.default_rng([seed, attempt])
-        machine = machine_of(str(random.choice(machines)), random)
-        model = measured_machines.base_model(machine, base, spared(machine, cause, random))
-        try:
-            first = Planted(machine, model, cause, times, random)
-            truths = [first.truth]
-            if kind == "pair":
-                other = second_cause(cause, random)
-                truths.append(Planted(machine, model, other, times, random, first.size_um).truth)
-            if kind == "sparse":
-                machine.keep_probings(PROBED_EACH_S)
-            return machine, model, truths
-        except Impossible:
-            continue
-    raise Impossible
-
-
-def untouched_case(seed, machines, base):
-    random = np.random.default_rng([seed, 0])
-    machine = machine_of(str(random.choice(machines)), random)
-    return machine, measured_machines.base_model(machine, base, spared(machine, None, random))
-
-
-def write(folder, machine, model):
-    """@return arguments of the program"""
-    model.write(folder / "model.toml")
-    train, test = [], []
-    for number, (run, rows) in enumerate(zip(machine.runs, machine.train)):
-        name = "run%d.csv" % number
-        np.savetxt(folder / name, np.stack(list(run.values()), axis=1), fmt="%.8g", delimiter=",",
-                   header=",".join(run), comments="")
-        time_s = run["time_s"]
-        if rows.stop == len(time_s):
-            train.append(name)
-        elif rows.stop:
-            train.append("%s@:%g" % (name, time_s[rows.stop]))
-            test.append("%s@%g:" % (name, time_s[rows.stop]))
-        else:
-            test.append(name)
-    return ["--model", "model.toml", "--train", *train, "--test", *test]
-
-
-def diagnosed(program, machine, model):
-    """@param program  with its options"""
-    with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        command = [program[0], "diagnose", *write(folder, machine, model), *program[1:], "--json",
-                   "answer.json"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-        if done.returncode != 0:
-            raise RuntimeError(" ".join(command) + ": " + done.stderr)
-        return json.loads((folder / "answer.json").read_text())
-
-
-def with_groups(truths, machine):
-    """The truths with the places that cannot be told from their subjects."""
-    for truth in truths:
-        truth["groups"] = [sorted(machine.group(p)) if p.endswith("_degC") else [p]
-                           for p in truth["subject"].split("|")]
-    return truths
-
-
-def examine(task):
-    """@return the task, the truths (None: untouched or not to be planted), the answer"""
-    program, seed, machines, base, cause, times, kind = task
-    named = lambda machine: (program, seed, machine.name, base, cause, times, kind)
-    if cause is None:
-        machine, model = untouched_case(seed, machines, base)
-        if kind == "sparse":
-            machine.keep_probings(PROBED_EACH_S)
-        return named(machine), None, diagnosed(program, machine, model)
-    try:
-        machine, model, truths = planted_case(seed, machines, base, cause, times, kind)
-    except Impossible:
-        return task, None, None
-    return named(machine), with_groups(truths, machine), diagnosed(program, machine, model)
-
-
-def subject_right(subject, truth):
-    places = subject.split("|")
-    if len(places) != len(truth["groups"]):
-        return False
-    return any(all(p in g for p, g in zip(places, order))
-               for order in (truth["groups"], truth["groups"][::-1]))
-
-
-def right(finding, truth):
-    return finding["cause"] == truth["cause"] and subject_right(finding["subject"], truth)
 
 
 def covered(finding, truth):
@@ -272,12 +150,6 @@ def tasks_of(options):
         tasks.append((options.program, 100000 * options.seed + 50000 + i,
                       machines, str(random.choice(bases)), None, 0.0, options.kind))
     return tasks
-
-
-def said(answer):
-    found = answer["findings"]
-    return ", ".join("%s(%s) %.2f" % (f["cause"], f["subject"], f.get("probability", np.nan))
-                     for f in found) or answer["verdict"]
 
 
 def arguments(words=None):

@@ -1,49 +1,48 @@
 #!/usr/bin/python3
 """Hides effects by seed, lets the tool look at the files alone, and counts what it says.
 
-campaign.py PROGRAM [--cases N] [--null N] [--outside N] [--double N] [--levels 1,2,3]
-            [--seed S] [--jobs 2] [--keep FOLDER] [--show] [--answers FILE]
+simulated_campaign.py PROGRAM [--thermal] [--cases N] [--null N] [--outside N] [--double N]
+                      [--levels 1,2,3] [--seed S] [--jobs 2] [--keep FOLDER] [--show]
+                      [--answers FILE]
 
-PROGRAM is thermocomp-modelling. Counts are for each level. --keep leaves the files in FOLDER and
-uses those that are there already; --show prints every answer that was not right; --answers keeps
-all but those to effects outside the catalogue for calibrate_posterior.py.
+PROGRAM is thermocomp-modelling. --thermal changes the heat flow of machines, and the tool compares
+temperatures. Counts are for each level. --keep leaves the files in FOLDER and uses those that are
+there already; --show prints every answer that was not right; --answers keeps all but those to
+effects outside the catalogue for calibrate_posterior.py.
 """
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the jobs are the threads
-
-# ruff: noqa: E402
 import argparse
 import collections
 import json
 import multiprocessing
 import pathlib
-import subprocess
 import sys
-import tempfile
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
+# ruff: noqa: E402
+from cases import NULL_SEED, examined, said, same  # first: it settles the number of threads
+import hidden_effects
+import hidden_heat
 import numpy as np
-
-import hidden_effects as hidden
 
 DOUBLE_SEED = 90000
 OUTSIDE_SEED = 70000
-NULL_SEED = 50000
 
 
-def diagnose(program, folder, model=("--model", "model.toml")):
-    answer = folder / "answer.json"
-    command = [program, "diagnose", *model, "--train", "train_a.csv", "train_b.csv", "--test",
-               "test.csv", "--json", str(answer)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    if done.returncode != 0:
-        raise RuntimeError("%s: %s" % (folder, done.stderr))
-    return json.loads(answer.read_text())
+def examine(task):
+    return examined(task, hidden_effects.make, ("--model", "model.toml", "--weighed"))
 
 
-def same(finding, truth):
-    return (finding["cause"], finding["subject"]) == (truth["cause"], truth["subject"])
+def examine_heat(task):
+    return examined(task, hidden_heat.make, ("--thermal", "machine.toml"))
+
+
+# How a case is examined; causes of single cases, effects outside, causes of pairs; how many single,
+# untouched, outside and double cases at each level; the unit.
+DISPLACEMENT = (examine, (hidden_effects.CAUSES, hidden_effects.OUTSIDE, hidden_effects.ALWAYS),
+                (144, 100, 40, 40), "um")
+HEAT = (examine_heat, (hidden_heat.CAUSES + hidden_heat.FAULTS, hidden_heat.OUTSIDE,
+                       hidden_heat.CAUSES), (90, 50, 20, 30), "K")
 
 
 def errors(finding, truth):
@@ -59,22 +58,6 @@ def errors(finding, truth):
     return out
 
 
-def examined(task, make, model=("--model", "model.toml")):
-    """@param make  writes the files of a case; those that are there already stay
-    @return (task, what was hidden, the answer)"""
-    program, keep, kind, level, seed, causes = task
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = pathlib.Path(keep or temporary) / ("%d_%d_%s" % (level, seed, "+".join(causes)))
-        facts = folder / "truth.json"
-        if not facts.exists():
-            make(folder, seed, level, causes)
-        return task, json.loads(facts.read_text()), diagnose(program, folder, model)
-
-
-def examine(task):
-    return examined(task, hidden.make, ("--model", "model.toml", "--weighed"))
-
-
 def tasks_of(options, level, catalogue):
     """@param catalogue  causes of single cases, effects outside, causes of pairs"""
     causes, outside, of_pairs = catalogue
@@ -86,11 +69,6 @@ def tasks_of(options, level, catalogue):
              ("double", DOUBLE_SEED, options.double, pair)]
     return [(options.program, options.keep, kind, level, base + options.seed + i, hide(i))
             for kind, base, count, hide in kinds for i in range(count)]
-
-
-def said(answer):
-    found = answer["findings"]
-    return ", ".join("%s(%s)" % (f["cause"], f["subject"]) for f in found) or answer["verdict"]
 
 
 def progress(done, total):
@@ -192,9 +170,8 @@ def kept_answer(task, truth, answer):
                 seed=task[4], truth=hidden_ones[0], truths=truth["hidden"], answer=answer)
 
 
-def counted(tasks, examine, levels, show, unit, jobs=2, answers=None):
-    """@param answers  a file that receives the answers
-    @return a Count for each level"""
+def counted(tasks, examine, levels, show, unit, jobs, answers):
+    """@param answers  a file that receives the answers, or None"""
     kept = []
     counts = {level: Count(level, show, unit) for level in levels}
     with multiprocessing.Pool(jobs) as pool:
@@ -206,17 +183,14 @@ def counted(tasks, examine, levels, show, unit, jobs=2, answers=None):
         count.report()
     if answers:
         pathlib.Path(answers).write_text(json.dumps([k for k in kept if k]))
-    return counts
 
 
-def long_campaign(text, examine, catalogue, numbers, unit="um"):
-    """Runs what the command line asks for.
-    @param text  what the program does
-    @param numbers  of single cases, untouched machines, effects outside, pairs at each level"""
-    parser = argparse.ArgumentParser(description=text.split("\n")[0])
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("program")
-    for name, number in zip(("cases", "null", "outside", "double"), numbers):
-        parser.add_argument("--" + name, type=int, default=number)
+    parser.add_argument("--thermal", action="store_true")
+    for name in ("cases", "null", "outside", "double"):
+        parser.add_argument("--" + name, type=int)
     parser.add_argument("--levels", default="1,2,3")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
@@ -224,29 +198,16 @@ def long_campaign(text, examine, catalogue, numbers, unit="um"):
     parser.add_argument("--show", action="store_true")
     parser.add_argument("--answers", help="file that receives what was said and weighed")
     options = parser.parse_args()
+    examine, catalogue, numbers, unit = HEAT if options.thermal else DISPLACEMENT
+    for name, number in zip(("cases", "null", "outside", "double"), numbers):
+        if getattr(options, name) is None:
+            setattr(options, name, number)
     options.program = str(pathlib.Path(options.program).resolve())
     if options.keep:
         options.keep = str(pathlib.Path(options.keep).resolve())
     levels = [int(level) for level in options.levels.split(",")]
     tasks = [task for level in levels for task in tasks_of(options, level, catalogue)]
-    counted(tasks, examine, levels, options.show, unit, options.jobs,
-            options.answers)
-
-
-def short_campaign(program, examine, level, causes, nulls, wrong_max, unit="um"):
-    """Every cause once and some untouched machines.
-    @return exit status: 1 when more than wrong_max are wrong or an untouched machine is not left
-    alone"""
-    tasks = [(program, None, "single", level, seed, [cause]) for seed, cause in enumerate(causes)]
-    tasks += [(program, None, "null", level, NULL_SEED + seed, []) for seed in range(nulls)]
-    count = counted(tasks, examine, [level], True, unit)[level]
-    wrong = count.total["single"] - count.right["single"]
-    return 0 if wrong <= wrong_max and count.right["null"] == count.total["null"] else 1
-
-
-def main():
-    catalogue = hidden.CAUSES, hidden.OUTSIDE, hidden.ALWAYS
-    long_campaign(__doc__, examine, catalogue, (144, 100, 40, 40))
+    counted(tasks, examine, levels, options.show, unit, options.jobs, options.answers)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,74 @@
+"""Cases in which effects were hidden by seed: the tool looks at the files alone."""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the jobs are the threads
+
+# ruff: noqa: E402
+import json
+import multiprocessing
+import pathlib
+import subprocess
+import tempfile
+
+NULL_SEED = 50000
+
+
+def diagnose(program, folder, model=("--model", "model.toml")):
+    answer = folder / "answer.json"
+    command = [program, "diagnose", *model, "--train", "train_a.csv", "train_b.csv", "--test",
+               "test.csv", "--json", str(answer)]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError("%s: %s" % (folder, done.stderr))
+    return json.loads(answer.read_text())
+
+
+def same(finding, truth):
+    return (finding["cause"], finding["subject"]) == (truth["cause"], truth["subject"])
+
+
+def said(answer):
+    found = answer["findings"]
+    return ", ".join("%s(%s)" % (f["cause"], f["subject"]) for f in found) or answer["verdict"]
+
+
+def examined(task, make, model=("--model", "model.toml")):
+    """@param task  program, folder that keeps the files or None, kind, level, seed, causes
+    @param make  writes the files of a case; those that are there already stay
+    @return (task, what was hidden, the answer)"""
+    program, keep, kind, level, seed, causes = task
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(keep or temporary) / ("%d_%d_%s" % (level, seed, "+".join(causes)))
+        facts = folder / "truth.json"
+        if not facts.exists():
+            make(folder, seed, level, causes)
+        return task, json.loads(facts.read_text()), diagnose(program, folder, model)
+
+
+def is_right(truth, answer):
+    """The one hidden cause and its subject are the first finding; nothing is named where nothing
+    was hidden."""
+    if not truth["hidden"]:
+        return answer["verdict"] != "effect"
+    return bool(answer["findings"]) and same(answer["findings"][0], truth["hidden"][0])
+
+
+def short_campaign(program, examine, level, causes, nulls, wrong_max):
+    """Every cause once and some untouched machines.
+    @return exit status: 1 when more than wrong_max are wrong or an untouched machine is not left
+    alone"""
+    tasks = [(program, None, "single", level, seed, [cause]) for seed, cause in enumerate(causes)]
+    tasks += [(program, None, "null", level, NULL_SEED + seed, []) for seed in range(nulls)]
+    wrong = invented = 0
+    with multiprocessing.Pool(2) as pool:
+        for task, truth, answer in pool.imap(examine, tasks):
+            if is_right(truth, answer):
+                continue
+            wrong += bool(truth["hidden"])
+            invented += not truth["hidden"]
+            print("  seed %d: %s -> %s" % (task[4], ", ".join(
+                "%s(%s)" % (t["cause"], t["subject"]) for t in truth["hidden"]) or "nothing",
+                said(answer)))
+    print("%d of %d wrong, %d of %d untouched named" % (wrong, len(causes), invented, nulls))
+    return 1 if wrong > wrong_max or invented else 0
