@@ -21,6 +21,7 @@ for (const state of body.states) {
 // ------------------------------------------------------------------ what can be shown
 
 const livePeriod_ms = 2000;
+const smoothEdges_max = 50000;  // triangles; of more the edges are not smoothed
 const shownOfSize = 0.08;  // the greatest displacement of a group, enlarged, as a share of the size
 const colours = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 const quantities = {
@@ -47,25 +48,25 @@ let factor = 0;
 
 THREE.Object3D.DefaultUp.set(0, 0, 1);
 const view = place('view');
-const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
+const renderer = new THREE.WebGLRenderer({antialias: body.triangles.length < 3 * smoothEdges_max, alpha: true, preserveDrawingBuffer: true});
 view.append(renderer.domElement);
 const scene = new THREE.Scene();
 const camera = new THREE.PerspectiveCamera(35, 1, 1, 1e6);
+// Every triangle has corners of its own, so that it has one light, which is computed where it moves:
+// so few operations a pixel that 200,000 triangles can be turned without a graphics card.
+const triangles = new Uint32Array(body.triangles);
 const geometry = new THREE.BufferGeometry();
-const positions = new THREE.BufferAttribute(nodes_mm.slice(), 3);
-const tints = new THREE.BufferAttribute(new Float32Array(3 * count), 3);
+const positions = new THREE.BufferAttribute(new Float32Array(3 * triangles.length), 3);
+const tints = new THREE.BufferAttribute(new Float32Array(3 * triangles.length), 3);
 geometry.setAttribute('position', positions);
 geometry.setAttribute('color', tints);
-geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(body.triangles), 1));
+for (let i = 0; i < 3 * triangles.length; ++i)
+  positions.array[i] = nodes_mm[3 * triangles[Math.floor(i / 3)] + i % 3];
 geometry.computeBoundingBox();
 geometry.computeBoundingSphere();
 geometry.boundingSphere.radius *= 1 + 2 * shownOfSize;
-const mesh = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial(
-  {vertexColors: THREE.VertexColors, flatShading: true, shininess: 0, side: THREE.DoubleSide}));
+const mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({vertexColors: THREE.VertexColors}));
 scene.add(mesh);
-scene.add(new THREE.HemisphereLight(0xffffff, 0xb0b0b0, 0.75), camera);
-const lamp = new THREE.DirectionalLight(0xffffff, 0.35);
-camera.add(lamp);
 
 const low = geometry.boundingBox.min;
 const high = geometry.boundingBox.max;
@@ -187,13 +188,34 @@ function measureGroup() {
   place('factor').textContent = factor > 0 ? 'displacement drawn \u00d7 ' + factor.toLocaleString('en') : 'nothing moves';
 }
 
+// 0.6 to 1: of a lamp above, to the right and in front.
+const lamp = [0.35, -0.55, 0.75].map(each => each / Math.hypot(0.35, 0.55, 0.75));
+function lightOn(points, first) {
+  const [a, b, c] = [0, 1, 2].map(corner => 3 * triangles[first + corner]);
+  const u = [0, 1, 2].map(k => points[b + k] - points[a + k]);
+  const v = [0, 1, 2].map(k => points[c + k] - points[a + k]);
+  const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  const towards = normal[0] * lamp[0] + normal[1] * lamp[1] + normal[2] * lamp[2];
+  return 0.8 + 0.2 * towards / (Math.hypot(...normal) || 1);
+}
+
 function draw(state) {
+  const moved_mm = new Float32Array(3 * count);
+  const colour = new Float32Array(3 * count);
   for (let i = 0; i < count; ++i) {
     const share = (quantity.of(state, i) - range[0]) / (range[1] - range[0]) * (colours.length - 1);
     const from = Math.min(colours.length - 2, Math.max(0, Math.floor(share)));
     for (let k = 0; k < 3; ++k) {
-      positions.array[3 * i + k] = nodes_mm[3 * i + k] + 1e-3 * factor * state.moved_um[3 * i + k];
-      tints.array[3 * i + k] = (colours[from][k] + (share - from) * (colours[from + 1][k] - colours[from][k])) / 255;
+      moved_mm[3 * i + k] = nodes_mm[3 * i + k] + 1e-3 * factor * state.moved_um[3 * i + k];
+      colour[3 * i + k] = (colours[from][k] + (share - from) * (colours[from + 1][k] - colours[from][k])) / 255;
+    }
+  }
+  for (let first = 0; first < triangles.length; first += 3) {
+    const light = lightOn(moved_mm, first);
+    for (let at = 3 * first; at < 3 * first + 9; ++at) {
+      const value = 3 * triangles[Math.floor(at / 3)] + at % 3;
+      positions.array[at] = moved_mm[value];
+      tints.array[at] = light * colour[value];
     }
   }
   positions.needsUpdate = tints.needsUpdate = true;
