@@ -17,34 +17,18 @@ namespace {
 /// Candidates whose gain alone is measured.
 constexpr std::size_t candidates_tried = 3;
 
-/// What a finding that no term can carry corrects, if it acts in every run.
-std::optional<Correction> correction_of(const std::string& cause_name,
-                                        const std::vector<Parameter>& parameters,
-                                        std::size_t output) {
-  const Cause& cause = cause_named(cause_name);
-  if (cause.correction == nullptr) return std::nullopt;
-  Correction correction = cause.correction(parameters);
-  correction.output = output;
-  return correction;
-}
-
-/// A model with what no term of it carries.
-struct Extended {
-  ThermalModel model;
-  Corrections corrections;
-};
-
 /// The model with one finding more; nothing where neither a term nor a correction carries it.
 std::optional<Extended> with_finding(const Extended& before, const Finding& finding,
                                      const MeasuredData& train) {
   Extended longer = before;
   const std::optional<TermSpec> term = term_of(finding, train);
   if (term) longer.model.terms.push_back(*term);
-  const std::string& cause = finding.explanation.hypothesis->cause;
-  for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
-    if (finding.explanation.gains[output].size() > 0)
-      if (const auto correction = correction_of(cause, parameters_of(finding, train), output))
-        longer.corrections.push_back(*correction);
+  const Cause& cause = cause_named(finding.explanation.hypothesis->cause);
+  for (std::size_t output = 0; output < train.model.outputs.size(); ++output) {
+    if (cause.correction == nullptr || finding.explanation.gains[output].size() == 0) continue;
+    longer.corrections.push_back(cause.correction(parameters_of(finding, train)));
+    longer.corrections.back().output = output;
+  }
   if (!term && longer.corrections.size() == before.corrections.size()) return std::nullopt;
   return longer;
 }
@@ -53,13 +37,14 @@ std::map<std::string, TestGain> gains_on_test(const Extended& before, const Exte
                                               const std::vector<std::string>& outputs,
                                               const MeasuredData& test) {
   std::map<std::string, TestGain> gains;
+  const std::vector<Residuals> was = residuals(before, test);
+  const std::vector<Residuals> is = residuals(after, test);
   for (const std::string& output : outputs) {
     const auto index = static_cast<std::size_t>(
         std::find(test.model.outputs.begin(), test.model.outputs.end(), output) -
         test.model.outputs.begin());
-    const Residuals was = residuals(before.model, before.corrections, test, index);
-    if (std::isfinite(root_mean_square(was)))
-      gains[output] = test_gain(was, residuals(after.model, after.corrections, test, index));
+    if (std::isfinite(root_mean_square(was[index])))
+      gains[output] = test_gain(was[index], is[index]);
   }
   return gains;
 }
@@ -140,11 +125,8 @@ void forget_output(RemainderBank& remainder, const std::string& output) {
 /// @return of each output the share that can
 std::vector<double> carry_remainder(Diagnosis& diagnosis, Extended& extended,
                                     const MeasuredData& train, const MeasuredData& test) {
-  std::vector<Residuals> left;
-  for (std::size_t output = 0; output < train.model.outputs.size(); ++output)
-    left.push_back(residuals(extended.model, extended.corrections, train, output));
   std::vector<double> predictable;
-  diagnosis.remainder = remainder_bank(train, left, predictable);
+  diagnosis.remainder = remainder_bank(train, residuals(extended, train), predictable);
   if (!diagnosis.remainder) return predictable;
   Extended longer = extended;
   add_remainder(longer.model, *diagnosis.remainder);
@@ -190,26 +172,21 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
   Extended extended = extend(diagnosis, result.findings, train_data, test_data);
   if (!diagnosis.findings.empty())
     correct_coefficients(extended.model, model, result.coefficient_errors);
-  const Corrections corrections = extended.corrections;
   const std::vector<double> predictable =
       carry_remainder(diagnosis, extended, train_data, test_data);
   diagnosis.extended = extended.model;
+  const std::vector<Residuals> train_base = residuals(train_data);
+  const std::vector<Residuals> base = residuals(test_data);
+  const std::vector<Residuals> after = residuals(extended, test_data);
   for (std::size_t output = 0; output < model.outputs.size(); ++output) {
-    const Residuals base = residuals(test_data, output);
-    const Residuals after = residuals(extended.model, corrections, test_data, output);
-    diagnosis.outputs[model.outputs[output]] = {
-        root_mean_square(residuals(train_data, output)),
-        root_mean_square(base),
-        peak(base),
-        root_mean_square(after),
-        peak(after),
-        result.unexplained_share[output],
-        headroom(result.noise_share[output], result.unexplained_share[output],
-                 predictable[output])};
+    const double unexplained = result.unexplained_share[output];
+    OutputFigures& figures = diagnosis.outputs[model.outputs[output]];
+    figures = output_figures(train_base[output], base[output], after[output], unexplained);
+    figures.headroom = headroom(result.noise_share[output], unexplained, predictable[output]);
   }
   if (report != nullptr) {
-    add_runs(*report, diagnosis, model, corrections, train_data, false);
-    add_runs(*report, diagnosis, model, corrections, test_data, true);
+    add_runs(*report, diagnosis, train_data, train_base, residuals(extended, train_data), false);
+    add_runs(*report, diagnosis, test_data, base, after, true);
   }
   return diagnosis;
 }

@@ -51,33 +51,44 @@ std::vector<BlockSquares> squares_by_block(const Residuals& before, const Residu
   return blocks;
 }
 
+double peak(const Residuals& residuals) {
+  double largest = not_a_number;
+  for (const Column& run : residuals.by_run)
+    for (const double value : run)
+      if (std::isfinite(value) && !(std::abs(value) <= largest)) largest = std::abs(value);
+  return largest;
+}
+
 }  // namespace
 
-Residuals residuals(const MeasuredData& data, std::size_t output) {
-  Residuals all;
+std::vector<Residuals> residuals(const MeasuredData& data) {
+  std::vector<Residuals> all(data.model.outputs.size());
   for (const MeasuredRun& run : data.runs)
-    all.by_run.emplace_back(
-        (run.measured_um[output] - run.model_um[output]).tail(run.rows() - run.begin));
+    for (std::size_t output = 0; output < all.size(); ++output)
+      all[output].by_run.emplace_back(
+          (run.measured_um[output] - run.model_um[output]).tail(run.rows() - run.begin));
   return all;
 }
 
-Residuals residuals(const ThermalModel& model, const Corrections& corrections,
-                    const MeasuredData& data, std::size_t output) {
-  Residuals all;
+std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& data) {
+  std::vector<Residuals> all(data.model.outputs.size());
   for (const MeasuredRun& run : data.runs) {
-    Column predicted = model_over(model, run, data)[output];
-    const Column& measured = run.measured_um[output];
-    Eigen::Index start = 0;
-    while (start < run.rows() && !std::isfinite(measured[start])) ++start;
-    for (const Correction& correction : corrections) {
-      if (correction.output != output) continue;
-      if (correction.period_s > 0)
-        predicted += sine_in(run.time_s, measured - predicted, correction);
-      else
-        predicted = shifted(run.time_s, predicted, correction.shift_s);
+    std::vector<Column> predictions = model_over(extended.model, run, data);
+    for (std::size_t output = 0; output < all.size(); ++output) {
+      Column& predicted = predictions[output];
+      const Column& measured = run.measured_um[output];
+      Eigen::Index start = 0;
+      while (start < run.rows() && !std::isfinite(measured[start])) ++start;
+      for (const Correction& correction : extended.corrections) {
+        if (correction.output != output) continue;
+        if (correction.period_s > 0)
+          predicted += sine_in(run.time_s, measured - predicted, correction);
+        else
+          predicted = shifted(run.time_s, predicted, correction.shift_s);
+      }
+      if (start < run.rows()) predicted.array() -= double(predicted[start]);
+      all[output].by_run.emplace_back((measured - predicted).tail(run.rows() - run.begin));
     }
-    if (start < run.rows()) predicted.array() -= double(predicted[start]);
-    all.by_run.emplace_back((measured - predicted).tail(run.rows() - run.begin));
   }
   return all;
 }
@@ -95,12 +106,10 @@ double root_mean_square(const Residuals& residuals) {
   return count > 0 ? std::sqrt(sum / count) : not_a_number;
 }
 
-double peak(const Residuals& residuals) {
-  double largest = not_a_number;
-  for (const Column& run : residuals.by_run)
-    for (const double value : run)
-      if (std::isfinite(value) && !(std::abs(value) <= largest)) largest = std::abs(value);
-  return largest;
+OutputFigures output_figures(const Residuals& train, const Residuals& test,
+                             const Residuals& extended_test, double unexplained_fraction) {
+  return {root_mean_square(train),         root_mean_square(test), peak(test),
+          root_mean_square(extended_test), peak(extended_test),    unexplained_fraction};
 }
 
 TestGain test_gain(const Residuals& before, const Residuals& after) {

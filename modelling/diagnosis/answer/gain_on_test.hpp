@@ -9,20 +9,25 @@
 
 namespace thermocomp::diagnosis {
 
-/// What no term carries, in all outputs.
-using Corrections = std::vector<Correction>;
+/// A model with what no term of it carries.
+struct Extended {
+  ThermalModel model;
+  std::vector<Correction> corrections;
+};
 
 struct Residuals {
   std::vector<Column> by_run;  ///< over the selected rows; NaN where nothing was measured
 };
 
-/// measured - model over the selected rows of every run, both from the run's first row on: the
-/// data's own model, or another.
-[[nodiscard]] Residuals residuals(const MeasuredData& data, std::size_t output);
-[[nodiscard]] Residuals residuals(const ThermalModel& model, const Corrections& corrections,
-                                  const MeasuredData& data, std::size_t output);
+/// measured - model of every output over the selected rows of every run, both from the run's first
+/// row on: the data's own model, or another.
+[[nodiscard]] std::vector<Residuals> residuals(const MeasuredData& data);
+[[nodiscard]] std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& data);
 [[nodiscard]] double root_mean_square(const Residuals& residuals);
-[[nodiscard]] double peak(const Residuals& residuals);
+/// Of what the model leaves of training and test runs, and the extended model of test runs.
+[[nodiscard]] OutputFigures output_figures(const Residuals& train, const Residuals& test,
+                                           const Residuals& extended_test,
+                                           double unexplained_fraction);
 /// The interval is from blocks of rows drawn anew.
 [[nodiscard]] TestGain test_gain(const Residuals& before, const Residuals& after);
 /// Whether no output gains by it on the test runs. The extended model goes without it then.

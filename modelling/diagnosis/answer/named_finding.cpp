@@ -77,10 +77,18 @@ std::vector<Parameter> parameters_of(const Finding& finding, const MeasuredData&
     if (!hypothesis.shape[i].discrete) parameter.ci95[""] = finding.shape_ci[i];
     all.push_back(std::move(parameter));
   }
-  if (cause.gains == nullptr) return all;
-  for (Parameter& parameter :
-       cause.gains({hypothesis.gains, data.model.outputs, each.gains, finding.gains_ci}))
-    all.push_back(std::move(parameter));
+  if (hypothesis.gains.empty()) return all;
+  const FoundGains found{hypothesis.gains, data.model.outputs, each.gains, finding.gains_ci};
+  if (cause.gains != nullptr) {
+    for (Parameter& parameter : cause.gains(found)) all.push_back(std::move(parameter));
+    return all;
+  }
+  Parameter gains = gain_table(found, 0);
+  if (hypothesis.output || hypothesis.form == Form::shared_gain) {
+    const std::string& output = data.model.outputs[first_output(found)];
+    gains = {gains.name, {{"", gains.values.at(output)}}, {{"", gains.ci95.at(output)}}};
+  }
+  all.push_back(std::move(gains));
   return all;
 }
 

@@ -106,7 +106,7 @@ struct Cause {
   /// What it would do to the displacement, if the subject is one that it can have. Null: it is a
   /// cause of the thermal layer alone.
   std::vector<Hypothesis> (*hypotheses)(const Material& material, const Subject& subject){nullptr};
-  /// Its gains as parameters; null: it has none.
+  /// Its gains as parameters; null: the first of each output, or the one that all share.
   std::vector<Parameter> (*gains)(const FoundGains& found){nullptr};
   /// Of a cause that acts in every run and that no term carries: what is corrected in its place,
   /// from its parameters. Null: nothing.

@@ -162,7 +162,6 @@ Cause displacement_step() {
       "Do not fit to this run across the jump; look whether the probe was touched or set again."};
   cause.experiment = Experiment::another_run;
   cause.hypotheses = displacement_step_hypotheses;
-  cause.gains = single_gain;
   return cause;
 }
 
@@ -187,7 +186,6 @@ Cause displacement_drift() {
                  "warm-up."};
   cause.experiment = Experiment::another_run;
   cause.hypotheses = displacement_drift_hypotheses;
-  cause.gains = single_gain;
   return cause;
 }
 

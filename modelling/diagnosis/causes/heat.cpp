@@ -102,7 +102,6 @@ Cause missing_heat_source() {
       "Add a [[source]] with these figures, then look which motor, bearing or pump it is."};
   cause.experiment = Experiment::standstill;
   cause.hypotheses = missing_heat_source_hypotheses;
-  cause.gains = gain_of_each_output;
   cause.in_network = missing_heat_source_in_network;
   cause.into_machine = missing_heat_source_into_machine;
   return cause;
@@ -131,7 +130,6 @@ Cause speed_growth() {
   cause.texts_without_unit->title = "Growth with the square of a signal, not with heat";
   cause.experiment = Experiment::standstill;
   cause.hypotheses = speed_growth_hypotheses;
-  cause.gains = gain_of_each_output;
   return cause;
 }
 

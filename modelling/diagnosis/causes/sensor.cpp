@@ -109,7 +109,6 @@ Cause sensor_step() {
       "Look at the connector and the amplifier's channel; leave the run out of any fit."};
   cause.experiment = Experiment::another_run;
   cause.hypotheses = sensor_step_hypotheses;
-  cause.gains = single_gain;
   cause.in_network = sensor_step_in_network;
   return cause;
 }
@@ -150,7 +149,6 @@ Cause sensor_drift() {
                  "Replace or calibrate the sensor; leave the run out of any fit."};
   cause.experiment = Experiment::another_run;
   cause.hypotheses = sensor_drift_hypotheses;
-  cause.gains = single_gain;
   cause.in_network = sensor_drift_in_network;
   return cause;
 }

@@ -29,7 +29,6 @@ Cause wrong_coefficient() {
       "Use the extended model; look at the support or material that the coefficient came from."};
   cause.experiment = Experiment::steady_levels;
   cause.hypotheses = wrong_coefficient_hypotheses;
-  cause.gains = gain_of_each_output;
   return cause;
 }
 
@@ -75,7 +74,6 @@ Cause thermal_lag() {
       "Use the extended model; a sensor deeper in the slow part would make it unnecessary."};
   cause.experiment = Experiment::up_and_down;
   cause.hypotheses = thermal_lag_hypotheses;
-  cause.gains = gain_of_each_output;
   return cause;
 }
 
@@ -108,7 +106,6 @@ Cause missing_temperature() {
       "a measured place that the model ignores moves the machine",
       "Use the extended model, or take this place into the model when it is fitted again."};
   cause.hypotheses = missing_temperature_hypotheses;
-  cause.gains = gain_of_each_output;
   return cause;
 }
 
@@ -133,7 +130,6 @@ Cause nonlinear_expansion() {
       "Use the extended model; beyond the temperatures seen here the curve is not known."};
   cause.experiment = Experiment::steady_levels;
   cause.hypotheses = nonlinear_expansion_hypotheses;
-  cause.gains = gain_of_each_output;
   return cause;
 }
 

@@ -27,16 +27,6 @@ std::size_t first_output(const FoundGains& found) {
   return output;
 }
 
-std::vector<Parameter> gain_of_each_output(const FoundGains& found) {
-  return {gain_table(found, 0)};
-}
-
-std::vector<Parameter> single_gain(const FoundGains& found) {
-  const std::size_t output = first_output(found);
-  return {
-      {found.names.front(), {{"", found.gains[output][0]}}, {{"", found.ci95[output].front()}}}};
-}
-
 std::size_t free_parameters(const Hypothesis& hypothesis) {
   const auto of_shape = std::count_if(hypothesis.shape.begin(), hypothesis.shape.end(),
                                       [](const ShapeParameter& each) { return !each.discrete; });

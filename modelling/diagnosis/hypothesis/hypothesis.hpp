@@ -46,11 +46,6 @@ struct FoundGains {
 /// The first output that it acts on.
 [[nodiscard]] std::size_t first_output(const FoundGains& found);
 
-/// What a cause tells of its gains. The first gain of each output:
-[[nodiscard]] std::vector<Parameter> gain_of_each_output(const FoundGains& found);
-/// The one gain of a fault:
-[[nodiscard]] std::vector<Parameter> single_gain(const FoundGains& found);
-
 /// The shape parameters' values, in their order.
 using Shape = std::vector<double>;
 using Shapes = std::vector<Shape>;

@@ -217,8 +217,7 @@ void Fits::fit_own_gains(const std::vector<Equations>& equations, Eigen::Index s
   const bool may_spare = !hypothesis.output && measured > 1;
   double most = -unknown;
   std::size_t most_of = 0;
-  std::vector<Eigen::VectorXd> all_gains(outputs_.size());
-  std::vector<Eigen::VectorXd> all_sd(outputs_.size());
+  std::vector<std::size_t> spared;
   for (std::size_t output = 0; output < outputs_.size(); ++output) {
     if (!concerns(hypothesis, output)) continue;
     const OutputFit& fit = outputs_[output]->fit;
@@ -245,26 +244,25 @@ void Fits::fit_own_gains(const std::vector<Equations>& equations, Eigen::Index s
     trial.score += may_spare ? log_add_exp(with, 0.0) - std::log(2.0) : with;
     const double variance =
         fit.variance(best_under, explained_by(equations[output], shape, best_under, best_gains));
-    all_gains[output] = best_gains;
-    all_sd[output] = (variance * equations[output]
-                                     .square_of(shape, best_under)
-                                     .completeOrthogonalDecomposition()
-                                     .pseudoInverse()
-                                     .diagonal()
-                                     .array()
-                                     .max(0.0))
-                         .sqrt();
-    if (!may_spare || with > 0.0) {
-      trial.gains[output] = all_gains[output];
-      trial.gain_sd[output] = all_sd[output];
-    }
+    trial.gains[output] = best_gains;
+    trial.gain_sd[output] = (variance * equations[output]
+                                            .square_of(shape, best_under)
+                                            .completeOrthogonalDecomposition()
+                                            .pseudoInverse()
+                                            .diagonal()
+                                            .array()
+                                            .max(0.0))
+                                .sqrt();
+    if (may_spare && !(with > 0.0)) spared.push_back(output);
     if (with <= most) continue;
     most = with;
     most_of = output;
   }
-  // It acts somewhere.
-  trial.gains[most_of] = all_gains[most_of];
-  trial.gain_sd[most_of] = all_sd[most_of];
+  for (const std::size_t output : spared) {
+    if (output == most_of) continue;  // it acts somewhere
+    trial.gains[output].resize(0);
+    trial.gain_sd[output].resize(0);
+  }
 }
 
 void Fits::fit_shared_gain(const std::vector<Equations>& equations, const Equations* of_reading,

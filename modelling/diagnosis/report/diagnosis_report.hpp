@@ -45,9 +45,10 @@ struct ReportData {
   std::vector<ReportRun> runs;
 };
 
-/// Adds the runs; `corrections` are what no term of the extended model carries.
-void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel& model,
-              const Corrections& corrections, const MeasuredData& data, bool test);
+/// Adds the runs.
+/// @param before, after  what model and extended model leave of each output
+void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData& data,
+              const std::vector<Residuals>& before, const std::vector<Residuals>& after, bool test);
 
 /// Two digits, three where the first is a 1: "53", "0.0040", "1810".
 [[nodiscard]] std::string figure(double value);

@@ -116,15 +116,16 @@ std::vector<std::size_t> named_others(const Diagnosis& diagnosis, const Measured
 
 }  // namespace
 
-void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel& model,
-              const Corrections& corrections, const MeasuredData& data, bool test) {
-  report.outputs = model.outputs;
+void add_runs(ReportData& report, const Diagnosis& diagnosis, const MeasuredData& data,
+              const std::vector<Residuals>& before, const std::vector<Residuals>& after,
+              bool test) {
+  report.outputs = data.model.outputs;
   report.signals = data.signals;
-  report.inputs = model.inputs;
+  report.inputs = data.model.inputs;
   const std::vector<std::size_t> others = named_others(diagnosis, data);
   for (const std::size_t other : others) report.inputs.push_back(data.others[other]);
-  const std::size_t first = report.runs.size();
-  for (const MeasuredRun& run : data.runs) {
+  for (std::size_t i = 0; i < data.runs.size(); ++i) {
+    const MeasuredRun& run = data.runs[i];
     const Eigen::Index rows = run.rows() - run.begin;
     ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
     for (const Column& measured : run.measured_um)
@@ -133,15 +134,9 @@ void add_runs(ReportData& report, const Diagnosis& diagnosis, const ThermalModel
     for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
     for (const std::size_t other : others)
       added.inputs_K.emplace_back(run.others_K[other].tail(rows));
+    for (const Residuals& each : before) added.before_um.push_back(each.by_run[i]);
+    for (const Residuals& each : after) added.after_um.push_back(each.by_run[i]);
     report.runs.push_back(std::move(added));
-  }
-  for (std::size_t output = 0; output < model.outputs.size(); ++output) {
-    const Residuals before = residuals(data, output);
-    const Residuals after = residuals(diagnosis.extended, corrections, data, output);
-    for (std::size_t i = 0; i < data.runs.size(); ++i) {
-      report.runs[first + i].before_um.push_back(before.by_run[i]);
-      report.runs[first + i].after_um.push_back(after.by_run[i]);
-    }
   }
 }
 

@@ -88,26 +88,6 @@ std::vector<Residuals> residuals_of(const HeatNetwork& network, const ThermalRun
   return all;
 }
 
-void add_to_report(ReportData& report, const HeatNetwork& before, const HeatNetwork& after,
-                   const ThermalRuns& runs, const MeasuredData& data, bool test) {
-  report.outputs = report.inputs = data.model.outputs;
-  report.signals = runs.signals;
-  const std::vector<Residuals> left_before = residuals_of(before, runs);
-  const std::vector<Residuals> left_after = residuals_of(after, runs);
-  for (std::size_t i = 0; i < runs.runs.size(); ++i) {
-    const MeasuredRun& run = data.runs[i];
-    const Eigen::Index rows = run.rows() - run.begin;
-    ReportRun added{run.name, test, run.time_s.tail(rows), phases_of(run, data)};
-    for (const Column& measured : run.measured_um)
-      added.measured_um.emplace_back(measured.tail(rows));
-    for (const Column& signal : run.signals) added.signals.emplace_back(signal.tail(rows));
-    for (const Column& input : run.inputs_K) added.inputs_K.emplace_back(input.tail(rows));
-    for (const Residuals& each : left_before) added.before_um.push_back(each.by_run[i]);
-    for (const Residuals& each : left_after) added.after_um.push_back(each.by_run[i]);
-    report.runs.push_back(std::move(added));
-  }
-}
-
 }  // namespace
 
 Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>& train,
@@ -153,18 +133,14 @@ Diagnosis diagnose_thermal(const ThermalPlant& plant, const std::vector<RunFile>
   }
   const std::vector<Residuals> train_base = residuals_of(plant.network, train_runs);
   for (std::size_t sensor = 0; sensor < base.size(); ++sensor) {
-    const double train_K = root_mean_square(train_base[sensor]);
-    if (!std::isfinite(train_K)) continue;
-    diagnosis.outputs[plant.network.sensors[sensor].column] = {train_K,
-                                                               root_mean_square(base[sensor]),
-                                                               peak(base[sensor]),
-                                                               root_mean_square(before[sensor]),
-                                                               peak(before[sensor]),
-                                                               result.unexplained_share[sensor]};
+    if (!std::isfinite(root_mean_square(train_base[sensor]))) continue;
+    diagnosis.outputs[plant.network.sensors[sensor].column] = output_figures(
+        train_base[sensor], base[sensor], before[sensor], result.unexplained_share[sensor]);
   }
   if (report != nullptr) {
-    add_to_report(*report, plant.network, network, train_runs, train_data, false);
-    add_to_report(*report, plant.network, network, test_runs, data_of(plant, test_runs), true);
+    add_runs(*report, diagnosis, train_data, train_base, residuals_of(network, train_runs), false);
+    add_runs(*report, diagnosis, data_of(plant, test_runs), base, residuals_of(network, test_runs),
+             true);
   }
   return diagnosis;
 }
