@@ -157,8 +157,10 @@ Diagnosis diagnose(const ThermalModel& model, std::vector<RunFile> train,
                    const std::vector<std::string>& test_names, ReportData* report,
                    const std::function<void()>& progress) {
   const SharedColumns columns = shared_columns(model, train, test);
-  const MeasuredData train_data = training_data(model, train, train_names, columns);
-  const MeasuredData test_data = measured_data(model, test, test_names, columns);
+  const MeasuredData train_data =
+      measured_data(model, train, train_names, columns, Purpose::search);
+  const MeasuredData test_data =
+      measured_data(model, test, test_names, columns, Purpose::comparison);
   train.clear();
   test.clear();
   const StackedRows rows = stacked_rows(train_data);

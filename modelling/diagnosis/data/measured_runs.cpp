@@ -14,6 +14,8 @@ namespace thermocomp::diagnosis {
 namespace {
 
 constexpr double missing_share_max = 0.2;
+/// A matrix that was fitted or calculated is right to a few per cent.
+constexpr double coefficient_sd = 0.03;
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -58,8 +60,6 @@ void take_displacements(const RunFile& file, const std::vector<std::size_t>& row
   }
 }
 
-enum class Purpose { search, comparison };
-
 MeasuredRun measured_run(const RunFile& file, const std::string& name, const MeasuredData& data,
                          Purpose purpose) {
   const ModelInputs inputs = model_inputs(data.model, file);
@@ -87,6 +87,10 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
   }
   for (const std::string& signal : data.signals)
     run.signals.push_back(taken(file.column(signal), rows));
+  if (purpose == Purpose::search) {
+    for (const Column& rise_K : run.inputs_K) run.calm_inputs_K.push_back(calm(run.time_s, rise_K));
+    for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));
+  }
   take_displacements(file, rows, data, run);
   const bool any = std::any_of(run.measured_um.begin(), run.measured_um.end(),
                                [](const auto& um) { return um.array().isFinite().any(); });
@@ -164,33 +168,13 @@ Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,
   return model_over(alone, unit, *this)[output];
 }
 
-namespace {
-/// A matrix that was fitted or calculated is right to a few per cent.
-constexpr double coefficient_sd = 0.03;
-
-MeasuredData data_of(const ThermalModel& model, const std::vector<RunFile>& runs,
-                     const std::vector<std::string>& names, const SharedColumns& columns,
-                     Purpose purpose) {
+MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
+                           const std::vector<std::string>& names, const SharedColumns& columns,
+                           Purpose purpose) {
   MeasuredData data{model, columns.others, columns.signals, {}, {}, coefficient_sd};
   data.runs.reserve(runs.size());
   for (std::size_t i = 0; i < runs.size(); ++i)
     data.runs.push_back(measured_run(runs[i], names[i], data, purpose));
-  return data;
-}
-}  // namespace
-
-MeasuredData measured_data(const ThermalModel& model, const std::vector<RunFile>& runs,
-                           const std::vector<std::string>& names, const SharedColumns& columns) {
-  return data_of(model, runs, names, columns, Purpose::comparison);
-}
-
-MeasuredData training_data(const ThermalModel& model, const std::vector<RunFile>& runs,
-                           const std::vector<std::string>& names, const SharedColumns& columns) {
-  MeasuredData data = data_of(model, runs, names, columns, Purpose::search);
-  for (MeasuredRun& run : data.runs) {
-    for (const Column& rise_K : run.inputs_K) run.calm_inputs_K.push_back(calm(run.time_s, rise_K));
-    for (const Column& rise_K : run.others_K) run.calm_others_K.push_back(calm(run.time_s, rise_K));
-  }
   return data;
 }
 

@@ -69,18 +69,15 @@ struct SharedColumns {
 [[nodiscard]] std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
                                              const MeasuredData& data);
 
+enum class Purpose { search, comparison };
+
 /// @param names  the runs' arguments as given
 /// @throws ConfigurationError when a run lacks an input or signal of the model, or has no measured
 ///         value of any output
 [[nodiscard]] MeasuredData measured_data(const ThermalModel& model,
                                          const std::vector<RunFile>& runs,
                                          const std::vector<std::string>& names,
-                                         const SharedColumns& columns);
-/// The same with what the search needs.
-[[nodiscard]] MeasuredData training_data(const ThermalModel& model,
-                                         const std::vector<RunFile>& runs,
-                                         const std::vector<std::string>& names,
-                                         const SharedColumns& columns);
+                                         const SharedColumns& columns, Purpose purpose);
 
 /// The first of the columns that is called like a room; empty: there is none.
 [[nodiscard]] std::string room_among(const std::vector<std::string>& columns);

@@ -135,31 +135,27 @@ class Search {
   SearchResult run() {
     SearchResult result;
     std::vector<double> left_before;
-    const auto set_unexplained = [&](const std::vector<double>& left) {
-      result.unexplained_share.clear();
-      for (std::size_t output = 0; output < left.size(); ++output)
-        result.unexplained_share.push_back(
-            left_before[output] > 0 ? std::min(1.0, left[output] / left_before[output]) : 0.0);
-    };
-    for (std::size_t round = 0; round <= rules_.findings_max; ++round) {
+    for (std::size_t round = 0; round < rules_.findings_max; ++round) {
       const Fits fits = fits_beside(explanations_of(result.findings));
-      const std::vector<double> left = structure_left(fits);
       if (round == 0) {
-        left_before = left;
+        left_before = structure_left(fits);
         result.noise_share = noise_shares(fits);
+        result.unexplained = is_structure(fits, left_before);
       }
-      set_unexplained(left);
-      if (round == 0) result.unexplained = is_structure(fits, left);
-      if (round == rules_.findings_max || !add_finding(fits, round, result)) break;
+      if (!add_finding(fits, round, result)) break;
     }
+    std::vector<double> left = left_before;
     if (!result.findings.empty()) {
       settle_together(result.findings);
       result.unexplained = result.unexplained && result.findings.empty();
       const Fits fits = fits_beside(explanations_of(result.findings));
-      set_unexplained(structure_left(fits));
+      left = structure_left(fits);
       for (std::size_t output = 0; output < data_.model.outputs.size(); ++output)
         result.coefficient_errors.push_back(fits.coefficient_errors(output));
     }
+    for (std::size_t output = 0; output < left.size(); ++output)
+      result.unexplained_share.push_back(
+          left_before[output] > 0 ? std::min(1.0, left[output] / left_before[output]) : 0.0);
     return result;
   }
 

@@ -163,7 +163,8 @@ TEST_CASE("what a cause is tried with lies within its physical range", "[diagnos
   model.outputs = {"z_um"};
   model.matrix_um_per_K = {{5.0, 1.0}};
   const std::vector<RunFile> runs = {machine_run(900)};
-  const MeasuredData data = training_data(model, runs, {"run.csv"}, shared_columns(model, runs));
+  const MeasuredData data =
+      measured_data(model, runs, {"run.csv"}, shared_columns(model, runs), Purpose::search);
   Names tried;
   for (const Hypothesis& each : hypotheses(data, stacked_rows(data))) {
     const Cause& cause = cause_named(each.cause);
