@@ -9,6 +9,7 @@
 #include <poll.h>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 
@@ -108,6 +109,12 @@ void Supervisor::note_report() {
   if (report.mode != Mode::compensating || !all_driven) idle_until_ = Clock::now();
   if (trend_.is_due(report.now))
     trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);
+  since_probing_.note(report.axes);
+  if (!warm_up_.is_due(report.now)) return;
+  std::vector<double> displacement_um;
+  for (const AxisReport& axis : report.axes) displacement_um.push_back(axis.displacement_um);
+  warm_up_.note(report.now, std::move(displacement_um),
+                parts_.config.estimator.compensation.warm_um);
 }
 
 void Supervisor::tick() {
@@ -208,6 +215,8 @@ StatusView Supervisor::view() {
       parts_.server.statistics(),
       parts_.journal.ended_within(recent, recent_max),
       &trend_,
+      &warm_up_,
+      &since_probing_,
       parts_.keeper.reference(),
       parts_.keeper.is_reference_lost(),
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(),

@@ -69,6 +69,8 @@ class Supervisor {
   Parts parts_;
   EventLog events_;
   TemperatureTrend trend_;
+  WarmUp warm_up_;
+  SinceProbing since_probing_;
   std::vector<std::string> warnings_;
   bool real_time_{false};
   Clock::time_point started_{Clock::now()};

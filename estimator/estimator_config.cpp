@@ -58,6 +58,7 @@ void CompensationConfig::validate() const {
           "must be in (0, 500]");
   require(suspected_sensors != SuspectedPolicy::weigh_down || estimate_lost_blocks,
           "estimate_lost_blocks", 0.0, "must be true where suspected_sensors is \"weigh_down\"");
+  require(warm_um > 0 && warm_um <= 500, "warm_um", warm_um, "must be in (0, 500]");
   require(prove_um_max > 0 && prove_um_max <= 50, "prove_um_max", prove_um_max,
           "must be in (0, 50]");
   require(prove_hold_s >= 0 && prove_hold_s <= 60, "prove_hold_s", prove_hold_s,

@@ -142,6 +142,7 @@ struct CompensationConfig {
   OutsidePolicy outside_domain{OutsidePolicy::warn};  ///< of a model with [made_from]
   /// Where the model has a covariance.
   SuspectedPolicy suspected_sensors{SuspectedPolicy::warn};
+  double warm_um{5.0};  ///< warm is a machine of which no axis is to move farther than this
   double prove_um_max{10.0};
   double prove_hold_s{3.0};
   void validate() const;  ///< @throws InvalidValue

@@ -490,6 +490,30 @@ struct CandidateStatus {
   }
 };
 
+/// What an axis is still to move while the machine goes on as it does.
+struct WarmStatus {
+  double remaining_um{not_a_number};
+  double minutes{not_a_number};  ///< until less than compensation.warm_um is to come
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("remaining_um", self.remaining_um);
+    visit("minutes", self.minutes);
+  }
+};
+
+/// Whether it is time to probe.
+struct ProbeDueStatus {
+  std::map<std::string, bool> axes{};
+  double because_um{not_a_number};  ///< what the model may be off by, of the worst axis
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit.members("because_um", self.axes);
+    visit("because_um", self.because_um);
+  }
+};
+
 struct ReferenceStatus {
   std::optional<std::string> by{};  ///< "model_file", "operator", "first_values", "reload"
   double wall_s{not_a_number};      ///< when it was taken, s since 1970
@@ -520,6 +544,8 @@ struct Status {
   ModelStatus model{};
   std::optional<CandidateStatus> candidate{};
   std::vector<AxisStatus> axes{};
+  std::optional<ProbeDueStatus> probe_due{};  ///< none: the model does not say how good it is
+  std::map<std::string, WarmStatus> warm{};   ///< by axis
   std::vector<InputStatus> inputs{};
   ReferenceStatus reference{};
   std::vector<std::string> sensors_bad{};
@@ -548,6 +574,8 @@ struct Status {
     visit("model", self.model);
     visit.if_any("candidate", self.candidate);
     visit("axes", self.axes);
+    visit.if_any("probe_due", self.probe_due);
+    visit("warm", self.warm);
     visit("inputs", self.inputs);
     visit("reference", self.reference);
     visit("sensors_bad", self.sensors_bad);

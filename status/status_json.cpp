@@ -70,6 +70,10 @@ struct Writer {
   void if_any(const char* key, const std::optional<T>& value) {
     if (value) object[key] = value_of(*value);
   }
+  /// Names of axes as keys of the object itself.
+  void members(const char* /*but*/, const std::map<std::string, bool>& values) {
+    for (const auto& [name, value] : values) object[name] = value;
+  }
   void mode(const char* key, Mode value, bool dry_run) {
     object[key] = code_text(value, dry_run).name;
   }
@@ -154,6 +158,11 @@ struct Reader {
   template <class T>
   void if_any(const char* key, std::optional<T>& value) {
     take(at(key), value);
+  }
+  void members(const char* but, std::map<std::string, bool>& values) {
+    if (!object.is_object()) return;
+    for (const auto& [name, value] : object.items())
+      if (name != but) take(value, values[name]);
   }
   void mode(const char* key, Mode& value, bool /*dry_run*/) {
     std::string name;

@@ -55,6 +55,24 @@ std::string correction_text(const CorrectionStatus& correction) {
   return text;
 }
 
+/// "a probing is due: the model may be off by 3.4 um; 12.0 um still to come, warm in 35 min"
+std::string next_text(const Status& status, const AxisStatus& axis) {
+  std::string text;
+  const auto is_due = [&](const ProbeDueStatus& due) {
+    const auto found = due.axes.find(axis.name);
+    return found != due.axes.end() && found->second;
+  };
+  if (status.probe_due && is_due(*status.probe_due))
+    text = "a probing is due: the model may be off by " + fixed(status.probe_due->because_um, 1) +
+           " um since the last one";
+  const auto warm = status.warm.find(axis.name);
+  if (warm == status.warm.end() || !std::isfinite(warm->second.remaining_um)) return text;
+  if (!text.empty()) text += "; ";
+  text += fixed(warm->second.remaining_um, 1) + " " + axis.unit + " still to come at this load, ";
+  return text + (warm->second.minutes > 0.0 ? "warm in " + duration_text(60 * warm->second.minutes)
+                                            : std::string("warm enough"));
+}
+
 std::string axes_lines(const Status& status) {
   std::string result;
   for (const AxisStatus& axis : status.axes) {
@@ -69,6 +87,8 @@ std::string axes_lines(const Status& status) {
                              with_unit(axis.latched->read_um, 2, axis.unit) + ": " +
                              axis.latched->likely);
     if (axis.correction) result += line("", correction_text(*axis.correction));
+    const std::string next = next_text(status, axis);
+    if (!next.empty()) result += line("", next);
   }
   return result;
 }

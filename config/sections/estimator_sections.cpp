@@ -242,7 +242,7 @@ std::vector<AxisConfig> read_axes(const std::vector<TomlTable>& tables) {
 
 CompensationConfig read_compensation(const TomlTable& table,
                                      const std::vector<std::string>& signals) {
-  constexpr std::array<NumberField<CompensationConfig>, 10> fields{{
+  constexpr std::array<NumberField<CompensationConfig>, 11> fields{{
       {"cycle_ahead", &CompensationConfig::cycle_ahead},
       {"hold_s", &CompensationConfig::hold_s},
       {"stop_ramp_s_max", &CompensationConfig::stop_ramp_s_max},
@@ -251,6 +251,7 @@ CompensationConfig read_compensation(const TomlTable& table,
       {"mismatch_after_s", &CompensationConfig::mismatch_after_s},
       {"restart_leap_um_max", &CompensationConfig::restart_leap_um_max},
       {"offset_sd_um_max", &CompensationConfig::offset_sd_um_max},
+      {"warm_um", &CompensationConfig::warm_um},
       {"prove_um_max", &CompensationConfig::prove_um_max},
       {"prove_hold_s", &CompensationConfig::prove_hold_s},
   }};

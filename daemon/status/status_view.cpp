@@ -347,6 +347,32 @@ json made_from(const ThermalModel& model) {
           {"outputs", std::move(outputs)}};
 }
 
+std::map<std::string, WarmStatus> warm_of(const StatusView& view) {
+  std::map<std::string, WarmStatus> warm;
+  if (view.warm_up == nullptr) return warm;
+  const std::vector<RemainingDrift>& remaining = view.warm_up->remaining();
+  const std::vector<AxisConfig>& axes = view.config.estimator.axes;
+  for (std::size_t i = 0; i < std::min(axes.size(), remaining.size()); ++i)
+    warm[axes[i].name] = {remaining[i].um, remaining[i].minutes};
+  return warm;
+}
+
+std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
+  if (view.since_probing == nullptr) return std::nullopt;
+  const CorrectionConfig& correction = view.config.estimator.correction;
+  ProbeDueStatus due;
+  for (std::size_t i = 0; i < view.report.axes.size(); ++i) {
+    const AxisConfig& axis = view.config.estimator.axes[i];
+    const double error_um =
+        view.since_probing->error_um(i, view.report.axes[i], view.config.model, axis.output,
+                                     correction.form != CorrectionForm::off);
+    if (!std::isfinite(error_um)) continue;
+    due.axes[axis.name] = error_um > correction.probe_sd_um;
+    due.because_um = std::fmax(due.because_um, error_um);
+  }
+  return due.axes.empty() ? std::nullopt : std::optional(due);
+}
+
 }  // namespace
 
 Status status_of(const StatusView& view) {
@@ -364,6 +390,8 @@ Status status_of(const StatusView& view) {
       .model = model_of(view),
       .candidate = candidate_of(view),
       .axes = axes_of(view),
+      .probe_due = probe_due_of(view),
+      .warm = warm_of(view),
       .inputs = inputs_of(view),
       .reference = reference_of(view),
       .controller = controller_of(view),

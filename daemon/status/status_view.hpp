@@ -14,6 +14,7 @@
 #include "daemon/state/reference_record.hpp"
 #include "daemon/status/event_journal.hpp"
 #include "daemon/status/temperature_trend.hpp"
+#include "daemon/status/warm_up.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "estimator/pipeline/estimator.hpp"
@@ -36,6 +37,8 @@ struct StatusView {
   SocketStatistics socket;
   std::vector<Event> ended{};              ///< outages that ended in the last minutes, newest first
   const TemperatureTrend* trend{nullptr};  ///< nullptr: nobody watches the temperatures
+  const WarmUp* warm_up{nullptr};          ///< nullptr: nobody watches the axes, as the next
+  const SinceProbing* since_probing{nullptr};
   ReferenceRecord reference{};
   bool reference_lost{false};   ///< see StateKeeper
   double wall_s{not_a_number};  ///< now, since 1970

@@ -22,6 +22,7 @@ class ProbedError {
   [[nodiscard]] double rms_um() const noexcept {
     return count_ > 0 ? std::sqrt(mean_square_um2_) : not_a_number;
   }
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   void visit_state(StateArchive& archive) { archive(count_, mean_square_um2_); }
 
  private:

@@ -101,6 +101,9 @@ class Probings {
     return operator_um_[axis];
   }
   [[nodiscard]] double rms_um(std::size_t axis) const noexcept { return errors_[axis].rms_um(); }
+  [[nodiscard]] std::uint64_t count(std::size_t axis) const noexcept {
+    return errors_[axis].count();
+  }
   [[nodiscard]] CorrectionReport report(std::size_t axis) const noexcept {
     return corrections_[axis].report();
   }

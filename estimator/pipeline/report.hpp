@@ -55,6 +55,7 @@ struct AxisReport {
   double claimed_sd_um{not_a_number};
   /// RMS of probed displacement minus the model's, without the running correction; NaN: none yet.
   double probed_rms_um{not_a_number};
+  std::uint64_t probings{0};  ///< displacements that were measured
   double entered_um{0.0};   ///< by operators at the controller since the reference, as displacement
   double absorbed_um{0.0};  ///< the part of it that the correction has learned
   CorrectionReport correction;

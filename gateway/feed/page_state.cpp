@@ -90,9 +90,9 @@ void round_numbers(json& value, double steps_per_unit) {
 
 /// Counters and digits that nobody sees would be sent again and again.
 void keep_what_is_shown(json& state) {
-  keep(state, {"time_s", "here", "since_s", "why", "machine", "verdict", "problems", "mode", "axes",
-               "sensors", "buses", "controller", "model", "reference", "version", "uptime_s",
-               "cycle", "history"});
+  keep(state, {"time_s", "here",      "since_s",   "why",      "machine", "verdict", "problems",
+               "mode",   "axes",      "probe_due", "warm",     "sensors", "buses",   "controller",
+               "model",  "reference", "version",   "uptime_s", "cycle",   "history"});
   for (json& axis : state["axes"])
     keep(axis, {"name", "unit", "offset", "offset_max", "offset_sd", "applied", "driven",
                 "disagrees", "mismatch", "at_bound", "proving"});
@@ -108,6 +108,7 @@ void keep_what_is_shown(json& state) {
     keep(bus, {"name", "kind", "connected", "last_error", "units"});
     for (json& unit : bus["units"]) keep(unit, {"name", "answering"});
   }
+  for (json& warm : state["warm"]) round_numbers(warm, 1.0);
   keep(state["controller"], {"name", "kind", "online", "last_error", "signals"});
   keep(state["cycle"], {"rate_hz", "missed"});
   keep(state["history"], {"enabled", "size_MB"});

@@ -160,6 +160,12 @@ function axisMarks(axis) {
     marks.push('the controller applies ' + signed(axis.applied, 1) + ' ' + unitText(axis.unit));
   if (axis.at_bound) marks.push('at its bound');
   if (axis.proving) marks.push('proving its sign');
+  if (state.probe_due && state.probe_due[axis.name]) marks.push('time to probe');
+  const warm = (state.warm || {})[axis.name];
+  if (warm && warm.minutes > 0)
+    marks.push(fixed(warm.remaining_um, 0) + ' ' + unitText(axis.unit) + ' still to come, warm in ' +
+               duration(60 * warm.minutes));
+  if (warm && warm.minutes === 0) marks.push('warm');
   return marks.join(', ');
 }
 

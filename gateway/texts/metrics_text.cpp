@@ -155,6 +155,14 @@ void write_axes(MetricsWriter& out, const Status& status) {
                     "Offset that is sent.");
   write_axis_figure(out, status, "thermocomp_axis_applied", &AxisStatus::applied,
                     "Offset that the controller reads back.");
+  if (status.probe_due) {
+    out.gauge("thermocomp_axis_probing_due", "1: it is time to probe the axis.");
+    for (const auto& [axis, due] : status.probe_due->axes) out.flag(due, {{"axis", axis}});
+  }
+  out.gauge("thermocomp_axis_warm_seconds",
+            "Until less than compensation.warm_um is to come; 0: warm, none: not known.");
+  for (const auto& [axis, warm] : status.warm)
+    if (std::isfinite(warm.minutes)) out.sample(60.0 * warm.minutes, {{"axis", axis}});
   write_axis_flag(out, status, "thermocomp_axis_driven", &AxisStatus::driven,
                   "1: offsets are written to the axis.");
   write_axis_flag(out, status, "thermocomp_axis_at_bound", &AxisStatus::at_bound,

@@ -48,6 +48,10 @@ def test_a_probing_moves_the_estimate_by_a_bounded_step_and_is_replayed(machine,
     daemon.wait_for_offset(12.0, 0.05)
     before = daemon.axis()["displacement"]
     assert gain(daemon) == 1.0 and daemon.axis()["correction"]["probing_wanted"]
+    due = daemon.status()["probe_due"]
+    assert due["z"] is True and due["because_um"] > 3.0, due
+    assert "a probing is due: the model may be off by" in daemon.cli("status")[1]
+    assert daemon.status()["warm"]["z"] == {"remaining_um": None, "minutes": None}  # some seconds tell nothing
     # 12.3 um are left: far more than one probing may say.
     status, out, said = daemon.cli("measured", "z", "12.3")
     assert status == 0, said
@@ -84,6 +88,7 @@ def test_without_a_correction_a_probing_is_only_noted(machine):
     time.sleep(0.5)
     assert abs(daemon.axis()["offset"] - 6.0) < 0.05
     assert "correction" not in daemon.axis()
+    assert "probe_due" not in daemon.status()  # the model does not say how good it is
 
 
 def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):

@@ -27,6 +27,7 @@ class Filler {
   void if_any(const char* /*key*/, std::optional<T>& value) {
     fill(value);
   }
+  void members(const char* /*but*/, std::map<std::string, bool>& values) { fill(values); }
   void mode(const char* /*key*/, Mode& value, bool /*dry_run*/) {
     value = static_cast<Mode>(below(5));
   }
@@ -129,6 +130,10 @@ struct Counter {
   template <class T>
   void if_any(const char* key, T& /*value*/) {
     keys.insert(key);
+  }
+  template <class T>
+  void members(const char* /*but*/, T& /*values*/) {
+    keys.insert("names");
   }
   template <class... Rest>
   void mode(const char* key, Rest&... /*rest*/) {

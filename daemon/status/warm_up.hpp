@@ -1,0 +1,77 @@
+/// When the machine is warm enough, and when it is time to probe.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "estimator/pipeline/report.hpp"
+#include "estimator/thermal_model.hpp"
+
+namespace thermocomp {
+
+/// What is still to come of a displacement while the machine goes on as it does.
+struct RemainingDrift {
+  double um{not_a_number};       ///< NaN: not known
+  double minutes{not_a_number};  ///< until less than the bound is to come; 0: it is less already
+};
+
+/// Extrapolates the displacement of each axis as it approaches an end in several ways at once,
+///
+///     d(t) = d_end + sum of a_k exp(-t / tau_k),   tau_k = 10, 30, 90, 270 min,
+///
+/// all a_k of one sign, by least squares over the last 240, 120, 60, 30 or 20 min: the longest of
+/// them in which the curve leaves less than a tenth of the bound, so that a change of load, after
+/// which another end is approached, is told by its misfit. The slowest is used only where the
+/// others leave much more. How well it does: docs/measurements.md. Main's thread only; time is an
+/// argument.
+class WarmUp {
+ public:
+  static constexpr nanoseconds pace = std::chrono::minutes(1);
+  static constexpr nanoseconds window = std::chrono::minutes(240);
+
+  [[nodiscard]] bool is_due(nanoseconds now) const noexcept {
+    return rows_.empty() || now - rows_.back().at >= pace;
+  }
+  /// @param displacement_um  one an axis; NaN: not known. Another number of axes begins anew
+  void note(nanoseconds now, std::vector<double> displacement_um, double bound_um);
+  /// As of the last note(); one an axis.
+  [[nodiscard]] const std::vector<RemainingDrift>& remaining() const noexcept { return remaining_; }
+
+ private:
+  struct Row {
+    nanoseconds at{};
+    std::vector<double> displacement_um;
+  };
+  [[nodiscard]] RemainingDrift remaining_of(std::size_t axis, double bound_um) const;
+
+  std::deque<Row> rows_;
+  std::vector<RemainingDrift> remaining_;
+};
+
+/// By how much the model may be off by now, of what the axis has moved since it was last probed, or
+/// since the daemon started:
+///
+///     e = s / D |d - d_probed|,
+///
+/// s: spread_um() of the output, D: its displacement where the model was judged (RMS without a
+/// model). Where [correction] learns from probings, its own spread instead.
+class SinceProbing {
+ public:
+  void note(std::span<const AxisReport> axes);
+  /// @return NaN: the model does not say what it was made from, or the axis has no displacement
+  [[nodiscard]] double error_um(std::size_t axis, const AxisReport& now, const ThermalModel& model,
+                                const std::string& output, bool is_corrected) const;
+
+ private:
+  struct Probed {
+    std::uint64_t probings{0};
+    double displacement_um{not_a_number};
+  };
+  std::vector<Probed> probed_;
+};
+
+}  // namespace thermocomp
