@@ -9,6 +9,7 @@ import json
 import math
 import pathlib
 import random
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -21,6 +22,8 @@ from machine import RESOLUTION_UM, Machine
 from process import PATIENCE_S, WATCHDOG_S, Daemon, eventually
 
 ANSWER_S = 2.0
+INVARIANTS = re.findall(r'\{"(\w+)",',
+                        (pathlib.Path(__file__).parents[1] / "invariant_list.hpp").read_text())
 UNCHANGING_SEGMENT = "id, run, token, setup, reason, first_cycle, inputs, estimator_state"
 CHUNK = "id, segment, number, through_cycle, count, records"
 
@@ -98,6 +101,10 @@ class Rig:
     def broke(self, what):
         if what not in self.broken:
             self.broken.append(what)
+
+    def invariant(self, holds, name, what):
+        assert name in INVARIANTS, name
+        return self.must(holds, f"{name}: {what}")
 
     def must(self, holds, what):
         """What has to be true in this attack beside the invariants."""
@@ -226,8 +233,8 @@ class Rig:
         for write in self.axis.writes:
             largest["writes"] += 1
             largest["value_um"] = max(largest["value_um"], abs(write.value_um))
-            if abs(write.value_um) > write.bound_um + RESOLUTION_UM:
-                self.broke(f"beyond the bound: {write.value_um:.3f} um")
+            self.invariant(abs(write.value_um) <= write.bound_um + RESOLUTION_UM,
+                           "offset_within_bound", f"{write.value_um:.3f} um")
             if self.machine.link == "piezo":
                 continue
             allowed = self.allowed_um(write)
@@ -236,16 +243,18 @@ class Rig:
             if write.step_um - allowed > worst:
                 worst = write.step_um - allowed
                 largest["step_um"], largest["allowed_um"] = write.step_um, allowed
-        if largest["beyond"]:
-            self.broke(f"{largest['beyond']} of {largest['writes']} writes leap, by "
-                       f"{largest['step_um']:.3f} um where {largest['allowed_um']:.3f} um may be")
+        self.invariant(
+            not largest["beyond"], "slew_kept_at_controller",
+            f"{largest['beyond']} of {largest['writes']} writes leap, by {largest['step_um']:.3f} um "
+            f"where {largest['allowed_um']:.3f} um may be")
         if self.machine.link == "piezo" and not self.axis.lied:
             self.must(self.machine.controller.hysteresis == 0, "a voltage was not reached from 0 V")
         unfed_s, wait_s = self.longest_unfed_s(), self.longest_wait_s()
         self.must(unfed_s <= WATCHDOG_S, f"the watchdog got nothing for {unfed_s:.1f} s")
         self.must(wait_s <= ANSWER_S, f"a client waited {wait_s:.1f} s")
-        self.must(self.rows_lost == 0, f"{self.rows_lost} committed rows lost")
-        self.must(self.commands_lost == 0, f"{self.commands_lost} operator's commands lost")
+        self.invariant(self.rows_lost == 0, "no_committed_history_lost", f"{self.rows_lost} rows")
+        self.invariant(self.commands_lost == 0, "state_survives_restart",
+                       f"{self.commands_lost} operator's commands lost")
         return largest | {
             "tries": max(1, self.tries), "bound_um": self.axis.bound_um, "ended": self.ended,
             "rows": len(self.rows), "rows_lost": self.rows_lost,

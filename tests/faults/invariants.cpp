@@ -108,10 +108,11 @@ void Invariants::restored(const PersistentState& saved, const Report& report,
            "held temperature of " + column);
   demand(report.enabled == saved.enabled, "state_survives_restart", now, "the operator's switch");
   for (const auto& [column, reference_degC] : saved.reference_degC)
-    demand(input_of(column).reference_degC == reference_degC, "state_survives_restart", now, [&] {
-      return fmt::format("reference of {}: {:.3f} degC, {:.3f} was saved", column,
-                         input_of(column).reference_degC, reference_degC);
-    });
+    demand(input_of(column).reference_degC == reference_degC, "state_survives_restart", now,
+           [&, column = column, reference_degC = reference_degC] {
+             return fmt::format("reference of {}: {:.3f} degC, {:.3f} was saved", column,
+                                input_of(column).reference_degC, reference_degC);
+           });
   for (std::size_t axis = 0; axis < axes_count; ++axis) {
     offset_um_[axis] = report.axes[axis].offset_um;
     const auto found = saved.offset_um.find(std::string(1, static_cast<char>('x' + axis)));

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "../invariant_list.hpp"
 #include "estimator/pipeline/estimator.hpp"
 #include "machine.hpp"
 
@@ -25,17 +26,6 @@ struct Broken {
   nanoseconds at{};
   std::string detail;
 };
-
-inline constexpr std::array<const char*, 25> invariant_names{
-    "offset_within_bound",       "slew_kept_at_controller",      "slew_kept_by_command",
-    "only_finite_numbers",       "reading_is_what_was_given",    "no_stale_reading_used",
-    "no_faulty_reading_used",    "no_offset_from_invalid_model", "hold_policy_kept",
-    "recovered_in_time",         "state_survives_restart",       "replay_is_exact",
-    "no_committed_history_lost", "probing_step_bounded",         "gains_within_bounds",
-    "nothing_learned_mid_cut",   "held_between_cycle_ends",      "slew_kept_by_what_is_sent",
-    "unexplained_is_latched",    "looked_before_written",        "suspicion_never_holds",
-    "compensating_is_written",   "slow_controller_is_written",   "no_false_reading_used",
-    "first_offset_is_known"};
 
 /// One cycle as it was.
 struct CycleSeen {
@@ -81,12 +71,12 @@ class Invariants {
   void check(const CycleSeen& seen, std::vector<Move>& moves, SimulatedController& controller);
   /// @param detail  a text, or what makes one: that is only called where it does not hold
   template <typename Detail>
-  void demand(bool holds, const char* invariant, nanoseconds at, const Detail& detail) {
+  void demand(bool holds, invariants::Rule rule, nanoseconds at, const Detail& detail) {
     if (holds || broken_) return;
     if constexpr (std::is_invocable_v<Detail>)
-      broken_ = Broken{invariant, at, detail()};
+      broken_ = Broken{std::string(rule.name()), at, detail()};
     else
-      broken_ = Broken{invariant, at, detail};
+      broken_ = Broken{std::string(rule.name()), at, detail};
   }
   [[nodiscard]] const std::optional<Broken>& broken() const noexcept { return broken_; }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "config/daemon/daemon_config.hpp"
 #include "daemon/controller_lock.hpp"

@@ -221,7 +221,8 @@ int main(int argc, char** argv) {
   if (options.list) {
     for (std::size_t i = 0; i < fault_kinds; ++i)
       fmt::print("fault      {}\n", name_of(static_cast<FaultKind>(i)));
-    for (const char* name : invariant_names) fmt::print("invariant  {}\n", name);
+    for (const thermocomp::invariants::Invariant& each : thermocomp::invariants::all)
+      fmt::print("invariant  {}: {}\n", each.name, each.text);
     for (const std::string& name : plant_names()) fmt::print("planted    {}\n", name);
     return 0;
   }

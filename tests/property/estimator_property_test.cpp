@@ -13,8 +13,9 @@ constexpr std::uint64_t seeds = 400;
 std::string text_of(const Outcome& outcome) {
   if (!outcome.violation) return "nothing";
   const Violation& violation = *outcome.violation;
-  return violation.rule + ", step " + std::to_string(violation.step) + ": " +
-         std::to_string(violation.value) + " beside " + std::to_string(violation.allowed);
+  return std::string(violation.rule).append(": ").append(violation.what) + ", step " +
+         std::to_string(violation.step) + ": " + std::to_string(violation.value) + " beside " +
+         std::to_string(violation.allowed);
 }
 
 /// In how many lives of the seeds a rule notices the planted bug.

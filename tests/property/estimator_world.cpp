@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "../invariant_list.hpp"
 #include "random_machine.hpp"
 
 namespace thermocomp::property {
@@ -148,7 +149,8 @@ class World {
       before_um_[i] = std::abs(offset_um) <= offset_um_max_of_any_axis ? offset_um : 0.0;
     }
     estimator_ = std::make_unique<Estimator>(planted(config_), model_);
-    demand("a state that was kept is taken", estimator_->restore(state).empty(), 0, 0);
+    demand("state_survives_restart", "a state that was kept is taken",
+           estimator_->restore(state).empty(), 0, 0);
     report_ = estimator_->make_report();
     estimator_stepped_ = false;
     dt_s_ = 0.0;
@@ -327,19 +329,20 @@ class World {
   void check_estimates() {
     const bool estimating = has_reason(report_.reasons, Reason::block_estimated);
     if (estimating) ++outcome_.steps_estimating;
-    demand("a lost block is either estimated or holds the offset",
+    demand("no_offset_from_invalid_model", "a lost block is either estimated or holds the offset",
            !(estimating && has_reason(report_.reasons, Reason::block_lost)), 0, 0);
     for (const InputReport& input : report_.inputs) {
-      demand("the spread of an estimate is a finite number, none of what is measured",
+      demand("only_finite_numbers",
+             "the spread of an estimate is a finite number, none of what is measured",
              input.sd_K >= 0 && input.sd_K < 1e6 && !(input.good && input.sd_K > 0), input.sd_K, 0);
-      demand("an estimate is a finite number", !input.estimated || std::isfinite(input.temp_degC),
-             input.temp_degC, 0);
-      demand("what is compensated with is measured or estimated",
+      demand("only_finite_numbers", "an estimate is a finite number",
+             !input.estimated || std::isfinite(input.temp_degC), input.temp_degC, 0);
+      demand("no_offset_from_invalid_model", "what is compensated with is measured or estimated",
              report_.mode != Mode::compensating || input.good || input.estimated, 0, 0);
     }
     const double most_um = config_.compensation.offset_sd_um_max;
     for (const AxisReport& axis : report_.axes)
-      demand("what is too uncertain is not compensated with",
+      demand("no_offset_from_invalid_model", "what is too uncertain is not compensated with",
              axis.offset_sd_um >= 0 && !(estimating && axis.offset_sd_um > most_um),
              axis.offset_sd_um, most_um);
   }
@@ -349,12 +352,12 @@ class World {
     const bool outside = model_.made_from && report_.domain.outside;
     if (outside) ++outcome_.steps_outside;
     if (was_outside_ && !outside) ++outcome_.returns;
-    demand("what is outside the domain is told",
+    demand("domain_kept", "what is outside the domain is told",
            !outside || has_reason(report_.reasons, Reason::outside_domain), 0, 0);
     const bool stays = outside && was_outside_ && report_.mode == Mode::compensating &&
                        config_.compensation.outside_domain == OutsidePolicy::hold;
     for (std::size_t i = 0; i < axes_count && stays && mode_before_ == Mode::compensating; ++i)
-      demand("with hold, an offset outside the domain goes no further",
+      demand("domain_kept", "with hold, an offset outside the domain goes no further",
              !command_.valid[i] || !valid_before_[i] || report_.axes[i].proving ||
                  std::abs(command_.offset_um[i] - before_um_[i]) <= tiny_um ||
                  std::abs(before_um_[i]) > config_.axes[i].limiter.offset_um_max ||
@@ -375,8 +378,8 @@ class World {
     const double before_um = before_um_[axis];
     const double bound_um = config_.axes[axis].limiter.offset_um_max + tiny_um;
     const double step_um = step_um_max(axis);
-    demand("offset is finite", std::isfinite(offset_um), offset_um, 0);
-    demand("no axis beyond what any configuration allows",
+    demand("only_finite_numbers", "offset is finite", std::isfinite(offset_um), offset_um, 0);
+    demand("offset_within_bound", "no axis beyond what any configuration allows",
            std::abs(offset_um) <= offset_um_max_of_any_axis, offset_um, offset_um_max_of_any_axis);
     const bool may_start = state_.link_epoch != started_on_[axis] || released_[axis];
     // The one leap that is none: the axis already stands where the controller says. A read-back is
@@ -387,7 +390,8 @@ class World {
       if (offset_um == 0.0 && !command_.valid[axis] && std::abs(before_um) > bound_um) return;
       ++outcome_.resyncs;
       const double from_applied_um = std::abs(offset_um - state_.applied_um[axis]);
-      demand("offset changes at the slew rate, or starts from the read-back",
+      demand("slew_kept_by_command",
+             "offset changes at the slew rate, or starts from the read-back",
              // While another node must stand nothing is sent, wherever this one starts from.
              state_.online && (command_.valid[axis] || is_node(axis)) && may_start &&
                  from_applied_um <= step_um + register_rounding_um,
@@ -398,7 +402,7 @@ class World {
     const bool may_change = !config_.compensation.hold_while_cutting;
     if (command_.valid[axis] && may_change && reads_in_epoch_ > reads_until_written &&
         std::abs(before_um) > bound_um && std::abs(state_.applied_um[axis] - before_um) <= tiny_um)
-      demand("an offset outside a new bound comes in at the slew rate",
+      demand("offset_within_bound", "an offset outside a new bound comes in at the slew rate",
              std::abs(offset_um) <= std::max(bound_um, std::abs(before_um) - step_um + 3 * tiny_um),
              offset_um, bound_um);
   }
@@ -411,19 +415,19 @@ class World {
   }
 
   void check_valid(std::size_t axis) {
-    demand("the nodes of a travel are driven together",
+    demand("nodes_driven_together", "the nodes of a travel are driven together",
            !options_.travel || command_.valid[1] == command_.valid[2], 0, 0);
-    demand("a latched axis is not driven", !(command_.valid[axis] && report_.axes[axis].latched), 0,
-           0);
-    demand("a latched mismatch is told",
+    demand("unexplained_is_latched", "a latched axis is not driven",
+           !(command_.valid[axis] && report_.axes[axis].latched), 0, 0);
+    demand("unexplained_is_latched", "a latched mismatch is told",
            !report_.axes[axis].latched || has_reason(report_.reasons, Reason::mismatch_latched), 0,
            0);
     if (!command_.valid[axis]) return;
     note_started(axis);
     const double told_um = controller_.told_um[axis];
-    demand("an axis whose position is not known is not driven",
+    demand("first_offset_is_known", "an axis whose position is not known is not driven",
            controller_.epoch > 0 && std::isfinite(told_um), told_um, 0);
-    demand("an axis at an impossible position is not driven",
+    demand("first_offset_is_known", "an axis at an impossible position is not driven",
            !(std::abs(told_um) > offset_um_max_of_any_axis + register_rounding_um), told_um,
            offset_um_max_of_any_axis);
   }
@@ -443,8 +447,8 @@ class World {
       const double change_um = std::abs(command_.offset_um[i] - controller_.applied_um[i]);
       double allowed_um = step_um_max(i) + register_rounding_um;
       if (controller_.disturbed[i]) allowed_um += undetected_um(i);
-      demand("what the controller applies changes at the slew rate", change_um <= allowed_um,
-             change_um, allowed_um);
+      demand("slew_kept_at_controller", "what the controller applies changes at the slew rate",
+             change_um <= allowed_um, change_um, allowed_um);
       controller_.applied_um[i] = command_.offset_um[i];
       controller_.disturbed[i] = false;
     }
@@ -474,8 +478,9 @@ class World {
     tolerance_um_ = std::max(tolerance_um_, compensation.mismatch_um);
   }
 
-  void demand(const char* rule, bool holds, double value, double allowed) {
-    if (!holds && !outcome_.violation) outcome_.violation = Violation{rule, step_, value, allowed};
+  void demand(invariants::Rule rule, const char* what, bool holds, double value, double allowed) {
+    if (!holds && !outcome_.violation)
+      outcome_.violation = Violation{rule.name(), what, step_, value, allowed};
   }
 
   WorldOptions options_;

@@ -9,7 +9,7 @@
 #include <memory>
 #include <optional>
 #include <random>
-#include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/pipeline/estimator.hpp"
@@ -18,7 +18,8 @@ namespace thermocomp::property {
 
 /// What went wrong, and when; nothing while all is well.
 struct Violation {
-  std::string rule;
+  std::string_view rule;  ///< of the list (tests/invariant_list.hpp)
+  std::string_view what;
   std::size_t step{0};
   double value{0.0};
   double allowed{0.0};
