@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Attacks the running daemon from outside: by configuration files, sockets and buses, without any
-knowledge of its code. docs/attacks.md tells what is attacked and what must hold.
+knowledge of its code. docs/robustness.md tells what is attacked and what must hold.
 
   attack.py [--bin DIR] [--seed N] [--links tcp,rtu,...] [--only TEXT]... [--minutes M] [--jobs N]
   attack.py --list
