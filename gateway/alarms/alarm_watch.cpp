@@ -20,10 +20,34 @@ void add_compensation(const Status& status, std::vector<AlarmCondition>& wrong) 
   wrong.push_back(std::move(condition));
 }
 
-void add_sensors(const SensorsAnswer& answer, std::vector<AlarmCondition>& wrong) {
+/// One a bus or module that is away, in the place of its sensors.
+/// @return their names
+std::set<std::string> add_buses(const Status& status, std::vector<AlarmCondition>& wrong) {
+  std::set<std::string> away;
+  for (const BusStatus& bus : status.buses) {
+    if (!bus.connected)
+      wrong.push_back({"bus/" + bus.name,
+                       "bus " + bus.name + " is not connected (" + bus.last_error + ")",
+                       std::string(bus_remedy(bus.kind))});
+    for (const UnitStatus& unit : bus.units) {
+      if (bus.connected && unit.answering) continue;
+      away.insert(unit.sensors.begin(), unit.sensors.end());
+      if (bus.connected)
+        wrong.push_back({"unit/" + unit.name,
+                         unit.name + " on " + bus.name + " does not answer: without sensors " +
+                             joined(unit.sensors),
+                         std::string(code_text(Fault::no_answer).remedy)});
+    }
+  }
+  return away;
+}
+
+/// @param away  sensors whose bus or module has an alarm of its own
+void add_sensors(const SensorsAnswer& answer, const std::set<std::string>& away,
+                 std::vector<AlarmCondition>& wrong) {
   for (const SensorStatus& sensor : answer.sensors) {
     const CodeText fault = code_text(sensor.fault);
-    if (sensor.fault != Fault::none)
+    if (sensor.fault != Fault::none && away.count(sensor.name) == 0)
       wrong.push_back({"sensor/" + sensor.name,
                        "sensor " + sensor.name + ": " + std::string(fault.meaning),
                        std::string(fault.remedy)});
@@ -46,7 +70,8 @@ std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot) {
   }
   const Status& status = snapshot.status;
   add_compensation(status, wrong);
-  add_sensors(snapshot.sensors, wrong);
+  const std::set<std::string> away = add_buses(status, wrong);
+  add_sensors(snapshot.sensors, away, wrong);
   for (const AxisStatus& axis : status.axes)
     if (axis.at_bound)
       wrong.push_back({"bound/" + axis.name, "axis " + axis.name + " is at its bound",
@@ -54,11 +79,6 @@ std::vector<AlarmCondition> wrong_now(const Snapshot& snapshot) {
   const CodeText domain = code_text(Reason::outside_domain);
   if (status.model.outside.value_or(false))
     wrong.push_back({"domain", std::string(domain.meaning), std::string(domain.remedy)});
-  for (const BusStatus& bus : status.buses)
-    if (!bus.connected)
-      wrong.push_back({"bus/" + bus.name,
-                       "bus " + bus.name + " is not connected (" + bus.last_error + ")",
-                       std::string(bus_remedy(bus.kind))});
   return wrong;
 }
 

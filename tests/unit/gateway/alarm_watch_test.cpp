@@ -87,14 +87,27 @@ TEST_CASE("each thing that is wrong has its alarm", "[gateway][alarm]") {
   snapshot.sensors.sensors[0].fault = Fault::open_circuit;
   snapshot.sensors.sensors[0].suspected = {.size_K = 2.0, .since = 1.0};
   const auto wrong = wrong_now(snapshot);
-  CHECK(names(wrong) == std::vector<std::string>{"compensation", "sensor/a", "suspected/a",
-                                                 "bound/z", "domain", "bus/cabinet"});
+  CHECK(names(wrong) == std::vector<std::string>{"compensation", "bus/cabinet", "sensor/a",
+                                                 "suspected/a", "bound/z", "domain"});
   for (const AlarmCondition& condition : wrong) {
     CHECK_FALSE(condition.text.empty());
     CHECK_FALSE(condition.remedy.empty());
   }
   snapshot.is_here = false;
   CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"daemon"});
+}
+
+TEST_CASE("a bus or module that is away has one alarm, and its sensors have none",
+          "[gateway][alarm]") {
+  Snapshot snapshot = good_snapshot();
+  snapshot.sensors.sensors[0].fault = Fault::no_answer;
+  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"sensor/a"});
+  snapshot.status.buses[0].units = {{.name = "module", .answering = false, .sensors = {"a", "b"}}};
+  const auto wrong = wrong_now(snapshot);
+  REQUIRE(names(wrong) == std::vector<std::string>{"unit/module"});
+  CHECK(wrong[0].text == "module on cabinet does not answer: without sensors a, b");
+  snapshot.status.buses[0].connected = false;
+  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"bus/cabinet"});
 }
 
 TEST_CASE("an hour has room for so many commands", "[gateway][alarm]") {
