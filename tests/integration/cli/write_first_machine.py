@@ -30,6 +30,16 @@ def said(folder, *arguments):
     return f"$ {typed}\n{answer.stdout}"
 
 
+def shortened(text):
+    """The first, the middle and the last line of a move in steps."""
+    lines = text.splitlines()
+    moves = [at for at, line in enumerate(lines) if re.match(r"axis \w+: sent", line)]
+    shown = {moves[0], moves[len(moves) // 2], moves[-1]}
+    short = [line if at in shown else "..." for at, line in enumerate(lines)
+             if at in shown or at not in moves or at - 1 in shown]
+    return "\n".join(short) + "\n"
+
+
 def first_outputs(folder):
     config = folder / "thermocompd.toml"
     answers = [f"tcp:127.0.0.1:{PORTS[0]}", "", "wago_750_458", NAMES,
@@ -44,7 +54,7 @@ def first_outputs(folder):
         first = said(folder, *socket, "sensors")
         eventually(lambda: run("--socket", "status.sock", "prove", "z", "0.1",
                                            cwd=folder).returncode == 0, "the axis is in step")
-        first += "\n" + said(folder, *socket, "prove", "z", "5")
+        first += "\n" + shortened(said(folder, *socket, "prove", "z", "5"))
     return first.replace(str(folder) + "/", "")
 
 
