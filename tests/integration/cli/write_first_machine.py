@@ -35,8 +35,12 @@ def shortened(text):
     lines = text.splitlines()
     moves = [at for at, line in enumerate(lines) if re.match(r"axis \w+: sent", line)]
     shown = {moves[0], moves[len(moves) // 2], moves[-1]}
-    short = [line if at in shown else "..." for at, line in enumerate(lines)
-             if at in shown or at not in moves or at - 1 in shown]
+    short = []
+    for at, line in enumerate(lines):
+        if at not in moves or at in shown:
+            short.append(line)
+        elif at - 1 in shown:
+            short.append("...")
     return "\n".join(short) + "\n"
 
 
