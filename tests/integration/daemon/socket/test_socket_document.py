@@ -1,4 +1,4 @@
-"""The examples of docs/socket.md: each request is taken by a daemon, and the answer has the fields that
+"""docs/socket_examples.txt: each request is taken by a daemon, and the answer has the fields that
 the document shows. `test_socket_document.py --write` makes the examples anew."""
 
 import json
@@ -11,8 +11,7 @@ import textwrap
 from lab import SOURCE, Lab
 from plain_devices import Machine
 
-DOCUMENT = SOURCE / "docs" / "socket.md"
-BEGIN, END = "<!-- examples -->\n", "<!-- end of examples -->\n"
+DOCUMENT = SOURCE / "docs" / "socket_examples.txt"
 READS = ("status", "sensors", "offsets", "timing", "model", "events")
 
 
@@ -71,13 +70,13 @@ def exchange(daemon, line):
 def examples(text):
     """[(request line, [answer lines])] of the document."""
     found = []
-    for line in text[text.index(BEGIN):text.index(END)].splitlines():
-        if line.startswith("    > "):
-            found.append((line[6:], []))
-        elif line.startswith("    < "):
-            found[-1][1].append(line[6:])
-        elif line.startswith("      ") and found:
-            found[-1][1][-1] += line[5:]  # of an answer that takes several lines
+    for line in text.splitlines():
+        if line.startswith("> "):
+            found.append((line[2:], []))
+        elif line.startswith("< "):
+            found[-1][1].append(line[2:])
+        elif line.startswith("  ") and found:
+            found[-1][1][-1] += line[1:]  # of an answer that takes several lines
     return found
 
 
@@ -126,7 +125,7 @@ def once(element, seen):
 def shown(answer, folder, seen):
     """On lines that a page has room for."""
     text = json.dumps(pruned(answer, seen)).replace(str(folder) + "/", "/etc/thermocomp/")
-    return "\n      ".join(textwrap.wrap(text, 100, break_long_words=False, break_on_hyphens=False))
+    return "\n  ".join(textwrap.wrap(text, 100, break_long_words=False, break_on_hyphens=False))
 
 
 def running(lab):
@@ -158,16 +157,13 @@ def write():
             text, seen = "", set()
             for title, method, params in requests():
                 line = line_of(method, params)
-                text += f"{title}:\n\n    > {line}\n"
+                text += f"{title}:\n> {line}\n"
                 for answer in exchange(daemon, line):
-                    text += f"    < {shown(answer, folder, seen)}\n"
+                    text += f"< {shown(answer, folder, seen)}\n"
                 text += "\n"
         finally:
             lab.end()
-    whole = DOCUMENT.read_text()
-    head, rest = whole.split(BEGIN)
-    DOCUMENT.write_text(head + BEGIN + "\n" + text + END + rest.split(END)[1])
-
+    DOCUMENT.write_text(text.rstrip() + "\n")
 
 if __name__ == "__main__":
     if sys.argv[1:] != ["--write"]:
