@@ -4,9 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "modelling/diagnosis/answer/gain_on_test.hpp"
-#include "modelling/diagnosis/answer/named_finding.hpp"
-#include "modelling/diagnosis/answer/remainder_bank.hpp"
+#include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/rank/search.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"

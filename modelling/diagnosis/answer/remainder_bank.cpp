@@ -1,8 +1,7 @@
-#include "modelling/diagnosis/answer/remainder_bank.hpp"
-
 #include <algorithm>
 #include <cmath>
 
+#include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/identification/families/bank_fit.hpp"
 
 namespace thermocomp::diagnosis {

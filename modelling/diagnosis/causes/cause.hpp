@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "modelling/diagnosis/hypothesis/hypothesis.hpp"
-#include "modelling/diagnosis/hypothesis/material.hpp"
 #include "modelling/diagnosis/network/heat_network.hpp"
 #include "modelling/diagnosis/network/machine_file.hpp"
 #include "modelling/diagnosis/network/network_simulation.hpp"

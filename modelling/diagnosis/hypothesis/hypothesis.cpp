@@ -1,6 +1,11 @@
 #include "modelling/diagnosis/hypothesis/hypothesis.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
+
+#include "estimator/checks.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
 
 namespace thermocomp::diagnosis {
 
@@ -56,6 +61,132 @@ std::vector<double> firsts_of(const Shapes& shapes) {
   firsts.reserve(shapes.size());
   for (const Shape& shape : shapes) firsts.push_back(shape[0]);
   return firsts;
+}
+
+namespace {
+
+/// Moments of largest jumps that are tried beside a grid.
+constexpr std::ptrdiff_t jumps_max = 12;
+
+double median_step_s(const MeasuredData& data) {
+  std::vector<double> steps;
+  for (const MeasuredRun& run : data.runs)
+    for (Eigen::Index row = run.begin + 1; row < run.rows(); ++row)
+      steps.push_back(run.time_s[row] - run.time_s[row - 1]);
+  if (steps.empty()) return 1.0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+bool moves(const Column& column) {
+  return column.size() > 1 && column.maxCoeff() > column.minCoeff();
+}
+
+}  // namespace
+
+Material::Material(const MeasuredData& data, const StackedRows& rows)
+    : data_(data), rows_(rows), step_s_(median_step_s(data)) {
+  for (const MeasuredRun& run : data.runs)
+    length_s_ = std::max(length_s_, run.time_s[run.rows() - 1] - run.time_s[run.begin]);
+  const auto& inputs = data.model.inputs;
+  settled_.setZero(std::ssize(data.model.outputs), std::ssize(inputs));
+  settled_of_group_ = settled_;
+  if (!data.model.guideways.empty()) return;
+  for (std::size_t output = 0; output < data.model.outputs.size(); ++output)
+    for (std::size_t input = 0; input < inputs.size(); ++input)
+      settled_(static_cast<Eigen::Index>(output), static_cast<Eigen::Index>(input)) =
+          diagnosis::settled_um_per_K(data, output, input);
+  // Of places that move alike a fit settles the sum, hardly each coefficient.
+  const PlaceGroups groups = place_groups(data);
+  for (std::size_t input = 0; input < inputs.size(); ++input)
+    for (std::size_t other = 0; other < inputs.size(); ++other)
+      if (same_places(groups, inputs[input], inputs[other]))
+        settled_of_group_.col(static_cast<Eigen::Index>(input)) +=
+            settled_.col(static_cast<Eigen::Index>(other));
+}
+
+const std::string& Material::name_of(const Subject& subject) const {
+  switch (subject.kind) {
+    case SubjectKind::input:
+    case SubjectKind::input_in_run:
+      return data_.model.inputs[subject.index];
+    case SubjectKind::other_temperature:
+      return data_.others[subject.index];
+    case SubjectKind::signal:
+      return data_.signals[subject.index];
+    case SubjectKind::output:
+    case SubjectKind::output_in_run:
+      break;
+  }
+  return data_.model.outputs[subject.index];
+}
+
+ColumnOf Material::values_of(const Subject& subject) const {
+  const std::size_t index = subject.index;
+  if (subject.kind == SubjectKind::input)
+    return [index](const MeasuredRun& run) -> const Column& { return run.calm_inputs_K[index]; };
+  if (subject.kind == SubjectKind::other_temperature)
+    return [index](const MeasuredRun& run) -> const Column& { return run.calm_others_K[index]; };
+  THERMOCOMP_ENSURE(subject.kind == SubjectKind::signal);
+  return [index](const MeasuredRun& run) -> const Column& { return run.signals[index]; };
+}
+
+bool Material::moves_anywhere(const ColumnOf& of) const {
+  return std::any_of(data_.runs.begin(), data_.runs.end(), [&](const MeasuredRun& run) {
+    return moves(of(run).tail(run.rows() - run.begin));
+  });
+}
+
+double Material::range(const ColumnOf& of) const {
+  double range = 0.0;
+  for (const MeasuredRun& run : data_.runs)
+    range = std::max(range, of(run).maxCoeff() - of(run).minCoeff());
+  return range;
+}
+
+std::vector<double> Material::lag_times_s(double low_s, double high_s, std::size_t count) const {
+  const double low = std::max(low_s, 0.5 * step_s_);
+  const double high = std::max(2.0 * low, std::min(high_s, 0.5 * length_s_));
+  return logarithmic_grid(low, high, count);
+}
+
+std::vector<double> Material::onsets_s(std::size_t run, double first, double last,
+                                       std::size_t count, const Column& values) const {
+  const MeasuredRun& of = data_.runs[run];
+  const double begin_s = of.time_s[of.begin];
+  const double span_s = of.time_s[of.rows() - 1] - begin_s;
+  std::vector<double> onsets =
+      linear_grid(begin_s + first * span_s, begin_s + last * span_s, count);
+  std::vector<std::pair<double, double>> jumps;  // how far, when
+  double before = not_a_number;
+  for (Eigen::Index row = of.begin; row < of.rows(); ++row) {
+    if (!std::isfinite(values[row])) continue;
+    const double time_s = of.time_s[row];
+    if (time_s >= onsets.front() && time_s <= onsets.back() && std::isfinite(before))
+      jumps.emplace_back(-std::abs(values[row] - before), time_s);
+    before = values[row];
+  }
+  const auto most = jumps.begin() + std::min(std::ssize(jumps), jumps_max);
+  std::partial_sort(jumps.begin(), most, jumps.end());
+  for (auto jump = jumps.begin(); jump != most; ++jump) onsets.push_back(jump->second);
+  std::sort(onsets.begin(), onsets.end());
+  onsets.erase(std::unique(onsets.begin(), onsets.end()), onsets.end());
+  return onsets;
+}
+
+Panel Material::in_run(std::size_t run, const Panel& whole) const {
+  const Block& block = rows_.runs[run];
+  Panel all = Panel::Zero(rows_.time_s.size(), whole.cols());
+  all.middleRows(block.begin, block.end - block.begin) = whole.bottomRows(block.end - block.begin);
+  return all;
+}
+
+Panel since(const Column& time_s, const std::vector<double>& onsets_s) {
+  Panel all(time_s.size(), std::ssize(onsets_s));
+  for (Eigen::Index i = 0; i < all.cols(); ++i)
+    all.col(i) = (time_s.array() >= onsets_s[static_cast<std::size_t>(i)]).cast<double>().matrix();
+  return all;
 }
 
 }  // namespace thermocomp::diagnosis

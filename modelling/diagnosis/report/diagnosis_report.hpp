@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "modelling/diagnosis/answer/answer.hpp"
-#include "modelling/diagnosis/answer/gain_on_test.hpp"
+#include "modelling/diagnosis/answer/findings.hpp"
 
 namespace thermocomp::diagnosis {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "config/text/units.hpp"
-#include "modelling/diagnosis/answer/gain_on_test.hpp"
+#include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 

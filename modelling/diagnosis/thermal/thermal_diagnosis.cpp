@@ -1,13 +1,11 @@
-#include "modelling/diagnosis/thermal/thermal_diagnosis.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
 
-#include "modelling/diagnosis/answer/gain_on_test.hpp"
-#include "modelling/diagnosis/answer/named_finding.hpp"
+#include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/network/network_simulation.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "modelling/diagnosis/thermal/network_hypotheses.hpp"

@@ -59,7 +59,7 @@ Diagnosis diagnosis_of(Hidden hidden) {
 }
 
 /// A machine that the readings move, each of which follows the speed in its own time.
-struct Readings {
+struct MeasuredMachine {
   std::vector<double> per_row;   ///< share of what it lacks that a reading rises in a row
   std::vector<double> um_per_K;  ///< as the model has them
   std::vector<double> factor;    ///< of the machine's coefficients to the model's
@@ -105,7 +105,7 @@ struct Readings {
 };
 
 /// With a position that goes to and fro in 23 minutes; the first reading's effect grows along it.
-RunFile along_axis(const Readings& machine, unsigned seed, double um_per_K_mm) {
+RunFile along_axis(const MeasuredMachine& machine, unsigned seed, double um_per_K_mm) {
   RunFile run = machine.run(seed);
   run.columns.emplace_back("x_mm");
   run.values.emplace_back();
@@ -120,20 +120,20 @@ RunFile along_axis(const Readings& machine, unsigned seed, double um_per_K_mm) {
   return run;
 }
 
-Diagnosis diagnosis_along_axis(const Readings& machine, double um_per_K_mm) {
+Diagnosis diagnosis_along_axis(const MeasuredMachine& machine, double um_per_K_mm) {
   return diagnose(machine.model(),
                   {along_axis(machine, 1, um_per_K_mm), along_axis(machine, 2, um_per_K_mm)},
                   {"a", "b"}, {along_axis(machine, 3, um_per_K_mm)}, {"c"});
 }
 
 /// A machine of six readings, which are more alike than the causes that they are to be told from.
-Readings six_readings(std::vector<double> factor) {
+MeasuredMachine six_readings(std::vector<double> factor) {
   return {{0.1, 0.05, 0.035, 0.025, 0.015, 0.01},
           {9.0, -12.0, 10.0, 7.0, -8.0, 5.0},
           std::move(factor)};
 }
 
-Diagnosis diagnosis_of_machine(const Readings& machine) {
+Diagnosis diagnosis_of_machine(const MeasuredMachine& machine) {
   return diagnose(machine.model(), {machine.run(1), machine.run(2)}, {"a", "b"}, {machine.run(3)},
                   {"c"});
 }
@@ -142,7 +142,7 @@ Diagnosis diagnosis_of_machine(const Readings& machine) {
 /// The displacement shows an error, not of which reading it is.
 template <class Error>
 Diagnosis diagnosis_of_false_reading(std::size_t sensor, Error error_K) {
-  Readings machine;
+  MeasuredMachine machine;
   for (int i = 0; i < 30; ++i) {
     machine.per_row.push_back(0.01 + 0.003 * i);
     machine.um_per_K.push_back((i % 2 == 0 ? 1.0 : -1.0) * (1.0 + 0.37 * (i * 7 % 10)));
@@ -252,7 +252,8 @@ TEST_CASE("a jump of the datum in one run is a fault of that run and no term", "
 }
 
 TEST_CASE("a cause is named with its size beside small errors of all coefficients", "[diagnosis]") {
-  Readings machine{{0.2, 0.05, 0.02, 0.01}, {9.0, -12.0, 10.0, 7.0}, {1.03, 0.96, 1.02, 0.97}};
+  MeasuredMachine machine{
+      {0.2, 0.05, 0.02, 0.01}, {9.0, -12.0, 10.0, 7.0}, {1.03, 0.96, 1.02, 0.97}};
   machine.heat_um = 20.0;
   const Diagnosis effect = diagnosis_of_machine(machine);
   REQUIRE(effect.findings.size() == 1);
@@ -262,7 +263,7 @@ TEST_CASE("a cause is named with its size beside small errors of all coefficient
 
 TEST_CASE("a cause that errors of all coefficients could take most of is the first candidate",
           "[diagnosis]") {
-  Readings machine = six_readings({0.99, 1.007, 0.981, 0.993, 1.007, 0.986});
+  MeasuredMachine machine = six_readings({0.99, 1.007, 0.981, 0.993, 1.007, 0.986});
   machine.heat_um = 12.0;
   const Diagnosis effect = diagnosis_of_machine(machine);
   CHECK(effect.verdict != "none");
@@ -273,7 +274,7 @@ TEST_CASE("a cause that errors of all coefficients could take most of is the fir
 
 TEST_CASE("a small cause beside errors of all coefficients is left to them or named as it is",
           "[diagnosis]") {
-  Readings machine = six_readings({0.989, 0.993, 1.001, 0.982, 1.002, 0.992});
+  MeasuredMachine machine = six_readings({0.989, 0.993, 1.001, 0.982, 1.002, 0.992});
   machine.heat_um = 3.0;
   const Diagnosis answer = diagnosis_of_machine(machine);
   for (const NamedFinding& finding : answer.findings) {
@@ -289,7 +290,7 @@ TEST_CASE("an effect along an axis is no rival of a wrong coefficient where no a
       return each.cause == cause && each.subject.starts_with("t1_degC") && each.probability > 0.2;
     });
   };
-  Readings machine{{0.05, 0.02}, {9.0, -12.0}, {1.0, 1.0}};
+  MeasuredMachine machine{{0.05, 0.02}, {9.0, -12.0}, {1.0, 1.0}};
   const Diagnosis along = diagnosis_along_axis(machine, 0.02);
   REQUIRE(along.findings.size() == 1);
   CHECK(along.findings[0].cause == "position_dependence");
@@ -304,7 +305,7 @@ TEST_CASE("an effect along an axis is no rival of a wrong coefficient where no a
 }
 
 TEST_CASE("a temperature that is named is shown beside those of the model", "[diagnosis]") {
-  const Readings machine{{0.05, 0.02, 0.01}, {9.0, -12.0, 10.0}, {1.0, 1.0, 1.0}};
+  const MeasuredMachine machine{{0.05, 0.02, 0.01}, {9.0, -12.0, 10.0}, {1.0, 1.0, 1.0}};
   ThermalModel model = machine.model();
   model.inputs = {"t1_degC", "t3_degC"};
   model.matrix_um_per_K = {{9.0, 10.0}};

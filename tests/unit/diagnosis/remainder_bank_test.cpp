@@ -1,5 +1,3 @@
-#include "modelling/diagnosis/answer/remainder_bank.hpp"
-
 #include <cmath>
 #include <random>
 #include <string>
@@ -8,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/model/model_file.hpp"
+#include "modelling/diagnosis/answer/findings.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

@@ -1,0 +1,77 @@
+/// What becomes of what the search found: names, parameters with intervals, a term of the model
+/// file; what that gains on runs that were not used to find anything; and what is left and follows
+/// from what was recorded, though no cause of the catalogue says how.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modelling/diagnosis/answer/answer.hpp"
+#include "modelling/diagnosis/causes/cause.hpp"
+#include "modelling/diagnosis/data/measured_runs.hpp"
+#include "modelling/diagnosis/rank/search.hpp"
+
+namespace thermocomp::diagnosis {
+
+/// Of the RMS of left-out rows, of the output that gains most.
+[[nodiscard]] double share_of_remainder(const Explanation& explanation);
+
+/// Everything but the gain on test runs.
+/// @param data  whose outputs and runs the finding is of
+[[nodiscard]] NamedFinding named_finding(const Finding& finding, const MeasuredData& data,
+                                         std::vector<Parameter> parameters);
+
+/// "effect", "none" or "unexplained".
+[[nodiscard]] std::string verdict_of(const SearchResult& result);
+
+[[nodiscard]] std::vector<Parameter> parameters_of(const Finding& finding,
+                                                   const MeasuredData& data);
+/// @return the term that the daemon evaluates; nullopt for what it cannot: faults of one run, a
+///         shift in time, a disturbance without an input
+[[nodiscard]] std::optional<TermSpec> term_of(const Finding& finding, const MeasuredData& data);
+
+/// A model with what no term of it carries.
+struct Extended {
+  ThermalModel model;
+  std::vector<Correction> corrections;
+};
+
+struct Residuals {
+  std::vector<Column> by_run;  ///< over the selected rows; NaN where nothing was measured
+};
+
+/// measured - model of every output over the selected rows of every run, both from the run's first
+/// row on: the data's own model, or another.
+[[nodiscard]] std::vector<Residuals> residuals(const MeasuredData& data);
+[[nodiscard]] std::vector<Residuals> residuals(const Extended& extended, const MeasuredData& data);
+[[nodiscard]] double root_mean_square(const Residuals& residuals);
+/// Of what the model leaves of training and test runs, and the extended model of test runs.
+[[nodiscard]] OutputFigures output_figures(const Residuals& train, const Residuals& test,
+                                           const Residuals& extended_test,
+                                           double unexplained_fraction);
+/// The interval is from blocks of rows drawn anew.
+[[nodiscard]] TestGain test_gain(const Residuals& before, const Residuals& after);
+/// Whether no output gains by it on the test runs. The extended model goes without it then.
+[[nodiscard]] bool fails_on_test_runs(const NamedFinding& finding);
+
+/// A bank for each output whose left-out rows it predicts better: each of eight blocks of the
+/// training rows is left out, and what is left of them must fall by a tenth (RMS), about the
+/// run's mean too, and by more than the standard error over the blocks. Everything counts from the
+/// run's first row, as it will in use: with a free offset a run twice as many outputs get a bank,
+/// and some are worse for it. Columns, penalties and gains: identification::BankEquations.
+///
+/// Coefficients that were fitted to these very rows say nothing of what they leave of others. Where
+/// the matrix leaves no more of them than a fit of its inputs would, the output is fitted anew
+/// without the blocks, from the inputs as they are and with the bank, and compared so; the bank
+/// then holds what the coefficients change by, too.
+/// @param left         by the model with the findings, over the training runs, order of the outputs
+/// @param predictable  receives of each output the share of the variance of its left-out rows that
+///                     the bank predicts, whether it gets one or not
+/// @return nullopt: no output gains
+[[nodiscard]] std::optional<RemainderBank> remainder_bank(const MeasuredData& train,
+                                                          const std::vector<Residuals>& left,
+                                                          std::vector<double>& predictable);
+
+}  // namespace thermocomp::diagnosis
