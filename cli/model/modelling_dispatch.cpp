@@ -28,7 +28,7 @@ constexpr std::array<ModellingCommand, 9> commands{{
     {"structure", "block matrix of a structure, by finite elements"},
     {"place", "sensor positions of a structure"},
     {"tiebar", "the coefficients of a gate-shaped machine with tie bars"},
-    {"plan", "test plan from factors and levels"},
+    {"plan", "test plan from factors and levels; --apart: for what always moved alike"},
     {"inspect", "what is wrong with recordings themselves, and what they can tell at all"},
     {"group", "similarity groups of measured temperatures"},
     {"fit", "sensor choice and model from measured runs"},

@@ -4,11 +4,14 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "modelling/experiments/separation.hpp"
 #include "modelling/experiments/test_plan.hpp"
 #include "report/output_file.hpp"
+#include "report/run_loader.hpp"
 
 namespace thermocomp::experiments {
 namespace {
@@ -16,10 +19,24 @@ namespace {
 struct Options {
   std::string factors;
   std::string folder;
+  std::vector<std::string> runs;
+  std::string columns;
   bool json{false};
 };
 
+int run_apart(const Options& options) {
+  identification::TestOptions wanted;
+  wanted.signals = true;
+  const identification::MeasuredTests tests =
+      identification::measured_tests(cli::RunLoader(options.columns).load(options.runs), wanted);
+  for (const std::string& note : tests.notes) std::fprintf(stderr, "%s\n", note.c_str());
+  const Separation found = separation(tests);
+  cli::write_file("-", options.json ? separation_json(found) : separation_text(found));
+  return 0;
+}
+
 int run(const Options& options) {
+  if (!options.runs.empty()) return run_apart(options);
   const TestPlan plan = make_plan(load_factors(options.factors));
   if (!options.folder.empty()) {
     const std::filesystem::path folder(options.folder);
@@ -49,12 +66,22 @@ int run(const Options& options) {
 void add_plan_command(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<Options>();
   CLI::App* sub = app.add_subcommand("plan", "test plan from factors and levels");
-  sub->add_option("FACTORS.toml", options->factors, "factors, levels, what is forbidden, stops")
-      ->required();
+  CLI::Option* const factors = sub->add_option("FACTORS.toml", options->factors,
+                                               "factors, levels, what is forbidden, stops");
+  sub->add_option(
+         "--apart", options->runs,
+         "in its place: the shortest run that tells apart what always moved alike in these")
+      ->type_name("RUN.csv")
+      ->excludes(factors);
+  sub->add_option("--columns", options->columns, cli::columns_help);
   sub->add_option("--out", options->folder,
                   "folder for the sheet, the plan and a run file to fill for each test");
   sub->add_flag("--json", options->json, "the plan for a program");
-  sub->callback([options, &action] { action = [options] { return run(*options); }; });
+  sub->callback([options, factors, &action] {
+    if (options->runs.empty() && factors->empty())
+      throw CLI::RequiredError("FACTORS.toml or --apart");
+    action = [options] { return run(*options); };
+  });
 }
 
 }  // namespace thermocomp::experiments

@@ -74,6 +74,16 @@ def test_plan_writes_a_sheet_and_a_run_file_for_each_test(tmp_path):
     assert again.returncode == 2 and "nothing is written" in again.stderr
 
 
+def test_plan_apart_proposes_to_move_one_of_two_places_that_moved_alike(tmp_path):
+    answer = run("plan", "--apart", *write_tests(tmp_path), "--json")
+    assert answer.returncode == 0, answer.stderr
+    moves = json.loads(answer.stdout)["moves"]
+    assert len(moves) == 1, moves
+    assert {moves[0]["column"], *moves[0]["rest"]} == {"t1_degC", "t2_degC"}
+    assert moves[0]["correlation"] > 0.98 and moves[0]["hours"] > 0
+    assert run("plan").returncode == 2
+
+
 def test_group_names_places_that_move_alike(tmp_path):
     answer = run("group", *write_tests(tmp_path), "--json", "--picture", tmp_path / "groups.svg")
     assert answer.returncode == 0, answer.stderr
