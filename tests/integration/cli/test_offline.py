@@ -178,6 +178,34 @@ def test_simulate_is_repeated_by_its_seed(tmp_path):
     assert outputs["a"].startswith("time_s,")
 
 
+@pytest.mark.parametrize("condition, range_um, peak_um, off_hours",
+                         [(1, 52, 44, (1, 3)), (2, 49, 42, (1, 3)), (3, 60, 42, (1,))])
+def test_the_gate_machine_moves_and_its_tie_cools_as_published(condition, range_um, peak_um,
+                                                               off_hours, tmp_path):
+    """Teratani et al. 1995: the first peak after 15 min; the tie is nearly constant while the oil does
+    not heat, and goes on rising while it is cold (condition 3, from 1 h to 2 h)."""
+    gate = SOURCE / "config/gate_machine"
+    machine = tmp_path / "machine.toml"
+    machine.write_text("\n".join((gate / name).read_text() for name in (
+        f"condition_{condition}.toml", "machine.toml", "network.toml", "machine_axis.toml")))
+    assert run("simulate", machine, "-o", tmp_path / "run.csv").returncode == 0
+    rows = [{name: float(value) for name, value in row.items()}
+            for row in csv.DictReader((tmp_path / "run.csv").open())]
+    moved_um = [row["x_um"] - rows[0]["x_um"] for row in rows]
+    assert max(moved_um) - min(moved_um) == pytest.approx(range_um, abs=1)
+    first = max(row["x_um"] - rows[0]["x_um"] for row in rows if row["time_s"] < 3600)
+    assert first == pytest.approx(peak_um, abs=1.5)
+
+    def tie_K(hour):
+        near = [row for row in rows if abs(row["time_s"] - 3600 * hour) <= 60]
+        places = [row[f"tie_{i}_degC"] - 20 for row in near for i in range(1, 11)]
+        return sum(places) / len(places)
+
+    assert tie_K(4.9) > 2.5
+    for hour in off_hours:
+        assert tie_K(hour + 1) == pytest.approx(tie_K(hour), abs=0.15), hour
+
+
 def test_a_run_file_is_replayed_through_a_configuration(tmp_path):
     demo = SOURCE / "config" / "demo"
     assert run("simulate", demo / "machine.toml", "-o", tmp_path / "run.csv").returncode == 0
