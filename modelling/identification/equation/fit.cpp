@@ -247,7 +247,8 @@ std::vector<std::size_t> choose_columns(const ColumnPool& pool, const FitOptions
   double lowest = best[0].score;
   for (const LaggedSubset& each : best) lowest = std::min(lowest, each.score);
   const auto found = std::find_if(best.begin(), best.end(), [&](const LaggedSubset& each) {
-    return each.score <= lowest * as_good_as * as_good_as;  // of squares
+    // Of squares; what is left of an exact equation may be rounded below nothing.
+    return each.score <= lowest + std::abs(lowest) * (as_good_as * as_good_as - 1.0);
   });
   return found->columns;
 }

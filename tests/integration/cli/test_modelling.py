@@ -91,6 +91,21 @@ def test_group_names_places_that_move_alike(tmp_path):
     assert (tmp_path / "groups.svg").read_text().count("<rect") == 1 + 9 + 2
 
 
+def test_the_place_of_the_room_stays_out_of_the_choice_by_itself(tmp_path):
+    files = write_tests(tmp_path)
+    for file in files:  # a room that would say it all: z = 5 (room - 20)
+        rows = list(csv.reader(file.open()))
+        with file.open("w", newline="") as out:
+            csv.writer(out).writerows(
+                [rows[0] + ["room_degC"]] + [row + [20 + float(row[4]) / 5] for row in rows[1:]])
+    few = ("fit", *files, "--outputs", "z_um", "--terms", "1..2", "-o", tmp_path / "model.toml", "--json")
+    answer = run(*few)
+    assert answer.returncode == 0, answer.stderr
+    assert "room_degC: not chosen from, called like a room" in answer.stderr
+    assert "room_degC" not in json.loads(answer.stdout)["inputs"]
+    assert "room_degC" in json.loads(run(*few, "--free").stdout)["inputs"]
+
+
 def test_fit_finds_the_equation_and_its_model_predicts(tmp_path):
     files = write_tests(tmp_path)
     model = tmp_path / "model.toml"
