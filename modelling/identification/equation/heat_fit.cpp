@@ -8,6 +8,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "config/runs/model_inputs.hpp"
 #include "estimator/model/terms/low_pass.hpp"
 
 namespace thermocomp::identification {
@@ -17,7 +18,40 @@ constexpr std::size_t heats_max = 4;
 constexpr double gain_min = 0.05;
 constexpr std::array<double, 6> taus_s{60.0, 300.0, 900.0, 2700.0, 8100.0, 24300.0};
 
-std::vector<HeatColumn> candidates(const MeasuredTests& tests) {
+constexpr std::size_t starts_min = 3;
+constexpr double starts_apart_K = 1.0;
+
+/// With a factor, about the mean of the runs' starts.
+HeatColumn by_start(const MeasuredTests& tests, HeatColumn column, std::size_t place,
+                    bool at_start) {
+  double sum_degC = 0.0;
+  for (const TestRun& run : tests.runs)
+    sum_degC += run.reference_degC[static_cast<Eigen::Index>(place)];
+  column.factor = {place, at_start, sum_degC / static_cast<double>(tests.runs.size())};
+  return column;
+}
+
+void add_starts(const MeasuredTests& tests, const Equation& equation,
+                std::vector<HeatColumn>& all) {
+  std::vector<HeatColumn> acting;
+  for (const FitColumn& column : equation.columns)
+    if (!(column.tau_s > 0)) acting.push_back({0, 1.0, 0.0, {}, column.place});
+  if (acting.empty()) return;
+  const std::size_t first = *acting.front().place;
+  for (const HeatColumn& heat : all)
+    if (heat.power < 1.5) acting.push_back(heat);
+  const auto room = static_cast<std::size_t>(
+      std::find_if(tests.places.begin(), tests.places.end(), is_called_like_a_room) -
+      tests.places.begin());
+  for (const HeatColumn& column : acting) {
+    const std::size_t own = column.place.value_or(first);
+    if (starts_differ(tests, own)) all.push_back(by_start(tests, column, own, true));
+    if (room < tests.places.size() && room != own && starts_differ(tests, room))
+      all.push_back(by_start(tests, column, room, false));
+  }
+}
+
+std::vector<HeatColumn> candidates(const MeasuredTests& tests, const Equation& equation) {
   double longest_s = 0.0;
   for (const TestRun& run : tests.runs)
     longest_s = std::max(longest_s, run.time_s[run.time_s.size() - 1] - run.time_s[0]);
@@ -28,6 +62,7 @@ std::vector<HeatColumn> candidates(const MeasuredTests& tests) {
       for (const double tau_s : taus_s)
         if (tau_s <= longest_s / 3.0) all.push_back({signal, power, tau_s});
   }
+  add_starts(tests, equation, all);
   return all;
 }
 
@@ -92,22 +127,37 @@ bool helps_on_most(const std::vector<double>& before, const std::vector<double>&
 
 }  // namespace
 
+bool starts_differ(const MeasuredTests& tests, std::size_t place) {
+  std::vector<double> starts_degC;
+  for (const TestRun& run : tests.runs)
+    starts_degC.push_back(run.reference_degC[static_cast<Eigen::Index>(place)]);
+  const auto [least, most] = std::minmax_element(starts_degC.begin(), starts_degC.end());
+  return starts_degC.size() >= starts_min && *most - *least >= starts_apart_K;
+}
+
 Eigen::VectorXd column_of(const TestRun& run, const HeatColumn& column) {
-  Eigen::VectorXd heat = run.signals.col(static_cast<Eigen::Index>(column.signal));
+  Eigen::VectorXd heat =
+      column.place ? Eigen::VectorXd(run.places_K.col(static_cast<Eigen::Index>(*column.place)))
+                   : Eigen::VectorXd(run.signals.col(static_cast<Eigen::Index>(column.signal)));
   if (column.power > 1.5) heat = heat.cwiseAbs2().eval();
   LowPass late(column.tau_s);
-  const double first = heat[0];
   for (Eigen::Index row = 0; row < heat.size(); ++row)
-    heat[row] =
-        late.step(
-            std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(run.time_s[row])),
-            heat[row]) -
-        first;
-  return heat;
+    heat[row] = late.step(
+        std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(run.time_s[row])),
+        heat[row]);
+  if (column.factor) {
+    const auto place = static_cast<Eigen::Index>(column.factor->place);
+    const double above_K = run.reference_degC[place] - column.factor->place0_degC;
+    if (column.factor->at_start)
+      heat *= above_K;
+    else
+      heat.array() *= above_K + run.places_K.col(place).array();
+  }
+  return heat.array() - double(heat[0]);
 }
 
 HeatEquation add_heats(const MeasuredTests& tests, const Equation& equation) {
-  const std::vector<HeatColumn> all = candidates(tests);
+  const std::vector<HeatColumn> all = candidates(tests, equation);
   const std::vector<Eigen::MatrixXd> folds = equations(tests, equation, all);
   const Eigen::MatrixXd total =
       std::accumulate(folds.begin() + 1, folds.end(), Eigen::MatrixXd(folds[0]));

@@ -131,12 +131,18 @@ void judge(const MeasuredTests& tests, FamilyResult& result) {
   result.answers = true;
 }
 
+bool any_start_differs(const MeasuredTests& tests) {
+  for (std::size_t place = 0; place < tests.places.size(); ++place)
+    if (starts_differ(tests, place)) return true;
+  return false;
+}
+
 FamilyResult judge_few(Family family, const MeasuredTests& tests, const FitOptions& options,
                        const std::function<void()>& done) {
   FamilyResult result;
   result.family = family;
-  if (family == Family::physical && tests.signals.empty()) {
-    result.why_not = "no operating signal varies";
+  if (family == Family::physical && tests.signals.empty() && !any_start_differs(tests)) {
+    result.why_not = "no operating signal varies, and no three runs begin 1 K apart";
     return result;
   }
   try {
@@ -321,12 +327,18 @@ ThermalModel few_model(const MeasuredTests& tests, const HeatEquation& equation)
   auto row = static_cast<Eigen::Index>(equation.columns.size());
   for (const HeatColumn& heat : equation.heats) {
     TermSpec term;
-    term.kind = "missing_heat_source";
-    term.subject = tests.signals[heat.signal];
+    term.kind = heat.factor ? "start_dependence" : "missing_heat_source";
+    term.subject = heat.place ? tests.places[*heat.place] : tests.signals[heat.signal];
     term.shared["tau_s"] = heat.tau_s;
-    term.shared["power"] = heat.power;
+    if (heat.factor) {
+      term.subject += "|" + tests.places[heat.factor->place];
+      term.shared["at_start"] = heat.factor->at_start ? 1.0 : 0.0;
+      term.shared["place0_degC"] = heat.factor->place0_degC;
+    } else {
+      term.shared["power"] = heat.power;
+    }
     for (std::size_t o = 0; o < tests.outputs.size(); ++o)
-      term.per_output["gain_um_per_unit"][tests.outputs[o]] =
+      term.per_output[heat.factor ? "gain_um_per_unit_K" : "gain_um_per_unit"][tests.outputs[o]] =
           equation.coefficients(row, static_cast<Eigen::Index>(o));
     model.terms.push_back(std::move(term));
     ++row;

@@ -1,5 +1,6 @@
 #include "modelling/identification/families/families.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -460,4 +461,74 @@ TEST_CASE("two heaters that ran together share the gain, so that one alone is fo
     CHECK(alone_um > 0.0);
     CHECK(alone_um < 160.0);
   }
+}
+
+namespace {
+
+/// Days that begin at `starts_degC` of the first place; z = moved(start, rise, speed with 900 s).
+template <class Moved>
+MeasuredTests days_from(const std::vector<double>& starts_degC, Moved moved) {
+  std::vector<RunFile> files;
+  for (std::size_t i = 0; i < starts_degC.size(); ++i) {
+    RunFile run = machine_run(std::string("day").append(std::to_string(i)), i + 1,
+                              [](double, double, double, double) { return 0.0; });
+    std::vector<double>& place_degC = run.values[1];
+    const double shift_K = starts_degC[i] - place_degC[0];
+    double late = run.values[3][0];
+    for (std::size_t row = 0; row < place_degC.size(); ++row) {
+      place_degC[row] += shift_K;
+      if (row > 0) late += (run.values[3][row] - late) * -std::expm1(-60.0 / 900.0);
+      run.values[4][row] += moved(starts_degC[i], place_degC[row] - starts_degC[i], late);
+    }
+    files.push_back(std::move(run));
+  }
+  TestOptions options;
+  options.outputs = {"z_um"};
+  options.signals = true;
+  return measured_tests(files, options);
+}
+
+/// The only one of its kind; its gain of z at the second temperature.
+double gain_at(const ThermalModel& model, double temp_degC) {
+  const TermSpec* found = nullptr;
+  for (const TermSpec& term : model.terms) {
+    if (term.kind != "start_dependence") continue;
+    REQUIRE(found == nullptr);
+    found = &term;
+  }
+  REQUIRE(found != nullptr);
+  return found->per_output.at("gain_um_per_unit_K").at("z_um") *
+         (temp_degC - found->shared.at("place0_degC"));
+}
+
+}  // namespace
+
+TEST_CASE("a coefficient that depends on how the day began is fitted (C1)", "[families]") {
+  // [5 + 0.25 (T0 - 19)] dT: 5 + 0.25 (16 - 19) = 4.25 and 5 + 0.25 (25 - 19) = 6.5 um/K.
+  const MeasuredTests tests =
+      days_from({16.0, 20.0, 25.0, 22.0}, [](double start_degC, double rise_K, double) {
+        return (5.0 + 0.25 * (start_degC - 19.0)) * rise_K;
+      });
+  const FamiliesFit fit = fitted(tests, Family::physical);
+  const double always_um_per_K = fit.model.matrix_um_per_K[0][0];
+  CHECK(always_um_per_K + gain_at(fit.model, 16.0) == Approx(4.25).epsilon(0.02));
+  CHECK(always_um_per_K + gain_at(fit.model, 25.0) == Approx(6.5).epsilon(0.02));
+  CHECK(fit.chosen_result().left_out_rms_um[0] <
+        0.4 * result_of(fit, Family::static_few).left_out_rms_um[0]);
+}
+
+TEST_CASE("a running-in that depends on how the day began is fitted (C2)", "[families]") {
+  // N [b1 + b2 (T0 - 20)] LP(1), b1 = 0.004, b2 = 0.0008: 0.0008 and 0.008 um/rpm from 16 and 25.
+  const MeasuredTests tests =
+      days_from({16.0, 20.0, 25.0, 22.0}, [](double start_degC, double rise_K, double late_rpm) {
+        return 3.0 * rise_K + (0.004 + 0.0008 * (start_degC - 20.0)) * late_rpm;
+      });
+  const FamiliesFit fit = fitted(tests, Family::physical);
+  CHECK(gain_at(fit.model, 25.0) - gain_at(fit.model, 16.0) == Approx(0.0072).epsilon(0.05));
+  const auto by_start =
+      std::find_if(fit.model.terms.begin(), fit.model.terms.end(),
+                   [](const TermSpec& term) { return term.kind == "start_dependence"; });
+  CHECK(by_start->subject == "spindle_rpm|t1_degC");
+  CHECK(by_start->shared.at("tau_s") == 900.0);
+  CHECK(by_start->shared.at("at_start") == 1.0);
 }
