@@ -54,7 +54,7 @@ struct GainStatus {
 
 /// The running correction of an axis.
 struct CorrectionStatus {
-  std::string form{};  ///< "two_phase", "recursive"
+  std::string form{};  ///< "two_phase", "recursive", "constant"
   std::vector<GainStatus> gains{};
   double bias_um{not_a_number};
   double sd_um{not_a_number};

@@ -33,15 +33,19 @@ double age_s(const StatusView& view, nanoseconds since) {
   return std::max(0.0, seconds(view.report.now - since));
 }
 
+std::string form_text(CorrectionForm form) {
+  if (form == CorrectionForm::constant) return "constant";
+  return form == CorrectionForm::two_phase ? "two_phase" : "recursive";
+}
+
 CorrectionStatus correction_of(const CorrectionConfig& config, const CorrectionReport& report) {
-  CorrectionStatus status{
-      .form = config.form == CorrectionForm::two_phase ? "two_phase" : "recursive",
-      .bias_um = report.bias_um,
-      .sd_um = report.sd_um,
-      .probing_wanted = report.probing_wanted,
-      .phase = report.phase,
-      .taken = report.taken,
-      .refused = report.refused};
+  CorrectionStatus status{.form = form_text(config.form),
+                          .bias_um = report.bias_um,
+                          .sd_um = report.sd_um,
+                          .probing_wanted = report.probing_wanted,
+                          .phase = report.phase,
+                          .taken = report.taken,
+                          .refused = report.refused};
   for (std::size_t g = 0; g < config.groups.size(); ++g) {
     GainStatus gain{config.groups[g], report.gain[g], report.gain_sd[g]};
     if (report.has_record) {
