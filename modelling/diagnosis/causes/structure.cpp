@@ -168,8 +168,8 @@ std::vector<Hypothesis> position_dependence_hypotheses(const Material& material,
   return all;
 }
 
-/// p0 = -b / c of c p T + b T; over several outputs weighted by c^2.
-Parameter pivot(const FoundGains& found) {
+/// Where c (p - p0) T is none: p0 = -b / c of c p T + b T; over several outputs weighted by c^2.
+double pivot(const FoundGains& found) {
   double above = 0.0;
   double below = 0.0;
   for (const Eigen::VectorXd& gains : found.gains) {
@@ -177,11 +177,11 @@ Parameter pivot(const FoundGains& found) {
     above -= gains[0] * gains[1];
     below += gains[0] * gains[0];
   }
-  return {"p0_mm", {{"", below > 0 ? above / below : 0.0}}, {}};
+  return below > 0 ? above / below : 0.0;
 }
 
 std::vector<Parameter> gains_along(const FoundGains& found) {
-  return {gain_table(found, 0), pivot(found)};
+  return {gain_table(found, 0), {"p0_mm", {{"", pivot(found)}}, {}}};
 }
 
 /// c (p - p0) T: the effect of a temperature grows along an axis.
@@ -196,6 +196,97 @@ Cause position_dependence() {
   cause.experiment = Experiment::along_the_axis;
   cause.hypotheses = position_dependence_hypotheses;
   cause.gains = gains_along;
+  return cause;
+}
+
+constexpr CauseParameter start_tau{"tau_s", "s", 0.0, 6 * 3600.0, "time constant"};
+constexpr CauseParameter at_start{"at_start", "1", 0.0, 1.0, "by the start (1) or by now (0):"};
+/// Runs that begin at so many temperatures, and so far apart.
+constexpr std::size_t starts_min = 3;
+constexpr double starts_apart_K = 1.0;
+/// Gains are fitted about here, where a run begins.
+constexpr double usual_degC = 20.0;
+
+bool starts_differ(const MeasuredData& data, const std::string& place) {
+  std::vector<double> starts_degC;
+  for (const MeasuredRun& run : data.runs) starts_degC.push_back(data.reference_degC(run, place));
+  const auto [least, most] = std::minmax_element(starts_degC.begin(), starts_degC.end());
+  return starts_degC.size() >= starts_min && *most - *least >= starts_apart_K;
+}
+
+/// @param now  the place's rise, where its temperature now counts too; empty: that at the start
+Hypothesis by_start(const Material& material, const Subject& subject, const std::string& place,
+                    const ColumnOf& now) {
+  const bool is_signal = subject.kind == SubjectKind::signal;
+  Hypothesis by{material.name_of(subject) + "|" + place,
+                Form::own_gains,
+                {{std::string(start_tau.name), {0.0}, false, true},
+                 {std::string(at_start.name), {1.0}, false, true}},
+                {"gain_um_per_unit_K", "place0_degC"}};
+  if (is_signal) {
+    by.shape[0] = {std::string(start_tau.name),
+                   material.lag_times_s(shortest_lag_s, start_tau.high, 12), true};
+    by.shape[0].grid.insert(by.shape[0].grid.begin(), start_tau.low);
+  }
+  if (now) by.shape[1].grid = {0.0, 1.0};
+  by.simpler_cause = is_signal ? "missing_heat_source" : "wrong_coefficient";
+  by.simpler_subject = material.name_of(subject);
+  by.columns = [&material, place, now, values = material.values_of(subject)](const Shapes& shapes,
+                                                                             std::size_t) {
+    return material.stacked([&](const MeasuredRun& run) {
+      const Panel late = lagged(run.time_s, values(run), firsts_of(shapes));
+      const double start_degC = material.data().reference_degC(run, place) - usual_degC;
+      Panel all(run.rows(), 2 * std::ssize(shapes));
+      for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
+        Column above_K = Column::Constant(run.rows(), start_degC);
+        if (now && shapes[static_cast<std::size_t>(i)][1] < 0.5) above_K += now(run);
+        all.col(2 * i) = above_K.cwiseProduct(late.col(i));
+        all.col(2 * i + 1) = late.col(i);
+      }
+      return all;
+    });
+  };
+  return by;
+}
+
+/// By the place itself, for a signal the first of the model, and by the room.
+std::vector<Hypothesis> start_dependence_hypotheses(const Material& material,
+                                                    const Subject& subject) {
+  if (subject.kind != SubjectKind::input && subject.kind != SubjectKind::signal) return {};
+  const MeasuredData& data = material.data();
+  const std::string& first =
+      subject.kind == SubjectKind::input ? material.name_of(subject) : data.model.inputs.front();
+  std::vector<Hypothesis> all;
+  if (starts_differ(data, first)) all.push_back(by_start(material, subject, first, {}));
+  const std::string among_others = room_among(data.others);
+  const std::string room = among_others.empty() ? room_among(data.model.inputs) : among_others;
+  if (room.empty() || room == first || !starts_differ(data, room)) return all;
+  const auto& names = among_others.empty() ? data.model.inputs : data.others;
+  const Subject of_room{
+      among_others.empty() ? SubjectKind::input : SubjectKind::other_temperature,
+      static_cast<std::size_t>(std::find(names.begin(), names.end(), room) - names.begin())};
+  all.push_back(by_start(material, subject, room, material.values_of(of_room)));
+  return all;
+}
+
+std::vector<Parameter> gains_by_start(const FoundGains& found) {
+  return {gain_table(found, 0), {"place0_degC", {{"", usual_degC + pivot(found)}}, {}}};
+}
+
+/// g (X - X0) LP(u), X at the start or now: [a1 + a2 T0 + a3 T1] dT and
+/// N [b1 + b2 T0 + b3 T1] LP(1) of JP7689460B2.
+Cause start_dependence() {
+  Cause cause{"start_dependence", "structure"};
+  cause.parameters = {start_tau,
+                      at_start,
+                      {.name = "gain_um_per_unit_K", .unit = "um/(? K)", .says = "effect"},
+                      {.name = "place0_degC", .unit = "degC", .says = "none at"}};
+  cause.texts = {"An effect depends on how the day began",
+                 "its effect depends on the second temperature: where that stood at the start, or "
+                 "stands now",
+                 "Use the extended model; runs of days that begin colder and warmer settle it."};
+  cause.hypotheses = start_dependence_hypotheses;
+  cause.gains = gains_by_start;
   return cause;
 }
 
@@ -320,8 +411,8 @@ Cause hysteresis() {
 }  // namespace
 
 std::vector<Cause> of_structure() {
-  return {wrong_coefficient(),   thermal_lag(), missing_temperature(), nonlinear_expansion(),
-          position_dependence(), slow_sensor(), hysteresis()};
+  return {wrong_coefficient(),   thermal_lag(),      missing_temperature(), nonlinear_expansion(),
+          position_dependence(), start_dependence(), slow_sensor(),         hysteresis()};
 }
 
 }  // namespace thermocomp::diagnosis::causes

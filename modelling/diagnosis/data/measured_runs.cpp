@@ -78,12 +78,14 @@ MeasuredRun measured_run(const RunFile& file, const std::string& name, const Mea
   for (std::size_t i = 0; i < data.model.inputs.size(); ++i) {
     Column temps_degC = taken(*inputs.temperatures[i], rows);
     run.inputs_K.push_back(rise_of(temps_degC, inputs.reference_degC[i]));
+    run.inputs_reference_degC.push_back(inputs.reference_degC[i]);
     if (purpose == Purpose::search) run.inputs_degC.push_back(std::move(temps_degC));
   }
   for (const std::string& other : data.others) {
     const std::vector<double>& column = file.column(other);
     Column temps_degC = taken(column, rows);
-    run.others_K.push_back(rise_of(temps_degC, first_value(column).value_or(0.0)));
+    run.others_reference_degC.push_back(first_value(column).value_or(0.0));
+    run.others_K.push_back(rise_of(temps_degC, run.others_reference_degC.back()));
     if (purpose == Purpose::search) run.others_degC.push_back(std::move(temps_degC));
   }
   for (const std::string& signal : data.signals)
@@ -129,9 +131,11 @@ SharedColumns shared_columns(const ThermalModel& model, const std::vector<RunFil
 std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run,
                                const MeasuredData& data) {
   std::vector<const Column*> temperatures;
+  std::vector<double> reference_degC;
   for (const std::string& name : model.temperature_columns()) {
     const Column* input = find_column(data.model.inputs, run.inputs_K, name);
     temperatures.push_back(input != nullptr ? input : find_column(data.others, run.others_K, name));
+    reference_degC.push_back(data.reference_degC(run, name));
   }
   std::vector<const Column*> signals;
   for (const std::string& name : model.signal_columns())
@@ -143,18 +147,29 @@ std::vector<Column> model_over(const ThermalModel& model, const MeasuredRun& run
                                "a run must have every column of the model and its terms"}});
   }
   DisplacementModel displacement(model);
-  std::vector<double> rise_K(temperatures.size());
-  const std::vector<double> reference_K(temperatures.size(), 0.0);
+  // Of the absolute temperatures that the model sees, the rise is all but the reference.
+  std::vector<double> temps_degC(temperatures.size());
   std::vector<double> signal_values(signals.size());
   std::vector<double> out(model.outputs.size());
   std::vector<Column> result(model.outputs.size(), Column(run.rows()));
   for (Eigen::Index row = 0; row < run.rows(); ++row) {
-    for (std::size_t i = 0; i < temperatures.size(); ++i) rise_K[i] = (*temperatures[i])[row];
+    for (std::size_t i = 0; i < temperatures.size(); ++i)
+      temps_degC[i] = reference_degC[i] + (*temperatures[i])[row];
     for (std::size_t i = 0; i < signals.size(); ++i) signal_values[i] = (*signals[i])[row];
-    displacement.step(time_of_row(run.time_s[row]), rise_K, reference_K, signal_values, out);
+    displacement.step(time_of_row(run.time_s[row]), temps_degC, reference_degC, signal_values, out);
     for (std::size_t i = 0; i < out.size(); ++i) result[i][row] = out[i];
   }
   return result;
+}
+
+double MeasuredData::reference_degC(const MeasuredRun& run, const std::string& name) const {
+  const auto input = std::find(model.inputs.begin(), model.inputs.end(), name);
+  if (input != model.inputs.end())
+    return run.inputs_reference_degC[static_cast<std::size_t>(input - model.inputs.begin())];
+  const auto other = std::find(others.begin(), others.end(), name);
+  return other == others.end()
+             ? 0.0
+             : run.others_reference_degC[static_cast<std::size_t>(other - others.begin())];
 }
 
 Column MeasuredData::coefficient(const MeasuredRun& run, std::size_t output,

@@ -28,6 +28,8 @@ struct MeasuredRun {
   std::vector<Column> inputs_K;  ///< rise over the reference, order of the model's inputs
   std::vector<Column> others_K;  ///< rise of MeasuredData::others
   std::vector<Column> signals;   ///< order of MeasuredData::signals
+  std::vector<double> inputs_reference_degC;
+  std::vector<double> others_reference_degC;
   // What the search alone needs; of training runs only.
   std::vector<Column> others_degC;
   std::vector<Column> inputs_degC;
@@ -51,6 +53,8 @@ struct MeasuredData {
   /// deviation, as a share of the coefficient. 0: they are never doubted.
   double coefficient_sd{0.0};
 
+  /// The reference of a temperature in a run. @pre an input or one of the others
+  [[nodiscard]] double reference_degC(const MeasuredRun& run, const std::string& name) const;
   /// The model's coefficient of an input [um/K] in each row: matrix and guideways.
   [[nodiscard]] Column coefficient(const MeasuredRun& run, std::size_t output,
                                    std::size_t input) const;

@@ -75,7 +75,7 @@ std::map<std::string, Names> documented() {
 }
 
 /// A machine with everything that a cause of the displacement can act on.
-RunFile machine_run(int rows) {
+RunFile machine_run(int rows, double start_degC = 20.0) {
   RunFile run;
   run.name = "run.csv";
   run.columns = {"time_s", "t1_degC", "t2_degC", "room_degC", "spindle_rpm", "x_mm", "z_um"};
@@ -83,9 +83,9 @@ RunFile machine_run(int rows) {
   for (int row = 0; row < rows; ++row) {
     const double rise_K = 5.0 * std::sin(row / 60.0);
     const std::vector<double> values = {60.0 * row,
-                                        20.0 + rise_K,
+                                        start_degC + rise_K,
                                         21.0 + 3.0 * std::sin(row / 23.0),
-                                        20.0 + std::sin(row / 200.0),
+                                        start_degC + std::sin(row / 200.0),
                                         row / 50 % 2 == 0 ? 0.0 : 3000.0,
                                         100.0 * std::sin(row / 7.0),
                                         5.0 * rise_K};
@@ -162,9 +162,10 @@ TEST_CASE("what a cause is tried with lies within its physical range", "[diagnos
   model.inputs = {"t1_degC", "t2_degC"};
   model.outputs = {"z_um"};
   model.matrix_um_per_K = {{5.0, 1.0}};
-  const std::vector<RunFile> runs = {machine_run(900)};
-  const MeasuredData data =
-      measured_data(model, runs, {"run.csv"}, shared_columns(model, runs), Purpose::search);
+  const std::vector<RunFile> runs = {machine_run(900), machine_run(900, 18.0),
+                                     machine_run(900, 23.0)};
+  const MeasuredData data = measured_data(model, runs, {"1.csv", "2.csv", "3.csv"},
+                                          shared_columns(model, runs), Purpose::search);
   Names tried;
   for (const Hypothesis& each : hypotheses(data, stacked_rows(data))) {
     const Cause& cause = cause_named(each.cause);

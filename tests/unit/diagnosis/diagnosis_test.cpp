@@ -58,6 +58,35 @@ Diagnosis diagnosis_of(Hidden hidden) {
                   {run_with(2, 400, hidden)}, {"test.csv"});
 }
 
+/// A day that begins at `start_degC`; z = 5 t1 + hidden(start_degC, rise, late), late being the
+/// speed after JP7689460B2's 90 % in 30 min.
+template <class Hidden>
+RunFile day_from(unsigned seed, double start_degC, Hidden hidden) {
+  double late_rpm = 0.0;
+  RunFile run = run_with(seed, 500, [&](double rpm, double rise_K, int) {
+    late_rpm += (rpm - late_rpm) * -std::expm1(-60.0 / 781.7);
+    return hidden(start_degC, rise_K, late_rpm);
+  });
+  for (double& temp_degC : run.values[1]) temp_degC += start_degC - 20.0;
+  return run;
+}
+
+const Parameter& parameter(const NamedFinding& finding, const std::string& name) {
+  const auto at = std::find_if(finding.parameters.begin(), finding.parameters.end(),
+                               [&](const Parameter& each) { return each.name == name; });
+  REQUIRE(at != finding.parameters.end());
+  return *at;
+}
+
+template <class Hidden>
+Diagnosis diagnosis_of_days(Hidden hidden) {
+  return diagnose(one_input(),
+                  {day_from(1, 16.0, hidden), day_from(2, 20.0, hidden), day_from(3, 25.0, hidden),
+                   day_from(4, 22.0, hidden)},
+                  {"a", "b", "c", "d"}, {day_from(5, 18.0, hidden), day_from(6, 24.0, hidden)},
+                  {"e", "f"});
+}
+
 /// A machine that the readings move, each of which follows the speed in its own time.
 struct MeasuredMachine {
   std::vector<double> per_row;   ///< share of what it lacks that a reading rises in a row
@@ -400,4 +429,35 @@ TEST_CASE("the answer as JSON has the parts that others read", "[diagnosis]") {
         "\"extended\"", "\"unexplained_fraction\"", "\"probability\"", "\"family\": \"heat\"",
         "\"family_probability\"", "\"group\"", "\"headroom\"", "\"not_recorded\"", "\"families\""})
     CHECK_THAT(json, Catch::Contains(key));
+}
+
+TEST_CASE("a coefficient that depends on how the day began is named (C1)", "[diagnosis]") {
+  // [5 + 0.25 (T0 - 19)] dT: 4.25 um/K on the day that begins at 16 degC, 6.5 at 25 degC.
+  const Diagnosis diagnosis = diagnosis_of_days(
+      [](double start_degC, double rise_K, double) { return 0.25 * (start_degC - 19.0) * rise_K; });
+  REQUIRE_FALSE(diagnosis.findings.empty());
+  const NamedFinding& finding = diagnosis.findings.front();
+  CHECK(finding.cause == "start_dependence");
+  CHECK(finding.subject == "t1_degC|t1_degC");
+  CHECK(parameter(finding, "gain_um_per_unit_K").values.at("z_um") == Approx(0.25).epsilon(0.05));
+  CHECK(parameter(finding, "place0_degC").values.at("") == Approx(19.0).margin(0.3));
+  const TestGain& gain = finding.test.at("z_um");
+  CHECK(gain.after_um < 0.3 * gain.before_um);
+}
+
+TEST_CASE("a running-in that depends on how the day began is named (C2)", "[diagnosis]") {
+  // N b2 (T0 - 14) {1 - exp(ln 0.1 t / 30 min)} with b2 = 0.0004: 3.6 um at 4500 rpm from 16 degC.
+  const Diagnosis diagnosis = diagnosis_of_days([](double start_degC, double, double late_rpm) {
+    return 0.0004 * (start_degC - 14.0) * late_rpm;
+  });
+  REQUIRE_FALSE(diagnosis.findings.empty());
+  const NamedFinding& finding = diagnosis.findings.front();
+  CHECK(finding.cause == "start_dependence");
+  CHECK(finding.subject == "spindle_rpm|t1_degC");
+  CHECK(parameter(finding, "gain_um_per_unit_K").values.at("z_um") == Approx(0.0004).epsilon(0.1));
+  CHECK(parameter(finding, "place0_degC").values.at("") == Approx(14.0).margin(0.5));
+  const Interval tau_s = parameter(finding, "tau_s").ci95.at("");
+  CHECK(tau_s.low < 781.7);
+  CHECK(tau_s.high > 781.7);
+  CHECK(tau_s.high < 2.0 * tau_s.low);
 }
