@@ -20,7 +20,6 @@
 #include "daemon/start_state.hpp"
 #include "daemon/supervisor.hpp"
 #include "daemon/system/log_setup.hpp"
-#include "drivers/controllers/kinds/dry_run_controller.hpp"
 #include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"

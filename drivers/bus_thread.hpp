@@ -1,14 +1,68 @@
-/// An ordinary thread for one bus: named, with a stack sized on purpose, and deaf to signals.
+/// A driver's thread, its clock and its sleep.
 #pragma once
 
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <ctime>
 #include <functional>
+#include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 #include <string>
+#include <unistd.h>
 
-#include "drivers/driver_error.hpp"
+#include <sys/eventfd.h>
+
+#include "drivers/bus.hpp"
 
 namespace thermocomp {
+
+/// The one clock of the drivers: CLOCK_MONOTONIC as nanoseconds, the time of every Reading.
+[[nodiscard]] inline std::chrono::nanoseconds monotonic_now() noexcept {
+  return std::chrono::steady_clock::now().time_since_epoch();
+}
+
+/// A configured time in seconds as nanoseconds, bounded to a year so that sums never overflow.
+[[nodiscard]] inline std::chrono::nanoseconds from_seconds(double time_s) noexcept {
+  constexpr double year_s = 365.0 * 86400.0;
+  if (!(time_s > 0.0)) return std::chrono::nanoseconds{0};
+  return std::chrono::nanoseconds{
+      static_cast<std::chrono::nanoseconds::rep>((time_s < year_s ? time_s : year_s) * 1e9)};
+}
+
+/// Once signalled it stays so: every later sleep ends at once. signal() may come from any thread.
+class WakeEvent {
+ public:
+  /// @throws DriverError when the system has no more descriptors
+  WakeEvent() : descriptor_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    if (descriptor_ < 0) throw DriverError("no descriptor for a wake event");
+  }
+  WakeEvent(const WakeEvent&) = delete;
+  WakeEvent& operator=(const WakeEvent&) = delete;
+  ~WakeEvent() { ::close(descriptor_); }
+
+  void signal() noexcept {
+    const std::uint64_t one = 1;
+    // It can only fail when the counter is full, and then it is signalled already.
+    [[maybe_unused]] const ssize_t written = ::write(descriptor_, &one, sizeof one);
+  }
+
+  /// Sleeps until `time` (CLOCK_MONOTONIC), the event, or input (or an error) at `other`
+  /// (negative: none); an interrupted sleep ends early.
+  void wait_until(std::chrono::nanoseconds time, int other = -1) noexcept {
+    const std::chrono::nanoseconds left = time - monotonic_now();
+    if (left <= std::chrono::nanoseconds{0}) return;
+    const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
+    const timespec limit{static_cast<time_t>(whole.count()),
+                         static_cast<long>((left - whole).count())};
+    std::array<pollfd, 2> watched{pollfd{descriptor_, POLLIN, 0}, pollfd{other, POLLIN, 0}};
+    ::ppoll(watched.data(), watched.size(), &limit, nullptr);
+  }
+
+ private:
+  int descriptor_;
+};
 
 /// The daemon locks its memory, so every stack is resident in full: 256 KiB instead of glibc's
 /// 8 MiB. The thread takes no signals (they belong to the main thread) and never inherits the

@@ -5,7 +5,6 @@
 #include <pwd.h>
 #include <utility>
 
-#include "config/text/number_text.hpp"
 #include "config/text/printable_text.hpp"
 #include "status/codes.hpp"
 #include "status/figures.hpp"

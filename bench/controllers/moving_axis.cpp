@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/controllers/kinds/modbus/travel_registers.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/pipeline/estimator.hpp"

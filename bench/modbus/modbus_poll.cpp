@@ -23,7 +23,7 @@
 
 #include <modbus/modbus.h>
 
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/sensors/modbus_source.hpp"
 #include "modbus_bench_server.hpp"
 

@@ -21,7 +21,7 @@
 
 #include <sys/resource.h>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "modelling/structure/solve/statics.hpp"
 #include "modelling/structure/structure_model.hpp"
 

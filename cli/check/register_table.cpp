@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cli/common/modbus_names.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "estimator/axis_spans.hpp"

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "estimator/axis_spans.hpp"
 #include "estimator/model/displacement_model.hpp"

@@ -3,7 +3,7 @@
 #include <array>
 #include <variant>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp::cli {
 

@@ -8,7 +8,7 @@
 
 #include "cli/import/clock_shift.hpp"
 #include "config/runs/robust.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "config/text/units.hpp"
 

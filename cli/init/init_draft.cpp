@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "cli/common/modbus_names.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/toml/toml_text.hpp"
 #include "daemon/history/replay/replay.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "config/model/model_file.hpp"
 #include "config/runs/robust.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 
 namespace thermocomp::cli {

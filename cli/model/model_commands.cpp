@@ -14,7 +14,6 @@
 #include "config/model/model_file.hpp"
 #include "config/runs/blunders.hpp"
 #include "config/runs/run_file.hpp"
-#include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "daemon/history/replay/record_loader.hpp"
 #include "report/output_file.hpp"

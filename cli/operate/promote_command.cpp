@@ -10,7 +10,7 @@
 
 #include "cli/common/daemon_client.hpp"
 #include "cli/common/json_fields.hpp"
-#include "config/toml/file_limits.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "report/output_file.hpp"
 
 namespace thermocomp::cli {

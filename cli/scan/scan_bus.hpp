@@ -8,7 +8,7 @@
 
 #include "cli/scan/scan_hints.hpp"
 #include "cli/scan/scan_report.hpp"
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/sensors/bus_config.hpp"
 #include "estimator/estimator_config.hpp"
 

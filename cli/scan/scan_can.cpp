@@ -9,9 +9,9 @@
 #include "cli/common/modbus_names.hpp"
 #include "cli/scan/scan_bus.hpp"
 #include "config/text/units.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "estimator/axis_spans.hpp"
 #include "estimator/checks.hpp"
 

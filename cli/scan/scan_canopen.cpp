@@ -4,9 +4,9 @@
 #include <set>
 
 #include "cli/scan/scan_protocol.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/can/canopen/canopen_line.hpp"
 #include "drivers/can/signal_codec.hpp"
-#include "drivers/monotonic_clock.hpp"
 
 namespace thermocomp::cli {
 namespace {

@@ -11,7 +11,7 @@
 #include "cli/common/modbus_names.hpp"
 #include "cli/scan/scan_bus.hpp"
 #include "cli/scan/serial_holder.hpp"
-#include "drivers/driver_error.hpp"
+#include "drivers/bus.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "drivers/sensors/modbus_poller.hpp"

@@ -5,7 +5,7 @@
 #include <map>
 #include <poll.h>
 
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
 
 namespace thermocomp::cli {
 namespace {

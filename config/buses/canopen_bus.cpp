@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-#include "config/buses/bus_section.hpp"
+#include "config/buses/buses.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 

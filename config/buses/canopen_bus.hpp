@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "config/buses/eds_files.hpp"
+#include "config/buses/database_files.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 

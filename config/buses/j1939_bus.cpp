@@ -3,7 +3,7 @@
 #include <charconv>
 #include <optional>
 
-#include "config/buses/bus_section.hpp"
+#include "config/buses/buses.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
 

@@ -1,4 +1,4 @@
-#include "config/buses/bus_section.hpp"
+#include "config/buses/buses.hpp"
 #include "config/sections/common.hpp"
 #include "config/sections/modbus_values.hpp"
 

@@ -1,16 +1,17 @@
 #include "config/model/model_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <openssl/evp.h>
 #include <set>
 
 #include <Eigen/Eigenvalues>
 
-#include "config/model/course_table.hpp"
-#include "config/model/made_from.hpp"
+#include "config/model/model_tables.hpp"
 #include "config/text/units.hpp"
-#include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
+#include "estimator/checks.hpp"
 
 namespace thermocomp {
 namespace {
@@ -445,6 +446,21 @@ ThermalModel parse_model(const std::string& text, const std::string& name) {
 
 ThermalModel load_model(const std::filesystem::path& path) {
   return parse_model(read_text_file(path, model_bytes_max), path.string());
+}
+
+std::string sha256_hex(std::string_view bytes) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int size = 0;
+  const int done =
+      EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr);
+  THERMOCOMP_ENSURE(done == 1 && size == 32);
+  std::string text;
+  for (unsigned int i = 0; i < size; ++i) {
+    constexpr std::string_view digits = "0123456789abcdef";
+    text += digits[digest[i] >> 4u];
+    text += digits[digest[i] & 15u];
+  }
+  return text;
 }
 
 }  // namespace thermocomp

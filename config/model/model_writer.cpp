@@ -1,9 +1,8 @@
 #include <algorithm>
 #include <string>
 
-#include "config/model/course_table.hpp"
-#include "config/model/made_from.hpp"
 #include "config/model/model_file.hpp"
+#include "config/model/model_tables.hpp"
 #include "config/toml/toml_text.hpp"
 #include "estimator/checks.hpp"
 

@@ -15,7 +15,7 @@
 #include "config/run_forms/text_table.hpp"
 #include "config/run_forms/time_column.hpp"
 #include "config/run_forms/time_stamp.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
 

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "config/run_forms/column_map.hpp"
-#include "config/run_forms/number_text.hpp"
 #include "config/run_forms/problem_list.hpp"
+#include "config/run_forms/spelled_unit.hpp"
 
 namespace thermocomp {
 

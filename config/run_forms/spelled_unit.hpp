@@ -1,4 +1,4 @@
-/// Units as people write them in a header: "T1 [°C]", "z (mm)", "Temp °C", "I / A".
+/// Units as others spell them, and the number in front of one.
 #pragma once
 
 #include <optional>
@@ -44,5 +44,18 @@ struct UnitConversion {
 
 /// `base` as one of our column names: blanks, commas, quotes and bars as `_`.
 [[nodiscard]] std::string plain_name(std::string_view base);
+
+/// A number with its unit behind it, "22.1 °C"; without one, `unit` is nullptr.
+struct NumberText {
+  std::string_view digits;  ///< the number
+  const SpelledUnit* unit{nullptr};
+};
+[[nodiscard]] NumberText number_text_of(std::string_view field);
+
+/// Whether it may be a number of one form or the other, with or without a unit.
+[[nodiscard]] bool looks_like_number(std::string_view field);
+
+/// Digits in front and, where there is none behind, three digits after each `sign`.
+[[nodiscard]] bool is_grouped(std::string_view text, char sign);
 
 }  // namespace thermocomp

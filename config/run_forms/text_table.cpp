@@ -4,7 +4,6 @@
 #include <map>
 #include <set>
 
-#include "config/run_forms/number_text.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp {
 namespace {

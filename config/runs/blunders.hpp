@@ -1,6 +1,8 @@
-/// Measured displacements that no structure can show: a probe that missed, a row read wrong.
+/// What is wrong with runs: displacements that no structure can show (a probe that missed, a row
+/// read wrong), and rows that are used twice.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,5 +34,15 @@ struct Blunders {
 
 /// The same, and each becomes a missing value.
 std::vector<Blunders> leave_out_blunders(RunFile& run, const std::vector<std::string>& columns);
+
+/// Whether both are of the same file and some row is selected in both. Files are the same when
+/// their names lead to the same place.
+[[nodiscard]] bool share_rows(const RunFile& a, const RunFile& b);
+
+/// Runs that are to be left out in turn, or one to be judged by another, must not share rows.
+/// @throws ConfigurationError naming the file
+void refuse_overlap(std::span<const RunFile> runs);
+/// Rows that a model is fitted to, and rows that it is judged on.
+void refuse_overlap(std::span<const RunFile> train, std::span<const RunFile> test);
 
 }  // namespace thermocomp

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "config/toml/toml_reader.hpp"
-#include "drivers/sentinel.hpp"
+#include "drivers/bus.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp::sections {

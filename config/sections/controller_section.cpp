@@ -5,12 +5,10 @@
 #include <optional>
 
 #include "config/sections/can_signals.hpp"
-#include "config/sections/can_travel.hpp"
 #include "config/sections/common.hpp"
-#include "config/sections/modbus_travel.hpp"
 #include "config/sections/modbus_values.hpp"
 #include "config/sections/travel_section.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "estimator/axis_spans.hpp"
 

@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "config/toml/toml_reader.hpp"
+#include "estimator/correction_config.hpp"
 #include "estimator/estimator_config.hpp"
+#include "estimator/thermal_model.hpp"
 
 namespace thermocomp::sections {
 
@@ -22,5 +24,12 @@ namespace thermocomp::sections {
 /// @param signals  what the controller reports
 [[nodiscard]] CompensationConfig read_compensation(const TomlTable& table,
                                                    const std::vector<std::string>& signals);
+
+/// [correction]: how measured displacements correct the model while it runs.
+[[nodiscard]] CorrectionConfig read_correction(const TomlTable& table);
+
+/// Checks that every input of a group is one of the model, and in no other group.
+void check_correction(const TomlTable& table, const CorrectionConfig& config,
+                      const ThermalModel& model);
 
 }  // namespace thermocomp::sections

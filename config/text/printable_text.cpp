@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -87,6 +89,22 @@ std::string printable_text(std::string_view text) {
     text.remove_prefix(bytes);
   }
   return shown;
+}
+
+void append_number(std::string& text, double value) {
+  if (std::isnan(value)) {  // to_chars would show the sign of a NaN
+    text += "nan";
+    return;
+  }
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+  text.append(buffer.data(), end);
+}
+
+std::string number_text(double value) {
+  std::string text;
+  append_number(text, value);
+  return text;
 }
 
 }  // namespace thermocomp

@@ -1,5 +1,4 @@
-/// What may be shown on a terminal as it is: valid UTF-8 without characters that command the
-/// terminal, turn the direction of writing or cannot be seen.
+/// What somebody else wrote as text that can be shown, and numbers as text that reads back.
 #pragma once
 
 #include <string>
@@ -17,5 +16,9 @@ inline constexpr std::string_view printable_rule =
 /// The same text with what is not printable named: `<U+202E>`; a byte that is not UTF-8 as `?`, a
 /// C0 control character or DEL as a blank.
 [[nodiscard]] std::string printable_text(std::string_view text);
+
+/// Appends the shortest decimal text of `value`; NaN becomes "nan".
+void append_number(std::string& text, double value);
+[[nodiscard]] std::string number_text(double value);
 
 }  // namespace thermocomp

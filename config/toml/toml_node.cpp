@@ -4,7 +4,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp::detail {
 namespace {

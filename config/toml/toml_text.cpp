@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp {
 

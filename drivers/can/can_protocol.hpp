@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "drivers/bus.hpp"
 #include "drivers/can/can_socket.hpp"
-#include "drivers/unit_health.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

@@ -14,7 +14,7 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -6,13 +6,11 @@
 
 #include <modbus/modbus.h>
 
-#include "drivers/driver_error.hpp"
+#include "drivers/bus.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/modbus/frames.hpp"
 #include "drivers/modbus/late_answers.hpp"
 #include "drivers/modbus/register_codec.hpp"
-#include "drivers/modbus/rtu_port.hpp"
-#include "drivers/modbus/tcp_port.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {
@@ -463,15 +461,6 @@ Exchange ModbusConnection::Implementation::write(int unit, const Pdu& request, s
                          word_at(answer(), 3) == word;
   if (!confirmed) reject(unit, written, "the answer confirms another write");
   return written;
-}
-
-std::unique_ptr<ModbusPort> make_modbus_port(const ModbusLine& line) {
-  if (const auto* rtu = std::get_if<ModbusRtu>(&line.link)) return std::make_unique<RtuPort>(*rtu);
-  const auto& tcp = std::get<ModbusTcp>(line.link);
-  const nanoseconds timeout = from_seconds(line.timeout_ms * 1e-3);
-  auto port = std::make_unique<TcpPort>(tcp, timeout);
-  if (!tcp.s7) return port;
-  return make_s7_port(*tcp.s7, std::move(port), timeout);
 }
 
 ModbusConnection::ModbusConnection(const ModbusLine& line)

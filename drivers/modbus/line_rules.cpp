@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "drivers/driver_error.hpp"
+#include "drivers/bus.hpp"
 #include "drivers/modbus/connection.hpp"
 
 namespace thermocomp {

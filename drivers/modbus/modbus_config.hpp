@@ -10,8 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "drivers/bus_outline.hpp"
-#include "drivers/sentinel.hpp"
+#include "drivers/bus.hpp"
 
 namespace thermocomp {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <variant>
 
-#include "drivers/bus_outline.hpp"
+#include "drivers/bus.hpp"
 #include "drivers/can/can_config.hpp"
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"

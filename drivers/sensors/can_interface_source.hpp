@@ -1,18 +1,20 @@
-/// What every source of readings on a CAN interface has: socket, thread, hand-over, health.
+/// Sources of readings on a CAN interface: socket, thread, hand-over, health; a protocol above
+/// frames.
 #pragma once
 
 #include <atomic>
 #include <cstddef>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "drivers/bus_thread.hpp"
+#include "drivers/can/can_protocol.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/sensors/sensor_source.hpp"
 #include "drivers/wait_free_slot.hpp"
-#include "drivers/wake_event.hpp"
 
 namespace thermocomp {
 
@@ -73,6 +75,27 @@ class CanInterfaceSource : public SensorSource {
   mutable std::mutex health_mutex_;
   BusHealth health_;
   BusThread thread_;
+};
+
+/// Gives a protocol its socket, its clock and its thread. While the interface is missing, down or
+/// bus-off the protocol is closed, which makes its readings no_answer; it is opened again for ever.
+class CanProtocolSource final : public CanInterfaceSource {
+ public:
+  /// @param kind  as BusHealth tells it
+  /// @throws InvalidValue for an impossible interface or number of identifiers
+  CanProtocolSource(std::string name, std::string kind, std::string interface, double reconnect_s,
+                    std::unique_ptr<CanProtocol> protocol);
+  ~CanProtocolSource() override;
+
+ private:
+  void bus_opened(nanoseconds now) override;
+  void bus_closed(nanoseconds now) override;
+  void work() override;
+  void write_readings(std::vector<Reading>& readings) override;
+  [[nodiscard]] std::vector<UnitHealth> units(nanoseconds now) override;
+  void send();
+
+  std::unique_ptr<CanProtocol> protocol_;
 };
 
 }  // namespace thermocomp

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/sensors/make_source.hpp"
 #include "estimator/checks.hpp"
 

@@ -1,5 +1,5 @@
 #include "drivers/can/canopen/canopen_line.hpp"
-#include "drivers/sensors/can_protocol_source.hpp"
+#include "drivers/sensors/can_interface_source.hpp"
 #include "drivers/sensors/make_source.hpp"
 
 namespace thermocomp {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "drivers/driver_error.hpp"
+#include "drivers/bus.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/modbus/register_codec.hpp"
-#include "drivers/monotonic_clock.hpp"
 
 namespace thermocomp {
 namespace {

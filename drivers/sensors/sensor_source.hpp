@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/unit_health.hpp"
+#include "drivers/bus.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "config/text/problems.hpp"
-#include "config/toml/file_limits.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "status/codes.hpp"
 #include "status/verdict.hpp"
 

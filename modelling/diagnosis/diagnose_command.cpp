@@ -12,7 +12,6 @@
 #include "config/model/model_file.hpp"
 #include "config/runs/blunders.hpp"
 #include "config/runs/run_file.hpp"
-#include "config/runs/run_overlap.hpp"
 #include "modelling/diagnosis/answer/findings.hpp"
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/diagnosis/report/diagnosis_report.hpp"

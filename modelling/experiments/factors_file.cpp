@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "modelling/experiments/test_plan.hpp"
 
 namespace thermocomp::experiments {

@@ -7,8 +7,7 @@
 #include <set>
 
 #include "config/runs/blunders.hpp"
-#include "config/runs/run_overlap.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "modelling/identification/printed.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "modelling/placement/comparison.hpp"
 #include "modelling/structure/pictures.hpp"
 #include "report/output_file.hpp"

@@ -5,7 +5,7 @@
 #include <map>
 #include <optional>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "modelling/structure/mesh/file_mesh.hpp"
 #include "modelling/structure/regions.hpp"
 #include "modelling/structure/solve/locate.hpp"

@@ -11,7 +11,7 @@
 #include "config/run_forms/number_form.hpp"
 #include "config/run_forms/text_table.hpp"
 #include "config/text/problems.hpp"
-#include "config/toml/file_limits.hpp"
+#include "config/toml/toml_reader.hpp"
 #include "modelling/thermal_test/test_report.hpp"
 #include "report/html_page.hpp"
 #include "report/svg_plot.hpp"

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "drivers/can/little_endian.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/can/signal_codec.hpp"
-#include "drivers/monotonic_clock.hpp"
 
 namespace thermocomp {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "drivers/can/canopen/canopen_config.hpp"
-#include "simulator/devices/field_node.hpp"
+#include "simulator/devices/field_nodes.hpp"
 
 namespace thermocomp {
 

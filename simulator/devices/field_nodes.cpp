@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "simulator/devices/field_node.hpp"
-
 namespace thermocomp {
 namespace {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/bus_thread.hpp"
 #include "drivers/can/j1939/j1939_message.hpp"
-#include "drivers/can/little_endian.hpp"
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/can/signal_codec.hpp"
 
 namespace thermocomp {
 namespace {

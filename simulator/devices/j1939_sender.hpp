@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "simulator/devices/field_node.hpp"
+#include "simulator/devices/field_nodes.hpp"
 
 namespace thermocomp {
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <functional>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "config/toml/toml_reader.hpp"
 #include "simulator/plant/reduced_body.hpp"

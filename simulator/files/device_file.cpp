@@ -3,13 +3,11 @@
 #include <map>
 
 #include "config/buses/presets.hpp"
-#include "config/sections/can_travel.hpp"
-#include "config/sections/modbus_travel.hpp"
+#include "config/sections/travel_section.hpp"
 #include "config/text/units.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"
 #include "simulator/files/can_places.hpp"
-#include "simulator/files/fault_codes.hpp"
 #include "simulator/files/machine_file_parts.hpp"
 #include "simulator/plant/scripted_events.hpp"
 

@@ -4,7 +4,6 @@
 
 #include "config/buses/canopen_bus.hpp"
 #include "config/buses/j1939_bus.hpp"
-#include "simulator/files/fault_codes.hpp"
 #include "simulator/files/machine_file_parts.hpp"
 
 namespace thermocomp {

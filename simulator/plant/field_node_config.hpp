@@ -1,7 +1,9 @@
 /// Simulated nodes above CAN frames as the machine's file gives them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <variant>
@@ -9,7 +11,34 @@
 
 #include "drivers/can/canopen/canopen_config.hpp"
 #include "drivers/can/j1939/j1939_config.hpp"
-#include "simulator/plant/channel_fault.hpp"
+
+namespace thermocomp {
+
+/// What a device can say of a channel instead of its temperature.
+enum class ChannelFault { open_circuit, short_circuit, over_range, under_range, error };
+/// Raw codes for it; the first of a list is shown unless an event names another.
+using FaultCodes = std::map<ChannelFault, std::vector<std::int64_t>>;
+
+/// The code that is shown for the fault: `named` if it is listed, else the first listed; nullopt:
+/// no fault, or no code for it.
+[[nodiscard]] inline std::optional<std::int64_t> code_for(const FaultCodes& codes,
+                                                          std::optional<ChannelFault> fault,
+                                                          std::optional<std::int64_t> named) {
+  if (!fault) return std::nullopt;
+  const auto found = codes.find(*fault);
+  if (found == codes.end()) return std::nullopt;
+  const auto& listed = found->second;
+  const bool is_listed = named && std::find(listed.begin(), listed.end(), *named) != listed.end();
+  return is_listed ? *named : listed.front();
+}
+
+/// Numbers of a status beside a value of a CAN device.
+struct CanStatusCodes {
+  std::int64_t good{0};
+  FaultCodes codes;
+};
+
+}  // namespace thermocomp
 
 /// Every kind: its table in the machine's file and its configuration. A kind has besides, for its
 /// configuration, read_node() (simulator/files) and switch_on() (simulator/devices).

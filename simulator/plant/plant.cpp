@@ -5,8 +5,7 @@
 #include <numeric>
 
 #include "estimator/checks.hpp"
-#include "simulator/plant/operating_signal.hpp"
-#include "simulator/plant/room_air.hpp"
+#include "simulator/plant/influences.hpp"
 #include "simulator/plant/seeded_noise.hpp"
 #include "simulator/plant/thermal_network.hpp"
 

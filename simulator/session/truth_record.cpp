@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 
 namespace thermocomp {

@@ -15,10 +15,10 @@
 
 #include "common/fuzz.hpp"
 #include "common/virtual_line.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/can/signal_codec.hpp"
 #include "drivers/controllers/kinds/can/travel_frames.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 
 using namespace thermocomp;

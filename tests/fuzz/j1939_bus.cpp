@@ -4,7 +4,7 @@
 
 #include "common/fuzz.hpp"
 #include "drivers/can/j1939/j1939_line.hpp"
-#include "drivers/can/little_endian.hpp"
+#include "drivers/can/signal_codec.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

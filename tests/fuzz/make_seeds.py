@@ -426,7 +426,7 @@ def dictionaries(folder):
     folder.mkdir(parents=True, exist_ok=True)
     toml = {"[[", "]]", " = ", "true", "false", "nan", "-inf", "1e300", '"""', "0x", "{ ", " }", "\n[",
             "\\u0000", "1979-05-27T07:32:00Z"}
-    model = literals("config/model/model_file.cpp", "config/model/course_table.cpp", "estimator/model/terms/*.cpp", "config/text/units.cpp")
+    model = literals("config/model/model_file.cpp", "config/model/model_tables.cpp", "estimator/model/terms/*.cpp", "config/text/units.cpp")
     dictionary(folder, "model_file", toml | model)
     buses = literals("config/buses/*.cpp", "config/sections/*.cpp", "drivers/**/*_config.hpp")
     buses |= listed("drivers/sensors/bus_config.hpp", "BUS")

@@ -29,7 +29,7 @@ SIGNALS = "drivers/can/signal_codec.cpp"
 SDO = "drivers/can/canopen/sdo_client.cpp"
 NODE = "drivers/can/canopen/canopen_node.cpp"
 J1939 = "drivers/can/j1939/j1939_message.cpp"
-TRANSPORT = "drivers/can/j1939/transport.cpp"
+TRANSPORT = "drivers/can/j1939/j1939_message.cpp"
 
 # Suite: (name, file, what stands there, what stands there instead)
 SUITES = {

@@ -18,7 +18,7 @@
 #include "daemon/cycle/cycle.hpp"
 #include "daemon/cycle/real_time_thread.hpp"
 #include "daemon/history/writing/history_writer.hpp"
-#include "drivers/controllers/kinds/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/sensors/modbus_source.hpp"
 #include "tests/real_time/thread_watch.hpp"
 

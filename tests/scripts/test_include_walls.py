@@ -37,7 +37,7 @@ def compile_beside(commands, file, header, folder):
 
 
 @pytest.mark.parametrize("file, header", [
-    ("estimator/axes/limiter.cpp", "drivers/driver_error.hpp"),
+    ("estimator/axes/limiter.cpp", "drivers/bus.hpp"),
     ("drivers/modbus/connection.cpp", "drivers/can/can_socket.hpp"),
     ("drivers/sensors/can_source.cpp", "drivers/modbus/connection.hpp"),
     ("drivers/can/canopen/canopen_node.cpp", "drivers/can/j1939/j1939_line.hpp"),

@@ -7,8 +7,8 @@
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/run_forms/time_stamp.hpp"
-#include "config/text/number_text.hpp"
 #include "config/text/outer_json.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp::forms {
 namespace {

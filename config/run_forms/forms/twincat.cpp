@@ -3,7 +3,7 @@
 #include "config/run_forms/field_text.hpp"
 #include "config/run_forms/log_form.hpp"
 #include "config/run_forms/number_form.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp::forms {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "config/runs/robust.hpp"
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/problems.hpp"
 #include "daemon/history/replay/replay.hpp"
 #include "daemon/history/replay/segment_walk.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "estimator/axis_spans.hpp"
 
 namespace thermocomp {

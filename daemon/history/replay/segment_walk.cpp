@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "config/daemon/daemon_config.hpp"
-#include "config/text/number_text.hpp"
 #include "config/text/printable_text.hpp"
 #include "daemon/history/format/chunk_codec.hpp"
 #include "estimator/checks.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/bus_outline.hpp"
+#include "drivers/bus.hpp"
 #include "drivers/can/can_config.hpp"
 
 namespace thermocomp {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/can/little_endian.hpp"
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
+#include "drivers/can/signal_codec.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string_view>
 
-#include "drivers/can/little_endian.hpp"
+#include "drivers/can/signal_codec.hpp"
 
 namespace thermocomp {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdio>
 
-#include "drivers/can/little_endian.hpp"
+#include "drivers/can/signal_codec.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

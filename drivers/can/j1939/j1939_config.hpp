@@ -8,8 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/bus_outline.hpp"
-#include "drivers/sentinel.hpp"
+#include "drivers/bus.hpp"
 
 namespace thermocomp {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "drivers/can/little_endian.hpp"
+#include "drivers/can/signal_codec.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -8,7 +8,6 @@
 
 #include "drivers/can/can_protocol.hpp"
 #include "drivers/can/j1939/j1939_message.hpp"
-#include "drivers/can/j1939/transport.hpp"
 
 namespace thermocomp {
 

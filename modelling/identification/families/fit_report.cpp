@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "estimator/model/model_domain.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"

@@ -3,7 +3,7 @@
 #include <limits>
 #include <set>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "modelling/structure/files/structure_reading.hpp"
 #include "modelling/structure/files/structure_spec.hpp"

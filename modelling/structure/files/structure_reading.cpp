@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp::structure {
 

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <unordered_map>
 
-#include "config/text/number_text.hpp"
+#include "config/text/printable_text.hpp"
 
 namespace thermocomp::structure {
 

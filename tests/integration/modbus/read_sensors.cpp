@@ -14,7 +14,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/sensors/modbus_source.hpp"
 
 namespace {

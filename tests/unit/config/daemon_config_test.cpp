@@ -3,7 +3,7 @@
 #include <functional>
 #include <set>
 
-#include "config/buses/bus_section.hpp"
+#include "config/buses/buses.hpp"
 #include "config/model/model_file.hpp"
 #include "files.hpp"
 

@@ -2,7 +2,7 @@
 #include <fstream>
 
 #include "config/model/model_file.hpp"
-#include "config/runs/run_overlap.hpp"
+#include "config/runs/blunders.hpp"
 #include "files.hpp"
 
 using namespace thermocomp;

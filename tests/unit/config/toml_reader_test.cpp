@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "config/text/number_text.hpp"
 #include "config/text/printable_text.hpp"
 #include "files.hpp"
 

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <thread>
 
+#include "drivers/bus_thread.hpp"
 #include "drivers/controllers/controller_link.hpp"
-#include "drivers/monotonic_clock.hpp"
 
 namespace thermocomp::test {
 

@@ -17,8 +17,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-#include "drivers/monotonic_clock.hpp"
-#include "drivers/wake_event.hpp"
+#include "drivers/bus_thread.hpp"
 
 namespace thermocomp::test {
 

@@ -4,13 +4,12 @@
 
 #include <catch2/catch.hpp>
 
+#include "drivers/bus.hpp"
 #include "drivers/can/can_socket.hpp"
 #include "drivers/controllers/kinds/can/can_controller.hpp"
-#include "drivers/controllers/kinds/dry_run_controller.hpp"
 #include "drivers/controllers/kinds/make_controller.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/write_gate.hpp"
-#include "drivers/driver_error.hpp"
 #include "estimator/checks.hpp"
 
 using namespace thermocomp;

@@ -1,6 +1,4 @@
 // Offsets along a travel as a set of registers, and the link that writes them.
-#include "drivers/controllers/kinds/modbus/travel_registers.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,7 +8,7 @@
 
 #include "cycle_stub.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_controller.hpp"
-#include "drivers/controllers/kinds/modbus/written_offsets.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
 #include "estimator/checks.hpp"

@@ -16,7 +16,7 @@
 #include <catch2/catch.hpp>
 #include <sys/syscall.h>
 
-#include "drivers/controllers/kinds/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
 
 using namespace thermocomp;
 using namespace std::chrono_literals;

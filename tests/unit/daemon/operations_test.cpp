@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/state/state_file.hpp"
-#include "drivers/controllers/kinds/dry_run_controller.hpp"
+#include "drivers/controllers/kinds/make_controller.hpp"
 #include "history_fixture.hpp"
 
 using namespace thermocomp;

@@ -3,9 +3,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "drivers/driver_error.hpp"
+#include "drivers/bus.hpp"
+#include "drivers/bus_thread.hpp"
 #include "drivers/modbus/connection.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "modbus_peer.hpp"
 
 using namespace thermocomp;

@@ -10,8 +10,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "drivers/driver_error.hpp"
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/bus.hpp"
+#include "drivers/bus_thread.hpp"
 #include "modbus_peer.hpp"
 
 using namespace thermocomp;

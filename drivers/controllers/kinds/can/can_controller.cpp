@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
+#include "drivers/bus_thread.hpp"
 #include "drivers/controllers/travel_values.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -12,7 +12,6 @@
 #include "drivers/controllers/kinds/can/travel_frames.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/wait_free_slot.hpp"
-#include "drivers/wake_event.hpp"
 
 namespace thermocomp {
 

@@ -1,10 +1,10 @@
 /// A controller reached over Modbus, spoken to by the line's thread.
 #pragma once
 
+#include "drivers/bus_thread.hpp"
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_dialogue.hpp"
 #include "drivers/modbus/shared_line.hpp"
-#include "drivers/monotonic_clock.hpp"
 
 namespace thermocomp {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/controllers/kinds/modbus/travel_registers.hpp"
+#include "drivers/bus_thread.hpp"
+#include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "estimator/checks.hpp"
 
 namespace thermocomp {

@@ -13,7 +13,6 @@
 #include "drivers/controllers/controller_link.hpp"
 #include "drivers/controllers/kinds/modbus/modbus_layout.hpp"
 #include "drivers/controllers/kinds/modbus/piezo_drive.hpp"
-#include "drivers/controllers/kinds/modbus/written_offsets.hpp"
 #include "drivers/controllers/write_gate.hpp"
 #include "drivers/modbus/shared_line.hpp"
 #include "drivers/wait_free_slot.hpp"

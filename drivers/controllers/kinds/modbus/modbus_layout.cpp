@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "drivers/controllers/travel_values.hpp"
 #include "drivers/modbus/register_codec.hpp"
+#include "estimator/checks.hpp"
 
 namespace thermocomp {
 namespace {
@@ -89,6 +91,112 @@ std::string write_error(const ModbusControllerConfig& config, const WriteField& 
   return begins + " (function " + std::to_string(config.write_function) + ", register " +
          std::to_string(request.address) + "): " + exchange.detail +
          (may_take_one ? "; if it takes single registers only, write_function = 6" : "");
+}
+
+namespace {
+
+void append(WriteField& field, const ModbusValue& place, double value, Encoding encoding) {
+  const Encoded encoded = encode(value, {encoding, place.word_order, place.scale, 0.0});
+  field.words.insert(field.words.end(), encoded.words().begin(), encoded.words().end());
+}
+
+/// Of a set's number: all bits are used.
+Encoding count_encoding(const ModbusValue& place) noexcept {
+  return place.encoding == Encoding::uint32 ? Encoding::uint32 : Encoding::uint16;
+}
+
+}  // namespace
+
+void check_travel(const ModbusTravel& travel) {
+  check_shape(travel);
+  check_count(travel, travel.values.size(), "values");
+  if (!travel.applied.empty()) check_count(travel, travel.applied.size(), "applied");
+  std::size_t next = travel.begin.address + registers_of(travel.begin.encoding);
+  const auto follows = [&next](const ModbusValue& value) {
+    require(value.table == ModbusTable::holding && value.address == next, "address", value.address,
+            "the registers of a set must follow one another: begin, values, end");
+    next += registers_of(value.encoding);
+  };
+  for (const ModbusValue& value : travel.values) follows(value);
+  follows(travel.end);
+  for (const ModbusValue* number : {&travel.begin, &travel.end})
+    require((number->encoding == Encoding::uint16 || number->encoding == Encoding::uint32) &&
+                number->encoding == travel.begin.encoding && number->scale == 1.0,
+            "encoding", number->address,
+            "begin and end must be both uint16 or both uint32, without scale");
+}
+
+std::uint64_t travel_numbers(const ModbusTravel& travel) noexcept {
+  return std::uint64_t{1} << (count_encoding(travel.begin) == Encoding::uint32 ? 32 : 16);
+}
+
+WriteField travel_field(const ModbusTravel& travel, std::uint64_t number,
+                        std::span<const double> offset_um) {
+  WriteField field{travel.begin.address, WriteStage::offset, {}};
+  const auto add_number = [&](const ModbusValue& place) {
+    append(field, place, static_cast<double>(number), count_encoding(place));
+  };
+  add_number(travel.begin);
+  const std::vector<double> values = travel_values(travel, travel.values.size(), offset_um);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    append(field, travel.values[i], values[i], travel.values[i].encoding);
+  add_number(travel.end);
+  return field;
+}
+
+double shown_resolution_um(const ModbusTravel& travel, std::size_t node) {
+  std::vector<double> counts;
+  counts.reserve(travel.applied.size());
+  for (const ModbusValue& value : travel.applied) counts.push_back(value.scale);
+  return node_resolution_um(travel, counts, node);
+}
+
+namespace {
+
+double value_of(const ModbusValue& place, std::span<const std::uint16_t> words) {
+  return thermocomp::decode(words, {place.encoding, place.word_order, place.scale, 0.0}, {}).value;
+}
+
+ReadRequest request_of(const ModbusAxis& axis) {
+  if (!axis.travel)
+    return {axis.offset.table, axis.offset.address, registers_of(axis.offset.encoding)};
+  const ModbusValue& end = axis.travel->end;
+  const std::uint16_t begin = axis.travel->begin.address;
+  return {ModbusTable::holding, begin, end.address + registers_of(end.encoding) - begin};
+}
+
+}  // namespace
+
+WrittenOffsets::WrittenOffsets(const ModbusAxis& axis) : axis_(axis), request_(request_of(axis)) {}
+
+std::vector<double> WrittenOffsets::decode(std::span<const std::uint16_t> words) const {
+  std::vector<double> offsets(axis_.offsets(), not_a_number);
+  if (words.size() != request_.count) return offsets;
+  if (!axis_.travel) return {value_of(axis_.offset, words)};
+  const ModbusTravel& travel = *axis_.travel;
+  const auto at = [&](const ModbusValue& place) {
+    return words.subspan(place.address - request_.address);
+  };
+  const auto number = [&](const ModbusValue& place) {
+    return bits_of(at(place).first(registers_of(place.encoding)), place.encoding, place.word_order);
+  };
+  // A set that was broken off is not in effect.
+  if (number(travel.begin) != number(travel.end)) return offsets;
+  std::vector<double> values;
+  for (const ModbusValue& value : travel.values) values.push_back(value_of(value, at(value)));
+  offsets_shown(travel, values, offsets);
+  return offsets;
+}
+
+bool WrittenOffsets::is_to_be_compared() const noexcept {
+  // Zeros are what registers show that hold nothing.
+  return held_ == Held::not_known &&
+         std::any_of(words_.begin(), words_.end(), [](std::uint16_t word) { return word != 0; });
+}
+
+void WrittenOffsets::compare(std::span<const std::uint16_t> words) noexcept {
+  held_ =
+      std::equal(words.begin(), words.end(), words_.begin(), words_.end()) ? Held::yes : Held::no;
 }
 
 }  // namespace thermocomp

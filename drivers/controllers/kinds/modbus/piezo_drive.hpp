@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "drivers/controllers/piezo_config.hpp"
+#include "drivers/controllers/controller_config.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp {

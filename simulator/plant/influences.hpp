@@ -1,4 +1,4 @@
-/// What the machine does over time: one signal, a pure function of plant time and seed.
+/// What acts on a simulated body: operating signals and the air of the room.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 
 namespace thermocomp {
 
+/// What the machine does over time: one signal, a pure function of plant time and seed.
 class OperatingSignal {
  public:
   /// @param stream  tells the random choices of several signals apart
@@ -26,6 +27,22 @@ class OperatingSignal {
   std::uint64_t seed_;
   std::uint64_t stream_;
   std::vector<double> changes_s_;  ///< random: when piece i ends; grows as time goes on
+};
+
+/// The temperature of the workshop's air over a day.
+class RoomAir {
+ public:
+  RoomAir(const RoomConfig& config, std::uint64_t seed);
+
+  /// Goes one step of plant time on: only the slow wander has a memory.
+  void step(double step_s);
+  [[nodiscard]] double temp_degC(double time_s) const;
+
+ private:
+  RoomConfig config_;
+  std::uint64_t seed_;
+  std::uint64_t steps_{0};
+  double wander_K_;
 };
 
 }  // namespace thermocomp

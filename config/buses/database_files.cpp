@@ -1,4 +1,4 @@
-#include "config/buses/can_database.hpp"
+#include "config/buses/database_files.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,9 +8,26 @@
 #include "config/run_forms/spelled_unit.hpp"
 #include "config/sections/can_signals.hpp"
 #include "config/sections/common.hpp"
-#include "config/toml/file_limits.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::sections {
+
+std::shared_ptr<EdsFile> EdsFiles::read(const TomlTable& device) {
+  if (!device.has("eds")) return nullptr;
+  const std::filesystem::path named = device.text("eds");
+  if (!folder_ || named.empty()) return nullptr;
+  const std::filesystem::path path = *folder_ / named;
+  if (const auto known = read_.find(path); known != read_.end()) return known->second;
+  std::shared_ptr<EdsFile>& file = read_[path];
+  try {
+    file = std::make_shared<EdsFile>(
+        read_eds_text(read_text_file(path, bus_table_bytes_max), path.string()));
+  } catch (const ConfigurationError& error) {
+    device.problem("eds", error.problems().front().rule);
+  }
+  return file;
+}
+
 namespace {
 
 constexpr std::uint64_t fd_bytes_max = 64;

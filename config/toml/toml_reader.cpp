@@ -1,12 +1,36 @@
-// What toml_reader.hpp offers beside the reader itself and that needs no TOML.
-#include <algorithm>
-#include <stdexcept>
+// What toml_reader.hpp offers that needs no parser: ranges, limits of files, the nearest of the
+// known keys.
 
-#include "config/text/regular_file.hpp"
-#include "config/toml/file_limits.hpp"
 #include "config/toml/toml_reader.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "config/text/printable_text.hpp"
+#include "config/text/regular_file.hpp"
+
 namespace thermocomp {
+
+bool Range::contains(double value) const {
+  return std::isfinite(value) && (min_excluded ? value > min : value >= min) && value <= max;
+}
+
+std::string Range::rule() const {
+  const bool bounded_below = min > any().min;
+  const bool bounded_above = max < any().max;
+  if (bounded_below && bounded_above) {
+    return std::string("must be in ") + (min_excluded ? "(" : "[") + number_text(min) + ", " +
+           number_text(max) + "]";
+  }
+  if (bounded_below) {
+    return std::string(min_excluded ? "must be above " : "must be at least ") + number_text(min);
+  }
+  if (bounded_above) return "must be at most " + number_text(max);
+  return "must be a finite number";
+}
+
 namespace {
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
