@@ -1,15 +1,18 @@
 # shellcheck shell=bash disable=SC2034
 # The Debian 12 packages, by what they are for. Sourced by setup.sh; nothing else names a package.
 
-# What the programs are built from and need to run.
-packages_build=(
-  cmake ninja-build g++ pkg-config ccache
+# What the daemon, its command and the simulated machine are built from and need to run.
+packages_machine=(
+  cmake ninja-build g++ pkg-config
   libeigen3-dev libmodbus-dev libspdlog-dev libtomlplusplus-dev nlohmann-json3-dev
   libsqlite3-dev libsystemd-dev libssl-dev libcli11-dev
+)
+
+# All programs that run beside the machine.
+packages_build=(
+  "${packages_machine[@]}" ccache
   # Of thermocomp-gateway; its page takes its charts from the last.
   libmicrohttpd-dev libmosquitto-dev libcrypt-dev zlib1g-dev libjs-dygraphs
-  # Configuring the tree looks for it, also where only the programs are built.
-  catch2
 )
 
 # Besides, for thermocomp-modelling. OpenBLAS: with the reference BLAS a factorisation takes
@@ -21,12 +24,12 @@ packages_modelling=("${packages_build[@]}" libsuitesparse-dev libopenblas-dev li
 # being large; they include it where it is there.
 packages_petsc=("${packages_modelling[@]}" libpetsc-real-dev)
 
-# The demo draws a picture of itself.
-packages_demo=("${packages_build[@]}" gnuplot-nox)
+# The demo builds what it runs, and draws a picture of itself.
+packages_demo=("${packages_machine[@]}" gnuplot-nox)
 
 # Software that is not ours and that the tests talk to, and the tools of the checks.
 packages_test=(
-  "${packages_demo[@]}" "${packages_modelling[@]}"
+  "${packages_demo[@]}" "${packages_modelling[@]}" catch2
   # The finite elements are compared with it; test plans with the other.
   calculix-ccx python3-allpairspy
   mbpoll can-utils python3-pymodbus python3-serial-asyncio python3-can python3-canmatrix
