@@ -214,6 +214,8 @@ void Operations::finish_loading() {
     add_recorder(*loaded->parts, loaded->config, parts_.history);
     loaded->parts->estimator.plan_adoption(cycle_.estimator());
     if (loaded->parts->candidate) loaded->parts->candidate->plan_adoption(cycle_.estimator());
+    loaded->parts->promotes = parts_.config.candidate &&
+                              parts_.config.candidate->checksum == loaded->config.model_checksum;
     reload_->next = std::move(loaded->config);
     reload_->answer->outcome = cycle_.replace(std::move(loaded->parts), Clock::now());
   } catch (const std::exception& error) {

@@ -32,6 +32,8 @@ class Candidate {
   /// From the estimator that ran before, and from the candidate beside it where there was one.
   void adopt(const Estimator& running, const Candidate* before) noexcept;
 
+  [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
+
   // Main's side.
 
   void plan_adoption(const Estimator& running) { estimator_.plan_adoption(running); }

@@ -26,7 +26,8 @@ struct CycleParts {
   explicit CycleParts(Estimator made)
       : estimator(std::move(made)), reports(estimator.make_report()) {}
   Estimator estimator;
-  std::unique_ptr<Candidate> candidate;     ///< none: no model runs beside
+  std::unique_ptr<Candidate> candidate;  ///< none: no model runs beside
+  bool promotes{false};  ///< the model is that of the candidate that the cycle has until now
   std::unique_ptr<CycleRecorder> recorder;  ///< none: no history
   WaitFreeSlot<Report> reports;             ///< cycle -> main
 };

@@ -207,6 +207,10 @@ void Estimator::adopt(const Estimator& previous) noexcept {
   stages_->adopt(*previous.stages_);
 }
 
+void Estimator::adopt_model(const Estimator& beside) noexcept {
+  stages_->prediction.adopt_model(beside.stages_->prediction);
+}
+
 std::uint32_t Estimator::forgotten_axes() const noexcept {
   return stages_->axes.forgotten();
 }

@@ -71,6 +71,8 @@ class Estimator {
   /// adopt() neither allocates nor throws.
   void plan_adoption(const Estimator& previous);
   void adopt(const Estimator& previous) noexcept;
+  /// After adopt(): the states of the model from one that ran beside. @pre made from the same model
+  void adopt_model(const Estimator& beside) noexcept;
 
   [[nodiscard]] const EstimatorConfig& config() const noexcept;
   [[nodiscard]] const ThermalModel& model() const noexcept;

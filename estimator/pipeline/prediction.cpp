@@ -86,6 +86,11 @@ void Prediction::adopt(const Prediction& previous, const std::vector<int>& terms
   certainty_.adopt(previous.certainty_);
 }
 
+void Prediction::adopt_model(const Prediction& beside) noexcept {
+  model_.copy_states(beside.model_);
+  if (domain_ && beside.domain_) domain_->adopt(*beside.domain_);
+}
+
 void Prediction::visit_domain(StateArchive& archive) {
   if (domain_) archive(*domain_);
   archive(outside_share_);

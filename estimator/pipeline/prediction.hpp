@@ -87,6 +87,8 @@ class Prediction {
   }
   /// After a reload: lags, domain and certainty go on; displacement is asked for anew.
   void adopt(const Prediction& previous, const std::vector<int>& terms, bool domain) noexcept;
+  /// Lags and domain of one that ran beside. @pre made from the same model
+  void adopt_model(const Prediction& beside) noexcept;
   void visit_lags(StateArchive& archive) { archive(model_); }
   void visit_domain(StateArchive& archive);
   void visit_state(StateArchive& archive) {

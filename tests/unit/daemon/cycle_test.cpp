@@ -251,13 +251,26 @@ struct WarmingMachine {
   std::uint64_t next{0};
 };
 
-std::unique_ptr<CycleParts> contested(double gain, double candidate_gain, double pair = 1.0) {
+/// Three quarters of its effect follow late.
+ThermalModel late_input() {
+  ThermalModel model = one_input(2.0);
+  model.terms.push_back(
+      {"thermal_lag", "b_degC", {{"tau_s", 14400.0}}, {{"gain_um_per_K", {{"z_um", 1.5}}}}});
+  return model;
+}
+
+std::unique_ptr<CycleParts> contested(const ThermalModel& model, const ThermalModel& candidate,
+                                      double pair = 1.0) {
   EstimatorConfig config = one_sensor();
   config.correction.measured = MeasuredMeaning::total;
   config.sensors[0].smoothing.form = SmoothingForm::off;
-  auto made = std::make_unique<CycleParts>(Estimator(config, one_input(gain)));
-  made->candidate = std::make_unique<Candidate>(config, one_input(candidate_gain), pair);
+  auto made = std::make_unique<CycleParts>(Estimator(config, model));
+  made->candidate = std::make_unique<Candidate>(config, candidate, pair);
   return made;
+}
+
+std::unique_ptr<CycleParts> contested(double gain, double candidate_gain, double pair = 1.0) {
+  return contested(one_input(gain), one_input(candidate_gain), pair);
 }
 
 double better(CycleParts& parts) {
@@ -324,6 +337,26 @@ TEST_CASE("a score outlives restart and reload, and counts for its two models on
   // It knows the machine's reference: its errors go on to be none.
   machine.probe();
   CHECK(machine.cycle.parts().candidate->score()[0].candidate_um2 == Approx(0.0).margin(1e-9));
+}
+
+TEST_CASE("a promoted candidate goes on with what its lags have lived through",
+          "[cycle][candidate]") {
+  const bool promotes = GENERATE(true, false);
+  WarmingMachine always(contested(late_input(), one_input(2.0)));
+  WarmingMachine machine(contested(one_input(2.0), late_input()));
+  always.step(20);
+  machine.step(20);
+  auto promoted = contested(late_input(), one_input(2.0));
+  promoted->promotes = promotes;
+  promoted->estimator.plan_adoption(machine.cycle.parts().estimator);
+  promoted->candidate->plan_adoption(machine.cycle.parts().estimator);
+  machine.cycle.hand_over(std::move(promoted));
+  always.step();
+  machine.step();
+  REQUIRE(machine.cycle.take_retired() != nullptr);
+  const double expected_um = always.cycle.report().axes[0].displacement_um;
+  const double displacement_um = machine.cycle.report().axes[0].displacement_um;
+  CHECK((displacement_um == Approx(expected_um)) == promotes);
 }
 
 TEST_CASE("a system that refuses to sleep is counted, and no cycle runs ahead of time", "[cycle]") {
