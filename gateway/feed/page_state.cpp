@@ -92,7 +92,7 @@ void round_numbers(json& value, double steps_per_unit) {
 void keep_what_is_shown(json& state) {
   keep(state, {"time_s", "here",      "since_s",   "why",      "machine", "verdict", "problems",
                "mode",   "axes",      "probe_due", "warm",     "sensors", "buses",   "controller",
-               "model",  "reference", "version",   "uptime_s", "cycle",   "history"});
+               "model",  "reference", "version",   "uptime_s", "cycle",   "history", "candidate"});
   for (json& axis : state["axes"])
     keep(axis, {"name", "unit", "offset", "offset_max", "offset_sd", "applied", "driven",
                 "disagrees", "mismatch", "at_bound", "proving"});

@@ -297,6 +297,16 @@ function showModel(now) {
   const probed = Object.entries(model.probed_rms_um || {}).filter(([, rms]) => isNumber(rms))
     .map(([axis, rms]) => axis + ' ' + fixed(rms, 1) + ' \u00b5m').join(', ');
   if (probed) lines.push(['probings differ by', probed, false]);
+  const candidate = now.candidate;
+  if (candidate) {
+    const worse = candidate.worse_probability > candidate.better_probability;
+    lines.push(['candidate', candidate.problem ? 'does not run: ' + candidate.problem :
+      Object.entries(candidate.rms_um).map(([axis, rms]) => axis + ' leaves ' + fixed(rms.candidate, 1) +
+        ' of ' + fixed(rms.model, 1) + ' \u00b5m').concat(candidate.probings + ' probings').join(', ') +
+      (candidate.probings ? ', ' + (worse ? 'worse' : 'better') + ' with ' +
+        fixed(100 * Math.max(candidate.better_probability, candidate.worse_probability), 0) + ' %' : ''),
+      Boolean(candidate.problem)]);
+  }
   if (now.reference)
     lines.push(['reference', now.reference.lost ? 'lost' : now.reference.wall_s ?
                 clockText(now.reference.wall_s) : now.reference.by || 'not known when', Boolean(now.reference.lost)]);
