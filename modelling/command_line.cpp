@@ -6,10 +6,11 @@
 
 #include "modelling/diagnosis/diagnosis.hpp"
 #include "modelling/experiments/plan_command.hpp"
+#include "modelling/fit_command.hpp"
 #include "modelling/identification/equation/group_command.hpp"
-#include "modelling/identification/families/fit_command.hpp"
 #include "modelling/identification/gate/tiebar_command.hpp"
 #include "modelling/inspection/inspect_command.hpp"
+#include "modelling/series/series_command.hpp"
 #include "report/command_slip.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/placement/place_command.hpp"
@@ -64,7 +65,8 @@ void declare_modelling_command_line(CLI::App& app, std::function<int()>& action)
   add_structure(app, action);
   experiments::add_plan_command(app, action);
   identification::add_group_command(app, action);
-  identification::add_fit_command(app, action);
+  add_fit_command(app, action);
+  series::add_series_command(app, action);
   identification::add_tiebar_command(app, action);
   thermal_test::add_thermal_test_command(app, action);
   name_files(app);

@@ -24,12 +24,13 @@ struct ModellingCommand {
   const char* name;
   const char* help;
 };
-constexpr std::array<ModellingCommand, 9> commands{{
+constexpr std::array<ModellingCommand, 10> commands{{
     {"structure", "block matrix of a structure, by finite elements"},
     {"place", "sensor positions of a structure"},
     {"tiebar", "the coefficients of a gate-shaped machine with tie bars"},
     {"plan", "test plan from factors and levels; --apart: for what always moved alike"},
     {"inspect", "what is wrong with recordings themselves, and what they can tell at all"},
+    {"series", "what machines of one type have in common"},
     {"group", "similarity groups of measured temperatures"},
     {"fit", "sensor choice and model from measured runs"},
     {"diagnose", "what a model gets wrong in measured runs, and why"},

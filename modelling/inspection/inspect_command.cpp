@@ -1,5 +1,6 @@
 #include "modelling/inspection/inspect_command.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -7,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "modelling/inspection/inspection.hpp"
+#include "modelling/series/series.hpp"
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"
 #include "report/terminal.hpp"
@@ -22,7 +24,18 @@ struct Options {
   std::string json;
   std::string report;
   bool all{false};
+  std::string series;
 };
+
+std::vector<series::Comparison> beside_sisters(const Options& options,
+                                               const std::vector<RunFile>& runs) {
+  const series::Series series = series::load_series(options.series);
+  std::vector<std::string> outputs;
+  for (const auto& [name, output] : series.outputs) outputs.push_back(name);
+  std::vector<std::string> notes;
+  return series::compared(
+      series, series::statistics_of(runs, "the machine", outputs, series.columns.taus_s, notes));
+}
 
 int run(const Options& options) {
   const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
@@ -32,10 +45,14 @@ int run(const Options& options) {
     inspection = inspect(runs, options.all ? 0.0 : likelier_than_not,
                          [&progress](double fraction) { progress.update(fraction); });
   }
-  if (!options.json.empty()) cli::write_file(options.json, inspection_json(inspection));
+  std::vector<series::Comparison> sisters;
+  if (!options.series.empty()) sisters = beside_sisters(options, runs);
+  if (!options.json.empty())
+    cli::write_file(options.json, inspection_json(inspection, series::comparison_json(sisters)));
   if (!options.report.empty()) cli::write_file(options.report, inspection_html(runs, inspection));
   if (options.json != "-" && options.report != "-")
-    cli::write_file("-", inspection_text(inspection));
+    cli::write_file("-", inspection_text(inspection) + series::comparison_text(sisters));
+  if (std::any_of(sisters.begin(), sisters.end(), series::departs)) return 1;
   for (const Finding& finding : inspection.findings)
     if (finding.probability >= likelier_than_not) return 1;
   return 0;
@@ -52,6 +69,8 @@ void add_inspect_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option("--json", options->json, "file for the answer as JSON; - is the output");
   sub->add_option("--report", options->report, "page with pictures (HTML); - is the output");
   sub->add_flag("--all", options->all, "also tell what is less likely than not");
+  sub->add_option("--series", options->series,
+                  "series file: where the machine of these runs departs from its sisters");
   sub->footer("Exit status: 0 nothing found, 1 something, 2 bad use or bad input.");
   sub->callback([options, &action] { action = [options] { return run(*options); }; });
 }

@@ -32,7 +32,9 @@ struct Cleaned {
 
 /// "10 s", "3.71 h": the time between two rows.
 [[nodiscard]] std::string step_text(double step_s);
-[[nodiscard]] std::string inspection_json(const Inspection& inspection);
+/// @param departure  a JSON value, or empty
+[[nodiscard]] std::string inspection_json(const Inspection& inspection,
+                                          const std::string& departure = "");
 /// What is printed for a person.
 [[nodiscard]] std::string inspection_text(const Inspection& inspection);
 /// A page with pictures of what was found.

@@ -47,7 +47,7 @@ std::string step_text(double step_s) {
   return std::string(text) + (in_hours ? " h" : in_minutes ? " min" : " s");
 }
 
-std::string inspection_json(const Inspection& inspection) {
+std::string inspection_json(const Inspection& inspection, const std::string& departure) {
   Json json;
   json["runs"] = Json::array();
   for (const RunSampling& run : inspection.runs) {
@@ -63,6 +63,7 @@ std::string inspection_json(const Inspection& inspection) {
   json["findings"] = Json::array();
   for (const Finding& finding : inspection.findings)
     json["findings"].push_back(json_of(finding, inspection));
+  if (!departure.empty()) json["departure"] = Json::parse(departure);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -220,6 +220,23 @@ std::vector<TermSpec> hinge_terms(const BankColumns& columns,
   return terms;
 }
 
+ThermalModel bank_model(const std::vector<std::string>& places,
+                        const std::vector<std::string>& outputs, const BankColumns& columns,
+                        Eigen::MatrixXd gains) {
+  ThermalModel model;
+  model.inputs = places;
+  model.outputs = outputs;
+  const auto count = static_cast<Eigen::Index>(places.size());
+  for (Eigen::Index o = 0; o < gains.cols(); ++o) {
+    const auto at_once = gains.col(o).head(count);
+    model.matrix_um_per_K.emplace_back(at_once.begin(), at_once.end());
+  }
+  gains.topRows(count).setZero();
+  model.terms = hinge_terms(columns, outputs, gains);
+  model.terms.insert(model.terms.begin(), bank_term(columns, outputs, gains));
+  return model;
+}
+
 BankEquations::BankEquations(const MeasuredTests& tests, const BankColumns& columns) {
   const auto count = static_cast<Eigen::Index>(columns.size());
   for (const TestRun& run : tests.runs) rows_.push_back(bank_of(run, tests, columns));

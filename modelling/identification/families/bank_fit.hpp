@@ -52,6 +52,11 @@ void add_hinges(const MeasuredTests& tests, BankColumns& columns);
                                                 const std::vector<std::string>& outputs,
                                                 const Eigen::MatrixXd& gains);
 
+/// All of it: what acts at once is the matrix's, the rest one term. @pre places stand first
+[[nodiscard]] ThermalModel bank_model(const std::vector<std::string>& places,
+                                      const std::vector<std::string>& outputs,
+                                      const BankColumns& columns, Eigen::MatrixXd gains);
+
 /// X'X and X'Y of every fold, columns scaled to a standard deviation of 1. Rows in which an output
 /// is missing (NaN) do not count.
 class BankEquations {

@@ -346,23 +346,6 @@ ThermalModel few_model(const MeasuredTests& tests, const HeatEquation& equation)
   return model;
 }
 
-/// What acts at once is the matrix's, the rest one term.
-ThermalModel bank_model(const MeasuredTests& tests, const BankColumns& columns,
-                        Eigen::MatrixXd gains) {
-  ThermalModel model;
-  model.inputs = tests.places;
-  model.outputs = tests.outputs;
-  const auto places = static_cast<Eigen::Index>(tests.places.size());
-  for (Eigen::Index o = 0; o < gains.cols(); ++o) {
-    const auto at_once = gains.col(o).head(places);
-    model.matrix_um_per_K.emplace_back(at_once.begin(), at_once.end());
-  }
-  gains.topRows(places).setZero();
-  model.terms = hinge_terms(columns, tests.outputs, gains);
-  model.terms.insert(model.terms.begin(), bank_term(columns, tests.outputs, gains));
-  return model;
-}
-
 void add_warnings(const MeasuredTests& tests, FamiliesFit& fit) {
   if (tests.runs.size() < 2)
     fit.warnings.emplace_back(
@@ -455,7 +438,7 @@ FamiliesFit fit_families(const MeasuredTests& tests, const FitOptions& options,
   if (fit.chosen == Family::none)
     fit.model = no_model(tests);
   else if (fit.chosen == Family::lag_bank)
-    fit.model = bank_model(tests, columns, bank.fit(tests.folds.size()));
+    fit.model = bank_model(tests.places, tests.outputs, columns, bank.fit(tests.folds.size()));
   else if (fit.chosen == Family::physical)
     fit.model = few_model(tests, few_of(fit.chosen, tests, options));
   else

@@ -1,4 +1,4 @@
-#include "modelling/identification/families/fit_command.hpp"
+#include "modelling/fit_command.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -14,12 +14,15 @@
 #include "config/text/units.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
+#include "modelling/series/series.hpp"
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"
 #include "report/terminal.hpp"
 
-namespace thermocomp::identification {
+namespace thermocomp {
 namespace {
+
+using namespace identification;
 
 constexpr std::size_t terms_of_any_equation = 8;
 constexpr std::size_t blocks_of_one_run = 8;
@@ -39,6 +42,9 @@ struct Options {
   std::string model;
   std::string report;
   bool json{false};
+  std::string prior;
+  double drift_percent{5.0};
+  double years{-1.0};  ///< negative: left out
 
   /// Whether anything was asked for that only an equation of few sensors has.
   [[nodiscard]] bool few_asked_for() const {
@@ -126,6 +132,21 @@ int run_families(const Options& options, const MeasuredTests& tests,
   return 0;
 }
 
+/// The coefficients of a type, or of last year, as far as the runs do not say otherwise.
+int run_prior(const Options& options, const std::vector<RunFile>& runs) {
+  const series::Series prior =
+      series::load_prior(options.prior, options.drift_percent / 100.0, options.years);
+  std::vector<std::string> notes;
+  const series::Statistics machine = series::statistics_of(
+      runs, "the machine", options.tests.outputs, prior.columns.taus_s, notes);
+  for (const std::string& note : notes) std::fprintf(stderr, "%s\n", note.c_str());
+  const series::Adapted adapted = series::adapted(prior, machine, options.prior);
+  cli::write_file(options.model, model_text(options, adapted.model));
+  if (options.model == "-") return 0;
+  cli::write_file("-", series::adapted_text(prior, machine, adapted, options.json));
+  return 0;
+}
+
 /// JP7689460B2 chooses among places of the machine; that of the room is none.
 void leave_out_room(const std::vector<RunFile>& runs, TestOptions& options) {
   for (const std::string& column : runs.front().columns) {
@@ -146,6 +167,7 @@ int run(const Options& options) {
   fit_options.lags = options.lags;
   fit_options.sensor_error_K = options.sensor_error_K;
   const std::vector<RunFile> runs = cli::RunLoader(options.columns).load(options.runs);
+  if (!options.prior.empty()) return run_prior(options, runs);
   TestOptions test_options = options.tests;
   const bool few = options.few_asked_for() && options.family.empty();
   if (few && !options.free_choice && options.tests.places.empty())
@@ -205,7 +227,26 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option("--stretches", options->tests.folds_of_one_run,
                   "into how many tests to cut the run when there is only one")
       ->check(CLI::Range(2, 100));
-  sub->add_option("--report", options->report, "page with curves and the choice (HTML)");
+  CLI::Option* prior =
+      sub->add_option(
+             "--prior", options->prior,
+             "a series (thermocomp series), or last year's model: its coefficients hold as "
+             "far as the runs do not say otherwise")
+          ->type_name("SERIES.toml")
+          ->excludes("--family", "--terms", "--places", "--free", "--threshold", "--lags",
+                     "--sensor-error-K", "--stretches");
+  sub->add_option(
+         "--drift-percent", options->drift_percent,
+         "with --years: share of the displacement by which the prior's prediction may have "
+         "moved in a year")
+      ->check(CLI::Range(0.0, 100.0))
+      ->needs(prior);
+  sub->add_option("--years", options->years, "age of the prior; else 0 of a series, 1 of a model")
+      ->check(CLI::Range(0.0, 50.0))
+      ->needs(prior);
+  CLI::Option* report =
+      sub->add_option("--report", options->report, "page with curves and the choice (HTML)");
+  prior->excludes(report);
   sub->add_flag("--json", options->json, "the answer for a program");
   sub->callback([options, terms, &action] {
     options->terms_given = terms->count() > 0;
@@ -213,4 +254,4 @@ void add_fit_command(CLI::App& app, std::function<int()>& action) {
   });
 }
 
-}  // namespace thermocomp::identification
+}  // namespace thermocomp

@@ -7,8 +7,8 @@ namespace CLI {  // NOLINT(readability-identifier-naming): the name is that of C
 class App;
 }
 
-namespace thermocomp::identification {
+namespace thermocomp {
 
 void add_fit_command(CLI::App& app, std::function<int()>& action);
 
-}  // namespace thermocomp::identification
+}  // namespace thermocomp

@@ -1,0 +1,113 @@
+#include "modelling/series/series_command.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include <CLI/CLI.hpp>
+
+#include "modelling/identification/printed.hpp"
+#include "modelling/series/series.hpp"
+#include "report/output_file.hpp"
+#include "report/run_loader.hpp"
+
+namespace thermocomp::series {
+namespace {
+
+using identification::printed;
+
+struct Options {
+  std::vector<std::string> files;
+  std::string columns;
+  std::vector<std::string> outputs;
+  std::optional<double> scatter;
+  std::string machine;
+  std::string result;
+};
+
+/// The CSV files of a folder, in order of their names.
+std::vector<std::string> runs_in(const std::filesystem::path& folder) {
+  std::vector<std::string> runs;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().extension() == ".csv") runs.push_back(entry.path().string());
+  if (runs.empty()) throw std::runtime_error(folder.string() + ": has no run file (*.csv)");
+  std::sort(runs.begin(), runs.end());
+  return runs;
+}
+
+Statistics of_runs(const Options& options, cli::RunLoader& loader,
+                   const std::vector<std::string>& runs, const std::string& machine) {
+  std::vector<std::string> notes;
+  Statistics statistics =
+      statistics_of(loader.load(runs), machine, options.outputs, series_taus_s, notes);
+  for (const std::string& note : notes) std::fprintf(stderr, "%s\n", note.c_str());
+  return statistics;
+}
+
+Statistics of_argument(const Options& options, cli::RunLoader& loader, const std::string& file) {
+  const std::filesystem::path path(file);
+  if (path.extension() == ".toml") return load_statistics(path);
+  if (std::filesystem::is_directory(path)) return of_runs(options, loader, runs_in(path), file);
+  return of_runs(options, loader, {file}, file);
+}
+
+std::string text_of(const Series& series) {
+  std::string text = printed("%zu machines, %.3g h, %zu columns\n", series.machines.size(),
+                             series.hours, static_cast<std::size_t>(series.columns.size()));
+  for (const auto& [name, output] : series.outputs) {
+    const double scatter_um = std::sqrt((output.covariance * series.moment).trace());
+    text += name + printed(
+                       ": moves %.3g um; a machine differs from the mean by %.3g um; left: "
+                       "%.3g um\n",
+                       output.displacement_um, scatter_um, output.remainder_um);
+  }
+  return text;
+}
+
+int run(const Options& options) {
+  cli::RunLoader loader(options.columns);
+  if (!options.machine.empty()) {
+    cli::write_file(options.result,
+                    write_statistics(of_runs(options, loader, options.files, options.machine)));
+    return 0;
+  }
+  std::vector<Statistics> machines;
+  machines.reserve(options.files.size());
+  for (const std::string& file : options.files)
+    machines.push_back(of_argument(options, loader, file));
+  const Series series = series_of(machines, options.scatter);
+  cli::write_file(options.result, write_series(series));
+  if (options.result != "-") cli::write_file("-", text_of(series));
+  return 0;
+}
+
+}  // namespace
+
+void add_series_command(CLI::App& app, std::function<int()>& action) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* sub = app.add_subcommand("series", "what machines of one type have in common");
+  sub->add_option("FILE", options->files,
+                  "one a machine: a run RUN.csv[@T0:T1], a folder of runs, or statistics that "
+                  "--machine wrote")
+      ->required();
+  sub->add_option("-o", options->result, "series file, for fit --prior and inspect --series")
+      ->required();
+  sub->add_option("--columns", options->columns, cli::columns_help);
+  sub->add_option("--outputs", options->outputs, "displacements; else all: z_um[,...]")
+      ->delimiter(',')
+      ->type_name("NAME");
+  sub->add_option("--machine", options->machine,
+                  "all files are runs of this one machine: write its statistics instead of a "
+                  "series; they do not hold the runs, and can be sent")
+      ->type_name("NAME");
+  sub->add_option("--scatter", options->scatter,
+                  "share of the displacement by which predictions of sisters differ, assumed as if "
+                  "two machines had shown it; left out: 0.15, and one machine is refused")
+      ->check(CLI::Range(0.01, 10.0));
+  sub->callback([options, &action] { action = [options] { return run(*options); }; });
+}
+
+}  // namespace thermocomp::series
