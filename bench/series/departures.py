@@ -1,10 +1,11 @@
-"""Machines of one type each night beside their sisters: what departs, and what falsely does.
+"""Machines of one type night by night: what departs, and what falsely does.
 
     departures.py PROGRAM
 
-Six machines run healthy nights, and nights with an effect planted from night 3 on, beside a series
-of eight sisters, and beside a series of eight nights of their own before. A false alarm is a night on which a healthy machine newly departs: nights that follow an
-alarm of the same machine are the same one. Detection: nights from the effect to the alarm.
+A series of eight machines; six others run healthy nights, and nights with an effect planted. Each is
+compared with its sisters, and with its own past: three healthy nights before. A false alarm is a
+night on which a healthy machine newly departs: nights that follow an alarm of the same machine are
+the same one. Detection: nights from the effect to the alarm.
 """
 
 import json
@@ -17,8 +18,10 @@ import numpy as np
 import series
 import series_type
 
-NIGHTS = 20
-BEGINS = 3
+NIGHTS = 40
+BEGINS = 3  # healthy nights before, where a night is compared with the machine's own past
+WATCHED = 5
+KINDS = ("sisters", "own_past")
 HOURS = 8
 
 
@@ -41,36 +44,26 @@ def grown_expansion(columns, fields):
 EFFECTS = {"swapped_sensors": swapped, "loose_sensor": loose_sensor, "column": grown_expansion}
 
 
-def nights(tool, series_file, seed, count, change=None, begins=0):
-    """Whether each night's run departs."""
+def own_past(tool, series_file, seed):
+    """The series of one machine: its first nights, and what its sisters say of the rest."""
+    machine, own = series_type.TypeMachine(seed), tool.path(".toml")
+    past = [tool.written(machine.day(90 + night, HOURS)) for night in range(BEGINS)]
+    tool.run("series", *past, "--machine", f"machine {seed}", "--prior", series_file, "-o", own)
+    return own
+
+
+def nights(tool, priors, seed, count, change=None):
+    """Whether each night's run departs, one list a prior."""
     machine = series_type.TypeMachine(seed)
-    said = []
+    said = [[] for _ in priors]
     for night in range(count):
-        run = tool.written(machine.day(100 + night, HOURS, change if night >= begins else None))
-        answer = tool.path(".json")
-        tool.run("inspect", run, "--series", series_file, "--json", answer, good=(0, 1))
-        departure = json.loads(answer.read_text())["departure"]
-        said.append(any(each["departs"] for each in departure.values()))
+        run, answer = tool.written(machine.day(100 + night, HOURS, change)), tool.path(".json")
+        for prior, of_prior in zip(priors, said):
+            tool.run("inspect", run, "--series", prior, "--json", answer, good=(0, 1))
+            departure = json.loads(answer.read_text())["departure"]
+            of_prior.append(any(each["departs"] for each in departure.values()))
         run.unlink()
     return said
-
-
-def judged(tool, kind, series_of, nights_of_healthy):
-    """Prints what a series that `series_of(seed)` gives finds, and how often it errs."""
-    alarms, healthy, found = 0, 0, {name: [] for name in EFFECTS}
-    for seed in range(200, 206):
-        series_file = series_of(seed)
-        said = nights(tool, series_file, seed, nights_of_healthy)
-        alarms += said[0] + sum(b and not a for a, b in zip(said, said[1:]))
-        healthy += len(said)
-        for name, change in EFFECTS.items():
-            said = nights(tool, series_file, seed, BEGINS + 5, change, BEGINS)[BEGINS:]
-            found[name].append(said.index(True) + 1 if True in said else np.nan)
-    for name, after in found.items():
-        print(f"{kind}_{name}_found {np.isfinite(after).mean():.3f} ratio")
-        if np.isfinite(after).any():
-            print(f"{kind}_{name}_after {np.nanmedian(after):.3g} nights")
-    print(f"{kind}_false_alarms {365.0 * alarms / healthy:.3g} 1/year")
 
 
 def main():
@@ -78,15 +71,26 @@ def main():
         tool = series.Tool(sys.argv[1], pathlib.Path(folder))
         sisters = tool.path(".toml")
         tool.run("series", *series.simulated_sisters(tool), "--outputs", "z_um,y_um", "-o", sisters)
-
-        def own(seed):
-            machine, result = series_type.TypeMachine(seed), tool.path(".toml")
-            runs = [tool.written(machine.day(50 + night, HOURS)) for night in range(8)]
-            tool.run("series", *runs, "--outputs", "z_um,y_um", "--scatter", 0.03, "-o", result)
-            return result
-
-        judged(tool, "sisters", lambda _seed: sisters, NIGHTS)
-        judged(tool, "own", own, NIGHTS)
+        priors = {seed: (sisters, own_past(tool, sisters, seed)) for seed in range(200, 206)}
+        alarms, healthy = np.zeros(2), 0
+        for seed in priors:
+            both = nights(tool, priors[seed], seed, NIGHTS)
+            alarms += [said[0] + sum(b and not a for a, b in zip(said, said[1:])) for said in both]
+            healthy += NIGHTS
+            print(f"healthy {seed}: {both}", file=sys.stderr)
+        after = {}
+        for name, change in EFFECTS.items():
+            both = [nights(tool, priors[seed], seed, WATCHED, change) for seed in priors]
+            for kind, said in zip(KINDS, zip(*both)):
+                after[f"{name}_{kind}"] = [each.index(True) + 1 if True in each else np.nan
+                                           for each in said]
+            print(f"{name}: {both}", file=sys.stderr)
+    for name, found in after.items():
+        print(f"{name}_found {np.isfinite(found).mean():.3f} ratio")
+        if np.isfinite(found).any():
+            print(f"{name}_after {np.nanmedian(found):.3g} nights")
+    for kind, count in zip(KINDS, alarms):
+        print(f"{kind}_false_alarms_a_machine_year {365.0 * count / healthy:.3g} 1/year")
 
 
 if __name__ == "__main__":

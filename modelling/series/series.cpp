@@ -347,6 +347,21 @@ Adapted adapted(const Series& series, const Statistics& machine, const std::stri
   return result;
 }
 
+Series own_series(const Series& prior, const Statistics& machine, const std::string& prior_name,
+                  double drift) {
+  const Adapted own = adapted(prior, machine, prior_name);
+  Series series = prior;
+  series.machines.push_back(machine.machine);
+  series.hours += machine.time_s / 3600.0;
+  std::erase_if(series.outputs,
+                [&](const auto& each) { return !own.coefficients.contains(each.first); });
+  for (auto& [name, output] : series.outputs) {
+    output.mean = own.coefficients.at(name).mean;
+    output.covariance = own.coefficients.at(name).covariance;
+  }
+  return drifted(std::move(series), drift, 1.0);
+}
+
 std::vector<Comparison> compared(const Series& series, const Statistics& machine) {
   refuse_other_units(names_of(machine.columns), names_of(series.columns), machine.machine);
   const Seen seen = seen_by(machine.columns, series.columns, series.moment);
@@ -364,6 +379,7 @@ std::vector<Comparison> compared(const Series& series, const Statistics& machine
     const Evidence evidence = spread_out(machine.evidence(output_of(machine, name)), seen);
     Comparison& comparison = comparisons.emplace_back();
     comparison.output = name;
+    comparison.false_alarm = false_alarms_a_night / static_cast<double>(series.outputs.size());
     comparison.departure = departure_of(evidence, output.density(), output.mean, output.covariance,
                                         freedom_of(series), groups);
     comparison.remainder_um = left_um(
@@ -382,7 +398,8 @@ std::vector<Comparison> compared(const Series& series, const Statistics& machine
 }
 
 bool departs(const Comparison& comparison) {
-  return comparison.departure.probability < false_alarm || comparison.deviations > deviations_max;
+  return comparison.departure.probability < comparison.false_alarm ||
+         comparison.deviations > deviations_max;
 }
 
 Series series_of_model(const ThermalModel& model, const std::string& file, double drift,

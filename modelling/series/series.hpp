@@ -59,6 +59,12 @@ struct Adapted {
 [[nodiscard]] Adapted adapted(const Series& series, const Statistics& machine,
                               const std::string& prior_name);
 
+/// The machine's own past as the prior of its next runs: m = b, S = V and `drift`, a share of each
+/// output's displacement.
+/// @throws std::runtime_error when machine and series do not fit together
+[[nodiscard]] Series own_series(const Series& prior, const Statistics& machine,
+                                const std::string& prior_name, double drift);
+
 /// What the prior and the rows came to, for a person or a program.
 [[nodiscard]] std::string adapted_text(const Series& series, const Statistics& machine,
                                        const Adapted& adapted, bool json);
@@ -70,11 +76,12 @@ struct Comparison {
   double remainder_um{0.0};  ///< that its posterior leaves
   double median_um{0.0};     ///< of the sisters
   double deviations{0.0};    ///< in 1.4826 median absolute deviations of the sisters' logarithms
+  double false_alarm{0.0};   ///< probability below which it departs
 };
 [[nodiscard]] std::vector<Comparison> compared(const Series& series, const Statistics& machine);
 
-/// One false alarm a year where a machine is compared each night.
-inline constexpr double false_alarm = 1.0 / 365.0;
+/// One false alarm a year where a machine is compared each night; its outputs share it.
+inline constexpr double false_alarms_a_night = 1.0 / 365.0;
 [[nodiscard]] bool departs(const Comparison& comparison);
 [[nodiscard]] std::string comparison_text(const std::vector<Comparison>& comparisons);
 /// Member "departure" of the answer of `inspect`.

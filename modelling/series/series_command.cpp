@@ -25,6 +25,8 @@ struct Options {
   std::vector<std::string> outputs;
   std::optional<double> scatter;
   std::string machine;
+  std::string prior;
+  double drift_percent{5.0};
   std::string result;
 };
 
@@ -67,11 +69,17 @@ std::string text_of(const Series& series) {
   return text;
 }
 
+std::string text_of_machine(const Options& options, const Statistics& machine) {
+  if (options.prior.empty()) return write_statistics(machine);
+  return write_series(own_series(load_series(options.prior), machine, options.prior,
+                                 options.drift_percent / 100.0));
+}
+
 int run(const Options& options) {
   cli::RunLoader loader(options.columns);
   if (!options.machine.empty()) {
-    cli::write_file(options.result,
-                    write_statistics(of_runs(options, loader, options.files, options.machine)));
+    cli::write_file(options.result, text_of_machine(options, of_runs(options, loader, options.files,
+                                                                     options.machine)));
     return 0;
   }
   std::vector<Statistics> machines;
@@ -99,10 +107,21 @@ void add_series_command(CLI::App& app, std::function<int()>& action) {
   sub->add_option("--outputs", options->outputs, "displacements; else all: z_um[,...]")
       ->delimiter(',')
       ->type_name("NAME");
-  sub->add_option("--machine", options->machine,
-                  "all files are runs of this one machine: write its statistics instead of a "
-                  "series; they do not hold the runs, and can be sent")
-      ->type_name("NAME");
+  CLI::Option* machine =
+      sub->add_option("--machine", options->machine,
+                      "all files are runs of this one machine: write its statistics instead of a "
+                      "series; they do not hold the runs, and can be sent")
+          ->type_name("NAME");
+  CLI::Option* prior =
+      sub->add_option("--prior", options->prior,
+                      "with --machine: write the series that has only this machine, known from its "
+                      "runs and this series: its next runs are then compared with its own past")
+          ->type_name("SERIES.toml")
+          ->needs(machine);
+  sub->add_option("--drift-percent", options->drift_percent,
+                  "with --prior: share of the displacement by which the machine may move by itself")
+      ->check(CLI::Range(0.0, 100.0))
+      ->needs(prior);
   sub->add_option("--scatter", options->scatter,
                   "share of the displacement by which predictions of sisters differ, assumed as if "
                   "two machines had shown it; left out: 0.15, and one machine is refused")

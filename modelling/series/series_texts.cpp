@@ -77,7 +77,7 @@ std::string comparison_json(const std::vector<Comparison>& comparisons) {
                         {"distance", std::sqrt(each.departure.distance2)},
                         {"directions", each.departure.freedom},
                         {"probability", each.departure.probability},
-                        {"false_alarm", false_alarm},
+                        {"false_alarm", each.false_alarm},
                         {"subjects", parts},
                         {"remainder_um", each.remainder_um},
                         {"sisters_um", each.median_um},

@@ -85,6 +85,24 @@ def test_a_machine_whose_sensors_are_exchanged_departs_from_its_sisters(series, 
     assert said.returncode == 1 and "it departs" in said.stdout, said.stdout
 
 
+def departs(run_file, prior):
+    said = run("inspect", run_file, "--series", prior, "--json", "-")
+    return json.loads(said.stdout)["departure"]["z_um"]["departs"]
+
+
+def test_beside_its_own_past_a_machine_departs_where_sisters_would_not(series, tmp_path):
+    past = [write_run(tmp_path / f"past_{i}.csv", 100 + i, 5.0) for i in range(2)]
+    own = tmp_path / "own.toml"
+    done = run("series", *past, "--machine", "mine", "--prior", series, "-o", own)
+    assert done.returncode == 0, done.stderr
+    assert tomllib.loads(own.read_text())["machines"][-1] == "mine"
+    assert not departs(write_run(tmp_path / "same.csv", 103, 5.0), own)
+    changed = write_run(tmp_path / "changed.csv", 103, 5.6)
+    assert departs(changed, own) and not departs(changed, series)
+    alone = run("series", *past, "--prior", series, "-o", own)
+    assert alone.returncode == 2 and "--machine" in alone.stderr, alone.stderr
+
+
 def test_what_cannot_be_used_is_refused_with_file_and_rule(series, tmp_path):
     one = write_run(tmp_path / "one.csv", 1, 5.0)
     lone = run("series", one, "-o", tmp_path / "s.toml")
