@@ -1,20 +1,93 @@
 #include "cli/commands.hpp"
 
-#include <CLI/CLI.hpp>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <unistd.h>
+#include <vector>
 
-#include "cli/check/check_command.hpp"
-#include "cli/history/history_commands.hpp"
-#include "cli/import/import_command.hpp"
-#include "cli/init/init_command.hpp"
-#include "cli/model/model_commands.hpp"
-#include "cli/model/modelling_dispatch.hpp"
-#include "cli/observe/observe_commands.hpp"
-#include "cli/operate/operate_commands.hpp"
-#include "cli/report/report_command.hpp"
-#include "cli/scan/scan_command.hpp"
-#include "report/command_slip.hpp"
+#include <CLI/CLI.hpp>
+#include <system_error>
 
 namespace thermocomp::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* program_name = "thermocomp-modelling";
+
+struct ModellingCommand {
+  const char* name;
+  const char* help;
+};
+constexpr std::array<ModellingCommand, 10> commands{{
+    {"structure", "block matrix of a structure, by finite elements"},
+    {"place", "sensor positions of a structure"},
+    {"tiebar", "the coefficients of a gate-shaped machine with tie bars"},
+    {"plan", "test plan from factors and levels; --apart: for what always moved alike"},
+    {"inspect", "what is wrong with recordings themselves, and what they can tell at all"},
+    {"series", "what machines of one type have in common"},
+    {"group", "similarity groups of measured temperatures"},
+    {"fit", "sensor choice and model from measured runs"},
+    {"diagnose", "what a model gets wrong in measured runs, and why"},
+    {"thermal-test", "tests of thermal behaviour after ISO 230-3: a plan, and what one showed"},
+}};
+
+std::vector<fs::path> places_to_look() {
+  std::vector<fs::path> places;
+  std::error_code error;
+  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  if (!error) {
+    const fs::path folder = self.parent_path();
+    places = {folder, folder.parent_path() / "libexec" / "thermocomp",
+              folder.parent_path() / "libexec"};
+  }
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path != nullptr ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (!folder.empty()) places.emplace_back(folder);
+  }
+  return places;
+}
+
+int run_modelling(const std::string& command, const std::vector<std::string>& arguments) {
+  std::vector<std::string> words{program_name, command};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+
+  for (const fs::path& place : places_to_look()) {
+    const std::string program = (place / program_name).string();
+    if (::access(program.c_str(), X_OK) != 0) continue;
+    ::execv(program.c_str(), pointers.data());
+    throw Failure("cannot start " + program + ": " + std::generic_category().message(errno));
+  }
+  throw Failure("'" + command +
+                "' needs the program thermocomp-modelling, which is not installed;" +
+                " it comes with the package thermocomp-modelling");
+}
+
+/// structure, place, tiebar, plan, inspect, group, fit, diagnose, thermal-test: all arguments go to
+/// `thermocomp-modelling` beside this program, in its libexec folder or in PATH.
+void add_modelling_commands(CLI::App& app, Action& action) {
+  for (const ModellingCommand& command : commands) {
+    CLI::App* sub = app.add_subcommand(command.name, command.help);
+    sub->group("Modelling (carried out by thermocomp-modelling)");
+    sub->prefix_command();
+    sub->set_help_flag();  // --help is for the other program
+    const std::string name = command.name;
+    sub->callback([sub, name, &action] {
+      action = [sub, name] { return run_modelling(name, sub->remaining()); };
+    });
+  }
+}
+
+}  // namespace
 
 void declare_command_line(CLI::App& app, GlobalOptions& global, Action& action) {
   app.name("thermocomp");

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "linuxcnc/machine_view.hpp"
 #include "linuxcnc/messages.hpp"
 
 namespace thermocomp_linuxcnc {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "linuxcnc/bridge_state.hpp"
-#include "linuxcnc/machine_view.hpp"
+#include "linuxcnc/messages.hpp"
 
 namespace thermocomp_linuxcnc {
 

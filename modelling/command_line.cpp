@@ -11,7 +11,7 @@
 #include "modelling/identification/gate/tiebar_command.hpp"
 #include "modelling/inspection/inspect_command.hpp"
 #include "modelling/series/series_command.hpp"
-#include "report/command_slip.hpp"
+#include "report/command.hpp"
 #ifdef THERMOCOMP_WITH_STRUCTURE
 #include "modelling/placement/place_command.hpp"
 #include "modelling/structure/structure_command.hpp"

@@ -8,7 +8,7 @@
 
 #include "config/text/problems.hpp"
 #include "config/toml/toml_reader.hpp"
-#include "report/xml_text.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp {
 namespace {

@@ -1,5 +1,6 @@
 /// What every command group of `thermocomp` shares: exit statuses, how a group hands its work to
-/// main(), and the failure that ends a command with one line.
+/// main(), the failure that ends a command with one line, and what is said of a command line that
+/// cannot be taken.
 #pragma once
 
 #include <functional>
@@ -8,7 +9,8 @@
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the name is that of CLI11
 class App;
-}
+class Error;
+}  // namespace CLI
 
 namespace thermocomp::cli {
 
@@ -36,5 +38,11 @@ class Failure : public std::runtime_error {
  private:
   int status_;
 };
+
+/// A word that should have been a command, of the program or of a group of commands: by that word
+/// and the command that was probably meant. None at all: by those that there are. Anything else as
+/// CLI11 says it.
+/// For CLI::App::failure_message().
+[[nodiscard]] std::string command_slip_text(const CLI::App* app, const CLI::Error& error);
 
 }  // namespace thermocomp::cli

@@ -4,7 +4,6 @@
 #include <cstdio>
 
 #include "report/svg_plot.hpp"
-#include "report/xml_text.hpp"
 
 namespace thermocomp {
 namespace {

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "config/runs/robust.hpp"
-#include "report/xml_text.hpp"
 
 namespace thermocomp {
 namespace {
@@ -393,6 +392,24 @@ std::string bars_plot(const std::vector<NamedBar>& bars) {
     top += bar_height + gap;
   }
   return svg + "</svg>\n";
+}
+
+std::string xml_text(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '&') {
+      result += "&amp;";
+    } else if (c == '<') {
+      result += "&lt;";
+    } else if (c == '>') {
+      result += "&gt;";
+    } else if (c == '"') {
+      result += "&quot;";
+    } else {
+      result += c;
+    }
+  }
+  return result;
 }
 
 }  // namespace thermocomp

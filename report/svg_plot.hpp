@@ -7,6 +7,10 @@
 
 namespace thermocomp {
 
+/// Text inside SVG, HTML and VTU files: `text` with &, <, > and " as references, for elements and
+/// for attributes in double quotes.
+[[nodiscard]] std::string xml_text(const std::string& text);
+
 /// The rules of a page's style sheet for lines, grid and labels.
 extern const char* const svg_style;
 

@@ -1,5 +1,3 @@
-#include "cli/history/history_commands.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/commands.hpp"
 #include "config/daemon/daemon_config.hpp"
 #include "config/runs/run_file.hpp"
 #include "daemon/history/replay/history_check.hpp"

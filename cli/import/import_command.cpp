@@ -1,5 +1,3 @@
-#include "cli/import/import_command.hpp"
-
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -11,8 +9,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/import/corrections.hpp"
-#include "cli/import/joined_runs.hpp"
+#include "cli/commands.hpp"
+#include "cli/import/import_runs.hpp"
 #include "config/runs/run_file.hpp"
 #include "report/output_file.hpp"
 #include "report/run_loader.hpp"

@@ -1,5 +1,3 @@
-#include "cli/init/init_command.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -15,6 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <system_error>
 
+#include "cli/commands.hpp"
 #include "cli/init/init_ask.hpp"
 #include "cli/init/init_probe.hpp"
 #include "cli/init/init_specs.hpp"

@@ -1,5 +1,3 @@
-#include "cli/model/model_commands.hpp"
-
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -7,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/commands.hpp"
 #include "cli/model/course_fit.hpp"
 #include "cli/model/covariance_fit.hpp"
 #include "cli/model/prediction.hpp"

@@ -1,5 +1,3 @@
-#include "cli/observe/observe_commands.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -14,10 +12,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/commands.hpp"
 #include "cli/common/daemon_client.hpp"
-#include "cli/observe/axis_trends.hpp"
 #include "cli/observe/status_text.hpp"
-#include "cli/observe/truth_file.hpp"
 #include "cli/observe/watch_text.hpp"
 #include "config/text/clean_output.hpp"
 #include "daemon/history/format/recorded_event.hpp"

@@ -1,5 +1,3 @@
-#include "cli/report/report_command.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -8,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/commands.hpp"
 #include "cli/report/machine_week.hpp"
 #include "cli/report/week_page.hpp"
 #include "daemon/history/format/history_time.hpp"

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "cli/scan/scan_hints.hpp"
 #include "cli/scan/scan_report.hpp"
 #include "drivers/bus_thread.hpp"
 #include "drivers/sensors/bus_config.hpp"
@@ -55,5 +54,14 @@ struct ScanTask {
                                  const ScanTask& task);
 THERMOCOMP_BUSES(THERMOCOMP_DECLARE_SCAN)
 #undef THERMOCOMP_DECLARE_SCAN
+
+/// Who else has a serial port open.
+struct SerialHolder {
+  std::string name;       ///< "thermocompd (process 812)"; empty: nobody, or it cannot be seen
+  bool is_daemon{false};  ///< thermocompd
+};
+
+/// Looks through the processes that the user may look into.
+[[nodiscard]] SerialHolder holder_of(const std::string& device);
 
 }  // namespace thermocomp::cli

@@ -1,5 +1,3 @@
-#include "cli/scan/scan_command.hpp"
-
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -8,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/commands.hpp"
 #include "cli/scan/scan_bus.hpp"
 #include "cli/scan/scan_controller.hpp"
 #include "cli/scan/scan_report.hpp"

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common/modbus_names.hpp"
+#include "cli/scan/scan_bus.hpp"
 #include "cli/scan/scan_can.hpp"
-#include "cli/scan/serial_holder.hpp"
 #include "config/text/printable_text.hpp"
 #include "config/text/units.hpp"
 #include "daemon/socket/status_client.hpp"

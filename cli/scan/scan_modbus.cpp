@@ -10,7 +10,6 @@
 
 #include "cli/common/modbus_names.hpp"
 #include "cli/scan/scan_bus.hpp"
-#include "cli/scan/serial_holder.hpp"
 #include "drivers/bus.hpp"
 #include "drivers/modbus/connection.hpp"
 #include "drivers/modbus/register_codec.hpp"

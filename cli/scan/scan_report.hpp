@@ -1,4 +1,5 @@
-/// What `thermocomp scan` found, as text for a person and as JSON.
+/// What `thermocomp scan` found, as text for a person and as JSON, and what registers that decode
+/// to nothing plausible may be instead. Pure.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +10,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "drivers/modbus/modbus_config.hpp"
 #include "estimator/types.hpp"
 
 namespace thermocomp::cli {
@@ -94,5 +96,29 @@ struct ScanReport {
 [[nodiscard]] std::string hex_bytes(const std::vector<std::uint8_t>& bytes);
 /// The same of registers, as they come over the wire.
 [[nodiscard]] std::string hex_words(std::span<const std::uint16_t> words);
+
+/// Temperatures that a sensor may have, from its [screening].
+struct PlausibleRange {
+  double min_degC{-30.0};
+  double max_degC{200.0};
+};
+
+/// Whether a decoded temperature may be true: in the range, and not a float so near 0 that only
+/// the bytes of another number in a wrong order make it.
+[[nodiscard]] bool is_plausible(const ModbusChannel& channel, double temp_degC,
+                                const PlausibleRange& range);
+
+/// The raw value, where it is one that most modules send for a broken wire: an end of the encoding.
+[[nodiscard]] std::optional<std::int64_t> likely_open_code(const ModbusChannel& channel,
+                                                           std::span<const std::uint16_t> words);
+
+/// For registers of which the temperature is not plausible: the word orders, scales and codes with
+/// which they would be, each a sentence. @param words  of the channel's value
+[[nodiscard]] std::vector<std::string> hints_for_words(const ModbusChannel& channel,
+                                                       std::span<const std::uint16_t> words,
+                                                       const PlausibleRange& range);
+
+/// For an address that the device refuses (exception 2 or 3), from the address alone.
+[[nodiscard]] std::vector<std::string> hints_for_address(const ModbusChannel& channel);
 
 }  // namespace thermocomp::cli

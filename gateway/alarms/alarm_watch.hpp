@@ -2,6 +2,7 @@
 /// cleared when it has been right for a while. Pure; time is an argument.
 #pragma once
 
+#include <deque>
 #include <map>
 #include <string>
 #include <vector>
@@ -51,6 +52,24 @@ class AlarmWatch {
   double raise_after_s_;
   double clear_after_s_;
   std::map<std::string, Place> places_;  ///< by name; those that are right and cleared are dropped
+};
+
+/// Not more than so many an hour, whatever happens. Pure.
+class HookLimit {
+ public:
+  explicit HookLimit(unsigned per_hour_max) : per_hour_max_(per_hour_max) {}
+  /// Whether one more may begin now; if so it is counted.
+  [[nodiscard]] bool take(double now_s) {
+    constexpr double hour_s = 3600.0;
+    while (!begun_s_.empty() && now_s - begun_s_.front() >= hour_s) begun_s_.pop_front();
+    if (begun_s_.size() >= per_hour_max_) return false;
+    begun_s_.push_back(now_s);
+    return true;
+  }
+
+ private:
+  unsigned per_hour_max_;
+  std::deque<double> begun_s_;
 };
 
 }  // namespace thermocomp::gateway

@@ -18,7 +18,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/wait.h>
 
-#include "gateway/alarms/hook_limit.hpp"
+#include "gateway/alarms/alarm_watch.hpp"
 
 namespace thermocomp::gateway {
 namespace {

@@ -13,7 +13,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/socket/status_client.hpp"
-#include "gateway/feed/trend_watch.hpp"
+#include "gateway/feed/snapshot.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp::gateway {

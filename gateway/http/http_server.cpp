@@ -18,13 +18,11 @@
 
 #include "config/toml/toml_reader.hpp"
 #include "gateway/feed/page_state.hpp"
-#include "gateway/http/answer_thread.hpp"
 #include "gateway/http/event_streams.hpp"
-#include "gateway/http/history_answer.hpp"
 #include "gateway/http/page_commands.hpp"
 #include "gateway/http/password_file.hpp"
 #include "gateway/http/request_rules.hpp"
-#include "gateway/http/slow_connections.hpp"
+#include "gateway/http/slow_answers.hpp"
 #include "status/status_json.hpp"
 
 namespace thermocomp::gateway {

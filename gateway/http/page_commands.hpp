@@ -10,7 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "gateway/feed/snapshot.hpp"
-#include "gateway/http/answer_thread.hpp"
+#include "gateway/http/slow_answers.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 
 namespace thermocomp::gateway {

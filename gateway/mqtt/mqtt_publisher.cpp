@@ -15,7 +15,6 @@
 #include <spdlog/spdlog.h>
 
 #include "config/toml/toml_reader.hpp"
-#include "gateway/mqtt/message_buffer.hpp"
 #include "gateway/texts/mqtt_texts.hpp"
 
 namespace thermocomp::gateway {

@@ -1,8 +1,14 @@
-/// The topics of a machine and what is published on them.
+/// The topics of a machine, what is published on them, and what waits for a broker that is away.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "gateway/alarms/alarm_watch.hpp"
@@ -37,5 +43,45 @@ struct TopicState {
 [[nodiscard]] std::string payload_of(const nlohmann::json& state, double wall_s);
 /// 2026-03-01T08:30:00.125Z
 [[nodiscard]] std::string utc_text(double wall_s);
+
+struct Message {
+  std::string topic;
+  std::string payload;
+};
+
+/// Messages for a broker that may be away: a bounded queue that keeps the newest, and the last of
+/// each topic. Pure.
+class MessageBuffer {
+ public:
+  explicit MessageBuffer(std::size_t messages_max) : messages_max_(messages_max) {}
+
+  void push(Message message) {
+    newest_[message.topic] = message.payload;
+    waiting_.push_back(std::move(message));
+    if (waiting_.size() <= messages_max_) return;
+    waiting_.pop_front();
+    ++dropped_;
+  }
+  /// The next to be sent, oldest first.
+  [[nodiscard]] std::optional<Message> take() {
+    if (waiting_.empty()) return std::nullopt;
+    Message message = std::move(waiting_.front());
+    waiting_.pop_front();
+    return message;
+  }
+  /// After a connection was made anew: behind what waits, the last of each topic once more, so that
+  /// what the broker retains is right even where the queue had to drop.
+  void repeat_newest() {
+    for (const auto& [topic, payload] : newest_) waiting_.push_back({topic, payload});
+  }
+  [[nodiscard]] std::size_t size() const noexcept { return waiting_.size(); }
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
+
+ private:
+  std::size_t messages_max_;
+  std::deque<Message> waiting_;
+  std::map<std::string, std::string> newest_;
+  std::uint64_t dropped_{0};
+};
 
 }  // namespace thermocomp::gateway

@@ -6,7 +6,6 @@
 #include "modelling/inspection/inspection.hpp"
 #include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
-#include "report/xml_text.hpp"
 
 namespace thermocomp::inspection {
 namespace {

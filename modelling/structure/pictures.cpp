@@ -7,7 +7,7 @@
 #include <map>
 #include <numeric>
 
-#include "report/xml_text.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp::structure {
 

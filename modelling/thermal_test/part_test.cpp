@@ -15,7 +15,6 @@
 #include "modelling/thermal_test/test_report.hpp"
 #include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
-#include "report/xml_text.hpp"
 
 namespace thermocomp::thermal_test {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
-#include "report/xml_text.hpp"
+#include "report/svg_plot.hpp"
 
 namespace thermocomp::diagnosis {
 namespace {

@@ -10,7 +10,6 @@
 #include "modelling/identification/printed.hpp"
 #include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
-#include "report/xml_text.hpp"
 
 namespace thermocomp::identification {
 namespace {

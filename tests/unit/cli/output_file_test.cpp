@@ -11,7 +11,7 @@
 #include <catch2/catch.hpp>
 #include <sys/stat.h>
 
-#include "cli/observe/truth_file.hpp"
+#include "cli/observe/watch_text.hpp"
 #include "report/command.hpp"
 
 namespace {

@@ -1,5 +1,3 @@
-#include "cli/scan/scan_hints.hpp"
-
 #include <array>
 #include <vector>
 

@@ -8,7 +8,6 @@
 
 #include "modelling/diagnosis/report/diagnosis_report.hpp"
 #include "report/svg_plot.hpp"
-#include "report/xml_text.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::diagnosis;

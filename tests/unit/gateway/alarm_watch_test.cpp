@@ -2,8 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "gateway/alarms/hook_limit.hpp"
-#include "gateway/mqtt/message_buffer.hpp"
+#include "gateway/texts/mqtt_texts.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::gateway;

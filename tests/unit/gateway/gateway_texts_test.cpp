@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "gateway/feed/page_state.hpp"
-#include "gateway/feed/trend_watch.hpp"
+#include "gateway/feed/snapshot.hpp"
 #include "gateway/texts/metrics_text.hpp"
 #include "gateway/texts/mqtt_texts.hpp"
 #include "gateway/texts/shdr_text.hpp"

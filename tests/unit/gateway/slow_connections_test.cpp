@@ -1,5 +1,3 @@
-#include "gateway/http/slow_connections.hpp"
-
 #include <algorithm>
 #include <arpa/inet.h>
 #include <array>
@@ -11,6 +9,8 @@
 #include <catch2/catch.hpp>
 #include <netinet/in.h>
 #include <sys/socket.h>
+
+#include "gateway/http/request_rules.hpp"
 
 using namespace thermocomp::gateway;
 using std::chrono::milliseconds;

@@ -22,9 +22,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "cli/import/clock_shift.hpp"
-#include "cli/import/corrections.hpp"
-#include "cli/import/joined_runs.hpp"
+#include "cli/import/import_runs.hpp"
 #include "config/run_forms/column_map.hpp"
 #include "config/runs/run_file.hpp"
 #include "config/text/problems.hpp"

@@ -1,5 +1,3 @@
-#include "cli/observe/axis_trends.hpp"
-
 #include <catch2/catch.hpp>
 
 #include "cli/observe/watch_text.hpp"

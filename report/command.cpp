@@ -1,4 +1,4 @@
-#include "report/command_slip.hpp"
+#include "report/command.hpp"
 
 #include <algorithm>
 #include <vector>

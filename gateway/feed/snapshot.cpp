@@ -1,4 +1,4 @@
-#include "gateway/feed/trend_watch.hpp"
+#include "gateway/feed/snapshot.hpp"
 
 #include <cmath>
 

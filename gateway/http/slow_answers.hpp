@@ -1,11 +1,13 @@
-/// Answers that take their time, made one after the other on a thread of its own: a long one makes
-/// no page wait for its live values.
+/// Answers that take their time: the thread that makes them, and the answer to /api/history.
 #pragma once
 
 #include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
+
+#include "gateway/feed/daemon_feed.hpp"
+#include "gateway/http/request_rules.hpp"
 
 namespace thermocomp::gateway {
 
@@ -14,6 +16,8 @@ struct JsonAnswer {
   std::string text;
 };
 
+/// Made one after the other on a thread of its own: a long one makes no page wait for its live
+/// values.
 class AnswerThread {
  public:
   using Work = std::function<JsonAnswer()>;  ///< must not throw
@@ -33,5 +37,12 @@ class AnswerThread {
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
+
+/// To /api/history: {"from_s", "to_s", "span_s", "columns": {"time_s": [...], "bed_degC": [...],
+/// "z_offset_um":
+/// [...]}, "probings": [{"axis", "time_s", "left_um", "needed_um"}], "modes": [{"mode", "from_s",
+/// "to_s"}], "events": [{"time_s", "text"}], "chunks", "chunks_read", "damage": [...]}; null: not
+/// known. The modes are those in which nothing is compensated.
+[[nodiscard]] JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request);
 
 }  // namespace thermocomp::gateway

@@ -1,0 +1,171 @@
+#include "cli/operate/axis_commands.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/common/daemon_client.hpp"
+#include "cli/common/json_fields.hpp"
+#include "cli/operate/prove_course.hpp"
+#include "report/terminal.hpp"
+#include "status/figures.hpp"
+
+namespace thermocomp::cli {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto line_period = 2s;
+
+/// The line of progress: one that is overwritten, or one every two seconds where stderr is no
+/// terminal.
+class ProgressLine {
+ public:
+  explicit ProgressLine(std::string what)
+      : what_(std::move(what)), on_terminal_(stderr_is_terminal()), last_(Clock::now()) {}
+  ~ProgressLine() {
+    if (shown_ && on_terminal_) std::fputs(rewritten_line("").c_str(), stderr);
+  }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  void update(const std::string& text) {
+    const auto now = Clock::now();
+    if (!on_terminal_ && now - last_ < line_period) return;
+    last_ = now;
+    shown_ = true;
+    const std::string line = what_ + ": " + text;
+    std::fputs((on_terminal_ ? rewritten_line(line) : line + "\n").c_str(), stderr);
+    std::fflush(stderr);
+  }
+
+ private:
+  std::string what_;
+  bool on_terminal_;
+  bool shown_{false};
+  Clock::time_point last_;
+};
+
+constexpr auto look_period = 50ms;
+/// The last read-back of a slow controller comes so late.
+constexpr auto settles_within = 2s;
+/// A daemon that does not say how long it takes.
+constexpr double takes_s_default = 120.0;
+/// Of the time that a move takes: longer, and something holds it.
+constexpr double patience_factor = 2.0;
+constexpr double patience_s = 10.0;
+
+json axis_now(const GlobalOptions& global, const std::string& name) {
+  const json offsets = ask_daemon(global.socket, "offsets", json::object());
+  for (const json& axis : list_of(offsets, "axes"))
+    if (text_of(axis, "name") == name || text_of(axis, "axis") == name) return axis;
+  return json::object();
+}
+
+void watch(const GlobalOptions& global, const std::string& axis, double takes_s,
+           ProveCourse& course) {
+  const auto patience = std::chrono::duration<double>(patience_factor * takes_s + patience_s);
+  const auto began = Clock::now();
+  auto over_since = Clock::time_point{};
+  ProgressLine line("axis " + axis);
+  while (Clock::now() - began < patience) {
+    course.take(axis_now(global, axis));
+    line.update(course.progress());
+    if (course.over()) {
+      if (over_since == Clock::time_point{}) over_since = Clock::now();
+      if (course.is_settled() || Clock::now() - over_since > settles_within) return;
+    }
+    std::this_thread::sleep_for(look_period);
+  }
+}
+
+/// With the read-backs that a release waits for.
+constexpr auto read_back_patience = 10s;
+
+/// Of the axis, or of the first of its nodes that has one: its mismatch with what it reads back
+/// now; empty where it has none.
+json mismatch_now(const GlobalOptions& global, const std::string& name) {
+  const json status = ask_daemon(global.socket, "status", json::object());
+  for (const json& axis : list_of(status, "axes")) {
+    if (text_of(axis, "name") != name && text_of(axis, "axis") != name) continue;
+    json mismatch = object_of(axis, "mismatch");
+    if (mismatch.empty()) continue;
+    mismatch["applied_um"] = number_of(axis, "applied");
+    return mismatch;
+  }
+  return json::object();
+}
+
+/// While read-backs are awaited.
+/// @return as mismatch_now(); the release is under way still where its `releasing` is true
+json waited_for(const GlobalOptions& global, const std::string& name) {
+  const auto began = Clock::now();
+  ProgressLine line("axis " + name);
+  json mismatch = mismatch_now(global, name);
+  while (flag_of(mismatch, "releasing") && Clock::now() - began < read_back_patience) {
+    line.update("waiting for what is read back");
+    std::this_thread::sleep_for(look_period);
+    mismatch = mismatch_now(global, name);
+  }
+  return mismatch;
+}
+
+/// Where what is read back is not what was sent last: what the release takes on trust.
+void warn_of_trust(const json& before) {
+  constexpr double same_um = 0.3;
+  const double sent_um = number_of(before, "sent_um");
+  const double read_um = number_of(before, "applied_um");
+  if (!(std::abs(read_um - sent_um) > same_um)) return;
+  std::cout << "It read back " << fixed_signed(read_um, 2) << " um where "
+            << fixed_signed(sent_um, 2)
+            << " um was sent last, and goes on from what it reads back.\nIf the controller adds "
+               "the difference by itself, the tool moves by it once more: mend that first.\n";
+}
+
+}  // namespace
+
+int run_prove(const GlobalOptions& global, const std::string& axis, double move_um) {
+  const json before = axis_now(global, axis);
+  const json answer = ask_daemon(global.socket, "prove", {{"axis", axis}, {"value_um", move_um}});
+  const double takes_s = number_of(answer, "takes_s");
+  ProveCourse course(move_um, before);
+  watch(global, axis, std::isfinite(takes_s) ? takes_s : takes_s_default, course);
+  const std::string amount = fixed_signed(move_um, 2);
+  std::cout << course.verdict(axis) << "an indicator at the tool must have shown " << amount
+            << " um in the axis' positive direction, else change the sign in its [[axis]] table\n";
+  return course.passed() ? exit_success : exit_no;
+}
+
+int run_release(const GlobalOptions& global, const std::string& axis) {
+  const json before = mismatch_now(global, axis);
+  ask_daemon(global.socket, "release", {{"axis", axis}});
+  const json after = waited_for(global, axis);
+  if (after.empty()) {
+    std::cout << "axis " << axis << ": released\n";
+    warn_of_trust(before);
+    return exit_success;
+  }
+  if (flag_of(after, "releasing")) {
+    std::cout << "axis " << axis
+              << ": not released yet: it goes on by itself once the controller's read-backs allow "
+                 "it (thermocomp status)\n";
+    return exit_no;
+  }
+  std::cout << "axis " << axis << ": NOT released: it reads back "
+            << fixed_signed(number_of(after, "applied_um"), 2) << " um where "
+            << fixed_signed(number_of(after, "sent_um"), 2) << " um was sent last ("
+            << text_of(after, "likely")
+            << ").\nMend that, wait until it reads back what was sent, "
+               "and release again.\n";
+  return exit_no;
+}
+
+}  // namespace thermocomp::cli
