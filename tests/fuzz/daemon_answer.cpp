@@ -6,8 +6,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/common/json_fields.hpp"
-#include "cli/observe/events_text.hpp"
 #include "cli/observe/status_text.hpp"
 #include "cli/observe/watch_text.hpp"
 #include "common/fuzz.hpp"
@@ -16,6 +14,8 @@
 #include "gateway/texts/metrics_text.hpp"
 #include "gateway/texts/mqtt_texts.hpp"
 #include "gateway/texts/shdr_text.hpp"
+#include "status/status_json.hpp"
+#include "status/verdict.hpp"
 
 using namespace thermocomp;
 using namespace thermocomp::gateway;
@@ -31,26 +31,28 @@ json taken(std::string_view line) {
   return copy;
 }
 
-void look_at(const json& answer) {
-  static_cast<void>(cli::status_text(answer, true));
-  static_cast<void>(cli::sensors_text(answer, true));
-  static_cast<void>(cli::events_text(answer));
-  static_cast<void>(cli::watch_screen(answer, nullptr, true, nullptr));
-  static_cast<void>(cli::why_not(answer, true));
+void look_at(const Status& status, const SensorsAnswer& sensors) {
+  static_cast<void>(cli::status_text(status, true));
+  static_cast<void>(cli::sensors_text(sensors, true));
+  static_cast<void>(cli::watch_screen(status, nullptr, true));
+  static_cast<void>(why_not(status, true));
+  static_cast<void>(troubles(status, &sensors));
 }
 
-std::set<std::string> names_in(const json& answer, const char* list) {
+template <class Part>
+std::set<std::string> names_of(const std::vector<Part>& parts) {
   std::set<std::string> names;
-  for (const json& each : cli::list_of(answer, list)) names.insert(cli::text_of(each, "name"));
+  for (const Part& part : parts) names.insert(part.name);
   return names;
 }
 
-void check_gateway(const json& answer) {
+void check_gateway(const Status& status, const SensorsAnswer& sensors_answer,
+                   const EventsAnswer& events) {
   Snapshot snapshot;
   snapshot.is_here = true;
-  snapshot.status = answer;
-  snapshot.sensors = answer;
-  snapshot.events = std::make_shared<const json>(cli::list_of(answer, "events"));
+  snapshot.status = status;
+  snapshot.sensors = sensors_answer;
+  snapshot.events = std::make_shared<const std::vector<Event>>(events.events);
   static_cast<void>(page_state(snapshot, "mill"));
   static_cast<void>(page_events(snapshot, 12));
   static_cast<void>(metrics_text(snapshot, {}));
@@ -62,7 +64,7 @@ void check_gateway(const json& answer) {
     sensors += item.starts_with("temp_") ? 1u : 0u;
     for (const char c : item) FUZZ_PROMISE(c == '_' || std::isalnum(static_cast<unsigned char>(c)));
   }
-  FUZZ_PROMISE(sensors == names_in(answer, "sensors").size());
+  FUZZ_PROMISE(sensors == names_of(sensors_answer.sensors).size());
   for (const char c : shdr_lines({}, states, 0.0))
     FUZZ_PROMISE(c == '\n' || static_cast<unsigned char>(c) >= ' ');
 
@@ -72,7 +74,7 @@ void check_gateway(const json& answer) {
     topics.insert(state.topic);
   }
   FUZZ_PROMISE(topics.size() ==
-               1 + names_in(answer, "sensors").size() + names_in(answer, "axes").size());
+               1 + names_of(sensors_answer.sensors).size() + names_of(status.axes).size());
 }
 
 }  // namespace
@@ -80,8 +82,10 @@ void check_gateway(const json& answer) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     const json answer = taken({reinterpret_cast<const char*>(data), size});
-    look_at(answer);
-    check_gateway(answer);
+    const Status status = part_from<Status>(answer);
+    const SensorsAnswer sensors = part_from<SensorsAnswer>(answer);
+    look_at(status, sensors);
+    check_gateway(status, sensors, part_from<EventsAnswer>(answer));
   } catch (const JsonError& error) {
     FUZZ_PROMISE(*error.what() != '\0');
   }

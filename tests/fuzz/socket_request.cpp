@@ -47,7 +47,7 @@ class Rig {
     step();
     add_operator_methods(
         server_, {[this] { return view(); }, [this](const Command& asked) { return take(asked); },
-                  []() -> RpcPending {
+                  [](const std::optional<std::filesystem::path>&) -> RpcPending {
                     throw ConfigurationError({{"config.toml", 3, "format", "2", "must be 1"}});
                   }});
   }
