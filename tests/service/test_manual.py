@@ -19,7 +19,7 @@ PROGRAMS = {"thermocomp": "thermocomp.1", "thermocompd": "thermocompd.8",
             "thermocomp-modelling": "thermocomp-modelling.1",
             "thermocomp-gateway": "thermocomp-gateway.1"}
 # Carried out by a program of its own, which has the help.
-MODELLING = {"structure", "place", "tiebar", "plan", "group", "fit", "diagnose", "inspect"}
+MODELLING = {"structure", "place", "tiebar", "plan", "series", "group", "fit", "diagnose", "inspect"}
 
 
 def shown(page):
