@@ -1,0 +1,11 @@
+#!/bin/bash
+# Whether each fuzz target still compiles: syntax alone, about a minute. Building and running them is
+# scripts/fuzz.sh, in the night.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
+source scripts/common.sh
+
+targets=(tests/fuzz/*.cpp)
+printf '%s\0' "${targets[@]}" | xargs -0 -n 1 -P "$(build_jobs)" \
+  clang++ -std=c++20 -fsyntax-only -I. -Itests/fuzz -isystem /usr/include/eigen3
+echo "${#targets[@]} fuzz targets compile"
