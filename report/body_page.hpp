@@ -29,8 +29,8 @@ struct BodyPoint {
 struct BodyPicture {
   std::string title;
   std::vector<double> nodes_mm;  ///< shape (3 nodes)
-  std::vector<std::uint32_t>
-      triangles;  ///< nodes, counterclockwise from outside; shape (3 triangles)
+  /// Numbers of nodes, counterclockwise as seen from outside; shape (3 triangles).
+  std::vector<std::uint32_t> triangles;
   std::vector<BodyState> states;
   std::vector<BodyPoint> points;
 };

@@ -59,7 +59,7 @@ constexpr auto look_period = 50ms;
 constexpr auto settles_within = 2s;
 /// A daemon that does not say how long it takes.
 constexpr double takes_s_default = 120.0;
-/// Of the time that a move takes: longer, and something holds it.
+/// A move may take this many times its computed duration, and this long besides.
 constexpr double patience_factor = 2.0;
 constexpr double patience_s = 10.0;
 

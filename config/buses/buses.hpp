@@ -30,7 +30,7 @@ struct ChannelTables {
   void check_period(double period_s, const std::string& period) const;
 };
 
-/// What the buses of a configuration share.
+/// Database files that several buses of a configuration read.
 struct BusFiles {
   DbcFiles& dbc;
   EdsFiles& eds;

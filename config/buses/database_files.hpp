@@ -37,7 +37,7 @@ class EdsFiles {
   /// The file of the key `eds` of a device; nullptr: it names none, or none that can be read.
   [[nodiscard]] std::shared_ptr<EdsFile> read(const TomlTable& device);
   [[nodiscard]] bool opens_files() const noexcept { return folder_.has_value(); }
-  /// What is wrong inside the files.
+  /// The flaws inside the files.
   /// @param in_use  at objects whose name or type a configuration takes from there; else elsewhere
   [[nodiscard]] std::vector<Problem> flaws(bool in_use) const { return flaws_of(read_, in_use); }
 
@@ -63,7 +63,7 @@ class DbcFiles {
 
   /// The file of the key `dbc` of a bus.
   [[nodiscard]] CanDatabase read(const TomlTable& bus);
-  /// What is wrong inside the files.
+  /// The flaws inside the files.
   /// @param in_use  where a sensor stands on it; else elsewhere
   [[nodiscard]] std::vector<Problem> flaws(bool in_use) const { return flaws_of(read_, in_use); }
 

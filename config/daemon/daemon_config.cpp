@@ -40,8 +40,8 @@ struct NamedFile {
   std::vector<std::string> endings{};
 };
 
-/// What is wrong becomes a problem of the key: links that lead only to themselves, what is not a
-/// regular file, and every pair of names of one file that is written under at least one of them.
+/// Adds a problem of the key for each link that leads only to itself, each path that is not a
+/// regular file, and each pair of names of one file that is written under at least one of them.
 /// Paths are compared with all links followed, files that exist by device and inode too.
 void check_named_files(const std::vector<NamedFile>& files);
 

@@ -1,5 +1,5 @@
-/// What is wrong with runs: displacements that no structure can show (a probe that missed, a row
-/// read wrong), and rows that are used twice.
+/// Finds flaws of runs: displacements that no structure can show (a probe that missed, a row read
+/// wrong), and rows that are used twice.
 #pragma once
 
 #include <span>
