@@ -16,8 +16,8 @@ import re
 import sys
 
 CODE = ("estimator", "drivers", "config", "status", "report", "daemon", "simulator", "cli", "gateway",
-        "linuxcnc", "modelling", "docs", "bench", "tests")
-DRAWN = CODE[:11]  # what a user installs
+        "fleet", "linuxcnc", "modelling", "docs", "bench", "tests")
+DRAWN = CODE[:12]  # what a user installs
 BEGIN, END = "<!-- floors: begin (scripts/check_includes.py --write) -->", "<!-- floors: end -->"
 INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 

@@ -13,6 +13,8 @@ packages_build=(
   "${packages_machine[@]}" ccache
   # Of thermocomp-gateway; its page takes its charts from the last.
   libmicrohttpd-dev libmosquitto-dev libcrypt-dev zlib1g-dev libjs-dygraphs
+  # Of thermocomp-fleet and thermocomp-uplink.
+  libpqxx-dev
 )
 
 # Besides, for thermocomp-modelling. OpenBLAS: with the reference BLAS a factorisation takes
@@ -36,6 +38,8 @@ packages_test=(
   python3-numpy python3-pytest python3-meshio
   # What the gateway is read by: its page, metrics and messages.
   chromium chromium-driver python3-selenium prometheus mosquitto mosquitto-clients openssl
+  # The store of a series.
+  postgresql postgresql-client
   sqlite3 socat rt-tests user-mode-linux kmod iproute2 procps valgrind
   clang-tidy clang-tools clang-format gcovr
   # The fuzz targets: the compiler, libFuzzer and the sanitizers' runtime.

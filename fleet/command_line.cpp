@@ -1,0 +1,28 @@
+#include "fleet/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include "fleet/store/store_commands.hpp"
+#include "report/command.hpp"
+
+namespace thermocomp::fleet {
+
+void declare_fleet_command_line(CLI::App& app, std::string& store, cli::Action& action) {
+  app.name("thermocomp-fleet");
+  app.description("The store of machines of one type: who is in it, what the nights found");
+  app.set_version_flag("--version", THERMOCOMP_VERSION);
+  app.require_subcommand(1);
+  app.failure_message(cli::command_slip_text);
+  app.footer("Exit status: 0 success, 1 no, 2 bad use, bad input, or a store that is not reached.");
+  store = "dbname=thermocomp_fleet";
+  app.add_option(
+         "--store", store,
+         "connection to PostgreSQL, as libpq takes it: \"host=... dbname=...\" or a URL. TLS "
+         "with the server's name verified, unless it says sslmode=... itself")
+      ->type_name("CONNECTION")
+      ->envname("THERMOCOMP_FLEET_STORE")
+      ->capture_default_str();
+  add_store_commands(app, store, action);
+}
+
+}  // namespace thermocomp::fleet

@@ -1,0 +1,22 @@
+import pytest
+
+from fleet_lab import Store
+from postgres import Postgres
+
+
+@pytest.fixture(scope="module")
+def server():
+    """With TLS for who comes over the network."""
+    running = Postgres()
+    running.require_tls()
+    running.start()
+    try:
+        yield running
+    finally:
+        running.end()
+
+
+@pytest.fixture
+def store(server, tmp_path, request):
+    """An empty store."""
+    return Store(server, tmp_path, request.node.name)
