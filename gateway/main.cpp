@@ -25,10 +25,10 @@
 #include "gateway/alarms/alarm_watch.hpp"
 #include "gateway/alarms/hook_runner.hpp"
 #include "gateway/command_line.hpp"
+#include "gateway/door/page_files.hpp"
+#include "gateway/door/password_file.hpp"
 #include "gateway/feed/daemon_feed.hpp"
 #include "gateway/http/http_server.hpp"
-#include "gateway/http/page_files.hpp"
-#include "gateway/http/password_file.hpp"
 #include "gateway/mqtt/mqtt_publisher.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 #include "gateway/shdr/shdr_adapter.hpp"
@@ -64,7 +64,7 @@ class Gateway {
     if (settings.shdr.enabled) shdr_.emplace(settings.shdr);
     if (!settings.alarm.command.empty()) hooks_.emplace(settings);
     if (settings.http.enabled) {
-      files_.emplace(page_folder(), charts_folder(), settings.http.body);
+      files_.emplace(page_folder("gateway"), charts_folder(), settings.http.body);
       http_.emplace(settings, feed_, *files_, [this](GatewayFigures& figures) {
         if (mqtt_) mqtt_->add_figures(figures);
       });

@@ -107,7 +107,7 @@ def main():
         machine.start()
         gateway = lab.also_end(Gateway(lab, machine.daemon)).start()
         page_bytes = sum(len(gateway.ask(path, headers={"Accept-Encoding": "gzip"})[2]) for path in (
-            "/", "/page.js", "/charts.js", "/page.css", "/icon.svg", "/manifest.json", "/dygraph.js", "/dygraph.css"))
+            "/", "/page.js", "/charts.js", "/page.css", "/icon.svg", "/manifest.json", "/dygraph.min.js", "/dygraph.min.css"))
         with contextlib.ExitStack() as stack:
             open_pages(gateway, options.pages, stack, stops)
             time.sleep(3.0)

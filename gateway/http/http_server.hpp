@@ -6,16 +6,13 @@
 #include <memory>
 #include <string>
 
+#include "gateway/door/page_files.hpp"
 #include "gateway/feed/daemon_feed.hpp"
-#include "gateway/http/page_files.hpp"
 #include "gateway/settings/gateway_settings.hpp"
 #include "gateway/texts/metrics_text.hpp"
 
 namespace thermocomp::gateway {
 
-/// One thread of libmicrohttpd serves all connections. What a client may cost: `connections_max`
-/// connections, 16 kB of headers, 4 kB of body, 10 s without a byte, 15 s until its request is
-/// whole, however slowly it comes.
 class HttpServer {
  public:
   /// Fills in, for /metrics and the page, what other parts of the gateway know. Called on the

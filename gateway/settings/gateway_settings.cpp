@@ -30,6 +30,30 @@ bool is_numeric_address(const std::string& address) {
          inet_pton(AF_INET6, address.c_str(), bytes.data()) == 1;
 }
 
+/// Relative to the folder of the file; empty where the key is absent.
+fs::path path_in(const TomlTable& table, std::string_view key, const fs::path& folder) {
+  if (!table.has(key)) return {};
+  const fs::path named = table.text(key);
+  if (named.empty()) return {};
+  return named.is_absolute() ? named : (folder / named).lexically_normal();
+}
+
+/// The same for a file that must be there; its secrets are not looked at here.
+fs::path existing_in(const TomlTable& table, std::string_view key, const fs::path& folder) {
+  fs::path named = path_in(table, key, folder);
+  std::error_code ignored;
+  if (!named.empty() && !fs::is_regular_file(named, ignored))
+    table.problem(key, "must name a file that exists");
+  return named;
+}
+
+std::string address_in(const TomlTable& table, const std::string& otherwise) {
+  std::string given = table.text("address", otherwise);
+  if (!is_numeric_address(given))
+    table.problem("address", "must be an IPv4 or IPv6 address in numbers");
+  return given;
+}
+
 /// Reads one file's tables; knows its folder.
 class SettingsReader {
  public:
@@ -47,7 +71,7 @@ class SettingsReader {
         settings.log_level);
     read_daemon(root_.table_or_empty("daemon"), settings);
     const TomlTable http = root_.table_or_empty("http");
-    settings.http = read_http(http);
+    settings.http = gateway::read_http(http, folder_);
     settings.commands = read_commands(root_.table_or_empty("commands"), settings.http);
     settings.mqtt = read_mqtt(root_.table_or_empty("mqtt"));
     settings.shdr = read_shdr(root_.table_or_empty("shdr"));
@@ -55,21 +79,11 @@ class SettingsReader {
   }
 
  private:
-  /// Relative to the folder of the file; empty where the key is absent.
   [[nodiscard]] fs::path path(const TomlTable& table, std::string_view key) const {
-    if (!table.has(key)) return {};
-    const fs::path named = table.text(key);
-    if (named.empty()) return {};
-    return named.is_absolute() ? named : (folder_ / named).lexically_normal();
+    return path_in(table, key, folder_);
   }
-
-  /// The same for a file that must be there; its secrets are not looked at here.
   [[nodiscard]] fs::path existing(const TomlTable& table, std::string_view key) const {
-    fs::path named = path(table, key);
-    std::error_code ignored;
-    if (!named.empty() && !fs::is_regular_file(named, ignored))
-      table.problem(key, "must name a file that exists");
-    return named;
+    return existing_in(table, key, folder_);
   }
 
   void read_daemon(const TomlTable& table, GatewaySettings& settings) const {
@@ -78,40 +92,6 @@ class SettingsReader {
     if (settings.socket.string().size() > path_max)
       table.problem("socket", "must have at most 107 characters");
     settings.history = path(table, "history");
-  }
-
-  [[nodiscard]] static std::string address(const TomlTable& table, const std::string& otherwise) {
-    std::string given = table.text("address", otherwise);
-    if (!is_numeric_address(given))
-      table.problem("address", "must be an IPv4 or IPv6 address in numbers");
-    return given;
-  }
-
-  [[nodiscard]] HttpSettings read_http(const TomlTable& table) const {
-    HttpSettings http;
-    http.enabled = table.flag("enabled", http.enabled);
-    http.address = address(table, http.address);
-    http.port = table.integer<std::uint16_t>("port", 0, 65535, http.port);
-    http.names = table.texts("names", {});
-    http.certificate = existing(table, "certificate");
-    http.key = existing(table, "key");
-    http.passwords = existing(table, "passwords");
-    http.body = existing(table, "body");
-    http.connections_max =
-        table.integer<unsigned>("connections_max", 4, 2000, http.connections_max);
-    if (http.certificate.empty() != http.key.empty())
-      table.problem(http.key.empty() ? "key" : "certificate",
-                    "certificate and key must be given together");
-    if (!http.passwords.empty() && !http.has_tls())
-      table.problem("passwords",
-                    "needs certificate and key: passwords never go over the network "
-                    "in the clear");
-    if (!is_loopback(http.address) && is_numeric_address(http.address) &&
-        (!http.has_tls() || http.passwords.empty()))
-      table.problem("address",
-                    "other computers reach this one: needs certificate, key and "
-                    "passwords");
-    return http;
   }
 
   [[nodiscard]] static CommandSettings read_commands(const TomlTable& table,
@@ -159,7 +139,7 @@ class SettingsReader {
     ShdrSettings shdr;
     if (!table) return shdr;
     shdr.enabled = table.flag("enabled", true);
-    shdr.address = address(table, shdr.address);
+    shdr.address = address_in(table, shdr.address);
     shdr.port = table.integer<std::uint16_t>("port", 0, 65535, shdr.port);
     shdr.heartbeat_s = table.number("heartbeat_s", Range::between(1, 60), shdr.heartbeat_s);
     shdr.agents_max = table.integer<unsigned>("agents_max", 1, 64, shdr.agents_max);
@@ -205,6 +185,32 @@ bool is_loopback(const std::string& address) {
   if (inet_pton(AF_INET, address.c_str(), &four) == 1) return (ntohl(four.s_addr) >> 24) == 127;
   in6_addr six{};
   return inet_pton(AF_INET6, address.c_str(), &six) == 1 && IN6_IS_ADDR_LOOPBACK(&six) != 0;
+}
+
+HttpSettings read_http(const TomlTable& table, const fs::path& folder) {
+  HttpSettings http;
+  http.enabled = table.flag("enabled", http.enabled);
+  http.address = address_in(table, http.address);
+  http.port = table.integer<std::uint16_t>("port", 0, 65535, http.port);
+  http.names = table.texts("names", {});
+  http.certificate = existing_in(table, "certificate", folder);
+  http.key = existing_in(table, "key", folder);
+  http.passwords = existing_in(table, "passwords", folder);
+  http.body = existing_in(table, "body", folder);
+  http.connections_max = table.integer<unsigned>("connections_max", 4, 2000, http.connections_max);
+  if (http.certificate.empty() != http.key.empty())
+    table.problem(http.key.empty() ? "key" : "certificate",
+                  "certificate and key must be given together");
+  if (!http.passwords.empty() && !http.has_tls())
+    table.problem("passwords",
+                  "needs certificate and key: passwords never go over the network "
+                  "in the clear");
+  if (!is_loopback(http.address) && is_numeric_address(http.address) &&
+      (!http.has_tls() || http.passwords.empty()))
+    table.problem("address",
+                  "other computers reach this one: needs certificate, key and "
+                  "passwords");
+  return http;
 }
 
 GatewaySettings load_gateway_settings(const fs::path& file) {

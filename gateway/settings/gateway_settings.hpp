@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "config/text/problems.hpp"
+#include "config/toml/toml_reader.hpp"
 
 namespace thermocomp::gateway {
 
@@ -82,6 +83,10 @@ struct GatewaySettings {
 [[nodiscard]] GatewaySettings load_gateway_settings(const std::filesystem::path& file);
 /// @param name  stands for the file, and its folder for paths that do not begin with a slash
 [[nodiscard]] GatewaySettings parse_gateway_settings(std::string text, const std::string& name);
+
+/// A table [http], of any program that serves a page.
+/// @param folder  of the file, for paths that do not begin with a slash
+[[nodiscard]] HttpSettings read_http(const TomlTable& table, const std::filesystem::path& folder);
 
 /// Whether a file is meant for the gateway and not for the daemon: it names a `machine` and has no
 /// sensor, axis or controller. A file that cannot be read is not.

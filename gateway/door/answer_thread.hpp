@@ -1,13 +1,10 @@
-/// Answers that take their time: the thread that makes them, and the answer to /api/history.
+/// The thread that makes answers that take their time.
 #pragma once
 
 #include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
-
-#include "gateway/feed/daemon_feed.hpp"
-#include "gateway/http/request_rules.hpp"
 
 namespace thermocomp::gateway {
 
@@ -38,11 +35,7 @@ class AnswerThread {
   std::unique_ptr<Parts> parts_;
 };
 
-/// To /api/history: {"from_s", "to_s", "span_s", "columns": {"time_s": [...], "bed_degC": [...],
-/// "z_offset_um":
-/// [...]}, "probings": [{"axis", "time_s", "left_um", "needed_um"}], "modes": [{"mode", "from_s",
-/// "to_s"}], "events": [{"time_s", "text"}], "chunks", "chunks_read", "damage": [...]}; null: not
-/// known. The modes are those in which nothing is compensated.
-[[nodiscard]] JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request);
+/// {"error": text}
+[[nodiscard]] std::string error_text(const std::string& text);
 
 }  // namespace thermocomp::gateway

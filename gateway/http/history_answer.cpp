@@ -1,14 +1,10 @@
-#include "gateway/http/slow_answers.hpp"
+#include "gateway/http/history_answer.hpp"
 
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <condition_variable>
-#include <deque>
 #include <exception>
-#include <mutex>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -20,59 +16,6 @@
 
 namespace thermocomp::gateway {
 
-struct AnswerThread::Parts {
-  struct Job {
-    Work work;
-    Done done;
-  };
-  void run();
-
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::deque<Job> jobs;
-  bool stops{false};
-  std::thread thread;
-};
-
-void AnswerThread::Parts::run() {
-  for (;;) {
-    std::unique_lock lock(mutex);
-    changed.wait(lock, [this] { return stops || !jobs.empty(); });
-    if (jobs.empty()) return;
-    const Job job = std::move(jobs.front());
-    jobs.pop_front();
-    const bool refuses = stops;
-    lock.unlock();
-    constexpr unsigned unavailable = 503;
-    job.done(refuses ? JsonAnswer{unavailable, R"({"error":"the gateway stops"})"} : job.work());
-  }
-}
-
-AnswerThread::AnswerThread() : parts_(std::make_unique<Parts>()) {
-  parts_->thread = std::thread([this] { parts_->run(); });
-}
-
-AnswerThread::~AnswerThread() {
-  stop();
-}
-
-bool AnswerThread::ask(Work work, Done done) {
-  const std::lock_guard lock(parts_->mutex);
-  if (parts_->stops || parts_->jobs.size() >= waiting_max) return false;
-  parts_->jobs.push_back({std::move(work), std::move(done)});
-  parts_->changed.notify_one();
-  return true;
-}
-
-void AnswerThread::stop() noexcept {
-  {
-    const std::lock_guard lock(parts_->mutex);
-    parts_->stops = true;
-  }
-  parts_->changed.notify_all();
-  if (parts_->thread.joinable()) parts_->thread.join();
-}
-
 namespace {
 
 using nlohmann::json;
@@ -82,7 +25,7 @@ std::string dumped(const json& value) {
 }
 
 JsonAnswer error_answer(unsigned status, const std::string& text) {
-  return {status, dumped({{"error", text}})};
+  return {status, error_text(text)};
 }
 
 /// A chart shows no more than seven significant digits, and an answer has half the size.

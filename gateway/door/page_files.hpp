@@ -20,7 +20,7 @@ struct PageFile {
 
 class PageFiles {
  public:
-  /// @param folder  of index.html, page.js, page.css and icon.svg
+  /// @param folder  of index.html, which is `/`, and of what it needs, by suffix
   /// @param charts  of dygraph.min.js and dygraph.min.css; where they are missing the page has no
   ///                charts, and says so
   /// @param body  the page of `thermocomp structure --page`; empty: none
@@ -32,13 +32,13 @@ class PageFiles {
   [[nodiscard]] const PageFile* find(std::string_view path) const;
 
  private:
-  void add(const std::string& path, const std::string& type, const std::filesystem::path& file);
+  void add(const std::string& path, const std::filesystem::path& file);
 
   std::map<std::string, PageFile, std::less<>> files_;
 };
 
-/// share/thermocomp/gateway beside the folder of the programs.
-[[nodiscard]] std::filesystem::path page_folder();
+/// share/thermocomp/`program` beside the folder of the programs.
+[[nodiscard]] std::filesystem::path page_folder(const std::string& program);
 /// Where Debian's libjs-dygraphs puts its files.
 [[nodiscard]] std::filesystem::path charts_folder();
 

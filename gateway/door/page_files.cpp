@@ -1,4 +1,4 @@
-#include "gateway/http/page_files.hpp"
+#include "gateway/door/page_files.hpp"
 
 #include <array>
 #include <stdexcept>
@@ -14,22 +14,20 @@
 namespace thermocomp::gateway {
 namespace {
 
-struct Place {
-  const char* path;
-  const char* file;
-  const char* type;
-};
+/// By the suffix of a file; nullptr: it is no part of a page.
+const char* type_of(const std::filesystem::path& file) {
+  constexpr std::array<std::array<const char*, 2>, 5> types{
+      {{".html", "text/html; charset=utf-8"},
+       {".js", "text/javascript; charset=utf-8"},
+       {".css", "text/css; charset=utf-8"},
+       {".json", "application/manifest+json"},
+       {".svg", "image/svg+xml"}}};
+  for (const auto& [suffix, type] : types)
+    if (file.extension() == suffix) return type;
+  return nullptr;
+}
 
-constexpr std::array<Place, 6> page_places{
-    {{"/", "index.html", "text/html; charset=utf-8"},
-     {"/page.js", "page.js", "text/javascript; charset=utf-8"},
-     {"/charts.js", "charts.js", "text/javascript; charset=utf-8"},
-     {"/manifest.json", "manifest.json", "application/manifest+json"},
-     {"/page.css", "page.css", "text/css; charset=utf-8"},
-     {"/icon.svg", "icon.svg", "image/svg+xml"}}};
-constexpr std::array<Place, 2> chart_places{
-    {{"/dygraph.js", "dygraph.min.js", "text/javascript; charset=utf-8"},
-     {"/dygraph.css", "dygraph.min.css", "text/css; charset=utf-8"}}};
+constexpr std::array<const char*, 2> chart_files{"dygraph.min.js", "dygraph.min.css"};
 
 }  // namespace
 
@@ -55,29 +53,33 @@ std::string gzipped(std::string_view bytes) {
 PageFiles::PageFiles(const std::filesystem::path& folder, const std::filesystem::path& charts,
                      const std::filesystem::path& body) {
   try {
-    for (const Place& place : page_places) add(place.path, place.type, folder / place.file);
+    add("/", folder / "index.html");
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      const std::string name = entry.path().filename().string();
+      if (type_of(entry.path()) != nullptr && name != "index.html") add("/" + name, entry.path());
+    }
     if (!body.empty()) {
-      add("/body", "text/html; charset=utf-8", body);
+      add("/body", body);
+      files_["/body"].type = type_of("body.html");
       files_["/body"].has_own_scripts = true;
     }
   } catch (const ConfigurationError& error) {
     throw std::runtime_error(std::string("the page cannot be read: ") + error.what());
   }
-  for (const Place& place : chart_places) {
+  for (const char* file : chart_files) {
     try {
-      add(place.path, place.type, charts / place.file);
+      add(std::string("/") + file, charts / file);
     } catch (const ConfigurationError& error) {
       spdlog::warn("no charts (package libjs-dygraphs): {}", error.what());
     }
   }
 }
 
-void PageFiles::add(const std::string& path, const std::string& type,
-                    const std::filesystem::path& file) {
+void PageFiles::add(const std::string& path, const std::filesystem::path& file) {
   constexpr std::uintmax_t bytes_max = 64 * bytes_per_MB;  // a body of many faces
   std::string bytes = read_text_file(file, bytes_max);
   std::string gzip = gzipped(bytes);
-  files_[path] = {type, std::move(bytes), std::move(gzip)};
+  files_[path] = {type_of(file), std::move(bytes), std::move(gzip)};
 }
 
 const PageFile* PageFiles::find(std::string_view path) const {
@@ -85,10 +87,10 @@ const PageFile* PageFiles::find(std::string_view path) const {
   return found != files_.end() ? &found->second : nullptr;
 }
 
-std::filesystem::path page_folder() {
+std::filesystem::path page_folder(const std::string& program) {
   std::error_code error;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  return program.parent_path().parent_path() / "share/thermocomp/gateway";
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  return self.parent_path().parent_path() / "share/thermocomp" / program;
 }
 
 std::filesystem::path charts_folder() {

@@ -1,0 +1,63 @@
+/// The HTTP side of a page: TLS, passwords, limits of a request, the page's files.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "gateway/door/answer_thread.hpp"
+#include "gateway/door/event_streams.hpp"
+#include "gateway/door/page_files.hpp"
+#include "gateway/settings/gateway_settings.hpp"
+
+namespace thermocomp::gateway {
+
+inline constexpr const char* json_type = "application/json";
+
+/// A request that the door let in. Its handler calls one of answer(), later() and stream(), once;
+/// a request without any of them ends its connection.
+class HttpExchange {
+ public:
+  virtual ~HttpExchange() = default;
+  [[nodiscard]] virtual std::string_view path() const = 0;
+  [[nodiscard]] virtual bool is_post() const = 0;
+  [[nodiscard]] virtual std::string_view header(const char* name) const = 0;  ///< empty: none
+  [[nodiscard]] virtual std::string_view argument(const char* name) const = 0;
+  [[nodiscard]] virtual const std::string& user() const = 0;  ///< empty: there are no passwords
+  [[nodiscard]] virtual const std::string& body() const = 0;
+  virtual void answer(unsigned status, const char* type, std::string text) = 0;
+  /// JSON, when the thread has made it; before that nothing ends the connection.
+  virtual void later(AnswerThread& answers, AnswerThread::Work work) = 0;
+  virtual void stream(EventStreams& streams) = 0;
+};
+
+/// One thread of libmicrohttpd serves all connections. What a client may cost: `connections_max`
+/// connections, 16 kB of headers, 4 kB of body, 10 s without a byte, 15 s until its request is
+/// whole, however slowly it comes.
+class HttpDoor {
+ public:
+  /// For all but the page's files; called on the server's thread.
+  using Handler = std::function<void(HttpExchange&)>;
+
+  /// @throws std::runtime_error when it cannot listen, or certificate or key cannot be used
+  HttpDoor(const HttpSettings& settings, const PageFiles& files, Handler handler);
+  ~HttpDoor();
+  HttpDoor(const HttpDoor&) = delete;
+  HttpDoor& operator=(const HttpDoor&) = delete;
+
+  /// Ends connections that do not get on; called each second.
+  void end_slow_connections();
+  [[nodiscard]] std::uint16_t port() const noexcept;
+  [[nodiscard]] std::uint64_t requests() const noexcept;
+  [[nodiscard]] std::atomic<std::uint64_t>& refused() noexcept;
+
+ private:
+  class Exchange;
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace thermocomp::gateway

@@ -1,0 +1,17 @@
+/// The answer to /api/history.
+#pragma once
+
+#include "gateway/door/answer_thread.hpp"
+#include "gateway/door/request_rules.hpp"
+#include "gateway/feed/daemon_feed.hpp"
+
+namespace thermocomp::gateway {
+
+/// To /api/history: {"from_s", "to_s", "span_s", "columns": {"time_s": [...], "bed_degC": [...],
+/// "z_offset_um":
+/// [...]}, "probings": [{"axis", "time_s", "left_um", "needed_um"}], "modes": [{"mode", "from_s",
+/// "to_s"}], "events": [{"time_s", "text"}], "chunks", "chunks_read", "damage": [...]}; null: not
+/// known. The modes are those in which nothing is compensated.
+[[nodiscard]] JsonAnswer history_answer(const DaemonFeed& feed, const HistoryRequest& request);
+
+}  // namespace thermocomp::gateway
