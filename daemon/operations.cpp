@@ -11,6 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/controller_lock.hpp"
+#include "daemon/status/status_view.hpp"
 #include "daemon/system/log_setup.hpp"
 
 namespace thermocomp {
@@ -284,6 +285,8 @@ void Operations::carried_out(const Command& done) {
     event.subject = {SubjectKind::sensor, parts_.config.estimator.sensors[done.axis].name};
   if (done.kind == CommandKind::measured || done.kind == CommandKind::prove)
     event.value = done.value_um;
+  if (Candidate* beside = cycle_.candidate(); beside && done.kind == CommandKind::measured)
+    event.candidate = candidate_of(parts_.config, &beside->score());
   spdlog::info("operator: {}", what_text(event));
   if (parts_.journal != nullptr) parts_.journal->command(std::move(event));
   if (done.kind == CommandKind::reference && is_reference_whole(cycle_.report())) {

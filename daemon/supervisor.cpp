@@ -109,7 +109,7 @@ void Supervisor::note_report() {
   if (report.mode != Mode::compensating || !all_driven) idle_until_ = Clock::now();
   if (trend_.is_due(report.now))
     trend_.note(report.now, parts_.config.model.temperature_columns(), report.inputs);
-  since_probing_.note(report.axes);
+  since_probing_.note(report.axes, parts_.config.model_checksum);
   if (!warm_up_.is_due(report.now)) return;
   std::vector<double> displacement_um;
   for (const AxisReport& axis : report.axes) displacement_um.push_back(axis.displacement_um);

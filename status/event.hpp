@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -41,6 +43,38 @@ struct Subject {
   auto operator<=>(const Subject&) const = default;
 };
 
+/// Of the probings, what each model alone left.
+struct ContestRms {
+  double model{std::numeric_limits<double>::quiet_NaN()};
+  double candidate{std::numeric_limits<double>::quiet_NaN()};
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("model", self.model);
+    visit("candidate", self.candidate);
+  }
+};
+
+/// The model that runs beside the one in use.
+struct CandidateStatus {
+  std::string file{};
+  std::string problem{};  ///< why it does not run; empty: it does
+  std::uint64_t probings{0};
+  std::map<std::string, ContestRms> rms_um{};  ///< by axis
+  double better_probability{std::numeric_limits<double>::quiet_NaN()};
+  double worse_probability{std::numeric_limits<double>::quiet_NaN()};
+
+  template <class Self, class Visitor>
+  static void fields(Self& self, Visitor& visit) {
+    visit("file", self.file);
+    visit("problem", self.problem);
+    visit("probings", self.probings);
+    visit("rms_um", self.rms_um);
+    visit("better_probability", self.better_probability);
+    visit("worse_probability", self.worse_probability);
+  }
+};
+
 struct Event {
   std::uint64_t number{0};  ///< counts up from 1 in a run of the daemon
   double wall_s{0.0};       ///< since 1970
@@ -57,6 +91,8 @@ struct Event {
   double duration_s{std::numeric_limits<double>::quiet_NaN()};
   bool comes_and_goes{false};  ///< fault: one that returned soon after its end
   std::int64_t user{-1};       ///< command: who gave it, by the kernel; -1: nobody, or SIGHUP
+  /// command `measured`: the score of a model that ran beside, this probing included
+  std::optional<CandidateStatus> candidate{};
 };
 
 /// An event of a history, with the run of the daemon that it belongs to.

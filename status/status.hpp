@@ -458,38 +458,6 @@ struct ModelStatus {
   }
 };
 
-/// Of the probings, what each model alone left.
-struct ContestRms {
-  double model{not_a_number};
-  double candidate{not_a_number};
-
-  template <class Self, class Visitor>
-  static void fields(Self& self, Visitor& visit) {
-    visit("model", self.model);
-    visit("candidate", self.candidate);
-  }
-};
-
-/// The model that runs beside the one in use.
-struct CandidateStatus {
-  std::string file{};
-  std::string problem{};  ///< why it does not run; empty: it does
-  std::uint64_t probings{0};
-  std::map<std::string, ContestRms> rms_um{};  ///< by axis
-  double better_probability{not_a_number};
-  double worse_probability{not_a_number};
-
-  template <class Self, class Visitor>
-  static void fields(Self& self, Visitor& visit) {
-    visit("file", self.file);
-    visit("problem", self.problem);
-    visit("probings", self.probings);
-    visit("rms_um", self.rms_um);
-    visit("better_probability", self.better_probability);
-    visit("worse_probability", self.worse_probability);
-  }
-};
-
 /// What an axis is still to move while the machine goes on as it does.
 struct WarmStatus {
   double remaining_um{not_a_number};

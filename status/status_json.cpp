@@ -27,27 +27,8 @@ json value_of(const std::string& value) {
 json value_of(Fault fault) {
   return to_string(fault);
 }
-json value_of(const Event& event) {
-  return {{"number", event.number},
-          {"wall_s", value_of(event.wall_s)},
-          {"kind", to_string(event.kind)},
-          {"about", to_string(event.subject.kind)},
-          {"name", event.subject.name},
-          {"code", event.code},
-          {"detail", event.detail},
-          {"value", value_of(event.value)},
-          {"comes_and_goes", event.comes_and_goes},
-          {"duration_s", value_of(event.duration_s)},
-          {"user", event.user < 0 ? json(nullptr) : json(event.user)},
-          // For people:
-          {"subject", subject_text(event.subject)},
-          {"what", what_text(event)}};
-}
-json value_of(const RecordedEvent& event) {
-  json value = value_of(static_cast<const Event&>(event));
-  value["run"] = event.run;
-  return value;
-}
+json value_of(const Event& event);
+json value_of(const RecordedEvent& event);
 template <class T>
 json value_of(const std::vector<T>& values);
 template <class T>
@@ -105,6 +86,30 @@ json value_of(const T& part) {
   Writer writer{object};
   T::fields(part, writer);
   return object;
+}
+
+json value_of(const Event& event) {
+  json value = {{"number", event.number},
+                {"wall_s", value_of(event.wall_s)},
+                {"kind", to_string(event.kind)},
+                {"about", to_string(event.subject.kind)},
+                {"name", event.subject.name},
+                {"code", event.code},
+                {"detail", event.detail},
+                {"value", value_of(event.value)},
+                {"comes_and_goes", event.comes_and_goes},
+                {"duration_s", value_of(event.duration_s)},
+                {"user", event.user < 0 ? json(nullptr) : json(event.user)},
+                // For people:
+                {"subject", subject_text(event.subject)},
+                {"what", what_text(event)}};
+  if (event.candidate) value["candidate"] = value_of(*event.candidate);
+  return value;
+}
+json value_of(const RecordedEvent& event) {
+  json value = value_of(static_cast<const Event&>(event));
+  value["run"] = event.run;
+  return value;
 }
 
 void take(const json& value, double& out) {
@@ -198,6 +203,7 @@ void take(const json& value, Event& event) {
   read("comes_and_goes", event.comes_and_goes);
   read("duration_s", event.duration_s);
   read("user", event.user);
+  read("candidate", event.candidate);
 }
 template <class T>
 void take(const json& value, std::vector<T>& out) {

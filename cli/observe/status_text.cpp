@@ -230,21 +230,7 @@ std::string model_lines(const ModelStatus& model) {
 }
 
 std::string candidate_line(const std::optional<CandidateStatus>& candidate) {
-  if (!candidate) return "";
-  if (!candidate->problem.empty())
-    return line("Candidate", candidate->file + " does not run: " + candidate->problem);
-  if (candidate->probings == 0) return line("Candidate", candidate->file + ", not probed yet");
-  std::string text = candidate->file;
-  for (const auto& [axis, rms] : candidate->rms_um)
-    text +=
-        ", " + axis + " leaves " + fixed(rms.candidate, 1) + " of " + fixed(rms.model, 1) + " um";
-  const bool is_worse = candidate->worse_probability > candidate->better_probability;
-  return line(
-      "Candidate",
-      text + " over " + std::to_string(candidate->probings) + " probings, " +
-          (is_worse ? "worse" : "better") + " with " +
-          fixed(100.0 * std::max(candidate->better_probability, candidate->worse_probability), 0) +
-          " %");
+  return candidate ? line("Candidate", candidate_text(*candidate)) : "";
 }
 
 std::string cycle_line(const CycleStatus& cycle) {
@@ -296,6 +282,21 @@ std::string status_text(const Status& status, bool colours) {
          model_lines(status.model) + candidate_line(status.candidate) + cycle_line(status.cycle) +
          history_line(status.history) +
          line("Daemon", "version " + status.version + ", up " + duration_text(status.uptime_s));
+}
+
+std::string candidate_text(const CandidateStatus& candidate) {
+  if (!candidate.problem.empty()) return candidate.file + " does not run: " + candidate.problem;
+  if (candidate.probings == 0) return candidate.file + ", not probed yet";
+  std::string text = candidate.file;
+  for (const auto& [axis, rms] : candidate.rms_um)
+    text +=
+        ", " + axis + " leaves " + fixed(rms.candidate, 1) + " of " + fixed(rms.model, 1) + " um";
+  const bool is_worse = candidate.worse_probability > candidate.better_probability;
+  return text + " over " + std::to_string(candidate.probings) +
+         (candidate.probings == 1 ? " probing, " : " probings, ") +
+         (is_worse ? "worse" : "better") + " with " +
+         fixed(100.0 * std::max(candidate.better_probability, candidate.worse_probability), 0) +
+         " %";
 }
 
 std::string sensors_text(const SensorsAnswer& answer, bool colours) {

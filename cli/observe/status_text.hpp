@@ -10,6 +10,9 @@ namespace thermocomp::cli {
 /// `thermocomp status`: aligned `Key : value` lines.
 [[nodiscard]] std::string status_text(const Status& status, bool colours);
 
+/// "new.toml, z leaves 1.8 of 3.1 um over 14 probings, better with 97 %".
+[[nodiscard]] std::string candidate_text(const CandidateStatus& candidate);
+
 /// `thermocomp sensors`: a line a sensor.
 [[nodiscard]] std::string sensors_text(const SensorsAnswer& answer, bool colours);
 

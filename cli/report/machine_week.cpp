@@ -399,6 +399,7 @@ MachineWeek machine_week(const std::filesystem::path& history, const WallSpan& s
     if (event.kind == EventKind::daemon && event.code == "started") ++week.starts;
     if (event.kind != EventKind::command) continue;
     week.commands.push_back(event);
+    if (event.candidate) week.candidate = event.candidate;
     const ReplaySetup* setup = setups.at(event.wall_s);
     if (setup != nullptr && event.code == to_string(CommandKind::measured))
       week.probings.push_back(

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -91,6 +92,7 @@ struct MachineWeek {
   std::vector<Outages> outages;  ///< longest first
   std::vector<AxisWeek> axes;
   std::vector<ProbingWeek> probings;
+  std::optional<CandidateStatus> candidate;  ///< its score at the last probing with one beside
   std::vector<SensorWeek> sensors;
   std::vector<RecordedEvent> commands;  ///< oldest first
   std::size_t starts{0};                ///< of the daemon

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "cli/observe/status_text.hpp"
 #include "report/html_page.hpp"
 #include "report/svg_plot.hpp"
 #include "status/codes.hpp"
@@ -145,6 +146,9 @@ std::string probings_part(const MachineWeek& week) {
                     figure_text(probing.left_um).append(" ").append(unit)});
   }
   html += html_table(rows);
+  if (week.candidate)
+    html += html_paragraph(
+        "A model that runs beside and is not used: " + candidate_text(*week.candidate) + ".");
   return html + html_paragraph(
                     "Taken out: the offset at that moment, which is what the model "
                     "claimed as far as bound and slew let it. Left: what the probing "

@@ -318,26 +318,6 @@ ModelStatus model_of(const StatusView& view) {
   return status;
 }
 
-/// nullopt: none is named, or it is the model itself.
-std::optional<CandidateStatus> candidate_of(const StatusView& view) {
-  const std::optional<CandidateModel>& named = view.config.candidate;
-  if (!named || (named->problem.empty() && view.contest == nullptr)) return std::nullopt;
-  CandidateStatus status{.file = named->file.string(), .problem = named->problem};
-  if (view.contest == nullptr) return status;
-  const ModelContest::Chances chances = ModelContest::chances(*view.contest);
-  status.better_probability = chances.better;
-  status.worse_probability = chances.worse;
-  for (std::size_t i = 0; i < view.config.estimator.axes.size(); ++i) {
-    const ModelContest::AxisScore& score = (*view.contest)[i];
-    if (!(score.probings > 0)) continue;
-    status.probings += static_cast<std::uint64_t>(score.probings);
-    status.rms_um[view.config.estimator.axes[i].name] = {
-        std::sqrt(score.model_um2 / score.probings),
-        std::sqrt(score.candidate_um2 / score.probings)};
-  }
-  return status;
-}
-
 /// What the model file says it was made from; null: nothing.
 json made_from(const ThermalModel& model) {
   if (!model.made_from) return nullptr;
@@ -379,6 +359,26 @@ std::optional<ProbeDueStatus> probe_due_of(const StatusView& view) {
 
 }  // namespace
 
+std::optional<CandidateStatus> candidate_of(const DaemonConfig& config,
+                                            const ModelContest::Score* contest) {
+  const std::optional<CandidateModel>& named = config.candidate;
+  if (!named || (named->problem.empty() && contest == nullptr)) return std::nullopt;
+  CandidateStatus status{.file = named->file.string(), .problem = named->problem};
+  if (contest == nullptr) return status;
+  const ModelContest::Chances chances = ModelContest::chances(*contest);
+  status.better_probability = chances.better;
+  status.worse_probability = chances.worse;
+  for (std::size_t i = 0; i < config.estimator.axes.size(); ++i) {
+    const ModelContest::AxisScore& score = (*contest)[i];
+    if (!(score.probings > 0)) continue;
+    status.probings += static_cast<std::uint64_t>(score.probings);
+    status.rms_um[config.estimator.axes[i].name] = {
+        std::sqrt(score.model_um2 / score.probings),
+        std::sqrt(score.candidate_um2 / score.probings)};
+  }
+  return status;
+}
+
 Status status_of(const StatusView& view) {
   Status status{
       .mode = view.report.mode,
@@ -392,7 +392,7 @@ Status status_of(const StatusView& view) {
       .uptime_s = view.uptime_s,
       .cycle = timing_of(view),
       .model = model_of(view),
-      .candidate = candidate_of(view),
+      .candidate = candidate_of(view.config, view.contest),
       .axes = axes_of(view),
       .probe_due = probe_due_of(view),
       .warm = warm_of(view),

@@ -50,6 +50,10 @@ struct StatusView {
 [[nodiscard]] Status status_of(const StatusView& view);
 [[nodiscard]] SensorsAnswer sensors_of(const StatusView& view);
 [[nodiscard]] OffsetsAnswer offsets_of(const StatusView& view);
+/// nullopt: none is named, or it is the model itself.
+/// @param contest  nullptr: none runs
+[[nodiscard]] std::optional<CandidateStatus> candidate_of(const DaemonConfig& config,
+                                                          const ModelContest::Score* contest);
 [[nodiscard]] CycleStatus timing_of(const StatusView& view);
 /// The answer of `model`: the file that runs.
 [[nodiscard]] nlohmann::json model_json(const DaemonConfig& config);

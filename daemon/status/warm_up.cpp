@@ -117,12 +117,18 @@ RemainingDrift WarmUp::remaining_of(std::size_t axis, double bound_um) const {
   return {};
 }
 
-void SinceProbing::note(std::span<const AxisReport> axes) {
+void SinceProbing::note(std::span<const AxisReport> axes, const std::string& model) {
+  const bool is_other = model != model_;
+  model_ = model;
   probed_.resize(axes.size());
   for (std::size_t i = 0; i < axes.size(); ++i) {
     Probed& probed = probed_[i];
-    if (probed.probings == axes[i].probings && std::isfinite(probed.displacement_um)) continue;
-    probed = {axes[i].probings, axes[i].displacement_um};
+    const double now_um = axes[i].displacement_um;
+    if (is_other) probed.displacement_um += now_um - probed.last_um;
+    if (probed.probings != axes[i].probings || !std::isfinite(probed.displacement_um))
+      probed.displacement_um = now_um;
+    probed.probings = axes[i].probings;
+    probed.last_um = now_um;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "estimator/pipeline/report.hpp"
@@ -61,7 +62,9 @@ class WarmUp {
 /// model). Where [correction] learns from probings, its own spread instead.
 class SinceProbing {
  public:
-  void note(std::span<const AxisReport> axes);
+  /// @param model  checksum. When another one runs, the displacement of the last probing moves by
+  ///               what the two models are apart at this moment
+  void note(std::span<const AxisReport> axes, const std::string& model);
   /// @return NaN: the model does not say what it was made from, or the axis has no displacement
   [[nodiscard]] double error_um(std::size_t axis, const AxisReport& now, const ThermalModel& model,
                                 const std::string& output, bool is_corrected) const;
@@ -70,7 +73,9 @@ class SinceProbing {
   struct Probed {
     std::uint64_t probings{0};
     double displacement_um{not_a_number};
+    double last_um{not_a_number};  ///< at the last note
   };
+  std::string model_;
   std::vector<Probed> probed_;
 };
 

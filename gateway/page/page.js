@@ -300,11 +300,13 @@ function showModel(now) {
   const candidate = now.candidate;
   if (candidate) {
     const worse = candidate.worse_probability > candidate.better_probability;
-    lines.push(['candidate', candidate.problem ? 'does not run: ' + candidate.problem :
-      Object.entries(candidate.rms_um).map(([axis, rms]) => axis + ' leaves ' + fixed(rms.candidate, 1) +
-        ' of ' + fixed(rms.model, 1) + ' \u00b5m').concat(candidate.probings + ' probings').join(', ') +
-      (candidate.probings ? ', ' + (worse ? 'worse' : 'better') + ' with ' +
-        fixed(100 * Math.max(candidate.better_probability, candidate.worse_probability), 0) + ' %' : ''),
+    const count = candidate.probings;
+    const score = Object.entries(candidate.rms_um).map(([axis, rms]) => axis + ' leaves ' + fixed(rms.candidate, 1) +
+      ' of ' + fixed(rms.model, 1) + ' \u00b5m, ');
+    lines.push(['candidate', (candidate.file || '').replace(/^.*\//, '') + (candidate.problem ?
+      ' does not run: ' + candidate.problem : !count ? ', not probed yet' : ': ' + score.join('') + count +
+      (count === 1 ? ' probing, ' : ' probings, ') + (worse ? 'worse' : 'better') + ' with ' +
+      fixed(100 * Math.max(candidate.better_probability, candidate.worse_probability), 0) + ' %'),
       Boolean(candidate.problem)]);
   }
   if (now.reference)

@@ -214,7 +214,7 @@ bool starts_differ(const MeasuredData& data, const std::string& place) {
   return starts_degC.size() >= starts_min && *most - *least >= starts_apart_K;
 }
 
-/// @param now  the place's rise, where its temperature now counts too; empty: that at the start
+/// @param now  the place's rise, where that of now counts; empty: that at the start
 Hypothesis by_start(const Material& material, const Subject& subject, const std::string& place,
                     const ColumnOf& now) {
   const bool is_signal = subject.kind == SubjectKind::signal;
@@ -228,7 +228,7 @@ Hypothesis by_start(const Material& material, const Subject& subject, const std:
                    material.lag_times_s(shortest_lag_s, start_tau.high, 12), true};
     by.shape[0].grid.insert(by.shape[0].grid.begin(), start_tau.low);
   }
-  if (now) by.shape[1].grid = {0.0, 1.0};
+  if (now) by.shape[1].grid = {0.0};
   by.simpler_cause = is_signal ? "missing_heat_source" : "wrong_coefficient";
   by.simpler_subject = material.name_of(subject);
   by.columns = [&material, place, now, values = material.values_of(subject)](const Shapes& shapes,
@@ -239,7 +239,7 @@ Hypothesis by_start(const Material& material, const Subject& subject, const std:
       Panel all(run.rows(), 2 * std::ssize(shapes));
       for (Eigen::Index i = 0; i < std::ssize(shapes); ++i) {
         Column above_K = Column::Constant(run.rows(), start_degC);
-        if (now && shapes[static_cast<std::size_t>(i)][1] < 0.5) above_K += now(run);
+        if (now) above_K += now(run);
         all.col(2 * i) = above_K.cwiseProduct(late.col(i));
         all.col(2 * i + 1) = late.col(i);
       }

@@ -108,7 +108,7 @@ def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
     assert daemon.cli("measured", "z", "4.0")[0] == 0
     eventually(rms, "the probing is scored")
     assert rms() == {"model": pytest.approx(4.0, abs=0.1), "candidate": pytest.approx(0, abs=0.1)}
-    assert "new.toml, z leaves 0.0 of 4.0 um over 1 probings" in daemon.cli("status")[1]
+    assert "new.toml, z leaves 0.0 of 4.0 um over 1 probing" in daemon.cli("status")[1]
     before = daemon.status()["candidate"]
     daemon.end()
     daemon.start().wait_for_mode("compensating")
@@ -136,6 +136,9 @@ def test_a_candidate_is_scored_promoted_and_taken_back(machine, lab):
     assert_slewed(machine.controller.orders())
     daemon.end()
     assert_replays_exactly(daemon.history, lab.folder / "out.csv")
+    status, week, said = run_tool("report", daemon.history, "-o", "-")
+    assert status == 0, said
+    assert "new.toml, z leaves 0.0 of 4.0 um over 1 probing, better with" in week
 
 
 def test_a_candidate_is_named_while_the_daemon_runs(machine, lab):

@@ -162,6 +162,19 @@ def test_the_axis_card_says_what_is_taken_out_and_what_was_left(machine, gateway
     picture(browser, "bound")
 
 
+def test_a_candidate_shows_its_score(machine, gateway, browser, lab):
+    new = lab.folder / "new.toml"
+    new.write_text(machine.model.read_text().replace("[[3.0, -1.5]]", "[[2.0, -1.5]]"))
+    assert machine.daemon.cli("candidate", new)[0] == 0
+    machine.warm_by(12.0)  # 4 K colder: -12 um by the model, -8 by the candidate
+    machine.daemon.wait_for_offset(12.0, 0.05)
+    machine.daemon.call("measured", axis="z", value_um=4.0, confirm=True)
+    show(browser, gateway, WALL)
+    eventually(lambda: "new.toml: z leaves 0.0 of 4.0 µm, 1 probing, better with " in text(browser, "model"),
+               "the score")
+    picture(browser, "candidate")
+
+
 def test_one_cursor_and_one_zoom_for_all_charts(machine, gateway, browser):
     show(browser, gateway, WALL)
     machine.warm_by(9.0)

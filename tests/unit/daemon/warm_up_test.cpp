@@ -61,16 +61,23 @@ TEST_CASE("a probing is due by what the model may be off by since the last one",
   SinceProbing since;
   std::vector<AxisReport> axes(1);
   axes[0].displacement_um = 5.0;
-  since.note(axes);
+  since.note(axes, "a");
   axes[0].displacement_um = 25.0;
-  since.note(axes);
+  since.note(axes, "a");
   // 2 / 20 of the 20 um since the start.
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.0));
   axes[0].probings = 1;
-  since.note(axes);
+  since.note(axes, "a");
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(0.0));
   axes[0].displacement_um = 15.0;
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(1.0));
+  since.note(axes, "a");
+  axes[0].displacement_um = 5.0;  // the same temperatures by another model
+  since.note(axes, "b");
+  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(1.0));
+  axes[0].displacement_um = -5.0;
+  since.note(axes, "b");
+  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.0));
   axes[0].correction.sd_um = 0.7;
   CHECK(since.error_um(0, axes[0], model, "z_um", true) == Approx(0.7));
   CHECK(std::isnan(since.error_um(0, axes[0], ThermalModel{}, "z_um", false)));

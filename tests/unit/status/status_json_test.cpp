@@ -56,6 +56,7 @@ class Filler {
     fill(event.duration_s);
     fill(event.comes_and_goes);
     event.user = static_cast<std::int64_t>(below(3)) - 1;
+    fill(event.candidate);
   }
   template <class T>
   void fill(std::vector<T>& values) {
