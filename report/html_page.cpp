@@ -18,7 +18,10 @@ constexpr const char* style =
     ".text td{text-align:left}figure{margin:.6em 0;overflow-x:auto}"
     "figcaption{color:#4a5568;font-size:.9em}svg{width:100%;min-width:560px;height:auto}"
     ".small{font-size:.85em;color:#4a5568}.good{color:#22543d}.bad{color:#9b2c2c}"
-    "@media print{body{margin:0;max-width:none}svg{min-width:0}}";
+    "@media print{@page{size:A4;margin:12mm}body{font-size:8.5pt;line-height:1.25;margin:0;"
+    "max-width:none}h2{margin:.8em 0 .2em}p,ul,table,figure{margin:.3em 0}td,th{padding:0 "
+    "6px}td:empty{height:2.4em}"
+    "svg{min-width:0}figure,tr{break-inside:avoid}}";
 
 std::string row(const std::vector<std::string>& cells, const char* tag) {
   std::string html = "<tr>";

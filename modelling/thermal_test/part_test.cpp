@@ -216,7 +216,7 @@ std::vector<std::string> instructions(const PartSheet& sheet) {
 std::string picture(const PartFigures& before, const std::optional<PartFigures>& after) {
   constexpr double left = 90.0;
   constexpr double width = 720.0;
-  constexpr double row = 24.0;
+  constexpr double row = 17.0;
   double reach = 1.0;
   for (const PartFigures* figures : {&before, after ? &*after : nullptr})
     if (figures != nullptr)
@@ -331,11 +331,13 @@ std::string part_html(const PartFigures& before, const std::optional<PartFigures
       "In brackets: 95 % by Student's t from the scatter of the repeats, with as many degrees of "
       "freedom as there are repeats less one, since the features of one repeat share its warmth."};
   for (const PartFigures* figures : {&before, after ? &*after : nullptr})
-    if (figures != nullptr)
+    if (figures != nullptr) {
+      std::string scatter = figures->file + ": the standard deviation of one repeat is";
       for (const PartAxis& axis : figures->axes)
-        method.push_back(figures->file + ", " + axis.axis + ": " + std::to_string(axis.repeats) +
-                         " repeats, one of them scatters by " + figure_text(axis.repeat_sd_um) +
-                         " µm (standard deviation).");
+        scatter += (&axis == &figures->axes.front() ? " " : ", ") + figure_text(axis.repeat_sd_um) +
+                   " µm in " + axis.axis + " (" + std::to_string(axis.repeats) + " repeats)";
+      method.push_back(scatter + ".");
+    }
   return html + html_heading("How these figures were made") + html_list(method) + html_end();
 }
 
