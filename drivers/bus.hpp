@@ -17,7 +17,7 @@ class DriverError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What people are told about a bus before it is opened.
+/// How a bus is described to people before it is opened.
 struct BusOutline {
   std::string kind;       ///< as the key `kind` and BusHealth tell it
   std::string interface;  ///< "can0"; empty where the bus has none

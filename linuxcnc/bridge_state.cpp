@@ -53,8 +53,8 @@ Outputs BridgeState::show(const MachineView& view, nanoseconds now) {
     else
       axis.apart_since.reset();
     outputs_.mismatch = outputs_.mismatch || lasts(axis.apart_since, now);
-    const AxisView& told = view.axes[i];
-    if (!std::isfinite(told.applied_mm + told.wanted_mm + told.position_mm)) fault();
+    const AxisView& shown = view.axes[i];
+    if (!std::isfinite(shown.applied_mm + shown.wanted_mm + shown.position_mm)) fault();
   }
   if (!std::isfinite(view.spindle_rpm)) fault();
   outputs_.fresh =

@@ -46,7 +46,7 @@ std::uint64_t new_session() {
 }
 
 /// When the machine has been switched on and homed LinuxCNC clears an external offset only some
-/// servo periods later. What is applied until then is of before: it is not told as taking yet.
+/// servo periods later. What is applied until then is of before: it is not reported as taking yet.
 class Settled {
  public:
   bool taking(bool taking, Clock::time_point now) {

@@ -26,7 +26,7 @@ enum class MotionType {
 
 struct AxisView {
   double applied_mm{NAN};   ///< offset in effect
-  double wanted_mm{NAN};    ///< offset that LinuxCNC has been told; differs while it moves there
+  double wanted_mm{NAN};    ///< setpoint of the offset in LinuxCNC; differs while it moves there
   double position_mm{NAN};  ///< of the axis, commanded
 };
 

@@ -231,8 +231,8 @@ std::string watch_text(const DaemonConfig& config) {
   if (config.model.covariance_K2.empty())
     return "sensors that creep or jump: NOT watched, since the model has no [covariance] "
            "(thermocomp covariance makes it)";
-  return policy == SuspectedPolicy::warn ? "sensors that creep or jump: told"
-                                         : "sensors that creep or jump: told, and not used";
+  return policy == SuspectedPolicy::warn ? "sensors that creep or jump: reported"
+                                         : "sensors that creep or jump: reported, and not used";
 }
 
 /// What the model file says of how well it fits a machine.

@@ -102,7 +102,7 @@ void add_import_command(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand(
       "import",
       "any log as a run file: tables of PLCs, loggers and databases, JSON, workbooks, LinuxCNC's "
-      "halsampler and halscope; what was understood is told line by line");
+      "halsampler and halscope; what was understood is printed line by line");
   sub->add_option("LOG", options->log, "the log")->type_name("FILE")->required();
   sub->add_option("--names", options->names,
                   "columns of a log without a header, as a run file calls them: z_mm,t1_degC")

@@ -19,7 +19,7 @@ namespace thermocomp::cli {
 /// @param writes_back  false: nothing is written
 /// @param progress  called with a line about what is being done
 /// @return none where nothing can be read: no controller, or one that calls the daemon, which
-///         `progress` is told
+///         `progress` is called
 [[nodiscard]] std::optional<ScanController> scan_controller(
     const DaemonConfig& config, double listen_s, bool writes_back,
     const std::function<void(const std::string&)>& progress);

@@ -10,7 +10,7 @@
 namespace thermocomp::sections {
 namespace {
 
-/// nullptr, and the problem told, where the table has none that there is.
+/// nullptr, and the problem reported, where the table has none that there is.
 const BusKind* read_kind(const TomlTable& table) {
   Names<const BusKind*> names;
   for (const BusKind& kind : bus_kinds()) names.emplace_back(kind.name, &kind);

@@ -34,7 +34,7 @@ bool can_be_tpdo(std::uint32_t cob_id) {
 struct Place {
   std::optional<ObjectAddress> object;
   std::optional<ObjectType> type;  ///< of the data sheet
-  bool unknown{false};             ///< a name, and no data sheet says of what; that was told
+  bool unknown{false};             ///< a name, and no data sheet says of what; reported
 };
 
 /// Names as they may be written: whole ones, and parts behind the '/'.

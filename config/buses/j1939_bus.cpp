@@ -85,7 +85,7 @@ J1939NodeConfig read_j1939_device(const TomlTable& table, const std::string& nam
       table.problem("j1939_name", "is that of the device " + other.name + " already");
     }
   }
-  // So that what is built from it is whole; the problem has been told.
+  // So that what is built from it is whole; the problem has been reported.
   if (!node.address && !node.name_claimed) node.address = 0;
   return node;
 }

@@ -122,7 +122,7 @@ void check_named_files(const std::vector<NamedFile>& files) {
   for (const Place& place : places) {
     if (place.named->use == FileUse::read) continue;
     for (const Place& other : places) {
-      // A pair of written files is told once, at the later name.
+      // A pair of written files is reported once, at the later name.
       const bool is_told = other.named->use != FileUse::read && other.named >= place.named;
       if (other.named == place.named || is_told || !is_same(place, other)) continue;
       place.named->table.problem(place.named->key, place.named->path.string(),

@@ -19,7 +19,7 @@ namespace thermocomp {
 /// Takes the part before the next separator off `rest`. @return false when nothing is left
 [[nodiscard]] bool take(std::string_view& rest, char separator, std::string_view& part);
 
-/// At most 40 bytes of it, not cut within a letter; what is left out is told by " ...".
+/// At most 40 bytes of it, not cut within a letter; " ..." stands for what is left out.
 [[nodiscard]] std::string shortened(std::string_view text);
 
 /// As a string of TOML, in quotes.

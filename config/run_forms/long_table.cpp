@@ -70,8 +70,8 @@ bool decreases(const std::vector<double>& time_s) {
   return std::adjacent_find(time_s.begin(), time_s.end(), std::less_equal<>()) == time_s.end();
 }
 
-std::optional<LongForm> told_form(const TextTable& table, const ColumnMap& map,
-                                  const std::vector<std::size_t>& numbers, ProblemList& problems) {
+std::optional<LongForm> form_of(const TextTable& table, const ColumnMap& map,
+                                const std::vector<std::size_t>& numbers, ProblemList& problems) {
   LongForm form;
   std::vector<std::size_t> columns;
   for (const std::string& name : map.pivot) {
@@ -134,9 +134,9 @@ std::optional<LongForm> long_form(const TextTable& table, const TimeColumns& tim
     }
   }
   if (map != nullptr && !map->pivot.empty()) {
-    auto told = told_form(table, *map, values.size() == 1 ? values : numbers, problems);
-    if (told) told->unit = form.unit;
-    return told;
+    auto found = form_of(table, *map, values.size() == 1 ? values : numbers, problems);
+    if (found) found->unit = form.unit;
+    return found;
   }
   // One series alone has one name throughout.
   if (form.names.empty() && values.size() == 1) {

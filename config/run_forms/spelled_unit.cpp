@@ -170,14 +170,14 @@ bool split_blank(std::string_view header, SpelledName& name) {
   if (blank == std::string_view::npos) return false;
   const SpelledUnit* unit = spelled_unit(header.substr(blank + 1));
   std::string_view base = trimmed(header.substr(0, blank));
-  bool told = false;
+  bool is_marked = false;
   for (const std::string_view before : {" /", " in", ","}) {
     if (!base.ends_with(before)) continue;
     base = trimmed(base.substr(0, base.size() - before.size()));
-    told = true;
+    is_marked = true;
     break;
   }
-  if (unit == nullptr || (unit->only_in_brackets && !told)) return false;
+  if (unit == nullptr || (unit->only_in_brackets && !is_marked)) return false;
   name = {std::string(base), std::string(header.substr(blank + 1)), unit};
   return true;
 }

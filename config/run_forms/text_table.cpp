@@ -335,14 +335,14 @@ class TableReader {
 
   /// Of the lines above the first row the one with the most names; the lowest of several.
   bool find_header() {
-    const bool told = map_ != nullptr && map_->header_line > 0;
-    row_begin_ = told ? std::max<std::size_t>(first_row(), 1) : first_row();
+    const bool named = map_ != nullptr && map_->header_line > 0;
+    row_begin_ = named ? std::max<std::size_t>(first_row(), 1) : first_row();
     std::optional<std::size_t> names;
     std::size_t most = 0;
     for (std::size_t up = 1; up <= std::min(row_begin_, header_rows_max); ++up) {
       const std::size_t i = row_begin_ - up;
       const Fields fields = fields_of(i);
-      if (told ? i == 0 : fields.size() == cut_.fields) {
+      if (named ? i == 0 : fields.size() == cut_.fields) {
         if (fields.size() == cut_.fields && is_row_of_units(fields) && i > 0) {
           take_units(fields);
           continue;
@@ -353,9 +353,9 @@ class TableReader {
           most = distinct.size();
           names = i;
         }
-      } else if (told && fields.size() == cut_.fields && is_row_of_units(fields)) {
+      } else if (named && fields.size() == cut_.fields && is_row_of_units(fields)) {
         take_units(fields);
-      } else if (!told) {
+      } else if (!named) {
         break;
       }
     }

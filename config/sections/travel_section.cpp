@@ -238,7 +238,7 @@ void CanTravelSection::check_numbers(const std::vector<Place>& values,
     else if (!carrying.contains(id_of(number.signal)))
       number.table.problem("id", "the frame carries no value of the set");
   }
-  if (numbers.empty()) return;  // told already
+  if (numbers.empty()) return;  // reported already
   for (const Place& value : values) {
     if (!value.table || numbered.contains(id_of(value.signal))) continue;
     value.table.problem("id",

@@ -259,7 +259,7 @@ Problem unknown_problem(const std::string& file, const UnknownKey& unknown, bool
 }  // namespace
 
 std::vector<Problem> TomlDocument::all_problems() const {
-  constexpr std::size_t suggestions_max = 100;  // as many as are told
+  constexpr std::size_t suggestions_max = 100;  // as many are reported
   std::vector<UnknownKey> unknown;
   for (const auto& [table, opened] : state_->opened) {
     if (opened.ignore_rest) continue;

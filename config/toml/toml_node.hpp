@@ -21,7 +21,7 @@
 
 namespace thermocomp::detail {
 
-/// Of these the first hundred are told; what comes after so many is not looked for.
+/// Of these the first hundred are reported; what comes after so many is not looked for.
 inline constexpr std::size_t kept_problems_max = 10'000;
 
 struct TomlState {

@@ -59,7 +59,7 @@ enum class CanState {
 };
 [[nodiscard]] std::string_view to_string(CanState state) noexcept;
 
-/// What error frames and the kernel told since the object was made.
+/// What error frames and the kernel reported since the object was made.
 struct CanErrors {
   std::uint64_t error_frames{0};
   std::uint64_t bus_off{0};

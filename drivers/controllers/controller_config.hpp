@@ -81,8 +81,8 @@ struct ModbusSignal {
 struct TravelShape {
   static constexpr std::size_t nodes_max = 16;
   std::vector<double> nodes_mm;  ///< increasing; of a line both ends of the travel
-  /// A line: the values are K0, the offset at P0 [um], its slope [um/m] and, where it is told, P0
-  /// itself [mm]:  offset = K0 + slope (P - P0).  None: the offset at each node [um].
+  /// A line: the values are K0, the offset at P0 [um], its slope [um/m] and, where it is written,
+  /// P0 itself [mm]:  offset = K0 + slope (P - P0).  None: the offset at each node [um].
   std::optional<double> p0_mm;
   bool operator==(const TravelShape&) const = default;
 };

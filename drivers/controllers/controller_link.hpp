@@ -38,7 +38,7 @@ struct ControllerHealth {
   std::string state;
   nanoseconds state_since{};  ///< CLOCK_MONOTONIC when it was entered
   std::uint64_t bus_offs{0};  ///< CAN: times the interface left the bus
-  /// Dry run of a controller that is read: what it really applies [um], NaN: not told.
+  /// Dry run of a controller that is read: what it really applies [um], NaN: not known.
   std::optional<std::array<double, axes_max>> shown_um{};
 };
 

@@ -17,13 +17,13 @@ void check_shape(const TravelShape& shape);
 void check_count(const TravelShape& shape, std::size_t values, const char* key);
 
 /// The values of the set, in their units: K0, slope and P0, or the offsets themselves.
-/// @param count      how many of them are told: a line's P0 may be left out
+/// @param count      how many of them are written: a line's P0 may be left out
 /// @param offset_um  shape (nodes)
 [[nodiscard]] std::vector<double> travel_values(const TravelShape& shape, std::size_t count,
                                                 std::span<const double> offset_um);
 
 /// @param shown      values of a set
-/// @param offset_um  shape (nodes); overwritten: what is applied there, NaN where it is not told
+/// @param offset_um  shape (nodes); overwritten: what is applied there, NaN where it is not known
 void offsets_shown(const TravelShape& shape, std::span<const double> shown,
                    std::span<double> offset_um) noexcept;
 

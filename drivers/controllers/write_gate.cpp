@@ -76,7 +76,7 @@ bool WriteGate::explains(const std::array<double, axes_max>& applied_um) noexcep
       explained = explained && (!to_be_driven || stands);
       continue;
     }
-    // Anywhere between where it stood and what it was told.
+    // Anywhere between where it stood and its setpoint.
     const auto end = lately.offset_um.begin() +
                      static_cast<std::ptrdiff_t>(std::min(lately.count, SentLately::length));
     const auto [low, high] = std::minmax_element(lately.offset_um.begin(), end);

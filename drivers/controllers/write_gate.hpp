@@ -92,7 +92,7 @@ class WriteGate {
   /// from what is applied since it saw the epoch, and the first step shall be a small one.
   [[nodiscard]] nanoseconds next_pause() noexcept;
 
-  /// What the controller applies, just read [um], NaN: not told.
+  /// What the controller applies, just read [um], NaN: not known.
   /// @return false: a driven axis stands where nothing that was sent can have taken it (re-homed,
   ///         overridden). What is still under way would be a leap from there: synchronised() must
   ///         come before anything is sent.

@@ -314,7 +314,8 @@ void ModbusConnection::Implementation::judge_silence(Exchange& exchange) const {
   const std::string within =
       " within timeout_ms = " + std::to_string(std::chrono::round<milliseconds>(timeout_).count());
   const std::string came = frames_.came();
-  // What has begun in TCP is followed by its rest, or by nothing that could be told apart from it.
+  // What has begun in TCP is followed by its rest, or by nothing that could be distinguished from
+  // it.
   const bool is_silent = came.empty() || (frames_.came_late() && (rtu_ || !frames_.has_part()));
   exchange.outcome = is_silent ? ExchangeOutcome::timeout : ExchangeOutcome::bad_frame;
   exchange.detail = came.empty()                       ? "no answer" + within

@@ -85,7 +85,7 @@ struct ModbusLine {
   double reconnect_s{1.0};            ///< pause before a connection is tried again
   double backoff_s_max{30.0};         ///< longest pause before a dead unit is asked again
   int retries{1};                     ///< further tries of one request before it has failed
-  /// TCP, UDP: answers carry any transaction number; late ones are told as on a serial line.
+  /// TCP, UDP: answers carry any transaction number; late ones are recognised as on a serial line.
   bool ignore_transaction{false};
   bool operator==(const ModbusLine&) const = default;
 };

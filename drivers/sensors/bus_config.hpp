@@ -15,7 +15,7 @@
 /// buses in a configuration. A configuration has
 ///   kinds       what the key `kind` of a [[bus]] may say
 ///   name        of the bus
-///   outline()   what people are told about it
+///   outline()   its description for people
 /// and compares equal. Besides it a kind has, each in a file of its own that is found by its name:
 ///   open_PROTOCOL()                  reads the sections    config/buses/PROTOCOL_bus.cpp
 ///   make_bus_source(configuration)   brings the readings   drivers/sensors/PROTOCOL_source.cpp

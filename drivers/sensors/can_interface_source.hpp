@@ -55,7 +55,7 @@ class CanInterfaceSource : public SensorSource {
   [[nodiscard]] virtual std::vector<UnitHealth> units(nanoseconds now) = 0;
 
   [[nodiscard]] CanSocket& socket() noexcept { return socket_; }
-  /// The bus is open and not bus-off, as the hooks were told last.
+  /// The bus is open and not bus-off, as last reported to the hooks.
   [[nodiscard]] bool usable() const noexcept { return usable_.value_or(false); }
   /// Calls bus_opened() or bus_closed() where the link has changed.
   void follow_link();
@@ -70,7 +70,7 @@ class CanInterfaceSource : public SensorSource {
   CanSocket socket_;
   WakeEvent wake_;
   std::atomic<bool> stopping_{false};
-  std::optional<bool> usable_;  ///< none: the hooks were told nothing yet
+  std::optional<bool> usable_;  ///< none: nothing was reported to the hooks yet
   WaitFreeSlot<std::vector<Reading>> slot_;
   mutable std::mutex health_mutex_;
   BusHealth health_;

@@ -134,7 +134,7 @@ void CanopenLine::send_cyclic(nanoseconds now) {
   }
 }
 
-/// Two nodes that both say that a TPDO is theirs: whose value a frame holds cannot be told.
+/// Two nodes that both say that a TPDO is theirs: whose value a frame holds is not known.
 void CanopenLine::look_for_conflicts(nanoseconds now) {
   std::map<std::uint32_t, std::vector<std::size_t>> owners;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {

@@ -25,7 +25,7 @@ enum class SdoOutcome {
   done,
   aborted,  ///< by the node, abort_code says why
   timed_out,
-  broken  ///< the node broke the protocol, abort_code says what it was told
+  broken  ///< the node broke the protocol, abort_code is what it was sent
 };
 
 struct SdoResult {
@@ -51,7 +51,7 @@ class SdoClient {
   void read(ObjectAddress object, nanoseconds now);
   /// @pre !busy(), 1..4 bytes
   void write(ObjectAddress object, std::span<const std::uint8_t> bytes, nanoseconds now);
-  /// Forgets the transfer; the node is not told.
+  /// Forgets the transfer; nothing is sent to the node.
   void cancel() noexcept;
 
   [[nodiscard]] bool busy() const noexcept { return state_ != State::idle; }
@@ -88,7 +88,7 @@ class SdoClient {
   ObjectAddress object_;
   bool answered_{false};  ///< the last transfer ended with the node's own answer
   bool toggle_{false};
-  std::size_t announced_{0};  ///< bytes of a segmented transfer; 0: not told
+  std::size_t announced_{0};  ///< bytes of a segmented transfer; 0: not announced
   std::vector<std::uint8_t> bytes_;
   nanoseconds deadline_{};
   std::deque<CanFrame> frames_;

@@ -71,7 +71,7 @@ class TransportReceiver {
 
   /// Our address; nullopt: only broadcasts are taken.
   void set_address(std::optional<std::uint8_t> address);
-  /// Drops all transfers; the senders are not told.
+  /// Drops all transfers; nothing is sent to the senders.
   void forget();
 
   /// Groups pgn_transfer and pgn_transfer_data. @return a message that is whole now

@@ -62,7 +62,7 @@ std::optional<BridgeAnswer> BridgeController::report(const BridgeReport& report)
   ++health_.reads;
   health_.last_error.clear();
   if (report.session != session_) ++health_.connects;
-  // An axis of which nothing is told cannot be said to be in step.
+  // An axis that nothing is reported of is not known to be in step.
   const bool taking =
       report.taking &&
       std::all_of(report.applied_um.begin(),

@@ -65,7 +65,7 @@ class BridgeController final : public ControllerLink {
   /// One ordinary thread, always the same. Not before start().
   /// @return nothing when another session has reported within silent_after_s: two bridges
   [[nodiscard]] std::optional<BridgeAnswer> report(const BridgeReport& report);
-  /// A report that cannot be understood came: counted, and told in the health.
+  /// A report that cannot be understood came: counted, and stands in the health.
   void refuse(const std::string& why);
 
  private:

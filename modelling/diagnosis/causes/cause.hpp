@@ -58,7 +58,7 @@ struct CauseParameter {
   double low{-std::numeric_limits<double>::infinity()};
   double high{std::numeric_limits<double>::infinity()};
   std::string_view says;  ///< before the value
-  bool of_a_jump{false};  ///< told by a jump: nothing else that a machine does looks like it
+  bool of_a_jump{false};  ///< recognised by a jump: nothing else that a machine does looks like it
 };
 
 /// What it says to the machine's owner.

@@ -8,7 +8,7 @@
 namespace thermocomp::diagnosis {
 namespace {
 
-/// What one hypothesis is told from another by; research/calibrate_posterior.py prints
+/// What tells one hypothesis from another; research/calibrate_posterior.py prints
 /// these.
 struct Weights {
   double score;

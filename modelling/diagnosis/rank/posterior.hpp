@@ -72,8 +72,8 @@ struct Choice {
   std::vector<std::string> other_subjects{};  ///< between which and its own nothing decides
 };
 
-/// The likeliest cause with a place and all that cannot be told from it. Where that is less likely
-/// than not, the likeliest cause with any of its places.
+/// The likeliest cause with a place and all that cannot be told apart from it. Where that is less
+/// likely than not, the likeliest cause with any of its places.
 /// @param explanations  at least one
 [[nodiscard]] Choice likeliest(const std::vector<Explanation>& explanations,
                                const PlaceGroups& groups);

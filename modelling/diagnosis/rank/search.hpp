@@ -33,7 +33,8 @@ struct SearchResult {
   std::vector<Explanation> weighed;          ///< for the first finding, likeliest first
 };
 
-/// @param accepted  told what is accepted before the columns of any hypothesis are asked for again
+/// @param accepted  called with what is accepted before the columns of any hypothesis are asked for
+/// again
 /// @param progress  called at each hypothesis
 [[nodiscard]] SearchResult search(
     const MeasuredData& data, const StackedRows& rows, const std::vector<Hypothesis>& hypotheses,

@@ -131,7 +131,7 @@ std::string by(const Diagnosis& diagnosis, double gain_um) {
          " RMS less)";
 }
 
-/// Outputs of which a share of the error is above the least that is told, by name.
+/// Outputs of which a share of the error is above the least that is reported, by name.
 template <class Share>
 std::string outputs_with(const Diagnosis& diagnosis, Share share) {
   std::string names;

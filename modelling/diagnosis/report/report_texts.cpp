@@ -18,12 +18,12 @@ std::string words_of(double value, double scale, bool is_duration) {
   return is_duration ? duration(value) : figure(scale * value);
 }
 
-/// " (47 min to 59 min)"; empty where the ends are the value, as far as it is told.
+/// " (47 min to 59 min)"; empty where the ends are the value, to the printed digits.
 std::string interval_words(const Interval& interval, double value, double scale, bool is_duration) {
   const std::string low = words_of(interval.low, scale, is_duration);
   const std::string high = words_of(interval.high, scale, is_duration);
-  const std::string told = words_of(value, scale, is_duration);
-  if (low == told && high == told) return "";
+  const std::string text = words_of(value, scale, is_duration);
+  if (low == text && high == text) return "";
   return " (" + low + " to " + high + ")";
 }
 

@@ -190,7 +190,7 @@ void CanController::plan_outgoing() {
   }
   if (config_.valid_bits) outgoing(*config_.valid_bits).has_valid_bits = true;
   if (config_.heartbeat) outgoing(*config_.heartbeat).has_heartbeat = true;
-  // The controller shall have all offsets before it is told that they are good and fresh.
+  // The controller shall have all offsets before the frame that says that they are good and fresh.
   std::stable_sort(outgoing_.begin(), outgoing_.end(), [](const Outgoing& a, const Outgoing& b) {
     return std::pair(a.has_heartbeat, a.has_valid_bits) <
            std::pair(b.has_heartbeat, b.has_valid_bits);

@@ -33,7 +33,7 @@ namespace thermocomp {
 /// shows of it counts when all frames carry the number of one set, and is as old as the oldest of
 /// them. Nothing is sent until the frames of whoever sent before this link was started are
 /// forgotten; the numbers then go on half-way round from the one in effect, or by the clock where
-/// it is not told: what is left of a former set in a queue or in a controller that forgets nothing
+/// not sent: what is left of a former set in a queue or in a controller that forgets nothing
 /// has another number.
 class CanController final : public ControllerLink {
  public:

@@ -397,11 +397,11 @@ bool ModbusDialogue::write_command() {
 void ModbusDialogue::note_confirmed(nanoseconds now) {
   const std::scoped_lock lock(health_mutex_);
   ++health_.writes;
-  WriteHealth& told = health_.write;
-  if (health_.last_error == told.error) health_.last_error.clear();
-  told.confirmed_at = now;
-  told.function = told.address = told.exception = 0;
-  told.error.clear();
+  WriteHealth& last = health_.write;
+  if (health_.last_error == last.error) health_.last_error.clear();
+  last.confirmed_at = now;
+  last.function = last.address = last.exception = 0;
+  last.error.clear();
 }
 
 bool ModbusDialogue::write(const WriteField& request) {
@@ -410,13 +410,13 @@ bool ModbusDialogue::write(const WriteField& request) {
   if (exchange.ok()) return true;
   const std::scoped_lock lock(health_mutex_);
   ++health_.write_errors;
-  WriteHealth& told = health_.write;
-  ++(refused_ ? told.refused : told.unanswered);
+  WriteHealth& last = health_.write;
+  ++(refused_ ? last.refused : last.unanswered);
   const bool is_s7 = s7_of(config_.line) != nullptr;  // then the text alone has the place
-  told.function = is_s7 ? 0 : config_.write_function;
-  told.address = is_s7 ? 0 : request.address;
-  told.exception = is_s7 ? exchange.exception_code & 0x7F : exchange.exception_code;
-  health_.last_error = told.error = write_error(config_, request, exchange);
+  last.function = is_s7 ? 0 : config_.write_function;
+  last.address = is_s7 ? 0 : request.address;
+  last.exception = is_s7 ? exchange.exception_code & 0x7F : exchange.exception_code;
+  health_.last_error = last.error = write_error(config_, request, exchange);
   return false;
 }
 
@@ -516,7 +516,7 @@ void ModbusDialogue::show_piezos() {
     if (piezos_[axis]->obeyed()) continue;
     const std::scoped_lock lock(health_mutex_);
     health_.last_error = "the amplifier of axis " + std::to_string(axis + 1) + " shows " +
-                         std::to_string(shown_V_[axis]) + " V and not what it was told";
+                         std::to_string(shown_V_[axis]) + " V and not what it was set to";
   }
 }
 

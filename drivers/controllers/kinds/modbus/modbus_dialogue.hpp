@@ -25,8 +25,8 @@ namespace thermocomp {
 /// (WriteGate); the link is still the same one. After a time-out or a lost connection it is
 /// another, after an exception or a pause of the cycle it is not. A controller that reads well and
 /// refuses or ignores a write stays online and is asked again a period later: that nothing is
-/// written is told by ControllerState::written. A piezo leaps to every new offset
-/// by way of 0 V: whether it stands where it was told is left to its drive and to the estimator's
+/// ControllerState::written says whether it is written. A piezo leaps to every new offset
+/// by way of 0 V: whether it stands where it was set is left to its drive and to the estimator's
 /// comparison.
 ///
 /// Of an axis whose controller interpolates along its travel the offsets of all nodes go as one set

@@ -58,7 +58,7 @@ void PiezoDrive::show(nanoseconds now, double read_V) noexcept {
   // Before the first voltage it rests until the offset stands still, and is meant to.
   const double meant_V = std::isfinite(volt_) ? volt_ : 0.0;
   const bool as_meant = std::abs(read_V - meant_V) <= config_.tolerance_V;
-  // One that has not obeyed does so again when it shows what it was told, not while it may be on
+  // One that has not obeyed does so again when it shows its setpoint, not while it may be on
   // its way; then it has come from anywhere but 0 V, unless that is where it is.
   const bool again = as_meant && !obeyed_ && meant_V > config_.tolerance_V;
   if ((!as_meant && !on_its_way) || again) known_ = false;

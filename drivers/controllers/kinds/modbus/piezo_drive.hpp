@@ -24,7 +24,7 @@ class PiezoDrive {
   void restart() noexcept { known_ = false; }
   /// The same where it has been read back: what stands there is kept, and need not be reached anew
   /// unless this drive knows that it was not reached from 0 V.
-  /// 0 V is the rest of an amplifier that has not been told anything yet.
+  /// 0 V is the rest of an amplifier that has no setpoint yet.
   void restart_at(double read_V) noexcept;
   /// @param now  must not run backwards. @return volts within the curve; NaN: nothing to write yet
   [[nodiscard]] double step(nanoseconds now, double offset_um) noexcept;
@@ -32,7 +32,7 @@ class PiezoDrive {
   /// What the amplifier shows. When it is neither the voltage written nor on the way to it, the
   /// offset is driven to anew once it stands still.
   void show(nanoseconds now, double read_V) noexcept;
-  /// Whether it showed what it was told, or went there from where it did.
+  /// Whether it showed its setpoint, or went there from where it did.
   [[nodiscard]] bool obeyed() const noexcept { return obeyed_; }
   /// Which offset that stands for: while it obeys, the one asked for, even where that is still
   /// waited for or too near to be followed; else what the curve says, and 0 at rest. NaN: not read.
