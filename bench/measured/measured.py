@@ -1,14 +1,15 @@
 """Test RMS on measured machines: what people fit, `thermocomp fit` without further options, and
 what `thermocomp diagnose` makes of a ridge model.
 
-    measured.py PROGRAM [--data FOLDER] [--splits TEXT] [--peers NAME,...]
+    measured.py PROGRAM [--data FOLDER] [--splits TEXT] [--further] [--peers NAME,...]
 
 The last lines: each split's RMS by method (mean over its outputs); what `fit` stated of its model
 beside what it left of the test rows (the median over outputs of their ratio; `told_as_range` where
 it states no figure); how many rows were said to be outside, the error inside and outside, and of
 95 % intervals the share that holds there, their mean width over that of split-conformal ones about
 ridge regression with lags, what share of those holds, and the interval score (width, and 40 times
-what is missed) of ours over theirs. Then ours over the best peer of the split: the median, the
+what is missed) of ours over theirs. Both kinds are also widened, by one factor each for all splits,
+until 95 % hold in the mean, and compared again. Then ours over the best peer of the split: the median, the
 largest; over no model; rows that are worse than no model without being called outside; and how many
 stated figures are right within 0.7 to 1.5.
 """
@@ -121,6 +122,19 @@ def share_covered(left, sd, rows):
     return float(np.mean([np.mean(np.abs(e[rows]) <= 1.96 * s[rows]) for e, s in zip(left, sd)]))
 
 
+def widening(errors, share=0.95):
+    """By what all intervals have to be widened for the share to hold, mean of the splits.
+
+    errors -- errors over half widths, one array a split
+    """
+    low, high = 1e-3, 1e4
+    while high / low > 1.001:
+        middle = np.sqrt(low * high)
+        holds = np.mean([np.mean(each <= middle) for each in errors])
+        low, high = (middle, high) if holds < share else (low, middle)
+    return high
+
+
 def interval_score_um(left, half_um):
     """Mean over outputs; lower is better, least for intervals that hold on 95 %."""
     return float(np.mean([np.nanmean(2 * h + 40 * np.maximum(0.0, np.abs(e) - h))
@@ -149,6 +163,9 @@ def judge(program, split, names, folder):
     if "ridge_lags" in names:
         widths_um = peers.conformal_lags_um(split)
         of_ridge = left_by_peer["ridge_lags"]
+        figures["errors"] = np.concatenate([np.abs(e) / (1.96 * s) for e, s in zip(left, sd)])
+        figures["errors_conformal"] = np.concatenate(
+            [np.abs(e) / w for e, w in zip(of_ridge, widths_um)])
         figures["width"] = float(np.mean([np.mean(1.96 * s) / w for s, w in zip(sd, widths_um)]))
         figures["conformal"] = float(np.mean([np.mean(np.abs(e) <= w)
                                               for e, w in zip(of_ridge, widths_um)]))
@@ -173,6 +190,7 @@ def main():
     parser.add_argument("--data", default=os.environ.get(
         "THERMOCOMP_DATA", SOURCE.parent / "shared" / "data"), type=pathlib.Path)
     parser.add_argument("--splits", default="")
+    parser.add_argument("--further", action="store_true", help="other splits of the same data")
     parser.add_argument("--peers", default=",".join(peers.PEERS))
     options = parser.parse_args()
     if not options.data.is_dir():
@@ -181,10 +199,11 @@ def main():
     names = options.peers.split(",")
     ratios, lines, worse, stated = {"fit": [], "diagnose": []}, [], 0, []
     covered, over_none = {"inside": [], "outside": []}, []
+    errors = {"errors": [], "errors_conformal": []}
     intervals = {"width": [], "conformal": [], "score": []}
     over_best = {name: [] for name in names if name != "none"}
     with tempfile.TemporaryDirectory() as folder:
-        for split in data.all_splits(options.data):
+        for split in (data.further_splits if options.further else data.all_splits)(options.data):
             if options.splits not in split.name:
                 continue
             figures = judge(options.program, split, names, pathlib.Path(folder) / split.name)
@@ -208,6 +227,8 @@ def main():
                 lines.append(f"{split.name}_covered_{where} {covered[where][-1]:.3f} share")
             for name, of_splits in intervals.items():
                 of_splits.append(figures.get(name, float("nan")))
+            for name, of_splits in errors.items():
+                of_splits += [figures[name]] if name in figures else []
             over_none.append(figures["fit"] / figures["none"])
             lines.append(f"{split.name}_width_over_conformal {intervals['width'][-1]:.2f} ratio")
             lines.append(f"{split.name}_interval_score_over_conformal "
@@ -227,6 +248,12 @@ def main():
     for where, of_splits in covered.items():
         print(f"covered_{where}_mean {np.nanmean(of_splits):.3f} share")
     print(f"width_over_conformal_median {np.nanmedian(intervals['width']):.2f} ratio")
+    if errors["errors"]:
+        wider, wider_conformal = (widening(of_splits) for of_splits in errors.values())
+        print(f"widening_to_95 {wider:.2f} ratio")
+        print(f"conformal_widening_to_95 {wider_conformal:.2f} ratio")
+        print(f"width_over_conformal_at_95_median "
+              f"{np.nanmedian(intervals['width']) * wider / wider_conformal:.2f} ratio")
     print(f"conformal_covered_mean {np.nanmean(intervals['conformal']):.3f} share")
     print(f"interval_score_over_conformal_median {np.nanmedian(intervals['score']):.2f} ratio")
     print(f"splits_worse_than_none_inside {worse} splits")

@@ -128,6 +128,45 @@ def printer_other(folder):
                   [run.selected(13000.0, np.inf)], ["z_um"])]
 
 
+def shares(run, outputs, *at):
+    """The rows before a share of the run's time, and those after it."""
+    first_s, last_s = run.columns["time_s"][[0, -1]]
+    splits = []
+    for share in at:
+        time_s = first_s + share * (last_s - first_s)
+        splits.append(Split(f"{run.name}_to_{share:g}", [run.selected(-np.inf, time_s)],
+                            [run.selected(time_s, np.inf)], outputs))
+    return splits
+
+
+def further_splits(folder):
+    """Others of the same data: they chose nothing but the width of the intervals."""
+    def runs(pattern):
+        return {path.stem: Run(path.stem, read(path)) for path in sorted(folder.glob(pattern))}
+    spindle_run, *_ = runs("spindle_46h/*.csv").values()
+    spindle_outputs = [f"ch{i}_um" for i in range(1, 6)]
+    pieces = [spindle_run.cut(6 * i * HOUR_S, 6 * (i + 1) * HOUR_S) for i in range(5)]
+    splits = shares(spindle_run, spindle_outputs, 0.25, 0.4)
+    splits += [Split(f"spindle_{n}x6h", pieces[:n], [pieces[n]], spindle_outputs) for n in (2, 4)]
+    for pattern, output, at in (("printer_frame/*.csv", "z_um", (0.3, 0.4, 0.6, 0.7)),
+                                ("printer_other/*.csv", "z_um", (0.35, 0.5, 0.75)),
+                                ("mirror_focus/*.csv", "m2_focus_um", (0.5,)),
+                                ("probe_drift/*.csv", "z_um", (0.4, 0.75))):
+        for run in runs(pattern).values():
+            splits += shares(run, [output], *at)
+    for pattern, output, count in (("telescope_focus/sci*.csv", "focus_um", (1, 2)),
+                                   ("telescope_focus/skye*.csv", "focus_um", (1, 2)),
+                                   ("cell_under_load/*S001_?C.csv", "diameter_um", (1, 3)),
+                                   ("cell_under_load/*S002_?C.csv", "diameter_um", (1, 3)),
+                                   ("probe_drift/*.csv", "z_um", (1, 5))):
+        of = list(runs(pattern).values())
+        for i, run in enumerate(of):
+            others = of[i + 1:] + of[:i]
+            splits += [Split(f"{'+'.join(each.name for each in others[:n])}_{run.name}", others[:n],
+                             [run], [output]) for n in count]
+    return [split.of_common_columns() for split in splits]
+
+
 def all_splits(folder):
     splits = (spindle(folder) + printer(folder) + telescope(folder) + cell(folder) +
               mirror(folder) + probes(folder) + printer_other(folder))

@@ -139,7 +139,7 @@ double SinceProbing::error_um(std::size_t axis, const AxisReport& now, const The
   const auto found = model.made_from->outputs.find(output);
   if (found == model.made_from->outputs.end() || !(found->second.no_model_rms_um > 0.0))
     return not_a_number;
-  return spread_um(*model.made_from, found->second) / found->second.no_model_rms_um *
+  return spread_um(*model.made_from, found->second, false) / found->second.no_model_rms_um *
          std::abs(now.displacement_um - probed_[axis].displacement_um);
 }
 

@@ -1,6 +1,7 @@
 #include "estimator/model/model_domain.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -13,6 +14,8 @@ namespace thermocomp {
 namespace {
 
 constexpr nanoseconds between_looks = std::chrono::seconds(1);
+/// What a single run has not shown of the machine, as a share of the displacement without a model.
+constexpr double unseen_share = 0.3;
 
 bool is_input(const MadeFrom& made_from, std::size_t column) {
   return is_temperature_name(made_from.columns[column]);
@@ -45,11 +48,11 @@ std::vector<double> whitening(const MadeFrom& made_from) {
 
 }  // namespace
 
-double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output) {
-  const bool by_stretches = made_from.within_one_run && output.freedom > 1.0;
-  if (!by_stretches || !(output.no_model_rms_um > output.left_out_rms_um))
-    return output.left_out_rms_um;
-  return std::sqrt(output.left_out_rms_um * output.no_model_rms_um);
+double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output, bool outside) {
+  const auto runs =
+      static_cast<double>(outside ? 1 : std::max<std::size_t>(made_from.runs.size(), 1));
+  return std::hypot(output.left_out_rms_um,
+                    unseen_share * output.no_model_rms_um / std::sqrt(runs));
 }
 
 std::size_t domain_features(const MadeFrom& made_from) {
@@ -69,7 +72,7 @@ struct ModelDomain::Metric {
   std::vector<double> mean;
   std::vector<double> lower;  ///< L^-1, row by row
   double distance_max{0.0};
-  std::vector<double> spread_um;  ///< one an output
+  std::array<std::vector<double>, 2> spread_um;  ///< inside and outside; one an output
   struct State {
     bool started{false};
     nanoseconds looked_at{};
@@ -132,7 +135,9 @@ ModelDomain::ModelDomain(const ThermalModel& model) : metric_(std::make_unique<M
   for (const std::string& name : model.outputs) {
     const auto output = made_from.outputs.find(name);
     const bool known = output != made_from.outputs.end();
-    metric_->spread_um.push_back(known ? spread_um(made_from, output->second) : not_a_number);
+    for (const bool outside : {false, true})
+      metric_->spread_um[outside].push_back(known ? spread_um(made_from, output->second, outside)
+                                                  : not_a_number);
   }
 }
 
@@ -202,7 +207,7 @@ double ModelDomain::believed_share() const noexcept {
 }
 
 double ModelDomain::sd_um(std::size_t output) const noexcept {
-  return metric_->spread_um[output] * std::sqrt(std::max(1.0, metric_->state.distance));
+  return metric_->spread_um[outside()][output];
 }
 
 void ModelDomain::visit_state(StateArchive& archive) {

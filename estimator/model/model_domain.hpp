@@ -11,10 +11,14 @@
 
 namespace thermocomp {
 
-/// What a prediction may be off by [um, 1 sd] at states of the record: the left-out error of whole
-/// runs, or (freedom 1) of the halves of one. Of one run cut in stretches (fit up to 0.2.0), which
-/// leave a third of what another day does: middle of the logarithms of that and of no model.
-[[nodiscard]] double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output);
+/// What a prediction may be off by [um, 1 sd]:
+///
+///     hypot(left_out_rms_um, 0.3 no_model_rms_um / sqrt(runs)).
+///
+/// The second part is what the runs have not shown; outside the domain they count as one. Further
+/// growth with the distance is not in measured machines (docs/measurements.md).
+[[nodiscard]] double spread_um(const MadeFrom& made_from, const MadeFrom::Output& output,
+                               bool outside);
 
 /// The distance of what the model reads from the rows that it was made from, in the metric of their
 /// covariance S,
@@ -46,9 +50,7 @@ class ModelDomain {
   /// The share of the model's displacement that is still believed: 1 inside, (distance_max / d)^2
   /// outside.
   [[nodiscard]] double believed_share() const noexcept;
-  /// Standard deviation of a new value of an output: spread_um() times sqrt(max(1, d)): gains that
-  /// were penalised err less than in proportion to the distance. NaN: nothing is known about the
-  /// output.
+  /// spread_um() of an output here; NaN: nothing is known about it.
   [[nodiscard]] double sd_um(std::size_t output) const noexcept;
 
   void visit_state(StateArchive& archive);

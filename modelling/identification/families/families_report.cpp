@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "estimator/model/model_domain.hpp"
 #include "modelling/identification/families/families.hpp"
 #include "modelling/identification/printed.hpp"
 
@@ -53,8 +52,7 @@ std::string about(double value) {
 
 /// What another day will show, as far as so many runs can tell. One run has seen no other day; two
 /// judge one another, each by a model of the other alone, which may be far worse than that of both.
-std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom& made_from,
-                       const MadeFrom::Output& output) {
+std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom::Output& output) {
   const char* of = name.c_str();
   const std::string left_out = about(output.left_out_rms_um);
   const std::string no_model = about(output.no_model_rms_um);
@@ -62,8 +60,7 @@ std::string claim_text(std::size_t runs, const std::string& name, const MadeFrom
     return printed(
         "%s: another day is not known; on it expect about %s um (each half of this run by a model "
         "of the other; rows fitted %s, no model %s)\n",
-        of, about(spread_um(made_from, output)).c_str(), about(output.remainder_rms_um).c_str(),
-        no_model.c_str());
+        of, left_out.c_str(), about(output.remainder_rms_um).c_str(), no_model.c_str());
   if (runs == 2)
     return printed(
         "%s: on a third run expect between %s um (rows fitted) and %s (each run by a model of the "
@@ -98,7 +95,7 @@ std::string families_text(const MeasuredTests& tests, const FamiliesFit& fit) {
   if (fit.chosen != Family::none) {
     const MadeFrom& made_from = *fit.model.made_from;
     for (const auto& [name, output] : made_from.outputs)
-      text += claim_text(tests.runs.size(), name, made_from, output);
+      text += claim_text(tests.runs.size(), name, output);
   }
   if (fit.few) text += equation_text(tests, *fit.few);
   const auto told = [&](const std::string& warning) {

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "config/text/printable_text.hpp"
-#include "estimator/model/model_domain.hpp"
 #include "modelling/identification/equation/fit.hpp"
 #include "modelling/identification/families/families.hpp"
 #include "modelling/identification/printed.hpp"
@@ -223,8 +222,7 @@ std::string families_html(const MeasuredTests& tests, const FamiliesFit& fit) {
     left_out.push_back({chosen.left_out_rms_um[o], fit.results.front().left_out_rms_um[o]});
   const bool has_claim = tests.runs.size() == 1 && fit.chosen != Family::none;
   for (std::size_t o = 0; o < tests.outputs.size() && has_claim; ++o)
-    left_out[o].other_day_um =
-        spread_um(*fit.model.made_from, fit.model.made_from->outputs.at(tests.outputs[o]));
+    left_out[o].other_day_um = fit.model.made_from->outputs.at(tests.outputs[o]).left_out_rms_um;
   return page(tests, shown, left_out, fit.warnings, families_text(tests, fit));
 }
 

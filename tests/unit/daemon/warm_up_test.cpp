@@ -49,9 +49,9 @@ TEST_CASE("what cannot be told is not known, and a straight rise is not nearly d
 ThermalModel model_with_claim() {
   ThermalModel model;
   model.outputs = {"z_um"};
-  model.made_from.emplace();
+  model.made_from.emplace().runs.resize(4);
   MadeFrom::Output& output = model.made_from->outputs["z_um"];
-  output.left_out_rms_um = 2.0;
+  output.left_out_rms_um = 4.0;
   output.no_model_rms_um = 20.0;
   return model;
 }
@@ -64,20 +64,20 @@ TEST_CASE("a probing is due by what the model may be off by since the last one",
   since.note(axes, "a");
   axes[0].displacement_um = 25.0;
   since.note(axes, "a");
-  // 2 / 20 of the 20 um since the start.
-  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.0));
+  // 5 / 20 of the 20 um since the start: left out 4, and 3 not shown by four runs.
+  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(5.0));
   axes[0].probings = 1;
   since.note(axes, "a");
   CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(0.0));
   axes[0].displacement_um = 15.0;
-  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(1.0));
+  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.5));
   since.note(axes, "a");
   axes[0].displacement_um = 5.0;  // the same temperatures by another model
   since.note(axes, "b");
-  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(1.0));
+  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.5));
   axes[0].displacement_um = -5.0;
   since.note(axes, "b");
-  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(2.0));
+  CHECK(since.error_um(0, axes[0], model, "z_um", false) == Approx(5.0));
   axes[0].correction.sd_um = 0.7;
   CHECK(since.error_um(0, axes[0], model, "z_um", true) == Approx(0.7));
   CHECK(std::isnan(since.error_um(0, axes[0], ThermalModel{}, "z_um", false)));

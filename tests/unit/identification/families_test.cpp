@@ -154,20 +154,18 @@ TEST_CASE("two runs, each judged by the other alone, give a range and three a fi
   CHECK(families_text(three, fitted(three)).find("z_um: RMS left out") != std::string::npos);
 }
 
-TEST_CASE("what one run cannot tell widens what a prediction may be off by", "[families]") {
+TEST_CASE("what few runs have not shown widens what a prediction may be off by", "[families]") {
   MadeFrom made_from;
+  made_from.runs = {"a.csv"};
   MadeFrom::Output output;
-  output.left_out_rms_um = 2.0;
-  output.no_model_rms_um = 18.0;
-  output.freedom = 20.0;
-  CHECK(spread_um(made_from, output) == 2.0);
-  made_from.within_one_run = true;
-  CHECK(spread_um(made_from, output) == 6.0);
-  output.no_model_rms_um = 1.0;  // a model that is worse than none says so already
-  CHECK(spread_um(made_from, output) == 2.0);
-  output.no_model_rms_um = 18.0;
-  output.freedom = 1.0;  // judged by halves
-  CHECK(spread_um(made_from, output) == 2.0);
+  output.left_out_rms_um = 4.0;
+  output.no_model_rms_um = 10.0;
+  CHECK(spread_um(made_from, output, false) == Approx(5.0));
+  made_from.runs.resize(9);
+  CHECK(spread_um(made_from, output, true) == Approx(5.0));
+  CHECK(spread_um(made_from, output, false) == Approx(std::hypot(4.0, 1.0)));
+  output.no_model_rms_um = 0.0;  // not stated
+  CHECK(spread_um(made_from, output, false) == 4.0);
 }
 
 TEST_CASE("a bank of lags is written, read and predicts what was judged", "[families]") {
