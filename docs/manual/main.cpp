@@ -18,6 +18,10 @@
 #ifdef THERMOCOMP_WITH_GATEWAY
 #include "gateway/command_line.hpp"
 #endif
+#ifdef THERMOCOMP_WITH_FLEET
+#include "fleet/command_line.hpp"
+#include "fleet/uplink/command_line.hpp"
+#endif
 #ifdef THERMOCOMP_WITH_MODELLING
 #include "modelling/command_line.hpp"
 #endif
@@ -133,6 +137,38 @@ void write_gateway(const fs::path& examples, const fs::path& folder) {
 }
 #endif
 
+#ifdef THERMOCOMP_WITH_FLEET
+void write_fleet(const fs::path& examples, const fs::path& folder) {
+  CLI::App fleet_app;
+  std::string store;
+  cli::Action action;
+  fleet::declare_fleet_command_line(fleet_app, store, action);
+  PageExtras extras;
+  extras.environment = {{"THERMOCOMP_FLEET_STORE", "connection, instead of --store"}};
+  extras.see_also = {"thermocomp-uplink(1)", "thermocomp-modelling(1)", "psql(1)"};
+  write_program(folder, fleet_app, extras);
+
+  CLI::App uplink_app;
+  fleet::UplinkOptions options;
+  fleet::declare_uplink_command_line(uplink_app, options);
+  extras = {};
+  extras.files = {
+      {options.config_file, "the configuration; the service does not start without it"}};
+  extras.see_also = {"uplink.toml(5)", "thermocomp-fleet(1)", "thermocompd(8)"};
+  write_program(folder, uplink_app, extras);
+  FormatPage page;
+  page.name = "uplink.toml";
+  page.what = "configuration of thermocomp-uplink";
+  page.text =
+      "The file is TOML, and is read strictly.\n"
+      "\n"
+      "The commented example below is the reference; every key is shown with its default.\n";
+  page.examples = {{"THE CONFIGURATION", content(examples / "uplink.toml")}};
+  page.see_also = {"thermocomp-uplink(1)"};
+  write(folder / "uplink.toml.5", format_page(page));
+}
+#endif
+
 void write_formats(const fs::path& examples, const fs::path& folder) {
   FormatPage page;
   page.name = "thermocompd.toml";
@@ -210,6 +246,9 @@ int main(int argc, char** argv) {
     write_command(folder);
     write_daemon(folder);
     write_simulator(folder);
+#ifdef THERMOCOMP_WITH_FLEET
+    write_fleet(fs::path(argv[1]), folder);
+#endif
 #ifdef THERMOCOMP_WITH_MODELLING
     write_modelling(folder);
 #endif

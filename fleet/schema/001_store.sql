@@ -69,8 +69,10 @@ CREATE TABLE fleet.setup (
 -- A row of another time has come from a clock that was wrong: it is refused.
 CREATE FUNCTION fleet.oldest_time() RETURNS timestamptz LANGUAGE sql STABLE AS
   $$SELECT date_trunc('month', now() - interval '12 months')$$;
+CREATE FUNCTION fleet.newest_time() RETURNS timestamptz LANGUAGE sql STABLE AS
+  $$SELECT now() + interval '1 hour'$$;
 CREATE FUNCTION fleet.is_sound_time(at timestamptz) RETURNS boolean LANGUAGE sql STABLE AS
-  $$SELECT at >= fleet.oldest_time() AND at <= now() + interval '1 hour'$$;
+  $$SELECT at >= fleet.oldest_time() AND at <= fleet.newest_time()$$;
 
 -- Means of 10 s. `at` is the beginning; a value that was missing is NULL.
 CREATE TABLE fleet.sample (
@@ -78,7 +80,7 @@ CREATE TABLE fleet.sample (
   setup integer NOT NULL,
   at timestamptz NOT NULL,
   value real[] NOT NULL,
-  PRIMARY KEY (machine, at)
+  PRIMARY KEY (machine, at, setup)
 ) PARTITION BY RANGE (at);
 
 -- The same of a minute; kept when samples are dropped.
@@ -126,7 +128,8 @@ CREATE TABLE fleet.probing (
   number smallint NOT NULL DEFAULT 0,  -- of several at once
   displacement_um real NOT NULL,    -- without the offset in effect
   measured_um real NOT NULL,        -- as it was given
-  claimed_um real,                  -- standard deviation that the model stated for its displacement
+  modelled_um real,                 -- what the model in use said, without what was learned from probings
+  claimed_um real,                  -- the standard deviation that it stated
   sd_um real,                       -- standard deviation of the measurement, where it was given
   source text NOT NULL DEFAULT 'probe',
   PRIMARY KEY (machine, at, output, number)
@@ -142,8 +145,9 @@ CREATE TABLE fleet.uplink (
   event_run bigint NOT NULL DEFAULT 0,
   event_number bigint NOT NULL DEFAULT 0,
   newest timestamptz,                      -- end of what was sent
-  refused bigint NOT NULL DEFAULT 0,       -- rows of an impossible time, and why
-  refused_why text NOT NULL DEFAULT '',
+  sent bigint NOT NULL DEFAULT 0,          -- rows of samples: taken, refused and repeated
+  refused bigint NOT NULL DEFAULT 0,       -- of an impossible time, from a clock that was wrong
+  repeated bigint NOT NULL DEFAULT 0,      -- of a time that was there already
   damaged bigint NOT NULL DEFAULT 0,       -- parts of the history that could not be read
   seen timestamptz NOT NULL DEFAULT now(),
   program_version text NOT NULL DEFAULT '',
@@ -211,6 +215,20 @@ CREATE VIEW fleet.release_state WITH (security_invoker = true) AS
   SELECT release.*, last.step, last.at, last.who, last.detail
   FROM fleet.release CROSS JOIN LATERAL
     (SELECT step, at, who, detail FROM fleet.release_step WHERE release = release.id ORDER BY id DESC LIMIT 1) last;
+
+-- A machine in one row: its uplink, its newest night, its newest release.
+CREATE VIEW fleet.machine_state WITH (security_invoker = true) AS
+  SELECT machine.*, uplink.seen, uplink.newest, uplink.sent, uplink.refused, uplink.repeated, uplink.damaged,
+    night.night, night.state AS night_state, night.departs, night.probability, night.remainder_um,
+    night.claimed_um, night.error, state.id AS release, state.model AS release_model, state.step AS release_step
+  FROM fleet.machine
+  LEFT JOIN LATERAL
+    (SELECT max(seen) AS seen, max(newest) AS newest, sum(sent) AS sent, sum(refused) AS refused,
+       sum(repeated) AS repeated, sum(damaged) AS damaged FROM fleet.uplink WHERE machine = machine.id) uplink ON true
+  LEFT JOIN LATERAL
+    (SELECT * FROM fleet.night_result WHERE machine = machine.id ORDER BY night DESC, finished DESC LIMIT 1) night ON true
+  LEFT JOIN LATERAL
+    (SELECT * FROM fleet.release_state WHERE machine = machine.id ORDER BY id DESC LIMIT 1) state ON true;
 
 -- --------------------------------------------------------------------------------------- who may what
 

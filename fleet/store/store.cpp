@@ -43,7 +43,8 @@ std::string random_password() {
 
 }  // namespace
 
-std::string complete_conninfo(const std::string& conninfo) {
+std::string complete_conninfo(const std::string& conninfo,
+                              std::map<std::string, std::string> more) {
   char* problem = nullptr;
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
       PQconninfoParse(conninfo.c_str(), &problem), &PQconninfoFree);
@@ -57,6 +58,7 @@ std::string complete_conninfo(const std::string& conninfo) {
       {"sslmode", "verify-full"},   {"options", "-c timezone=UTC"}, {"connect_timeout", "10"},
       {"keepalives_idle", "30"},    {"keepalives_interval", "10"},  {"keepalives_count", "3"},
       {"tcp_user_timeout", "60000"}};
+  given.merge(more);
   for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option)
     if (option->val != nullptr) given[option->keyword] = option->val;
   std::string text;

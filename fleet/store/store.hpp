@@ -2,22 +2,22 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <pqxx/connection>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace thermocomp::fleet {
 
-/// Connects. TLS with a verified name is required where `conninfo` does not name another `sslmode`
-/// (a Unix socket has none).
+/// `conninfo` with what it leaves out: TLS with a verified name (a Unix socket has none), times
+/// after which a server counts as gone, and `more`.
 /// @param conninfo  of libpq: "host=... dbname=..." or a URL
-/// @throws std::invalid_argument when it cannot be parsed, pqxx::broken_connection
-[[nodiscard]] pqxx::connection open_store(const std::string& conninfo);
+/// @throws std::invalid_argument when it cannot be parsed
+[[nodiscard]] std::string complete_conninfo(const std::string& conninfo,
+                                            std::map<std::string, std::string> more = {});
 
-/// `conninfo` with what open_store() adds, in libpq's form key='value'. @throws
-/// std::invalid_argument
-[[nodiscard]] std::string complete_conninfo(const std::string& conninfo);
+/// Connects by complete_conninfo(). @throws std::invalid_argument, pqxx::broken_connection
+[[nodiscard]] pqxx::connection open_store(const std::string& conninfo);
 
 struct MigrationResult {
   std::vector<std::string> applied;  ///< just now

@@ -30,6 +30,12 @@ RecordedEvent event_from(const Statement& row) {
   return event;
 }
 
+std::string query_of_events(Database& database, const std::string& condition) {
+  return std::string("SELECT run, number, wall_ns, kind, subject, what, duration_ns, user, ") +
+         (has_event_records(database) ? "record" : "''") + " FROM event" + condition +
+         " ORDER BY run, number";
+}
+
 }  // namespace
 
 bool has_event_records(Database& database) {
@@ -42,10 +48,7 @@ std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
                                        const std::optional<HistoryTime>& to) {
   Database database(history, DatabaseMode::read_only);
   require_history(database);
-  const std::string query =
-      "SELECT run, number, wall_ns, kind, subject, what, duration_ns, user, " +
-      std::string(has_event_records(database) ? "record" : "''") +
-      " FROM event ORDER BY run, number";
+  const std::string query = query_of_events(database, "");
   std::vector<RecordedEvent> events;
   Statement rows(database, query.c_str());
   std::optional<std::int64_t> first_ns;
@@ -57,6 +60,18 @@ std::vector<RecordedEvent> read_events(const std::filesystem::path& history,
     if (to && !is_before(since_first_s, wall_ns, *to)) continue;
     events.push_back(event_from(rows));
   }
+  return events;
+}
+
+std::vector<RecordedEvent> read_events_after(const std::filesystem::path& history, std::int64_t run,
+                                             std::uint64_t number, std::int64_t count) {
+  Database database(history, DatabaseMode::read_only);
+  require_history(database);
+  const std::string query = query_of_events(database, " WHERE (run, number) > (?, ?)") + " LIMIT ?";
+  Statement rows(database, query.c_str());
+  rows.bind(run).bind(static_cast<std::int64_t>(number)).bind(count);
+  std::vector<RecordedEvent> events;
+  while (rows.step()) events.push_back(event_from(rows));
   return events;
 }
 

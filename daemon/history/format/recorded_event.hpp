@@ -21,4 +21,10 @@ namespace thermocomp {
                                                      const std::optional<HistoryTime>& from = {},
                                                      const std::optional<HistoryTime>& to = {});
 
+/// The events after that of `run` and `number`, by run and number, `count` at most.
+/// @throws HistoryError: no history, or one that cannot be read
+[[nodiscard]] std::vector<RecordedEvent> read_events_after(const std::filesystem::path& history,
+                                                           std::int64_t run, std::uint64_t number,
+                                                           std::int64_t count);
+
 }  // namespace thermocomp

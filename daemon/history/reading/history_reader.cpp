@@ -248,9 +248,15 @@ bool RecordCursor::next(Record& out) {
   while (parts.given == parts.records.size()) {
     if (!load_chunk()) return false;
   }
-  out = parts.records[parts.given++];
+  out = parts.records[parts.given];
   // What follows the last cycle was cut off before its cycle was whole.
-  return out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
+  const bool is_whole = out.cycle < static_cast<std::uint64_t>(parts.segment.last_cycle + 1);
+  if (is_whole) ++parts.given;
+  return is_whole;
+}
+
+void RecordCursor::extend(std::int64_t last_cycle) {
+  parts_->segment.last_cycle = std::max(parts_->segment.last_cycle, last_cycle);
 }
 
 bool RecordCursor::resume() {

@@ -37,6 +37,8 @@ class RecordCursor {
   /// After an error: goes on with the next chunk there is. What the damaged one said is unknown.
   /// @return false when there is none
   bool resume();
+  /// The segment has grown: next() goes on after what was its last whole cycle.
+  void extend(std::int64_t last_cycle);
   /// Whether a chunk so far gave an impossible wall time; the last good difference then counts.
   [[nodiscard]] bool wall_time_was_impossible() const noexcept;
   /// Wall clock minus the grid's time, as noted with the record last returned [ns].

@@ -159,8 +159,36 @@ std::vector<std::string> SegmentExport::happened() {
   return all;
 }
 
+std::vector<ExportedProbing> SegmentExport::probings() {
+  std::vector<ExportedProbing> all;
+  all.swap(probings_);
+  for (ExportedProbing& probing : all) {
+    if (!steps_) continue;
+    probing.claimed_um = report_.axes[probing.axis].claimed_sd_um;
+    const auto& outputs = model_.outputs;
+    const auto output =
+        std::find(outputs.begin(), outputs.end(), config_.axes[probing.axis].output);
+    if (output != outputs.end())
+      probing.modelled_um =
+          report_.displacement_um[static_cast<std::size_t>(output - outputs.begin())];
+  }
+  return all;
+}
+
+void SegmentExport::extend(std::int64_t last_cycle) {
+  segment_.last_cycle = last_cycle;
+  cursor_.extend(last_cycle);
+  try {
+    if (steps_) steps_->extend(last_cycle);
+  } catch (const std::exception& error) {
+    give_up_following(error.what());
+  }
+  if (!has_record_) advance();
+}
+
 void SegmentExport::skip() {
   happened_.clear();
+  probings_.clear();
   measured_um_.fill(not_a_number);
   displacement_um_.fill(not_a_number);
 }
@@ -233,8 +261,17 @@ void SegmentExport::take_measured() {
   const std::size_t axis = record_.index;
   measured_um_[axis] = record_.value;
   displacement_um_[axis] = record_.value;
-  if (config_.correction.measured != MeasuredMeaning::remaining) return;
-  displacement_um_[axis] -= config_.axes[axis].sign * effect_um(axis);
+  if (config_.correction.measured == MeasuredMeaning::remaining)
+    displacement_um_[axis] -= config_.axes[axis].sign * effect_um(axis);
+  Command command;
+  set_measured_bits(record_.time_ns, command);
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  probings_.push_back({.axis = axis,
+                       .wall_ns = wall_ns(record_.cycle) - ns_per_s * command.ago_s,
+                       .measured_um = record_.value,
+                       .displacement_um = displacement_um_[axis],
+                       .sd_um = command.sd_nm > 0 ? 1e-3 * command.sd_nm : not_a_number,
+                       .source = command.source});
 }
 
 /// What the axis is offset by; of a travel where its slide stands.

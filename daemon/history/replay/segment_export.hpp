@@ -33,6 +33,18 @@ struct ExportPlaces {
 [[nodiscard]] ExportPlaces export_places(const ReplaySetup& setup, ExportContent content,
                                          const std::vector<bool>& probed, RunColumns& columns);
 
+/// A displacement that an operator or a probe gave.
+struct ExportedProbing {
+  std::size_t axis{0};
+  std::int64_t wall_ns{0};               ///< when the tool was there
+  double measured_um{not_a_number};      ///< as it was given
+  double displacement_um{not_a_number};  ///< without the offset in effect
+  double modelled_um{not_a_number};      ///< of the model alone; NaN: not known
+  double claimed_um{not_a_number};       ///< standard deviation that the model states; NaN: none
+  double sd_um{not_a_number};            ///< NaN: as configured
+  MeasuredSource source{MeasuredSource::probe};
+};
+
 /// Marks the axes of which an operator measured a displacement in this segment. What cannot be read
 /// is not reported here but by the export itself.
 void note_probed(const HistoryReader& reader, const SegmentInfo& segment,
@@ -56,6 +68,10 @@ class SegmentExport {
   void fill(std::vector<double>& row, std::uint64_t cycle);
   /// Since the last call: faults that begin and end, and commands; one text each.
   [[nodiscard]] std::vector<std::string> happened();
+  /// What was measured between the fill() before and the last one.
+  [[nodiscard]] std::vector<ExportedProbing> probings();
+  /// The segment has grown: next() goes on.
+  void extend(std::int64_t last_cycle);
   /// The cycle that next() gave is not wanted, nor what was commanded before it.
   void skip();
 
@@ -73,7 +89,7 @@ class SegmentExport {
   void tell_faults();
   [[nodiscard]] Fault fault_of(std::size_t sensor) const;
 
-  const SegmentInfo& segment_;
+  SegmentInfo segment_;
   const EstimatorConfig& config_;
   const ThermalModel& model_;
   const bool dry_run_;
@@ -91,6 +107,7 @@ class SegmentExport {
   Report report_;
   std::vector<Fault> faults_told_;
   std::vector<std::string> happened_;
+  std::vector<ExportedProbing> probings_;
   std::string not_followed_;  ///< why the estimator is not stepped any more, until it is told
 };
 

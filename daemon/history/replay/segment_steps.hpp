@@ -32,11 +32,17 @@ class SegmentSteps {
     return is_one ? &record_ : nullptr;
   }
   void next() { has_record_ = cursor_.next(record_); }
+  /// The segment has grown.
+  void extend(std::int64_t last_cycle) {
+    segment_.last_cycle = last_cycle;
+    cursor_.extend(last_cycle);
+    if (!has_record_) next();
+  }
 
  private:
   [[nodiscard]] std::uint64_t take_inputs(std::uint64_t cycle);
 
-  const SegmentInfo& segment_;
+  SegmentInfo segment_;
   Estimator estimator_;
   RecordCursor cursor_;
   InputsInForce inputs_;

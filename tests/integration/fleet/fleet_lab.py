@@ -1,9 +1,15 @@
 """A store, and what works with it: thermocomp-fleet, thermocomp-uplink."""
 
+import datetime
+import json
+import math
 import os
 import pathlib
 import re
+import shutil
 import subprocess
+import tempfile
+import time
 
 BIN = pathlib.Path(os.environ["THERMOCOMP_BIN"])
 
@@ -58,3 +64,168 @@ class Store:
 
     def as_person(self, name, sql):
         return self.server.run_sql(sql, conninfo=self.local.replace("user=postgres", f"user=person_{name}"))
+
+
+CONFIG = """format = 1
+state_file = "{folder}/state.json"
+[model]
+file = "model.toml"
+[[bus]]
+name = "cabinet"
+kind = "modbus_tcp"
+host = "127.0.0.1"
+[[device]]
+name = "module"
+bus = "cabinet"
+unit = 1
+table = "input"
+encoding = "int16"
+scale = 0.01
+[[sensor]]
+name = "column"
+device = "module"
+address = 0
+[[sensor]]
+name = "spindle"
+device = "module"
+address = 1
+[[block]]
+name = "column"
+input = "column_degC"
+sensors = ["column"]
+[[block]]
+name = "spindle"
+input = "spindle_degC"
+sensors = ["spindle"]
+[controller]
+name = "cnc"
+kind = "dry_run"
+[[axis]]
+name = "z"
+output = "z_um"
+offset_um_max = 50.0
+rate_um_per_s_max = 1.0
+[history]
+file = "{folder}/history.db"
+[socket]
+path = "{folder}/status.sock"
+"""
+MODEL = """format = 1
+inputs = ["column_degC", "spindle_degC"]
+outputs = ["z_um"]
+reference = "first_sample"
+matrix_um_per_K = [[3.0, -1.5]]
+"""
+
+
+class Machine:
+    """A machine with a history and an uplink."""
+
+    def __init__(self, store, name, *, history=None, more="", connection=""):
+        self.store = store
+        self.name = name
+        self.folder = store.folder / name
+        self.folder.mkdir()
+        (self.folder / "thermocompd.toml").write_text(CONFIG.format(folder=self.folder))
+        (self.folder / "model.toml").write_text(MODEL)
+        self.history = self.folder / "history.db"
+        if history:
+            shutil.copyfile(history, self.history)
+        store.add(name)
+        self.log = self.folder / "uplink.log"
+        self.process = None
+        self.configure(connection or store.remote(f"machine_{name}"), more)
+
+    def configure(self, connection, more=""):
+        (self.folder / "uplink.toml").write_text(
+            f'format = 1\nmachine = "{self.name}"\nstore = "{connection}"\n'
+            f'password_file = "{self.store.folder}/{self.name}.password"\n'
+            f'history = ["{self.history}"]\ncpu_percent_max = 100\nperiod_s = 1\n{more}')
+
+    def record(self, hours_ago, hours, *, probings_per_h=2.0, clock=()):
+        """What the history then has more: {"probings": ..., "events": ...}. Written in memory: hours of a
+        daemon's commits to a disk take minutes."""
+        with tempfile.TemporaryDirectory(dir="/dev/shm") as memory:
+            file = pathlib.Path(memory) / "history.db"
+            if self.history.exists():
+                shutil.copyfile(self.history, file)
+            done = subprocess.run([str(BIN / "record_history"), str(self.folder / "thermocompd.toml"), str(file),
+                                   str(time.time() - 3600 * hours_ago), str(hours), "1", str(probings_per_h),
+                                   *map(str, clock)], stdin=subprocess.DEVNULL, capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+            shutil.copyfile(file, self.history)
+        return json.loads(done.stdout)
+
+    def send(self, status=0):
+        """Until all is sent; what the uplink said."""
+        done = subprocess.run([str(BIN / "thermocomp-uplink"), "--once", str(self.folder / "uplink.toml")],
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        assert done.returncode == status, done.stderr
+        return done.stderr
+
+    def start(self):
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen([str(BIN / "thermocomp-uplink"), str(self.folder / "uplink.toml")],
+                                            stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        return self
+
+    def end(self):
+        if self.process:
+            self.process.terminate()
+            assert self.process.wait(30) == 0, self.log.read_text()
+            self.process = None
+
+    def recorded(self):
+        """{beginning of 10 s [s since 1970]: {column: mean}}, from the exported run file; without probings."""
+        run = self.folder / "run.csv"
+        done = subprocess.run([str(BIN / "thermocomp"), "export", str(self.history), "-o", str(run)],
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        means, header, wall = {}, None, None
+        for line in run.read_text().splitlines():
+            told = re.match(r"# ([\d.]+) s: wall time (\S+)Z$", line)
+            if told:
+                at = datetime.datetime.fromisoformat(told[2]).replace(tzinfo=datetime.timezone.utc)
+                wall = at.timestamp() - float(told[1])
+            elif line.startswith("#"):
+                continue
+            elif header is None:
+                header = line.split(",")
+            else:
+                values = dict(zip(header, (float(value) if value else math.nan for value in line.split(","))))
+                begin = int((wall + values["time_s"] + 1e-4) // 10 * 10)
+                for name, value in values.items():
+                    if name not in ("time_s", "z_um", "z_measured_um") and not math.isnan(value):
+                        means.setdefault(begin, {}).setdefault(name, []).append(value)
+        return {begin: {name: sum(values) / len(values) for name, values in row.items()}
+                for begin, row in means.items()}
+
+    def taken(self):
+        """The same from the store."""
+        columns = self.store.value(f"SELECT array_to_string(columns, ' ') FROM fleet.setup JOIN fleet.machine "
+                                   f"ON id = machine WHERE name = '{self.name}' ORDER BY number LIMIT 1").split()
+        rows = self.store.ask(f"SELECT extract(epoch FROM at)::bigint, array_to_string(value, ' ', 'nan') "
+                              f"FROM fleet.sample JOIN fleet.machine ON id = machine WHERE name = '{self.name}'")
+        means = {int(at): dict(zip(columns, map(float, values.split()))) for at, values in rows}
+        assert len(means) == len(rows)
+        return means
+
+    def count(self, table):
+        return int(self.store.value(f"SELECT count(*) FROM fleet.{table} JOIN fleet.machine ON id = machine "
+                                    f"WHERE name = '{self.name}'"))
+
+    def progress(self):
+        """(rows sent, refused, repeated) by the uplink's own count."""
+        [row] = self.store.ask(f"SELECT sent, refused, repeated FROM fleet.uplink JOIN fleet.machine "
+                               f"ON id = machine WHERE name = '{self.name}'")
+        return tuple(map(int, row))
+
+
+def eventually(check, what, patience_s=60):
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        value = check()
+        if value:
+            return value
+        time.sleep(0.05)
+    raise AssertionError("never happened: " + what)

@@ -1,0 +1,106 @@
+// thermocomp-uplink: what thermocompd has recorded, for the store of a series of machines.
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "config/text/clean_output.hpp"
+#include "config/text/problems.hpp"
+#include "fleet/uplink/command_line.hpp"
+#include "fleet/uplink/uplink.hpp"
+
+namespace thermocomp::fleet {
+namespace {
+
+constexpr std::chrono::seconds first_wait(2);
+constexpr std::chrono::seconds longest_wait(300);
+
+/// The first line; of a server's answer the rest repeats the statement.
+std::string first_line(const std::string& text) {
+  return text.substr(0, text.find('\n'));
+}
+
+/// @return the exit status
+int run_once(Uplink& uplink) {
+  try {
+    while (uplink.send_new()) {
+    }
+    return 0;
+  } catch (const std::exception& error) {
+    spdlog::error("{}", first_line(error.what()));
+    return 1;
+  }
+}
+
+/// Until a signal ends it. A server that is away is asked again after 2 s, 4 s, ... 5 min.
+void run_on(Uplink& uplink, const UplinkSettings& settings, const Pace& pace) {
+  std::chrono::duration<double> wait = first_wait;
+  std::string told;
+  for (;;) {
+    try {
+      uplink.send_new();
+      if (!told.empty()) spdlog::info("sending again");
+      told.clear();
+      wait = first_wait;
+      pace.sleep(std::chrono::duration<double>(settings.period_s));
+    } catch (const std::exception& error) {
+      uplink.hang_up();
+      if (const std::string why = first_line(error.what()); why != told) {
+        spdlog::warn("not sent: {}", why);
+        told = why;
+      }
+      pace.sleep(wait);
+      wait = std::min<std::chrono::duration<double>>(2.0 * wait, longest_wait);
+    }
+  }
+}
+
+int run(const UplinkOptions& options) {
+  const UplinkSettings settings = load_uplink_settings(options.config_file);
+  spdlog::set_default_logger(spdlog::stderr_color_mt("thermocomp-uplink"));
+  sigset_t ending;
+  sigemptyset(&ending);
+  sigaddset(&ending, SIGTERM);
+  sigaddset(&ending, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &ending, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  Pace pace(settings.cpu_percent_max, ending);
+  Uplink uplink(settings, pace);
+  try {
+    if (options.once) return run_once(uplink);
+    run_on(uplink, settings, pace);
+  } catch (const Stopped&) {
+    spdlog::info("stopped as asked");
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace thermocomp::fleet
+
+int main(int argc, char** argv) {
+  using namespace thermocomp::fleet;
+  thermocomp::clean_standard_output();
+  CLI::App app;
+  UplinkOptions options;
+  declare_uplink_command_line(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    return run(options);
+  } catch (const thermocomp::ConfigurationError& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "thermocomp-uplink: %s\n", error.what());
+  }
+  return 2;
+}

@@ -1,0 +1,267 @@
+"""What a daemon recorded is in the store, all of it and once, whatever happens on the way."""
+
+import os
+import pathlib
+import shutil
+import socket
+import sqlite3
+import subprocess
+import tempfile
+import threading
+
+import pytest
+
+from fleet_lab import Machine, eventually
+from postgres import Postgres
+
+
+@pytest.fixture(scope="module")
+def day(server, tmp_path_factory):
+    """A history of twelve hours, which machines copy."""
+    from fleet_lab import Store
+    machine = Machine(Store(server, tmp_path_factory.mktemp("day"), "day"), "first")
+    machine.told = machine.record(hours_ago=20, hours=12)
+    machine.means = machine.recorded()
+    return machine
+
+
+@pytest.fixture
+def machine(store, day):
+    made = Machine(store, "mill_1", history=day.history)
+    made.told, made.means = dict(day.told), dict(day.means)
+    yield made
+    made.end()
+
+
+def assert_all_there_once(machine):
+    taken = machine.taken()
+    assert taken.keys() == machine.means.keys()
+    for begin, means in machine.means.items():
+        for name, value in means.items():
+            assert taken[begin][name] == pytest.approx(value, rel=1e-5, abs=1e-5), (begin, name)
+    assert machine.count("probing") == machine.told["probings"]
+    assert machine.count("event") == machine.told["events"]
+
+
+def test_everything_recorded_arrives_once(machine):
+    machine.send()
+    assert len(machine.means) > 4000
+    assert_all_there_once(machine)
+    # The same again: nothing is sent.
+    before = machine.progress()
+    machine.send()
+    assert machine.progress() == before == (len(machine.means), 0, 0)
+    # ... and where the store has forgotten how far it was, nothing is there twice.
+    machine.store.ask("UPDATE fleet.uplink SET segment = 0, event_run = 0, event_number = 0")
+    machine.send()
+    assert_all_there_once(machine)
+    assert machine.progress() == (2 * len(machine.means), 0, len(machine.means))
+
+
+def test_probings_have_what_the_model_said(machine):
+    machine.send()
+    assert machine.store.value("SELECT count(*) FROM fleet.probing WHERE modelled_um IS NULL") == "0"
+    assert machine.store.value("SELECT max(abs(modelled_um)) > 1 FROM fleet.probing") == "t"
+    assert machine.store.value("SELECT content ~ 'matrix_um_per_K' FROM fleet.setup "
+                               "JOIN fleet.document ON checksum = model") == "t"
+
+
+def test_another_start_of_the_daemon_goes_on(machine):
+    machine.send()
+    more = machine.record(hours_ago=5, hours=2)
+    machine.means = machine.recorded()
+    machine.told = {name: machine.told[name] + more[name] for name in more}
+    machine.send()
+    assert_all_there_once(machine)
+    assert machine.progress() == (len(machine.means), 0, 0)
+
+
+def test_a_history_that_was_begun_anew_is_sent_from_its_beginning(machine):
+    machine.send()
+    for file in machine.folder.glob("history.db*"):
+        file.unlink()
+    more = machine.record(hours_ago=5, hours=1)
+    assert "from its beginning" in machine.send()
+    machine.means.update(machine.recorded())
+    machine.told = {name: machine.told[name] + more[name] for name in more}
+    assert_all_there_once(machine)
+
+
+def test_a_server_that_is_killed_loses_nothing(machine):
+    server = machine.store.server
+    machine.start()
+    for share in (0.1, 0.4, 0.7):
+        eventually(lambda: machine.count("sample") > share * len(machine.means), "rows arrive")
+        server.stop("immediate")
+        server.start()
+    eventually(lambda: machine.count("sample") == len(machine.means), "all rows")
+    eventually(lambda: machine.count("event") == machine.told["events"], "all events")
+    machine.end()
+    assert "sending again" in machine.log.read_text()
+    assert_all_there_once(machine)
+
+
+class Cable:
+    """Passes bytes on until it is pulled."""
+
+    def __init__(self, port):
+        self.to = port
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        self.links, self.plugged, self.passed = [], True, 0
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        while True:
+            try:
+                near, _ = self.listener.accept()
+            except OSError:
+                return
+            if not self.plugged:
+                near.close()
+                continue
+            far = socket.create_connection(("127.0.0.1", self.to))
+            self.links += [near, far]
+            threading.Thread(target=self.carry, args=(near, far), daemon=True).start()
+            threading.Thread(target=self.carry, args=(far, near), daemon=True).start()
+
+    def carry(self, source, target):
+        try:
+            while data := source.recv(4096):
+                target.sendall(data)
+                self.passed += len(data)
+        except OSError:
+            pass
+        for link in (source, target):
+            try:
+                link.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+
+    def pull(self):
+        self.plugged = False
+        for link in self.links:
+            try:
+                link.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+
+    def plug(self):
+        self.plugged = True
+
+
+def test_a_cable_that_is_pulled_loses_nothing(machine):
+    cable = Cable(machine.store.server.port)
+    machine.configure(machine.store.remote("machine_mill_1", port=cable.port))
+    machine.start()
+    for share in (0.2, 0.6):
+        eventually(lambda: machine.count("sample") > share * len(machine.means), "rows arrive")
+        cable.pull()
+        eventually(lambda: machine.log.read_text().count("not sent") > 0, "it is noticed")
+        cable.plug()
+    eventually(lambda: machine.count("sample") == len(machine.means), "all rows")
+    eventually(lambda: machine.count("event") == machine.told["events"], "all events")
+    machine.end()
+    cable.listener.close()
+    assert_all_there_once(machine)
+
+
+def test_a_clock_that_is_wrong_costs_its_own_rows_and_is_told(store):
+    machine = Machine(store, "mill_1")
+    machine.told = machine.record(hours_ago=20, hours=3, clock=(3600, 400 * 86400))
+    machine.means = machine.recorded()
+    now = eventually(lambda: int(store.value("SELECT extract(epoch FROM now())::bigint")), "a time")
+    ahead = {begin for begin in machine.means if begin > now}
+    assert 50 <= len(ahead) <= 62  # of 10 min, from one commit to another
+    assert "rows refused" in machine.send()
+    taken = machine.taken()
+    assert taken.keys() == machine.means.keys() - ahead
+    assert machine.progress() == (len(machine.means), len(ahead), 0)
+    # The machine's rows are complete but for those 10 minutes, which nobody can place.
+    assert 3 * 360 - 63 <= len(taken) <= 3 * 360 - 50
+    assert "mill_1" in store.fleet("status") and f"{len(ahead)} refused" in store.fleet("status")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="a small file system needs root")
+def test_a_disk_that_is_full_loses_nothing(tmp_path, day):
+    from fleet_lab import Store
+    place = pathlib.Path(tempfile.mkdtemp(prefix="disk"))
+    place.chmod(0o755)
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200m,mode=0755", "tmpfs", place]).returncode:
+        pytest.skip("a tmpfs cannot be mounted here")
+    server = machine = None
+    try:
+        server = Postgres(place)
+        server.configure(max_wal_size="'32MB'", min_wal_size="'32MB'")
+        server.require_tls()
+        server.start()
+        store = Store(server, tmp_path, "full_disk")
+        machine = Machine(store, "mill_1", history=day.history)
+        machine.told, machine.means = day.told, day.means
+        ballast = place / "ballast"
+        left = shutil.disk_usage(place).free
+        with ballast.open("wb") as file:
+            os.posix_fallocate(file.fileno(), 0, left - 600_000)
+        machine.start()
+        eventually(lambda: "not sent" in machine.log.read_text(), "the disk is full")
+        ballast.unlink()
+        server.stop("immediate")  # it may have ended by itself
+        server.start()
+        eventually(lambda: machine.count("sample") == len(machine.means), "all rows")
+        eventually(lambda: machine.count("event") == machine.told["events"], "all events")
+        machine.end()
+        assert "No space left" in machine.log.read_text() + (server.folder / "log").read_text()
+        assert_all_there_once(machine)
+    finally:
+        if machine and machine.process:
+            machine.process.kill()
+            machine.process.wait()
+        if server:
+            server.end()
+        subprocess.run(["umount", place], check=True)
+        place.rmdir()
+
+
+def test_many_uplinks_at_once(store, day):
+    machines = [Machine(store, f"mill_{i}", history=day.history) for i in range(12)]
+    for machine in machines:
+        machine.start()
+    for machine in machines:
+        eventually(lambda: machine.count("sample") == len(day.means) and
+                   machine.count("event") == day.told["events"], "all rows of " + machine.name, patience_s=120)
+    for machine in machines:
+        machine.end()
+        machine.told, machine.means = day.told, day.means
+        assert machine.progress() == (len(day.means), 0, 0)
+    assert_all_there_once(machines[7])
+
+
+def test_in_the_clear_only_where_it_is_asked_for(machine):
+    server = machine.store.server
+    plain = f"host=localhost port={server.port} dbname={machine.store.name}"
+    machine.configure(plain)  # no authority: the certificate cannot be verified
+    assert "certificate" in machine.send(status=1)
+    machine.configure(f"{plain} sslmode=disable")
+    assert "no encryption" in machine.send(status=1)
+    machine.configure(f"{plain} sslrootcert={server.authority}")
+    machine.send()
+    assert_all_there_once(machine)
+
+
+def test_a_segment_that_is_damaged_costs_itself_and_is_told(machine):
+    base = sqlite3.connect(machine.history)
+    [segment] = base.execute("SELECT id FROM segment ORDER BY id LIMIT 1 OFFSET 1").fetchone()
+    base.execute("UPDATE chunk SET records = x'00' WHERE segment = ? AND number % 50 = 7", [segment])
+    base.commit()
+    base.close()
+    machine.send()
+    assert 0.7 * len(machine.means) < machine.count("sample") < len(machine.means) + 1
+    assert int(machine.store.value("SELECT damaged FROM fleet.uplink")) > 0
+
+
+def test_a_configuration_is_refused_with_every_problem(machine):
+    (machine.folder / "uplink.toml").write_text(
+        'format = 1\nmachine = "x"\nstore = "nonsense"\ncpu_percent_max = 0\npassword_file = "none"\nperiod = 3\n')
+    said = machine.send(status=2)
+    for what in ('store', 'cpu_percent_max', 'password_file', 'period'):
+        assert what in said, said
