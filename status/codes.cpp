@@ -22,7 +22,7 @@ constexpr std::array<Entry<Mode>, 5> mode_table{{
     {Mode::starting, fault, "starting: waiting for the first good values", ""},
     {Mode::disabled, intended, "switched off: offsets at or on the way to zero", ""},
     {Mode::compensating, normal, "compensating", ""},
-    {Mode::holding, fault, "data lost: holding the last offsets", ""},
+    {Mode::holding, fault, "data lost: the offsets stand still, the machine may go on moving", ""},
     {Mode::ramping_to_zero, fault, "data lost: offsets on the way to zero", ""},
 }};
 constexpr CodeText dry_run_text{"dry_run", "dry run: nothing is written to the controller", "",
@@ -40,8 +40,8 @@ constexpr std::array<Entry<Reason>, reasons_count> reason_table{{
     {Reason::no_reference, fault, "there is no reference state yet",
      "wait until every sensor has had a value, or take the reference", "thermocomp reference"},
     {Reason::controller_offline, fault, "the controller cannot be read",
-     "silent: power, cable, address; refused: table and address; the offset it applied last may "
-     "stay in effect",
+     "where it is silent, check power, cable and address; where it refuses, table and address; the "
+     "offset it applied last may stay in effect",
      "thermocomp scan"},
     {Reason::not_synced, fault, "what the controller applies is not known yet",
      "wait a moment; if it stays, check the read-back (`applied`) of every axis"},
@@ -96,7 +96,7 @@ constexpr std::array<Entry<Fault>, faults_count> fault_table{{
     {Fault::device_busy, fault, "the device was busy", "poll it less often"},
     {Fault::device_error, fault, "the device reports an error",
      "see its status register and manual"},
-    {Fault::unconfirmed, fault, "too new, or contradicts its past, and nothing confirms it yet",
+    {Fault::unconfirmed, fault, "contradicts its past, and nothing confirms it yet",
      "compare it with a hand-held thermometer; where it is right, accept it",
      "thermocomp accept SENSOR"},
 }};

@@ -438,6 +438,7 @@ struct ModelStatus {
   std::string checksum{};
   std::uint64_t inputs{0};
   std::uint64_t outputs{0};
+  bool moves{true};               ///< some coefficient is not zero: `init` writes zeros
   bool compared{true};            ///< with measured displacement, by what its file says
   std::optional<bool> outside{};  ///< of what it was made from
   double outside_share_24h{not_a_number};
@@ -450,6 +451,7 @@ struct ModelStatus {
     visit("checksum", self.checksum);
     visit("inputs", self.inputs);
     visit("outputs", self.outputs);
+    visit("moves", self.moves);
     visit("compared", self.compared);
     visit("outside", self.outside);
     visit("outside_share_24h", self.outside_share_24h);

@@ -6,7 +6,6 @@
 #include <set>
 #include <utility>
 
-#include "status/codes.hpp"
 #include "status/figures.hpp"
 
 namespace thermocomp {
@@ -16,6 +15,8 @@ namespace {
 /// The operator's switch outlives the dry run: left on, the first offsets go out unwatched.
 constexpr std::string_view dry_run_remedy =
     "switched on, the offsets are shown; switch it off before the dry run ends";
+constexpr std::string_view moves_nothing =
+    "the model gives no displacement: all its coefficients are 0";
 constexpr std::string_view can_remedy = "check cable, termination, bit rate";
 
 bool is_network(std::string_view kind) {
@@ -48,14 +49,16 @@ class Causes {
             status_.controller.state_s, {SubjectKind::controller, status_.controller.name});
     for (const Severity severity : {Severity::warning, Severity::intended, Severity::normal})
       add_reasons(severity);
+    if (status_.mode == Mode::compensating && !status_.model.moves)
+      add(std::string(moves_nothing), "fit one to measured runs", "thermocomp fit");
     for (const std::string& warning : status_.warnings) add(warning);
     return std::move(list_);
   }
 
  private:
   void add(const std::string& what, std::string_view remedy = "", std::string_view command = "",
-           const Subject& subject = {}) {
-    list_.push_back({what, std::string(remedy), std::string(command), subject});
+           const Subject& subject = {}, const std::string& detail = "") {
+    list_.push_back({what, std::string(remedy), std::string(command), subject, detail});
   }
 
   /// Whether entries of sensors, modules or axes say more than the reason does.
@@ -66,7 +69,7 @@ class Causes {
     switch (reason) {
       case Reason::block_lost:
       case Reason::block_estimated:
-        return !named_inputs_.empty();
+        return !named_inputs_.empty() || only_settles();
       case Reason::signal_lost:  // signals come from the controller
         return has_reason(status_.reasons, Reason::controller_offline);
       case Reason::sensor_suspected:
@@ -84,6 +87,11 @@ class Causes {
     }
   }
 
+  /// At a start no value has lasted long enough to count.
+  [[nodiscard]] bool only_settles() const {
+    return status_.mode == Mode::starting && status_.sensors_bad.empty();
+  }
+
   void add_reasons(Severity severity) {
     for (const Reason reason : members_of(status_.reasons)) {
       const CodeText text = code_text(reason);
@@ -91,9 +99,9 @@ class Causes {
       const std::string& error = status_.controller.last_error;
       const bool is_of_link = reason == Reason::not_written || reason == Reason::controller_offline;
       const bool switched_off = reason == Reason::operator_disabled && status_.dry_run;
-      add(std::string(text.meaning) + (is_of_link && !error.empty() ? ": " + error : ""),
-          switched_off ? dry_run_remedy : text.remedy, text.command,
-          is_of_link ? Subject(SubjectKind::controller, status_.controller.name) : Subject());
+      add(std::string(text.meaning), switched_off ? dry_run_remedy : text.remedy, text.command,
+          is_of_link ? Subject(SubjectKind::controller, status_.controller.name) : Subject(),
+          is_of_link ? error : "");
     }
   }
 
@@ -265,7 +273,7 @@ void add_degradations(const Status& status, std::vector<std::string>& why) {
 
 bool is_compensating(const Status& status) {
   return status.mode == Mode::compensating && !status.dry_run && axes_not_driven(status).empty() &&
-         !has_reason(status.reasons, Reason::controller_offline);
+         !has_reason(status.reasons, Reason::controller_offline) && status.model.moves;
 }
 
 Verdict verdict(const Status& status) {
@@ -283,7 +291,9 @@ Verdict verdict(const Status& status) {
   if (status.mode == Mode::compensating) {
     const auto idle = axes_not_driven(status);
     return {false, false, "no",
-            idle.empty() ? "the controller takes no offsets" : "axes not driven: " + joined(idle)};
+            !idle.empty()         ? "axes not driven: " + joined(idle)
+            : !status.model.moves ? std::string(moves_nothing)
+                                  : "the controller takes no offsets"};
   }
   return {false, status.mode == Mode::disabled, "no", words};
 }
@@ -302,6 +312,7 @@ std::vector<std::string> why_not(const Status& status, bool strict) {
       why.push_back("mode " + std::string(code_text(status.mode, status.dry_run).name));
     for (const std::string& axis : axes_not_driven(status))
       why.push_back("axis " + axis + " is not driven");
+    if (!status.model.moves) why.emplace_back(moves_nothing);
   }
   for (const Reason reason : members_of(status.reasons)) {
     const Severity severity = code_text(reason).severity;
@@ -335,6 +346,17 @@ std::vector<std::string> estimate_lines(const std::vector<InputStatus>& inputs,
                            : ""));
   lines.push_back("this makes the offsets uncertain by (1 sd): " + joined(offsets));
   return lines;
+}
+
+bool settles(const SensorStatus& sensor) {
+  return sensor.fault == Fault::unconfirmed && !sensor.jump;
+}
+
+CodeText fault_text(const SensorStatus& sensor) {
+  CodeText text = code_text(sensor.fault);
+  if (settles(sensor))
+    text = {text.name, "new: counts once it has lasted settle_s", "", Severity::normal};
+  return text;
 }
 
 std::string suspicion_text(const SensorError& suspected) {

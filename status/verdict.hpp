@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "status/codes.hpp"
 #include "status/status.hpp"
 
 namespace thermocomp {
@@ -16,7 +17,7 @@ struct Verdict {
   bool compensating{false};
   bool intended{false};  ///< not compensating as wanted: switched off, dry run
   std::string answer;    ///< "yes", "no", "no: DRY RUN"
-  std::string detail;    ///< "for 2 h 10 min", "data lost: holding the last offsets, for 3 s"
+  std::string detail;    ///< "for 2 h 10 min", "data lost: the offsets stand still ..., for 3 s"
 };
 [[nodiscard]] Verdict verdict(const Status& status);
 /// Answer and detail in one line: "yes, for 2 h 10 min", "no (data lost: ...)".
@@ -30,9 +31,10 @@ struct Verdict {
 
 struct Trouble {
   std::string what;
-  std::string remedy;   ///< empty: none that is known
-  std::string command;  ///< for a terminal; empty: none
-  Subject subject{};    ///< where a view shows more of it
+  std::string remedy;    ///< empty: none that is known
+  std::string command;   ///< for a terminal; empty: none
+  Subject subject{};     ///< where a view shows more of it
+  std::string detail{};  ///< what was observed, in the driver's words; may be empty
 };
 /// Everything that is wrong, one entry a cause, worst first: a module that is silent stands for its
 /// sensors, and these for the inputs of the model that they make.
@@ -43,6 +45,10 @@ struct Trouble {
 /// "block head is estimated from 5 others, +-0.40 K (1 sd)", one line a block, then the offsets.
 [[nodiscard]] std::vector<std::string> estimate_lines(const std::vector<InputStatus>& inputs,
                                                       const std::vector<AxisStatus>& axes);
+/// Of the sensor's fault: one that only settles has none to mend.
+[[nodiscard]] CodeText fault_text(const SensorStatus& sensor);
+/// Nothing contradicts its newest value, which has not lasted long enough to count.
+[[nodiscard]] bool settles(const SensorStatus& sensor);
 /// "off by +2.0 K against its neighbours since 2026-03-01 08:30:11.1, used all the same"
 [[nodiscard]] std::string suspicion_text(const SensorError& suspected);
 /// The newest write that failed: "refused (function 16, address 100, exception 1), last confirmed

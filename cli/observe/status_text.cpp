@@ -116,7 +116,8 @@ std::string trouble_lines(const Status& status, bool colours) {
   for (const Trouble& trouble : troubles(status))
     result += line(
         result.empty() ? "Problems" : "",
-        coloured(trouble.what, Colour::yellow, colours) +
+        coloured(trouble.what + (trouble.detail.empty() ? "" : ": " + trouble.detail),
+                 Colour::yellow, colours) +
             (trouble.remedy.empty() ? "" : " -> " + with_command(trouble.remedy, trouble.command)));
   return result.empty() ? line("Problems", "none") : result;
 }
@@ -257,9 +258,13 @@ std::string history_line(const HistoryStatus& history) {
 std::string sensor_state(const SensorStatus& sensor, bool colours) {
   // Only a value that is no number comes without one.
   const bool is_nan = sensor.fault == Fault::out_of_range && std::isnan(sensor.raw_degC);
-  const CodeText text = is_nan ? nan_text() : code_text(sensor.fault);
+  const CodeText text = is_nan ? nan_text() : fault_text(sensor);
   const bool good = sensor.fault == Fault::none;
-  std::string state = coloured(text.meaning, good ? Colour::green : Colour::red, colours);
+  std::string state = coloured(text.meaning,
+                               good              ? Colour::green
+                               : settles(sensor) ? Colour::yellow
+                                                 : Colour::red,
+                               colours);
   if (good && sensor.suspected)
     state = coloured("suspected: " + suspicion_text(*sensor.suspected), Colour::yellow, colours);
   if (sensor.jump)

@@ -57,12 +57,36 @@ std::string what_to_do(const CodeText& text) {
   return text.remedy.empty() ? "" : " Do: " + with_command(text.remedy, text.command) + ".";
 }
 
+bool any_told(const MachineWeek& week, SubjectKind subject) {
+  return std::any_of(week.outages.begin(), week.outages.end(), [subject](const Outages& outages) {
+    return outages.subject.kind == subject &&
+           is_told({outages.count, outages.lasted_s, outages.lasts});
+  });
+}
+
+/// Lines of sensors, axes and the controller say more.
+bool is_told_by_its_cause(const MachineWeek& week, Reason reason) {
+  switch (reason) {
+    case Reason::sensor_suspected:
+    case Reason::at_bound:
+      return true;
+    case Reason::block_lost:
+    case Reason::block_estimated:
+    case Reason::sensor_unconfirmed:
+      return any_told(week, SubjectKind::sensor);
+    case Reason::controller_offline:
+    case Reason::not_written:
+      return any_told(week, SubjectKind::controller);
+    default:
+      return false;
+  }
+}
+
 void add_reasons(const MachineWeek& week, std::vector<std::string>& lines) {
   for (const Outages& outages : week.outages) {
     const auto reason = reason_named(outages.last.code);
     if (outages.subject.kind != SubjectKind::reason || !reason) continue;
-    // Lines of sensors and axes say which.
-    if (reason == Reason::sensor_suspected || reason == Reason::at_bound) continue;
+    if (is_told_by_its_cause(week, *reason)) continue;
     const Outages::Kind all{outages.count, outages.lasted_s, outages.lasts};
     const CodeText text = code_text(*reason);
     if (is_told(all))

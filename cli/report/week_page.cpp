@@ -30,10 +30,6 @@ std::string local_text(double wall_s) {
   return text.data();
 }
 
-std::string hours(double seconds) {
-  return figure_text(seconds / 3600.0) + " h";
-}
-
 std::string mode_words(const std::string& name) {
   const auto mode = mode_named(name);
   return mode ? std::string(code_text(*mode, name == "dry_run").meaning) : name;
@@ -47,25 +43,25 @@ std::string summary(const MachineWeek& week) {
   const double on_s = week.mode_s("compensating");
   std::string text = "From " + local_text(week.span.from_s) + " to " + local_text(week.span.to_s) +
                      " (" + duration_text(week.span.length_s()) +
-                     ") the machine was compensated for " + hours(on_s);
+                     ") the machine was compensated for " + duration_text(on_s);
   if (week.recorded_s > 0.0)
     text += ", that is " + figure_text(100.0 * on_s / week.recorded_s) +
             " % of the time in which the daemon ran";
   text += ".";
   if (week.dry_run_s() > 0.0)
-    text += " Of the time in which it ran, " + hours(week.dry_run_s()) +
+    text += " Of the time in which it ran, " + duration_text(week.dry_run_s()) +
             " were a dry run: everything was computed and recorded, and nothing was sent to the "
             "machine.";
   return text;
 }
 
 std::string time_table(const MachineWeek& week) {
-  std::vector<std::vector<std::string>> rows{{"", "time", "share"}};
+  std::vector<std::vector<std::string>> rows{{"", "time", "share of the whole"}};
   const auto add = [&](const std::string& what, double seconds) {
     constexpr double told_s_min = 30.0;
     if (seconds < told_s_min) return;
     rows.push_back(
-        {what, hours(seconds), figure_text(100.0 * seconds / week.span.length_s()) + " %"});
+        {what, duration_text(seconds), figure_text(100.0 * seconds / week.span.length_s()) + " %"});
   };
   double told_s = 0.0;
   for (const char* mode :
@@ -112,7 +108,7 @@ std::string why_part(const MachineWeek& week) {
 std::string ranges_table(const MachineWeek& week, const std::string& what,
                          OffsetRange AxisWeek::*range) {
   std::vector<std::vector<std::string>> rows{
-      {what, "least", "most", "mean size", "bound", "at the bound"}};
+      {what, "from", "to", "mean size", "bound", "at the bound"}};
   for (const AxisWeek& axis : week.axes) {
     const OffsetRange& of = axis.*range;
     if (of.is_there())
@@ -263,6 +259,7 @@ void add_offsets(const MachineWeek& week, const std::string& title, PointPlace p
     const char* colour = colours[next++ % colours.size()];
     std::vector<double> values = only(column.values, places, place);
     if (!has_values(values)) continue;
+    for (double& value : values) value = -value;  // of the offset: what it takes out
     all.kept.push_back(std::move(values));
     panel.lines.push_back(
         {column.name.substr(0, column.name.size() - offset.size()), colour, all.kept.back()});
@@ -285,8 +282,8 @@ void add_temperatures(const MachineWeek& week, WeekPanels& all) {
 
 std::string picture(const MachineWeek& week) {
   WeekPanels all;
-  add_offsets(week, "offsets as sent", PointPlace::sent, all);
-  add_offsets(week, "offsets of the dry run, not sent", PointPlace::dry_run, all);
+  add_offsets(week, "displacement taken out", PointPlace::sent, all);
+  add_offsets(week, "computed in the dry run, not taken out", PointPlace::dry_run, all);
   add_temperatures(week, all);
   if (all.panels.empty()) return "";
   std::vector<double> since_s = week.course.time_s;
@@ -311,10 +308,14 @@ std::string picture(const MachineWeek& week) {
 
 std::string week_html(const MachineWeek& week) {
   std::string html = html_begin("Thermal compensation: report");
-  html += html_paragraph(summary(week));
   const std::vector<std::string> lines = advice(week);
-  html += html_heading("What to do");
-  html += lines.empty() ? html_paragraph("Nothing.") : html_list(lines);
+  html += lines.empty()
+              ? html_paragraph("Good: nothing needs to be done.", "good")
+              : html_paragraph("To be looked at: " + std::to_string(lines.size()) +
+                                   (lines.size() == 1 ? " point, below." : " points, below."),
+                               "bad");
+  html += html_paragraph(summary(week));
+  if (!lines.empty()) html += html_heading("What to do") + html_list(lines);
   html += html_heading("Time") + time_table(week) + why_part(week) + spells_part(week);
   html += html_heading("Displacement") + axes_part(week) + picture(week);
   html += probings_part(week) + sensors_part(week) + outages_part(week);

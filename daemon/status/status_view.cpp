@@ -151,7 +151,8 @@ std::vector<std::string> blocks_of(const StatusView& view, std::size_t sensor) {
 
 SensorStatus sensor_of(const StatusView& view, std::size_t index) {
   const SensorReport& sensor = view.report.sensors[index];
-  const bool ever = sensor.taken_at != nanoseconds{};
+  // Of one that jumped before a restart nothing was taken in this run.
+  const bool ever = sensor.taken_at > nanoseconds{};
   return {.name = view.config.estimator.sensors[index].name,
           .blocks = blocks_of(view, index),
           .raw_degC = sensor.raw_degC,
@@ -303,12 +304,20 @@ std::map<std::string, double> by_axis(const StatusView& view, double AxisReport:
   return figures;
 }
 
+bool moves(const ThermalModel& model) {
+  if (!model.terms.empty() || !model.guideways.empty()) return true;
+  for (const std::vector<double>& row : model.matrix_um_per_K)
+    if (std::any_of(row.begin(), row.end(), [](double gain) { return gain != 0.0; })) return true;
+  return false;
+}
+
 ModelStatus model_of(const StatusView& view) {
   const DomainReport& domain = view.report.domain;
   ModelStatus status{.file = view.config.model_file.string(),
                      .checksum = view.config.model_checksum,
                      .inputs = view.config.model.inputs.size(),
                      .outputs = view.config.model.outputs.size(),
+                     .moves = moves(view.config.model),
                      .compared = is_compared(view.config.model),
                      .claimed_sd_um = by_axis(view, &AxisReport::claimed_sd_um),
                      .probed_rms_um = by_axis(view, &AxisReport::probed_rms_um)};
@@ -405,7 +414,9 @@ Status status_of(const StatusView& view) {
       .warnings = view.warnings};
   for (std::size_t i = 0; i < view.report.sensors.size(); ++i) {
     const std::string& name = view.config.estimator.sensors[i].name;
-    if (view.report.sensors[i].fault != Fault::none) status.sensors_bad.push_back(name);
+    const SensorReport& sensor = view.report.sensors[i];
+    const bool settles = sensor.fault == Fault::unconfirmed && !sensor.jumped;
+    if (sensor.fault != Fault::none && !settles) status.sensors_bad.push_back(name);
     if (const auto jump = jump_of(view, view.report.sensors[i]))
       status.sensors_jumped.push_back({name, *jump});
     if (const auto suspicion = suspicion_of(view, view.report.sensors[i]))

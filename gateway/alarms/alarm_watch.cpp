@@ -12,6 +12,8 @@ namespace {
 void add_compensation(const Status& status, std::vector<AlarmCondition>& wrong) {
   const Verdict now = verdict(status);
   if (now.compensating) return;
+  // At a start values must last before they count.
+  if (status.mode == Mode::starting && status.sensors_bad.empty()) return;
   // A dry run that computes is wanted, for days.
   if (status.dry_run && status.mode == Mode::compensating) return;
   AlarmCondition condition{"compensation", "compensating: " + verdict_text(now), ""};
@@ -46,8 +48,8 @@ std::set<std::string> add_buses(const Status& status, std::vector<AlarmCondition
 void add_sensors(const SensorsAnswer& answer, const std::set<std::string>& away,
                  std::vector<AlarmCondition>& wrong) {
   for (const SensorStatus& sensor : answer.sensors) {
-    const CodeText fault = code_text(sensor.fault);
-    if (sensor.fault != Fault::none && away.count(sensor.name) == 0)
+    const CodeText fault = fault_text(sensor);
+    if (sensor.fault != Fault::none && !settles(sensor) && away.count(sensor.name) == 0)
       wrong.push_back({"sensor/" + sensor.name,
                        "sensor " + sensor.name + ": " + std::string(fault.meaning),
                        std::string(fault.remedy)});

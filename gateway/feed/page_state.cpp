@@ -98,9 +98,10 @@ void keep_what_is_shown(json& state) {
                 "disagrees", "mismatch", "at_bound", "proving"});
   for (json& sensor : state["sensors"]) {
     keep(sensor, {"name", "blocks", "raw_degC", "smoothed_degC", "fault", "fault_text",
-                  "fault_remedy", "suspected", "trend_K_per_h", "age_s"});
-    if (sensor["smoothed_degC"].is_number()) sensor["raw_degC"] = nullptr;
-    if (sensor["fault"] == to_string(Fault::none)) sensor["age_s"] = nullptr;
+                  "fault_remedy", "suspected", "trend_K_per_h", "age_s", "jump", "settles"});
+    const bool is_good = sensor["fault"] == to_string(Fault::none);
+    if (is_good && sensor["smoothed_degC"].is_number()) sensor["raw_degC"] = nullptr;
+    if (is_good) sensor["age_s"] = nullptr;
     round_numbers(sensor["age_s"], 1.0);
     round_numbers(sensor["trend_K_per_h"], 10.0);
   }
@@ -155,6 +156,7 @@ json problems_json(const Snapshot& snapshot) {
   }
   for (const Trouble& trouble : troubles(snapshot.status, &snapshot.sensors)) {
     json entry = {{"what", trouble.what}, {"remedy", trouble.remedy}};
+    if (!trouble.detail.empty()) entry["detail"] = trouble.detail;
     if (trouble.subject.kind != SubjectKind::nothing)
       entry["about"] = std::string(to_string(trouble.subject.kind)) + "-" + trouble.subject.name;
     list.push_back(std::move(entry));
@@ -164,7 +166,8 @@ json problems_json(const Snapshot& snapshot) {
 
 json sensor_json(const SensorStatus& sensor, const Snapshot& snapshot) {
   json state = json_of(sensor);
-  const CodeText fault = code_text(sensor.fault);
+  const CodeText fault = fault_text(sensor);
+  state["settles"] = settles(sensor);
   state["fault_text"] = fault.meaning;
   state["fault_remedy"] = fault.remedy;
   const auto trend = snapshot.trends.find(sensor.name);

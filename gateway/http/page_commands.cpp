@@ -46,7 +46,7 @@ std::string word(const json& object, const char* key) {
 
 CommandRequest request_from(const json& object) {
   const json value = object.value("value_um", json(nullptr));
-  return {word(object, "method"), word(object, "axis"),
+  return {word(object, "method"), word(object, "axis"), word(object, "sensor"),
           value.is_number() ? value.get<double>() : not_a_number};
 }
 
@@ -82,6 +82,10 @@ std::string confirmation_text(const CommandRequest& asked, const Status& status)
     return "Take the machine as it is now for straight. Displacement is counted from here on; "
            "right "
            "only with the machine cold and even and the offsets at zero.";
+  if (method == "accept")
+    return "Take the reading of sensor " + asked.sensor +
+           " for right, though it jumped. The axes will follow it, no faster than their slew "
+           "rates. Compare it with a hand-held thermometer first.";
   if (!std::isfinite(asked.value_um)) throw std::invalid_argument("value_um must be a number");
   return "Axis " + asked.axis + " will move by " + fixed_signed(asked.value_um, 1) + " " +
          axis_named(status, asked.axis).unit +
@@ -128,6 +132,7 @@ JsonAnswer PageCommands::confirm(const std::string& user, const CommandRequest& 
   if (!snapshot.is_here) return error(503, "the daemon does not answer");
   const std::string text = confirmation_text(asked, snapshot.status);
   json params = json::object();
+  if (method == "accept") params = {{"sensor", asked.sensor}};
   if (method == "prove") params = {{"axis", asked.axis}, {"value_um", asked.value_um}};
   const auto now = std::chrono::steady_clock::now();
   const std::string token = random_token();

@@ -18,7 +18,8 @@ namespace thermocomp::gateway {
 /// What a page asks for.
 struct CommandRequest {
   std::string method{};
-  std::string axis{};
+  std::string axis{};    ///< of prove
+  std::string sensor{};  ///< of accept
   double value_um{not_a_number};
 };
 

@@ -86,10 +86,15 @@ function drawUnder(canvas, area, graph) {
 function drawError(canvas, graph) {
   const sd = claimedSd(graph.axisName);
   const index = columns.indexOf(graph.axisName + '_offset_um');
-  const known = table.filter(row => isNumber(row[index]));
-  if (sd > 0 && known.length > 1) {
-    const point = (row, side) => [graph.toDomXCoord(row[0].getTime()), graph.toDomYCoord(row[index] + side * 2 * sd)];
-    canvas.fillStyle = css('--band');
+  // While nothing follows the machine, nothing is claimed.
+  const idle = row => modes.some(each => row[0] >= each.from_s * 1000 && row[0] <= each.to_s * 1000);
+  const stretches = [[]];
+  for (const row of table)
+    if (idle(row)) stretches.push([]);
+    else if (isNumber(row[index])) stretches[stretches.length - 1].push(row);
+  const point = (row, side) => [graph.toDomXCoord(row[0].getTime()), graph.toDomYCoord(row[index] + side * 2 * sd)];
+  canvas.fillStyle = css('--band');
+  for (const known of stretches.filter(each => sd > 0 && each.length > 1)) {
     canvas.beginPath();
     known.forEach((row, i) => canvas[i ? 'lineTo' : 'moveTo'](...point(row, 1)));
     known.slice().reverse().forEach(row => canvas.lineTo(...point(row, -1)));

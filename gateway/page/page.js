@@ -101,7 +101,7 @@ function show(now) {
           fixed(now.cycle.rate_hz, 0) + ' Hz, ' + (now.cycle.missed || 0) + ' cycles missed' +
           (now.history.enabled ? ', history ' + fixed(now.history.size_MB, 1) + ' MB' : ', no history'));
   if (now.here) addLiveRow(now);
-  followProbings(now.events);
+  followEvents(now.events);
 }
 
 function showVerdict(verdict) {
@@ -128,6 +128,7 @@ function showProblems(now) {
     const what = make(problem.about ? 'a' : 'div', withUnits(problem.what), 'what');
     if (problem.about) what.href = '#' + encodeURIComponent(problem.about);
     item.append(what);
+    if (problem.detail) item.append(make('div', withUnits(problem.detail), 'small'));
     if (problem.remedy) item.append(make('div', withUnits(problem.remedy), 'remedy'));
     return item;
   }));
@@ -197,16 +198,17 @@ function showAxes(axes) {
   }
 }
 
-// A new probing is in the history once that is committed.
-let newestProbing = null;
-function followProbings(events) {
-  const found = events.find(event => event.kind === 'command' && event.text.startsWith('measured'));
+// A probing, or a time without compensation, is in the history once that is committed.
+let newestDrawn = null;
+function followEvents(events) {
+  const found = events.find(event => event.kind === 'mode' || event.kind === 'command' && event.text.startsWith('measured'));
   const number = found ? found.number : 0;
-  if (newestProbing !== null && number !== newestProbing) setTimeout(loadHistory, historyCommit_ms);
-  newestProbing = number;
+  if (newestDrawn !== null && number !== newestDrawn) setTimeout(loadHistory, historyCommit_ms);
+  newestDrawn = number;
 }
 
-const temperatureOf = sensor => isNumber(sensor.smoothed_degC) ? sensor.smoothed_degC : sensor.raw_degC;
+// Of a sensor with a fault what it shows now, to be compared with a thermometer.
+const temperatureOf = sensor => isNumber(sensor.raw_degC) ? sensor.raw_degC : sensor.smoothed_degC;
 
 function showHottest(sensors) {
   const list = place('hottest');
@@ -249,16 +251,17 @@ function showSensors(sensors) {
     const sensor = sensors[i];
     const bad = sensor.fault !== 'none';
     const rate = sensor.trend_K_per_h;
-    let words = bad ? sensor.fault_text + (sensor.fault_remedy ? ' \u2192 ' + sensor.fault_remedy : '')
+    let words = bad ? (sensor.jump ? 'jumped by ' + signed(sensor.jump.size_K, 1) + ' K' : sensor.fault_text) +
+                      (sensor.fault_remedy ? ' \u2192 ' + sensor.fault_remedy : '')
                     : 'block ' + (sensor.blocks || []).join(', ');
     if (!bad && sensor.suspected)
       words = 'suspected: off by ' + signed(sensor.suspected.size_K, 1) + ' K against its neighbours';
     row.id = 'sensor-' + sensor.name;
     row.title = 'show its history';
-    fillRow(row, 'row' + (bad ? ' wrong' : sensor.suspected ? ' suspect' : ''), [
+    fillRow(row, 'row' + (bad && !sensor.settles ? ' wrong' : sensor.suspected ? ' suspect' : ''), [
       sensor.name, fixed(temperatureOf(sensor), 2) +
         ' \u00b0C ' + arrow(rate), words,
-      bad ? 'age ' + duration(sensor.age_s) : isNumber(rate) ? signed(rate, 1) + ' K/h' : '']);
+      sensor.settles ? '' : bad ? 'age ' + duration(sensor.age_s) : isNumber(rate) ? signed(rate, 1) + ' K/h' : '']);
   });
 }
 
@@ -266,8 +269,8 @@ function showBuses(now) {
   const list = now.buses.map(bus => {
     const silent = bus.units.filter(unit => !unit.answering).map(unit => unit.name);
     return {id: 'bus-' + bus.name, name: bus.name + ' (' + bus.kind + ')', wrong: !bus.connected || silent.length > 0,
-            value: bus.connected ? 'connected' : 'away',
-            words: silent.length ? 'silent: ' + silent.join(', ') : bus.connected ? bus.units.length + ' units answer' : bus.last_error};
+            value: !bus.connected ? 'away' : silent.length ? 'silent' : 'connected',
+            words: bus.connected && silent.length ? silent.join(', ') : bus.connected ? bus.units.length + ' units answer' : bus.last_error};
   });
   const controller = now.controller;
   const signals = Object.entries(controller.signals || {})
@@ -374,8 +377,15 @@ function proveRequest() {
   return isNumber(value_um) ? {method: 'prove', axis: axis, value_um: value_um} : null;
 }
 
+function acceptRequest() {
+  const jumped = (state ? state.sensors : []).filter(each => each.jump).map(each => each.name);
+  const sensor = prompt('Accept the reading of which sensor?', jumped[0] || '');
+  return sensor ? {method: 'accept', sensor: sensor} : null;
+}
+
 const commandNames = {enable: 'Switch on', disable: 'Switch off', reference: 'Take the reference',
-                      prove: 'Prove an axis'};
+                      prove: 'Prove an axis', accept: 'Accept a reading'};
+const requests = {prove: proveRequest, accept: acceptRequest};
 
 async function offerCommands() {
   try {
@@ -385,7 +395,7 @@ async function offerCommands() {
     place('command-buttons').replaceChildren(...told.commands.map(method => {
       const button = make('button', commandNames[method]);
       button.addEventListener('click', () => {
-        const request = method === 'prove' ? proveRequest() : {method: method};
+        const request = requests[method] ? requests[method]() : {method: method};
         if (request) command(request);
       });
       return button;

@@ -100,10 +100,11 @@ class SettingsReader {
     if (!table) return commands;
     commands.users = table.texts("users");
     commands.methods = table.texts("methods", {"enable", "disable"});
-    const std::vector<std::string> known{"enable", "disable", "reference", "prove"};
+    const std::vector<std::string> known{"enable", "disable", "reference", "prove", "accept"};
     for (const std::string& method : commands.methods)
       if (std::find(known.begin(), known.end(), method) == known.end())
-        table.problem("methods", method, "must be one of enable, disable, reference, prove");
+        table.problem("methods", method,
+                      "must be one of enable, disable, reference, prove, accept");
     if (!http.has_tls() || http.passwords.empty())
       table.problem("users", "commands need TLS and a password file in [http]");
     return commands;

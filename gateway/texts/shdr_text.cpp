@@ -63,8 +63,9 @@ std::vector<std::string> system_condition(const Status& status) {
 }
 
 std::string sensor_condition(const SensorStatus& sensor) {
-  const CodeText fault = code_text(sensor.fault);
-  if (sensor.fault != Fault::none) return condition("FAULT", fault.name, fault.meaning);
+  const CodeText fault = fault_text(sensor);
+  if (sensor.fault != Fault::none)
+    return condition(settles(sensor) ? "WARNING" : "FAULT", fault.name, fault.meaning);
   if (sensor.suspected) return condition("WARNING", "suspected", "off against its neighbours");
   return normal;
 }

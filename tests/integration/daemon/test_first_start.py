@@ -192,6 +192,11 @@ def test_a_sensor_that_jumps_counts_only_once_an_operator_accepts_it(day):
     assert daemon.cli("accept", "spindle")[0] != 0
     assert daemon.axis()["offset"] == before_um
 
+    daemon.end()
+    daemon.start()
+    eventually(lambda: "sensor_unconfirmed" in daemon.status()["reasons"], "the jump outlives a restart")
+    ages_s = {each["name"]: each["age_s"] for each in daemon.call("sensors")["sensors"]}
+    assert ages_s["column"] is None, ages_s  # it gave nothing that counts since the start
     assert daemon.cli("accept", "column")[0] == 0
     daemon.wait_for_mode("compensating")
     assert column(daemon)["temp_degC"] == pytest.approx(68.0, abs=0.02)

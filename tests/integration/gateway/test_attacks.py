@@ -171,7 +171,7 @@ def guarded(lab, machine):
     made = lab.also_end(Gateway(
         lab, machine.daemon,
         f'certificate = "{certificate}"\nkey = "{key}"\npasswords = "{passwords}"',
-        '[commands]\nusers = ["maria"]\nmethods = ["enable", "disable", "prove"]'))
+        '[commands]\nusers = ["maria"]\nmethods = ["enable", "disable", "prove", "accept"]'))
     made.context = trusting(certificate)
     return made.start()
 
@@ -353,7 +353,7 @@ def test_a_deep_answer_ends_neither_gateway_nor_command(lab, machine):
 
 def test_a_named_user_confirms_what_will_move(guarded, machine):
     offered = guarded.json("/api/commands", headers=MARIA)
-    assert offered["commands"] == ["enable", "disable", "prove"]
+    assert offered["commands"] == ["enable", "disable", "prove", "accept"]
     machine.warm_by(12.0)
     machine.daemon.wait_for_offset(12.0)
     eventually(lambda: abs(guarded.json("/api/status", headers=MARIA)["axes"][0]["offset"] - 12.0) <
@@ -373,6 +373,10 @@ def test_a_named_user_confirms_what_will_move(guarded, machine):
     status, refused = post(guarded, {"token": asked["token"]}, MARIA)
     assert status == 409 and "prove_um_max" in refused["error"]
     assert post(guarded, {"method": "prove", "axis": "q", "value_um": 1}, MARIA)[0] == 400
+    status, asked = post(guarded, {"method": "accept", "sensor": "spindle"}, MARIA)
+    assert status == 200 and "hand-held thermometer" in asked["text"], asked
+    status, refused = post(guarded, {"token": asked["token"]}, MARIA)
+    assert status == 409 and "has no value that waits to be confirmed" in refused["error"]
     status, asked = post(guarded, {"method": "enable"}, MARIA)
     assert post(guarded, {"token": asked["token"]}, MARIA) == (200, {"done": True})
     machine.daemon.wait_for_mode("compensating")

@@ -152,7 +152,7 @@ TEST_CASE("trouble is named in plain words", "[cli][status]") {
                    .last_error = "refused",
                    .units = {{.name = "bed_module"}}}};
   const std::string text = status_text(status, false);
-  CHECK_THAT(text, Contains("no (data lost: holding the last offsets"));
+  CHECK_THAT(text, Contains("no (data lost: the offsets stand still"));
   CHECK_THAT(text,
              Contains("no good sensor left -> mend the sensor or its bus: thermocomp sensors"));
   CHECK_THAT(text, Contains("bad sensors: table"));
@@ -285,6 +285,27 @@ TEST_CASE("an unconfirmed reading is shown with its jump and the command that ac
                             .jump = Jump{.size_K = 18.0, .since = 1'700'000'000.0}};
   CHECK_THAT(sensors_text({{sensor}, {}, {}}, false),
              Contains("(jumped by +18.0 K at 2023-") && Contains("thermocomp accept SENSOR"));
+}
+
+TEST_CASE("a value that only settles is no fault to mend", "[cli][status]") {
+  const SensorStatus sensor{.name = "head", .raw_degC = 20.0, .fault = Fault::unconfirmed};
+  CHECK_THAT(sensors_text({{sensor}, {}, {}}, false),
+             Contains("new: counts once it has lasted settle_s") && !Contains("thermometer"));
+  Status status = good_status();
+  status.mode = Mode::starting;
+  status.reasons = only(Reason::block_lost);
+  CHECK_THAT(status_text(status, false), !Contains("mend the sensor"));
+  status.sensors_bad = {"head"};
+  CHECK_THAT(status_text(status, false), Contains("mend the sensor"));
+}
+
+TEST_CASE("a model of zeros compensates nothing", "[cli][status]") {
+  Status status = good_status();
+  CHECK(why_not(status, false).empty());
+  status.model.moves = false;
+  CHECK_FALSE(why_not(status, false).empty());
+  CHECK_THAT(status_text(status, false), Contains("no (the model gives no displacement") &&
+                                             Contains("fit one to measured runs: thermocomp fit"));
 }
 
 TEST_CASE("a refused write is shown with function, address and exception", "[cli][status]") {

@@ -109,6 +109,16 @@ TEST_CASE("a bus or module that is away has one alarm, and its sensors have none
   CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"bus/cabinet"});
 }
 
+TEST_CASE("values that must last before they count are no alarm", "[gateway][alarm]") {
+  Snapshot snapshot = good_snapshot();
+  snapshot.status.mode = Mode::starting;
+  snapshot.sensors.sensors[0].fault = Fault::unconfirmed;
+  CHECK(wrong_now(snapshot).empty());
+  snapshot.sensors.sensors[0].jump = Jump{.size_K = 18.0};
+  snapshot.status.sensors_bad = {"a"};
+  CHECK(names(wrong_now(snapshot)) == std::vector<std::string>{"compensation", "sensor/a"});
+}
+
 TEST_CASE("an hour has room for so many commands", "[gateway][alarm]") {
   HookLimit limit(2);
   CHECK(limit.take(0.0));
